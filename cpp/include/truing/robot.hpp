@@ -1,0 +1,103 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+namespace truing {
+
+/// How a joint's link values are read.
+enum class Convention {
+  dh,    ///< Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta): Denavit-Hartenberg, distal
+  mdh,   ///< Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d): modified DH (Craig), proximal
+  urdf,  ///< T_parent_joint, then the motion about or along `axis`
+};
+
+enum class JointType { revolute, prismatic };
+
+/// One joint and the link that belongs to it. Lengths in m, angles in rad, masses in kg.
+///
+/// A driven joint moves by `ratio * reading + offset`. A passive joint has no reading: it moves by the weighted
+/// sum of the *corrected* motions of the joints in `driven_by` (a palletizer's q4 = -(q2 + q3)), so their ratios
+/// and offsets act through it too. The motion adds to `theta` (revolute) or `d` (prismatic).
+struct Joint {
+  std::string name;
+  JointType type = JointType::revolute;
+  double theta = 0.0;  ///< [rad]
+  double d = 0.0;      ///< [m]
+  double a = 0.0;      ///< [m]
+  double alpha = 0.0;  ///< [rad]
+  double beta = 0.0;   ///< [rad] Hayati's twist about y, for near-parallel neighbouring axes
+  Eigen::Isometry3d T_parent_joint = Eigen::Isometry3d::Identity();  ///< Convention::urdf only
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();                   ///< Convention::urdf only, unit vector
+  double ratio = 1.0;                                                ///< gear-ratio correction [-]
+  double offset = 0.0;                                               ///< joint zero [rad | m]
+  std::vector<std::pair<std::string, double>> driven_by;             ///< empty: the joint has a reading
+  double lower = -std::numeric_limits<double>::infinity();           ///< limit [rad | m]
+  double upper = std::numeric_limits<double>::infinity();            ///< limit [rad | m]
+  std::optional<double> mass;                                        ///< of the link that this joint moves [kg]
+  Eigen::Vector3d center_of_mass = Eigen::Vector3d::Zero();          ///< in the frame after the link [m]
+
+  bool passive() const { return !driven_by.empty(); }
+};
+
+/// A measured point (and orientation) on the last link.
+struct Target {
+  std::string name;
+  Eigen::Isometry3d T_last_target = Eigen::Isometry3d::Identity();  ///< target in the frame after the last link
+};
+
+/// An effect with its fitted parameters, as `identify` found them, e.g. {"backlash", {"J3"}, {{"backlash.J3", 2e-4}}}.
+struct AppliedEffect {
+  std::string effect;
+  std::vector<std::string> joints;
+  std::map<std::string, double> parameters;
+};
+
+/// The far end of a draw-wire or ballbar: a fixed point, and the length that the instrument leaves out.
+struct Anchor {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< in the measurement frame [m]
+  double zero = 0.0;                                ///< reading = distance + zero [m]
+};
+
+/// A robot model, nominal or calibrated: a plain value. `validate` says whether it can be used.
+struct Robot {
+  std::string name;
+  Convention convention = Convention::dh;
+  Eigen::Vector3d gravity{0.0, 0.0, -9.81};                         ///< in the base frame [m/s^2]
+  Eigen::Isometry3d T_measurement_base = Eigen::Isometry3d::Identity();  ///< base in the measurement frame
+  std::vector<Joint> joints;                                        ///< in chain order
+  std::vector<Target> targets;                                      ///< targets[0] is the tool
+  std::vector<AppliedEffect> effects;
+  std::optional<Anchor> anchor;
+
+  /// Number of joints that have a reading.
+  std::size_t driven_count() const;
+  /// Index in `joints` of each driven joint, in chain order.
+  std::vector<std::size_t> driven_joints() const;
+  /// Index of the joint of that name; throws std::invalid_argument that lists the joints there are.
+  std::size_t joint_index(const std::string& joint_name) const;
+};
+
+/// Throws std::invalid_argument, naming the joint and what is wrong, when the robot cannot be used: no joints, duplicate
+/// or empty names, unknown or circular `driven_by`, values that are not finite, axis not of unit length, lower > upper.
+void validate(const Robot& robot);
+
+/// Roll-pitch-yaw as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll). [rad]
+Eigen::Matrix3d rotation_from_rpy(const Eigen::Vector3d& rpy);
+/// The inverse of rotation_from_rpy; at pitch = +-pi/2 roll is set to 0. [rad]
+Eigen::Vector3d rpy_from_rotation(const Eigen::Matrix3d& rotation);
+Eigen::Isometry3d frame_from_xyz_rpy(const Eigen::Vector3d& xyz, const Eigen::Vector3d& rpy);
+
+/// T_measurement_link of the frame after every joint, then T_measurement_target of target `target`: size n_joints + 1.
+/// `reading`: driven joints in chain order [rad | m]. Effects are left out. The readable twin of the kernel: tests hold them together.
+std::vector<Eigen::Isometry3d> forward_kinematics(const Robot& robot, const Eigen::VectorXd& reading, std::size_t target = 0);
+
+}  // namespace truing

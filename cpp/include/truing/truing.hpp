@@ -1,0 +1,12 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+/// Everything that truing offers to C++.
+#pragma once
+
+#include "truing/effect.hpp"
+#include "truing/identify.hpp"
+#include "truing/measurement.hpp"
+#include "truing/plan.hpp"
+#include "truing/robot.hpp"
+#include "truing/urdf.hpp"
+#include "truing/version.hpp"

@@ -1,0 +1,23 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "truing/robot.hpp"
+
+namespace truing::detail {
+
+/// True when some link of the robot has a mass.
+bool knows_mass(const Robot& robot);
+
+/// gravity_torques without allocation: `coupling` from coupling_matrix(robot), `frames` from
+/// forward_kinematics(robot, q, 0), `torque` of size n_joints. Links without a mass weigh nothing; it does
+/// not throw.
+void gravity_torques_at(const Robot& robot, const Eigen::MatrixXd& coupling,
+                        const std::vector<Eigen::Isometry3d>& frames, double payload,
+                        Eigen::Ref<Eigen::VectorXd> torque);
+
+}  // namespace truing::detail

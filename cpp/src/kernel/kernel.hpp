@@ -1,0 +1,99 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The inner loop: poses side by side in SIMD lanes. See README.md in this folder.
+// Only plain structs and raw pointers cross into it, since each copy is compiled for another instruction set.
+
+#include <cstddef>
+
+namespace truing::kernel {
+
+/// Poses of one tile: its Jacobian (40 columns x 3 rows) just fits the first-level cache.
+constexpr int kTilePoses = 48;
+/// A tile's measured rows per pose, at most: position and rotation.
+constexpr int kMaxComponents = 6;
+
+/// One step of the chain sweep. R and p are the frame reached so far, in measurement coordinates.
+enum class Code : int {
+  rotate_x, rotate_y, rotate_z,           ///< R <- R Rot(value)
+  translate_x, translate_y, translate_z,  ///< p <- p + value * column of R
+  rotate_fixed,                           ///< R <- R F, F constant
+  save_x, save_y, save_z,                 ///< slot <- column of R: a site's axis
+  save_origin,                            ///< slot <- p: a rotation site's origin
+};
+
+struct Step {
+  Code code;
+  int dynamic;   ///< row of Tile::values that holds the value per pose; -1: the same for all poses
+  int constant;  ///< else index into Program::constants: value, or cos and sin, or F column by column
+  int slot;      ///< where a save goes
+};
+
+/// A site's geometric Jacobian column, times a weight: translation [axis; 0], rotation [axis x (tip - origin); axis].
+struct Part {
+  int axis;    ///< slot
+  int origin;  ///< slot; -1: a translation
+  double weight;
+};
+
+/// One Jacobian column: the sum of its parts times a basis value; or minus a unit vector (a fixed point's coordinate);
+/// or, for distances, the anchor's coordinates and the wire's zero.
+struct ColumnPlan {
+  int first_part;
+  int part_count;
+  int basis;       ///< row of Tile::bases; -1: one
+  int fixed_axis;  ///< 0..2: minus this unit vector; 3: the constant 1 (wire zero); -1: parts
+};
+
+enum class Kind : int { position, pose, distance };
+
+enum class RowLoss : int { none, huber, cauchy, tukey };
+
+struct Program {
+  Kind kind;
+  const Step* steps;
+  int step_count;
+  const double* constants;
+  const Part* parts;
+  const ColumnPlan* columns;
+  int column_count;
+  double anchor[4];      ///< distance: the fixed point [m] and the wire's zero [m]
+  double position_scale;  ///< multiplies position rows (1 / sigma)
+  double rotation_scale;
+  RowLoss loss;
+  double loss_scale;     ///< on the scaled norm of a row's residual
+};
+
+struct Tile {
+  const double* values;    ///< [dynamic][kTilePoses]
+  const double* bases;     ///< [basis][kTilePoses]
+  const double* measured;  ///< [component][kTilePoses]: x y z | x y z and R column by column | distance
+  const double* position_weight;  ///< [kTilePoses] multiplies position or distance rows (0: a padded pose); null: all one
+  const double* rotation_weight;  ///< [kTilePoses] the same for rotation rows; null exactly when position_weight is
+  double* slots;           ///< scratch [slot][3 * lanes]
+  double* jacobian;        ///< out [column][component][kTilePoses]
+  double* residual;        ///< out [component][kTilePoses], the column after the Jacobian's last; weighted like it
+  double* squared_norm;    ///< out [kTilePoses]: of the scaled residual, before loss and weight; null: not wanted
+  double* tip;             ///< out [12][kTilePoses]: p, then R column by column; null: not wanted
+  int poses;               ///< rounded up to whole lanes by the kernel
+};
+
+/// Accumulator of a Gram matrix; `size` doubles, opaque between gram_clear and gram_reduce.
+struct Functions {
+  const char* name;
+  int lanes;
+  void (*evaluate)(const Program&, const Tile&);
+  std::size_t (*gram_size)(int columns);
+  /// acc += C^T C of `columns` columns of `length` doubles (a multiple of 8), `stride` apart.
+  void (*gram_add)(const double* c, std::ptrdiff_t stride, int columns, int length, double* acc);
+  /// Sums the lanes: upper triangle of `out` (columns x columns, column-major) += acc; acc is cleared.
+  void (*gram_reduce)(double* acc, int columns, double* out);
+};
+
+/// The widest copy that this machine can run; TRUING_KERNEL=scalar|sse2|avx2|avx512 in the environment asks for a narrower one.
+const Functions& functions();
+/// The named copy, or null when this machine or build lacks it.
+const Functions* functions(const char* name);
+
+}  // namespace truing::kernel
