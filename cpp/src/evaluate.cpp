@@ -644,6 +644,19 @@ void Evaluator::residuals(const Eigen::VectorXd& values, const RowSink& sink) co
   });
 }
 
+void Evaluator::jacobian_tiles(const Eigen::VectorXd& values, const Weighing& weighing, const TileSink& sink) const {
+  const std::lock_guard<std::mutex> lock(impl_->busy);
+  Impl& impl = *impl_;
+  impl.for_slots(values, [&](int slot, Impl::Workspace* w) {
+    const auto [begin, end] = impl.tiles_of(slot);
+    for (std::size_t k = begin; k < end; ++k) {
+      impl.evaluate_tile(impl.tiles[k], values, weighing, true, true, w);
+      const int segment = impl.tiles[k].segment;
+      sink(w->jacobian.get(), static_cast<int>(impl.compiled[segment].columns.size()), components_of(impl.segments[segment].kind));
+    }
+  });
+}
+
 int Evaluator::tile_count() const { return static_cast<int>(impl_->tiles.size()); }
 int Evaluator::tile_rows(int tile) const { return impl_->tiles[tile].count; }
 int Evaluator::tile_components(int tile) const { return components_of(impl_->segments[impl_->tiles[tile].segment].kind); }

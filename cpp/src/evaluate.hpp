@@ -75,6 +75,10 @@ class Evaluator {
   /// Residuals, unscaled: 3 position and 3 rotation numbers, zero where not measured; a distance error stands first.
   void residuals(const Eigen::VectorXd& values, const RowSink& sink) const;
 
+  /// Every tile's Jacobian as the kernel leaves it: [column][component][kernel::kTilePoses], the residual as one more column.
+  using TileSink = std::function<void(const double* jacobian, int columns, int components)>;
+  void jacobian_tiles(const Eigen::VectorXd& values, const Weighing& weighing, const TileSink& sink) const;
+
   /// Residual (and, if not null, row-major Jacobian) of tile `tile`, weighted, for solvers that want rows. Returns components.
   int tile_count() const;
   int tile_rows(int tile) const;  ///< poses in it

@@ -45,7 +45,7 @@ struct IdentifyOptions {
   double rotation_length = 0.1;            ///< [m]: a rotation error of 1 rad counts as this length, where rows give no sigma
   double test_share = 0.2;                 ///< of the pose groups, held out when `set` is absent
   std::uint64_t seed = 0;                  ///< of the split
-  int max_iterations = 100;
+  int max_iterations = 5000;  ///< long valleys take thousands of short steps; well-seen robots stop after 3 to 5
   double initial_damping = 1e-9;           ///< mu, on columns of unit norm
   double rms_fall = 1e-12;                 ///< [m] stop when an accepted step lowers the rms by no more (the method's own: 1e-3 mm)
   double gradient = 1e-14;                 ///< stop when |g| of unit columns, relative to the residual's norm, is no more

@@ -11,6 +11,8 @@
 
 #include <Eigen/Geometry>
 
+#include "truing/version.hpp"
+
 namespace truing {
 
 /// How a joint's link values are read.

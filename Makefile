@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# What one types. The work is done by scripts/ and CMake. Every target sets up what it needs by itself.
+
+.PHONY: help setup demo test bench stubs docs-check clean distclean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make demo        set up, calibrate an example robot, write the report into demo/"
+	@echo "make setup       system packages (apt), .venv, truing built and installed into it"
+	@echo "make test        every check: C++, sanitizers, consumer, Python, stubs, types, examples, docs"
+	@echo "make bench       the benchmarks"
+	@echo "make stubs       write python/truing/_core.pyi from the built module"
+	@echo "make docs-check  check the links in *.md"
+	@echo "make clean       remove build/ and demo/ (distclean: .venv as well)"
+	@echo ""
+	@echo "JOBS=n sets the number of compilers at a time, PYTHON=... the interpreter of .venv."
+
+setup:
+	@scripts/setup.sh
+
+demo:
+	@scripts/setup.sh
+	@.venv/bin/truing demo --out demo
+
+test:
+	@scripts/setup.sh --test
+	@scripts/test.sh
+
+bench:
+	@scripts/setup.sh --test
+	@scripts/bench.sh
+
+stubs:
+	@scripts/setup.sh --test
+	@scripts/stubs.sh
+
+docs-check:
+	@python3 tests/check_links.py
+
+clean:
+	rm -rf build demo
+
+distclean: clean
+	rm -rf .venv

@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+/// The Python module truing._core: conversion, keywords, docstrings, and the GIL released around long calls.
+#include "casters.hpp"
+
+namespace py = pybind11;
+
+PYBIND11_MODULE(_core, m) {
+  m.doc() = "The C++ core of truing. Use it through `import truing`.";
+  // A function, so that the committed stubs do not hold the version a second time.
+  m.def(
+      "version", [] { return truing::version; }, "Version of the C++ core: 'major.minor.patch'.");
+
+  // The library reports bad input as std::invalid_argument; the exception that teaches is written in Python.
+  py::register_local_exception_translator([](std::exception_ptr pointer) {
+    try {
+      if (pointer) std::rethrow_exception(pointer);
+    } catch (const std::invalid_argument& error) {
+      py::set_error(py::module_::import("truing.errors").attr("InputError"), error.what());
+    }
+  });
+
+  truing::python::bind_robot(m);
+  truing::python::bind_measurements(m);
+  truing::python::bind_effects(m);
+  truing::python::bind_identify(m);
+  truing::python::bind_plan(m);
+}

@@ -1,0 +1,1230 @@
+"""
+The C++ core of truing. Use it through `import truing`.
+"""
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import types
+import typing
+__all__: list[str] = ['Anchor', 'AppliedEffect', 'BeforeAfter', 'EffectRequest', 'ErrorStatistics', 'Frozen', 'Identification', 'IdentifyOptions', 'Joint', 'Measurements', 'OwnEffect', 'Parameter', 'PlanOptions', 'PlanResult', 'Prediction', 'Residuals', 'Robot', 'SolverSummary', 'Target', 'catalogue', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'identify', 'joint_motion', 'plan', 'pose_groups', 'predict', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'version']
+class Joint:
+    """
+    One joint and the link that belongs to it. Lengths in m, angles in rad, masses in kg.
+    
+    A driven joint moves by `ratio * reading + offset`. A passive joint has no reading: it moves by the weighted sum of the
+    corrected motions of the joints in `driven_by`, a mapping or pairs of name and weight (a palletizer's J4: {"J2": -1, "J3": -1}).
+    """
+    def __init__(self, name: str, *, type: typing.Literal['revolute', 'prismatic'] = 'revolute', theta: typing.SupportsFloat | typing.SupportsIndex = 0.0, d: typing.SupportsFloat | typing.SupportsIndex = 0.0, a: typing.SupportsFloat | typing.SupportsIndex = 0.0, alpha: typing.SupportsFloat | typing.SupportsIndex = 0.0, beta: typing.SupportsFloat | typing.SupportsIndex = 0.0, T_parent_joint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, driven_by: collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex]] | dict[str, typing.SupportsFloat | typing.SupportsIndex] = [], lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., mass: typing.SupportsFloat | typing.SupportsIndex | None = None, center_of_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Joint:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Joint:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def T_parent_joint(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4) [m]: joint in its parent; convention 'urdf' only. Setting it to what is not rigid raises InputError.
+        """
+    @T_parent_joint.setter
+    def T_parent_joint(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+        ...
+    @property
+    def a(self) -> float:
+        """
+        [m] link length.
+        """
+    @a.setter
+    def a(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def alpha(self) -> float:
+        """
+        [rad] link twist.
+        """
+    @alpha.setter
+    def alpha(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def axis(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,) unit vector; convention 'urdf' only.
+        """
+    @axis.setter
+    def axis(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def beta(self) -> float:
+        """
+        [rad] Hayati's twist about y, for near-parallel neighbouring axes.
+        """
+    @beta.setter
+    def beta(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def center_of_mass(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,) [m] in the frame after the link.
+        """
+    @center_of_mass.setter
+    def center_of_mass(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def d(self) -> float:
+        """
+        [m] the motion of a prismatic joint adds to it.
+        """
+    @d.setter
+    def d(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def driven_by(self) -> tuple[tuple[str, float], ...]:
+        """
+        Pairs of driving joint and weight; empty: the joint has a reading. A mapping may be set.
+        """
+    @driven_by.setter
+    def driven_by(self, arg1: collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex]] | dict[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def lower(self) -> float:
+        """
+        [rad | m] lower limit, -inf if there is none.
+        """
+    @lower.setter
+    def lower(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def mass(self) -> float | None:
+        """
+        [kg] of the link that this joint moves; None: not known.
+        """
+    @mass.setter
+    def mass(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def name(self) -> str:
+        """
+        Name, unique within the robot.
+        """
+    @name.setter
+    def name(self, arg0: str) -> None:
+        ...
+    @property
+    def offset(self) -> float:
+        """
+        [rad | m] joint zero.
+        """
+    @offset.setter
+    def offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def passive(self) -> bool:
+        """
+        Whether other joints drive it.
+        """
+    @property
+    def ratio(self) -> float:
+        """
+        [-] gear-ratio correction.
+        """
+    @ratio.setter
+    def ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def theta(self) -> float:
+        """
+        [rad] the motion of a revolute joint adds to it.
+        """
+    @theta.setter
+    def theta(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def type(self) -> typing.Literal['revolute', 'prismatic']:
+        """
+        'revolute' or 'prismatic'.
+        """
+    @type.setter
+    def type(self, arg0: typing.Literal['revolute', 'prismatic']) -> None:
+        ...
+    @property
+    def upper(self) -> float:
+        """
+        [rad | m] upper limit, inf if there is none.
+        """
+    @upper.setter
+    def upper(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class Target:
+    """
+    A measured point (and orientation) on the last link.
+    """
+    def __init__(self, name: str, T_last_target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Target:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Target:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def T_last_target(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4) [m]: target in the frame after the last link. Setting it to what is not rigid raises InputError.
+        """
+    @T_last_target.setter
+    def T_last_target(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+        ...
+    @property
+    def name(self) -> str:
+        """
+        Name, unique within the robot.
+        """
+    @name.setter
+    def name(self, arg0: str) -> None:
+        ...
+class Anchor:
+    """
+    The far end of a draw-wire or ballbar: reading = distance + zero.
+    
+    It does not change: set `robot.anchor = robot.anchor.replace(zero=0.01)`.
+    """
+    def __init__(self, point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., zero: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Anchor:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Anchor:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def point(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,) [m] in the base frame.
+        """
+    @property
+    def zero(self) -> float:
+        """
+        [m] the length that the instrument leaves out.
+        """
+class AppliedEffect:
+    """
+    An effect with its fitted parameters, as `identify` found them.
+    
+    It does not change; make another one.
+    """
+    def __init__(self, effect: str, joints: collections.abc.Sequence[str], parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> AppliedEffect:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> AppliedEffect:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def effect(self) -> str:
+        """
+        Name, as in `catalogue()`.
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Names of the joints it acts on.
+        """
+    @property
+    def parameters(self) -> types.MappingProxyType[str, float]:
+        """
+        Value by full name, e.g. {'backlash.J3': 2e-4}.
+        """
+class Robot:
+    """
+    A robot model, nominal or calibrated. `truing.validate` says whether it can be used.
+    
+    `robot.joints[1].a = 0.3` and `robot.joint("J2").a = 0.3` change the robot. The number of joints and targets is fixed:
+    `robot.replace(joints=...)` makes another robot.
+    """
+    def __init__(self, name: str, *, joints: collections.abc.Sequence[Joint], targets: collections.abc.Sequence[Target] = ..., convention: typing.Literal['dh', 'mdh', 'urdf'] = 'dh', gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., T_measurement_base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., effects: collections.abc.Sequence[AppliedEffect] = [], anchor: Anchor | None = None) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Robot:
+        """
+        An independent copy.
+        """
+    def driven_joints(self) -> tuple[int, ...]:
+        """
+        Index of each driven joint, in chain order.
+        """
+    def joint(self, name: str) -> Joint:
+        """
+        The joint of that name; what is set on it changes the robot. Raises InputError that lists the joints there are.
+        """
+    def joint_index(self, name: str) -> int:
+        """
+        Index of the joint of that name; raises InputError that lists the joints there are.
+        """
+    def replace(self, **kwargs: typing.Any) -> Robot:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def T_measurement_base(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4) [m]: base in the measurement frame. Setting it to what is not rigid raises InputError.
+        """
+    @T_measurement_base.setter
+    def T_measurement_base(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+        ...
+    @property
+    def anchor(self) -> Anchor | None:
+        """
+        The far end of a draw-wire or ballbar, or None.
+        """
+    @anchor.setter
+    def anchor(self, arg1: Anchor | None) -> None:
+        ...
+    @property
+    def convention(self) -> typing.Literal['dh', 'mdh', 'urdf']:
+        """
+        How the links are read: 'dh', 'mdh' or 'urdf'.
+        
+        dh: Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta). mdh: Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d). urdf: T_parent_joint, then the
+        motion about or along `axis`.
+        """
+    @convention.setter
+    def convention(self, arg0: typing.Literal['dh', 'mdh', 'urdf']) -> None:
+        ...
+    @property
+    def driven_count(self) -> int:
+        """
+        Number of joints that have a reading.
+        """
+    @property
+    def effects(self) -> tuple[AppliedEffect, ...]:
+        """
+        Effects with their fitted parameters.
+        """
+    @effects.setter
+    def effects(self, arg1: collections.abc.Sequence[AppliedEffect]) -> None:
+        ...
+    @property
+    def gravity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,) [m/s^2] in the base frame.
+        """
+    @gravity.setter
+    def gravity(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """
+        The joints in chain order; what is set on them changes the robot.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Name of the model.
+        """
+    @name.setter
+    def name(self, arg0: str) -> None:
+        ...
+    @property
+    def targets(self) -> tuple[Target, ...]:
+        """
+        The targets, the tool first; what is set on them changes the robot.
+        """
+class Measurements:
+    """
+    One row per measurement: n rows of joint readings, and what was measured there.
+    
+    joints: shape=(n, driven joints) [rad | m], chain order.
+    positions: shape=(n, 3) [m] of the target in the measurement frame; NaN rows: not measured.
+    orientations: shape=(n, 4) w x y z, Hamilton; NaN rows: not measured.
+    distances: shape=(n,) [m] to the robot's anchor; NaN: not measured.
+    fixed_points: n names ('' or None: none), or indices into `fixed_point_names` (-1: none).
+    targets: n names, or indices into `robot.targets`; absent: the tool. `target_names`: the targets in the robot's order,
+        unless `robot` is given; default ["tool"].
+    directions: shape=(n, driven joints), approach direction -1, 0, 1. joint_speeds: shape=(n, driven joints) [rad/s | m/s].
+    payload [kg], temperature [deg C], time [s], position_sigma [m], rotation_sigma [rad], weight: shape=(n,); all but time
+        may be one number for all rows.
+    pose: n numbers or names, rows of one robot pose share one; absent: equal joints. set: n of 'train', 'test' (or 0, 1).
+    covariates: more columns by name, shape=(n,).
+    
+    Arrays of float64 are not copied, whatever their strides: do not change them while this object is in use. A list or tuple
+    of arrays holds columns (from Arrow or pandas); a list of lists of numbers holds rows.
+    Raises InputError naming the column when shapes or types do not fit; `validate_measurements` checks the values.
+    """
+    def __init__(self, joints: numpy.typing.ArrayLike, *, positions: numpy.typing.ArrayLike | None = None, orientations: numpy.typing.ArrayLike | None = None, distances: numpy.typing.ArrayLike | None = None, fixed_points: numpy.typing.ArrayLike | collections.abc.Sequence[str | None] | None = None, fixed_point_names: collections.abc.Sequence[str] = [], targets: numpy.typing.ArrayLike | collections.abc.Sequence[str | None] | None = None, target_names: collections.abc.Sequence[str] | None = None, directions: numpy.typing.ArrayLike | None = None, joint_speeds: numpy.typing.ArrayLike | None = None, payload: numpy.typing.ArrayLike | None = None, temperature: numpy.typing.ArrayLike | None = None, time: numpy.typing.ArrayLike | None = None, pose: numpy.typing.ArrayLike | collections.abc.Sequence[str | None] | None = None, set: numpy.typing.ArrayLike | collections.abc.Sequence[str | None] | None = None, position_sigma: numpy.typing.ArrayLike | None = None, rotation_sigma: numpy.typing.ArrayLike | None = None, weight: numpy.typing.ArrayLike | None = None, covariates: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, robot: Robot | None = None) -> None:
+        ...
+    def __len__(self) -> int:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Measurements:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Measurements:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def covariates(self) -> types.MappingProxyType[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        More columns by name, each of shape (n,).
+        """
+    @property
+    def directions(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n, driven joints), a copy, or None.
+        """
+    @property
+    def distances(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n,) [m], or None.
+        """
+    @property
+    def fixed_point_names(self) -> tuple[str, ...]:
+        """
+        Names of the fixed points.
+        """
+    @property
+    def fixed_points(self) -> numpy.typing.NDArray[numpy.int32] | None:
+        """
+        shape=(n,): index into `fixed_point_names`, -1: none; or None.
+        """
+    @property
+    def joint_speeds(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n, driven joints) [rad/s | m/s], a copy, or None.
+        """
+    @property
+    def joints(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, driven joints) [rad | m], a copy.
+        """
+    @property
+    def orientations(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n, 4) w x y z, a copy, or None.
+        """
+    @property
+    def payload(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n,) [kg], or None.
+        """
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.int32] | None:
+        """
+        shape=(n,): number of the pose, or None.
+        """
+    @property
+    def position_sigma(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n,) [m], or None.
+        """
+    @property
+    def positions(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n, 3) [m], a copy, or None.
+        """
+    @property
+    def rotation_sigma(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n,) [rad], or None.
+        """
+    @property
+    def rows(self) -> int:
+        """
+        Number of rows n.
+        """
+    @property
+    def set(self) -> numpy.typing.NDArray[numpy.int8] | None:
+        """
+        shape=(n,): 0 train, 1 test; or None.
+        """
+    @property
+    def targets(self) -> numpy.typing.NDArray[numpy.int32] | None:
+        """
+        shape=(n,): index into `robot.targets`, or None.
+        """
+    @property
+    def temperature(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n,) [deg C], or None.
+        """
+    @property
+    def time(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n,) [s], or None.
+        """
+    @property
+    def weight(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n,), or None.
+        """
+class EffectRequest:
+    """
+    An effect asked for: its name, and joints (none: every driven joint).
+    """
+    def __init__(self, effect: str, joints: collections.abc.Sequence[str] = []) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> EffectRequest:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> EffectRequest:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def effect(self) -> str:
+        """
+        Name, as in `catalogue()`.
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Names of joints; none: every driven one.
+        """
+class OwnEffect:
+    """
+    The values of a user's effect for the rows of some data; `truing.Effect` makes these.
+    """
+    def __init__(self, name: str, summary: str = '') -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def add(self, *, joint: str, parameter: str, unit: str, site: str, values: numpy.typing.ArrayLike) -> None:
+        """
+        Adds a term: parameter * values[row] on `site`, listed under `joint`. values: shape=(n,); not copied when float64. Raises InputError.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Name of the effect.
+        """
+class IdentifyOptions:
+    """
+    How `identify` works; see the attributes.
+    """
+    def __init__(self, *, free: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, max_iterations: typing.SupportsInt | typing.SupportsIndex = 100, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> IdentifyOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> IdentifyOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def bounds(self) -> types.MappingProxyType[str, tuple[float, float]]:
+        """
+        (lowest, highest) by parameter; solver 'ceres' only.
+        """
+    @bounds.setter
+    def bounds(self, arg1: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def effects(self) -> tuple[EffectRequest, ...]:
+        """
+        Effects to fit as well.
+        """
+    @effects.setter
+    def effects(self, arg1: collections.abc.Sequence[EffectRequest]) -> None:
+        ...
+    @property
+    def frame_by(self) -> typing.Literal['parameters', 'svd']:
+        """
+        The measurement frame: 'parameters' (six more), or 'svd' (registered after every step; positions only).
+        """
+    @frame_by.setter
+    def frame_by(self, arg0: typing.Literal['parameters', 'svd']) -> None:
+        ...
+    @property
+    def free(self) -> tuple[str, ...]:
+        """
+        Names and globs ('J2.*', '*.ratio'); empty: every geometric value, base and targets.
+        """
+    @free.setter
+    def free(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
+    def gradient(self) -> float:
+        """
+        Stop when the gradient of unit columns, relative to the residual's norm, is no more.
+        """
+    @gradient.setter
+    def gradient(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def hayati_angle(self) -> float:
+        """
+        [rad] neighbouring axes nearer to parallel get beta.
+        """
+    @hayati_angle.setter
+    def hayati_angle(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def initial_damping(self) -> float:
+        """
+        mu, on columns of unit norm.
+        """
+    @initial_damping.setter
+    def initial_damping(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def loss(self) -> typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey']:
+        """
+        'reject' (gross outliers are found, listed and left out), 'none', 'huber', 'cauchy' or 'tukey'.
+        """
+    @loss.setter
+    def loss(self, arg0: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey']) -> None:
+        ...
+    @property
+    def max_iterations(self) -> int:
+        """
+        The fit stops here at the latest.
+        """
+    @max_iterations.setter
+    def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rank_tolerance(self) -> float:
+        """
+        A unit column that the others explain but for this share is not observable.
+        """
+    @rank_tolerance.setter
+    def rank_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reject_beyond(self) -> float:
+        """
+        Loss 'reject': robust standard deviations.
+        """
+    @reject_beyond.setter
+    def reject_beyond(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rms_fall(self) -> float:
+        """
+        [m] stop when a step lowers the rms by no more.
+        """
+    @rms_fall.setter
+    def rms_fall(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_length(self) -> float:
+        """
+        [m] a rotation error of 1 rad counts as this length, where rows give no sigma.
+        """
+    @rotation_length.setter
+    def rotation_length(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of the split.
+        """
+    @seed.setter
+    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def solver(self) -> typing.Literal['lm', 'ceres']:
+        """
+        'lm' (Levenberg-Marquardt) or 'ceres' (takes bounds).
+        """
+    @solver.setter
+    def solver(self, arg0: typing.Literal['lm', 'ceres']) -> None:
+        ...
+    @property
+    def test_share(self) -> float:
+        """
+        Share of the pose groups held out when the data has no `set`.
+        """
+    @test_share.setter
+    def test_share(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def threads(self) -> int:
+        """
+        0: as many as the machine has.
+        """
+    @threads.setter
+    def threads(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def undamped(self) -> bool:
+        """
+        mu = 0: plain least-squares iteration.
+        """
+    @undamped.setter
+    def undamped(self, arg0: bool) -> None:
+        ...
+class Parameter:
+    """
+    One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3` ...
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def frozen(self) -> bool:
+        """
+        Held at nominal, because the data cannot see it.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Full name.
+        """
+    @property
+    def nominal(self) -> float:
+        """
+        Value before, in `unit`.
+        """
+    @property
+    def sigma(self) -> float:
+        """
+        Standard error, in `unit`; NaN when frozen.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        m, rad, -, rad/Nm ...
+        """
+    @property
+    def value(self) -> float:
+        """
+        Value found, in `unit`.
+        """
+class Frozen:
+    """
+    A combination of parameters that the data cannot see: moving them together so changes no measurement.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def combination(self) -> types.MappingProxyType[str, float]:
+        """
+        Weight by parameter, 1 for `parameter`.
+        """
+    @property
+    def parameter(self) -> str:
+        """
+        The one held at nominal.
+        """
+    @property
+    def why(self) -> str:
+        """
+        Why it is frozen.
+        """
+class ErrorStatistics:
+    """
+    Length of the position (or distance) errors of a set of rows.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def max(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def mean(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def median(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def n(self) -> int:
+        """
+        Number of rows.
+        """
+    @property
+    def p95(self) -> float:
+        """
+        [m] 95th percentile.
+        """
+    @property
+    def rms(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def rotation_rms(self) -> float:
+        """
+        [rad]; NaN: no orientation measured.
+        """
+class BeforeAfter:
+    """
+    Errors before and after calibration.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def after(self) -> ErrorStatistics:
+        """
+        Calibrated robot.
+        """
+    @property
+    def before(self) -> ErrorStatistics:
+        """
+        Nominal robot with base, targets (anchor, fixed points) fitted.
+        """
+class SolverSummary:
+    """
+    How the solver ended.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def converged(self) -> bool:
+        """
+        False: the result must not be used.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Steps made.
+        """
+    @property
+    def name(self) -> str:
+        """
+        'lm' or 'ceres'.
+        """
+    @property
+    def stopped_because(self) -> str:
+        """
+        The reason, in words.
+        """
+class Identification:
+    """
+    What `identify` found.
+    """
+    def __repr__(self) -> str:
+        ...
+    def parameter(self, name: str) -> Parameter:
+        """
+        The parameter of that name; raises InputError that lists the parameters there are.
+        """
+    def summary(self) -> str:
+        """
+        A few lines for people.
+        """
+    @property
+    def before(self) -> Robot:
+        """
+        Nominal robot with base and targets fitted. Part of this result.
+        """
+    @property
+    def columns(self) -> int:
+        """
+        Number of parameters asked for.
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        shape=(rank, rank), of the fitted (not frozen) parameters in order of `parameters`, in their units.
+        """
+    @property
+    def errors(self) -> types.MappingProxyType[str, BeforeAfter]:
+        """
+        Errors [m] by set: 'train', and 'test' if rows were held out.
+        """
+    @property
+    def frozen(self) -> tuple[Frozen, ...]:
+        """
+        What the data cannot see.
+        """
+    @property
+    def noise_sigma(self) -> float:
+        """
+        [m] of one position component (or distance), from the training residuals.
+        """
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """
+        Every parameter asked for, frozen ones included.
+        """
+    @property
+    def rank(self) -> int:
+        """
+        Number of parameters fitted.
+        """
+    @property
+    def rejected_rows(self) -> tuple[int, ...]:
+        """
+        Training rows (counted from 0) left out as gross outliers.
+        """
+    @property
+    def robot(self) -> Robot:
+        """
+        Calibrated robot. Part of this result: copy() it before changing it.
+        """
+    @property
+    def rotation_noise_sigma(self) -> float:
+        """
+        [rad] of one rotation component; NaN: none measured.
+        """
+    @property
+    def set(self) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        shape=(n,): 0 train, 1 test, for every row.
+        """
+    @property
+    def solver(self) -> SolverSummary:
+        """
+        How the solver ended.
+        """
+    @property
+    def test(self) -> BeforeAfter | None:
+        """
+        Errors of the held-out rows [m], or None.
+        """
+    @property
+    def train(self) -> BeforeAfter:
+        """
+        Errors of the training rows [m].
+        """
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """
+        What to know before trusting it.
+        """
+class Prediction:
+    """
+    What the robot predicts for the rows of some data.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def distance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        shape=(n,) [m]; empty without an anchor.
+        """
+    @property
+    def orientation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 4]"]:
+        """
+        shape=(n, 4): w x y z, w >= 0.
+        """
+    @property
+    def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        shape=(n, 3) [m]: target in the measurement frame.
+        """
+class Residuals:
+    """
+    Predicted minus measured; NaN where not measured.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def distance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        shape=(n,) [m]
+        """
+    @property
+    def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        shape=(n, 3) [m]
+        """
+    @property
+    def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        shape=(n, 3) [rad]: twice the vector part of the error quaternion.
+        """
+class PlanOptions:
+    """
+    How `plan` works; see the attributes.
+    """
+    def __init__(self, *, poses: typing.SupportsInt | typing.SupportsIndex = 50, min_step: typing.SupportsFloat | typing.SupportsIndex = 0.2617993877991494, min_step_prismatic: typing.SupportsFloat | typing.SupportsIndex = 0.0, index: typing.Literal['d_optimal', 'a_optimal', 'e_optimal', 'inverse_condition', 'noise_amplification'] = 'd_optimal', orientation: bool = False, position_sigma: typing.SupportsFloat | typing.SupportsIndex = 3e-05, rotation_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0001, sweeps: typing.SupportsInt | typing.SupportsIndex = 4, proposals: typing.SupportsInt | typing.SupportsIndex = 64, seed: typing.SupportsInt | typing.SupportsIndex = 0, free: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = []) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> PlanOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> PlanOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def effects(self) -> tuple[EffectRequest, ...]:
+        """
+        Effects that shall be seen as well.
+        """
+    @effects.setter
+    def effects(self, arg1: collections.abc.Sequence[EffectRequest]) -> None:
+        ...
+    @property
+    def free(self) -> tuple[str, ...]:
+        """
+        As in `identify`.
+        """
+    @free.setter
+    def free(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
+    def index(self) -> typing.Literal['d_optimal', 'a_optimal', 'e_optimal', 'inverse_condition', 'noise_amplification']:
+        """
+        What the plan makes large.
+        
+        'd_optimal' (determinant; O1 of Borm and Menq 1989), 'a_optimal' (minus the sum of variances), 'e_optimal' (smallest
+        singular value; O3 of Nahvi et al. 1994), 'inverse_condition' (O2 of Driels and Pathre 1990) or 'noise_amplification'
+        (O4 of Nahvi and Hollerbach 1996).
+        """
+    @index.setter
+    def index(self, arg0: typing.Literal['d_optimal', 'a_optimal', 'e_optimal', 'inverse_condition', 'noise_amplification']) -> None:
+        ...
+    @property
+    def min_step(self) -> float:
+        """
+        [rad] every revolute joint moves by more between neighbours.
+        """
+    @min_step.setter
+    def min_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_step_prismatic(self) -> float:
+        """
+        [m] the same for prismatic joints.
+        """
+    @min_step_prismatic.setter
+    def min_step_prismatic(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def orientation(self) -> bool:
+        """
+        Full poses are measured, not only positions.
+        """
+    @orientation.setter
+    def orientation(self, arg0: bool) -> None:
+        ...
+    @property
+    def poses(self) -> int:
+        """
+        Number of poses.
+        """
+    @poses.setter
+    def poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_sigma(self) -> float:
+        """
+        [m] of one component, for the standard errors promised.
+        """
+    @position_sigma.setter
+    def position_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def proposals(self) -> int:
+        """
+        Candidates tried for a pose in a pass.
+        """
+    @proposals.setter
+    def proposals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_sigma(self) -> float:
+        """
+        [rad]
+        """
+    @rotation_sigma.setter
+    def rotation_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of the random start and the candidates.
+        """
+    @seed.setter
+    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sweeps(self) -> int:
+        """
+        Passes of exchange over all poses.
+        """
+    @sweeps.setter
+    def sweeps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class PlanResult:
+    """
+    What `plan` found.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def exchanges(self) -> int:
+        """
+        Poses exchanged.
+        """
+    @property
+    def frozen(self) -> tuple[Frozen, ...]:
+        """
+        What no plan of this kind could see.
+        """
+    @property
+    def index_end(self) -> float:
+        """
+        Index of this plan.
+        """
+    @property
+    def index_start(self) -> float:
+        """
+        Index of the random plan that the exchange began with.
+        """
+    @property
+    def joints(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        shape=(poses, driven joints) [rad | m]
+        """
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """
+        sigma: the standard error that this plan promises.
+        """
+def catalogue() -> list[tuple[str, str]]:
+    """
+    Name and summary of the effects that truing knows.
+    """
+def forward_kinematics(robot: Robot, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], target: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Frames of the links and of a target in the measurement frame, effects left out.
+    
+    q: shape=(driven joints,) [rad | m]. target: its index in `robot.targets`.
+    Returns shape=(joints + 1, 4, 4) [m]: the frame after every joint, then the target's. Raises InputError.
+    """
+def frame_from_xyz_rpy(xyz: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], rpy: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+    """
+    Frame, shape=(4, 4), of a position, shape=(3,) [m], and roll, pitch, yaw, shape=(3,) [rad].
+    """
+def gravity_torque_rows(robot: Robot, data: Measurements) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    shape=(n, joints) [Nm | N]: `gravity_torques` of every row, with its payload. Raises InputError.
+    """
+def gravity_torques(robot: Robot, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], payload: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    Gravity torque on every joint, passive ones included.
+    
+    q: shape=(driven joints,) [rad | m]. payload: [kg] at the tool. Returns shape=(joints,) [Nm | N].
+    Raises InputError when no mass is known and the payload is zero.
+    """
+def identify(robot: Robot, data: Measurements, options: IdentifyOptions | None = None, own_effects: collections.abc.Sequence[OwnEffect] = []) -> Identification:
+    """
+    Finds the robot's parameters from measurements. Raises InputError on data or options that cannot be used.
+    
+    A fit that did not converge returns with solver.converged == False.
+    """
+def joint_motion(robot: Robot, data: Measurements, joint: str) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    shape=(n,) [rad | m]: motion of a joint as read, of a passive one from its drivers' readings. Raises InputError.
+    """
+def plan(robot: Robot, options: PlanOptions | None = None) -> PlanResult:
+    """
+    Measurement poses by exchange on an observability index.
+    
+    Revolute joints without limits use -pi ... pi. Raises InputError: fewer poses than the parameters need, a joint whose range is too
+    small for `min_step`.
+    """
+def pose_groups(data: Measurements) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    shape=(n,): group of every row, 0 ... count-1 in order of appearance; `pose` if given, else equal joint readings.
+    """
+def predict(robot: Robot, data: Measurements, own_effects: collections.abc.Sequence[OwnEffect] = [], threads: typing.SupportsInt | typing.SupportsIndex = 0) -> Prediction:
+    """
+    What the robot predicts for the rows of `data`. Raises InputError on unknown effects or columns that they need.
+    """
+def residuals(robot: Robot, data: Measurements, own_effects: collections.abc.Sequence[OwnEffect] = [], threads: typing.SupportsInt | typing.SupportsIndex = 0) -> Residuals:
+    """
+    Predicted minus measured, NaN where not measured. Raises InputError.
+    
+    Rows of a fixed point are compared with the mean of that point's predictions.
+    """
+def robot_from_urdf(urdf_text: str, base_link: str = '', tip_link: str = '') -> Robot:
+    """
+    The chain from `base_link` to `tip_link` of a URDF text, as a robot of convention 'urdf'.
+    
+    Fixed joints are folded into the next moving joint, the last ones into the tool; link masses are merged the same way;
+    `mimic` becomes `driven_by`. Empty link names: the only root, the only leaf.
+    Raises InputError: not a URDF, unknown base or tip (lists the links there are), tip not below base, planar or floating joint.
+    """
+def rotation_from_rpy(rpy: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+    """
+    Rotation of roll, pitch and yaw as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll).
+    
+    rpy: shape=(3,) [rad]. Returns shape=(3, 3).
+    """
+def rpy_from_rotation(rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+    """
+    Roll, pitch and yaw of a rotation: shape=(3, 3) to shape=(3,) [rad]. At pitch = +-pi/2 roll is 0.
+    """
+def urdf_with_calibration(urdf_text: str, calibrated: Robot, base_link: str = '', tip_link: str = '') -> str:
+    """
+    The URDF text with the joint origins of the chain replaced by those of `calibrated`.
+    
+    What URDF cannot hold (gear ratios, base frame, effects) is named in a comment at the top. Raises InputError.
+    """
+def validate_measurements(data: Measurements, robot: Robot, joints_only: bool = False) -> None:
+    """
+    Raises InputError naming the row (counted from 0) and what is wrong with the measurements for this robot.
+    
+    Checked are: counts that do not fit the robot, joints or inputs that are not finite, a row without any measurement (unless
+    `joints_only`), half a position, a quaternion that is not of unit length, directions, sigmas.
+    """
+def validate_robot(robot: Robot) -> None:
+    """
+    Raises InputError when the robot cannot be used.
+    
+    The error names the joint and what is wrong: no joints, duplicate or empty names, unknown or circular `driven_by`, values that
+    are not finite, an axis that is not of unit length, lower > upper.
+    """
+def version() -> str:
+    """
+    Version of the C++ core: 'major.minor.patch'.
+    """

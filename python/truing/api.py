@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The four verbs: identify, predict, residuals, plan. Each hands its keywords to the C++ core."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal
+
+from truing import _core
+from truing._core import Identification, Measurements, PlanResult, Prediction, Residuals, Robot
+from truing.effects import Effect, Effects, evaluated, split_effects
+from truing.errors import InputError, NotConvergedError
+
+
+def identify(
+    robot: Robot,
+    data: Measurements,
+    *,
+    free: str | Sequence[str] = (),
+    effects: Effects = (),
+    solver: Literal["lm", "ceres"] = "lm",
+    loss: Literal["reject", "none", "huber", "cauchy", "tukey"] = "reject",
+    frame_by: Literal["parameters", "svd"] = "parameters",
+    rotation_length: float = 0.1,
+    test_share: float = 0.2,
+    seed: int = 0,
+    max_iterations: int = 100,
+    initial_damping: float = 1e-9,
+    rms_fall: float = 1e-12,
+    gradient: float = 1e-14,
+    undamped: bool = False,
+    rank_tolerance: float = 1e-6,
+    hayati_angle: float = 0.08726646259971647,
+    reject_beyond: float = 6.0,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    threads: int = 0,
+    raise_if_not_converged: bool = True,
+) -> Identification:
+    """Find the robot's parameters from measurements.
+
+    Base, targets (anchor, fixed points) are found first; what the data cannot see is frozen at nominal and named in the
+    result; then the fit runs on the training rows.
+
+    robot: nominal. data: measurements, see `Measurements`.
+    free: names and globs, "J2.*,*.ratio" or a list; empty: every geometric value, base and targets.
+    effects: effects to fit as well: "backlash,harmonic:J2+J3", or a list of such words, `EffectRequest` and `Effect`.
+    solver: "lm" (Levenberg-Marquardt) or "ceres" (takes bounds).
+    loss: "reject" finds gross outliers, lists them and fits without; or "none", "huber", "cauchy", "tukey".
+    frame_by: the measurement frame as six "parameters", or registered after every step ("svd"; positions only).
+    rotation_length: [m] a rotation error of 1 rad counts as this length, where rows give no sigma.
+    test_share: of the pose groups, held out when the data has no `set`. seed: of that split.
+    max_iterations, initial_damping, rms_fall [m], gradient, undamped: of the iteration, see `IdentifyOptions`.
+    rank_tolerance: a unit column that the others explain but for this share is not observable.
+    hayati_angle: [rad] neighbouring axes nearer to parallel get beta.
+    reject_beyond: loss "reject": robust standard deviations.
+    bounds: {parameter: (lowest, highest)}, solver "ceres" only. threads: 0: as many as the machine has.
+
+    Raises InputError on data or options that cannot be used, and NotConvergedError (it carries the result), unless
+    `raise_if_not_converged` is False.
+    """
+    asked, own = split_effects(effects)
+    options = _core.IdentifyOptions(
+        free=_names(free),
+        effects=[item.request(robot) if isinstance(item, Effect) else item for item in asked],
+        solver=solver,
+        loss=loss,
+        frame_by=frame_by,
+        rotation_length=rotation_length,
+        test_share=test_share,
+        seed=seed,
+        max_iterations=max_iterations,
+        initial_damping=initial_damping,
+        rms_fall=rms_fall,
+        gradient=gradient,
+        undamped=undamped,
+        rank_tolerance=rank_tolerance,
+        hayati_angle=hayati_angle,
+        reject_beyond=reject_beyond,
+        bounds=bounds or {},
+        threads=threads,
+    )
+    result = _core.identify(robot, data, options, evaluated(own, robot, data))
+    if raise_if_not_converged and not result.solver.converged:
+        raise NotConvergedError(result)
+    return result
+
+
+def predict(robot: Robot, data: Measurements, *, effects: Effect | Iterable[Effect] = (), threads: int = 0) -> Prediction:
+    """What the robot, with its fitted effects, predicts for the rows of `data`.
+
+    effects: definitions of one's own effects that the robot carries; those of the catalogue are known.
+    Raises InputError on unknown effects or columns that they need.
+    """
+    return _core.predict(robot, data, evaluated(_own(effects), robot, data), threads)
+
+
+def residuals(robot: Robot, data: Measurements, *, effects: Effect | Iterable[Effect] = (), threads: int = 0) -> Residuals:
+    """Predicted minus measured, NaN where not measured.
+
+    Rows of a fixed point are compared with the mean of that point's predictions. effects: as in `predict`.
+    Raises InputError on unknown effects or columns that they need.
+    """
+    return _core.residuals(robot, data, evaluated(_own(effects), robot, data), threads)
+
+
+def plan(
+    robot: Robot,
+    *,
+    poses: int = 50,
+    min_step: float = 0.2617993877991494,
+    min_step_prismatic: float = 0.0,
+    index: Literal["d_optimal", "a_optimal", "e_optimal", "inverse_condition", "noise_amplification"] = "d_optimal",
+    orientation: bool = False,
+    position_sigma: float = 3e-5,
+    rotation_sigma: float = 1e-4,
+    sweeps: int = 4,
+    proposals: int = 64,
+    seed: int = 0,
+    free: str | Sequence[str] = (),
+    effects: Effects = (),
+) -> PlanResult:
+    """Measurement poses by exchange on an observability index.
+
+    poses: how many. min_step: [rad], min_step_prismatic: [m]: joints move by more between neighbours.
+    index: what the plan makes large, see `PlanOptions`. orientation: full poses are measured, not only positions.
+    position_sigma: [m], rotation_sigma: [rad] of one component, for the standard errors promised.
+    sweeps, proposals, seed: of the exchange. free, effects: as in `identify`; effects of the catalogue only.
+
+    Raises InputError: fewer poses than the parameters need, a joint whose range is too small for `min_step`.
+    """
+    asked, own = split_effects(effects)
+    if own:
+        raise InputError(f"plan cannot use own effects ({', '.join(effect.name for effect in own)}): their basis is known only "
+                         "for rows that were recorded; plan with effects of the catalogue")  # fmt: skip
+    options = _core.PlanOptions(
+        poses=poses,
+        min_step=min_step,
+        min_step_prismatic=min_step_prismatic,
+        index=index,
+        orientation=orientation,
+        position_sigma=position_sigma,
+        rotation_sigma=rotation_sigma,
+        sweeps=sweeps,
+        proposals=proposals,
+        seed=seed,
+        free=_names(free),
+        effects=[item for item in asked if not isinstance(item, Effect)],
+    )
+    return _core.plan(robot, options)
+
+
+def _names(names: str | Sequence[str]) -> list[str]:
+    if isinstance(names, str):
+        return [name.strip() for name in names.split(",") if name.strip()]
+    return list(names)
+
+
+def _own(effects: Effect | Iterable[Effect]) -> list[Effect]:
+    own = [effects] if isinstance(effects, Effect) else list(effects)
+    for effect in own:
+        if not isinstance(effect, Effect):
+            raise InputError(f"effects holds {effect!r}: only definitions of own effects are needed here; effects of the catalogue "
+                             "come with the robot")  # fmt: skip
+    return own

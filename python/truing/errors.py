@@ -1,0 +1,30 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""What truing raises and warns with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from truing._core import Identification
+
+
+class InputError(ValueError):
+    """A file, value or option cannot be used. The message says where, what was found, and what was expected."""
+
+
+class InputWarning(UserWarning):
+    """An input can be used, but looks odd. The message says where and why."""
+
+
+class NotConvergedError(RuntimeError):
+    """A fit did not converge. `result` is what it came to; do not use it without knowing why."""
+
+    def __init__(self, result: Identification) -> None:
+        self.result = result
+        solver = result.solver
+        super().__init__(
+            f"the fit ({solver.name}) did not converge in {solver.iterations} iterations: {solver.stopped_because}. "
+            "The exception's `result` has what it came to; raise_if_not_converged=False returns it instead."
+        )

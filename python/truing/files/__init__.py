@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reading and writing files: robots, measurements, tables. Every error names file, line or column, found and expected."""
+
+from __future__ import annotations
+
+from truing.files.common import Units, atomic_output_dir, atomic_write, write_table
+from truing.files.measurement_file import load_measurements, save_measurements
+from truing.files.robot_file import load_calibration, load_robot, load_units, robot_to_yaml, save_robot
+
+__all__ = [
+    "Units",
+    "atomic_output_dir",
+    "atomic_write",
+    "load_calibration",
+    "load_measurements",
+    "load_robot",
+    "load_units",
+    "robot_to_yaml",
+    "save_measurements",
+    "save_robot",
+    "write_table",
+]

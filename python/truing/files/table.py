@@ -1,0 +1,254 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""CSV and Parquet files as columns of numbers and labels, with errors that name line and column.
+
+Arrow reads on all cores. Where a file is at fault it says so in its own words, or not at which line; the file is then read a
+second time, slowly, to find the place: only a file that is refused anyway costs that time.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+from numpy.typing import NDArray
+
+from truing.errors import InputError
+from truing.files.common import PARQUET_SUFFIXES, decoded, listed, reason, shown
+
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int32]
+
+_PARQUET_MAGIC = b"PAR1"
+_LONGEST_HEADER = 1_000_000
+# What programs write for "no value"; "nan" is not among them: a number that came out as NaN is another matter.
+_EMPTY = ["", "NA", "N/A", "#N/A", "null", "NULL"]
+_NUMBER = re.compile(r"\s*[-+]?(([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?|inf(inity)?|nan)\s*", re.IGNORECASE)
+
+
+class Table:
+    """A table on disk. `names` is known at once; `read` loads it; then columns are taken out one by one."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.rows = 0
+        self._columns: dict[str, Any] = {}
+        try:
+            with path.open("rb") as file:
+                head = file.read(65536)
+                file.seek(0)
+                first_line = file.readline(_LONGEST_HEADER)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path}: cannot be read: {reason(error)}") from None
+        if not head.strip():
+            raise InputError(f"{path}: is empty, expected a table: column names, then one line per row")
+        self._is_parquet = head.startswith(_PARQUET_MAGIC)
+        if not self._is_parquet and path.suffix.lower() in PARQUET_SUFFIXES:
+            raise InputError(f"{path}: is not a Parquet file, though its name says so")
+        self.names = self._parquet_names() if self._is_parquet else self._csv_names(head, first_line)
+        self._check_names()
+
+    def refuse(self, message: str, *, row: int | None = None, column: str | None = None) -> NoReturn:
+        """Raises InputError about the file, a column, or the cell in `row` (counted from 0)."""
+        where = [str(self.path)]
+        if row is not None:
+            where.append(f"row {row + 1}" if self._is_parquet else f"line {self._csv_cell(row, None)[0]}")
+        if column is not None:
+            where.append(f"column {column!r}")
+        raise InputError(f"{', '.join(where)}: {message}")
+
+    def refuse_cell(self, row: int, column: str, expected: str) -> NoReturn:
+        """Raises InputError: what the file holds there, and what was expected."""
+        cell = str(self._columns[column][row].as_py()) if self._is_parquet else self._csv_cell(row, column)[1]
+        found = "an empty cell" if cell in ("", "None") else shown(cell)
+        self.refuse(f"found {found}, expected {expected}", row=row, column=column)
+
+    def read(self, numbers: Collection[str], labels: Collection[str]) -> None:
+        """Loads the table. All other columns may hold numbers or nothing; text in them is refused."""
+        table = self._read_parquet() if self._is_parquet else self._read_csv(numbers, labels)
+        self.rows = table.num_rows
+        if self.rows == 0:
+            self.refuse("has column names but no rows")
+        self._columns = dict(zip(self.names, table.columns, strict=True))
+        for name in self.names:
+            kind = self._columns[name].type
+            if name not in labels and not _is_number(kind):
+                self._refuse_text(name, str(kind), known=name in numbers)
+
+    def numbers(self, name: str, expected: str = "a finite number", *, gaps: bool = False, any_value: bool = False) -> Floats:
+        """The column as contiguous doubles, without a copy where Arrow has them so.
+
+        Empty cells become NaN if `gaps`, else they are refused; NaN and infinity in the file are refused. With `any_value`
+        everything is taken.
+        """
+        column = self._columns[name]
+        if column.type != pa.float64():
+            column = column.cast(pa.float64(), safe=False)
+        chunks = column.chunks
+        if len(chunks) == 1:
+            values = chunks[0].to_numpy(zero_copy_only=False)
+        else:
+            values = np.empty(self.rows)
+            start = 0
+            for chunk in chunks:
+                values[start : start + len(chunk)] = chunk.to_numpy(zero_copy_only=False)
+                start += len(chunk)
+        if not any_value:
+            wrong = ~np.isfinite(values)
+            if gaps and wrong.any() and column.null_count:
+                wrong &= ~column.is_null().to_numpy()
+            if wrong.any():
+                self.refuse_cell(int(np.argmax(wrong)), name, expected)
+        if not self._is_parquet:
+            del self._columns[name]  # the memory can go; what an error message needs is in the file
+        return np.asarray(values, dtype=np.float64)
+
+    def labels(self, name: str) -> tuple[Codes, list[str]]:
+        """The column of text as codes into a list of names without spaces around them; -1: an empty cell."""
+        column = self._columns[name]
+        try:
+            if not pa.types.is_dictionary(column.type):
+                column = column.cast(pa.string()).dictionary_encode()
+            column = column.unify_dictionaries()
+            words = [str(word or "").strip() for word in column.chunk(0).dictionary.to_pylist()]
+        except (pa.ArrowException, ValueError) as error:
+            self.refuse(f"found {column.type} values, expected text ({reason(error)})", column=name)
+        names = [word for word in dict.fromkeys(words) if word]
+        for name_found in names:
+            if not name_found.isprintable():
+                self.refuse(f"found {shown(name_found)}, expected a name without unprintable characters", column=name)
+        place = {word: code for code, word in enumerate(names)}
+        lookup = np.array([*(place.get(word, -1) for word in words), -1], dtype=np.int32)
+        codes = np.empty(self.rows, dtype=np.int32)
+        start = 0
+        for chunk in column.chunks:
+            codes[start : start + len(chunk)] = lookup[chunk.indices.fill_null(len(words)).to_numpy(zero_copy_only=False)]
+            start += len(chunk)
+        return codes, names
+
+    # ---- Names
+
+    def _check_names(self) -> None:
+        where = self.path if self._is_parquet else f"{self.path}, line 1"
+        if len(self.names) == 1:
+            for separator, called in ((";", "semicolons"), ("\t", "tabs")):
+                if separator in self.names[0]:
+                    raise InputError(f"{where}: columns are separated by {called}, expected commas (and points as decimal marks)")
+        first: dict[str, int] = {}
+        for number, name in enumerate(self.names, 1):
+            if not name:
+                raise InputError(f"{where}: column {number} has no name; the others are {listed([n for n in self.names if n])}")
+            if not name.isprintable():
+                raise InputError(f"{where}: the name of column {number}, {shown(name)}, holds characters that cannot be printed")
+            if name in first:
+                raise InputError(f"{where}: columns {first[name]} and {number} are both called {name!r}: remove one")
+            first[name] = number
+
+    def _parquet_names(self) -> list[str]:
+        try:
+            return [str(name).strip() for name in pa.parquet.read_schema(self.path).names]
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
+
+    def _csv_names(self, head: bytes, first_line: bytes) -> list[str]:
+        decoded(self.path, head[: head.rfind(b"\n") + 1] or head)  # binary or of another encoding?
+        if len(first_line) >= _LONGEST_HEADER:
+            raise InputError(f"{self.path}, line 1: has more than {_LONGEST_HEADER} characters, expected column names")
+        line = re.split(r"[\r\n]", decoded(self.path, first_line))[0]
+        if not line.strip():
+            raise InputError(f"{self.path}, line 1: is blank, expected column names")
+        if line.count('"') % 2:
+            raise InputError(f"{self.path}, line 1: a quotation mark is not closed")
+        try:
+            return [name.strip() for name in next(csv.reader([line]))]
+        except (csv.Error, StopIteration) as error:
+            raise InputError(f"{self.path}, line 1: expected column names, separated by commas ({error})") from None
+
+    # ---- Loading
+
+    def _read_parquet(self) -> Any:
+        try:
+            return pa.parquet.read_table(self.path, partitioning=None)
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
+
+    def _read_csv(self, numbers: Collection[str], labels: Collection[str]) -> Any:
+        types = dict.fromkeys(numbers, pa.float64()) | dict.fromkeys(labels, pa.dictionary(pa.int32(), pa.string()))
+        # The header is skipped, not parsed again: Arrow would leave spaces around the names.
+        read = pa.csv.ReadOptions(column_names=self.names, skip_rows=1)
+        convert = pa.csv.ConvertOptions(column_types=types, null_values=_EMPTY, true_values=[], false_values=[])
+        try:
+            return pa.csv.read_csv(str(self.path), read_options=read, convert_options=convert)
+        except (pa.ArrowException, OSError, ValueError) as error:
+            complaint = reason(error)
+        if "Empty CSV file" in complaint or "Could not skip initial" in complaint:
+            self.refuse("has column names but no rows")
+        self._find_fault(numbers)
+        raise InputError(f"{self.path}: cannot be read as a table: {complaint[:200]}")
+
+    def _csv_lines(self) -> Iterator[tuple[int, list[str]]]:
+        """Line number and cells of every row, the slow way."""
+        with self.path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+            reader = csv.reader(file)
+            next(reader)
+            for cells in reader:
+                if cells:  # Arrow passes over blank lines, too
+                    yield reader.line_num, cells
+
+    def _find_fault(self, numbers: Collection[str]) -> None:
+        """Raises InputError for the first line with a wrong number of cells, or without a number where one belongs."""
+        places = [(self.names.index(name), name) for name in numbers]
+        last = 1
+        try:
+            for line, cells in self._csv_lines():
+                last = line
+                if len(cells) != len(self.names):
+                    raise InputError(f"{self.path}, line {line}: found {len(cells)} cells, expected {len(self.names)} "
+                                     "as there are column names")  # fmt: skip
+                for place, name in places:
+                    if cells[place] not in _EMPTY and not _NUMBER.fullmatch(cells[place]):
+                        hint = " with a point as decimal mark" if "," in cells[place] else ""
+                        raise InputError(f"{self.path}, line {line}, column {name!r}: found {shown(cells[place])}, "
+                                         f"expected a number{hint}")  # fmt: skip
+        except csv.Error as error:
+            raise InputError(f"{self.path}, after line {last}: cannot be read as a table: {error}") from None
+
+    def _csv_cell(self, row: int, column: str | None) -> tuple[int, str]:
+        """Line number of a row, and the text in one of its cells."""
+        place = None if column is None else self.names.index(column)
+        try:
+            for index, (line, cells) in enumerate(self._csv_lines()):
+                if index == row:
+                    return line, cells[place].strip() if place is not None and place < len(cells) else ""
+        except (csv.Error, OSError):
+            pass
+        return row + 2, "?"
+
+    def _refuse_text(self, name: str, kind: str, *, known: bool) -> NoReturn:
+        if self._is_parquet:
+            self.refuse(f"holds {kind} values, expected numbers", column=name)
+        place = self.names.index(name)
+        for line, cells in self._csv_lines():
+            if place < len(cells) and cells[place] not in _EMPTY and not _NUMBER.fullmatch(cells[place]):
+                what = "a number" if known else "a number: an unknown column is kept as a covariate, and text cannot be one"
+                raise InputError(f"{self.path}, line {line}, column {name!r}: found {shown(cells[place])}, expected {what}")
+        self.refuse(f"holds {kind} values, expected numbers", column=name)
+
+
+def _is_number(kind: Any) -> bool:
+    types = pa.types
+    return bool(types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind) or types.is_null(kind))
+
+
+def sample_rows(rows: int, at_most: int) -> NDArray[np.intp]:
+    """`at_most` rows spread evenly over a table, or all of them."""
+    step = max(1, math.ceil(rows / at_most))
+    return np.arange(0, rows, step, dtype=np.intp)

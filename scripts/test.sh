@@ -1,0 +1,155 @@
+#!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Every check of truing, in order, up to the first that fails. Run `scripts/setup.sh --test` first, or `make test`.
+#
+#   scripts/test.sh              all steps
+#   scripts/test.sh cpp python   only these: cpp sanitize consumer python stubs types examples docs
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+root=$PWD
+python=$root/.venv/bin/python
+jobs=${JOBS:-$(nproc)}
+export CMAKE_BUILD_PARALLEL_LEVEL=$jobs CTEST_PARALLEL_LEVEL=$jobs CTEST_OUTPUT_ON_FAILURE=1
+export CMAKE_GENERATOR=${CMAKE_GENERATOR:-Ninja}
+
+[[ -x $python && -e .venv/.extras ]] || {
+  echo "scripts/test.sh: .venv is missing or has no test packages; run scripts/setup.sh --test" >&2
+  exit 1
+}
+
+# ---- The steps. Each is run in a shell of its own, under set -e. -----------------------------------------------------
+
+step_cpp() {
+  cmake -S . -B build/tests -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON > build/tests.configure.log ||
+    { cat build/tests.configure.log; return 1; }
+  cmake --build build/tests
+  ctest --test-dir build/tests
+}
+
+step_sanitize() {
+  cmake -S . -B build/asan -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DTRUING_SANITIZE=ON -DCMAKE_BUILD_TYPE=Debug \
+    -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" > build/asan.configure.log || { cat build/asan.configure.log; return 1; }
+  cmake --build build/asan
+  ctest --test-dir build/asan
+}
+
+step_consumer() {
+  rm -rf build/prefix
+  cmake --install build/tests --prefix build/prefix > build/install.log
+  cmake -S tests/consumer -B build/consumer -DCMAKE_PREFIX_PATH="$root/build/prefix" -DCMAKE_BUILD_TYPE=Release \
+    > build/consumer.configure.log || { cat build/consumer.configure.log; return 1; }
+  cmake --build build/consumer
+  ctest --test-dir build/consumer -L consumer
+}
+
+# The folder to run Python in: the source tree's own python/ must not be importable, only what is installed.
+elsewhere() {
+  mkdir -p "build/run/$1"
+  cd "build/run/$1"
+  "$python" - "$root" << 'PYTHON'
+import pathlib, sys
+
+import truing
+where = pathlib.Path(truing.__file__).resolve()
+if not where.is_relative_to(pathlib.Path(sys.argv[1]) / ".venv"):
+    sys.exit(f"truing is imported from {where}, not from the installed wheel")
+PYTHON
+}
+
+step_python() {
+  elsewhere python
+  "$python" -m pytest -c "$root/pyproject.toml" --rootdir "$root" "$root/tests/python" 2>&1 |
+    tee "$root/build/pytest.log"
+}
+
+step_stubs() {
+  scripts/stubs.sh --check
+}
+
+step_types() {
+  elsewhere types
+  "$python" -m mypy --config-file "$root/pyproject.toml" --cache-dir "$root/build/mypy_cache" -p truing
+  shopt -s nullglob
+  local example
+  # One at a time: two scripts may well have functions of the same name.
+  for example in "$root"/examples/python/*.py; do
+    "$python" -m mypy --config-file "$root/pyproject.toml" --cache-dir "$root/build/mypy_cache" "$example"
+  done
+}
+
+step_examples() {
+  # The C++ examples were built with the consumer, against the installed library.
+  if compgen -G 'examples/cpp/*.cpp' > /dev/null; then
+    [[ -d build/consumer ]] || step_consumer
+    ctest --test-dir build/consumer -L example
+  fi
+  elsewhere examples
+  shopt -s nullglob
+  local example
+  for example in "$root"/examples/python/*.py; do
+    printf '%s: ' "examples/python/${example##*/}"
+    if ! timeout 300 "$python" "$example" > "${example##*/}.log" 2>&1; then
+      printf 'failed\n'
+      cat "${example##*/}.log"
+      return 1
+    fi
+    printf 'ran\n'
+  done
+}
+
+step_docs() {
+  "$python" tests/check_links.py
+}
+
+# ---- Running them ----------------------------------------------------------------------------------------------------
+
+title() {
+  case $1 in
+    cpp) echo "C++ tests, warnings as errors" ;;
+    sanitize) echo "C++ tests under AddressSanitizer and UBSan" ;;
+    consumer) echo "a project that uses the installed C++ library" ;;
+    python) echo "Python tests against the installed wheel" ;;
+    stubs) echo "stubs: committed against generated" ;;
+    types) echo "types of the installed package and the examples" ;;
+    examples) echo "examples, C++ and Python" ;;
+    docs) echo "links of the documentation" ;;
+    *) return 1 ;;
+  esac
+}
+
+all=(cpp sanitize consumer python stubs types examples docs)
+steps=("$@")
+[[ $# -gt 0 ]] || steps=("${all[@]}")
+for step in "${steps[@]}"; do
+  title "$step" > /dev/null || { echo "scripts/test.sh: no step '$step'; there are: ${all[*]}" >&2; exit 1; }
+done
+
+# Run as "scripts/test.sh" runs itself for one step, so that set -e holds inside the step.
+if [[ ${TRUING_TEST_STEP:-} == 1 ]]; then
+  "step_${steps[0]}"
+  exit
+fi
+
+rm -f build/pytest.log
+number=0
+summary=""
+for step in "${steps[@]}"; do
+  number=$((number + 1))
+  printf '\n==== %d/%d  %s ====\n' "$number" "${#steps[@]}" "$(title "$step")"
+  started=$SECONDS
+  if ! TRUING_TEST_STEP=1 bash "$root/scripts/test.sh" "$step"; then
+    printf '\n==== FAILED: %s (again: scripts/test.sh %s) ====\n' "$(title "$step")" "$step"
+    [[ $step == python ]] || printf '%d steps passed, 1 failed\n' $((number - 1))
+    if [[ $step == python ]]; then tail -n 1 build/pytest.log; fi
+    exit 1
+  fi
+  summary+=$(printf '%5d s  %s' $((SECONDS - started)) "$(title "$step")")$'\n'
+done
+
+printf '\n==== all %d steps passed ====\n%s' "${#steps[@]}" "$summary"
+if [[ -e build/pytest.log ]]; then
+  # The tests' own closing line, once more.
+  tail -n 1 build/pytest.log
+fi
