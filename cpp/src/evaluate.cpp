@@ -56,7 +56,9 @@ struct ConstantSource {
 
 /// A segment's program, but for the numbers that change with the parameters.
 struct Compiled {
+  std::vector<kernel::Step> prefix;  ///< the same for all poses: base, and what stands before the first joint
   std::vector<kernel::Step> steps;
+  std::vector<int> fixed_slots;      ///< saved within the prefix
   std::vector<double> constants;  ///< fixed rotations are in place already
   std::vector<ConstantSource> sources;
   std::vector<DynamicSite> dynamic;
@@ -164,6 +166,13 @@ Compiled compile(const Model& model, const Segment& segment, const std::vector<i
   for (int s = 0; s < model.common_sites; ++s) add_site(s);
   for (int s = model.target_first[segment.target]; s < model.target_first[segment.target + 1]; ++s) add_site(s);
 
+  const auto first_dynamic = std::find_if(out.steps.begin(), out.steps.end(), [](const kernel::Step& step) { return step.dynamic >= 0; });
+  out.prefix.assign(out.steps.begin(), first_dynamic);
+  out.steps.erase(out.steps.begin(), first_dynamic);
+  for (const kernel::Step& step : out.prefix) {
+    if (step.slot >= 0) out.fixed_slots.push_back(step.slot);
+  }
+
   for (std::size_t f = 0; f < free.size(); ++f) {
     const ParameterInfo& info = model.parameters[free[f]];
     if (!is_seen(info, segment)) continue;
@@ -186,6 +195,37 @@ Compiled compile(const Model& model, const Segment& segment, const std::vector<i
 }
 
 }  // namespace
+
+/// What the prefix comes to: the frame after it (R column by column, then p), and the vectors that it saves.
+static void sweep_prefix(const Compiled& program, const std::vector<double>& constants, std::vector<double>* start, std::vector<double>* fixed_vectors) {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+  fixed_vectors->clear();
+  for (const kernel::Step& step : program.prefix) {
+    const double* constant = constants.data() + step.constant;
+    const auto rotate = [&](int u, int v) {
+      const Eigen::Vector3d u0 = R.col(u), v0 = R.col(v);
+      R.col(u) = constant[0] * u0 + constant[1] * v0;
+      R.col(v) = constant[0] * v0 - constant[1] * u0;
+    };
+    const auto save = [&](const Eigen::Vector3d& v) { fixed_vectors->insert(fixed_vectors->end(), v.data(), v.data() + 3); };
+    switch (step.code) {
+      case Code::rotate_x: rotate(1, 2); break;
+      case Code::rotate_y: rotate(2, 0); break;
+      case Code::rotate_z: rotate(0, 1); break;
+      case Code::translate_x: p += constant[0] * R.col(0); break;
+      case Code::translate_y: p += constant[0] * R.col(1); break;
+      case Code::translate_z: p += constant[0] * R.col(2); break;
+      case Code::rotate_fixed: R = R * Eigen::Map<const Eigen::Matrix3d>(constant); break;
+      case Code::save_x: save(R.col(0)); break;
+      case Code::save_y: save(R.col(1)); break;
+      case Code::save_z: save(R.col(2)); break;
+      case Code::save_origin: save(p); break;
+    }
+  }
+  std::copy(R.data(), R.data() + 9, start->begin());
+  std::copy(p.data(), p.data() + 3, start->begin() + 9);
+}
 
 std::vector<Segment> make_segments(const Measurements& data, const std::vector<std::int32_t>& rows, bool as_positions) {
   std::map<std::tuple<int, int, int>, Segment> sorted;
@@ -268,7 +308,7 @@ struct Evaluator::Impl {
   struct Workspace {
     Buffer values, bases, coordinates, measured, position_weight, rotation_weight, slots, jacobian, squared_norm, tip, accumulator;
     std::vector<double> local;
-    std::vector<std::vector<double>> constants;  ///< per segment
+    std::vector<std::vector<double>> constants, starts, fixed_vectors;  ///< per segment
     double anchor[4] = {0, 0, 0, 0};
     bool clean_accumulator = true;
   };
@@ -304,16 +344,22 @@ struct Evaluator::Impl {
       w.measured = Buffer(12 * kTilePoses);
       w.position_weight = Buffer(kTilePoses);
       w.rotation_weight = Buffer(kTilePoses);
-      w.slots = Buffer(most_slots * 3 * 8);
+      w.slots = Buffer(most_slots * 3 * kernel::kMostGroupPoses);
       w.jacobian = Buffer(gram_columns * kMaxComponents * kTilePoses);
       w.squared_norm = Buffer(kTilePoses);
       w.tip = Buffer(12 * kTilePoses);
       w.accumulator = Buffer(run.gram_size(static_cast<int>(gram_columns)));
       w.local.resize(gram_columns * gram_columns);
-      for (const Compiled& c : compiled) w.constants.push_back(c.constants);
+      for (const Compiled& c : compiled) {
+        w.constants.push_back(c.constants);
+        w.starts.emplace_back(12);
+        w.fixed_vectors.emplace_back();
+        w.fixed_vectors.back().reserve(3 * c.fixed_slots.size());
+      }
     }
     const std::size_t p = free.size() + 1;
-    slot_sums.assign(static_cast<std::size_t>(std::min<std::size_t>(kSlots, tiles.size())), std::vector<double>(p * p + 1));
+    const std::size_t slots = std::min<std::size_t>(kSlots, (tiles.size() + kTilesPerReduce - 1) / kTilesPerReduce);
+    slot_sums.assign(slots, std::vector<double>(p * p + 1));
   }
 
   /// The numbers of the programs that depend on the parameters.
@@ -332,6 +378,7 @@ struct Evaluator::Impl {
           at[0] = value;
         }
       }
+      sweep_prefix(compiled[k], w->constants[k], &w->starts[k], &w->fixed_vectors[k]);
     }
     for (std::size_t i = 0; i < model.parameters.size(); ++i) {
       if (model.parameters[i].role == Role::anchor) w->anchor[model.parameters[i].axis] = values[static_cast<Eigen::Index>(i)];
@@ -343,8 +390,15 @@ struct Evaluator::Impl {
     const Segment& segment = segments[range.segment];
     const Compiled& program = compiled[range.segment];
     const std::int32_t* rows = segment.rows.data() + range.first;
-    const auto fill = [&](double* out, const auto& value) {
-      for (int i = 0; i < range.count; ++i) out[i] = value(static_cast<std::size_t>(rows[i]));
+    // Rows are in increasing order: when first and last are as far apart as their places, all lie side by side.
+    const bool side_by_side = rows[range.count - 1] - rows[0] == range.count - 1;
+    const auto fill = [&](double* out, Column column, double scale, double offset) {
+      if (side_by_side && column.stride == 1) {
+        const double* in = column.data + rows[0];
+        for (int i = 0; i < range.count; ++i) out[i] = scale * in[i] + offset;
+      } else {
+        for (int i = 0; i < range.count; ++i) out[i] = scale * column[static_cast<std::size_t>(rows[i])] + offset;
+      }
       for (int i = range.count; i < kTilePoses; ++i) out[i] = out[range.count - 1];
     };
     for (std::size_t k = 0; k < model.coordinates.size(); ++k) {
@@ -352,9 +406,7 @@ struct Evaluator::Impl {
       double* out = w->coordinates.get() + k * kTilePoses;
       const double offset = coordinate.offset < 0 ? 0.0 : values[coordinate.offset];
       if (coordinate.reading >= 0) {
-        const Column column = data.joints[coordinate.reading];
-        const double ratio = values[coordinate.ratio];
-        fill(out, [&](std::size_t row) { return ratio * column[row] + offset; });
+        fill(out, data.joints[coordinate.reading], values[coordinate.ratio], offset);
       } else {
         std::fill(out, out + kTilePoses, offset);
       }
@@ -367,23 +419,17 @@ struct Evaluator::Impl {
     }
     for (std::size_t s = 0; s < program.dynamic.size(); ++s) {
       double* out = w->values.get() + s * kTilePoses;
-      const double constant = program.dynamic[s].parameter < 0 ? 0.0 : values[program.dynamic[s].parameter];
-      std::fill(out, out + kTilePoses, constant);
+      double constant = program.dynamic[s].parameter < 0 ? 0.0 : values[program.dynamic[s].parameter];
       for (const auto& [coordinate, weight] : program.dynamic[s].moved_by) {
         const double* in = w->coordinates.get() + coordinate * kTilePoses;
-        for (int i = 0; i < kTilePoses; ++i) out[i] += weight * in[i];
+        const bool first = &weight == &program.dynamic[s].moved_by.front().second;
+        for (int i = 0; i < kTilePoses; ++i) out[i] = (first ? constant : out[i]) + weight * in[i];
       }
     }
     for (std::size_t b = 0; b < program.bases.size(); ++b) {
       double* out = w->bases.get() + b * kTilePoses;
       const auto [reading, term] = program.bases[b];
-      if (reading >= 0) {
-        const Column column = data.joints[reading];
-        fill(out, [&](std::size_t row) { return column[row]; });
-      } else {
-        const std::vector<double>& basis = bases[term];
-        fill(out, [&](std::size_t row) { return basis[row]; });
-      }
+      fill(out, reading >= 0 ? data.joints[reading] : Column{bases[term].data(), 1}, 1.0, 0.0);
     }
     double* measured = w->measured.get();
     if (!with_measurements) {
@@ -393,12 +439,9 @@ struct Evaluator::Impl {
         std::fill(measured + k * kTilePoses, measured + (k + 1) * kTilePoses, values[point_parameter(segment.point, k)]);
       }
     } else if (segment.kind == Kind::distance) {
-      fill(measured, [&](std::size_t row) { return data.distance[row]; });
+      fill(measured, data.distance, 1.0, 0.0);
     } else {
-      for (int k = 0; k < 3; ++k) {
-        const Column column = data.position[k];
-        fill(measured + k * kTilePoses, [&](std::size_t row) { return column[row]; });
-      }
+      for (int k = 0; k < 3; ++k) fill(measured + k * kTilePoses, data.position[k], 1.0, 0.0);
       if (segment.kind == Kind::pose) {
         for (int i = 0; i < kTilePoses; ++i) {
           const auto row = static_cast<std::size_t>(rows[std::min(i, range.count - 1)]);
@@ -439,6 +482,10 @@ struct Evaluator::Impl {
     p.steps = program.steps.data();
     p.step_count = static_cast<int>(program.steps.size());
     p.constants = w->constants[range.segment].data();
+    p.start = w->starts[range.segment].data();
+    p.fixed_slots = program.fixed_slots.data();
+    p.fixed_vectors = w->fixed_vectors[range.segment].data();
+    p.fixed_slot_count = static_cast<int>(program.fixed_slots.size());
     p.parts = program.parts.data();
     p.columns = program.columns.data();
     p.column_count = with_jacobian ? static_cast<int>(program.columns.size()) : 0;
@@ -459,7 +506,6 @@ struct Evaluator::Impl {
     t.residual = w->jacobian.get() + p.column_count * components_of(segment.kind) * kTilePoses;
     t.squared_norm = w->squared_norm.get();
     t.tip = with_measurements ? nullptr : w->tip.get();
-    t.poses = kTilePoses;
     run.evaluate(p, t);
   }
 

@@ -230,16 +230,17 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
     program.kind = Kind::position;
     program.steps = steps;
     program.step_count = 2;
+    const double start[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     program.constants = constants;
+    program.start = start;
     program.position_scale = program.rotation_scale = 1.0;
-    std::vector<double> values(kTilePoses), measured(3 * kTilePoses, 0.0), residual(3 * kTilePoses), slots(64);
+    std::vector<double> values(kTilePoses), measured(3 * kTilePoses, 0.0), residual(3 * kTilePoses), slots(256);
     for (int i = 0; i < kTilePoses; ++i) values[i] = i < 20 ? (i - 10) * M_PI / 4 : (i - 30) * 137.3;
     Tile tile{};
     tile.values = values.data();
     tile.measured = measured.data();
     tile.slots = slots.data();
     tile.jacobian = tile.residual = residual.data();
-    tile.poses = kTilePoses;
     f->evaluate(program, tile);
     for (int i = 0; i < kTilePoses; ++i) {
       CHECK(std::abs(residual[i] - std::cos(values[i])) < 3e-16);

@@ -31,15 +31,17 @@ inline Vec operator-(Vec a, Vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec operator*(Pack s, Vec a) { return {s * a.x, s * a.y, s * a.z}; }
 inline Pack dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Vec cross(Vec a, Vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-inline Vec load_slot(const double* slots, int slot) {
-  const double* p = slots + 3 * kLanes * slot;
-  return {load(p), load(p + kLanes), load(p + 2 * kLanes)};
-}
-inline void store_slot(double* slots, int slot, Vec v) {
-  double* p = slots + 3 * kLanes * slot;
+
+// Poses that go through the chain together: enough independent work to hide what one multiplication waits for the last.
+constexpr int kGroupPoses = kLanes == 8 ? 16 : 8;
+static_assert(kGroupPoses <= kMostGroupPoses && kTilePoses % kGroupPoses == 0, "a tile is made of whole groups");
+
+// A vector for each pose of a group: [3][kGroupPoses].
+inline Vec load_vec(const double* p) { return {load(p), load(p + kGroupPoses), load(p + 2 * kGroupPoses)}; }
+inline void store_vec(double* p, Vec v) {
   store(p, v.x);
-  store(p + kLanes, v.y);
-  store(p + 2 * kLanes, v.z);
+  store(p + kGroupPoses, v.y);
+  store(p + 2 * kGroupPoses, v.z);
 }
 
 // sin and cos to about one unit in the last place for |angle| < 1e5: Cody-Waite reduction by pi/2 in three parts,
@@ -63,56 +65,70 @@ inline void sine_cosine(Pack angle, Pack* sine, Pack* cosine) {
   *cosine = ((quadrant + 1) & 2) != 0 ? -cos_size : cos_size;
 }
 
-struct Frame { Vec x, y, z, p; };
+constexpr int kVec = 3 * kGroupPoses;
 
-// The two columns of R that a rotation mixes: (u, v) <- (c u + s v, c v - s u).
-inline void mix(Vec* u, Vec* v, Pack c, Pack s) {
-  const Vec u0 = *u;
-  *u = c * u0 + s * *v;
-  *v = c * *v - s * u0;
-}
+/// The frame reached so far, for each pose of a group: the columns of R, then p.
+struct Frames {
+  alignas(64) double numbers[4 * kVec];
+  double* column(int k) { return numbers + k * kVec; }
+  const double* column(int k) const { return numbers + k * kVec; }
+  double* origin() { return numbers + 3 * kVec; }
+  const double* origin() const { return numbers + 3 * kVec; }
+};
 
-inline void angle_of(const Program& program, const Tile& tile, const Step& step, int lane, Pack* c, Pack* s) {
-  if (step.dynamic >= 0) {
-    sine_cosine(load(tile.values + step.dynamic * kTilePoses + lane), s, c);
-  } else {
-    *c = splat(program.constants[step.constant]);
-    *s = splat(program.constants[step.constant + 1]);
+// R <- R Rot(angle): the two columns that it mixes become (c u + s v, c v - s u).
+inline void rotate(const Program& program, const double* angles, const Step& step, double* u, double* v) {
+  Pack c{}, s{};
+  if (step.dynamic < 0) {
+    c = splat(program.constants[step.constant]);
+    s = splat(program.constants[step.constant + 1]);
+  }
+  for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
+    if (step.dynamic >= 0) sine_cosine(load(angles + lane), &s, &c);
+    const Vec u0 = load_vec(u + lane), v0 = load_vec(v + lane);
+    store_vec(u + lane, c * u0 + s * v0);
+    store_vec(v + lane, c * v0 - s * u0);
   }
 }
 
-inline Pack length_of(const Program& program, const Tile& tile, const Step& step, int lane) {
-  return step.dynamic >= 0 ? load(tile.values + step.dynamic * kTilePoses + lane) : splat(program.constants[step.constant]);
+// p <- p + length * column of R.
+inline void translate(const Program& program, const double* lengths, const Step& step, const double* column, double* origin) {
+  for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
+    const Pack length = step.dynamic < 0 ? splat(program.constants[step.constant]) : load(lengths + lane);
+    store_vec(origin + lane, load_vec(origin + lane) + length * load_vec(column + lane));
+  }
+}
+
+// R <- R F.
+inline void rotate_fixed(const double* m, Frames* f) {
+  for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
+    const Vec x = load_vec(f->column(0) + lane), y = load_vec(f->column(1) + lane), z = load_vec(f->column(2) + lane);
+    for (int k = 0; k < 3; ++k) store_vec(f->column(k) + lane, splat(m[3 * k]) * x + splat(m[3 * k + 1]) * y + splat(m[3 * k + 2]) * z);
+  }
 }
 
 // One sweep from the measurement frame to the target; axes and origins of the wanted sites fall out on the way.
-inline Frame sweep(const Program& program, const Tile& tile, int lane) {
-  const Pack zero = splat(0.0), one = splat(1.0);
-  Frame f{{one, zero, zero}, {zero, one, zero}, {zero, zero, one}, {zero, zero, zero}};
-  Pack c, s;
+inline void sweep(const Program& program, const Tile& tile, int first, Frames* f) {
+  for (int k = 0; k < 12; ++k) {
+    for (int lane = 0; lane < kGroupPoses; lane += kLanes) store(f->numbers + k * kGroupPoses + lane, splat(program.start[k]));
+  }
   for (const Step* step = program.steps; step != program.steps + program.step_count; ++step) {
+    const double* values = tile.values + step->dynamic * kTilePoses + first;  // not read where dynamic < 0
+    double* slot = tile.slots + step->slot * kVec;
     switch (step->code) {
-      case Code::rotate_x: angle_of(program, tile, *step, lane, &c, &s); mix(&f.y, &f.z, c, s); break;
-      case Code::rotate_y: angle_of(program, tile, *step, lane, &c, &s); mix(&f.z, &f.x, c, s); break;
-      case Code::rotate_z: angle_of(program, tile, *step, lane, &c, &s); mix(&f.x, &f.y, c, s); break;
-      case Code::translate_x: f.p = f.p + length_of(program, tile, *step, lane) * f.x; break;
-      case Code::translate_y: f.p = f.p + length_of(program, tile, *step, lane) * f.y; break;
-      case Code::translate_z: f.p = f.p + length_of(program, tile, *step, lane) * f.z; break;
-      case Code::rotate_fixed: {
-        const double* m = program.constants + step->constant;
-        const Frame g = f;
-        f.x = splat(m[0]) * g.x + splat(m[1]) * g.y + splat(m[2]) * g.z;
-        f.y = splat(m[3]) * g.x + splat(m[4]) * g.y + splat(m[5]) * g.z;
-        f.z = splat(m[6]) * g.x + splat(m[7]) * g.y + splat(m[8]) * g.z;
-        break;
-      }
-      case Code::save_x: store_slot(tile.slots, step->slot, f.x); break;
-      case Code::save_y: store_slot(tile.slots, step->slot, f.y); break;
-      case Code::save_z: store_slot(tile.slots, step->slot, f.z); break;
-      case Code::save_origin: store_slot(tile.slots, step->slot, f.p); break;
+      case Code::rotate_x: rotate(program, values, *step, f->column(1), f->column(2)); break;
+      case Code::rotate_y: rotate(program, values, *step, f->column(2), f->column(0)); break;
+      case Code::rotate_z: rotate(program, values, *step, f->column(0), f->column(1)); break;
+      case Code::translate_x: translate(program, values, *step, f->column(0), f->origin()); break;
+      case Code::translate_y: translate(program, values, *step, f->column(1), f->origin()); break;
+      case Code::translate_z: translate(program, values, *step, f->column(2), f->origin()); break;
+      case Code::rotate_fixed: rotate_fixed(program.constants + step->constant, f); break;
+      case Code::save_x: std::memcpy(slot, f->column(0), kVec * sizeof(double)); break;
+      case Code::save_y: std::memcpy(slot, f->column(1), kVec * sizeof(double)); break;
+      case Code::save_z: std::memcpy(slot, f->column(2), kVec * sizeof(double)); break;
+      case Code::save_origin: std::memcpy(slot, f->origin(), kVec * sizeof(double)); break;
     }
   }
-  return f;
 }
 
 // Square root of the weight that a robust loss gives a residual of squared norm s2 (IRLS: weight = rho'(s) / s).
@@ -128,44 +144,37 @@ inline Pack root_weight(RowLoss loss, double scale, Pack s2) {
   return one;
 }
 
-struct Motion { Vec linear, angular; };
+constexpr int components_of(Kind kind) { return kind == Kind::distance ? 1 : kind == Kind::position ? 3 : 6; }
 
+/// What the columns of one pack of poses need of its residual.
 template <Kind kind>
-inline Motion column_motion(const Program& program, const Tile& tile, const ColumnPlan& plan, Vec tip) {
-  const Pack zero = splat(0.0);
-  Motion sum{{zero, zero, zero}, {zero, zero, zero}};
-  for (const Part* part = program.parts + plan.first_part; part != program.parts + plan.first_part + plan.part_count; ++part) {
-    const Vec axis = load_slot(tile.slots, part->axis);
-    const Vec linear = part->origin < 0 ? axis : cross(axis, tip - load_slot(tile.slots, part->origin));
-    const Pack weight = splat(part->weight);
-    const bool alone = plan.part_count == 1 && part->weight == 1.0;
-    sum.linear = alone ? linear : sum.linear + weight * linear;
-    if (kind == Kind::pose && part->origin >= 0) sum.angular = alone ? axis : sum.angular + weight * axis;
-  }
-  return sum;
-}
+struct PackResidual {
+  Vec tip;
+  Vec toward;                      ///< distance: unit vector from the anchor to the tip
+  Pack qw;                         ///< pose: the error quaternion of R_predicted R_measured^T
+  Vec qv;
+  Pack scale[components_of(kind)];  ///< of every row: 1 / sigma, weight and loss
+};
 
+// Residual, predicted minus measured; its scale, weight and loss.
 template <Kind kind, bool weighted>
-inline void evaluate_pack(const Program& program, const Tile& tile, int lane) {
-  constexpr int components = kind == Kind::distance ? 1 : kind == Kind::position ? 3 : 6;
-  constexpr int column_size = components * kTilePoses;
-  const Frame f = sweep(program, tile, lane);
-  const double* m = tile.measured + lane;
-
-  // Residual, predicted minus measured.
+inline void evaluate_residual(const Program& program, const Tile& tile, const Frames& f, int first, int lane, PackResidual<kind>* out) {
+  constexpr int components = components_of(kind);
+  const int at = first + lane;
+  const double* m = tile.measured + at;
+  const Vec x = load_vec(f.column(0) + lane), y = load_vec(f.column(1) + lane), z = load_vec(f.column(2) + lane);
+  const Vec p = load_vec(f.origin() + lane);
+  out->tip = p;
   Pack r[components];
-  Vec toward{};          // distance: unit vector from the anchor to the tip
-  Pack qw{};             // pose: the error quaternion of R_predicted R_measured^T
-  Vec qv{};
   if (kind == Kind::distance) {
-    const Vec from_anchor = f.p - Vec{splat(program.anchor[0]), splat(program.anchor[1]), splat(program.anchor[2])};
+    const Vec from_anchor = p - Vec{splat(program.anchor[0]), splat(program.anchor[1]), splat(program.anchor[2])};
     const Pack length = square_root(dot(from_anchor, from_anchor));
-    toward = (1.0 / length) * from_anchor;
+    out->toward = (1.0 / length) * from_anchor;
     r[0] = length + program.anchor[3] - load(m);
   } else {
-    r[0] = f.p.x - load(m);
-    r[1] = f.p.y - load(m + kTilePoses);
-    r[2] = f.p.z - load(m + 2 * kTilePoses);
+    r[0] = p.x - load(m);
+    r[1] = p.y - load(m + kTilePoses);
+    r[2] = p.z - load(m + 2 * kTilePoses);
   }
   if (kind == Kind::pose) {
     const auto column = [&](int k) {
@@ -174,56 +183,78 @@ inline void evaluate_pack(const Program& program, const Tile& tile, int lane) {
     };
     const Vec mx = column(0), my = column(1), mz = column(2);
     // E = sum over k of p_k m_k^T: its trace is 4 w^2 - 1, its antisymmetric part sum of m_k x p_k is 4 w v.
-    const Pack trace = dot(mx, f.x) + dot(my, f.y) + dot(mz, f.z);
-    const Pack w2 = 0.25 * (1.0 + trace);
-    qw = square_root(w2 > 1e-12 ? w2 : splat(1e-12));
-    qv = (0.25 / qw) * (cross(mx, f.x) + cross(my, f.y) + cross(mz, f.z));
-    r[components - 3] = 2.0 * qv.x;
-    r[components - 2] = 2.0 * qv.y;
-    r[components - 1] = 2.0 * qv.z;
+    const Pack w2 = 0.25 * (1.0 + dot(mx, x) + dot(my, y) + dot(mz, z));
+    out->qw = square_root(w2 > 1e-12 ? w2 : splat(1e-12));
+    out->qv = (0.25 / out->qw) * (cross(mx, x) + cross(my, y) + cross(mz, z));
+    r[components - 3] = 2.0 * out->qv.x;
+    r[components - 2] = 2.0 * out->qv.y;
+    r[components - 1] = 2.0 * out->qv.z;
   }
 
-  // Scales, weights and loss.
-  Pack scale[components];
   Pack s2 = splat(0.0);
   for (int k = 0; k < components; ++k) {
-    scale[k] = splat(k < 3 ? program.position_scale : program.rotation_scale);
-    if (weighted && tile.position_weight) scale[k] *= load((k < 3 ? tile.position_weight : tile.rotation_weight) + lane);
-    s2 += scale[k] * r[k] * scale[k] * r[k];
+    out->scale[k] = splat(k < 3 ? program.position_scale : program.rotation_scale);
+    if (weighted && tile.position_weight) out->scale[k] *= load((k < 3 ? tile.position_weight : tile.rotation_weight) + at);
+    s2 += out->scale[k] * r[k] * out->scale[k] * r[k];
   }
-  if (tile.squared_norm) store(tile.squared_norm + lane, s2);
-  if (tile.tip) {
-    const Vec out[4] = {f.p, f.x, f.y, f.z};
-    for (int k = 0; k < 4; ++k) {
-      store(tile.tip + (3 * k) * kTilePoses + lane, out[k].x);
-      store(tile.tip + (3 * k + 1) * kTilePoses + lane, out[k].y);
-      store(tile.tip + (3 * k + 2) * kTilePoses + lane, out[k].z);
-    }
-  }
+  if (tile.squared_norm) store(tile.squared_norm + at, s2);
   if (weighted) {
     const Pack root = root_weight(program.loss, program.loss_scale, s2);
-    for (int k = 0; k < components; ++k) scale[k] *= root;
+    for (int k = 0; k < components; ++k) out->scale[k] *= root;
   }
-  for (int k = 0; k < components; ++k) store(tile.residual + k * kTilePoses + lane, weighted ? scale[k] * r[k] : r[k]);
+  for (int k = 0; k < components; ++k) store(tile.residual + k * kTilePoses + at, weighted ? out->scale[k] * r[k] : r[k]);
+  if (tile.tip) {
+    const Vec frame[4] = {p, x, y, z};
+    for (int k = 0; k < 4; ++k) {
+      store(tile.tip + (3 * k) * kTilePoses + at, frame[k].x);
+      store(tile.tip + (3 * k + 1) * kTilePoses + at, frame[k].y);
+      store(tile.tip + (3 * k + 2) * kTilePoses + at, frame[k].z);
+    }
+  }
+}
 
-  // Columns.
-  for (int c = 0; c < program.column_count; ++c) {
-    const ColumnPlan& plan = program.columns[c];
+struct Motion { Vec linear, angular; };
+
+// The tip's motion for a unit of one part: translation [axis; 0], rotation [axis x (tip - origin); axis].
+inline Motion part_motion(const Tile& tile, const Part& part, int lane, Vec tip) {
+  const Vec axis = load_vec(tile.slots + part.axis * kVec + lane);
+  if (part.origin < 0) return {axis, {splat(0.0), splat(0.0), splat(0.0)}};
+  return {cross(axis, tip - load_vec(tile.slots + part.origin * kVec + lane)), axis};
+}
+
+inline Motion column_motion(const Program& program, const Tile& tile, const ColumnPlan& plan, int at, int lane, Vec tip) {
+  const Part* part = program.parts + plan.first_part;
+  Motion sum = part_motion(tile, *part, lane, tip);
+  if (plan.part_count > 1 || part->weight != 1.0) {
+    sum = {splat(part->weight) * sum.linear, splat(part->weight) * sum.angular};
+    for (int k = 1; k < plan.part_count; ++k) {
+      const Motion more = part_motion(tile, part[k], lane, tip);
+      sum = {sum.linear + splat(part[k].weight) * more.linear, sum.angular + splat(part[k].weight) * more.angular};
+    }
+  }
+  if (plan.basis >= 0) {
+    const Pack phi = load(tile.bases + plan.basis * kTilePoses + at);
+    sum = {phi * sum.linear, phi * sum.angular};
+  }
+  return sum;
+}
+
+template <Kind kind, bool weighted>
+inline void evaluate_column(const Program& program, const Tile& tile, const ColumnPlan& plan, int first, const PackResidual<kind>* residuals, double* column) {
+  constexpr int components = components_of(kind);
+  for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
+    const PackResidual<kind>& residual = residuals[lane / kLanes];
     Pack out[components];
     if (plan.fixed_axis >= 0) {
       for (int k = 0; k < components; ++k) out[k] = splat(k == plan.fixed_axis ? -1.0 : 0.0);
       if (kind == Kind::distance) {
-        out[0] = plan.fixed_axis == 0 ? -toward.x : plan.fixed_axis == 1 ? -toward.y : plan.fixed_axis == 2 ? -toward.z : splat(1.0);
+        const Vec t = residual.toward;
+        out[0] = plan.fixed_axis == 0 ? -t.x : plan.fixed_axis == 1 ? -t.y : plan.fixed_axis == 2 ? -t.z : splat(1.0);
       }
     } else {
-      Motion motion = column_motion<kind>(program, tile, plan, f.p);
-      if (plan.basis >= 0) {
-        const Pack phi = load(tile.bases + plan.basis * kTilePoses + lane);
-        motion.linear = phi * motion.linear;
-        if (kind == Kind::pose) motion.angular = phi * motion.angular;
-      }
+      const Motion motion = column_motion(program, tile, plan, first + lane, lane, residual.tip);
       if (kind == Kind::distance) {
-        out[0] = dot(toward, motion.linear);
+        out[0] = dot(residual.toward, motion.linear);
       } else {
         out[0] = motion.linear.x;
         out[1] = motion.linear.y;
@@ -231,20 +262,36 @@ inline void evaluate_pack(const Program& program, const Tile& tile, int lane) {
       }
       if (kind == Kind::pose) {
         // d(2 v) = w omega + omega x v for R_predicted <- Exp(omega) R_predicted.
-        const Vec turn = qw * motion.angular + cross(motion.angular, qv);
+        const Vec turn = residual.qw * motion.angular + cross(motion.angular, residual.qv);
         out[components - 3] = turn.x;
         out[components - 2] = turn.y;
         out[components - 1] = turn.z;
       }
     }
-    double* column = tile.jacobian + static_cast<std::ptrdiff_t>(c) * column_size + lane;
-    for (int k = 0; k < components; ++k) store(column + k * kTilePoses, weighted ? scale[k] * out[k] : out[k]);
+    for (int k = 0; k < components; ++k) store(column + k * kTilePoses + first + lane, weighted ? residual.scale[k] * out[k] : out[k]);
   }
 }
 
 template <Kind kind, bool weighted>
 void evaluate_tile(const Program& program, const Tile& tile) {
-  for (int lane = 0; lane < tile.poses; lane += kLanes) evaluate_pack<kind, weighted>(program, tile, lane);
+  constexpr int column_size = components_of(kind) * kTilePoses;
+  Frames frames;
+  PackResidual<kind> residuals[kGroupPoses / kLanes];
+  for (int k = 0; k < program.fixed_slot_count; ++k) {
+    const double* v = program.fixed_vectors + 3 * k;
+    for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
+      store_vec(tile.slots + program.fixed_slots[k] * kVec + lane, {splat(v[0]), splat(v[1]), splat(v[2])});
+    }
+  }
+  for (int first = 0; first < kTilePoses; first += kGroupPoses) {
+    sweep(program, tile, first, &frames);
+    for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
+      evaluate_residual<kind, weighted>(program, tile, frames, first, lane, &residuals[lane / kLanes]);
+    }
+    for (int c = 0; c < program.column_count; ++c) {
+      evaluate_column<kind, weighted>(program, tile, program.columns[c], first, residuals, tile.jacobian + static_cast<std::ptrdiff_t>(c) * column_size);
+    }
+  }
 }
 
 void evaluate(const Program& program, const Tile& tile) {
@@ -258,13 +305,34 @@ void evaluate(const Program& program, const Tile& tile) {
 
 // Gram: blocks of kRows x kCols columns whose products stay in registers while the tile's rows stream by.
 #if TRUING_LANES == 8
-constexpr int kRows = 4, kCols = 6;  // 24 of 32 registers
+constexpr int kRows = 4, kCols = 4;  // 16 of 32 registers; larger blocks gain less than their sums cost in the first-level cache
 #elif TRUING_LANES == 1
 constexpr int kRows = 2, kCols = 2;
 #else
 constexpr int kRows = 4, kCols = 3;  // 12 of 16 registers
 #endif
 constexpr int kBlock = kRows * kCols * kLanes;
+
+// acc += the products of kRows by kCols columns. Not inlined: the sums then stay in registers through the loop.
+__attribute__((noinline)) void block_product(const double* const* a, const double* const* b, int length, double* acc) {
+  Pack sum[kRows][kCols];
+  for (int m = 0; m < kRows; ++m)
+    for (int n = 0; n < kCols; ++n) sum[m][n] = Pack{};
+  const double* a0[kRows];
+  const double* b0[kCols];
+  for (int m = 0; m < kRows; ++m) a0[m] = a[m];
+  for (int n = 0; n < kCols; ++n) b0[n] = b[n];
+  for (int k = 0; k < length; k += kLanes) {
+    Pack left[kRows];
+    for (int m = 0; m < kRows; ++m) left[m] = load(a0[m] + k);
+    for (int n = 0; n < kCols; ++n) {
+      const Pack right = load(b0[n] + k);
+      for (int m = 0; m < kRows; ++m) sum[m][n] += left[m] * right;
+    }
+  }
+  for (int m = 0; m < kRows; ++m)
+    for (int n = 0; n < kCols; ++n) store(acc + (m * kCols + n) * kLanes, load(acc + (m * kCols + n) * kLanes) + sum[m][n]);
+}
 
 // Calls f(first row column, first col column, accumulator) for each block that touches the upper triangle.
 template <typename F>
@@ -292,19 +360,7 @@ void gram_add(const double* c, std::ptrdiff_t stride, int columns, int length, d
     // Beyond the last column the last one is read again; gram_reduce leaves those products out.
     for (int m = 0; m < kRows; ++m) a[m] = c + stride * (i + m < columns ? i + m : columns - 1);
     for (int n = 0; n < kCols; ++n) b[n] = c + stride * (j + n < columns ? j + n : columns - 1);
-    Pack sum[kRows][kCols];
-    for (int m = 0; m < kRows; ++m)
-      for (int n = 0; n < kCols; ++n) sum[m][n] = load(acc + at + (m * kCols + n) * kLanes);
-    for (int k = 0; k < length; k += kLanes) {
-      Pack left[kRows];
-      for (int m = 0; m < kRows; ++m) left[m] = load(a[m] + k);
-      for (int n = 0; n < kCols; ++n) {
-        const Pack right = load(b[n] + k);
-        for (int m = 0; m < kRows; ++m) sum[m][n] += left[m] * right;
-      }
-    }
-    for (int m = 0; m < kRows; ++m)
-      for (int n = 0; n < kCols; ++n) store(acc + at + (m * kCols + n) * kLanes, sum[m][n]);
+    block_product(a, b, length, acc + at);
   });
 }
 

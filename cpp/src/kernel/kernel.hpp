@@ -11,6 +11,8 @@ namespace truing::kernel {
 
 /// Poses of one tile: its Jacobian (40 columns x 3 rows) just fits the first-level cache.
 constexpr int kTilePoses = 48;
+/// Poses that go through the chain together, at most.
+constexpr int kMostGroupPoses = 16;
 /// A tile's measured rows per pose, at most: position and rotation.
 constexpr int kMaxComponents = 6;
 
@@ -55,6 +57,10 @@ struct Program {
   const Step* steps;
   int step_count;
   const double* constants;
+  const double* start;         ///< frame before the first step: R column by column, then p; what comes before is the same for all poses
+  const int* fixed_slots;      ///< slots saved there, and the vectors in them
+  const double* fixed_vectors;
+  int fixed_slot_count;
   const Part* parts;
   const ColumnPlan* columns;
   int column_count;
@@ -71,12 +77,11 @@ struct Tile {
   const double* measured;  ///< [component][kTilePoses]: x y z | x y z and R column by column | distance
   const double* position_weight;  ///< [kTilePoses] multiplies position or distance rows (0: a padded pose); null: all one
   const double* rotation_weight;  ///< [kTilePoses] the same for rotation rows; null exactly when position_weight is
-  double* slots;           ///< scratch [slot][3 * lanes]
+  double* slots;           ///< scratch, 3 * kMostGroupPoses numbers a slot
   double* jacobian;        ///< out [column][component][kTilePoses]
   double* residual;        ///< out [component][kTilePoses], the column after the Jacobian's last; weighted like it
   double* squared_norm;    ///< out [kTilePoses]: of the scaled residual, before loss and weight; null: not wanted
   double* tip;             ///< out [12][kTilePoses]: p, then R column by column; null: not wanted
-  int poses;               ///< rounded up to whole lanes by the kernel
 };
 
 /// Accumulator of a Gram matrix; `size` doubles, opaque between gram_clear and gram_reduce.
