@@ -52,7 +52,7 @@ std::vector<Term> link_geometry(const Robot& robot, std::size_t joint, const Mea
   return {};
 }
 
-// The joint stops short by half the play, on the side that it comes from: sign(direction) * play / 2.
+// The joint stands half the play further on in the direction that it came in: direction * play / 2.
 std::vector<Term> backlash(const Robot& robot, std::size_t joint, const Measurements& data) {
   const Joint& at = robot.joints.at(joint);
   require_driven("backlash", at);

@@ -4,7 +4,6 @@
 #include "truing/identify.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <iterator>
@@ -102,12 +101,12 @@ int components_of(const Measurements& data, std::size_t row) {
 }
 
 /// The measurement frame refitted to the current predictions by SVD.
-Refit frame_by_registration(const Model& model, const Measurements& data, const Evaluator& evaluator, std::size_t rows) {
+Refit frame_by_registration(const Model& model, const Measurements& data, const Evaluator& evaluator, std::vector<std::int32_t> rows) {
   return [&model, &data, &evaluator, rows](Eigen::VectorXd* values) {
-    Eigen::Matrix3Xd from(3, static_cast<Eigen::Index>(rows)), to(3, static_cast<Eigen::Index>(rows));
-    std::atomic<Eigen::Index> next{0};
+    const auto n = static_cast<Eigen::Index>(rows.size());
+    Eigen::Matrix3Xd from(3, n), to(3, n);
     evaluator.predict(*values, [&](std::size_t row, const double* frame) {
-      const Eigen::Index i = next++;
+      const auto i = std::lower_bound(rows.begin(), rows.end(), static_cast<std::int32_t>(row)) - rows.begin();
       for (int k = 0; k < 3; ++k) {
         from(k, i) = frame[k];
         to(k, i) = data.position[static_cast<std::size_t>(k)][row];
@@ -161,10 +160,10 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
   const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, job.rows), fitted, job.options.threads);
   const bool by_svd = job.options.frame_by == FrameBy::svd &&
                       std::any_of(fitted.begin(), fitted.end(), [&](int k) { return job.model.parameters[k].role == Role::base; });
-  const auto refit_on = [&](const Evaluator& rows, std::size_t count) {
-    return by_svd ? frame_by_registration(job.model, job.data, rows, count) : Refit();
+  const auto refit_on = [&](const Evaluator& of_rows, const std::vector<std::int32_t>& rows) {
+    return by_svd ? frame_by_registration(job.model, job.data, of_rows, rows) : Refit();
   };
-  const Refit refit = refit_on(evaluator, job.rows.size());
+  const Refit refit = refit_on(evaluator, job.rows);
   out.solver = solve(job, evaluator, out.weighing, refit, &out.values);
   if (job.options.loss == Loss::none) return out;
 
@@ -203,7 +202,7 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
     out.rejected = std::move(rejected);
     const std::vector<std::int32_t> kept = without(job.rows, out.rejected);
     const Evaluator clean(job.model, job.data, job.bases, make_segments(job.data, kept), fitted, job.options.threads);
-    out.solver = solve(job, clean, out.weighing, refit_on(clean, kept.size()), &out.values);
+    out.solver = solve(job, clean, out.weighing, refit_on(clean, kept), &out.values);
     iterations += out.solver.iterations;
   }
   out.solver.iterations = iterations;
@@ -250,8 +249,8 @@ std::vector<Predicted> predict_some(const Robot& robot, const Job& job, const Wa
   return out;
 }
 
-/// Base frame by registration of the nominal robot's predictions, and target orientations by the mean of what is left.
-void register_frames(const Job& job, bool base_free, Robot* robot) {
+/// Base frame by registration of the nominal robot's predictions, and target orientations (where they are free) by the mean of what is left.
+void register_frames(const Job& job, bool base_free, const std::vector<bool>& turn_free, Robot* robot) {
   const Measurements& data = job.data;
   const std::vector<Predicted> predicted =
       predict_some(*robot, job, [&](std::size_t row) { return data.has_position(row) && !data.has_fixed_point(row); });
@@ -276,7 +275,7 @@ void register_frames(const Job& job, bool base_free, Robot* robot) {
     turn[target] += (correction.linear() * p.frame.linear()).transpose() * want.normalized().toRotationMatrix();
   }
   for (std::size_t k = 0; k < turn.size(); ++k) {
-    if (!turn[k].isZero(0.0)) robot->targets[k].T_last_target.linear() = robot->targets[k].T_last_target.linear() * nearest_rotation(turn[k]);
+    if (turn_free[k] && !turn[k].isZero(0.0)) robot->targets[k].T_last_target.linear() = robot->targets[k].T_last_target.linear() * nearest_rotation(turn[k]);
   }
 }
 
@@ -329,7 +328,12 @@ double reach_of(const Robot& robot) {
 Start fit_instrument(const Job& nominal_job, const std::vector<std::string>& unknown, const Robot& guess, bool base_free, bool distance) {
   Start out;
   out.robot = guess;
-  register_frames(nominal_job, base_free, &out.robot);
+  std::vector<bool> turn_free(guess.targets.size(), true);
+  for (const ParameterInfo& info : nominal_job.model.parameters) {
+    const bool unknown_turn = std::find(unknown.begin(), unknown.end(), info.name) != unknown.end();
+    if (info.role == Role::target && info.rotation && !unknown_turn) turn_free[static_cast<std::size_t>(info.owner)] = false;
+  }
+  register_frames(nominal_job, base_free, turn_free, &out.robot);
   if (distance) locate_anchor(nominal_job, &out.robot);
   const Model model = make_model(out.robot, nominal_job.data, nominal_job.options.effects, nominal_job.options.own_effects);
   Eigen::VectorXd values = initial_values(model);
@@ -603,7 +607,10 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   Identification result;
   result.set = split(data, options);
   std::vector<std::int32_t> train, test;
-  for (std::size_t row = 0; row < data.rows; ++row) (result.set[row] ? test : train).push_back(static_cast<std::int32_t>(row));
+  for (std::size_t row = 0; row < data.rows; ++row) {
+    if (data.weight && data.weight[row] == 0.0) continue;  // counts for nothing
+    (result.set[row] ? test : train).push_back(static_cast<std::int32_t>(row));
+  }
 
   // What is asked for.
   const Model nominal_model = make_model(nominal, data, options.effects, options.own_effects);

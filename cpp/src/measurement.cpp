@@ -185,6 +185,9 @@ void validate(const Measurements& data, const Robot& robot, bool joints_only) {
   require_finite(data.time, "time", data.rows);
   require_positive(data.position_sigma, "position_sigma", data.rows);
   require_positive(data.rotation_sigma, "rotation_sigma", data.rows);
+  if (data.rotation_sigma && !data.position_sigma) {
+    throw std::invalid_argument("rotation_sigma needs position_sigma beside it: rows are weighed by both or by neither");
+  }
   require_not_negative(data.weight, "weight", data.rows);
   if (!joints_only) require_some_measurement(data);
 }

@@ -82,19 +82,20 @@ bool draw_pose(const Robot& robot, const Model& model, const std::vector<Range>&
   return false;
 }
 
-/// Poses as measurements whose values do not matter: only their Jacobian is wanted.
+/// Poses as measurements of the robot itself: only their Jacobian is wanted, at errors of zero.
 class Poses {
  public:
-  Poses(const std::vector<Pose>& poses, bool orientation) : columns_(static_cast<std::size_t>(poses.empty() ? 0 : poses[0].size())) {
+  Poses(const Robot& robot, const std::vector<Pose>& poses, bool orientation) : columns_(static_cast<std::size_t>(poses.empty() ? 0 : poses[0].size())) {
     data.rows = poses.size();
     for (std::size_t k = 0; k < columns_.size(); ++k) {
       for (const Pose& pose : poses) columns_[k].push_back(pose[static_cast<Eigen::Index>(k)]);
       data.joints.push_back({columns_[k].data(), 1});
     }
-    zero_.assign(poses.size(), 0.0);
-    one_.assign(poses.size(), 1.0);
-    data.position = {Column{zero_.data()}, Column{zero_.data()}, Column{zero_.data()}};
-    if (orientation) data.orientation = {Column{one_.data()}, Column{zero_.data()}, Column{zero_.data()}, Column{zero_.data()}};
+    Robot plain = robot;
+    plain.effects.clear();
+    predicted_ = predict(plain, data, {}, 1);
+    for (std::size_t k = 0; k < 3; ++k) data.position[k] = {predicted_.position.data() + k, 3};
+    for (std::size_t k = 0; k < 4 && orientation; ++k) data.orientation[k] = {predicted_.orientation.data() + k, 4};
   }
   Poses(const Poses&) = delete;
   Poses& operator=(const Poses&) = delete;
@@ -109,7 +110,7 @@ class Poses {
 
  private:
   std::vector<std::vector<double>> columns_;
-  std::vector<double> zero_, one_;
+  Prediction predicted_;
 };
 
 Weighing weighing_of(const PlanOptions& options) {
@@ -121,12 +122,10 @@ Weighing weighing_of(const PlanOptions& options) {
 
 /// Unit-weight Jacobian of every pose, shape (rows of a pose, parameters).
 std::vector<Eigen::MatrixXd> jacobians(const Model& model, const std::vector<int>& free, const std::vector<Pose>& poses, const PlanOptions& options) {
-  const Poses measured(poses, options.orientation);
+  const Poses measured(model.robot, poses, options.orientation);
   const std::vector<std::vector<double>> bases = make_bases(model, measured.data);
   const Evaluator evaluator(model, measured.data, bases, make_segments(measured.data, measured.rows()), free, 1);
   const Eigen::VectorXd values = initial_values(model);
-  // Orientations are compared with the identity here; the rows of a rotation error do not depend on what it is compared with, to first
-  // order, only where the error is small: so positions and turning axes are taken, not the error's own derivative.
   std::vector<Eigen::MatrixXd> out;
   for (int tile = 0; tile < evaluator.tile_count(); ++tile) {
     const int m = evaluator.tile_components(tile);
@@ -190,7 +189,7 @@ PlanResult plan(const Robot& robot, const PlanOptions& options) {
     if (!draw_pose(robot, bare, ranges, nullptr, nullptr, &random, &pose)) throw std::invalid_argument("plan: no pose is within the limits of the passive joints");
     sample.push_back(pose);
   }
-  const Poses measured(sample, options.orientation);
+  const Poses measured(robot, sample, options.orientation);
   const Model model = make_model(robot, measured.data, options.effects);
   const std::vector<Segment> segments = make_segments(measured.data, measured.rows());
   const std::vector<int> free = select_free(model, content_of(model, segments), identify_options);

@@ -51,13 +51,15 @@ void bind_options(py::module_& m) {
   const IdentifyOptions usual;
   py::class_<IdentifyOptions> cls(m, "IdentifyOptions", "How `identify` works; see the attributes.");
   cls.def(
-      py::init([](std::vector<std::string> free, std::vector<EffectRequest> effects, Solver solver, Loss loss,
+      py::init([](std::vector<std::string> free, std::vector<std::string> hold,
+                  std::vector<EffectRequest> effects, Solver solver, Loss loss,
                   FrameBy frame_by, double rotation_length, double test_share, std::uint64_t seed,
                   int max_iterations, double initial_damping, double rms_fall, double gradient, bool undamped,
                   double rank_tolerance, double hayati_angle, double reject_beyond,
                   std::map<std::string, std::pair<double, double>> bounds, int threads) {
         IdentifyOptions o;
         o.free = std::move(free);
+        o.hold = std::move(hold);
         o.effects = std::move(effects);
         o.solver = solver;
         o.loss = loss;
@@ -77,8 +79,8 @@ void bind_options(py::module_& m) {
         o.threads = threads;
         return o;
       }),
-      py::kw_only(), py::arg("free") = usual.free, py::arg("effects") = usual.effects,
-      py::arg("solver") = usual.solver, py::arg("loss") = usual.loss, py::arg("frame_by") = usual.frame_by,
+      py::kw_only(), py::arg("free") = usual.free, py::arg("hold") = usual.hold,
+      py::arg("effects") = usual.effects, py::arg("solver") = usual.solver, py::arg("loss") = usual.loss, py::arg("frame_by") = usual.frame_by,
       py::arg("rotation_length") = usual.rotation_length, py::arg("test_share") = usual.test_share,
       py::arg("seed") = usual.seed, py::arg("max_iterations") = usual.max_iterations,
       py::arg("initial_damping") = usual.initial_damping, py::arg("rms_fall") = usual.rms_fall,
@@ -90,6 +92,10 @@ void bind_options(py::module_& m) {
       "free", [](const IdentifyOptions& o) { return tuple_of(o.free); },
       [](IdentifyOptions& o, std::vector<std::string> v) { o.free = std::move(v); },
       "Names and globs ('J2.*', '*.ratio'); empty: every geometric value, base and targets.");
+  cls.def_property(
+      "hold", [](const IdentifyOptions& o) { return tuple_of(o.hold); },
+      [](IdentifyOptions& o, std::vector<std::string> v) { o.hold = std::move(v); },
+      "Names and globs that stay at nominal whatever else is asked for.");
   cls.def_property(
       "effects", [](const IdentifyOptions& o) { return tuple_of(o.effects); },
       [](IdentifyOptions& o, std::vector<EffectRequest> v) { o.effects = std::move(v); },
@@ -119,7 +125,7 @@ void bind_options(py::module_& m) {
   cls.def_readwrite("hayati_angle", &IdentifyOptions::hayati_angle,
                     "[rad] neighbouring axes nearer to parallel get beta.");
   cls.def_readwrite("reject_beyond", &IdentifyOptions::reject_beyond,
-                    "Loss 'reject': robust standard deviations.");
+                    "Loss 'reject': rows whose residual is longer than this many medians.");
   cls.def_property(
       "bounds", [](const IdentifyOptions& o) { return mapping_of(o.bounds); },
       [](IdentifyOptions& o, std::map<std::string, std::pair<double, double>> v) { o.bounds = std::move(v); },
@@ -130,7 +136,7 @@ void bind_options(py::module_& m) {
            "', free: " + (o.free.empty() ? "default" : joined(o.free)) + ", " +
            std::to_string(o.effects.size()) + " effects)";
   });
-  define_value(cls, {"free", "effects", "solver", "loss", "frame_by", "rotation_length", "test_share", "seed",
+  define_value(cls, {"free", "hold", "effects", "solver", "loss", "frame_by", "rotation_length", "test_share", "seed",
                      "max_iterations", "initial_damping", "rms_fall", "gradient", "undamped",
                      "rank_tolerance", "hayati_angle", "reject_beyond", "bounds", "threads"});
 }

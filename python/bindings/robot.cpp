@@ -194,7 +194,7 @@ It does not change: set `robot.anchor = robot.anchor.replace(zero=0.01)`.)");
              }),
              py::arg("point") = array_from(Anchor{}.point), py::arg("zero") = Anchor{}.zero);
   anchor.def_property_readonly(
-      "point", [](const Anchor& a) { return array_from(a.point); }, "shape=(3,) [m] in the base frame.");
+      "point", [](const Anchor& a) { return array_from(a.point); }, "shape=(3,) [m] in the measurement frame.");
   anchor.def_readonly("zero", &Anchor::zero, "[m] the length that the instrument leaves out.");
   anchor.def("__repr__", [](const Anchor& a) {
     return "Anchor(at " + text(a.point.x()) + " " + text(a.point.y()) + " " + text(a.point.z()) +

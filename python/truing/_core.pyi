@@ -219,7 +219,7 @@ class Anchor:
     @property
     def point(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(3,) [m] in the base frame.
+        shape=(3,) [m] in the measurement frame.
         """
     @property
     def zero(self) -> float:
@@ -541,7 +541,7 @@ class IdentifyOptions:
     """
     How `identify` works; see the attributes.
     """
-    def __init__(self, *, free: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, max_iterations: typing.SupportsInt | typing.SupportsIndex = 100, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, free: collections.abc.Sequence[str] = [], hold: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, max_iterations: typing.SupportsInt | typing.SupportsIndex = 5000, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -604,6 +604,14 @@ class IdentifyOptions:
     def hayati_angle(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def hold(self) -> tuple[str, ...]:
+        """
+        Names and globs that stay at nominal whatever else is asked for.
+        """
+    @hold.setter
+    def hold(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
     def initial_damping(self) -> float:
         """
         mu, on columns of unit norm.
@@ -638,7 +646,7 @@ class IdentifyOptions:
     @property
     def reject_beyond(self) -> float:
         """
-        Loss 'reject': robust standard deviations.
+        Loss 'reject': rows whose residual is longer than this many medians.
         """
     @reject_beyond.setter
     def reject_beyond(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:

@@ -12,27 +12,30 @@ from truing._core import Identification, Measurements, PlanResult, Prediction, R
 from truing.effects import Effect, Effects, evaluated, split_effects
 from truing.errors import InputError, NotConvergedError
 
+_USUAL = _core.IdentifyOptions()  # the defaults stand in identify.hpp alone
+
 
 def identify(
     robot: Robot,
     data: Measurements,
     *,
     free: str | Sequence[str] = (),
+    hold: str | Sequence[str] = (),
     effects: Effects = (),
     solver: Literal["lm", "ceres"] = "lm",
     loss: Literal["reject", "none", "huber", "cauchy", "tukey"] = "reject",
     frame_by: Literal["parameters", "svd"] = "parameters",
-    rotation_length: float = 0.1,
-    test_share: float = 0.2,
-    seed: int = 0,
-    max_iterations: int = 100,
-    initial_damping: float = 1e-9,
-    rms_fall: float = 1e-12,
-    gradient: float = 1e-14,
-    undamped: bool = False,
-    rank_tolerance: float = 1e-6,
-    hayati_angle: float = 0.08726646259971647,
-    reject_beyond: float = 6.0,
+    rotation_length: float = _USUAL.rotation_length,
+    test_share: float = _USUAL.test_share,
+    seed: int = _USUAL.seed,
+    max_iterations: int = _USUAL.max_iterations,
+    initial_damping: float = _USUAL.initial_damping,
+    rms_fall: float = _USUAL.rms_fall,
+    gradient: float = _USUAL.gradient,
+    undamped: bool = _USUAL.undamped,
+    rank_tolerance: float = _USUAL.rank_tolerance,
+    hayati_angle: float = _USUAL.hayati_angle,
+    reject_beyond: float = _USUAL.reject_beyond,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     threads: int = 0,
     raise_if_not_converged: bool = True,
@@ -44,6 +47,7 @@ def identify(
 
     robot: nominal. data: measurements, see `Measurements`.
     free: names and globs, "J2.*,*.ratio" or a list; empty: every geometric value, base and targets.
+    hold: names and globs that stay at nominal whatever else is asked for, "base.*" for a frame that is known.
     effects: effects to fit as well: "backlash,harmonic:J2+J3", or a list of such words, `EffectRequest` and `Effect`.
     solver: "lm" (Levenberg-Marquardt) or "ceres" (takes bounds).
     loss: "reject" finds gross outliers, lists them and fits without; or "none", "huber", "cauchy", "tukey".
@@ -53,7 +57,7 @@ def identify(
     max_iterations, initial_damping, rms_fall [m], gradient, undamped: of the iteration, see `IdentifyOptions`.
     rank_tolerance: a unit column that the others explain but for this share is not observable.
     hayati_angle: [rad] neighbouring axes nearer to parallel get beta.
-    reject_beyond: loss "reject": robust standard deviations.
+    reject_beyond: loss "reject": rows whose residual is longer than this many medians.
     bounds: {parameter: (lowest, highest)}, solver "ceres" only. threads: 0: as many as the machine has.
 
     Raises InputError on data or options that cannot be used, and NotConvergedError (it carries the result), unless
@@ -62,6 +66,7 @@ def identify(
     asked, own = split_effects(effects)
     options = _core.IdentifyOptions(
         free=_names(free),
+        hold=_names(hold),
         effects=[item.request(robot) if isinstance(item, Effect) else item for item in asked],
         solver=solver,
         loss=loss,

@@ -145,6 +145,7 @@ def identify(
     data: DataFile,
     out: Annotated[Optional[Path], _out("identify")] = None,
     free: Free = "",
+    hold: Annotated[str, typer.Option(help="Names and globs that stay at nominal, e.g. 'base.*,J6.*'.")] = "",
     effects: Effects = "",
     loss: Annotated[LossName, typer.Option(help="What to do about outliers: find and leave them out, or weigh errors down.")] = LossName.reject,
     solver: Annotated[SolverName, typer.Option(help="Levenberg-Marquardt of the palletizer method, or Ceres.")] = SolverName.lm,
@@ -171,7 +172,7 @@ def identify(
         def work() -> Any:
             import truing
 
-            return truing.identify(model, table, free=free, effects=effects, solver=solver.value, loss=loss.value, frame_by=frame.value,
+            return truing.identify(model, table, free=free, hold=hold, effects=effects, solver=solver.value, loss=loss.value, frame_by=frame.value,
                                    rotation_length=length, test_share=held_out, seed=seed, threads=threads,
                                    raise_if_not_converged=False)  # fmt: skip
 

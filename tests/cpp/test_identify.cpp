@@ -171,6 +171,35 @@ TEST_CASE("the measurement frame by SVD and as parameters end in the same place"
   }
 }
 
+TEST_CASE("the frame by SVD gives the same bits on one and on two threads") {
+  const Ur10Case c(10000, 1e-4, 20);
+  IdentifyOptions options;
+  options.frame_by = truing::FrameBy::svd;
+  options.threads = 1;
+  const Identification one = truing::identify(c.nominal, c.table->data, options);
+  options.threads = 2;
+  const Identification two = truing::identify(c.nominal, c.table->data, options);
+  for (std::size_t k = 0; k < one.parameters.size(); ++k) CHECK(one.parameters[k].value == two.parameters[k].value);
+}
+
+TEST_CASE("a row of weight zero counts for nothing") {
+  Ur10Case c(120, 1e-4, 53);
+  std::vector<double> weight(120);
+  std::vector<std::int8_t> set(120, 0);
+  for (std::size_t i = 0; i < 120; ++i) weight[i] = i < 80 ? 1.0 : 0.0;
+  c.table->data.set = set;
+  c.table->data.weight = c.table->add(weight);
+  const Identification with_zeros = truing::identify(c.nominal, c.table->data);
+  Ur10Case half(120, 1e-4, 53);
+  half.table->data.rows = 80;
+  half.table->data.set.assign(80, 0);
+  const Identification without = truing::identify(half.nominal, half.table->data);
+  for (std::size_t k = 0; k < without.parameters.size(); ++k) {
+    CHECK(with_zeros.parameters[k].value == doctest::Approx(without.parameters[k].value).epsilon(1e-9));
+    if (!without.parameters[k].frozen) CHECK(with_zeros.parameters[k].sigma == doctest::Approx(without.parameters[k].sigma).epsilon(1e-6));
+  }
+}
+
 TEST_CASE("the undamped iteration of the differential error model ends in the same place") {
   const Ur10Case c(200, 1e-4, 21);
   IdentifyOptions options;
@@ -476,6 +505,14 @@ TEST_CASE("several targets on the tool are found together") {
   // Places on the tool are seen up to a turn about the last axis and a shift along it, which the last link shares: their distance is seen.
   const auto gap = [](const Robot& r) { return (r.targets[1].T_last_target.translation() - r.targets[0].T_last_target.translation()).norm(); };
   CHECK(gap(result.robot) == doctest::Approx(gap(truth)).epsilon(1e-8));
+}
+
+TEST_CASE("a tool that is not asked for keeps its orientation") {
+  const Ur10Case c(100, 0.0, 52, What::pose);
+  IdentifyOptions options;
+  options.free = {"J2.theta"};
+  const Identification result = truing::identify(c.nominal, c.table->data, options);
+  CHECK(result.robot.targets[0].T_last_target.matrix() == c.nominal.targets[0].T_last_target.matrix());
 }
 
 TEST_CASE("pose groups stay together, and the split depends on the seed alone") {

@@ -23,7 +23,7 @@ enum class Solver {
 };
 
 enum class Loss {
-  reject,  ///< Tukey to find gross outliers, then plain least squares without them (they are listed); the default
+  reject,  ///< Cauchy to find gross outliers, then plain least squares without them (they are listed); the default
   none, huber, cauchy, tukey,
 };
 
