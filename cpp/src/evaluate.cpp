@@ -58,7 +58,8 @@ struct ConstantSource {
 struct Compiled {
   std::vector<kernel::Step> prefix;  ///< the same for all poses: base, and what stands before the first joint
   std::vector<kernel::Step> steps;
-  std::vector<int> fixed_slots;      ///< saved within the prefix
+  std::vector<int> fixed_slots, start_slots;  ///< what the prefix leaves behind for good, and for the steps to write over
+  int tip_slots[4];
   std::vector<double> constants;  ///< fixed rotations are in place already
   std::vector<ConstantSource> sources;
   std::vector<DynamicSite> dynamic;
@@ -69,19 +70,6 @@ struct Compiled {
   std::vector<int> left_out;     ///< parameters whose sites move nothing because they are zero, and must stay so
   int slot_count = 0;
 };
-
-Code code_of(Motion motion) {
-  switch (motion) {
-    case Motion::rotate_x: return Code::rotate_x;
-    case Motion::rotate_y: return Code::rotate_y;
-    case Motion::rotate_z: return Code::rotate_z;
-    case Motion::translate_x: return Code::translate_x;
-    case Motion::translate_y: return Code::translate_y;
-    case Motion::translate_z: return Code::translate_z;
-    case Motion::fixed: break;
-  }
-  return Code::rotate_fixed;
-}
 
 int axis_of(Motion motion) { return static_cast<int>(motion) % 3; }
 
@@ -117,23 +105,36 @@ Compiled compile(const Model& model, const Segment& segment, const std::vector<i
   }
 
   std::vector<int> axis_slot(model.sites.size(), -1), origin_slot(model.sites.size(), -1);
-  int saved_axis[3] = {-1, -1, -1};
-  int saved_origin = -1;
+  int current[4] = {0, 1, 2, 3};  // slots of x y z p
+  bool wanted_as_is[4] = {false, false, false, false};
+  out.slot_count = 4;
+  const auto keep = [&](int vector) {
+    wanted_as_is[vector] = true;
+    return current[vector];
+  };
+  const auto next_slot = [&](int vector) {  // where the vector's new value goes
+    if (wanted_as_is[vector]) current[vector] = out.slot_count++;
+    wanted_as_is[vector] = false;
+    return current[vector];
+  };
+  bool in_prefix = true;
+  const auto end_prefix = [&] {
+    in_prefix = false;
+    for (int k = 0; k < 4; ++k) {
+      if (!wanted_as_is[k]) out.start_slots.push_back(current[k]);
+    }
+    out.prefix.swap(out.steps);
+  };
   const auto add_site = [&](int index) {
     const Site& site = model.sites[index];
+    if (dynamic[index] && in_prefix) end_prefix();
     if (wanted[index]) {
-      const int axis = axis_of(site.motion);
-      if (saved_axis[axis] < 0) {
-        saved_axis[axis] = out.slot_count++;
-        out.steps.push_back({static_cast<Code>(static_cast<int>(Code::save_x) + axis), -1, 0, saved_axis[axis]});
-      }
-      axis_slot[index] = saved_axis[axis];
-      if (is_rotation(site.motion)) {
-        if (saved_origin < 0) {
-          saved_origin = out.slot_count++;
-          out.steps.push_back({Code::save_origin, -1, 0, saved_origin});
+      axis_slot[index] = keep(axis_of(site.motion));
+      if (is_rotation(site.motion)) origin_slot[index] = keep(3);
+      if (in_prefix) {
+        for (const int slot : {axis_slot[index], origin_slot[index]}) {
+          if (slot >= 0 && std::find(out.fixed_slots.begin(), out.fixed_slots.end(), slot) == out.fixed_slots.end()) out.fixed_slots.push_back(slot);
         }
-        origin_slot[index] = saved_origin;
       }
     }
     // A value that is zero and stays zero moves nothing.
@@ -142,36 +143,42 @@ Compiled compile(const Model& model, const Segment& segment, const std::vector<i
       return;
     }
 
-    kernel::Step step{code_of(site.motion), -1, static_cast<int>(out.constants.size()), -1};
+    kernel::Step step{Code::fixed, -1, static_cast<int>(out.constants.size()), {0, 0, 0}, {0, 0, 0}};
     if (site.motion == Motion::fixed) {
       for (int k = 0; k < 9; ++k) out.constants.push_back(site.fixed(k % 3, k / 3));
-    } else if (dynamic[index]) {
-      step.dynamic = static_cast<int>(out.dynamic.size());
-      out.dynamic.push_back({site.parameter, moved_by[index]});
+      for (int k = 0; k < 3; ++k) step.in[k] = current[k];
+      for (int k = 0; k < 3; ++k) step.out[k] = next_slot(k);
     } else {
-      out.sources.push_back({site.parameter, is_rotation(site.motion), step.constant});
-      out.constants.resize(out.constants.size() + (is_rotation(site.motion) ? 2 : 1));
+      const bool rotation = is_rotation(site.motion);
+      const int axis = axis_of(site.motion);
+      if (dynamic[index]) {
+        step.dynamic = static_cast<int>(out.dynamic.size());
+        out.dynamic.push_back({site.parameter, moved_by[index]});
+      } else {
+        out.sources.push_back({site.parameter, rotation, step.constant});
+        out.constants.resize(out.constants.size() + (rotation ? 2 : 1));
+      }
+      if (rotation) {
+        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+        step.code = Code::rotate;
+        step.in[0] = current[u];
+        step.in[1] = current[v];
+        step.out[0] = next_slot(u);
+        step.out[1] = next_slot(v);
+      } else {
+        step.code = Code::translate;
+        step.in[0] = current[3];
+        step.in[1] = current[axis];
+        step.out[0] = next_slot(3);
+      }
     }
     out.steps.push_back(step);
-    if (site.motion == Motion::fixed) {
-      saved_axis[0] = saved_axis[1] = saved_axis[2] = -1;
-    } else if (is_rotation(site.motion)) {
-      for (int k = 0; k < 3; ++k) {
-        if (k != axis_of(site.motion)) saved_axis[k] = -1;
-      }
-    } else {
-      saved_origin = -1;
-    }
   };
   for (int s = 0; s < model.common_sites; ++s) add_site(s);
   for (int s = model.target_first[segment.target]; s < model.target_first[segment.target + 1]; ++s) add_site(s);
 
-  const auto first_dynamic = std::find_if(out.steps.begin(), out.steps.end(), [](const kernel::Step& step) { return step.dynamic >= 0; });
-  out.prefix.assign(out.steps.begin(), first_dynamic);
-  out.steps.erase(out.steps.begin(), first_dynamic);
-  for (const kernel::Step& step : out.prefix) {
-    if (step.slot >= 0) out.fixed_slots.push_back(step.slot);
-  }
+  if (in_prefix) end_prefix();
+  std::copy(current, current + 4, out.tip_slots);
 
   for (std::size_t f = 0; f < free.size(); ++f) {
     const ParameterInfo& info = model.parameters[free[f]];
@@ -196,35 +203,30 @@ Compiled compile(const Model& model, const Segment& segment, const std::vector<i
 
 }  // namespace
 
-/// What the prefix comes to: the frame after it (R column by column, then p), and the vectors that it saves.
-static void sweep_prefix(const Compiled& program, const std::vector<double>& constants, std::vector<double>* start, std::vector<double>* fixed_vectors) {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d p = Eigen::Vector3d::Zero();
-  fixed_vectors->clear();
+/// The prefix, once for all poses: what it leaves in its slots.
+static void sweep_prefix(const Compiled& program, const std::vector<double>& constants, std::vector<double>* start_vectors, std::vector<double>* fixed_vectors) {
+  Eigen::Matrix3Xd slots = Eigen::Matrix3Xd::Zero(3, program.slot_count);
+  slots.leftCols<3>().setIdentity();
   for (const kernel::Step& step : program.prefix) {
     const double* constant = constants.data() + step.constant;
-    const auto rotate = [&](int u, int v) {
-      const Eigen::Vector3d u0 = R.col(u), v0 = R.col(v);
-      R.col(u) = constant[0] * u0 + constant[1] * v0;
-      R.col(v) = constant[0] * v0 - constant[1] * u0;
-    };
-    const auto save = [&](const Eigen::Vector3d& v) { fixed_vectors->insert(fixed_vectors->end(), v.data(), v.data() + 3); };
+    const Eigen::Vector3d a = slots.col(step.in[0]), b = slots.col(step.in[1]), c = slots.col(step.in[2]);
     switch (step.code) {
-      case Code::rotate_x: rotate(1, 2); break;
-      case Code::rotate_y: rotate(2, 0); break;
-      case Code::rotate_z: rotate(0, 1); break;
-      case Code::translate_x: p += constant[0] * R.col(0); break;
-      case Code::translate_y: p += constant[0] * R.col(1); break;
-      case Code::translate_z: p += constant[0] * R.col(2); break;
-      case Code::rotate_fixed: R = R * Eigen::Map<const Eigen::Matrix3d>(constant); break;
-      case Code::save_x: save(R.col(0)); break;
-      case Code::save_y: save(R.col(1)); break;
-      case Code::save_z: save(R.col(2)); break;
-      case Code::save_origin: save(p); break;
+      case Code::rotate:
+        slots.col(step.out[0]) = constant[0] * a + constant[1] * b;
+        slots.col(step.out[1]) = constant[0] * b - constant[1] * a;
+        break;
+      case Code::translate: slots.col(step.out[0]) = a + constant[0] * b; break;
+      case Code::fixed:
+        for (int k = 0; k < 3; ++k) slots.col(step.out[k]) = constant[3 * k] * a + constant[3 * k + 1] * b + constant[3 * k + 2] * c;
+        break;
     }
   }
-  std::copy(R.data(), R.data() + 9, start->begin());
-  std::copy(p.data(), p.data() + 3, start->begin() + 9);
+  const auto collect = [&slots](const std::vector<int>& wanted, std::vector<double>* out) {
+    out->clear();
+    for (const int slot : wanted) out->insert(out->end(), slots.col(slot).data(), slots.col(slot).data() + 3);
+  };
+  collect(program.start_slots, start_vectors);
+  collect(program.fixed_slots, fixed_vectors);
 }
 
 std::vector<Segment> make_segments(const Measurements& data, const std::vector<std::int32_t>& rows, bool as_positions) {
@@ -352,9 +354,8 @@ struct Evaluator::Impl {
       w.local.resize(gram_columns * gram_columns);
       for (const Compiled& c : compiled) {
         w.constants.push_back(c.constants);
-        w.starts.emplace_back(12);
-        w.fixed_vectors.emplace_back();
-        w.fixed_vectors.back().reserve(3 * c.fixed_slots.size());
+        w.starts.emplace_back(3 * c.start_slots.size());
+        w.fixed_vectors.emplace_back(3 * c.fixed_slots.size());
       }
     }
     const std::size_t p = free.size() + 1;
@@ -395,7 +396,11 @@ struct Evaluator::Impl {
     const auto fill = [&](double* out, Column column, double scale, double offset) {
       if (side_by_side && column.stride == 1) {
         const double* in = column.data + rows[0];
-        for (int i = 0; i < range.count; ++i) out[i] = scale * in[i] + offset;
+        if (scale == 1.0 && offset == 0.0) {
+          std::copy(in, in + range.count, out);
+        } else {
+          for (int i = 0; i < range.count; ++i) out[i] = scale * in[i] + offset;
+        }
       } else {
         for (int i = 0; i < range.count; ++i) out[i] = scale * column[static_cast<std::size_t>(rows[i])] + offset;
       }
@@ -419,11 +424,14 @@ struct Evaluator::Impl {
     }
     for (std::size_t s = 0; s < program.dynamic.size(); ++s) {
       double* out = w->values.get() + s * kTilePoses;
-      double constant = program.dynamic[s].parameter < 0 ? 0.0 : values[program.dynamic[s].parameter];
+      const double constant = program.dynamic[s].parameter < 0 ? 0.0 : values[program.dynamic[s].parameter];
       for (const auto& [coordinate, weight] : program.dynamic[s].moved_by) {
         const double* in = w->coordinates.get() + coordinate * kTilePoses;
-        const bool first = &weight == &program.dynamic[s].moved_by.front().second;
-        for (int i = 0; i < kTilePoses; ++i) out[i] = (first ? constant : out[i]) + weight * in[i];
+        if (&weight == &program.dynamic[s].moved_by.front().second) {
+          for (int i = 0; i < kTilePoses; ++i) out[i] = constant + weight * in[i];
+        } else {
+          for (int i = 0; i < kTilePoses; ++i) out[i] += weight * in[i];
+        }
       }
     }
     for (std::size_t b = 0; b < program.bases.size(); ++b) {
@@ -482,10 +490,13 @@ struct Evaluator::Impl {
     p.steps = program.steps.data();
     p.step_count = static_cast<int>(program.steps.size());
     p.constants = w->constants[range.segment].data();
-    p.start = w->starts[range.segment].data();
+    p.start_slots = program.start_slots.data();
+    p.start_vectors = w->starts[range.segment].data();
+    p.start_count = static_cast<int>(program.start_slots.size());
     p.fixed_slots = program.fixed_slots.data();
     p.fixed_vectors = w->fixed_vectors[range.segment].data();
-    p.fixed_slot_count = static_cast<int>(program.fixed_slots.size());
+    p.fixed_count = static_cast<int>(program.fixed_slots.size());
+    std::copy(program.tip_slots, program.tip_slots + 4, p.tip_slots);
     p.parts = program.parts.data();
     p.columns = program.columns.data();
     p.column_count = with_jacobian ? static_cast<int>(program.columns.size()) : 0;

@@ -224,15 +224,18 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
     }
     // Sine and cosine, through a chain of one rotation about z and a step along x: also where the quadrant changes, and many turns away.
     using namespace truing::kernel;
-    const Step steps[2] = {{Code::rotate_z, 0, 0, -1}, {Code::translate_x, -1, 0, -1}};
-    const double constants[1] = {1.0};
+    const Step steps[2] = {{Code::rotate, 0, 0, {0, 1, 0}, {0, 1, 0}}, {Code::translate, -1, 0, {3, 0, 0}, {3, 0, 0}}};
+    const double constants[1] = {1.0}, start[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    const int slots_at_start[4] = {0, 1, 2, 3};
     Program program{};
     program.kind = Kind::position;
     program.steps = steps;
     program.step_count = 2;
-    const double start[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     program.constants = constants;
-    program.start = start;
+    program.start_slots = slots_at_start;
+    program.start_vectors = start;
+    program.start_count = 4;
+    std::copy(slots_at_start, slots_at_start + 4, program.tip_slots);
     program.position_scale = program.rotation_scale = 1.0;
     std::vector<double> values(kTilePoses), measured(3 * kTilePoses, 0.0), residual(3 * kTilePoses), slots(256);
     for (int i = 0; i < kTilePoses; ++i) values[i] = i < 20 ? (i - 10) * M_PI / 4 : (i - 30) * 137.3;

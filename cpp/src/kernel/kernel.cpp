@@ -67,17 +67,18 @@ inline void sine_cosine(Pack angle, Pack* sine, Pack* cosine) {
 
 constexpr int kVec = 3 * kGroupPoses;
 
-/// The frame reached so far, for each pose of a group: the columns of R, then p.
-struct Frames {
-  alignas(64) double numbers[4 * kVec];
-  double* column(int k) { return numbers + k * kVec; }
-  const double* column(int k) const { return numbers + k * kVec; }
-  double* origin() { return numbers + 3 * kVec; }
-  const double* origin() const { return numbers + 3 * kVec; }
-};
+inline double* at_slot(const Tile& tile, int slot) { return tile.slots + slot * kVec; }
 
-// R <- R Rot(angle): the two columns that it mixes become (c u + s v, c v - s u).
-inline void rotate(const Program& program, const double* angles, const Step& step, double* u, double* v) {
+// The same vectors for every pose of a group.
+inline void fill_slots(const Tile& tile, const int* slots, const double* vectors, int count) {
+  for (int k = 0; k < count; ++k) {
+    const Vec v{splat(vectors[3 * k]), splat(vectors[3 * k + 1]), splat(vectors[3 * k + 2])};
+    for (int lane = 0; lane < kGroupPoses; lane += kLanes) store_vec(at_slot(tile, slots[k]) + lane, v);
+  }
+}
+
+// R <- R Rot(angle).
+inline void rotate(const Program& program, const Tile& tile, const double* angles, const Step& step) {
   Pack c{}, s{};
   if (step.dynamic < 0) {
     c = splat(program.constants[step.constant]);
@@ -85,48 +86,37 @@ inline void rotate(const Program& program, const double* angles, const Step& ste
   }
   for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
     if (step.dynamic >= 0) sine_cosine(load(angles + lane), &s, &c);
-    const Vec u0 = load_vec(u + lane), v0 = load_vec(v + lane);
-    store_vec(u + lane, c * u0 + s * v0);
-    store_vec(v + lane, c * v0 - s * u0);
+    const Vec u = load_vec(at_slot(tile, step.in[0]) + lane), v = load_vec(at_slot(tile, step.in[1]) + lane);
+    store_vec(at_slot(tile, step.out[0]) + lane, c * u + s * v);
+    store_vec(at_slot(tile, step.out[1]) + lane, c * v - s * u);
   }
 }
 
 // p <- p + length * column of R.
-inline void translate(const Program& program, const double* lengths, const Step& step, const double* column, double* origin) {
+inline void translate(const Program& program, const Tile& tile, const double* lengths, const Step& step) {
   for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
     const Pack length = step.dynamic < 0 ? splat(program.constants[step.constant]) : load(lengths + lane);
-    store_vec(origin + lane, load_vec(origin + lane) + length * load_vec(column + lane));
+    store_vec(at_slot(tile, step.out[0]) + lane, load_vec(at_slot(tile, step.in[0]) + lane) + length * load_vec(at_slot(tile, step.in[1]) + lane));
   }
 }
 
 // R <- R F.
-inline void rotate_fixed(const double* m, Frames* f) {
+inline void rotate_fixed(const Tile& tile, const double* f, const Step& step) {
   for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
-    const Vec x = load_vec(f->column(0) + lane), y = load_vec(f->column(1) + lane), z = load_vec(f->column(2) + lane);
-    for (int k = 0; k < 3; ++k) store_vec(f->column(k) + lane, splat(m[3 * k]) * x + splat(m[3 * k + 1]) * y + splat(m[3 * k + 2]) * z);
+    const Vec x = load_vec(at_slot(tile, step.in[0]) + lane), y = load_vec(at_slot(tile, step.in[1]) + lane), z = load_vec(at_slot(tile, step.in[2]) + lane);
+    for (int k = 0; k < 3; ++k) store_vec(at_slot(tile, step.out[k]) + lane, splat(f[3 * k]) * x + splat(f[3 * k + 1]) * y + splat(f[3 * k + 2]) * z);
   }
 }
 
-// One sweep from the measurement frame to the target; axes and origins of the wanted sites fall out on the way.
-inline void sweep(const Program& program, const Tile& tile, int first, Frames* f) {
-  for (int k = 0; k < 12; ++k) {
-    for (int lane = 0; lane < kGroupPoses; lane += kLanes) store(f->numbers + k * kGroupPoses + lane, splat(program.start[k]));
-  }
+// One sweep from the measurement frame to the target; axes and origins of the wanted sites stay in their slots.
+inline void sweep(const Program& program, const Tile& tile, int first) {
+  fill_slots(tile, program.start_slots, program.start_vectors, program.start_count);
   for (const Step* step = program.steps; step != program.steps + program.step_count; ++step) {
-    const double* values = tile.values + step->dynamic * kTilePoses + first;  // not read where dynamic < 0
-    double* slot = tile.slots + step->slot * kVec;
+    const double* values = tile.values + (step->dynamic < 0 ? 0 : step->dynamic) * kTilePoses + first;
     switch (step->code) {
-      case Code::rotate_x: rotate(program, values, *step, f->column(1), f->column(2)); break;
-      case Code::rotate_y: rotate(program, values, *step, f->column(2), f->column(0)); break;
-      case Code::rotate_z: rotate(program, values, *step, f->column(0), f->column(1)); break;
-      case Code::translate_x: translate(program, values, *step, f->column(0), f->origin()); break;
-      case Code::translate_y: translate(program, values, *step, f->column(1), f->origin()); break;
-      case Code::translate_z: translate(program, values, *step, f->column(2), f->origin()); break;
-      case Code::rotate_fixed: rotate_fixed(program.constants + step->constant, f); break;
-      case Code::save_x: std::memcpy(slot, f->column(0), kVec * sizeof(double)); break;
-      case Code::save_y: std::memcpy(slot, f->column(1), kVec * sizeof(double)); break;
-      case Code::save_z: std::memcpy(slot, f->column(2), kVec * sizeof(double)); break;
-      case Code::save_origin: std::memcpy(slot, f->origin(), kVec * sizeof(double)); break;
+      case Code::rotate: rotate(program, tile, values, *step); break;
+      case Code::translate: translate(program, tile, values, *step); break;
+      case Code::fixed: rotate_fixed(tile, program.constants + step->constant, *step); break;
     }
   }
 }
@@ -158,12 +148,13 @@ struct PackResidual {
 
 // Residual, predicted minus measured; its scale, weight and loss.
 template <Kind kind, bool weighted>
-inline void evaluate_residual(const Program& program, const Tile& tile, const Frames& f, int first, int lane, PackResidual<kind>* out) {
+inline void evaluate_residual(const Program& program, const Tile& tile, int first, int lane, PackResidual<kind>* out) {
   constexpr int components = components_of(kind);
   const int at = first + lane;
   const double* m = tile.measured + at;
-  const Vec x = load_vec(f.column(0) + lane), y = load_vec(f.column(1) + lane), z = load_vec(f.column(2) + lane);
-  const Vec p = load_vec(f.origin() + lane);
+  const int* tip = program.tip_slots;
+  const Vec x = load_vec(at_slot(tile, tip[0]) + lane), y = load_vec(at_slot(tile, tip[1]) + lane), z = load_vec(at_slot(tile, tip[2]) + lane);
+  const Vec p = load_vec(at_slot(tile, tip[3]) + lane);
   out->tip = p;
   Pack r[components];
   if (kind == Kind::distance) {
@@ -217,9 +208,9 @@ struct Motion { Vec linear, angular; };
 
 // The tip's motion for a unit of one part: translation [axis; 0], rotation [axis x (tip - origin); axis].
 inline Motion part_motion(const Tile& tile, const Part& part, int lane, Vec tip) {
-  const Vec axis = load_vec(tile.slots + part.axis * kVec + lane);
+  const Vec axis = load_vec(at_slot(tile, part.axis) + lane);
   if (part.origin < 0) return {axis, {splat(0.0), splat(0.0), splat(0.0)}};
-  return {cross(axis, tip - load_vec(tile.slots + part.origin * kVec + lane)), axis};
+  return {cross(axis, tip - load_vec(at_slot(tile, part.origin) + lane)), axis};
 }
 
 inline Motion column_motion(const Program& program, const Tile& tile, const ColumnPlan& plan, int at, int lane, Vec tip) {
@@ -275,18 +266,12 @@ inline void evaluate_column(const Program& program, const Tile& tile, const Colu
 template <Kind kind, bool weighted>
 void evaluate_tile(const Program& program, const Tile& tile) {
   constexpr int column_size = components_of(kind) * kTilePoses;
-  Frames frames;
   PackResidual<kind> residuals[kGroupPoses / kLanes];
-  for (int k = 0; k < program.fixed_slot_count; ++k) {
-    const double* v = program.fixed_vectors + 3 * k;
-    for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
-      store_vec(tile.slots + program.fixed_slots[k] * kVec + lane, {splat(v[0]), splat(v[1]), splat(v[2])});
-    }
-  }
+  fill_slots(tile, program.fixed_slots, program.fixed_vectors, program.fixed_count);
   for (int first = 0; first < kTilePoses; first += kGroupPoses) {
-    sweep(program, tile, first, &frames);
+    sweep(program, tile, first);
     for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
-      evaluate_residual<kind, weighted>(program, tile, frames, first, lane, &residuals[lane / kLanes]);
+      evaluate_residual<kind, weighted>(program, tile, first, lane, &residuals[lane / kLanes]);
     }
     for (int c = 0; c < program.column_count; ++c) {
       evaluate_column<kind, weighted>(program, tile, program.columns[c], first, residuals, tile.jacobian + static_cast<std::ptrdiff_t>(c) * column_size);

@@ -16,20 +16,20 @@ constexpr int kMostGroupPoses = 16;
 /// A tile's measured rows per pose, at most: position and rotation.
 constexpr int kMaxComponents = 6;
 
-/// One step of the chain sweep. R and p are the frame reached so far, in measurement coordinates.
+/// One step of the chain sweep. A frame is four vectors: the columns x y z of R and the origin p, each in a slot. A step writes over what it reads
+/// unless some site wants the old vector as its axis or origin: then the new one goes to a slot of its own, and nothing is ever copied.
 enum class Code : int {
-  rotate_x, rotate_y, rotate_z,           ///< R <- R Rot(value)
-  translate_x, translate_y, translate_z,  ///< p <- p + value * column of R
-  rotate_fixed,                           ///< R <- R F, F constant
-  save_x, save_y, save_z,                 ///< slot <- column of R: a site's axis
-  save_origin,                            ///< slot <- p: a rotation site's origin
+  rotate,     ///< the two columns that a rotation mixes: u' = c u + s v, v' = c v - s u
+  translate,  ///< p' = p + value * column
+  fixed,      ///< R' = R F, F constant
 };
 
 struct Step {
   Code code;
   int dynamic;   ///< row of Tile::values that holds the value per pose; -1: the same for all poses
   int constant;  ///< else index into Program::constants: value, or cos and sin, or F column by column
-  int slot;      ///< where a save goes
+  int in[3];     ///< slots: u v | p column | x y z
+  int out[3];    ///< slots: u' v' | p' | x' y' z'
 };
 
 /// A site's geometric Jacobian column, times a weight: translation [axis; 0], rotation [axis x (tip - origin); axis].
@@ -57,10 +57,13 @@ struct Program {
   const Step* steps;
   int step_count;
   const double* constants;
-  const double* start;         ///< frame before the first step: R column by column, then p; what comes before is the same for all poses
-  const int* fixed_slots;      ///< slots saved there, and the vectors in them
+  const int* start_slots;        ///< vectors before the first step, the same for all poses: those that a step will write over …
+  const double* start_vectors;
+  int start_count;
+  const int* fixed_slots;        ///< … and those that none does
   const double* fixed_vectors;
-  int fixed_slot_count;
+  int fixed_count;
+  int tip_slots[4];              ///< x y z p at the end
   const Part* parts;
   const ColumnPlan* columns;
   int column_count;
