@@ -550,9 +550,13 @@ void report_orientations(const Robot& nominal, const Robot& found, const Model& 
   }
 }
 
-std::vector<std::string> make_warnings(const Identification& result, std::size_t train_components) {
+std::vector<std::string> make_warnings(const Identification& result, std::size_t train_components, double spread) {
   std::vector<std::string> warnings;
   const auto text = [](double v) { char buffer[32]; std::snprintf(buffer, sizeof buffer, "%.3g", v); return std::string(buffer); };
+  if (spread > 0.0 && result.train.after.median > 0.02 * spread) {
+    warnings.push_back("what is left, " + text(1e3 * result.train.after.median) + " mm in the median, is " + text(100.0 * result.train.after.median / spread) +
+                       " % of the measured range: is a joint column wrong (unit, sign, order), or the robot file?");
+  }
   if (train_components < 3 * static_cast<std::size_t>(result.rank)) {
     warnings.push_back("only " + count_of(train_components, "measured value") + " for " + count_of(static_cast<std::size_t>(result.rank), "parameter") +
                        ": measure more poses or free fewer parameters");
@@ -716,7 +720,7 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
     (after ? result.train.after : result.train.before) = statistics(errors, kept);
     if (result.test) (after ? result.test->after : result.test->before) = statistics(errors, seen_test);
   }
-  result.warnings = make_warnings(result, train_components);
+  result.warnings = make_warnings(result, train_components, spread_of(job));
   return result;
 }
 

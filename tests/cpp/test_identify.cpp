@@ -544,6 +544,14 @@ TEST_CASE("what cannot be identified is refused with a reason") {
   CHECK(complaint(c.nominal, c.table->data, options).find("ceres") != std::string::npos);
 }
 
+TEST_CASE("a joint column that makes no sense is suspected aloud") {
+  Ur10Case c(100, 1e-5, 54);
+  std::swap(c.table->data.joints[1], c.table->data.joints[2]);
+  bool said = false;
+  for (const std::string& w : truing::identify(c.nominal, c.table->data).warnings) said = said || w.find("is a joint column wrong") != std::string::npos;
+  CHECK(said);
+}
+
 TEST_CASE("rank counts what a Gram can tell") {
   Eigen::MatrixXd j = Eigen::MatrixXd::Random(50, 5);
   j.col(4) = 2.0 * j.col(0) - j.col(2);

@@ -529,6 +529,18 @@ def test_millimetres_in_a_column_of_distances(tmp_path: Path) -> None:
         read(write(tmp_path, columns), robot)
 
 
+@pytest.mark.parametrize(("column", "word"), [("q1_rad", "radians"), ("q3_rad", "radians"), ("q2_deg", "degrees")])
+def test_one_column_in_another_angle_unit_is_found_by_where_the_robot_was(tmp_path: Path, column: str, word: str) -> None:
+    robot = six_axis()
+    columns = table(robot)
+    if word == "radians":  # called degrees, but radians
+        columns = {(name.replace("_rad", "_deg") if name == column else name): values for name, values in columns.items()}
+    else:
+        columns = {name: (np.degrees(values) if name == "q2_rad" else values) for name, values in columns.items()}
+    with pytest.raises(InputError, match=f"{column[:2]}.* look like {word}"):
+        read(write(tmp_path, columns), robot)
+
+
 @pytest.mark.parametrize("tool", ["known", "unknown"])
 @pytest.mark.parametrize("size", [1e-4, 0.01, 0.05])
 def test_small_motions_in_degrees_are_believed(tmp_path: Path, size: float, tool: str) -> None:

@@ -165,21 +165,25 @@ def test_jacobian_by_differences_is_pinocchios(both: Both) -> None:
     """Differences of predictions of fourth order: their error is 1e-11 here."""
     q = readings(both, 20, seed=3)
     h = 1e-3
+    weights = {-2: 1.0, -1: -8.0, 1: 8.0, 2: -1.0}
+
+    def frames(joints: Floats) -> tuple[Floats, Floats]:
+        predicted = truing.predict(both.robot, truing.Measurements(joints))
+        matrices = [pin.Quaternion(*quaternion).toRotationMatrix() for quaternion in predicted.orientation]
+        return np.asarray(predicted.position), np.array(matrices)
+
+    rotation = frames(q)[1]
     for k in range(both.robot.driven_count):
         step = np.zeros(both.robot.driven_count)
         step[k] = h
-        moved = {n: truing.predict(both.robot, truing.Measurements(q + n * step)) for n in (-2, -1, 1, 2)}
-        linear = sum(w * moved[n].position for n, w in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0))) / (12.0 * h)
-        turn = sum(w * moved[n].orientation for n, w in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0))) / (12.0 * h)
-        here = truing.predict(both.robot, truing.Measurements(q)).orientation
-        for row, reading in enumerate(q):
-            theirs = both.jacobian(reading)[:, k]
-            np.testing.assert_allclose(linear[row], theirs[:3], rtol=0, atol=1e-9)
-            if min(abs(float(m.orientation[row] @ here[row])) for m in moved.values()) > 0.9 and here[row, 0] > 0.01:
-                # omega = 2 dq/dt conj(q); w stays positive from one difference to the next
-                w, v = here[row, 0], -here[row, 1:]
-                omega = 2.0 * (turn[row, 0] * v + w * turn[row, 1:] + np.cross(turn[row, 1:], v))
-                np.testing.assert_allclose(omega, theirs[3:], rtol=0, atol=1e-9)
+        moved = {n: frames(q + n * step) for n in weights}
+        linear = sum((w * moved[n][0] for n, w in weights.items()), np.zeros(3)) / (12.0 * h)
+        turning = sum((w * moved[n][1] for n, w in weights.items()), np.zeros((3, 3))) / (12.0 * h)
+        theirs = np.array([both.jacobian(reading)[:, k] for reading in q])
+        np.testing.assert_allclose(linear, theirs[:, :3], rtol=0, atol=1e-9)
+        # dR/dq R^T is the cross product matrix of the joint's axis.
+        cross = np.array([pin.skew(axis) for axis in theirs[:, 3:]])
+        np.testing.assert_allclose(turning @ rotation.transpose(0, 2, 1), cross, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", sorted(ROBOTS))
@@ -207,7 +211,7 @@ def test_analytic_jacobian_gives_pinocchios_covariance(name: str) -> None:
                **{f"base.{axis}": frame[:, :, k] for k, axis in enumerate(("x", "y", "z", "rx", "ry", "rz"))}}  # fmt: skip
     # A joint that does nothing but what others do is frozen: both columns leave it out.
     jacobian = np.stack([columns[parameter] for parameter in fitted], axis=2).reshape(3 * len(q), -1)
-    # The base may stand anywhere: its rotation is counted from where it was found at first, about its own origin.
+    # The base was found where it is, at the origin: it turns about that.
     expected = found.noise_sigma**2 * np.linalg.inv(jacobian.T @ jacobian)
     size = np.sqrt(np.diag(expected))
     np.testing.assert_allclose(found.covariance / size[:, None] / size, expected / size[:, None] / size, rtol=0, atol=1e-5)
@@ -220,7 +224,7 @@ def test_identified_joint_zeros_are_those_put_into_pinocchio(both: Both) -> None
     hidden = np.r_[0.0, 0.01 * rng.standard_normal(len(driven) - 1)]
     q = readings(both, 100, seed=7)
     frames = np.array([both.frames(reading + hidden)[-1] for reading in q])
-    quaternions = np.array([(lambda c: (c[3], c[0], c[1], c[2]))(pin.Quaternion(frame[:3, :3]).coeffs()) for frame in frames])
+    quaternions = np.array([np.roll(pin.Quaternion(frame[:3, :3]).coeffs(), 1) for frame in frames])  # x y z w to w x y z
     data = truing.Measurements(q, positions=frames[:, :3, 3], orientations=quaternions)
     found = truing.identify(both.robot, data, free=[f"{joint}.offset" for joint in driven[1:]], loss="none")
     value = {p.name: p.value for p in found.parameters}

@@ -75,7 +75,7 @@ def warned(found: truing.Identification, words: str) -> bool:
 @pytest.mark.parametrize("recording", real_data.RECORDINGS, ids=lambda r: r.name)
 def test_held_out_errors_are_those_of_the_baseline(recording: Any, loss: str) -> None:
     before, after = real_data.on_test(fitted(recording.name, loss))
-    assert after.rms < 0.8 * before.rms
+    assert after.mean < 0.85 * before.mean
     if math.isnan(recording.after.mean):  # published to two digits, and as rms alone
         assert after.rms <= SLACK * recording.after.rms and after.rotation <= SLACK * recording.after.rotation
         return

@@ -50,6 +50,7 @@ def check_units_look_right(
             pose = np.flatnonzero(use)[sample_rows(int(use.sum()), _POSE_ROWS)]
             witness = _Witness(robot, int(targets[pose[0]]), np.column_stack(readings)[pose], positions[pose])
             _check_degrees(table, joints, units, readings, witness)
+            _check_one_joint(table, joints, units, witness)
             _check_positions(table, units, positions[use], reach, witness)
     if units.get("dist") == "m":
         distances = columns["distances"][rows]
@@ -106,6 +107,25 @@ def _check_degrees(
         table.refuse(f"all of {_names(units, roles)} lie within +-{math.pi:.4g}, and the measured positions follow the robot model only "
                      "if these are radians: they look like radians; call the columns "
                      f"{listed([f'{role}_rad' for role in roles])}, or convert the values")  # fmt: skip
+
+
+def _check_one_joint(table: Table, joints: Sequence[_core.Joint], units: Mapping[str, str], witness: _Witness) -> None:
+    """One column in another angle unit than its name says: the positions follow the model only when it alone is converted."""
+    if witness.match(1.0).explained > 0.9:
+        return
+    best, wrong = 0.0, ""
+    for number, joint in enumerate(joints, 1):
+        if joint.type != "revolute":
+            continue
+        factors = np.ones(len(joints))
+        factors[number - 1] = 1.0 / _DEGREE if units[f"q{number}"] == "deg" else _DEGREE
+        explained = witness.match(factors).explained
+        if explained > best:
+            best, wrong = explained, f"q{number}"
+    if best > 0.98:
+        looks, word = ("rad", "radians") if units[wrong] == "deg" else ("deg", "degrees")
+        table.refuse(f"the measured positions follow the robot model only if these are {word}: they look like {word}; call the column "
+                     f"{wrong}_{looks}, or convert the values", column=f"{wrong}_{units[wrong]}")  # fmt: skip
 
 
 def _check_positions(
@@ -171,8 +191,8 @@ class _Witness:
         self._positions = positions
         self._revolute = np.array([robot.joints[index].type == "revolute" for index in robot.driven_joints()])
 
-    def match(self, angle_factor: float) -> _Match:
-        """Measured against modelled positions, the revolute joints' readings multiplied by `angle_factor`."""
+    def match(self, angle_factor: float | NDArray[np.float64]) -> _Match:
+        """Measured against modelled positions, the revolute joints' readings multiplied by `angle_factor` (one, or one each)."""
         readings = np.where(self._revolute, self._readings * angle_factor, self._readings)
         modelled = [_core.forward_kinematics(self._robot, row, self._target)[-1, :3, 3] for row in readings]
         return _Match(np.array(modelled), self._positions)
