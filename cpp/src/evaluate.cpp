@@ -13,6 +13,8 @@
 #include <thread>
 #include <tuple>
 
+#include "gravity.hpp"
+#include "motion.hpp"
 #include "truing/effect.hpp"
 
 namespace truing::detail {
@@ -261,6 +263,8 @@ std::vector<std::vector<double>> make_bases(const Model& model, const Measuremen
   Inputs inputs;
   inputs.data = &data;
   Eigen::VectorXd reading(static_cast<Eigen::Index>(data.joints.size()));
+  const Eigen::MatrixXd coupling = gravity ? coupling_matrix(model.robot) : Eigen::MatrixXd();
+  inputs.gravity_torque = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.robot.joints.size()));
   inputs.joints = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.robot.joints.size()));
   for (std::size_t row = 0; row < data.rows; ++row) {
     inputs.row = row;
@@ -279,7 +283,12 @@ std::vector<std::vector<double>> make_bases(const Model& model, const Measuremen
         }
       }
     }
-    if (gravity) inputs.gravity_torque = gravity_torques(model.robot, reading, data.payload ? data.payload[row] : 0.0);
+    if (gravity) {
+      inputs.frames = forward_kinematics(model.robot, reading, 0);
+      const auto target = data.target.empty() ? 0 : static_cast<std::size_t>(data.target[row]);
+      inputs.tip = inputs.frames[model.robot.joints.size() - 1] * model.robot.targets[target].T_last_target.translation();
+      gravity_torques_at(model.robot, coupling, inputs.frames, data.payload ? data.payload[row] : 0.0, inputs.gravity_torque);
+    }
     for (std::size_t t = 0; t < model.terms.size(); ++t) {
       const double value = model.terms[t].basis(inputs);
       if (!std::isfinite(value)) {

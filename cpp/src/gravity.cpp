@@ -13,13 +13,6 @@
 #include "truing/effect.hpp"
 
 namespace truing::detail {
-namespace {
-
-// The joint's axis and a point on it, in the measurement frame.
-struct Axis {
-  Eigen::Vector3d direction;
-  Eigen::Vector3d point;
-};
 
 Axis joint_axis(const Robot& robot, const std::vector<Eigen::Isometry3d>& frames, std::size_t i) {
   switch (robot.convention) {
@@ -34,8 +27,6 @@ Axis joint_axis(const Robot& robot, const std::vector<Eigen::Isometry3d>& frames
   }
   return {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
 }
-
-}  // namespace
 
 bool knows_mass(const Robot& robot) {
   return std::any_of(robot.joints.begin(), robot.joints.end(),

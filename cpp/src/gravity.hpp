@@ -10,6 +10,15 @@
 
 namespace truing::detail {
 
+/// A joint's axis and a point on it, in the measurement frame.
+struct Axis {
+  Eigen::Vector3d direction;
+  Eigen::Vector3d point;
+};
+
+/// Axis of joint `i`; `frames` from forward_kinematics.
+Axis joint_axis(const Robot& robot, const std::vector<Eigen::Isometry3d>& frames, std::size_t i);
+
 /// True when some link of the robot has a mass.
 bool knows_mass(const Robot& robot);
 

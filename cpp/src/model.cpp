@@ -307,8 +307,10 @@ Robot robot_with(const Model& model, const Eigen::VectorXd& values) {
         AppliedEffect& applied = robot.effects[info.owner];
         applied.parameters[info.name] = value;
         for (const ColumnTerm& column : info.columns) {
-          const std::string& site = model.terms[column.term].site;
-          const std::string joint = site.substr(0, site.find('.'));
+          const Term& term = model.terms[column.term];
+          applied.parameters.insert(term.constants.begin(), term.constants.end());
+          const std::string& joint = term.joint;  // not its site, which may belong to a neighbour
+          if (joint.empty()) continue;
           if (std::find(applied.joints.begin(), applied.joints.end(), joint) == applied.joints.end()) applied.joints.push_back(joint);
         }
         break;

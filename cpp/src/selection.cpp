@@ -52,7 +52,7 @@ std::vector<int> select_free(const Model& model, const Content& content, const I
       default: break;
     }
   }
-  // Effects asked for: their own terms, or the model parameters that three of them stand for.
+  // Effects asked for: their own terms, or the model parameters that they stand for.
   for (const EffectRequest& request : options.effects) {
     const auto on_joint = [&](int joint) {
       const Joint& j = model.robot.joints[joint];
@@ -64,10 +64,13 @@ std::vector<int> select_free(const Model& model, const Content& content, const I
       if (request.effect == "gear_ratio" && info.role == Role::ratio && on_joint(info.owner)) wanted[k] = true;
       if (request.effect == "joint_offset" && info.role == Role::offset && on_joint(info.owner)) wanted[k] = true;
       if (request.effect == "link_geometry" && info.role == Role::geometry && on_joint(info.owner)) wanted[k] = !suffix_is(info, "beta") || parallel[info.owner];
+      if (request.effect == "base_frame" && info.role == Role::base) wanted[k] = content.frame;
+      if (request.effect == "tool_frame" && info.role == Role::target) {
+        wanted[k] = info.rotation ? content.target_rotation[info.owner] : content.target[info.owner];
+      }
       if (info.role == Role::effect) {
         const EffectRequest& from = model.requests[info.owner];
-        const std::string site = model.terms[info.columns[0].term].site;
-        const std::string joint = site.substr(0, site.find('.'));
+        const std::string& joint = model.terms[info.columns[0].term].joint;
         const bool named = request.joints.empty() || std::find(request.joints.begin(), request.joints.end(), joint) != request.joints.end();
         if (from.effect == request.effect && named) wanted[k] = true;
       }

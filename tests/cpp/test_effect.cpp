@@ -124,34 +124,36 @@ TEST_CASE("gravity torques without any mass are refused") {
 }
 
 TEST_CASE("every effect of the catalogue is found by its name") {
-  CHECK(truing::catalogue().size() == 6);
+  CHECK(truing::catalogue().size() == 22);
   for (const truing::Effect& effect : truing::catalogue()) {
     CHECK(&truing::find_effect(effect.name) == &effect);
     CHECK(!effect.summary.empty());
   }
   CHECK_THROWS_WITH_AS(truing::find_effect("backlsh"),
                        "effect 'backlsh' does not exist; there are gear_ratio, joint_offset, link_geometry, "
-                       "joint_compliance, harmonic, backlash",
+                       "base_frame, tool_frame, joint_compliance, stiffness_zones, gravity_moment, link_compliance, "
+                       "harmonic, transmission_error, backlash, gravity_backlash, windup, thermal, thermal_zero, drift, "
+                       "joint_coupling, linkage, axis_wobble, scale, time_offset",
                        std::invalid_argument);
 }
 
 TEST_CASE("one's own effect stands beside the catalogue, under another name") {
-  truing::Effect drift;
-  drift.name = "drift";
-  drift.terms = [](const Robot& robot, std::size_t joint, const Measurements&) {
+  truing::Effect creep;
+  creep.name = "creep";
+  creep.terms = [](const Robot& robot, std::size_t joint, const Measurements&) {
     Term term;
-    term.parameter = "drift." + robot.joints[joint].name;
+    term.parameter = "creep." + robot.joints[joint].name;
     term.unit = "rad/s";
     term.site = robot.joints[joint].name;
     term.basis = [](const Inputs& in) { return in.data->time[in.row]; };
     return std::vector<Term>{term};
   };
   const Robot robot = loaded_arm(Convention::dh);
-  const auto terms = truing::effect_terms({{"drift", {"J2"}}}, robot, no_columns(), {drift});
+  const auto terms = truing::effect_terms({{"creep", {"J2"}}}, robot, no_columns(), {creep});
   REQUIRE(terms.size() == 1);
-  CHECK(terms[0].parameter == "drift.J2");
-  drift.name = "backlash";
-  CHECK(complaint({{"backlash", {"J2"}}}, robot, no_columns(), {drift}).find("exists twice") !=
+  CHECK(terms[0].parameter == "creep.J2");
+  creep.name = "backlash";
+  CHECK(complaint({{"backlash", {"J2"}}}, robot, no_columns(), {creep}).find("exists twice") !=
         std::string::npos);
 }
 
