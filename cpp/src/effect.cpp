@@ -50,14 +50,16 @@ void require_driven(const char* effect, const Joint& joint) {
 }
 
 void require_revolute(const char* effect, const Joint& joint, const std::string& why) {
-  if (!is_revolute(joint)) unsuited(effect, joint, "needs a revolute joint; " + joint.name + " is prismatic" + why);
+  if (!is_revolute(joint))
+    unsuited(effect, joint, "needs a revolute joint; " + joint.name + " is prismatic" + why);
 }
 
 void require_weight(const char* effect, const Robot& robot, const Joint& joint, const Measurements& data,
                     const std::string& or_else = "") {
   if (detail::knows_mass(robot) || data.payload) return;
-  refuse(effect, joint,
-         "needs gravity torques: give the links' mass and com in the robot, or the column payload_kg" + or_else);
+  refuse(
+      effect, joint,
+      "needs gravity torques: give the links' mass and com in the robot, or the column payload_kg" + or_else);
 }
 
 // Place of a driven joint among the driven ones: the number in its column names, less one.
@@ -153,11 +155,12 @@ std::vector<Term> harmonic(const Robot& robot, std::size_t joint, const Measurem
   return terms;
 }
 
-// A linear spring: the joint gives way by compliance * torque, in the direction that the weight pulls. Where no mass is known, the
-// payload's torque alone.
+// A linear spring: the joint gives way by compliance * torque, in the direction that the weight pulls. Where
+// no mass is known, the payload's torque alone.
 std::vector<Term> joint_compliance(const Robot& robot, std::size_t joint, const Measurements& data) {
   const Joint& at = robot.joints.at(joint);
-  require_weight("joint_compliance", robot, at, data, ", or ask for gravity_moment, which finds the moments itself");
+  require_weight("joint_compliance", robot, at, data,
+                 ", or ask for gravity_moment, which finds the moments itself");
   const auto index = static_cast<Eigen::Index>(joint);
   Term term;
   term.parameter = "joint_compliance." + at.name;
@@ -168,9 +171,9 @@ std::vector<Term> joint_compliance(const Robot& robot, std::size_t joint, const 
   return {term};
 }
 
-// Stiffness in three zones, as strain-wave gears have it (K1 < K2 < K3 below T1, up to T2 and beyond; Harmonic Drive, Engineering
-// data, "torsional stiffness"): a compliance for each zone of |torque|. T1 and T2 are not fitted: they part the data's |torque| in
-// thirds, so that every zone is seen.
+// Stiffness in three zones, as strain-wave gears have it (K1 < K2 < K3 below T1, up to T2 and beyond;
+// Harmonic Drive, Engineering data, "torsional stiffness"): a compliance for each zone of |torque|. T1 and T2
+// are not fitted: they part the data's |torque| in thirds, so that every zone is seen.
 std::vector<Term> stiffness_zones(const Robot& robot, std::size_t joint, const Measurements& data) {
   const Joint& at = robot.joints.at(joint);
   require_weight("stiffness_zones", robot, at, data);
@@ -185,7 +188,8 @@ std::vector<Term> stiffness_zones(const Robot& robot, std::size_t joint, const M
       Eigen::VectorXd reading(static_cast<Eigen::Index>(data.joints.size()));
       Eigen::VectorXd torque(static_cast<Eigen::Index>(robot.joints.size()));
       for (std::size_t row = 0; row < data.rows; row += step) {
-        for (Eigen::Index k = 0; k < reading.size(); ++k) reading[k] = data.joints[static_cast<std::size_t>(k)][row];
+        for (Eigen::Index k = 0; k < reading.size(); ++k)
+          reading[k] = data.joints[static_cast<std::size_t>(k)][row];
         detail::gravity_torques_at(robot, coupling, forward_kinematics(robot, reading, 0),
                                    data.payload ? data.payload[row] : 0.0, torque);
         sizes.push_back(std::abs(torque[index]));
@@ -194,60 +198,68 @@ std::vector<Term> stiffness_zones(const Robot& robot, std::size_t joint, const M
     }
     return sizes.empty() ? 0.0 : sizes[static_cast<std::size_t>(share * static_cast<double>(sizes.size()))];
   };
-  const double first = remembered(robot, "stiffness_zones", prefix + ".T1", [&] { return quantile(1.0 / 3.0); });
-  const double second = remembered(robot, "stiffness_zones", prefix + ".T2", [&] { return quantile(2.0 / 3.0); });
+  const double first =
+      remembered(robot, "stiffness_zones", prefix + ".T1", [&] { return quantile(1.0 / 3.0); });
+  const double second =
+      remembered(robot, "stiffness_zones", prefix + ".T2", [&] { return quantile(2.0 / 3.0); });
   const double edges[4] = {0.0, first, second, std::numeric_limits<double>::infinity()};
   std::vector<Term> terms;
   for (int zone = 0; zone < 3; ++zone) {
     const double from = edges[zone], to = edges[zone + 1];
-    terms.push_back(make_term(prefix + ".c" + std::to_string(zone + 1), is_revolute(at) ? "rad/Nm" : "m/N", at.name,
-                              [index, from, to](const Inputs& in) {
-                                const double torque = in.gravity_torque[index];
-                                return std::copysign(std::clamp(std::abs(torque), from, to) - from, torque);
-                              },
-                              true));
+    terms.push_back(make_term(
+        prefix + ".c" + std::to_string(zone + 1), is_revolute(at) ? "rad/Nm" : "m/N", at.name,
+        [index, from, to](const Inputs& in) {
+          const double torque = in.gravity_torque[index];
+          return std::copysign(std::clamp(std::abs(torque), from, to) - from, torque);
+        },
+        true));
     terms.back().constants = {{prefix + ".T1", first}, {prefix + ".T2", second}};
   }
   return terms;
 }
 
-// A spring under weights that nobody knows. The weight of all that hangs beyond a revolute joint turns it by a . sum_l (R_l H_l) x g,
-// linear in the first moments H_l [kg m]: each link's own, and what hangs beyond it at its end (Atkeson, An and Hollerbach 1986;
-// Khalil and Dombre 2002, ch. 9: those that can be told apart are the base parameters, the others are frozen by name). A prismatic
-// joint beyond carries its mass along. A parameter is compliance * moment. A known payload comes on top by joint_compliance.
+// A spring under weights that nobody knows. The weight of all that hangs beyond a revolute joint turns it by
+// a . sum_l (R_l H_l) x g, linear in the first moments H_l [kg m]: each link's own, and what hangs beyond it
+// at its end (Atkeson, An and Hollerbach 1986; Khalil and Dombre 2002, ch. 9: those that can be told apart
+// are the base parameters, the others are frozen by name). A prismatic joint beyond carries its mass along. A
+// parameter is compliance * moment. A known payload comes on top by joint_compliance.
 std::vector<Term> gravity_moment(const Robot& robot, std::size_t joint, const Measurements&) {
   const Joint& at = robot.joints.at(joint);
   require_revolute("gravity_moment", at, "");
   const auto shared = std::make_shared<const Robot>(robot);
   const Eigen::VectorXd carried = detail::coupling_matrix(robot).col(static_cast<Eigen::Index>(joint));
   const Vector3d g = robot.T_measurement_base.linear() * robot.gravity;
-  // Turning the coordinate turns it and its passive joints: the torques of all these, of a force at an arm from the axis.
+  // Turning the coordinate turns it and its passive joints: the torques of all these, of a force at an arm
+  // from the axis.
   const auto torque = [shared, carried, g](const Inputs& in, std::size_t link, const Vector3d& arm) {
-    double sum = 0.0;
+    double sum = 0.0, size = 0.0;
     for (std::size_t m = 0; m <= link; ++m) {
       const double weight = carried[static_cast<Eigen::Index>(m)];
       if (weight == 0.0 || !is_revolute(shared->joints[m])) continue;
       sum += weight * detail::joint_axis(*shared, in.frames, m).direction.dot(arm.cross(g));
+      size += std::abs(weight) * arm.norm() * g.norm();
     }
-    return sum;
+    return detail::without_rounding(sum, size);
   };
   const std::string prefix = "gravity_moment." + at.name + ".";
   std::vector<Term> terms;
   for (std::size_t link = joint; link < robot.joints.size(); ++link) {
     for (int axis = 0; axis < 3; ++axis) {
-      terms.push_back(make_term(prefix + robot.joints[link].name + "." + "xyz"[axis], "rad kg/N", at.name,
-                                [torque, link, axis](const Inputs& in) {
-                                  return torque(in, link, in.frames[link].linear().col(axis));
-                                },
-                                true));
+      terms.push_back(make_term(
+          prefix + robot.joints[link].name + "." + "xyz"[axis], "rad kg/N", at.name,
+          [torque, link, axis](const Inputs& in) {
+            return torque(in, link, in.frames[link].linear().col(axis));
+          },
+          true));
     }
     if (is_revolute(robot.joints[link])) continue;
-    terms.push_back(make_term(prefix + robot.joints[link].name + ".mass", "rad kg/Nm", at.name,
-                              [shared, torque, link](const Inputs& in) {
-                                const Vector3d axis = detail::joint_axis(*shared, in.frames, link).direction;
-                                return torque(in, link, in.joints[static_cast<Eigen::Index>(link)] * axis);
-                              },
-                              true));
+    terms.push_back(make_term(
+        prefix + robot.joints[link].name + ".mass", "rad kg/Nm", at.name,
+        [shared, torque, link](const Inputs& in) {
+          const Vector3d axis = detail::joint_axis(*shared, in.frames, link).direction;
+          return torque(in, link, in.joints[static_cast<Eigen::Index>(link)] * axis);
+        },
+        true));
   }
   return terms;
 }
@@ -256,32 +268,40 @@ std::vector<Term> gravity_moment(const Robot& robot, std::size_t joint, const Me
 Isometry3d link_end(const Robot& robot, const std::vector<Isometry3d>& frames, std::size_t link) {
   if (robot.convention == Convention::dh) return frames[link];
   const Joint& next = robot.joints[link + 1];
-  if (robot.convention == Convention::urdf) return frames[link] * Eigen::Translation3d(next.T_parent_joint.translation());
-  return frames[link] * Eigen::AngleAxisd(next.alpha, Vector3d::UnitX()) * Eigen::Translation3d(next.a, 0.0, 0.0) *
-         Eigen::AngleAxisd(next.beta, Vector3d::UnitY());
+  if (robot.convention == Convention::urdf)
+    return frames[link] * Eigen::Translation3d(next.T_parent_joint.translation());
+  return frames[link] * Eigen::AngleAxisd(next.alpha, Vector3d::UnitX()) *
+         Eigen::Translation3d(next.a, 0.0, 0.0) * Eigen::AngleAxisd(next.beta, Vector3d::UnitY());
 }
 
 // Where it starts: at its own joint.
-Vector3d link_start(const Robot& robot, const std::vector<Isometry3d>& frames, std::size_t link, double motion) {
+Vector3d link_start(const Robot& robot, const std::vector<Isometry3d>& frames, std::size_t link,
+                    double motion) {
   const Joint& joint = robot.joints[link];
   switch (robot.convention) {
-    case Convention::dh: return (link == 0 ? robot.T_measurement_base : frames[link - 1]).translation();
-    case Convention::mdh: return frames[link] * Vector3d(0.0, 0.0, -joint.d - (is_revolute(joint) ? 0.0 : motion));
-    case Convention::urdf: break;
+    case Convention::dh:
+      return (link == 0 ? robot.T_measurement_base : frames[link - 1]).translation();
+    case Convention::mdh:
+      return frames[link] * Vector3d(0.0, 0.0, -joint.d - (is_revolute(joint) ? 0.0 : motion));
+    case Convention::urdf:
+      break;
   }
   return frames[link].translation();
 }
 
-// A link bends: its end turns about the two axes across it by compliance * bending moment. A uniform beam that is loaded at its end
-// turns there by L / EI times the moment at its middle (Euler and Bernoulli), so that is the moment taken: of all links beyond and
-// the payload; the link's own weight is left out. Moment at the end instead would be the next joint's torque, and its spring.
+// A link bends: its end turns about the two axes across it by compliance * bending moment. A uniform beam
+// that is loaded at its end turns there by L / EI times the moment at its middle (Euler and Bernoulli), so
+// that is the moment taken: of all links beyond and the payload; the link's own weight is left out. Moment at
+// the end instead would be the next joint's torque, and its spring.
 std::vector<Term> link_compliance(const Robot& robot, std::size_t joint, const Measurements& data) {
   const Joint& at = robot.joints.at(joint);
-  if (joint + 1 == robot.joints.size()) unsuited("link_compliance", at, "needs a joint beyond the link; " + at.name + " is the last");
+  if (joint + 1 == robot.joints.size())
+    unsuited("link_compliance", at, "needs a joint beyond the link; " + at.name + " is the last");
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.driven_count()));
   const std::vector<Isometry3d> frames = forward_kinematics(robot, zero, 0);
   const Isometry3d end = link_end(robot, frames, joint);
-  const Vector3d along = end.linear().transpose() * (end.translation() - link_start(robot, frames, joint, 0.0));
+  const Vector3d along =
+      end.linear().transpose() * (end.translation() - link_start(robot, frames, joint, 0.0));
   if (along.norm() < 1e-6) unsuited("link_compliance", at, "needs a link with a length; this one has none");
   require_weight("link_compliance", robot, at, data);
   Eigen::Index lengthwise = 0;
@@ -299,17 +319,23 @@ std::vector<Term> link_compliance(const Robot& robot, std::size_t joint, const M
     if (axis == lengthwise) continue;
     const auto moment = [shared, g, joint, axis](const Inputs& in) {
       const Isometry3d at_end = link_end(*shared, in.frames, joint);
-      const Vector3d start = link_start(*shared, in.frames, joint, in.joints[static_cast<Eigen::Index>(joint)]);
+      const Vector3d start =
+          link_start(*shared, in.frames, joint, in.joints[static_cast<Eigen::Index>(joint)]);
       const Vector3d middle = 0.5 * (start + at_end.translation());
-      double mass = in.data->payload ? in.data->payload[in.row] : 0.0;
+      const double mass = in.data->payload ? in.data->payload[in.row] : 0.0;
       Vector3d first_moment = mass * (in.frames.back().translation() - middle);
+      double size = first_moment.norm();  // of what adds up
       for (std::size_t k = joint + 1; k < shared->joints.size(); ++k) {
         const Joint& beyond = shared->joints[k];
-        if (beyond.mass) first_moment += *beyond.mass * (in.frames[k] * beyond.center_of_mass - middle);
+        if (!beyond.mass) continue;
+        const Vector3d part = *beyond.mass * (in.frames[k] * beyond.center_of_mass - middle);
+        first_moment += part;
+        size += part.norm();
       }
-      return at_end.linear().col(axis).dot(first_moment.cross(g));
+      return detail::without_rounding(at_end.linear().col(axis).dot(first_moment.cross(g)), size * g.norm());
     };
-    terms.push_back(make_term("link_compliance." + at.name + ".r" + "xyz"[axis], "rad/Nm", sites[static_cast<std::size_t>(axis)], moment, true));
+    terms.push_back(make_term("link_compliance." + at.name + ".r" + "xyz"[axis], "rad/Nm",
+                              sites[static_cast<std::size_t>(axis)], moment, true));
   }
   return terms;
 }
@@ -326,19 +352,23 @@ std::vector<Term> gravity_backlash(const Robot& robot, std::size_t joint, const 
   return {make_term("gravity_backlash." + at.name, motion_unit(at), at.name, side, true)};
 }
 
-// Wind-up of the drive under the torque that the motor gives, friction included: torque / K (Slocum 1992, Precision machine design).
+// Wind-up of the drive under the torque that the motor gives, friction included: torque / K (Slocum 1992,
+// Precision machine design).
 std::vector<Term> windup(const Robot& robot, std::size_t joint, const Measurements& data) {
   const Joint& at = robot.joints.at(joint);
   require_driven("windup", at);
-  const std::string name = "tau" + std::to_string(driven_number(robot, joint) + 1) + (is_revolute(at) ? "_Nm" : "_N");
-  if (data.covariates.count(name) == 0) refuse("windup", at, "needs the column " + name + " (torque of the joint)");
+  const std::string name =
+      "tau" + std::to_string(driven_number(robot, joint) + 1) + (is_revolute(at) ? "_Nm" : "_N");
+  if (data.covariates.count(name) == 0)
+    refuse("windup", at, "needs the column " + name + " (torque of the joint)");
   return {make_term("windup." + at.name, is_revolute(at) ? "rad/Nm" : "m/N", at.name,
                     [name](const Inputs& in) { return in.data->covariates.at(name)[in.row]; })};
 }
 
 constexpr const char* kTransmission = "transmission_error";
 
-std::vector<Term> transmission_error_at(const std::string& name, double order, const Robot& robot, std::size_t joint) {
+std::vector<Term> transmission_error_at(const std::string& name, double order, const Robot& robot,
+                                        std::size_t joint) {
   const Joint& at = robot.joints.at(joint);
   require_revolute(kTransmission, at, " and has no turn to be periodic in");
   const auto index = static_cast<Eigen::Index>(joint);
@@ -349,10 +379,13 @@ std::vector<Term> transmission_error_at(const std::string& name, double order, c
 }
 
 std::vector<Term> transmission_error_without_order(const Robot&, std::size_t, const Measurements&) {
-  throw std::invalid_argument("transmission_error needs the order of the mesh in its name, e.g. transmission_error@96 (per turn of the joint)");
+  throw std::invalid_argument(
+      "transmission_error needs the order of the mesh in its name, e.g. transmission_error@96 (per turn of "
+      "the joint)");
 }
 
-// "transmission_error@96" -> its effect; nullptr when the name is of another form. Made once and kept: find_effect hands out references.
+// "transmission_error@96" -> its effect; nullptr when the name is of another form. Made once and kept:
+// find_effect hands out references.
 const Effect* transmission_error_of(const std::string& name) {
   const std::string prefix = std::string(kTransmission) + "@";
   if (name.compare(0, prefix.size(), prefix) != 0) return nullptr;
@@ -361,7 +394,8 @@ const Effect* transmission_error_of(const std::string& name) {
   in.imbue(std::locale::classic());
   double order = 0.0;
   if (!(in >> order) || !in.eof()) {
-    throw std::invalid_argument("effect '" + name + "': the order '" + text + "' is not a number; expected e.g. transmission_error@96");
+    throw std::invalid_argument("effect '" + name + "': the order '" + text +
+                                "' is not a number; expected e.g. transmission_error@96");
   }
   static std::mutex mutex;
   static std::map<std::string, Effect> made;
@@ -390,21 +424,23 @@ Warmth warmth(const char* effect, const Robot& robot, const Joint& at, const Mea
   return out;
 }
 
-// The link grows: every length by k * (T - T_ref) * length, one k for the link; steel 12e-6, aluminium 23e-6 per kelvin. The
-// reference is the mean temperature, where the identified lengths hold.
+// The link grows: every length by k * (T - T_ref) * length, one k for the link; steel 12e-6, aluminium 23e-6
+// per kelvin. The reference is the mean temperature, where the identified lengths hold.
 std::vector<Term> thermal(const Robot& robot, std::size_t joint, const Measurements& data) {
   const Joint& at = robot.joints.at(joint);
   const Vector3d origin = at.T_parent_joint.translation();
   std::vector<std::pair<const char*, double>> lengths = {{"a", at.a}, {"d", at.d}};
-  if (robot.convention == Convention::urdf) lengths = {{"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
+  if (robot.convention == Convention::urdf)
+    lengths = {{"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
   const auto is_zero = [](const auto& length) { return length.second == 0.0; };
   lengths.erase(std::remove_if(lengths.begin(), lengths.end(), is_zero), lengths.end());
   if (lengths.empty()) unsuited("thermal", at, "needs a link with a length; this one has none");
   const Warmth warm = warmth("thermal", robot, at, data);
   std::vector<Term> terms;
   for (const auto& [value, length] : lengths) {
-    terms.push_back(make_term("thermal." + at.name, "1/K", at.name + "." + value,
-                              [warm, metres = length](const Inputs& in) { return warm(in) * metres; }, true));
+    terms.push_back(make_term(
+        "thermal." + at.name, "1/K", at.name + "." + value,
+        [warm, metres = length](const Inputs& in) { return warm(in) * metres; }, true));
     terms.back().constants = warm.constants;
   }
   return terms;
@@ -419,11 +455,12 @@ std::vector<Term> thermal_zero(const Robot& robot, std::size_t joint, const Meas
   return {term};
 }
 
-// The base wanders in the measurement frame: each of its six coordinates by rate * (t - t_ref), t_ref the mean time. No order of rows
-// stands for a missing time.
+// The base wanders in the measurement frame: each of its six coordinates by rate * (t - t_ref), t_ref the
+// mean time. No order of rows stands for a missing time.
 std::vector<Term> drift(const Robot& robot, std::size_t, const Measurements& data) {
   if (!data.time) throw std::invalid_argument("drift needs the column t_s (time)");
-  const double reference = remembered(robot, "drift", "drift.reference_s", [&] { return mean_of(data.time, data.rows); });
+  const double reference =
+      remembered(robot, "drift", "drift.reference_s", [&] { return mean_of(data.time, data.rows); });
   std::vector<Term> terms;
   for (const char* coordinate : {"x", "y", "z", "rx", "ry", "rz"}) {
     const std::string site = std::string("base.") + coordinate;
@@ -434,8 +471,8 @@ std::vector<Term> drift(const Robot& robot, std::size_t, const Measurements& dat
   return terms;
 }
 
-// Concentric shafts of a wrist: turning one joint turns the next ones a little. dq5 = c q4, dq6 = c' q4 + c" q5, for the last three
-// joints, each ratio on its own.
+// Concentric shafts of a wrist: turning one joint turns the next ones a little. dq5 = c q4, dq6 = c' q4 + c"
+// q5, for the last three joints, each ratio on its own.
 std::vector<Term> joint_coupling(const Robot& robot, std::size_t, const Measurements&) {
   const std::size_t n = robot.joints.size();
   const auto is_wrist = [](const Joint& joint) { return is_revolute(joint) && !joint.passive(); };
@@ -443,46 +480,64 @@ std::vector<Term> joint_coupling(const Robot& robot, std::size_t, const Measurem
     throw Unsuited("joint_coupling needs a wrist: the last three joints revolute and with readings");
   }
   std::vector<Term> terms;
-  for (const auto& [moved, mover] : {std::make_pair(n - 2, n - 3), std::make_pair(n - 1, n - 3), std::make_pair(n - 1, n - 2)}) {
+  for (const auto& [moved, mover] :
+       {std::make_pair(n - 2, n - 3), std::make_pair(n - 1, n - 3), std::make_pair(n - 1, n - 2)}) {
     const std::string site = robot.joints[moved].name;
-    terms.push_back(make_term("joint_coupling." + site + "." + robot.joints[mover].name, "-", site,
-                              [index = static_cast<Eigen::Index>(mover)](const Inputs& in) { return in.joints[index]; }));
+    terms.push_back(
+        make_term("joint_coupling." + site + "." + robot.joints[mover].name, "-", site,
+                  [index = static_cast<Eigen::Index>(mover)](const Inputs& in) { return in.joints[index]; }));
   }
   return terms;
 }
 
-// A four-bar linkage whose opposite bars are not quite equal: to first order the passive joint errs by a cos u + b sin u, u the angle
-// between the bars, that is between the first and the last of its drivers (q3 - q2 of a palletizer).
+// A four-bar linkage whose opposite bars are not quite equal: to first order the passive joint errs by a cos
+// u + b sin u, u the angle between the bars, that is between the first and the last of its drivers (q3 - q2
+// of a palletizer).
 std::vector<Term> linkage(const Robot& robot, std::size_t joint, const Measurements&) {
   const Joint& at = robot.joints.at(joint);
-  if (!at.passive()) unsuited("linkage", at, "needs a passive joint; " + at.name + " has a reading of its own");
+  if (!at.passive())
+    unsuited("linkage", at, "needs a passive joint; " + at.name + " has a reading of its own");
   std::vector<Eigen::Index> drivers;
-  for (const auto& driver : at.driven_by) drivers.push_back(static_cast<Eigen::Index>(robot.joint_index(driver.first)));
+  for (const auto& driver : at.driven_by)
+    drivers.push_back(static_cast<Eigen::Index>(robot.joint_index(driver.first)));
   const auto [first, last] = std::minmax_element(drivers.begin(), drivers.end());
-  const auto angle = [a = *first, b = *last](const Inputs& in) { return a == b ? in.joints[b] : in.joints[b] - in.joints[a]; };
-  return {make_term("linkage." + at.name + ".cos", motion_unit(at), at.name, [angle](const Inputs& in) { return std::cos(angle(in)); }),
-          make_term("linkage." + at.name + ".sin", motion_unit(at), at.name, [angle](const Inputs& in) { return std::sin(angle(in)); })};
+  const auto angle = [a = *first, b = *last](const Inputs& in) {
+    return a == b ? in.joints[b] : in.joints[b] - in.joints[a];
+  };
+  return {make_term("linkage." + at.name + ".cos", motion_unit(at), at.name,
+                    [angle](const Inputs& in) { return std::cos(angle(in)); }),
+          make_term("linkage." + at.name + ".sin", motion_unit(at), at.name,
+                    [angle](const Inputs& in) { return std::sin(angle(in)); })};
 }
 
-// Bearing run-out: the axis tilts about the two directions across it, once per turn. DH turns before its link, so what tilts the
-// axis is the link before (alpha, beta), or the base; modified DH has alpha and beta before the joint; URDF the origin's rotations.
+// Bearing run-out: the axis tilts about the two directions across it, once per turn. DH turns before its
+// link, so what tilts the axis is the link before (alpha, beta), or the base; modified DH has alpha and beta
+// before the joint; URDF the origin's rotations.
 std::vector<Term> axis_wobble(const Robot& robot, std::size_t joint, const Measurements&) {
   const Joint& at = robot.joints.at(joint);
   require_revolute("axis_wobble", at, " and does not turn");
   // Elementary rotations there are, and what each of the two tilts is in these.
   std::vector<std::string> sites;
   Eigen::Matrix<double, 3, 2> tilts = Eigen::Matrix<double, 3, 2>::Identity();
-  const auto about_any_axis = [&](const std::string& frame, const Eigen::Matrix3d& rotation, const Vector3d& axis) {
+  const auto about_any_axis = [&](const std::string& frame, const Eigen::Matrix3d& rotation,
+                                  const Vector3d& axis) {
     sites = {frame + ".rx", frame + ".ry", frame + ".rz"};
-    const Eigen::Matrix3d from_z = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
+    const Eigen::Matrix3d from_z =
+        Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
     tilts = (rotation * from_z).leftCols<2>();
   };
   switch (robot.convention) {
-    case Convention::mdh: sites = {at.name + ".alpha", at.name + ".beta"}; break;
-    case Convention::urdf: about_any_axis(at.name, at.T_parent_joint.linear(), at.axis); break;
+    case Convention::mdh:
+      sites = {at.name + ".alpha", at.name + ".beta"};
+      break;
+    case Convention::urdf:
+      about_any_axis(at.name, at.T_parent_joint.linear(), at.axis);
+      break;
     case Convention::dh:
-      if (joint == 0) about_any_axis("base", robot.T_measurement_base.linear(), Vector3d::UnitZ());
-      else sites = {robot.joints[joint - 1].name + ".alpha", robot.joints[joint - 1].name + ".beta"};
+      if (joint == 0)
+        about_any_axis("base", robot.T_measurement_base.linear(), Vector3d::UnitZ());
+      else
+        sites = {robot.joints[joint - 1].name + ".alpha", robot.joints[joint - 1].name + ".beta"};
       break;
   }
   const auto index = static_cast<Eigen::Index>(joint);
@@ -493,20 +548,22 @@ std::vector<Term> axis_wobble(const Robot& robot, std::size_t joint, const Measu
       for (std::size_t k = 0; k < sites.size(); ++k) {
         const double share = tilts(static_cast<Eigen::Index>(k), tilt);
         if (share == 0.0) continue;
-        terms.push_back(make_term(parameter, "rad", sites[k],
-                                  [index, cosine, share](const Inputs& in) {
-                                    return share * (cosine ? std::cos(in.joints[index]) : std::sin(in.joints[index]));
-                                  },
-                                  sites.size() == 3));  // the shares come from the robot's frames
+        terms.push_back(make_term(
+            parameter, "rad", sites[k],
+            [index, cosine, share](const Inputs& in) {
+              return share * (cosine ? std::cos(in.joints[index]) : std::sin(in.joints[index]));
+            },
+            sites.size() == 3));  // the shares come from the robot's frames
       }
     }
   }
   return terms;
 }
 
-// The instrument's metre: x -> (1 + s) x. Stretching about the base's origin differs from stretching about the instrument's by a shift
-// of the base, which is fitted anyway; and what it adds at the tip does not depend on where the base stands: the way from base to
-// tip, in the last link's frame, where the targets' coordinates are.
+// The instrument's metre: x -> (1 + s) x. Stretching about the base's origin differs from stretching about
+// the instrument's by a shift of the base, which is fitted anyway; and what it adds at the tip does not
+// depend on where the base stands: the way from base to tip, in the last link's frame, where the targets'
+// coordinates are.
 std::vector<Term> scale(const Robot& robot, std::size_t, const Measurements&) {
   std::vector<std::string> targets;
   for (const Target& target : robot.targets) targets.push_back(target.name);
@@ -516,23 +573,30 @@ std::vector<Term> scale(const Robot& robot, std::size_t, const Measurements&) {
   std::vector<Term> terms;
   for (const std::string& target : targets) {
     for (int axis = 0; axis < 3; ++axis) {
-      terms.push_back(make_term("scale", "-", target + "." + "xyz"[axis],
-                                [last, base, axis](const Inputs& in) { return in.frames[last].linear().col(axis).dot(in.tip - base); }, true));
+      terms.push_back(make_term(
+          "scale", "-", target + "." + "xyz"[axis],
+          [last, base, axis](const Inputs& in) {
+            return in.frames[last].linear().col(axis).dot(in.tip - base);
+          },
+          true));
     }
   }
   return terms;
 }
 
-// Joints and measurement are stamped by clocks that differ by dt: every joint is read dt * speed too far back.
+// Joints and measurement are stamped by clocks that differ by dt: every joint is read dt * speed too far
+// back.
 std::vector<Term> time_offset(const Robot& robot, std::size_t, const Measurements& data) {
   std::vector<Term> terms;
   const std::vector<std::size_t> driven = robot.driven_joints();
   for (std::size_t k = 0; k < driven.size(); ++k) {
     const Joint& at = robot.joints[driven[k]];
     if (k >= data.joint_speed.size() || !data.joint_speed[k]) {
-      throw std::invalid_argument("time_offset needs the column qd" + std::to_string(k + 1) + "_" + motion_unit(at) + "_s (speed of joint " + at.name + ")");
+      throw std::invalid_argument("time_offset needs the column qd" + std::to_string(k + 1) + "_" +
+                                  motion_unit(at) + "_s (speed of joint " + at.name + ")");
     }
-    terms.push_back(make_term("time_offset", "s", at.name, [k](const Inputs& in) { return in.data->joint_speed[k][in.row]; }));
+    terms.push_back(make_term("time_offset", "s", at.name,
+                              [k](const Inputs& in) { return in.data->joint_speed[k][in.row]; }));
   }
   return terms;
 }
@@ -540,14 +604,17 @@ std::vector<Term> time_offset(const Robot& robot, std::size_t, const Measurement
 // Parameters of the model, as the first three: identify frees base and targets.
 std::vector<Term> no_terms(const Robot&, std::size_t, const Measurements&) { return {}; }
 
-constexpr std::size_t kRobot = std::numeric_limits<std::size_t>::max();  // in place of a joint: the robot as a whole
+constexpr std::size_t kRobot =
+    std::numeric_limits<std::size_t>::max();  // in place of a joint: the robot as a whole
 
 // Terms of one effect at one joint, or of the robot as a whole.
-std::vector<Term> terms_at(const Effect& effect, const Robot& robot, std::size_t joint, const Measurements& data) {
+std::vector<Term> terms_at(const Effect& effect, const Robot& robot, std::size_t joint,
+                           const Measurements& data) {
   std::vector<Term> terms = effect.terms(robot, joint == kRobot ? 0 : joint, data);
   for (Term& term : terms) {
     if (term.parameter.empty() || !term.basis) {
-      throw std::invalid_argument("effect '" + effect.name + "' gives a term without parameter name or basis");
+      throw std::invalid_argument("effect '" + effect.name +
+                                  "' gives a term without parameter name or basis");
     }
     term.joint = joint == kRobot ? "" : robot.joints[joint].name;
   }
@@ -556,8 +623,8 @@ std::vector<Term> terms_at(const Effect& effect, const Robot& robot, std::size_t
 
 using Place = std::pair<std::size_t, std::vector<Term>>;
 
-// What a request without joints means: the driven joints, less those that the effect has no meaning for; if there is none left, the
-// passive ones.
+// What a request without joints means: the driven joints, less those that the effect has no meaning for; if
+// there is none left, the passive ones.
 std::vector<Place> suitable_places(const Effect& effect, const Robot& robot, const Measurements& data) {
   std::vector<Place> places;
   std::string first_complaint;
@@ -575,10 +642,13 @@ std::vector<Place> suitable_places(const Effect& effect, const Robot& robot, con
   throw Unsuited(effect.name + " suits no joint of this robot: " + first_complaint);
 }
 
-std::vector<Place> requested_places(const EffectRequest& request, const Effect& effect, const Robot& robot, const Measurements& data) {
+std::vector<Place> requested_places(const EffectRequest& request, const Effect& effect, const Robot& robot,
+                                    const Measurements& data) {
   if (!effect.per_joint) {
     if (!request.joints.empty()) {
-      throw std::invalid_argument(effect.name + " belongs to the robot as a whole: ask for it without joints, not at " + listed(request.joints));
+      throw std::invalid_argument(effect.name +
+                                  " belongs to the robot as a whole: ask for it without joints, not at " +
+                                  listed(request.joints));
     }
     return {{kRobot, terms_at(effect, robot, kRobot, data)}};
   }
@@ -595,11 +665,14 @@ std::vector<Place> requested_places(const EffectRequest& request, const Effect& 
 
 Effect transmission_error(double order) {
   if (!(std::isfinite(order) && order > 0.0)) {
-    throw std::invalid_argument("transmission_error: order is " + detail::number(order) + " per turn, expected a positive number");
+    throw std::invalid_argument("transmission_error: order is " + detail::number(order) +
+                                " per turn, expected a positive number");
   }
   const std::string name = std::string(kTransmission) + "@" + detail::exact_number(order);
   return {name, "error that repeats with the gear's teeth, order times per turn",
-          [name, order](const Robot& robot, std::size_t joint, const Measurements&) { return transmission_error_at(name, order, robot, joint); }};
+          [name, order](const Robot& robot, std::size_t joint, const Measurements&) {
+            return transmission_error_at(name, order, robot, joint);
+          }};
 }
 
 const std::vector<Effect>& catalogue() {
@@ -610,11 +683,14 @@ const std::vector<Effect>& catalogue() {
       {"base_frame", "the robot stands elsewhere in the measurement frame", no_terms, false},
       {"tool_frame", "the targets sit elsewhere on the last link", no_terms, false},
       {"joint_compliance", "the joint gives way under the weight that it carries", joint_compliance},
-      {"stiffness_zones", "the joint gives way, and more or less so as torque grows: strain-wave gears", stiffness_zones},
+      {"stiffness_zones", "the joint gives way, and more or less so as torque grows: strain-wave gears",
+       stiffness_zones},
       {"gravity_moment", "the joint gives way under weights that are not known", gravity_moment},
       {"link_compliance", "the link bends under the weight that hangs beyond it", link_compliance},
       {"harmonic", "error once and twice per turn: eccentric gear or encoder disc", harmonic},
-      {"transmission_error", "error that repeats with the gear's teeth; name the order: transmission_error@96", transmission_error_without_order},
+      {"transmission_error",
+       "error that repeats with the gear's teeth; name the order: transmission_error@96",
+       transmission_error_without_order},
       {"backlash", "the joint's play, seen when poses are approached from both sides", backlash},
       {"gravity_backlash", "the joint's play, taken up by the weight", gravity_backlash},
       {"windup", "the drive twists under the torque of the motor", windup},
@@ -659,7 +735,9 @@ std::vector<Term> effect_terms(const std::vector<EffectRequest>& requests, const
     for (Place& place : requested_places(request, effect, robot, data)) {
       // Twice the same columns would make both parameters invisible.
       if (!seen.insert({effect.name, place.first}).second) {
-        throw std::invalid_argument(effect.name + (place.first == kRobot ? "" : " at " + robot.joints[place.first].name) + " is asked for twice");
+        throw std::invalid_argument(effect.name +
+                                    (place.first == kRobot ? "" : " at " + robot.joints[place.first].name) +
+                                    " is asked for twice");
       }
       std::move(place.second.begin(), place.second.end(), std::back_inserter(all));
     }

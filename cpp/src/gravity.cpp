@@ -50,9 +50,11 @@ void gravity_torques_at(const Robot& robot, const Eigen::MatrixXd& coupling,
     // Virtual work of the weight for a unit motion: sum of m g . (a x (p - o)) = a . (sum of m (p - o)) x g,
     // or m g . a
     const Axis axis = joint_axis(robot, frames, i);
-    const double site_torque = joint.type == JointType::revolute
-                                   ? axis.direction.dot((moment - mass * axis.point).cross(g))
-                                   : mass * axis.direction.dot(g);
+    const Eigen::Vector3d arm = moment - mass * axis.point;
+    const double site_torque =
+        joint.type == JointType::revolute
+            ? without_rounding(axis.direction.dot(arm.cross(g)), (moment.norm() + mass * axis.point.norm()) * g.norm())
+            : without_rounding(mass * axis.direction.dot(g), mass * g.norm());
     // A joint feels what acts on all that moves with it, passive joints included: the transposed coupling.
     torque += site_torque * coupling.row(static_cast<Eigen::Index>(i)).transpose();
   }

@@ -246,12 +246,12 @@ TEST_CASE("law: identified from what it makes, an effect predicts just that, fro
       const truing::Identification found = truing::identify(robot, table->data, options);
       REQUIRE(found.robot.effects.size() == 1);
       CHECK(found.robot.effects[0].effect == name);
-      CHECK(found.train.after.rms < 1e-9);
+      CHECK(found.train.after.rms < 1e-7);
       CHECK(found.train.before.rms > 100.0 * found.train.after.rms);
 
       const truing::Prediction whole = truing::predict(found.robot, table->data);
       const truing::Prediction expected = truing::predict(truth, table->data);
-      CHECK((whole.position - expected.position).cwiseAbs().maxCoeff() < 1e-8);
+      CHECK((whole.position - expected.position).cwiseAbs().maxCoeff() < 2e-6);
       // Nothing that the basis took from the data is taken anew: the last rows alone are predicted as among the others.
       Measurements part = table->data;
       const std::size_t skip = 100;
@@ -344,6 +344,19 @@ TEST_CASE("springs under unknown weights do what a spring under the known ones d
     CHECK(found.train.before.rms > 1e-5);
     CHECK(found.train.after.rms < 1e-10);
     CHECK(found.test->after.rms < 1e-10);
+  }
+}
+
+TEST_CASE("the weight on a vertical axis is none, not the rounding that is left of it") {
+  Robot robot = ur10();
+  robot.T_measurement_base = somewhere();
+  const auto table = random_joints(robot, 50, 95);
+  for (const char* name : {"joint_compliance", "gravity_backlash", "stiffness_zones", "gravity_moment"}) {
+    CAPTURE(name);
+    const detail::Model model = detail::make_model(robot, table->data, {{name, {"J1"}}});
+    for (const std::vector<double>& basis : detail::make_bases(model, table->data)) {
+      for (const double v : basis) CHECK(v == 0.0);
+    }
   }
 }
 
