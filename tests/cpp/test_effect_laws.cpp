@@ -418,3 +418,17 @@ TEST_CASE("base_frame and tool_frame free the model's own parameters") {
   CHECK(found.robot.effects.empty());
   CHECK(found.train.after.rms < 1e-10);
 }
+
+TEST_CASE("a transmission error is the same by helper and by name") {
+  for (const double order : {96.0, 0.5, 161.1}) {
+    const truing::Effect made = truing::transmission_error(order);
+    const truing::Effect& found = truing::find_effect(made.name);
+    CHECK(found.name == made.name);
+    truing::Inputs in;
+    in.joints = Eigen::VectorXd::Constant(6, 0.3);
+    CHECK(made.terms(ur10(), 1, {})[0].basis(in) == std::cos(order * 0.3));
+    CHECK(found.terms(ur10(), 1, {})[1].basis(in) == std::sin(order * 0.3));
+    CHECK(found.terms(ur10(), 1, {})[0].parameter == made.name + ".J2.cos");
+  }
+  CHECK_THROWS_AS(truing::transmission_error(0.0), std::invalid_argument);
+}
