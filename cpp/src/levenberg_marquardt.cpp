@@ -6,6 +6,7 @@
 // must not meet unscaled in one mu I. With mu = 0 it is the least-squares iteration of the differential error model,
 // dxi = (Psi^T Psi)^-1 Psi^T dP.
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -86,6 +87,9 @@ SolverSummary levenberg_marquardt(const Evaluator& problem, const Weighing& weig
       mu = options.undamped ? 0.0 : std::max(mu / 10.0, kLeastDamping);
       if (fall >= 0.0 && fall <= options.rms_fall) return stop("fall of the rms below its bound", true);
     } else {
+      // The step was taken back; nothing is lost when it promised no more than the bound.
+      const double promised = now.rms() - std::sqrt(std::max(0.0, now.cost - step.predicted_fall) / static_cast<double>(now.components));
+      if (promised <= options.rms_fall) return stop("predicted fall of the rms below its bound", true);
       if (options.undamped || mu >= kMostDamping) return stop("no step lowers the rms", false);
       mu *= 10.0;
     }

@@ -425,8 +425,8 @@ def _simulated_effect(text: str) -> tuple[str, float]:
     """ "backlash:J2=0.2mrad" as parameter name and value."""
     place, equals, size = text.partition("=")
     words = [word.strip() for word in place.split(":")]
-    if not equals or len(words) not in (2, 3) or not all(words):
-        raise InputError(f"--effect: found {text!r}, expected effect:joint=size such as backlash:J2=0.2mrad, or effect:joint:part=size")
+    if not equals or len(words) not in (1, 2, 3) or not all(words):
+        raise InputError(f"--effect: found {text!r}, expected effect:joint=size such as backlash:J2=0.2mrad, effect:joint:part=size, or scale=size")
     for kind in ("angle", "length"):
         with contextlib.suppress(InputError):
             return ".".join(words), quantity(size, kind, "--effect")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import fnmatch
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -28,6 +29,10 @@ SECONDS_PER_POSE = 20.0
 LARGEST_PAYLOAD = 10.0  # [kg]
 # An effect with several parameters, asked for by one value: which of them is meant.
 _MAIN_PART = {"harmonic": ".cos1"}
+# Effects of the robot as a whole: their parameters name no joint.
+_WHOLE_ROBOT = ("drift", "joint_coupling", "scale", "time_offset")
+# What --geometry-error and --base-unknown make.
+_NOT_EFFECTS = ("link_geometry", "base_frame", "tool_frame")
 # Effects that are parameters of the model itself, and the attribute that holds them.
 _MODEL_EFFECTS = {"gear_ratio": "ratio", "joint_offset": "offset"}
 _NEAR_PARALLEL = math.sin(math.radians(5.0))
@@ -263,11 +268,14 @@ def random_joints(robot: truing.Robot, count: int, seed: int = 0) -> Floats:
 
 def _true_effect(robot: truing.Robot, name: str, value: float) -> TrueEffect:
     """The effect that a parameter name stands for. Raises InputError that lists the effects there are."""
-    effect, _, rest = name.partition(".")
+    found = re.fullmatch(r"([a-z_]+(?:@\d+(?:\.\d+)?)?)(?:\.(.*))?", name)
+    effect, rest = (found[1], found[2] or "") if found else (name, "")
+    known = [word for word, _ in truing.catalogue() if word not in _NOT_EFFECTS]
+    if effect.partition("@")[0] not in known:
+        raise InputError(f"effect {effect!r} cannot be simulated; there are {', '.join(known)} (link geometry, base and tool come from options of their own)")
+    if effect in _WHOLE_ROBOT:
+        return TrueEffect(effect, "", name, value)
     joint, _, part = rest.partition(".")
-    known = [word for word, _ in truing.catalogue() if word != "link_geometry"]
-    if effect not in known:
-        raise InputError(f"effect {effect!r} cannot be simulated; there are {', '.join(known)} (link geometry comes from the geometry error)")
     robot.joint_index(joint)  # raises, and lists the joints
     attribute = _MODEL_EFFECTS.get(effect)
     if attribute:
@@ -311,9 +319,9 @@ def _frames(robot: truing.Robot) -> Iterator[tuple[str, Any, Any]]:
 def _add_effects(robot: truing.Robot, effects: Sequence[TrueEffect], changed: dict[str, tuple[float, float, str]]) -> None:
     applied: dict[tuple[str, str], dict[str, float]] = {}
     for effect in effects:
-        joint = robot.joint(effect.joint)
         attribute = _MODEL_EFFECTS.get(effect.effect)
         if attribute:
+            joint = robot.joint(effect.joint)
             before = float(getattr(joint, attribute))
             setattr(joint, attribute, before + effect.value)
             first, _, unit = changed.get(effect.parameter, (before, before, "-" if attribute == "ratio" else "rad"))
@@ -321,7 +329,7 @@ def _add_effects(robot: truing.Robot, effects: Sequence[TrueEffect], changed: di
         else:
             applied.setdefault((effect.effect, effect.joint), {})[effect.parameter] = effect.value
     if applied:
-        robot.effects = [*robot.effects, *(truing.AppliedEffect(name, [joint], values) for (name, joint), values in applied.items())]
+        robot.effects = [*robot.effects, *(truing.AppliedEffect(name, [joint] if joint else [], values) for (name, joint), values in applied.items())]
 
 
 def _inputs(robot: truing.Robot, n: int, columns: Sequence[str], seed: int) -> dict[str, Any]:

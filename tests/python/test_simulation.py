@@ -158,3 +158,13 @@ def test_identification_finds_the_hidden_palletizer(solver: str) -> None:
     for p in found.parameters:
         if not p.frozen and p.name in simulated.truth.parameters and p.name not in tied:
             assert abs(p.value - simulated.truth.parameters[p.name][1]) < 4.5 * p.sigma, p.name
+
+
+@pytest.mark.parametrize(("name", "columns"), [("scale", ()), ("drift.base.x", ("t",)), ("thermal.elbow", ("temp",)),
+                                               ("transmission_error@7.5.elbow.cos", ()), ("gravity_backlash.elbow", ("payload",))])  # fmt: skip
+def test_effects_of_every_form_can_be_hidden(name: str, columns: tuple[str, ...]) -> None:
+    robot = truing.load_robot(example("ur10"))
+    plain = truing.simulate(robot, noise=0.0, poses=50, columns=columns, lengths=0.0, angles=0.0, seed=1)
+    hidden = truing.simulate(robot, effects={name: 1e-4}, noise=0.0, poses=50, columns=columns, lengths=0.0, angles=0.0, seed=1)
+    moved = np.linalg.norm(np.asarray(hidden.data.positions) - np.asarray(plain.data.positions), axis=1)
+    assert moved.max() > 1e-6
