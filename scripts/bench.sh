@@ -2,23 +2,30 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Builds and runs the benchmarks: every bench/*.cpp, then every bench/*.py.
+# Builds every bench/*.cpp, sets up the peers' environments (build/peers, about 2 GB), and runs bench/run.py.
+#
+#   scripts/bench.sh             everything; the slowest peer takes several minutes
+#   scripts/bench.sh --quick     without peers that take more than 20 s
+#   scripts/bench.sh --no-peers  truing alone, nothing is downloaded
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 root=$PWD
 export CMAKE_BUILD_PARALLEL_LEVEL=${JOBS:-$(nproc)} CMAKE_GENERATOR=${CMAKE_GENERATOR:-Ninja}
-shopt -s nullglob
 
 cmake -S . -B build/bench -DTRUING_BUILD_TESTS=OFF -DTRUING_BUILD_BENCHMARKS=ON -DCMAKE_BUILD_TYPE=Release > /dev/null
 cmake --build build/bench
+
+# A peer that cannot be installed is reported by the bench and stops nothing.
+stamp=build/peers/.made
+if [[ " $* " != *" --no-peers "* ]] && ! cmp -s bench/peers/setup_peers.sh "$stamp"; then
+  echo "setting up the peers in build/peers (some minutes)"
+  if bench/peers/setup_peers.sh build/peers; then
+    cp bench/peers/setup_peers.sh "$stamp"
+  else
+    echo "the peers' environments could not be made" >&2
+  fi
+fi
+
 mkdir -p build/run/bench
-cd build/run/bench
-for source in "$root"/bench/*.cpp; do
-  name=$(basename "$source" .cpp)
-  printf '\n==== bench/%s.cpp ====\n' "$name"
-  "$root/build/bench/bench_$name"
-done
-for source in "$root"/bench/*.py; do
-  printf '\n==== bench/%s ====\n' "$(basename "$source")"
-  "$root/.venv/bin/python" "$source"
-done
+cd build/run/bench  # not the source tree: only the installed truing is to be imported
+"$root/.venv/bin/python" "$root/bench/run.py" "$@"

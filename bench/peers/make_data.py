@@ -1,5 +1,5 @@
-# SPDX-FileCopyrightText: 2026 The truing authors
-# SPDX-License-Identifier: Apache-2.0
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
 """Write the synthetic UR10 set on which every program of the bench is scored.
 
     python make_data.py ur10.npz --seed 1

@@ -1,5 +1,5 @@
-# SPDX-FileCopyrightText: 2026 The truing authors
-# SPDX-License-Identifier: Apache-2.0
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
 """Plain NumPy kinematics of a modified-DH (Craig + Hayati) arm, shared by the peers.
 
 T_i = Rx(alpha) Tx(a) Ry(beta) Rz(theta + q) Tz(d), all poses at once. Lengths in

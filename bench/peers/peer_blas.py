@@ -1,5 +1,5 @@
-# SPDX-FileCopyrightText: 2026 The truing authors
-# SPDX-License-Identifier: Apache-2.0
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
 """BLAS dsyrk of a tall matrix: the price of forming a Gram matrix after the Jacobian exists."""
 
 import numpy as np

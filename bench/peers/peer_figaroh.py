@@ -1,5 +1,5 @@
-# SPDX-FileCopyrightText: 2026 The truing authors
-# SPDX-License-Identifier: Apache-2.0
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
 """FIGAROH's geometric calibration: full placements of all joints, base and tip unknown.
 
 FIGAROH reads a URDF, a CSV and a YAML file, so those are written to a temporary

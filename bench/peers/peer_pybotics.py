@@ -1,5 +1,5 @@
-# SPDX-FileCopyrightText: 2026 The truing authors
-# SPDX-License-Identifier: Apache-2.0
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
 """pybotics, used as its calibration example does: scipy least squares over optimize_accuracy.
 
 Its links have four parameters (no beta) and are in millimetres. All 24 are free,

@@ -1,5 +1,5 @@
-# SPDX-FileCopyrightText: 2026 The truing authors
-# SPDX-License-Identifier: Apache-2.0
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
 """robotkinecal: minimal product-of-exponentials fit (Li, Wu, Löwe, Li 2016).
 
 It expects points in the base frame, so the points are first brought there by Kabsch;

@@ -1,5 +1,5 @@
-# SPDX-FileCopyrightText: 2026 The truing authors
-# SPDX-License-Identifier: Apache-2.0
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
 """Time and score the peers on one data file, each in a process of its own.
 
     ./setup_peers.sh ENVS                       # once
@@ -25,7 +25,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent
-
 
 
 class Peer(NamedTuple):
@@ -79,7 +78,8 @@ def work(name, data_file, out):
 def drive(name, data_file, envs, timeout):
     """Results of one peer, from a process with its own environment and number of threads."""
     peer = PEERS[name]
-    python = Path(envs) / peer.environment / "bin" / "python" if envs else Path(sys.executable)
+    # absolute, not resolved: an environment's python is a link, and the worker runs in another folder
+    python = Path(envs).absolute() / peer.environment / "bin" / "python" if envs else Path(sys.executable)
     command = f"python peers.py {Path(data_file).name} --only {name}"
     if not python.exists():
         return [{"peer": name, "error": f"environment '{peer.environment}' was not made", "command": command}]

@@ -1,6 +1,6 @@
 #!/bin/sh
-# SPDX-FileCopyrightText: 2026 The truing authors
-# SPDX-License-Identifier: Apache-2.0
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
 # Make the environments of the peers:  ./setup_peers.sh DIR
 # pybotics and robotkinecal want NumPy 1, FIGAROH and Pinocchio NumPy 2. A peer that
 # cannot be installed does not stop the others: peers.py reports it as missing.
