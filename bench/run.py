@@ -353,7 +353,7 @@ def main() -> None:
     others = peers("--only", names, *(("--quick",) if args.quick else ()))
 
     rows = collect(cpp, avx2, python, csv, blas, others)
-    about = {"command": "scripts/bench.sh" + (" --quick" if args.quick else ""), "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
+    about = {"command": " ".join(["scripts/bench.sh", *sys.argv[1:]]), "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
              "load_before": load_before, "load_after": os.getloadavg()[0], "quick": args.quick, "other_work": busy}  # fmt: skip
     print()
     print_table(rows)
