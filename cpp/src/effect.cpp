@@ -14,6 +14,7 @@
 #include <set>
 #include <sstream>
 #include <stdexcept>
+#include <tuple>
 
 #include "gravity.hpp"
 #include "motion.hpp"
@@ -302,7 +303,7 @@ std::vector<Term> link_compliance(const Robot& robot, std::size_t joint, const M
   const Isometry3d end = link_end(robot, frames, joint);
   const Vector3d along =
       end.linear().transpose() * (end.translation() - link_start(robot, frames, joint, 0.0));
-  if (along.norm() < 1e-6) unsuited("link_compliance", at, "needs a link with a length; this one has none");
+  if (along.norm() < 5e-3) unsuited("link_compliance", at, "needs a link with a length; this one has none");
   require_weight("link_compliance", robot, at, data);
   Eigen::Index lengthwise = 0;
   along.cwiseAbs().maxCoeff(&lengthwise);
@@ -432,7 +433,8 @@ std::vector<Term> thermal(const Robot& robot, std::size_t joint, const Measureme
   std::vector<std::pair<const char*, double>> lengths = {{"a", at.a}, {"d", at.d}};
   if (robot.convention == Convention::urdf)
     lengths = {{"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
-  const auto is_zero = [](const auto& length) { return length.second == 0.0; };
+  constexpr double kNoLength = 1e-3;  // [m]: an offset found where the drawing has none does not make it a beam
+  const auto is_zero = [](const auto& length) { return std::abs(length.second) < kNoLength; };
   lengths.erase(std::remove_if(lengths.begin(), lengths.end(), is_zero), lengths.end());
   if (lengths.empty()) unsuited("thermal", at, "needs a link with a length; this one has none");
   const Warmth warm = warmth("thermal", robot, at, data);
@@ -490,9 +492,9 @@ std::vector<Term> joint_coupling(const Robot& robot, std::size_t, const Measurem
   return terms;
 }
 
-// A four-bar linkage whose opposite bars are not quite equal: to first order the passive joint errs by a cos
-// u + b sin u, u the angle between the bars, that is between the first and the last of its drivers (q3 - q2
-// of a palletizer).
+// Four-bar linkages whose opposite bars are not quite equal: to first order the passive joint errs by a cos u + b sin u, u an
+// angle between two bars: the difference of its first and last driver (q3 - q2 of a palletizer), or, where one bar is fixed to
+// the base or the wrist, the first driver's angle or their sum.
 std::vector<Term> linkage(const Robot& robot, std::size_t joint, const Measurements&) {
   const Joint& at = robot.joints.at(joint);
   if (!at.passive())
@@ -501,13 +503,19 @@ std::vector<Term> linkage(const Robot& robot, std::size_t joint, const Measureme
   for (const auto& driver : at.driven_by)
     drivers.push_back(static_cast<Eigen::Index>(robot.joint_index(driver.first)));
   const auto [first, last] = std::minmax_element(drivers.begin(), drivers.end());
-  const auto angle = [a = *first, b = *last](const Inputs& in) {
-    return a == b ? in.joints[b] : in.joints[b] - in.joints[a];
-  };
-  return {make_term("linkage." + at.name + ".cos", motion_unit(at), at.name,
-                    [angle](const Inputs& in) { return std::cos(angle(in)); }),
-          make_term("linkage." + at.name + ".sin", motion_unit(at), at.name,
-                    [angle](const Inputs& in) { return std::sin(angle(in)); })};
+  std::vector<std::tuple<std::string, double, double>> angles = {{"", -1.0, 1.0}, {"_first", 1.0, 0.0}, {"_sum", 1.0, 1.0}};
+  if (*first == *last) angles = {{"", 0.0, 1.0}};
+  std::vector<Term> terms;
+  for (const auto& [suffix, of_first, of_last] : angles) {
+    const auto angle = [a = *first, b = *last, of_first = of_first, of_last = of_last](const Inputs& in) {
+      return of_first * in.joints[a] + of_last * in.joints[b];
+    };
+    terms.push_back(make_term("linkage." + at.name + ".cos" + suffix, motion_unit(at), at.name,
+                              [angle](const Inputs& in) { return std::cos(angle(in)); }));
+    terms.push_back(make_term("linkage." + at.name + ".sin" + suffix, motion_unit(at), at.name,
+                              [angle](const Inputs& in) { return std::sin(angle(in)); }));
+  }
+  return terms;
 }
 
 // Bearing run-out: the axis tilts about the two directions across it, once per turn. DH turns before its
@@ -547,7 +555,7 @@ std::vector<Term> axis_wobble(const Robot& robot, std::size_t joint, const Measu
       const std::string parameter = "axis_wobble." + at.name + (cosine ? ".cos_" : ".sin_") + "xy"[tilt];
       for (std::size_t k = 0; k < sites.size(); ++k) {
         const double share = tilts(static_cast<Eigen::Index>(k), tilt);
-        if (share == 0.0) continue;
+        if (share == 0.0 && sites.size() < 3) continue;  // of three, none stays zero when the frame turns
         terms.push_back(make_term(
             parameter, "rad", sites[k],
             [index, cosine, share](const Inputs& in) {

@@ -190,8 +190,13 @@ Compiled compile(const Model& model, const Segment& segment, const std::vector<i
       out.column_free.push_back(static_cast<int>(f));
     }
     for (const ColumnTerm& column : info.columns) {
-      kernel::ColumnPlan plan{static_cast<int>(out.parts.size()), static_cast<int>(column.sites.size()), -1, -1};
-      for (const auto& [site, weight] : column.sites) out.parts.push_back({axis_slot[site], origin_slot[site], weight});
+      kernel::ColumnPlan plan{static_cast<int>(out.parts.size()), 0, -1, -1};
+      for (const auto& [site, weight] : column.sites) {
+        if (axis_slot[site] < 0) continue;  // on another target
+        out.parts.push_back({axis_slot[site], origin_slot[site], weight});
+        ++plan.part_count;
+      }
+      if (plan.part_count == 0) continue;
       if (column.reading >= 0 || column.term >= 0) {
         plan.basis = static_cast<int>(out.bases.size());
         out.bases.push_back({column.reading, column.term});

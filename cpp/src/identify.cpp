@@ -17,6 +17,7 @@
 #include "registration.hpp"
 #include "selection.hpp"
 #include "solvers.hpp"
+#include "statistics.hpp"
 
 namespace truing {
 namespace detail {
@@ -28,13 +29,6 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kChiMedian[7] = {0.0, 0.674490, 1.177410, 1.538172, 1.832134, 2.086015, 2.312600};
 
 std::string count_of(std::size_t n, const char* what) { return std::to_string(n) + " " + what + (n == 1 ? "" : "s"); }
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // --- which rows, which parameters ---------------------------------------------------------------------------------------
 
@@ -407,39 +401,19 @@ ErrorLengths error_lengths(const Job& job, const Evaluator& evaluator, const Eig
 }
 
 ErrorStatistics statistics(const ErrorLengths& errors, const std::vector<std::int32_t>& rows) {
-  ErrorStatistics out;
   std::vector<double> lengths;
   lengths.reserve(rows.size());
-  double squares = 0.0, sum = 0.0, turn = 0.0;
+  double turn = 0.0;
   std::size_t turns = 0;
   for (const std::int32_t row : rows) {
-    const double length = errors.position[row];
-    lengths.push_back(length);
-    sum += length;
-    squares += length * length;
+    lengths.push_back(errors.position[row]);
     if (!errors.rotation.empty() && std::isfinite(errors.rotation[row])) {
       turn += static_cast<double>(errors.rotation[row]) * static_cast<double>(errors.rotation[row]);
       ++turns;
     }
   }
-  out.n = lengths.size();
-  out.rotation_rms = turns ? std::sqrt(turn / static_cast<double>(turns)) : kNaN;
-  if (lengths.empty()) return out;
-  const auto n = static_cast<double>(lengths.size());
-  // Quantiles by linear interpolation between order statistics (Hyndman and Fan's type 7, NumPy's default).
-  const auto quantile = [&](double share) {
-    const double at = share * (n - 1.0);
-    const auto low = static_cast<std::ptrdiff_t>(at);
-    std::nth_element(lengths.begin(), lengths.begin() + low, lengths.end());
-    const double below = lengths[static_cast<std::size_t>(low)];
-    const auto above = std::min_element(lengths.begin() + low + 1, lengths.end());
-    return above == lengths.end() ? below : below + (at - static_cast<double>(low)) * (*above - below);
-  };
-  out.rms = std::sqrt(squares / n);
-  out.mean = sum / n;
-  out.median = quantile(0.5);
-  out.p95 = quantile(0.95);
-  out.max = *std::max_element(lengths.begin(), lengths.end());
+  ErrorStatistics out = error_statistics(std::move(lengths));
+  if (turns) out.rotation_rms = std::sqrt(turn / static_cast<double>(turns));
   return out;
 }
 
@@ -646,6 +620,7 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
 
   // What can be seen of it.
   const Model model = make_model(start.robot, data, options.effects, options.own_effects);
+  if (model.terms.size() != nominal_model.terms.size()) bases = make_bases(model, data);
   const Job job{model, data, bases, options, train};
   int scale_carrier = -1;
   if (!content.frame && !content.distance) {
@@ -667,7 +642,9 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   const bool gravity = std::any_of(model.terms.begin(), model.terms.end(), [](const Term& t) { return t.needs_gravity; });
   for (int round = 0; gravity && round < 5; ++round) {
     const Robot robot = robot_with(model, found.values);
-    bases = make_bases(make_model(robot, data, options.effects, options.own_effects), data);
+    const Model found_model = make_model(robot, data, options.effects, options.own_effects);
+    if (found_model.terms.size() != model.terms.size()) break;  // a length that was none: the law stays with the drawing's
+    bases = make_bases(found_model, data);
     const Eigen::VectorXd before = found.values;
     found = fit(job, selection.fitted, before);
     if ((found.values - before).cwiseAbs().maxCoeff() < 1e-11) break;

@@ -13,6 +13,7 @@
 
 #include "evaluate.hpp"
 #include "observability.hpp"
+#include "plan_poses.hpp"
 #include "random.hpp"
 #include "selection.hpp"
 
@@ -23,28 +24,28 @@ namespace {
 constexpr int kRankPoses = 1000;  // random poses that decide what any plan could see
 constexpr int kDraws = 200;       // for one joint, before a proposal is given up
 
-using Pose = Eigen::VectorXd;  // readings of the driven joints
+}  // namespace
 
-struct Range { double lower, upper, step; };
-
-std::vector<Range> joint_ranges(const Robot& robot, const PlanOptions& options) {
+std::vector<Range> joint_ranges(const Robot& robot, double min_step, double min_step_prismatic, const char* who) {
   std::vector<Range> ranges;
   for (const std::size_t k : robot.driven_joints()) {
     const Joint& joint = robot.joints[k];
     const bool revolute = joint.type == JointType::revolute;
     if (!revolute && !(std::isfinite(joint.lower) && std::isfinite(joint.upper))) {
-      throw std::invalid_argument("plan: prismatic joint " + joint.name + " needs limits");
+      throw std::invalid_argument(std::string(who) + ": prismatic joint " + joint.name + " needs limits");
     }
     Range range{std::isfinite(joint.lower) ? joint.lower : -M_PI, std::isfinite(joint.upper) ? joint.upper : M_PI,
-                revolute ? options.min_step : options.min_step_prismatic};
+                revolute ? min_step : min_step_prismatic};
     if (range.upper - range.lower <= 2.0 * range.step) {
-      throw std::invalid_argument("plan: the range of joint " + joint.name + " is too small for steps of more than " + std::to_string(range.step) +
+      throw std::invalid_argument(std::string(who) + ": the range of joint " + joint.name + " is too small for steps of more than " + std::to_string(range.step) +
                                   (revolute ? " rad" : " m") + " between any two neighbours: lower min_step");
     }
     ranges.push_back(range);
   }
   return ranges;
 }
+
+namespace {
 
 /// Passive joints keep their limits too.
 bool passive_joints_within(const Robot& robot, const Model& model, const Pose& pose) {
@@ -64,7 +65,8 @@ bool passive_joints_within(const Robot& robot, const Model& model, const Pose& p
   return true;
 }
 
-/// A pose within limits whose every joint is more than its step away from both neighbours (null: there is none). False: none was found.
+}  // namespace
+
 bool draw_pose(const Robot& robot, const Model& model, const std::vector<Range>& ranges, const Pose* before, const Pose* after, Random* random, Pose* out) {
   for (int attempt = 0; attempt < kDraws; ++attempt) {
     bool found = true;
@@ -81,6 +83,8 @@ bool draw_pose(const Robot& robot, const Model& model, const std::vector<Range>&
   }
   return false;
 }
+
+namespace {
 
 /// Poses as measurements of the robot itself: only their Jacobian is wanted, at errors of zero.
 class Poses {
@@ -174,7 +178,7 @@ PlanResult plan(const Robot& robot, const PlanOptions& options) {
   std::string error;
   if (!options.is_valid(&error)) throw std::invalid_argument("plan: " + error);
   validate(robot);
-  const std::vector<Range> ranges = joint_ranges(robot, options);
+  const std::vector<Range> ranges = joint_ranges(robot, options.min_step, options.min_step_prismatic, "plan");
   Random random(options.seed);
   const auto n_joints = static_cast<Eigen::Index>(ranges.size());
 

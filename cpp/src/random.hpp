@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace truing::detail {
@@ -19,6 +20,12 @@ class Random {
   }
 
   double uniform(double low, double high) { return low + (high - low) * (static_cast<double>(next() >> 11) * 0x1.0p-53); }
+
+  /// Standard normal (Box and Muller 1958).
+  double normal() {
+    const double r = std::sqrt(-2.0 * std::log(1.0 - uniform(0.0, 1.0)));
+    return r * std::cos(uniform(0.0, 6.283185307179586));
+  }
 
   /// 0 … count - 1
   std::uint64_t below(std::uint64_t count) { return next() % count; }

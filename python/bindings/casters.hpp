@@ -23,6 +23,7 @@
 #include <pybind11/typing.h>
 #include <Eigen/Geometry>
 
+#include "truing/diagnose.hpp"
 #include "truing/truing.hpp"
 
 namespace truing::python {
@@ -95,6 +96,14 @@ struct Words<Observability> {
                                                    "noise_amplification"};
   static constexpr auto type = py::detail::const_name(
       "typing.Literal['d_optimal', 'a_optimal', 'e_optimal', 'inverse_condition', 'noise_amplification']");
+};
+
+template <>
+struct Words<Verdict> {
+  static constexpr const char* what = "verdict";
+  static constexpr std::array<const char*, 4> list{"none", "effects", "unknown", "effects+unknown"};
+  static constexpr auto type =
+      py::detail::const_name("typing.Literal['none', 'effects', 'unknown', 'effects+unknown']");
 };
 
 template <class Enum>
@@ -216,6 +225,8 @@ void bind_measurements(py::module_& m);
 void bind_effects(py::module_& m);
 void bind_identify(py::module_& m);
 void bind_plan(py::module_& m);
+void bind_diagnose(py::module_& m);
+void bind_distinguish(py::module_& m);
 
 /// A double array of whatever strides, without a copy unless its type or memory layout calls for one.
 py::array float_array(py::handle object, const std::string& name);
@@ -284,6 +295,8 @@ template <>
 struct type_caster<truing::FrameBy> : word_caster<truing::FrameBy> {};
 template <>
 struct type_caster<truing::Observability> : word_caster<truing::Observability> {};
+template <>
+struct type_caster<truing::Verdict> : word_caster<truing::Verdict> {};
 
 template <>
 struct type_caster<Eigen::Isometry3d> {

@@ -25,4 +25,6 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_effects(m);
   truing::python::bind_identify(m);
   truing::python::bind_plan(m);
+  truing::python::bind_diagnose(m);
+  truing::python::bind_distinguish(m);
 }

@@ -7,28 +7,49 @@
     found = truing.identify(robot, data, effects="backlash")
     truing.save_robot("calibrated.yaml", found.robot)
 
+    print(truing.diagnose(robot, data).summary())  # which effects cause the gap
+
 SI units throughout: m, rad, kg, s. `T_a_b` maps b-coordinates into a. Quaternions are w x y z.
 """
 
 from truing._core import (
+    Alternative,
     Anchor,
     AppliedEffect,
     BeforeAfter,
+    Candidate,
+    Curve,
+    Detectable,
+    DiagnoseOptions,
+    Diagnosis,
+    Distinction,
+    DistinguishOptions,
+    EffectPair,
     EffectRequest,
+    EffectSize,
     ErrorStatistics,
+    FoundEffect,
     Frozen,
     Identification,
     IdentifyOptions,
     Joint,
     Measurements,
+    NextPose,
+    NotTestable,
     Parameter,
     PlanOptions,
     PlanResult,
     Prediction,
     Residuals,
     Robot,
+    SanityFinding,
+    Share,
     SolverSummary,
     Target,
+    UnknownEffect,
+    WhereInput,
+    WhereJoint,
+    WorkspaceCell,
     catalogue,
     forward_kinematics,
     frame_from_xyz_rpy,
@@ -42,7 +63,7 @@ from truing._core import (
     validate_robot,
     version,
 )
-from truing.api import identify, plan, predict, residuals
+from truing.api import diagnose, distinguish, identify, plan, predict, residuals
 from truing.effects import Effect
 from truing.errors import InputError, InputWarning, NotConvergedError
 from truing.files import load_measurements, load_robot, save_measurements, save_robot
@@ -52,12 +73,23 @@ __version__ = version()
 validate = validate_robot
 
 __all__ = [
+    "Alternative",
     "Anchor",
     "AppliedEffect",
     "BeforeAfter",
+    "Candidate",
+    "Curve",
+    "Detectable",
+    "DiagnoseOptions",
+    "Diagnosis",
+    "Distinction",
+    "DistinguishOptions",
     "Effect",
+    "EffectPair",
     "EffectRequest",
+    "EffectSize",
     "ErrorStatistics",
+    "FoundEffect",
     "Frozen",
     "Identification",
     "IdentifyOptions",
@@ -65,17 +97,27 @@ __all__ = [
     "InputWarning",
     "Joint",
     "Measurements",
+    "NextPose",
     "NotConvergedError",
+    "NotTestable",
     "Parameter",
     "PlanOptions",
     "PlanResult",
     "Prediction",
     "Residuals",
     "Robot",
+    "SanityFinding",
+    "Share",
     "SolverSummary",
     "Target",
+    "UnknownEffect",
+    "WhereInput",
+    "WhereJoint",
+    "WorkspaceCell",
     "__version__",
     "catalogue",
+    "diagnose",
+    "distinguish",
     "forward_kinematics",
     "frame_from_xyz_rpy",
     "gravity_torques",

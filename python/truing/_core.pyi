@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Anchor', 'AppliedEffect', 'BeforeAfter', 'EffectRequest', 'ErrorStatistics', 'Frozen', 'Identification', 'IdentifyOptions', 'Joint', 'Measurements', 'OwnEffect', 'Parameter', 'PlanOptions', 'PlanResult', 'Prediction', 'Residuals', 'Robot', 'SolverSummary', 'Target', 'catalogue', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'identify', 'joint_motion', 'plan', 'pose_groups', 'predict', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Candidate', 'Curve', 'Detectable', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'ErrorStatistics', 'FoundEffect', 'Frozen', 'Identification', 'IdentifyOptions', 'Joint', 'Measurements', 'NextPose', 'NotTestable', 'OwnEffect', 'Parameter', 'PlanOptions', 'PlanResult', 'Prediction', 'Residuals', 'Robot', 'SanityFinding', 'Share', 'SolverSummary', 'Target', 'UnknownEffect', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'catalogue', 'diagnose', 'distinguish', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'identify', 'joint_motion', 'plan', 'pose_groups', 'predict', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'version']
 class Joint:
     """
     One joint and the link that belongs to it. Lengths in m, angles in rad, masses in kg.
@@ -1137,9 +1137,1035 @@ class PlanResult:
         """
         sigma: the standard error that this plan promises.
         """
+class DiagnoseOptions:
+    """
+    How `diagnose` works; see the attributes.
+    """
+    def __init__(self, *, leave_out: collections.abc.Sequence[str] = [], false_alarm: typing.SupportsFloat | typing.SupportsIndex = 0.01, max_effects: typing.SupportsInt | typing.SupportsIndex = 12, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, search_poses: typing.SupportsInt | typing.SupportsIndex = 6000, resamples: typing.SupportsInt | typing.SupportsIndex = 60, rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, seed: typing.SupportsInt | typing.SupportsIndex = 0, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> DiagnoseOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> DiagnoseOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def false_alarm(self) -> float:
+        """
+        Chance that a robot without any gap is said to have one.
+        """
+    @false_alarm.setter
+    def false_alarm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def leave_out(self) -> tuple[str, ...]:
+        """
+        Effects that are not to be considered, by name.
+        """
+    @leave_out.setter
+    def leave_out(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
+    def max_effects(self) -> int:
+        """
+        At most so many are named.
+        """
+    @max_effects.setter
+    def max_effects(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def resamples(self) -> int:
+        """
+        Bootstrap samples of pose groups; each repeats the search.
+        """
+    @resamples.setter
+    def resamples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_length(self) -> float:
+        """
+        [m] a rotation error of 1 rad counts as this length in reported errors.
+        """
+    @rotation_length.setter
+    def rotation_length(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def search_poses(self) -> int:
+        """
+        Of more pose groups, so many are searched; errors are those of all rows.
+        """
+    @search_poses.setter
+    def search_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of the split and of every simulation.
+        """
+    @seed.setter
+    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def test_share(self) -> float:
+        """
+        Share of the pose groups held out when the data has no `set`.
+        """
+    @test_share.setter
+    def test_share(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def threads(self) -> int:
+        """
+        0: as many as the machine has.
+        """
+    @threads.setter
+    def threads(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class Share:
+    """
+    A share and its 90 % interval.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def high(self) -> float:
+        """
+        Upper end.
+        """
+    @property
+    def low(self) -> float:
+        """
+        Lower end.
+        """
+    @property
+    def value(self) -> float:
+        """
+        1: all of it.
+        """
+class Alternative:
+    """
+    An effect that would explain the data as well.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effect(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Where.
+        """
+    @property
+    def probability(self) -> float:
+        """
+        Its part of the class's probability.
+        """
+    @property
+    def separated_by(self) -> str:
+        """
+        What to measure to tell.
+        """
+class Curve:
+    """
+    A fitted law, or a free function, drawn against its input: value at the site [rad | m].
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def input(self) -> str:
+        """
+        'q4', 'torque2', 'temp', 'time', 'dir3', 'payload', a covariate.
+        """
+    @property
+    def input_unit(self) -> str:
+        """
+        Of the input.
+        """
+    @property
+    def points(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, 3): input, value, standard error.
+        """
+    @property
+    def samples(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, 2): input and value, what single poses say; at most 600.
+        """
+    @property
+    def second_high(self) -> float:
+        """
+        Of the second input.
+        """
+    @property
+    def second_input(self) -> str:
+        """
+        Of a function of two inputs: the other one, which is between `second_low` and `second_high`; or ''.
+        """
+    @property
+    def second_low(self) -> float:
+        """
+        Of the second input.
+        """
+    @property
+    def site(self) -> str:
+        """
+        What moves: a joint's name, 'base.x' ...
+        """
+    @property
+    def unit(self) -> str:
+        """
+        Of the value and its standard error: rad or m.
+        """
+class FoundEffect:
+    """
+    An effect that `diagnose` named.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def confounded_with(self) -> tuple[Alternative, ...]:
+        """
+        Effects that would explain these data as well.
+        """
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """
+        The law, drawn through what single poses say.
+        """
+    @property
+    def effect(self) -> str:
+        """
+        Its name, as in `catalogue()`, or that of an effect of one's own.
+        """
+    @property
+    def held_out_after(self) -> ErrorStatistics:
+        """
+        Held-out errors with all named effects [m].
+        """
+    @property
+    def held_out_before(self) -> ErrorStatistics:
+        """
+        Held-out errors without this effect, all others in [m].
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Where.
+        """
+    @property
+    def note(self) -> str:
+        """
+        What else is to be known of it; may be empty.
+        """
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """
+        Values and standard errors.
+        """
+    @property
+    def probability(self) -> float:
+        """
+        Of the class: this effect or one of `confounded_with`.
+        """
+    @property
+    def share(self) -> float:
+        """
+        Of the gap's mean square; those of all effects and unknowns add up to what was closed.
+        """
+    @property
+    def share_alone(self) -> float:
+        """
+        Of the gap's mean square, what it closes when it is the only one.
+        """
+    @property
+    def share_last(self) -> float:
+        """
+        What it closes when all others are in already.
+        """
+    @property
+    def shrink(self) -> Share:
+        """
+        Of the held-out rms: 1 - after / before.
+        """
+class UnknownEffect:
+    """
+    Something that no effect of the catalogue is: a joint that moves as a free function of recorded inputs.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """
+        Along the first input; of two inputs, one for each of three ranges of the second.
+        """
+    @property
+    def held_out_after(self) -> ErrorStatistics:
+        """
+        Held-out errors with it [m].
+        """
+    @property
+    def held_out_before(self) -> ErrorStatistics:
+        """
+        Held-out errors without it [m].
+        """
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """
+        One or two.
+        """
+    @property
+    def joint(self) -> str:
+        """
+        A joint's name, 'base', or '' when only 'somewhere' can be said.
+        """
+    @property
+    def looks_like(self) -> str:
+        """
+        In words: 'a step at q4 = 0.41 rad'.
+        """
+    @property
+    def probability(self) -> float:
+        """
+        That there is such a function.
+        """
+    @property
+    def share(self) -> float:
+        """
+        Of the gap's mean square, as that of an effect.
+        """
+    @property
+    def shrink(self) -> Share:
+        """
+        Of the held-out rms: 1 - after / before.
+        """
+class NotTestable:
+    """
+    An effect that these data could not show.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effect(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Where; empty: at any joint.
+        """
+    @property
+    def why(self) -> str:
+        """
+        'no column temp_C', 'J1 does not move' ...
+        """
+class Detectable:
+    """
+    The smallest effect that would have been found.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effect(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def joint(self) -> str:
+        """
+        Where.
+        """
+    @property
+    def parameter(self) -> str:
+        """
+        Of which parameter `size` is.
+        """
+    @property
+    def size(self) -> float:
+        """
+        In the parameter's unit.
+        """
+    @property
+    def size_at_tip(self) -> float:
+        """
+        Rms at the tip [m].
+        """
+    @property
+    def unit(self) -> str:
+        """
+        Of `size`.
+        """
+class Candidate:
+    """
+    One candidate before any choice: what methods without a search would go by.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def columns(self) -> int:
+        """
+        Parameters that the data can see.
+        """
+    @property
+    def effect(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def evidence(self) -> float:
+        """
+        Log Bayes factor against frames only.
+        """
+    @property
+    def gain(self) -> float:
+        """
+        Fall of the sum of squares when it is added alone, in units of the noise.
+        """
+    @property
+    def held_out_gain(self) -> float:
+        """
+        Cross-validated fall of the mean square, as a share of the gap.
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Where.
+        """
+    @property
+    def largest_z(self) -> float:
+        """
+        Largest |estimate / standard error| when everything is fitted together.
+        """
+class SanityFinding:
+    """
+    What looks wrong with the data themselves.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def kind(self) -> str:
+        """
+        joint_record, joint_order, joint_sign, joint_unit, duplicates, direction, lag, moved_target, constant or outliers.
+        """
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """
+        Rows (counted from 0) that it is about, if few.
+        """
+    @property
+    def text(self) -> str:
+        """
+        A sentence with what to do.
+        """
+class NextPose:
+    """
+    A pose worth measuring next.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def direction(self) -> tuple[int, ...]:
+        """
+        Approach direction of every driven joint; empty: any.
+        """
+    @property
+    def joints(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(driven joints,) [rad | m]
+        """
+    @property
+    def payload(self) -> float:
+        """
+        [kg]; NaN: any.
+        """
+    @property
+    def why(self) -> str:
+        """
+        What it tells.
+        """
+class WhereJoint:
+    """
+    How much of the closable gap sits at a joint.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def joint(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def share(self) -> Share:
+        """
+        Of the closable gap, what a free function of the inputs at this joint explains.
+        """
+class WhereInput:
+    """
+    How much of the gap goes with an input.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def input(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def share(self) -> float:
+        """
+        Of the closable gap.
+        """
+class WorkspaceCell:
+    """
+    The error in one part of the workspace.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def center(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,) [m] in the base frame.
+        """
+    @property
+    def n(self) -> int:
+        """
+        Number of rows.
+        """
+    @property
+    def rms(self) -> float:
+        """
+        Of the gap [m].
+        """
+class Diagnosis:
+    """
+    What `diagnose` found.
+    """
+    def __repr__(self) -> str:
+        ...
+    def summary(self) -> str:
+        """
+        A few lines for people.
+        """
+    @property
+    def after(self) -> ErrorStatistics:
+        """
+        Held-out errors with all named effects, corrections of their laws and drifts included [m].
+        """
+    @property
+    def after_unknown(self) -> ErrorStatistics:
+        """
+        Held-out errors with the unknown functions as well [m].
+        """
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """
+        Every candidate, before any choice.
+        """
+    @property
+    def closable(self) -> float:
+        """
+        Share of the gap's mean square above the noise floor that the named effects close.
+        """
+    @property
+    def detectable(self) -> tuple[Detectable, ...]:
+        """
+        The smallest effects that would have been found; of each, its easiest joint first.
+        """
+    @property
+    def direction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        shape=(3, 3): principal axes of the residual in the base frame, as columns.
+        """
+    @property
+    def direction_rms(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,) [m]: along them.
+        """
+    @property
+    def directions(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(n, driven joints): approach directions that were inferred from the order of the rows; None: the data had them.
+        """
+    @property
+    def effects(self) -> tuple[FoundEffect, ...]:
+        """
+        By how much of the gap each explains, most first.
+        """
+    @property
+    def error_after(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [m]: with all named effects, as `after`.
+        """
+    @property
+    def error_before(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [m]: with base and targets fitted only.
+        """
+    @property
+    def gap(self) -> ErrorStatistics:
+        """
+        Held-out errors with base, targets (and anchor) fitted only [m].
+        """
+    @property
+    def joint_record(self) -> str:
+        """
+        'q' or 'qr': the record that explains the measurements better.
+        """
+    @property
+    def neighbour_p95(self) -> float:
+        """
+        [m] 95th percentile of the errors of a nearest-neighbour predictor; NaN: too few rows.
+        """
+    @property
+    def neighbour_share(self) -> float:
+        """
+        Of the remaining mean square, what a nearest-neighbour predictor still explains.
+        """
+    @property
+    def next_poses(self) -> tuple[NextPose, ...]:
+        """
+        Poses worth measuring next.
+        """
+    @property
+    def noise_floor(self) -> float:
+        """
+        [m] rms length of a row's error that is noise.
+        """
+    @property
+    def noise_from_repeats(self) -> bool:
+        """
+        The noise is that of repeated poses, not of what a flexible fit leaves.
+        """
+    @property
+    def not_testable(self) -> tuple[NotTestable, ...]:
+        """
+        What these data could not show.
+        """
+    @property
+    def outliers(self) -> tuple[int, ...]:
+        """
+        Rows (counted from 0) that counted for little.
+        """
+    @property
+    def p_gap(self) -> float:
+        """
+        Chance of a gain as large under noise alone.
+        """
+    @property
+    def remaining_structure_p(self) -> float:
+        """
+        Permutation test of the free functions on what is left.
+        """
+    @property
+    def residuals_after(self) -> Residuals:
+        """
+        Predicted minus measured, of every row, as `after`.
+        """
+    @property
+    def residuals_before(self) -> Residuals:
+        """
+        Predicted minus measured, of every row, as `gap`.
+        """
+    @property
+    def robot(self) -> Robot:
+        """
+        Robot with the effects that were named; free functions are left out. Part of this result.
+        """
+    @property
+    def robot_before(self) -> Robot:
+        """
+        Nominal robot with base and targets fitted. Part of this result: copy() it before changing it.
+        """
+    @property
+    def sanity(self) -> tuple[SanityFinding, ...]:
+        """
+        What looks wrong with the data themselves.
+        """
+    @property
+    def seed(self) -> int:
+        """
+        Of the split and of every simulation.
+        """
+    @property
+    def sentence(self) -> str:
+        """
+        The verdict in words.
+        """
+    @property
+    def set(self) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        shape=(n,): 0 train, 1 test, for every row.
+        """
+    @property
+    def shrink(self) -> Share:
+        """
+        Of the held-out rms, by `robot`: 1 - its error / gap.
+        """
+    @property
+    def unknown(self) -> tuple[UnknownEffect, ...]:
+        """
+        What no effect of the catalogue is.
+        """
+    @property
+    def verdict(self) -> typing.Literal['none', 'effects', 'unknown', 'effects+unknown']:
+        """
+        'none' (no gap beyond noise), 'effects' (named, and nothing is left), 'unknown' (a gap that no effect of the catalogue explains) or 'effects+unknown' (named, and something is left).
+        """
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """
+        What to know before trusting it.
+        """
+    @property
+    def where_inputs(self) -> tuple[WhereInput, ...]:
+        """
+        The gap by input.
+        """
+    @property
+    def where_joints(self) -> tuple[WhereJoint, ...]:
+        """
+        The gap by joint.
+        """
+    @property
+    def workspace(self) -> tuple[WorkspaceCell, ...]:
+        """
+        The gap by part of the workspace.
+        """
+class EffectSize:
+    """
+    The smallest effect that a plan would see.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effect(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def joint(self) -> str:
+        """
+        Where; empty: it belongs to no joint.
+        """
+    @property
+    def parameter(self) -> str:
+        """
+        The one of its parameters that shows best.
+        """
+    @property
+    def size(self) -> float:
+        """
+        In the parameter's unit, when base and tool are fitted.
+        """
+    @property
+    def size_at_tip(self) -> float:
+        """
+        Rms motion of the tip that this makes [m].
+        """
+    @property
+    def size_with_geometry(self) -> float:
+        """
+        When all geometry is fitted as well; NaN: geometry takes it all up.
+        """
+    @property
+    def size_with_geometry_at_tip(self) -> float:
+        """
+        Its motion of the tip [m].
+        """
+    @property
+    def standard_errors(self) -> float:
+        """
+        How many of the parameter's standard errors `size` is.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        Of `size`.
+        """
+class EffectPair:
+    """
+    Two effects, and how far the first is like what the other can do.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effect(self) -> str:
+        """
+        The first.
+        """
+    @property
+    def joint(self) -> str:
+        """
+        Where; empty: it belongs to no joint.
+        """
+    @property
+    def other(self) -> str:
+        """
+        The other.
+        """
+    @property
+    def other_joint(self) -> str:
+        """
+        Where the other is.
+        """
+    @property
+    def parameter(self) -> str:
+        """
+        Of the first: what `size` is of.
+        """
+    @property
+    def r2(self) -> float:
+        """
+        Share of the first's motion of the tip, beyond base and tool, that the other explains.
+        """
+    @property
+    def r2_after(self) -> float:
+        """
+        With the added poses; NaN: none were asked for.
+        """
+    @property
+    def separated_by(self) -> str:
+        """
+        What to measure to tell.
+        """
+    @property
+    def size(self) -> float:
+        """
+        From which on the first is told from the other; NaN: never.
+        """
+    @property
+    def size_after(self) -> float:
+        """
+        With the added poses.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        Of `size`.
+        """
+class DistinguishOptions:
+    """
+    How `distinguish` works; see the attributes.
+    """
+    def __init__(self, *, columns: collections.abc.Sequence[str] = [], separate: collections.abc.Sequence[EffectRequest] = [], payload: typing.SupportsFloat | typing.SupportsIndex = 5.0, temperature_low: typing.SupportsFloat | typing.SupportsIndex = 20.0, temperature_high: typing.SupportsFloat | typing.SupportsIndex = 35.0, seconds_per_pose: typing.SupportsFloat | typing.SupportsIndex = 30.0, orientation: bool = False, position_sigma: typing.SupportsFloat | typing.SupportsIndex = 3e-05, rotation_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0001, alike: typing.SupportsFloat | typing.SupportsIndex = 0.98, add: typing.SupportsInt | typing.SupportsIndex = 12, proposals: typing.SupportsInt | typing.SupportsIndex = 300, min_step: typing.SupportsFloat | typing.SupportsIndex = 0.2617993877991494, min_step_prismatic: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> DistinguishOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> DistinguishOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def add(self) -> int:
+        """
+        At most so many poses are added.
+        """
+    @add.setter
+    def add(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def alike(self) -> float:
+        """
+        An effect of which another explains a larger share is not told from it.
+        """
+    @alike.setter
+    def alike(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """
+        Of 'dir', 'payload', 'temp', 't'.
+        """
+    @columns.setter
+    def columns(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
+    def min_step(self) -> float:
+        """
+        [rad] every revolute joint moves by more to an added pose.
+        """
+    @min_step.setter
+    def min_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_step_prismatic(self) -> float:
+        """
+        [m] the same for prismatic joints.
+        """
+    @min_step_prismatic.setter
+    def min_step_prismatic(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def orientation(self) -> bool:
+        """
+        Full poses are measured, not only positions.
+        """
+    @orientation.setter
+    def orientation(self, arg0: bool) -> None:
+        ...
+    @property
+    def payload(self) -> float:
+        """
+        [kg] a pose is measured with this or with nothing.
+        """
+    @payload.setter
+    def payload(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_sigma(self) -> float:
+        """
+        [m] of one component.
+        """
+    @position_sigma.setter
+    def position_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def proposals(self) -> int:
+        """
+        Poses that each of them is chosen from.
+        """
+    @proposals.setter
+    def proposals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_sigma(self) -> float:
+        """
+        [rad]
+        """
+    @rotation_sigma.setter
+    def rotation_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seconds_per_pose(self) -> float:
+        """
+        [s]
+        """
+    @seconds_per_pose.setter
+    def seconds_per_pose(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of directions, payloads and proposals.
+        """
+    @seed.setter
+    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def separate(self) -> tuple[EffectRequest, ...]:
+        """
+        Effects to be told apart; empty: the whole catalogue is looked at, and no poses are added.
+        """
+    @separate.setter
+    def separate(self, arg1: collections.abc.Sequence[EffectRequest]) -> None:
+        ...
+    @property
+    def temperature_high(self) -> float:
+        """
+        [deg C] halfway.
+        """
+    @temperature_high.setter
+    def temperature_high(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def temperature_low(self) -> float:
+        """
+        [deg C] at the first and the last pose.
+        """
+    @temperature_low.setter
+    def temperature_low(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class Distinction:
+    """
+    What `distinguish` found.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def added(self) -> int:
+        """
+        The last so many poses.
+        """
+    @property
+    def alike(self) -> tuple[EffectPair, ...]:
+        """
+        Not told apart, most alike first.
+        """
+    @property
+    def direction(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(poses, driven joints): -1 or 1; None: not asked for.
+        """
+    @property
+    def effects(self) -> tuple[EffectSize, ...]:
+        """
+        Smallest sizes, as of all poses, added ones included.
+        """
+    @property
+    def joints(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        shape=(poses, driven joints) [rad | m]: the poses given, then those added.
+        """
+    @property
+    def not_testable(self) -> tuple[NotTestable, ...]:
+        """
+        Effects that such data could not show.
+        """
+    @property
+    def payload(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(poses,) [kg]
+        """
+    @property
+    def r2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        shape=(effects, effects): share of the row's effect that the column's explains.
+        """
+    @property
+    def separated(self) -> tuple[EffectPair, ...]:
+        """
+        Every pair of those to be told apart, before and after poses were added.
+        """
+    @property
+    def temperature(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(poses,) [deg C]
+        """
+    @property
+    def time(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(poses,) [s]
+        """
 def catalogue() -> list[tuple[str, str]]:
     """
     Name and summary of the effects that truing knows.
+    """
+def diagnose(robot: Robot, data: Measurements, options: DiagnoseOptions | None = None, own_effects: collections.abc.Sequence[OwnEffect] = []) -> Diagnosis:
+    """
+    Where the gap between robot and model lies, which effect causes it, and how far it shrinks.
+    
+    Raises InputError on data or options that cannot be used.
+    """
+def distinguish(robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], options: DistinguishOptions | None = None) -> Distinction:
+    """
+    Before any data: which effects a plan can tell apart, how small it would still see them, and the poses to add.
+    
+    Raises InputError: unknown effects, joints or columns.
     """
 def forward_kinematics(robot: Robot, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], target: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
     """

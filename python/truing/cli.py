@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line. Each command reads, lets the core work, and writes all of its files at once or none.
 
-Exit status: 0 done, 1 did not converge, 2 bad input (one line on stderr, nothing written), 130 interrupted.
+Exit status: 0 done (a diagnosis that finds nothing, or something unknown, is an answer too), 1 did not converge, 2 bad input (one line on stderr, nothing written), 130 interrupted.
 """
 
 from __future__ import annotations
@@ -78,6 +78,20 @@ class FrameName(str, Enum):
     svd = "svd"
 
 
+class RecordName(str, Enum):
+    """--record"""
+
+    q = "q"
+    qr = "qr"
+
+
+class ExamSet(str, Enum):
+    """--set"""
+
+    development = "development"
+    examination = "examination"
+
+
 class IndexName(str, Enum):
     """--index"""
 
@@ -93,14 +107,15 @@ class IndexName(str, Enum):
 _UNITS = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6},
     "angle": {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6, "deg": math.pi / 180, "°": math.pi / 180},
+    "mass": {"kg": 1.0, "g": 1e-3},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0},
 }
-_EXAMPLES = {"length": "0.03mm", "angle": "15deg", "time": "40ms"}
+_EXAMPLES = {"length": "0.03mm", "angle": "15deg", "mass": "5kg", "time": "40ms"}
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d]*)\s*")
 
 
 def quantity(text: str, kind: str, option: str) -> float:
-    """`text` ("0.03mm", "15deg", "40ms") in SI. `kind`: length, angle or time. Raises InputError that names `option`."""
+    """`text` ("0.03mm", "15deg", "40ms") in SI. `kind`: length, angle, mass or time. Raises InputError that names `option`."""
     match = _QUANTITY.fullmatch(text)
     units = _UNITS[kind]
     value = float(match[1]) if match else math.nan
@@ -190,6 +205,55 @@ def identify(
     if not found.solver.converged:
         _err().print(f"truing: did not converge: {found.solver.stopped_because}", style="bold red", markup=False, highlight=False)
         raise typer.Exit(1)
+
+
+@app.command()
+def diagnose(
+    robot: RobotFile,
+    data: DataFile,
+    out: Annotated[Optional[Path], _out("diagnose")] = None,
+    leave_out: Annotated[str, typer.Option(help="Effects that are not to be considered: 'drift,scale'. `truing effects` lists them.", show_default=False)] = "",
+    false_alarm: Annotated[str, typer.Option(help="Chance that a robot without any gap is said to have one.")] = "1%",
+    record: Annotated[RecordName, typer.Option(help="qr: go by the second record of the joints (qr1_rad …). Else by the one that explains the measurements better.")] = RecordName.q,
+    seed: Seed = 0,
+    base_link: BaseLink = "",
+    tip_link: TipLink = "",
+    threads: Annotated[int, typer.Option(help="0: as many as the machine has.", min=0)] = 0,
+    json: Json = False,
+) -> None:
+    """Say where the gap between robot and model comes from, and how far it can be closed.
+
+    Writes result.json, report.html, robot.yaml (with what was named), residuals.csv, and next_poses.csv if more should be measured.
+    """
+    from truing.files import atomic_output_dir
+
+    folder = out or Path("truing-diagnose")
+    alarm = share(false_alarm, "--false-alarm")
+    with _warnings_heard() as heard:
+        model, table = _load(robot, data, base_link, tip_link)
+        if record is RecordName.qr:
+            from truing.results import with_second_record
+
+            table = with_second_record(model, table)
+
+        def work() -> Any:
+            import truing
+
+            return truing.diagnose(model, table, leave_out=leave_out, false_alarm=alarm, seed=seed, threads=threads)
+
+        found = _busy("diagnosing", work)
+        with atomic_output_dir(folder) as temporary, _progress("writing"):
+            from truing.results import write_diagnosis
+
+            result = write_diagnosis(temporary, found, table, source=data.name, warnings=heard, nominal_file=robot, base_link=base_link,
+                                     tip_link=tip_link)  # fmt: skip
+        if not found.next_poses:  # those of an earlier run would be taken for this one's
+            (folder / "next_poses.csv").unlink(missing_ok=True)
+    _warn(found.warnings)
+    if json:
+        _print_json(result)
+    else:
+        diagnosis_table(result, folder)
 
 
 @app.command()
@@ -315,11 +379,16 @@ def plan(
     seed: Seed = 0,
     free: Free = "",
     effects: Effects = "",
+    columns: Annotated[str, typer.Option(help="What will be recorded and varied as well, of dir,payload,temp,t: says which effects the plan tells apart.", show_default=False)] = "",
+    separate: Annotated[str, typer.Option(help="Effects to be told apart, 'backlash,joint_offset:J2'; poses are added if it takes any.", show_default=False)] = "",
+    add: Annotated[int, typer.Option(help="At most so many poses are added for --separate.", min=0)] = 12,
+    payload: Annotated[str, typer.Option(help="A pose is measured with this load or with none.")] = "5kg",
+    temperatures: Annotated[str, typer.Option(metavar="LOW,HIGH", help="Warm-up and cool-down, in deg C.")] = "20,35",
     base_link: BaseLink = "",
     tip_link: TipLink = "",
     json: Json = False,
 ) -> None:
-    """Choose the poses that tell most about the robot.
+    """Choose the poses that tell most about the robot; say, before any data, which effects they tell apart.
 
     Writes poses.csv, result.json, report.html (what standard errors to expect).
     """
@@ -327,6 +396,7 @@ def plan(
 
     folder = out or Path("truing-plan")
     step, sigma = quantity(min_step, "angle", "--min-step"), quantity(noise, "length", "--noise")
+    load, (cold, warm) = quantity(payload, "mass", "--payload"), _temperatures(temperatures)
     long_index = {"d": "d_optimal", "a": "a_optimal", "e": "e_optimal"}.get(index.value, index.value.replace("-", "_"))
     with _warnings_heard() as heard:
         model = load_robot(robot, base_link, tip_link)
@@ -334,32 +404,90 @@ def plan(
         def work() -> Any:
             import truing
 
-            return truing.plan(model, poses=poses, min_step=step, index=long_index, orientation=orientation,  # type: ignore[arg-type]
-                               position_sigma=sigma, seed=seed, free=free, effects=effects)  # fmt: skip
+            if columns or separate:  # words that mean nothing are said at once
+                truing.distinguish(model, [[0.1 * (k + j) for j in range(model.driven_count)] for k in range(3)], columns=_words(columns),
+                                   separate=separate, add=0, payload=load, temperature_low=cold, temperature_high=warm)  # fmt: skip
+            planned = truing.plan(model, poses=poses, min_step=step, index=long_index, orientation=orientation,  # type: ignore[arg-type]
+                                  position_sigma=sigma, seed=seed, free=free, effects=effects)  # fmt: skip
+            if not (columns or separate):
+                return planned, None
+            return planned, truing.distinguish(model, planned.joints, columns=_words(columns), separate=separate, add=add, payload=load,
+                                               temperature_low=cold, temperature_high=warm, orientation=orientation, position_sigma=sigma,
+                                               min_step=step, seed=seed)  # fmt: skip
 
-        planned = _busy("planning", work)
+        planned, seen = _busy("planning", work)
         with atomic_output_dir(folder) as temporary:
             from truing.report import plan_report
-            from truing.results import joint_columns, plan_dict, to_json, without_nan
+            from truing.results import plan_columns, plan_dict, to_json, without_nan
 
-            result: dict[str, Any] = without_nan(plan_dict(model, planned, index=long_index, noise=sigma, seed=seed, warnings=heard))
-            columns = joint_columns(model, planned.joints)
-            write_table(temporary / "poses.csv", columns)
+            result: dict[str, Any] = without_nan(plan_dict(model, planned, index=long_index, noise=sigma, seed=seed, seen=seen, warnings=heard))
+            write_table(temporary / "poses.csv", plan_columns(model, planned.joints, seen))
             (temporary / "result.json").write_text(to_json(result), encoding="utf-8")
             driven = [model.joints[k] for k in model.driven_joints()]
-            page = plan_report(result, [joint.name for joint in driven], planned.joints, ["rad" if joint.type == "revolute" else "m" for joint in driven])
+            page = plan_report(result, [joint.name for joint in driven], planned.joints if seen is None else seen.joints,
+                               ["rad" if joint.type == "revolute" else "m" for joint in driven])  # fmt: skip
             (temporary / "report.html").write_text(page, encoding="utf-8")
     if json:
         _print_json(result)
         return
-    seen = [p for p in result["parameters"] if p["sigma"] is not None]
-    lines = [("poses", str(poses)), ("parameters found", f"{len(seen)} of {len(result['parameters'])}")]
+    found = [p for p in result["parameters"] if p["sigma"] is not None]
+    lines = [("poses", str(result["poses"])), ("parameters found", f"{len(found)} of {len(result['parameters'])}")]
     for unit, word in (("m", "length"), ("rad", "angle")):
-        sigmas = [p["sigma"] for p in seen if p["unit"] == unit]
+        sigmas = [p["sigma"] for p in found if p["unit"] == unit]
         if sigmas:
             lines.append((f"largest standard error of a {word}".replace("a a", "an a"), _mm(max(sigmas)) if unit == "m" else f"{max(sigmas) * 1e3:.3g} mrad"))
     _table(f"{model.name}: plan", ("", ""), lines)
+    if seen is not None:
+        _distinction_table(result["distinguish"])
     _last_line(folder)
+
+
+def _temperatures(text: str) -> tuple[float, float]:
+    try:
+        low, high = (float(part) for part in text.split(","))
+    except ValueError:
+        low = high = math.nan
+    if not low < high:
+        raise InputError(f"--temperatures: found {text!r}, expected two temperatures in deg C, the lower one first, such as 20,35")
+    return low, high
+
+
+def _distinction_table(seen: Mapping[str, Any]) -> None:
+    """Which effects a plan tells apart, on stdout."""
+    from truing.report import effect_at, size_words
+
+    every: dict[str, list[Mapping[str, Any]]] = {}
+    for effect in seen["effects"]:
+        every.setdefault(effect["effect"], []).append(effect)
+    lines = []
+    for name, at in every.items():
+        best = min(at, key=lambda e: e["size_at_tip_m"])
+        held = [e for e in at if e["size_with_geometry"] is not None]
+        worst = max(held, key=lambda e: e["size_with_geometry_at_tip_m"]) if held else None
+        lines.append((name.replace("_", " "), *((best["joint"], size_words(best["size"], best["unit"]), _mm(best["size_at_tip_m"]))),
+                      "no" if worst is None else f"{_mm(worst['size_with_geometry_at_tip_m'])} ({len(held)} of {len(at)})" if len(at) > 1 else
+                      _mm(worst["size_with_geometry_at_tip_m"])))  # fmt: skip
+    _table("the smallest effects that would be seen", ("", "best at", "size", "at the tip", "with geometry, worst joint"), lines, words=True)
+    if seen["separated"]:
+        told = [(effect_at(p["effect"], p["joint"]), effect_at(p["other"], p["other_joint"]), f"{p['r2']:.3f}",
+                 "-" if p["r2_after"] is None else f"{p['r2_after']:.3f}", "never" if p["size"] is None else size_words(p["size"], p["unit"]),
+                 "-" if p["r2_after"] is None else "never" if p["size_after"] is None else size_words(p["size_after"], p["unit"]))
+                for p in seen["separated"][:10]]  # fmt: skip
+        _table(f"to be told apart: {seen['added_poses']} poses added", ("", "from", "R2", "after", "from this size on", "after"), told, words=True)
+        if len(seen["separated"]) > len(told):
+            _say(f"and {len(seen['separated']) - len(told)} pairs that are less alike: see the report")
+    alike: dict[tuple[str, str, str], list[str]] = {}  # at the same joint: named once
+    for p in seen["alike"]:
+        same = p["joint"] == p["other_joint"]
+        names = (effect_at(p["effect"], ""), effect_at(p["other"], "")) if same else (effect_at(p["effect"], p["joint"]), effect_at(p["other"], p["other_joint"]))
+        alike.setdefault((*names, p["separated_by"]), []).extend([p["joint"]] if same and p["joint"] else [])
+    for (first, other, how), joints in list(alike.items())[:8]:
+        _say(f"not told apart: {first} from {other}{' at ' + ', '.join(joints) if joints else ''}; to tell: {how}")
+    if len(alike) > 8:
+        _say(f"and {len(alike) - 8} more: see the report")
+    if seen["not_testable"]:
+        words = [f"{effect_at(n['effect'], ', '.join(n['joints']))} ({n['why']})" for n in seen["not_testable"]]
+        _say("not testable with such data: " + "; ".join(words[:8]) + (f"; and {len(words) - 8} more" if len(words) > 8 else ""))
 
 
 @app.command()
@@ -372,6 +500,43 @@ def demo(
 
     with _warnings_heard():
         run(out, seed=seed, busy=_busy, console=_console())
+
+
+@app.command()
+def exam(
+    out: Annotated[Optional[Path], _out("exam")] = None,
+    which: Annotated[ExamSet, typer.Option("--set", help="The robots, sizes and effects of development, or those kept for the examination.")] = ExamSet.development,
+    quick: Annotated[bool, typer.Option("--quick", help="A few data sets of every family.")] = False,
+    families: Annotated[str, typer.Option(help="Only these families of data sets, e.g. 'none,one'. Default: all.", show_default=False)] = "",
+    workers: Annotated[int, typer.Option(help="Processes at a time; 0: as many as the machine has.", min=0)] = 0,
+    limit: Annotated[int, typer.Option(help="At most so many sets of each family; 0: all.", min=0)] = 0,
+    seed: Seed = 0,
+    json: Json = False,
+) -> None:
+    """Examine the diagnosis on withheld effects, simulated by other means than its own.
+
+    Writes result.json (the score table) and report.html. Needs MuJoCo: pip install "truing[exam]".
+    """
+    from truing.files import atomic_output_dir
+
+    folder = out or Path("truing-exam")
+    try:
+        from truing.exam.run import run_exam
+        from truing.exam.score import table
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] == "truing":
+            raise
+        raise InputError(f'the examination needs the package {error.name}, which is not installed: pip install "truing[exam]"') from None
+    with _warnings_heard(), atomic_output_dir(folder) as temporary, _counting("examining") as progress:
+        from truing.results import write_exam
+
+        scores = run_exam(which.value, quick=quick, seed=seed, families=_words(families) or None, limit=limit or None,
+                          workers=workers or os.cpu_count() or 1, out=temporary, progress=progress)  # fmt: skip
+        result = write_exam(temporary, {"set": which.value, "seed": seed, "sets": scores.sets, "scores": table(scores), "failures": scores.failures})
+    if json:
+        _print_json(result)
+    else:
+        exam_table(result, folder)
 
 
 @app.command()
@@ -473,13 +638,14 @@ def _mm(metres: float | None) -> str:
     return "-" if metres is None else f"{metres * 1e3:.4f} mm"
 
 
-def _table(title: str, head: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
+def _table(title: str, head: Sequence[str], lines: Sequence[Sequence[str]], words: bool = False) -> None:
+    """A table on stdout. `words`: its cells are no numbers."""
     from rich import box
     from rich.table import Table
 
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, show_header=any(head))
     for k, name in enumerate(head):
-        table.add_column(name, justify="left" if k == 0 or len(head) == 2 else "right", overflow="fold")
+        table.add_column(name, justify="left" if k == 0 or len(head) == 2 or words else "right", overflow="fold")
     for line in lines:
         table.add_row(*line)
     _console().print(table)
@@ -502,6 +668,57 @@ def identification_table(result: Mapping[str, Any], folder: Path) -> None:
     if frozen:
         more = f" and {len(frozen) - 8} more" if len(frozen) > 8 else ""
         _say("not visible in these data, kept at nominal: " + ", ".join(f["parameter"] for f in frozen[:8]) + more)
+    _last_line(folder)
+
+
+def diagnosis_table(result: Mapping[str, Any], folder: Path) -> None:
+    """The short answer of `truing diagnose`, on stdout; the last line is the path of the report."""
+    from truing.diagnose_report import at_joints, size_text, trouble
+
+    for finding in trouble(result):
+        _say(f"look at the data first: {finding['text']}")
+    _say(result["sentence"])
+    gap, after, by_all, shrink = result["gap"], result["after"], result["after_unknown"], result["shrink"]
+    cells = [("rms", *(_mm(e["rms_m"]) for e in (gap, after, by_all))), ("95 %", *(_mm(e["p95_m"]) for e in (gap, after, by_all))),
+             ("noise", _mm(gap["noise_floor_m"]), "", "")]  # fmt: skip
+    shown = [0, 1, *([2] if result["effects"] else []), *([3] if result["unknown"] else [])]
+    heading = ("", "before", "with what is named", "with free functions")
+    _table(f"{result['robot']}: error of held-out poses", [heading[k] for k in shown], [[line[k] for k in shown] for line in cells])
+    if result["effects"]:
+        _say(f"robot.yaml takes {100 * shrink['value']:.0f} % off the error (90 % interval {100 * shrink['ci'][0]:.0f} to {100 * shrink['ci'][1]:.0f} %)")
+    found = []
+    for effect in result["effects"]:
+        others = ", ".join(at_joints(other) for other in effect["confounded_with"])
+        found.append((at_joints(effect), f"{100 * effect['probability']:.0f} %", size_text(effect), _off(effect["held_out"]), others))
+    for unknown in result["unknown"]:
+        place = unknown["joint"] or "somewhere"
+        found.append((f"unknown at {place}", f"{100 * unknown['probability']:.0f} %", unknown["looks_like"] or f"over {', '.join(unknown['inputs'])}",
+                      _off(unknown["held_out"]), ""))  # fmt: skip
+    if found:
+        _table("what causes it", ("what", "sure", "size", "off the error", "not told from"), found, words=True)
+    if result["not_testable"]:
+        words = [f"{at_joints(n)} ({n['why']})" for n in result["not_testable"]]
+        _say("not testable with these data: " + "; ".join(words[:6]) + (f"; and {len(words) - 6} more" if len(words) > 6 else ""))
+    for finding in result["sanity"]:
+        if finding not in trouble(result):
+            _say(f"note: {finding['text']}")
+    if result["next_measurements"]:
+        _say(f"measure next: {folder / 'next_poses.csv'} ({len(result['next_measurements'])} poses)")
+    _last_line(folder)
+
+
+def _off(held: Mapping[str, Any]) -> str:
+    """ "46 % [43, 48]": off the error, and the 90 % interval."""
+    value, low, high = (round(100 * share) for share in (held["shrink"], *held["ci"]))
+    return f"{value} % [{low}, {high}]"
+
+
+def exam_table(result: Mapping[str, Any], folder: Path) -> None:
+    """The score table of `truing exam`, on stdout; the last line is the path of the report."""
+    from truing.diagnose_report import plain
+
+    names = list(dict.fromkeys(name for score in result["scores"] for name in score))
+    _table("examination", [name.replace("_", " ") for name in names], [[plain(score.get(name)) for name in names] for score in result["scores"]])
     _last_line(folder)
 
 
@@ -557,6 +774,17 @@ def _progress(what: str) -> Iterator[None]:
     with Progress(*columns, console=_err(), transient=True, disable=not _err().is_terminal) as progress:
         progress.add_task(what, total=None)
         yield
+
+
+@contextlib.contextmanager
+def _counting(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar on stderr, if that is a terminal, that is told how many of how many are done."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=_err(), transient=True, disable=not _err().is_terminal) as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -41,7 +41,7 @@ def identification_report(result: Mapping[str, Any], rows: Rows, correlation: tu
         rows: Errors of every row before and after.
         correlation: Names and correlation matrix, shape=(n, n), of the fitted parameters.
     """
-    page = _Page(f"{result.get('robot') or 'Robot'}: calibration report")
+    page = Page(f"{result.get('robot') or 'Robot'}: calibration report")
     held_out = "test" in result["errors"]
     errors = result["errors"]["test" if held_out else "train"]
     shown = rows.test if held_out else ~rows.test & ~rows.rejected
@@ -50,8 +50,8 @@ def identification_report(result: Mapping[str, Any], rows: Rows, correlation: tu
     page.add(_headline(result, errors, held_out, rows.what))
     page.add('<div class="first">')
     page.add('<section class="card"><h2>How far off, before and after</h2>')
-    page.chart("distribution", *_distribution([(before[shown], BEFORE, "before"), (after[shown], AFTER, "after")]), size="tall")
-    page.add(f'<p class="note">{_count(int(shown.sum()), "row")} {"held out of the fit" if held_out else "of the fit"}. '
+    page.chart("distribution", *distribution_chart([(before[shown], BEFORE, "before"), (after[shown], AFTER, "after")]), size="tall")
+    page.add(f'<p class="note">{counted(int(shown.sum()), "row")} {"held out of the fit" if held_out else "of the fit"}. '
              f"“Before” is the nominal robot with its base and tool already fitted, so only the robot's own error is compared. "
              f"The scale is logarithmic.</p></section>")
     page.add(_trust_box(result, rows))
@@ -65,68 +65,144 @@ def identification_report(result: Mapping[str, Any], rows: Rows, correlation: tu
              "Flat and low is good.</p>")
     _joint_charts(page, rows)
     page.add('</section><section class="card"><h2>Error over ' + ("time" if rows.time is not None else "the order of the rows") + "</h2>")
-    _over_rows(page, rows)
+    chart_over_rows(page, rows)
     page.add("</section>")
     page.add(_parameter_table(result["parameters"]))
     page.add(_frozen(result.get("frozen", [])))
     if correlation is not None and len(correlation[0]) > 1:
         _correlations(page, *correlation)
     page.add(_rejected(rows))
-    page.add(_warnings_card(result))
-    page.add(_footer(result))
+    page.add(warnings_card(result))
+    page.add(footer(result))
     return page.html()
 
 
 def prediction_report(result: Mapping[str, Any], rows: Rows | None) -> str:
     """The report of ``truing predict``; `rows` (before and after are the same) is looked at when `result` has errors."""
-    page = _Page(f"{result.get('robot') or 'Robot'}: prediction")
+    page = Page(f"{result.get('robot') or 'Robot'}: prediction")
     if rows is None or "errors" not in result:
-        page.add(f'<header><p class="kicker">truing predict</p><h1>{_count(result["rows"], "row")} predicted.</h1>'
+        page.add(f'<header><p class="kicker">truing predict</p><h1>{counted(result["rows"], "row")} predicted.</h1>'
                  '<p class="sub">The data has no measurements, so there is nothing to compare with.</p></header>')
     else:
         errors = result["errors"]
-        page.add(f'<header><p class="kicker">truing predict · {_esc(result.get("robot"))}</p>'
-                 f'<h1>This robot file misses the measurements by <span class="after">{_length(errors["mean_m"])}</span> on average.</h1>'
-                 f'<p class="sub">{_count(errors["n"], "measured row")}. Base and tool are those of the robot file; nothing was fitted.</p></header>')
+        page.add(f'<header><p class="kicker">truing predict · {escaped(result.get("robot"))}</p>'
+                 f'<h1>This robot file misses the measurements by <span class="after">{length_text(errors["mean_m"])}</span> on average.</h1>'
+                 f'<p class="sub">{counted(errors["n"], "measured row")}. Base and tool are those of the robot file; nothing was fitted.</p></header>')
         page.add('<div class="big">' + "".join(
-            f'<div class="number"><p>{label}</p><strong class="after">{_length(errors[key])}</strong></div>'
+            f'<div class="number"><p>{label}</p><strong class="after">{length_text(errors[key])}</strong></div>'
             for label, key in (("mean", "mean_m"), ("95 % are below", "p95_m"), ("worst", "max_m"))) + "</div>")
         page.add('<section class="card"><h2>Distribution</h2>')
-        page.chart("distribution", *_distribution([(rows.magnitude_after, AFTER, "error")]), size="tall")
+        page.chart("distribution", *distribution_chart([(rows.magnitude_after, AFTER, "error")]), size="tall")
         page.add("</section>")
-    page.add(_warnings_card(result))
-    page.add(_footer(result))
+    page.add(warnings_card(result))
+    page.add(footer(result))
     return page.html()
 
 
 def plan_report(result: Mapping[str, Any], joint_names: Sequence[str], joints: Floats, units: Sequence[str]) -> str:
     """The report of ``truing plan``: what standard errors the planned poses promise."""
-    page = _Page(f"{result.get('robot') or 'Robot'}: measurement plan")
+    page = Page(f"{result.get('robot') or 'Robot'}: measurement plan")
     seen = [p for p in result["parameters"] if not p["frozen"]]
     lost = len(result["parameters"]) - len(seen)
     lengths = [p["sigma"] for p in seen if p["unit"] == "m" and p["sigma"] is not None]
     angles = [p["sigma"] for p in seen if p["unit"] == "rad" and p["sigma"] is not None]
     promise = " and ".join(
-        text for text in (f'lengths to <span class="after">±{_length(max(lengths))}</span>' if lengths else "",
-                          f'angles to <span class="after">±{_angle(max(angles))}</span>' if angles else "") if text)
-    page.add(f'<header><p class="kicker">truing plan · {_esc(result.get("robot"))}</p>'
-             f"<h1>{_count(len(joints), 'pose')} will find " + (f"{promise}, or better." if promise else f"{len(seen)} parameters.") + "</h1>"
-             f'<p class="sub">One standard error, if every position is measured with {_length(result["noise_m"])} noise per axis. '
-             f"{_count(len(seen), 'parameter')} can be found{f'; {lost} cannot, by measurements of this kind' if lost else ', all there are'}. "
-             f"Exchange raised the {_esc(result['index']['name'])} index from {result['index']['start']:.4g} to {result['index']['end']:.4g}.</p></header>")
+        text for text in (f'lengths to <span class="after">±{length_text(max(lengths))}</span>' if lengths else "",
+                          f'angles to <span class="after">±{angle_text(max(angles))}</span>' if angles else "") if text)
+    page.add(f'<header><p class="kicker">truing plan · {escaped(result.get("robot"))}</p>'
+             f"<h1>{counted(len(joints), 'pose')} will find " + (f"{promise}, or better." if promise else f"{len(seen)} parameters.") + "</h1>"
+             f'<p class="sub">One standard error, if every position is measured with {length_text(result["noise_m"])} noise per axis. '
+             f"{counted(len(seen), 'parameter')} can be found{f'; {lost} cannot, by measurements of this kind' if lost else ', all there are'}. "
+             f"Exchange raised the {escaped(result['index']['name'])} index from {result['index']['start']:.4g} to {result['index']['end']:.4g}.</p></header>")
     page.add('<section class="card"><h2>The poses, joint by joint</h2><div class="multiples">')
     scale = [180 / math.pi if unit == "rad" else 1000.0 for unit in units]
     for column, name in enumerate(joint_names):
         values = joints[:, column] * scale[column]
         unit = "°" if units[column] == "rad" else "mm"
-        page.chart(f"joint{column}", [_points(np.arange(1, len(values) + 1), values, AFTER, name, 6)],
+        page.chart(f"joint{column}", [points_trace(np.arange(1, len(values) + 1), values, AFTER, name, 6)],
                    {"xaxis": {"title": {"text": "pose"}}, "yaxis": {"title": {"text": f"{name} [{unit}]"}}}, size="small")
     page.add("</div></section>")
+    if "distinguish" in result:
+        _told_apart(page, result["distinguish"])
     page.add(_parameter_table(result["parameters"], promised=True))
     page.add(_frozen(result.get("frozen", [])))
-    page.add(_warnings_card(result))
-    page.add(_footer(result))
+    page.add(warnings_card(result))
+    page.add(footer(result))
     return page.html()
+
+
+def effect_at(effect: str, joint: str) -> str:
+    """ "joint offset J2" """
+    return f"{effect.replace('_', ' ')} {joint}".rstrip()
+
+
+def size_words(value: float | None, unit: str) -> str:
+    """A size with a prefix that makes it a number people read: "0.12 mrad", "23 ppm"."""
+    if value is None:
+        return "–"
+    if unit in ("", "-"):
+        return f"{figures_text(value * 1e6, 2)} ppm" if abs(value) < 1e-2 else figures_text(value, 2)
+    if unit == "1/K":
+        return f"{figures_text(value * 1e6, 2)} ppm/K"
+    for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n")):
+        if abs(value) * factor >= 0.05 and not (unit == "m" and factor == 1.0 and abs(value) < 1.0):
+            return f"{figures_text(value * factor, 2)} {prefix}{unit}"
+    return f"{value:.2g} {unit}"
+
+
+def _told_apart(page: Page, seen: Mapping[str, Any]) -> None:
+    """What a plan tells apart: smallest sizes, a map of what is like what, what poses were added for."""
+    effects = seen["effects"]
+    if seen["separated"]:
+        rows = "".join(
+            f"<tr><th>{escaped(effect_at(p['effect'], p['joint']))}</th><td>{escaped(effect_at(p['other'], p['other_joint']))}</td>"
+            + table_cell(p["r2"], f"{p['r2']:.3f}") + (table_cell(p["r2_after"], f"{p['r2_after']:.3f}") if p["r2_after"] is not None else "<td>–</td>")
+            + f"<td>{'never' if p['size'] is None else escaped(size_words(p['size'], p['unit']))}</td>"
+            + f"<td>{'–' if p['r2_after'] is None else 'never' if p['size_after'] is None else escaped(size_words(p['size_after'], p['unit']))}</td></tr>"
+            for p in seen["separated"])
+        head = "".join(f'<th><button type="button">{name}</button></th>' for name in ("effect", "told from", "R² before", "R² after", "from this size on, before", "after"))
+        page.add(f'<section class="card"><h2>To be told apart: {counted(seen["added_poses"], "pose")} added</h2>'
+                 f'<p class="lead">R² is the share of the first effect that the second one could pass for, once base and tool are fitted. The added poses are the '
+                 f'last ones of poses.csv.</p><div class="scroll"><table class="sortable"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div></section>')  # fmt: skip
+    if effects:
+        shown = sorted(effects, key=lambda e: -e["size_at_tip_m"])
+        labels = [effect_at(e["effect"], e["joint"]) for e in shown]
+        sizes = [[size_words(e["size"], e["unit"]), size_words(e["size_with_geometry"], e["unit"]), e["parameter"]] for e in shown]
+        tips = [tip for e in shown for tip in (e["size_at_tip_m"], e["size_with_geometry_at_tip_m"]) if tip is not None]
+        page.add('<section class="card"><h2>The smallest effects that would be seen</h2><p class="lead">How far the tip would move (rms) by an effect that just shows: '
+                 '<span class="after">dark</span> with base and tool fitted, <span class="before">light</span> with all geometry fitted as well. Without a light '
+                 "mark, geometry takes the effect up. Short is good.</p>")
+        page.chart("smallest", [
+            {"type": "bar", "orientation": "h", "y": labels, "x": [1e3 * e["size_at_tip_m"] for e in shown], "marker": {"color": AFTER}, "name": "base and tool fitted",
+             "customdata": sizes, "hovertemplate": "%{y}: %{x:.3g} mm at the tip<br>%{customdata[2]}: %{customdata[0]}<extra></extra>"},
+            {"type": "scatter", "mode": "markers", "y": labels, "x": [None if e["size_with_geometry_at_tip_m"] is None else 1e3 * e["size_with_geometry_at_tip_m"] for e in shown],
+             "marker": {"color": BEFORE, "size": 9, "symbol": "diamond"}, "name": "all geometry fitted too", "customdata": sizes,
+             "hovertemplate": "%{y}: %{x:.3g} mm at the tip<br>%{customdata[2]}: %{customdata[1]}<extra></extra>"}],
+            {"xaxis": {"type": "log" if max(tips) > 30 * min(tips) else "linear", "title": {"text": "rms motion of the tip [mm]"}},
+             "yaxis": {"dtick": 1, "tickfont": {"size": 11}, "automargin": True, "showgrid": False, "range": [-0.6, len(shown) - 0.4]},
+             "height": max(300, 17 * len(shown) + 90)}, size="free")  # fmt: skip
+        page.add("</section>")
+    if len(effects) > 1:
+        labels = [effect_at(e["effect"], e["joint"]) for e in effects]
+        size = max(440, 15 * len(labels) + 190)
+        page.add('<section class="card"><h2>Which effects look alike</h2><p class="lead">How much of the effect on the left the effect below could pass for (R²), once base '
+                 "and tool are fitted. Dark pairs cannot be told apart by this plan.</p>"
+                 f'<div class="scroll"><div style="min-width:{min(size, 1180)}px">')
+        page.chart("alike", [{"type": "heatmap", "z": [[round(float(v), 3) for v in row] for row in seen["r2"]], "x": labels, "y": labels, "zmin": 0, "zmax": 1,
+                              "colorscale": [[0, "#ffffff"], [0.5, "#cfe0f2"], [0.9, "#5f97cf"], [0.98, "#1f5fa8"], [1, "#0d2f57"]], "colorbar": {"thickness": 12},
+                              "hovertemplate": "%{y}, of which %{x} explains %{z:.2f}<extra></extra>"}],
+                   {"xaxis": {"tickangle": -90, "showgrid": False, "dtick": 1, "tickfont": {"size": 10}, "automargin": True},
+                    "yaxis": {"autorange": "reversed", "showgrid": False, "dtick": 1, "tickfont": {"size": 10}, "automargin": True, "zeroline": False},
+                    "height": size}, size="free")  # fmt: skip
+        page.add("</div></div>")
+        if seen["alike"]:
+            items = "".join(f"<li><b>{escaped(effect_at(p['effect'], p['joint']))}</b> is not told from <b>{escaped(effect_at(p['other'], p['other_joint']))}</b> "
+                            f"(R² {p['r2']:.3f}). To tell: {escaped(p['separated_by'])}.</li>" for p in seen["alike"])  # fmt: skip
+            page.add(f'<ul class="plain">{items}</ul>')
+        page.add("</section>")
+    if seen["not_testable"]:
+        items = "".join(f"<li><b>{escaped(effect_at(n['effect'], ', '.join(n['joints'])))}</b>: {escaped(n['why'])}</li>" for n in seen["not_testable"])
+        page.add(f'<section class="card"><h2>Not testable with such data</h2><ul class="plain">{items}</ul></section>')
 
 
 # ------------------------------------------------------------------------------------------------------------------ first screen
@@ -134,9 +210,9 @@ def plan_report(result: Mapping[str, Any], joint_names: Sequence[str], joints: F
 
 def _headline(result: Mapping[str, Any], errors: Mapping[str, Any], held_out: bool, what: str) -> str:
     before, after = errors["before"], errors["after"]
-    name = _esc(result.get("robot") or "The robot")
+    name = escaped(result.get("robot") or "The robot")
     ratio = before["mean_m"] / after["mean_m"] if after["mean_m"] else math.inf
-    was, now = f'<span class="before">{_length(before["mean_m"])}</span>', f'<span class="after">{_length(after["mean_m"])}</span>'
+    was, now = f'<span class="before">{length_text(before["mean_m"])}</span>', f'<span class="after">{length_text(after["mean_m"])}</span>'
     if ratio > 1.05:
         sentence = f"{name} was off by {was} on average.<br>Calibrated, it is off by {now}."
     elif ratio > 0.95:
@@ -144,21 +220,21 @@ def _headline(result: Mapping[str, Any], errors: Mapping[str, Any], held_out: bo
     else:
         sentence = f"Calibration made {name} worse: off by {was} on average before, {now} after."
     n = after["n"]
-    where = (f"Measured on {_count(n, 'row')} that the fit never saw" if held_out
-             else f"Measured on the {_count(n, 'row')} of the fit itself, because nothing was held out")
+    where = (f"Measured on {counted(n, 'row')} that the fit never saw" if held_out
+             else f"Measured on the {counted(n, 'row')} of the fit itself, because nothing was held out")
     if not result["solver"].get("converged", True):
         where += "; the fit did not converge"
     rotation = ""
     if before.get("rotation_rms_rad") is not None and after.get("rotation_rms_rad") is not None:
-        rotation = f" Orientation: {_angle(before['rotation_rms_rad'])} → {_angle(after['rotation_rms_rad'])} rms."
+        rotation = f" Orientation: {angle_text(before['rotation_rms_rad'])} → {angle_text(after['rotation_rms_rad'])} rms."
     cards = []
     for label, key in (("mean error", "mean_m"), ("95 % of errors are below", "p95_m"), ("worst error", "max_m")):
-        unit, scale = _length_unit(before[key])
+        unit, scale = length_unit(before[key])
         times = before[key] / after[key] if after[key] else math.inf
-        gain = f"{_figures(times, 2)} × better" if times > 1.05 else ("no change" if times > 0.95 else f"{_figures(1 / times, 2)} × worse")
+        gain = f"{figures_text(times, 2)} × better" if times > 1.05 else ("no change" if times > 0.95 else f"{figures_text(1 / times, 2)} × worse")
         tone = "" if times > 1.05 else "same" if times > 0.95 else "bad"
-        cards.append(f'<div class="number"><p>{label}</p><div><span class="before">{_figures(before[key] * scale)}</span>'
-                     f'<span class="arrow">→</span><strong class="after">{_figures(after[key] * scale)}</strong>'
+        cards.append(f'<div class="number"><p>{label}</p><div><span class="before">{figures_text(before[key] * scale)}</span>'
+                     f'<span class="arrow">→</span><strong class="after">{figures_text(after[key] * scale)}</strong>'
                      f'<span class="unit">{unit}</span><em class="{tone}">{gain}</em></div></div>')
     return (f'<header><p class="kicker">truing identify · {"held-out " if held_out else ""}{what} errors</p><h1>{sentence}</h1>'
             f'<p class="sub">{where}.{rotation}</p></header><div class="big">{"".join(cards)}</div>')
@@ -170,9 +246,9 @@ def _trust_box(result: Mapping[str, Any], rows: Rows) -> str:
     errors, solver = result["errors"], result["solver"]
     train = errors["train"]["after"]
     if solver.get("converged", True):
-        checks.append((0, "The fit converged", f"{_count(solver['iterations'], 'iteration')}, {_esc(solver['name'])}"))
+        checks.append((0, "The fit converged", f"{counted(solver['iterations'], 'iteration')}, {escaped(solver['name'])}"))
     else:
-        checks.append((2, "The fit did not converge", _esc(solver["stopped_because"])))
+        checks.append((2, "The fit did not converge", escaped(solver["stopped_because"])))
     # Held-out rows are never rejected. A few gross outliers among them say nothing about the fit, so they are judged apart.
     usual = float(np.median(rows.magnitude_after[~rows.test & ~rows.rejected])) if train["n"] else 0.0
     wild = rows.test & (rows.magnitude_after > GROSS * usual) if usual else np.zeros_like(rows.test)
@@ -185,39 +261,39 @@ def _trust_box(result: Mapping[str, Any], rows: Rows) -> str:
         grade = 0 if ratio < 1.35 else 1 if ratio < 2 else 2
         text = ("Unseen poses are as good as fitted ones", "Unseen poses are somewhat worse than fitted ones",
                 "Unseen poses are much worse than fitted ones")[grade]
-        checks.append((grade, text, f"rms {_length(held_out)} held out{' (without bad measurements)' if wild.any() else ''}, {_length(train['rms_m'])} fitted"))
+        checks.append((grade, text, f"rms {length_text(held_out)} held out{' (without bad measurements)' if wild.any() else ''}, {length_text(train['rms_m'])} fitted"))
     else:
         checks.append((1, "Nothing was held out", "the errors are those of the rows that were fitted, and flatter"))
     rank = int(result["rank"])
     per = train["n"] / rank if rank else math.inf
     grade = 0 if rows.numbers_per_row * per >= 10 else 1 if rows.numbers_per_row * per >= 4 else 2
     checks.append((grade, ("Enough rows", "Few rows", "Too few rows")[grade] + " for the parameters",
-                   f"{_figures(per, 2)} rows per parameter ({train['n']} rows, {rank} parameters)"))
+                   f"{figures_text(per, 2)} rows per parameter ({train['n']} rows, {rank} parameters)"))
     noise = result.get("noise_sigma_m")
     if noise is not None:
-        checks.append((0, "What the model leaves", f"{_length(noise)} per {'reading' if rows.what == 'distance' else 'axis'}: measurement noise and what the robot cannot repeat"))
+        checks.append((0, "What the model leaves", f"{length_text(noise)} per {'reading' if rows.what == 'distance' else 'axis'}: measurement noise and what the robot cannot repeat"))
     rejected = int(rows.rejected.sum())
     share = rejected / max(1, int((~rows.test).sum()))
-    checks.append((0 if share <= 0.05 else 1, "No row rejected" if rejected == 0 else f"{_count(rejected, 'row')} rejected as gross outliers",
+    checks.append((0 if share <= 0.05 else 1, "No row rejected" if rejected == 0 else f"{counted(rejected, 'row')} rejected as gross outliers",
                    f"{share:.1%} of the training rows" if rejected else "no gross outliers among the training rows"))
     if wild.any():
-        checks.append((1, f"{_count(int(wild.sum()), 'held-out row')} {'looks like a bad measurement' if wild.sum() == 1 else 'look like bad measurements'}",
-                       f"{GROSS} times the usual error or more, and counted above. Without: mean {_length(float(np.nanmean(rest)))}, "
-                       f"worst {_length(float(np.nanmax(rest)))}"))  # fmt: skip
+        checks.append((1, f"{counted(int(wild.sum()), 'held-out row')} {'looks like a bad measurement' if wild.sum() == 1 else 'look like bad measurements'}",
+                       f"{GROSS} times the usual error or more, and counted above. Without: mean {length_text(float(np.nanmean(rest)))}, "
+                       f"worst {length_text(float(np.nanmax(rest)))}"))  # fmt: skip
     frozen = result.get("frozen", [])
     if frozen:
-        names = ", ".join(_esc(f.get("parameter") or _main(f["combination"])) for f in frozen[:4]) + (" …" if len(frozen) > 4 else "")
-        checks.append((0, f"{_count(len(frozen), 'combination')} that these data cannot see",
+        names = ", ".join(escaped(f.get("parameter") or _main(f["combination"])) for f in frozen[:4]) + (" …" if len(frozen) > 4 else "")
+        checks.append((0, f"{counted(len(frozen), 'combination')} that these data cannot see",
                        f'kept at nominal: {names} (<a href="#frozen">in words</a>). Harmless for poses like these.'))
     else:
         checks.append((0, "Every parameter can be seen", "nothing had to be kept at nominal"))
     # Warnings that a check above has already said are not said twice.
     other = [w for w in result.get("warnings", []) if not any(said in w for said in _SAID_BY_CHECKS)]
     for warning in other[:3]:
-        short = _esc(warning) if len(warning) < 130 else _esc(warning[:120].rsplit(" ", 1)[0]) + ' … (<a href="#warnings">in full</a>)'
+        short = escaped(warning) if len(warning) < 130 else escaped(warning[:120].rsplit(" ", 1)[0]) + ' … (<a href="#warnings">in full</a>)'
         checks.append((1, "Warning", short))
     if len(other) > 3:
-        checks.append((1, "More warnings", f'<a href="#warnings">{_count(len(other) - 3, "more warning")}</a>'))
+        checks.append((1, "More warnings", f'<a href="#warnings">{counted(len(other) - 3, "more warning")}</a>'))
     worst = max(grade for grade, _, _ in checks)
     verdict = ("You can trust this calibration", "Usable, but look at the marked points", "Do not rely on this yet")[worst]
     items = "".join(f'<li class="g{grade}"><i aria-label="{("good", "look", "bad")[grade]}">{"✓!✕"[grade]}</i><div><b>{head}</b><span>{text}</span></div></li>'
@@ -238,14 +314,14 @@ def _found(result: Mapping[str, Any]) -> str:
             say = "clearly there" if significance > 5 else "probably there" if significance > 3 else "not distinguishable from none"
             unit, scale = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}.get(p["unit"], (p["unit"], 1.0))
             number = f"{p['value'] * scale:.3g} ± {p['sigma'] * scale:.2g}"
-            items.append(f"<li><b>{_esc(p['name'])}</b> = {number} {_esc(unit)}: {say} ({_figures(min(significance, 99999), 2)} σ)</li>")
+            items.append(f"<li><b>{escaped(p['name'])}</b> = {number} {escaped(unit)}: {say} ({figures_text(min(significance, 99999), 2)} σ)</li>")
     return f'<section class="card"><h2>Effects that were fitted</h2><ul class="plain">{"".join(items)}</ul></section>' if items else ""
 
 
 # ---------------------------------------------------------------------------------------------------------------------- the charts
 
 
-def _distribution(series: Sequence[tuple[Floats, str, str]]) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+def distribution_chart(series: Sequence[tuple[Floats, str, str]]) -> tuple[list[dict[str, Any]], dict[str, Any]]:
     """Share of rows over the error, on a logarithmic axis: steps, filled, named where they peak."""
     finite = [(values[np.isfinite(values)], colour, name) for values, colour, name in series]
     everything = np.concatenate([values for values, _, _ in finite]) if finite else np.empty(0)
@@ -254,7 +330,7 @@ def _distribution(series: Sequence[tuple[Floats, str, str]]) -> tuple[list[dict[
     low = max(float(np.quantile(everything, 0.002)), float(everything.max()) * 1e-5)
     high = float(everything.max()) * 1.15
     edges = np.geomspace(low / 1.15, high, 46)
-    unit, scale = _length_unit(float(np.median(everything)), big=True)
+    unit, scale = length_unit(float(np.median(everything)), big=True)
     traces: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
     top = 0.0
@@ -265,8 +341,8 @@ def _distribution(series: Sequence[tuple[Floats, str, str]]) -> tuple[list[dict[
         # A step line that starts and ends on the floor.
         x = np.repeat(edges, 2) * scale
         y = np.concatenate([[0.0], np.repeat(counts, 2), [0.0]])
-        traces.append({"type": "scatter", "mode": "lines", "x": _pack(x), "y": _pack(y), "name": name, "fill": "tozeroy",
-                       "line": {"color": colour, "width": 2}, "fillcolor": _faded(colour, 0.28), "hoverinfo": "skip"})
+        traces.append({"type": "scatter", "mode": "lines", "x": packed(x), "y": packed(y), "name": name, "fill": "tozeroy",
+                       "line": {"color": colour, "width": 2}, "fillcolor": faded(colour, 0.28), "hoverinfo": "skip"})
         peak = int(np.argmax(counts))
         annotations.append({"x": math.log10(math.sqrt(edges[peak] * edges[peak + 1]) * scale), "y": float(counts[peak]), "text": f"<b>{name}</b>",
                             "showarrow": False, "yshift": 12, "font": {"color": colour, "size": 15}})
@@ -281,9 +357,9 @@ def _distribution(series: Sequence[tuple[Floats, str, str]]) -> tuple[list[dict[
     return traces, layout
 
 
-def _workspace(page: _Page, rows: Rows) -> None:
+def _workspace(page: Page, rows: Rows) -> None:
     known = np.flatnonzero(np.isfinite(rows.position).all(axis=1) & np.isfinite(rows.magnitude_after) & ~rows.rejected)
-    pick = _subsample(known, CLOUD_POINTS)
+    pick = subsample(known, CLOUD_POINTS)
     if pick.size == 0:
         page.add('<p class="note">No positions to draw.</p>')
         return
@@ -295,22 +371,22 @@ def _workspace(page: _Page, rows: Rows) -> None:
     for name, error, size, shown in (("after", rows.error_after[pick], rows.magnitude_after[pick], True),
                                      ("before", rows.error_before[pick], rows.magnitude_before[pick], False)):
         limit = float(np.quantile(size, 0.98)) or 1e-9
-        unit, scale = _length_unit(limit)
-        marker = {"size": 3.5, "color": _pack(size * scale), "colorscale": "Viridis", "reversescale": True, "cmin": 0, "cmax": limit * scale,
+        unit, scale = length_unit(limit)
+        marker = {"size": 3.5, "color": packed(size * scale), "colorscale": "Viridis", "reversescale": True, "cmin": 0, "cmax": limit * scale,
                   "colorbar": {"title": {"text": unit}, "thickness": 12, "len": 0.7}}
         traces.append({"type": "scatter3d", "mode": "markers", "visible": shown, "name": name, "marker": marker,
-                       **{axis: _pack(position[:, i]) for i, axis in enumerate("xyz")},
+                       **{axis: packed(position[:, i]) for i, axis in enumerate("xyz")},
                        "hovertemplate": f"%{{marker.color:.3g}} {unit}<br>x %{{x:.3f}} y %{{y:.3f}} z %{{z:.3f}} m<extra>{name}</extra>"})
         factor = _round_down(0.06 * extent / limit)
         drawn = np.isfinite(error).all(axis=1)
         tails = np.full((3 * int(drawn.sum()), 3), np.nan)
         tails[0::3], tails[1::3] = position[drawn], position[drawn] + factor * error[drawn]
         traces.append({"type": "scatter3d", "mode": "lines", "visible": shown, "name": name, "hoverinfo": "skip",
-                       "line": {"color": _faded(INK, 0.45), "width": 1.5}, **{axis: _pack(tails[:, i]) for i, axis in enumerate("xyz")}})
+                       "line": {"color": faded(INK, 0.45), "width": 1.5}, **{axis: packed(tails[:, i]) for i, axis in enumerate("xyz")}})
         if drawn.any():
             words.append(f"{name}: {factor:g} ×")
         for view, (first, second) in {"top": (0, 1), "side": (0, 2)}.items():
-            flat[view].append({"type": "scatter", "mode": "markers", "visible": shown, "x": _pack(position[:, first]), "y": _pack(position[:, second]),
+            flat[view].append({"type": "scatter", "mode": "markers", "visible": shown, "x": packed(position[:, first]), "y": packed(position[:, second]),
                                "marker": {**marker, "size": 6}, "name": name, "hovertemplate": f"%{{marker.color:.3g}} {unit}<extra>{name}</extra>"})
     page.add('<div class="toggle" role="group" aria-label="errors shown"><button data-show="after" class="on">after</button>'
              '<button data-show="before">before</button></div>')
@@ -320,9 +396,9 @@ def _workspace(page: _Page, rows: Rows) -> None:
     page.add(f'<p class="note">{_shown(pick.size, known.size, "row")}{strokes} Rejected rows are left out. Colours stop at the 98 % quantile.</p>')
 
 
-def _joint_charts(page: _Page, rows: Rows) -> None:
+def _joint_charts(page: Page, rows: Rows) -> None:
     usable = np.flatnonzero(np.isfinite(rows.magnitude_after) & np.isfinite(rows.magnitude_before) & ~rows.rejected)
-    pick = _subsample(usable, SMALL_POINTS)
+    pick = subsample(usable, SMALL_POINTS)
     limits, axis = _log_error_axis(np.concatenate([rows.magnitude_before[usable], rows.magnitude_after[usable]]))
     page.add('<p class="legend"><i class="before"></i>before <i class="after"></i>after · lines are running medians</p><div class="multiples">')
     for column, name in enumerate(rows.joint_names):
@@ -330,40 +406,41 @@ def _joint_charts(page: _Page, rows: Rows) -> None:
         values = rows.joints[:, column] * (180 / math.pi if angle else 1000.0)
         traces = []
         for size, colour, label in ((rows.magnitude_before, BEFORE, "before"), (rows.magnitude_after, AFTER, "after")):
-            traces.append(_points(values[pick], size[pick] * limits, colour, label, 3, opacity=0.35))
+            traces.append(points_trace(values[pick], size[pick] * limits, colour, label, 3, opacity=0.35))
         for size, colour, label in ((rows.magnitude_before, BEFORE, "before"), (rows.magnitude_after, AFTER, "after")):
             middles, medians = _running_median(values[usable], size[usable])
-            traces.append({"type": "scatter", "mode": "lines", "x": _pack(middles), "y": _pack(medians * limits), "hoverinfo": "skip",
+            traces.append({"type": "scatter", "mode": "lines", "x": packed(middles), "y": packed(medians * limits), "hoverinfo": "skip",
                            "line": {"color": colour, "width": 3}, "name": label})
         page.chart(f"joint{column}", traces, {"xaxis": {"title": {"text": f"{name} [{'°' if angle else 'mm'}]"}}, "yaxis": axis},
                    size="small")
     page.add(f'</div><p class="note">{_shown(pick.size, usable.size, "row")} Medians are of all of them.</p>')
 
 
-def _over_rows(page: _Page, rows: Rows) -> None:
+def chart_over_rows(page: Page, rows: Rows, out_word: str = "rejected") -> None:
+    """Errors before and after over time, or over the order of the rows. `out_word`: what the rows in `rows.rejected` are."""
     order = rows.time if rows.time is not None else np.arange(rows.count, dtype=np.float64)
     usable = np.flatnonzero(np.isfinite(rows.magnitude_after) & np.isfinite(rows.magnitude_before) & ~rows.rejected)
-    pick = _subsample(usable, ROW_POINTS)
+    pick = subsample(usable, ROW_POINTS)
     everything = np.concatenate([rows.magnitude_before[usable], rows.magnitude_after[usable], rows.magnitude_after[rows.rejected]])
     limits, axis = _log_error_axis(everything)
-    traces = [_points(order[pick], rows.magnitude_before[pick] * limits, BEFORE, "before", 4, opacity=0.5),
-              _points(order[pick], rows.magnitude_after[pick] * limits, AFTER, "after", 4, opacity=0.6)]
+    traces = [points_trace(order[pick], rows.magnitude_before[pick] * limits, BEFORE, "before", 4, opacity=0.5),
+              points_trace(order[pick], rows.magnitude_after[pick] * limits, AFTER, "after", 4, opacity=0.6)]
     if rows.rejected.any():
-        out = _subsample(np.flatnonzero(rows.rejected), 500)
-        traces.append({"type": "scatter", "mode": "markers", "x": _pack(order[out]), "y": _pack(rows.magnitude_after[out] * limits), "name": "rejected",
+        out = subsample(np.flatnonzero(rows.rejected), 500)
+        traces.append({"type": "scatter", "mode": "markers", "x": packed(order[out]), "y": packed(rows.magnitude_after[out] * limits), "name": out_word,
                        "text": [f"row {i}" for i in out], "marker": {"symbol": "x-thin", "size": 9, "line": {"color": REJECTED, "width": 2}}})
     page.chart("rows", traces, {"xaxis": {"title": {"text": "time [s]" if rows.time is not None else "row"}}, "yaxis": axis,
                                 "showlegend": True, "legend": {"orientation": "h", "y": 1.12, "x": 0}}, size="wide")
     page.add(f'<p class="note">{_shown(pick.size, usable.size, "row")} A trend here means drift: warming up, a tracker that moved, a loose target.</p>')
 
 
-def _correlations(page: _Page, names: Sequence[str], matrix: Floats) -> None:
+def _correlations(page: Page, names: Sequence[str], matrix: Floats) -> None:
     off = np.abs(matrix - np.diag(np.diag(matrix)))
     pairs = [(i, j) for i, j in zip(*np.unravel_index(np.argsort(-np.triu(off), axis=None)[:6], off.shape), strict=True) if off[i, j] > 0.9]
     page.add('<section class="card"><h2>Which parameters lean on each other</h2>')
     if pairs:
         page.add('<p class="lead">Strongly tied (their sum or difference is known better than each alone): '
-                 + "; ".join(f"{_esc(names[i])} and {_esc(names[j])} ({matrix[i, j]:+.2f})" for i, j in pairs) + ".</p>")
+                 + "; ".join(f"{escaped(names[i])} and {escaped(names[j])} ({matrix[i, j]:+.2f})" for i, j in pairs) + ".</p>")
     else:
         page.add('<p class="lead">No two parameters are tied more strongly than 0.9.</p>')
     labels = list(names)
@@ -387,11 +464,11 @@ def _parameter_table(parameters: Iterable[Mapping[str, Any]], promised: bool = F
     # The robot first; where it stands was never nominal, so it comes last and has no significance.
     for p in sorted(parameters, key=lambda p: _placed(p["name"])):
         nominal, unit = _natural(p["nominal"], p["unit"])
-        cells = [f"<th>{_esc(p['name'])}</th>", _cell(nominal, f"{nominal:.6g} {unit}")]
+        cells = [f"<th>{escaped(p['name'])}</th>", table_cell(nominal, f"{nominal:.6g} {unit}")]
         frozen = p.get("frozen", False) or p["sigma"] is None
         sigma = None if frozen else _natural(p["sigma"], p["unit"])[0]
         if promised:
-            cells.append('<td class="held" data-v="-1">cannot be found</td>' if sigma is None else _cell(sigma, f"± {_figures(sigma, 2)} {unit}"))
+            cells.append('<td class="held" data-v="-1">cannot be found</td>' if sigma is None else table_cell(sigma, f"± {figures_text(sigma, 2)} {unit}"))
         elif sigma is None:
             cells.append('<td class="held" colspan="4" data-v="-1">kept at nominal: the data cannot see it</td>')
         else:
@@ -400,14 +477,14 @@ def _parameter_table(parameters: Iterable[Mapping[str, Any]], promised: bool = F
             significance = abs(change) / sigma if sigma > 0 else math.inf
             decimals = min(9, max(0, 1 - math.floor(math.log10(sigma)))) if sigma > 0 else 6
             if _placed(p["name"]):
-                cells += [_cell(value, f"{value:.{decimals}f} {unit}"), _cell(change, f"{change:+.{decimals}f}"), _cell(sigma, f"± {_figures(sigma, 2)}"),
+                cells += [table_cell(value, f"{value:.{decimals}f} {unit}"), table_cell(change, f"{change:+.{decimals}f}"), table_cell(sigma, f"± {figures_text(sigma, 2)}"),
                           '<td class="held" data-v="-1">placement</td>']  # fmt: skip
                 body.append(f"<tr>{''.join(cells)}</tr>")
                 continue
             width = min(100.0, 25 * math.log10(1 + significance)) if math.isfinite(significance) else 100.0
-            cells += [_cell(value, f"{value:.{decimals}f} {unit}"), _cell(change, f"{change:+.{decimals}f}"), _cell(sigma, f"± {_figures(sigma, 2)}"),
+            cells += [table_cell(value, f"{value:.{decimals}f} {unit}"), table_cell(change, f"{change:+.{decimals}f}"), table_cell(sigma, f"± {figures_text(sigma, 2)}"),
                       f'<td data-v="{significance:.6g}" class="{"strong" if significance > 3 else "held"}">'
-                      f'<span class="bar" style="width:{width * 0.6:.0f}px"></span>{_figures(min(significance, 99999), 2)} σ</td>']
+                      f'<span class="bar" style="width:{width * 0.6:.0f}px"></span>{figures_text(min(significance, 99999), 2)} σ</td>']
         body.append(f"<tr>{''.join(cells)}</tr>")
     title = "What standard errors these poses promise" if promised else "Every parameter"
     lead = ("" if promised else '<p class="lead">Significance is the change over its standard error: above 3 the robot really differs there from its '
@@ -428,12 +505,12 @@ def _frozen(frozen: Sequence[Mapping[str, Any]]) -> str:
         others = [(name, weight) for name, weight in combination.items() if name != held and abs(weight) > 1e-3]
         others.sort(key=lambda item: -abs(item[1]))
         if others:
-            tied = ", ".join(f"{_esc(name)} ({weight:+.2g})" for name, weight in others[:5]) + (f" and {len(others) - 5} more" if len(others) > 5 else "")
-            text = f"changing <b>{_esc(held)}</b> together with {tied} changes no measurement, so only the combination is known. {_esc(held)} stays at nominal and the others take over its part."
+            tied = ", ".join(f"{escaped(name)} ({weight:+.2g})" for name, weight in others[:5]) + (f" and {len(others) - 5} more" if len(others) > 5 else "")
+            text = f"changing <b>{escaped(held)}</b> together with {tied} changes no measurement, so only the combination is known. {escaped(held)} stays at nominal and the others take over its part."
         else:
-            text = f"<b>{_esc(held)}</b> changes no measurement at all; it stays at nominal."
+            text = f"<b>{escaped(held)}</b> changes no measurement at all; it stays at nominal."
         reason = entry.get("why") or ""
-        why = f' <span class="muted">({_esc(reason)})</span>' if reason and "changes no measurement" not in reason else ""
+        why = f' <span class="muted">({escaped(reason)})</span>' if reason and "changes no measurement" not in reason else ""
         items.append(f"<li>{text[0].upper() + text[1:]}{why}</li>")
     return f'<section class="card" id="frozen"><h2>What these data cannot see</h2><ul class="plain">{"".join(items)}</ul></section>'
 
@@ -445,24 +522,24 @@ def _rejected(rows: Rows) -> str:
     body = []
     order = out[np.argsort(-np.nan_to_num(rows.magnitude_after[out]))]
     for row in order[:LISTED_REJECTED]:
-        parts = "".join(_cell(float(v), _signed_length(float(v))) for v in rows.error_after[row]) if np.isfinite(rows.error_after[row]).all() else "<td></td>" * 3
-        body.append(f"<tr><th>{row}</th>{_cell(float(rows.magnitude_after[row]), _length(float(rows.magnitude_after[row])))}{parts}</tr>")
+        parts = "".join(table_cell(float(v), _signed_length(float(v))) for v in rows.error_after[row]) if np.isfinite(rows.error_after[row]).all() else "<td></td>" * 3
+        body.append(f"<tr><th>{row}</th>{table_cell(float(rows.magnitude_after[row]), length_text(float(rows.magnitude_after[row])))}{parts}</tr>")
     more = f'<p class="note">The {LISTED_REJECTED} largest of {out.size}; residuals.csv has all.</p>' if out.size > LISTED_REJECTED else ""
-    return (f'<section class="card"><h2>Rejected rows</h2><p class="lead">{_count(out.size, "training row")} so far from all others that the fit left '
+    return (f'<section class="card"><h2>Rejected rows</h2><p class="lead">{counted(out.size, "training row")} so far from all others that the fit left '
             f"{'it' if out.size == 1 else 'them'} out. Rows count from 0, in the order of the data file.</p>"
             '<div class="scroll"><table class="sortable"><thead><tr><th><button>row</button></th><th><button>error</button></th><th><button>x</button></th>'
             f"<th><button>y</button></th><th><button>z</button></th></tr></thead><tbody>{''.join(body)}</tbody></table></div>{more}</section>")
 
 
-def _warnings_card(result: Mapping[str, Any]) -> str:
-    items = "".join(f"<li>{_esc(w)}</li>" for w in result.get("warnings", []))
+def warnings_card(result: Mapping[str, Any]) -> str:
+    items = "".join(f"<li>{escaped(w)}</li>" for w in result.get("warnings", []))
     return f'<section class="card" id="warnings"><h2>Warnings</h2><ul class="plain">{items}</ul></section>' if items else ""
 
 
-def _footer(result: Mapping[str, Any]) -> str:
-    parts = [f"truing {_esc(result.get('version', ''))}", _esc(result["format"])]
+def footer(result: Mapping[str, Any]) -> str:
+    parts = [f"truing {escaped(result.get('version', ''))}", escaped(result["format"])]
     if "solver" in result:
-        parts.append(f"{_esc(result['solver']['name'])}: {_esc(result['solver']['stopped_because'])}")
+        parts.append(f"{escaped(result['solver']['name'])}: {escaped(result['solver']['stopped_because'])}")
     if "seed" in result:
         parts.append(f"seed {result['seed']}")
     return f"<footer>{' · '.join(parts)}</footer>"
@@ -471,19 +548,19 @@ def _footer(result: Mapping[str, Any]) -> str:
 # ------------------------------------------------------------------------------------------------------------------------- numbers
 
 
-def _esc(text: object) -> str:
+def escaped(text: object) -> str:
     return html.escape(str(text if text is not None else ""))
 
 
-def _count(n: int, noun: str) -> str:
+def counted(n: int, noun: str) -> str:
     return f"{n:,} {noun}{'' if n == 1 else 's'}".replace(",", "\u202f")
 
 
 def _shown(shown: int, total: int, noun: str) -> str:
-    return f"{_count(total, noun)}." if shown == total else f"{_count(shown, noun)} drawn of {_count(total, noun)}, evenly picked."
+    return f"{counted(total, noun)}." if shown == total else f"{counted(shown, noun)} drawn of {counted(total, noun)}, evenly picked."
 
 
-def _figures(value: float, figures: int | None = None) -> str:
+def figures_text(value: float, figures: int | None = None) -> str:
     """Plain decimal text with `figures` significant figures (3 from 1 on, 2 below), never an exponent."""
     if not math.isfinite(value):
         return "∞" if value > 0 else "–"
@@ -495,26 +572,26 @@ def _figures(value: float, figures: int | None = None) -> str:
     return f"{rounded:.{max(0, min(decimals, 9))}f}"
 
 
-def _length_unit(metres: float, big: bool = False) -> tuple[str, float]:
+def length_unit(metres: float, big: bool = False) -> tuple[str, float]:
     """mm, unless that gives numbers nobody reads."""
     if not big and 0 < abs(metres) < 2e-6:
         return "µm", 1e6
     return ("m", 1.0) if abs(metres) >= 10 else ("mm", 1e3)
 
 
-def _length(metres: float | None) -> str:
+def length_text(metres: float | None) -> str:
     if metres is None:
         return "–"
-    unit, scale = _length_unit(metres)
-    return f"{_figures(metres * scale)}\u202f{unit}"
+    unit, scale = length_unit(metres)
+    return f"{figures_text(metres * scale)}\u202f{unit}"
 
 
 def _signed_length(metres: float) -> str:
-    return ("+" if metres >= 0 else "−") + _length(abs(metres))
+    return ("+" if metres >= 0 else "−") + length_text(abs(metres))
 
 
-def _angle(radians: float) -> str:
-    return f"{_figures(math.degrees(radians))}°" if abs(radians) > 2e-3 else f"{_figures(radians * 1e3)}\u202fmrad"
+def angle_text(radians: float) -> str:
+    return f"{figures_text(math.degrees(radians))}°" if abs(radians) > 2e-3 else f"{figures_text(radians * 1e3)}\u202fmrad"
 
 
 def _natural(value: float, unit: str) -> tuple[float, str]:
@@ -535,25 +612,25 @@ def _main(combination: Mapping[str, float]) -> str:
     return max(combination, key=lambda name: abs(combination[name]))
 
 
-def _cell(value: float, text: str) -> str:
+def table_cell(value: float, text: str) -> str:
     return f'<td data-v="{value:.9g}">{text}</td>'
 
 
-def _faded(colour: str, alpha: float) -> str:
+def faded(colour: str, alpha: float) -> str:
     red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return f"rgba({red},{green},{blue},{alpha})"
 
 
-def _pack(values: Floats | NDArray[np.integer[Any]]) -> dict[str, str]:
+def packed(values: Floats | NDArray[np.integer[Any]]) -> dict[str, str]:
     """plotly.js's own form of a typed array: four bytes a number."""
     return {"dtype": "f4", "bdata": base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()}
 
 
-def _points(x: Floats | NDArray[np.integer[Any]], y: Floats, colour: str, name: str, size: int, opacity: float = 0.8) -> dict[str, Any]:
-    return {"type": "scatter", "mode": "markers", "x": _pack(x), "y": _pack(y), "name": name, "marker": {"color": colour, "size": size, "opacity": opacity}}
+def points_trace(x: Floats | NDArray[np.integer[Any]], y: Floats, colour: str, name: str, size: int, opacity: float = 0.8) -> dict[str, Any]:
+    return {"type": "scatter", "mode": "markers", "x": packed(x), "y": packed(y), "name": name, "marker": {"color": colour, "size": size, "opacity": opacity}}
 
 
-def _subsample(indices: NDArray[np.integer[Any]], limit: int) -> NDArray[np.integer[Any]]:
+def subsample(indices: NDArray[np.integer[Any]], limit: int) -> NDArray[np.integer[Any]]:
     return indices if indices.size <= limit else indices[np.linspace(0, indices.size - 1, limit).astype(np.intp)]
 
 
@@ -586,7 +663,7 @@ def _log_error_axis(errors: Floats) -> tuple[float, dict[str, Any]]:
     positive = errors[np.isfinite(errors) & (errors > 0)]
     if positive.size == 0:
         return 1e3, {"title": {"text": "error [mm]"}}
-    unit, scale = _length_unit(float(np.median(positive)), big=True)
+    unit, scale = length_unit(float(np.median(positive)), big=True)
     low, high = float(np.quantile(positive, 0.003)) / 1.3 * scale, float(positive.max()) * 1.3 * scale
     values, texts = _log_ticks(low, high)
     return scale, {"type": "log", "title": {"text": f"error [{unit}]"}, "tickvals": values, "ticktext": texts, "range": [math.log10(low), math.log10(high)]}
@@ -595,11 +672,12 @@ def _log_error_axis(errors: Floats) -> tuple[float, dict[str, Any]]:
 # --------------------------------------------------------------------------------------------------------------------------- page
 
 
-class _Page:
-    """Collects markup and charts; charts are drawn by plotly.js once the page is there."""
+class Page:
+    """Collects markup and charts; charts are drawn by plotly.js once the page is there. `style`: more of it, after the common one."""
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str, style: str = "") -> None:
         self._title = title
+        self._style = _STYLE + style
         self._body: list[str] = []
         self._charts: list[dict[str, Any]] = []
 
@@ -615,7 +693,7 @@ class _Page:
 
         charts = json.dumps(without_nan(self._charts), separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
         return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
-                f"<title>{_esc(self._title)}</title><style>{_STYLE}</style></head>\n<body><main>\n"
+                f"<title>{escaped(self._title)}</title><style>{self._style}</style></head>\n<body><main>\n"
                 + "\n".join(self._body)
                 + f'\n</main>\n<script>{get_plotlyjs()}</script>\n<script type="application/json" id="charts">{charts}</script>\n<script>{_SCRIPT}</script>\n</body></html>\n')
 

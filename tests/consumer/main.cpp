@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Uses the installed library as its users do: a two-joint robot with a link that is 1 mm longer than drawn
-// is measured, and found out.
+// is measured, found out, and has no other cause to be named afterwards.
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -68,5 +68,14 @@ int main() {
   }
   std::printf("truing %s: J1.a %.6f m, real %.6f m, %s\n", truing::version, length->value, real.joints[0].a,
               result.solver.stopped_because.c_str());
-  return std::abs(length->value - real.joints[0].a) < 1e-6 ? 0 : 1;
+  if (std::abs(length->value - real.joints[0].a) > 1e-6) return 1;
+
+  unsigned state = 1;  // a little noise, or there would be no scale for what is large
+  for (double& coordinate : position) {
+    state = state * 1664525u + 1013904223u;
+    coordinate += 1e-4 * (static_cast<double>(state >> 8) / 16777216.0 - 0.5);
+  }
+  const truing::Diagnosis diagnosis = truing::diagnose(result.robot, data);
+  std::printf("%s\n", diagnosis.sentence.c_str());
+  return diagnosis.verdict == truing::Verdict::none ? 0 : 1;
 }

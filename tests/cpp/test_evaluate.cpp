@@ -60,19 +60,11 @@ void add_directions(Table* table, unsigned seed) {
   }
 }
 
-void check_jacobian(const Robot& robot, What what, unsigned seed) {
-  CAPTURE(robot.name);
-  CAPTURE(static_cast<int>(what));
-  Robot truth = robot;
-  truth.T_measurement_base = somewhere();
-  truth.anchor = truing::Anchor{{1.0, 2.0, -0.5}, 0.3};
-  auto table = random_joints(truth, 70, seed);  // one full tile and a part of another
-  add_directions(table.get(), seed + 1);
-  measure(table.get(), truth, what, 0.0, seed + 2);
-  const Robot near = perturbed(truth, 1e-3, 1e-3, seed + 3);
-  const detail::Model model = detail::make_model(near, table->data, effects_for(robot));
-  const auto bases = detail::make_bases(model, table->data);
-  const detail::Evaluator evaluator(model, table->data, bases, detail::make_segments(table->data, all_rows(table->data)), all_parameters(model), 1);
+/// Columns of every parameter of `near` with `effects`, against central differences.
+void check_columns(const Robot& near, const Measurements& data, const std::vector<truing::EffectRequest>& effects) {
+  const detail::Model model = detail::make_model(near, data, effects);
+  const auto bases = detail::make_bases(model, data);
+  const detail::Evaluator evaluator(model, data, bases, detail::make_segments(data, all_rows(data)), all_parameters(model), 1);
   Eigen::VectorXd values = detail::initial_values(model);
   for (Eigen::Index k = 0; k < values.size(); ++k) {  // effects and orientation corrections away from zero
     const bool per_torque = model.parameters[static_cast<std::size_t>(k)].unit.find("Nm") != std::string::npos;
@@ -95,6 +87,18 @@ void check_jacobian(const Robot& robot, What what, unsigned seed) {
     INFO(model.parameters[k].name);
     CHECK((difference - j.col(static_cast<Eigen::Index>(k))).cwiseAbs().maxCoeff() < (per_torque ? 2e-7 : 2e-8) * size);
   }
+}
+
+void check_jacobian(const Robot& robot, What what, unsigned seed) {
+  CAPTURE(robot.name);
+  CAPTURE(static_cast<int>(what));
+  Robot truth = robot;
+  truth.T_measurement_base = somewhere();
+  truth.anchor = truing::Anchor{{1.0, 2.0, -0.5}, 0.3};
+  auto table = random_joints(truth, 70, seed);  // one full tile and a part of another
+  add_directions(table.get(), seed + 1);
+  measure(table.get(), truth, what, 0.0, seed + 2);
+  check_columns(perturbed(truth, 1e-3, 1e-3, seed + 3), table->data, effects_for(robot));
 }
 
 }  // namespace
@@ -125,6 +129,18 @@ TEST_CASE("the Jacobian of every parameter and effect agrees with central differ
     check_jacobian(robot, What::position, 21);
     check_jacobian(robot, What::pose, 22);
     check_jacobian(robot, What::distance, 23);
+  }
+}
+
+TEST_CASE("an effect on the targets has a column that is right for the rows of each") {
+  for (const What what : {What::position, What::pose}) {
+    Robot truth = ur10();
+    truth.targets.push_back({"elbow", truing::frame_from_xyz_rpy({0.2, 0.1, -0.3}, {0.4, 0.5, 0.6})});
+    truth.T_measurement_base = somewhere();
+    auto table = random_joints(truth, 80, 24);
+    for (std::int32_t row = 0; row < 80; ++row) table->data.target.push_back(row % 2);
+    measure(table.get(), truth, what, 0.0, 25);
+    check_columns(perturbed(truth, 1e-3, 1e-3, 26), table->data, {{"scale", {}}});
   }
 }
 

@@ -19,15 +19,18 @@ ROOT = Path(__file__).resolve().parents[2]
 # From the ground up. A file may include files of its own layer and of those above it in this list.
 CPP_LAYERS = [
     ("kernel", ["kernel/kernel.hpp", "kernel/kernel.cpp", "kernel/dispatch.cpp"]),
-    ("tools", ["truing/version.hpp", "text.hpp", "random.hpp", "registration.hpp", "registration.cpp", "observability.hpp", "observability.cpp"]),
+    ("tools", ["truing/version.hpp", "text.hpp", "random.hpp", "registration.hpp", "registration.cpp", "observability.hpp", "observability.cpp",
+               "evidence.hpp", "evidence.cpp"]),
     ("robot", ["truing/robot.hpp", "robot.cpp", "motion.hpp", "truing/urdf.hpp", "urdf.cpp"]),
     ("measurement", ["truing/measurement.hpp", "measurement.cpp"]),
     ("effect", ["truing/effect.hpp", "effect.cpp", "gravity.hpp", "gravity.cpp"]),
     ("model", ["model.hpp", "model.cpp"]),
     ("evaluate", ["evaluate.hpp", "evaluate.cpp"]),
-    ("options", ["truing/identify.hpp"]),  # what is asked for and what comes back, known to the solvers too
+    ("options", ["truing/identify.hpp", "truing/diagnose.hpp", "statistics.hpp"]),  # what is asked for and what comes back
     ("estimation", ["selection.hpp", "selection.cpp", "solvers.hpp", "levenberg_marquardt.cpp", "ceres_solver.cpp"]),
-    ("tasks", ["truing/plan.hpp", "identify.cpp", "plan.cpp"]),
+    ("diagnosis", ["linearise.hpp", "linearise.cpp", "sanity.hpp", "sanity.cpp", "candidates.hpp", "candidates.cpp", "free_search.hpp", "free_search.cpp",
+                   "where.hpp", "where.cpp", "next_poses.hpp", "next_poses.cpp"]),
+    ("tasks", ["truing/plan.hpp", "identify.cpp", "plan_poses.hpp", "plan_effects.cpp", "plan.cpp", "diagnose.cpp"]),
     ("everything", ["truing/truing.hpp"]),
 ]  # fmt: skip
 CPP_RANK = {file: rank for rank, (_, files) in enumerate(CPP_LAYERS) for file in files}
@@ -38,7 +41,7 @@ CPP_ONLY_IN = {
     "urdf_": {"urdf.cpp"},
     "console_bridge/": {"urdf.cpp"},
     "tinyxml2": {"urdf.cpp"},
-    "thread": {"evaluate.cpp"},
+    "thread": {"evaluate.cpp", "diagnose.cpp"},
     "iostream": set[str](),  # the library prints nothing
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
@@ -118,12 +121,21 @@ PYTHON_MAY_IMPORT = {
     "truing.api": {"truing._core", "truing.errors", "truing.effects"},
     "truing.files": {"truing._core", "truing.errors", "truing.files"},
     "truing.simulation": {"truing", "truing.errors", "truing.files"},
-    "truing.results": {"truing", "truing.errors", "truing.files", "truing.report"},
+    "truing.results": {"truing", "truing.errors", "truing.files", "truing.report", "truing.diagnose_report"},
     "truing.report": {"truing.results"},
+    "truing.diagnose_report": {"truing.results", "truing.report"},
     "truing.demo": {"truing", "truing.errors", "truing.files", "truing.simulation", "truing.results"},
-    "truing.cli": {"truing", "truing.errors", "truing.files", "truing.simulation", "truing.results", "truing.report", "truing.demo"},
+    "truing.exam": {"truing"},  # and of that only containers and readers: test_exam.py
+    "truing.cli": {"truing", "truing.errors", "truing.files", "truing.simulation", "truing.results", "truing.report", "truing.diagnose_report",
+                   "truing.demo", "truing.exam"},
     "truing": {"truing._core", "truing.errors", "truing.effects", "truing.api", "truing.files", "truing.simulation"},
 }  # fmt: skip
+
+# Parts of several modules, which may import each other.
+FOLDERS = {"truing.files", "truing.exam"}
+# Those of the examination, from the ground up: each may import those before it.
+EXAM_LAYERS = ["robots", "kinematics", "laws", "surprises", "design", "physics", "worlds", "sizing", "recordings", "confounded", "sets", "answers", "score",
+               "sealing", "run"]  # fmt: skip
 
 # Packages that are slow to import, or belong to one job: who may import them.
 PYTHON_ONLY_IN = {
@@ -133,6 +145,7 @@ PYTHON_ONLY_IN = {
     "plotly": {"truing.report"},
     "typer": {"truing.cli"},
     "rich": {"truing.cli", "truing.demo"},
+    "mujoco": {"truing.exam"},
 }
 
 
@@ -169,7 +182,7 @@ def test_a_module_imports_only_what_its_part_may(file: str) -> None:
     assert part in PYTHON_MAY_IMPORT, f"{file} is in no part: give it one, here and in docs/architecture.md"
     for name in imports(python_files()[file]):
         if name.split(".")[0] == "truing":
-            assert part_of(name) in PYTHON_MAY_IMPORT[part] | ({part} if part == "truing.files" else set()), f"{file} imports {name}"
+            assert part_of(name) in PYTHON_MAY_IMPORT[part] | ({part} if part in FOLDERS else set()), f"{file} imports {name}"
 
 
 @pytest.mark.parametrize("file", sorted(python_files()))
@@ -182,6 +195,18 @@ def test_heavy_packages_stay_where_they_are_needed(file: str) -> None:
             assert package in {"truing", "numpy", "pydantic_core", *sys.stdlib_module_names}, f"{file} imports {package}: a new dependency?"
 
 
+@pytest.mark.parametrize("module", EXAM_LAYERS)
+def test_a_module_of_the_examination_imports_only_those_below_it(module: str) -> None:
+    below = set(EXAM_LAYERS[: EXAM_LAYERS.index(module)])
+    for name in imports(python_files()[f"exam/{module}.py"]):
+        words = name.split(".")
+        assert words[:2] != ["truing", "exam"] or (words[2] if len(words) > 2 else "") in below, f"exam/{module}.py imports {name}"
+
+
+def test_every_module_of_the_examination_has_a_layer() -> None:
+    assert {f"exam/{module}.py" for module in EXAM_LAYERS} | {"exam/__init__.py"} == {file for file in python_files() if file.startswith("exam/")}
+
+
 def test_nobody_imports_the_command_line() -> None:
     for file, path in python_files().items():
         assert not any(part_of(name) == "truing.cli" for name in imports(path)), f"{file} imports the command line"
@@ -189,6 +214,6 @@ def test_nobody_imports_the_command_line() -> None:
 
 def test_importing_truing_stays_cheap() -> None:
     """The package itself needs no plotting, no command line and no report."""
-    later = {"truing.cli", "truing.report", "truing.results", "truing.demo"}
+    later = {"truing.cli", "truing.report", "truing.diagnose_report", "truing.results", "truing.demo", "truing.exam"}
     assert not later & PYTHON_MAY_IMPORT["truing"]
     assert not any(part_of(name) in later for name in imports(python_files()["__init__.py"]))

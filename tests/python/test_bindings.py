@@ -85,10 +85,10 @@ def test_an_unknown_word_lists_the_choices(make: Any, choices: str) -> None:
 
 
 def test_the_wrappers_defaults_are_those_of_the_core() -> None:
-    for function, options in ((api.identify, truing.IdentifyOptions()), (api.plan, truing.PlanOptions())):
+    for function, options in ((api.identify, truing.IdentifyOptions()), (api.plan, truing.PlanOptions()), (api.distinguish, truing.DistinguishOptions())):
         for name, parameter in inspect.signature(function).parameters.items():
             if not hasattr(options, name):
-                assert name in {"robot", "data", "raise_if_not_converged"}
+                assert name in {"robot", "data", "joints", "raise_if_not_converged"}
                 continue
             default = {} if parameter.default is None else parameter.default
             assert default == getattr(options, name), name
@@ -447,6 +447,25 @@ def test_other_threads_run_while_the_core_works(robot: truing.Robot) -> None:
         time.sleep(1e-4)
     thread.join()
     assert turns > 3
+
+
+def test_distinguish_says_what_a_plan_tells_apart(robot: truing.Robot, q: np.ndarray) -> None:
+    seen = truing.distinguish(robot, q[:40], columns="dir,temp", separate="backlash:J2,thermal_zero:J2")
+    assert {e.effect for e in seen.effects} == {"backlash", "thermal_zero"}
+    assert seen.r2.shape == (2, 2) and np.allclose(np.diag(seen.r2), 1)
+    assert seen.direction is not None and seen.direction.shape == (40 + seen.added, 6)
+    assert seen.temperature is not None and seen.payload is None and seen.time is None
+    assert np.array_equal(seen.joints[:40], q[:40])
+    (pair,) = seen.separated
+    assert pair.r2 < 0.98 and pair.size > 0 and "EffectPair(" in repr(pair)
+    with pytest.raises(truing.InputError, match="dir, payload, temp, t"):
+        truing.distinguish(robot, q, columns="humidity")
+    with pytest.raises(truing.InputError, match="driven"):
+        truing.distinguish(robot, q[:, :3])
+    with pytest.raises(truing.InputError, match="shape"):
+        truing.distinguish(robot, q[0])
+    with pytest.raises(truing.InputError, match="own effects"):
+        truing.distinguish(robot, q, separate=truing.Effect("mine", "J2", lambda d: np.ones(len(d))))
 
 
 def test_plan_gives_poses(robot: truing.Robot) -> None:

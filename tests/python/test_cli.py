@@ -172,6 +172,41 @@ def test_a_plan_is_measured_by_the_simulator(capsys: pytest.CaptureFixture[str])
     assert [float(value) for value in measured["q3_rad"]] == joints[:, 2].tolist()
 
 
+def test_a_plan_says_which_effects_it_tells_apart(capsys: pytest.CaptureFixture[str]) -> None:
+    plan = ["plan", ROBOT, "--poses", "30", "--out"]
+    assert main([*plan, "full", "--columns", "payload,dir,temp,t"]) == 0
+    assert "smallest effects" in capsys.readouterr().out
+    result = json.loads(Path("full/result.json").read_text())
+    seen, table = result["distinguish"], columns("full/poses.csv")
+    assert {"dir1", "dir6", "payload_kg", "temp_C", "t_s"} <= set(table)
+    assert {float(v) for v in table["dir2"]} == {-1, 1} and {float(v) for v in table["payload_kg"]} == {0, 5}
+    assert result["poses"] == len(table["q1_rad"]) == 30 and seen["added_poses"] == 0
+    assert len(seen["r2"]) == len(seen["effects"]) and all(len(row) == len(seen["effects"]) for row in seen["r2"])
+    assert all(e["size"] > 0 and e["size_at_tip_m"] > 0 for e in seen["effects"])
+    assert any(n["effect"] == "joint_offset" and n["joints"] == ["J1"] and "base" in n["why"] for n in seen["not_testable"])
+    assert "Which effects look alike" in Path("full/report.html").read_text(encoding="utf-8")
+
+    assert main([*plan, "one", "--separate", "backlash,joint_offset"]) == 0
+    one_sided = json.loads(Path("one/result.json").read_text())["distinguish"]
+    assert "dir1" not in columns("one/poses.csv")
+    assert main([*plan, "two", "--separate", "backlash,joint_offset", "--columns", "dir"]) == 0
+    two_sided = json.loads(Path("two/result.json").read_text())["distinguish"]
+
+    def alike(found: dict[str, Any]) -> set[str]:
+        return {p["joint"] for p in found["alike"] if p["joint"] == p["other_joint"]}
+
+    assert {"J2", "J3", "J4", "J5"} <= alike(one_sided) and not alike(two_sided)
+    assert {e["effect"] for e in two_sided["effects"]} == {"backlash", "joint_offset"}
+    rows = len(columns("two/poses.csv")["q1_rad"])
+    assert rows == 30 + two_sided["added_poses"]
+
+
+def test_a_plan_that_is_asked_nothing_says_nothing_of_effects() -> None:
+    assert main(["plan", ROBOT, "--poses", "20", "--out", "planned"]) == 0
+    assert "distinguish" not in json.loads(Path("planned/result.json").read_text())
+    assert list(columns("planned/poses.csv")) == [f"q{k}_rad" for k in range(1, 7)]
+
+
 def test_simulated_files_hold_nominal_and_truth() -> None:
     options = ["--effect", "backlash:J2=0.2mrad", "--effect", "harmonic:J3:sin2=1e-4", "--columns", "payload,temp,t", "--orientation", "--base-unknown"]
     assert main(["simulate", ROBOT, "--poses", "12", "--out", "sim", *options]) == 0
@@ -239,6 +274,11 @@ BAD = [
     ["plan", ROBOT, "--poses", "2"],
     ["plan", ROBOT, "--min-step", "15"],
     ["plan", ROBOT, "--min-step", "300deg"],
+    ["plan", ROBOT, "--columns", "humidity"],
+    ["plan", ROBOT, "--separate", "slack"],
+    ["plan", ROBOT, "--separate", "backlash:J9"],
+    ["plan", ROBOT, "--columns", "payload", "--payload", "5"],
+    ["plan", ROBOT, "--columns", "temp", "--temperatures", "35,20"],
 ]
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from truing.report import _figures, _length, identification_report, plan_report, prediction_report
+from truing.report import figures_text, length_text, identification_report, plan_report, prediction_report
 from truing.results import Rows, correlations, statistics, to_json, without_nan
 
 
@@ -73,7 +73,7 @@ def test_the_first_screen_answers_how_accurate_it_was_and_is() -> None:
     result = some_result(rows)
     text = visible(identification_report(result, rows))
     errors = result["errors"]["test"]
-    was, now = (_length(errors[when]["mean_m"]).replace("\u202f", " ") for when in ("before", "after"))
+    was, now = (length_text(errors[when]["mean_m"]).replace("\u202f", " ") for when in ("before", "after"))
     assert f"arm was off by {was} on average. Calibrated, it is off by {now} ." in text
     assert "40 rows that the fit never saw" in text
     assert text.index("95 % of errors are below") < text.index("You can trust this calibration") < text.index("Where in the workspace")
@@ -194,7 +194,7 @@ def test_prediction_and_plan_reports() -> None:
     ("value", "text"), [(1.9234, "1.92"), (0.05234, "0.052"), (12.345, "12.3"), (1234.5, "1230"), (0.00012345, "0.00012"), (0.0, "0"), (0.0999, "0.10")]
 )
 def test_numbers_have_the_figures_that_mean_something(value: float, text: str) -> None:
-    assert _figures(value) == text
+    assert figures_text(value) == text
 
 
 def test_json_has_no_nan() -> None:

@@ -3,6 +3,7 @@
 /// Everything that truing offers to C++.
 #pragma once
 
+#include "truing/diagnose.hpp"
 #include "truing/effect.hpp"
 #include "truing/identify.hpp"
 #include "truing/measurement.hpp"

@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What is in no catalogue: a joint (or the base) that moves as a function of one or two recorded inputs.
+
+#include <cstdint>
+#include <vector>
+
+#include "candidates.hpp"
+#include "evidence.hpp"
+
+namespace truing::detail {
+
+/// One free function tried.
+struct FreeGain {
+  Explanation what;
+  std::vector<int> site_columns;
+  Evidence::Gain gain;
+};
+
+struct FreeScan {
+  std::vector<FreeGain> best;      ///< by score, best first
+  double p = 1.0;                  ///< chance of a score as high when the signs of whole poses are random
+  std::vector<double> joint_best;  ///< best score by joint, the base last
+};
+
+struct FreeScanOptions {
+  int flips = 99;
+  std::uint64_t seed = 0;
+  std::size_t most_values = 20000;  ///< measured values looked at: of more, whole folds are left out
+  double cost_scale = 1.0;
+};
+
+/// Scores free functions on what `state` leaves of the training rows. `deff`: rows that count as one.
+FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidence::State& state, const std::vector<InputColumn>& inputs,
+                   const Robot& robot, double deff, const FreeScanOptions& options);
+
+/// Mesh orders of every revolute joint scanned on what is left: the best order of each joint [per turn], if any wins.
+struct MeshGain {
+  std::size_t joint = 0;
+  double order = 0.0;
+  double score = 0.0;
+  int tried = 0;
+};
+std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, const Evidence::State& state,
+                                const std::vector<InputColumn>& inputs, const Robot& robot, double deff, std::size_t most_values = 20000);
+
+/// "a step at q4 = 0.41 rad", "linear in temp", … from points (input, value, standard error).
+std::string shape_of(const Curve& curve);
+
+}  // namespace truing::detail

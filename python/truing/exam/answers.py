@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""A diagnosis as a plain value, and what simpler methods would have said by the same candidates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import truing
+
+_FRAMES = frozenset({"base_frame", "tool_frame"})  # fitted anyway, never an answer
+_SURE = 4.0  # |z| below which fitting everything names nothing: of some 60 values, noise alone stays below it in 99.6 %
+BASELINES = ("gain", "bic", "z")
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect that was named, and those said to look the same."""
+
+    effect: str
+    joints: tuple[str, ...]
+    probability: float = 1.0
+    same: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+    def members(self) -> list[tuple[str, tuple[str, ...]]]:
+        return [(self.effect, self.joints), *self.same]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    joint: str
+    inputs: tuple[str, ...]
+    probability: float = 1.0
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was said of one set."""
+
+    verdict: str
+    effects: tuple[Named, ...] = ()
+    unknown: tuple[Unknown, ...] = ()
+    not_testable: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    shrink: tuple[float, float, float] | None = None  # promised: value, 90 % interval
+    realised: float | None = None  # on fresh poses
+    seconds: float = math.nan
+    sentence: str = ""
+    error: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def answer_of(diagnosis: Any) -> Answer:
+    """From a `Diagnosis`, or whatever has its attributes."""
+    share = diagnosis.shrink
+    return Answer(
+        verdict=str(diagnosis.verdict),
+        effects=_once(_named(found) for found in diagnosis.effects if _plain(found.effect) not in _FRAMES),
+        unknown=tuple(Unknown(str(u.joint), tuple(u.inputs), float(u.probability)) for u in diagnosis.unknown),
+        not_testable=tuple((_plain(item.effect), tuple(item.joints)) for item in diagnosis.not_testable),
+        shrink=(float(share.value), float(share.low), float(share.high)),
+        sentence=str(diagnosis.sentence),
+    )
+
+
+def _once(named: Iterable[Named]) -> tuple[Named, ...]:
+    """A drift that is even at first and wanders later is one drift; the first naming counts."""
+    first: dict[tuple[str, tuple[str, ...]], Named] = {}
+    for item in named:
+        first.setdefault((item.effect, item.joints), item)
+    return tuple(first.values())
+
+
+def _plain(effect: str) -> str:
+    """transmission_error@96 -> transmission_error."""
+    return str(effect).partition("@")[0]
+
+
+def _named(found: Any) -> Named:
+    same = tuple((_plain(other.effect), tuple(other.joints)) for other in found.confounded_with)
+    return Named(_plain(found.effect), tuple(found.joints), float(found.probability), same)
+
+
+def realised_shrink(diagnosis: Any, fresh: truing.Measurements) -> float | None:
+    """Fall of the rms error on fresh poses, from the robot with fitted frames to the diagnosed one. None: it cannot be evaluated."""
+    if not diagnosis.effects or diagnosis.unknown:
+        return None
+    try:
+        before, after = (_rms(robot, fresh) for robot in (diagnosis.robot_before, diagnosis.robot))
+    except (truing.InputError, ValueError):
+        return None
+    return 1.0 - after / before if before > 0.0 else None
+
+
+def _rms(robot: truing.Robot, data: truing.Measurements) -> float:
+    error = np.asarray(truing.residuals(robot, data).position)
+    return float(np.sqrt(np.nanmean(np.sum(error**2, axis=1))))
+
+
+# ---- Simpler methods -------------------------------------------------------------------------------------------------------
+
+
+def baseline(method: str, candidates: Iterable[Any], rows: int, ignored: frozenset[str] = frozenset()) -> Answer:
+    """gain: the largest improvement of the fit; bic: the same, columns paid for; z: the largest |z| when everything is fitted at once."""
+    score = {"gain": _gain, "bic": _bic, "z": _z}[method]
+    entered = [c for c in candidates if _plain(c.effect) not in _FRAMES | ignored]
+    rated = [(score(c, 3 * rows), c) for c in entered]
+    rated = [(value, c) for value, c in rated if math.isfinite(value) and value > 0.0]
+    if not rated:
+        return Answer("none")
+    best = max(rated, key=lambda item: item[0])[1]
+    return Answer("effects", (Named(_plain(best.effect), tuple(best.joints)),))
+
+
+def _gain(candidate: Any, numbers: int) -> float:
+    return float(candidate.gain)
+
+
+def _bic(candidate: Any, numbers: int) -> float:
+    return float(candidate.gain) - float(candidate.columns) * math.log(numbers)
+
+
+def _z(candidate: Any, numbers: int) -> float:
+    return float(candidate.largest_z) - _SURE
+
+
+def baselines(candidates: Sequence[Any], rows: int, geometry_underneath: bool) -> dict[str, Answer]:
+    """Where link values are wrong everywhere, they are taken for granted: else these methods would name nothing else."""
+    ignored = frozenset({"link_geometry", "joint_offset"}) if geometry_underneath else frozenset()
+    return {method: baseline(method, candidates, rows, ignored) for method in BASELINES}

@@ -1,0 +1,435 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""From answers and opened labels to the table of scores."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from truing.exam.answers import Answer, Named
+
+_Z90 = 1.6448536269514722
+_CONFIDENT = 0.9
+_GEOMETRY = frozenset({"link_geometry", "joint_offset"})  # what lies underneath, by either name
+_WHOLE = frozenset({"drift", "scale", "joint_coupling", "time_offset"})
+_BINS = 10
+MARKER = ("<!-- scores -->", "<!-- /scores -->")
+
+Label = dict[str, Any]
+Effect = tuple[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """One set: its label, opened, and the answers to it."""
+
+    id: str
+    label: Label
+    answer: Answer
+    others: dict[str, Answer] = field(default_factory=dict)  # of simpler methods
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table. A share with its counts, or a value."""
+
+    key: str
+    text: str
+    target: str = ""
+    hits: int = 0
+    n: int = 0
+    value: float = math.nan
+    met: bool | None = None
+    percent: bool = True
+
+    def interval(self) -> tuple[float, float]:
+        return wilson(self.hits, self.n) if self.percent and self.n else (math.nan, math.nan)
+
+
+def wilson(hits: int, n: int, z: float = _Z90) -> tuple[float, float]:
+    """90 % interval of a share (Wilson 1927)."""
+    if n == 0:
+        return 0.0, 1.0
+    p = hits / n
+    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+# ---- What is right -----------------------------------------------------------------------------------------------------------
+
+
+def _pairs(items: Iterable[dict[str, Any]]) -> list[Effect]:
+    return [(str(item["effect"]), tuple(item["joints"])) for item in items]
+
+
+def same(said: Effect, true: Effect) -> bool:
+    """The same effect at the same joints. Of geometry it is enough that the joint is among those named."""
+    if said[0] != true[0]:
+        return False
+    if true[0] in _WHOLE:
+        return True
+    if true[0] == "link_geometry":
+        return not true[1] or not said[1] or set(true[1]) <= set(said[1])
+    return set(said[1]) == set(true[1])
+
+
+def holds(named: Named, true: Effect) -> bool:
+    """Whether a named effect or one of its class is the true one."""
+    return any(same(member, true) for member in named.members())
+
+
+def right(named: Named, label: Label) -> bool:
+    """A true effect, or one that looks the same by the label."""
+    return any(holds(named, true) for true in _pairs(label["effects"]) + _pairs(label["acceptable"]))
+
+
+def called_right(named: Named, label: Label) -> bool:
+    """The kind of effect is right, wherever."""
+    said = {effect for effect, _ in named.members()}
+    return bool(said & {effect for effect, _ in _pairs(label["effects"]) + _pairs(label["acceptable"])})
+
+
+def counted(sheet: Sheet) -> list[Named]:
+    """Named effects, without geometry where geometry is wrong underneath: naming it is right there and says nothing."""
+    named = list(sheet.answer.effects)
+    if not sheet.label["geometry_underneath"]:
+        return named
+    others = [item for item in named if item.effect not in _GEOMETRY or right(item, sheet.label)]
+    return others or named
+
+
+def first_right(sheet: Sheet) -> bool:
+    named = counted(sheet)
+    return bool(named) and right(named[0], sheet.label)
+
+
+def exact_set(sheet: Sheet) -> bool:
+    named = counted(sheet)
+    return both_present(sheet) and len(named) == len(sheet.label["effects"]) and not sheet.answer.unknown and all(right(item, sheet.label) for item in named)
+
+
+def both_present(sheet: Sheet) -> bool:
+    """Every true effect is named, or one that looks like it, each by another name."""
+    named = counted(sheet)
+    truths = _pairs(sheet.label["effects"])
+    strict = [true for true in truths if any(holds(item, true) for item in named)]
+    if len(strict) == len(truths):
+        return True
+    rest = [item for item in named if not any(holds(item, true) for true in truths)]
+    stand_in = [item for item in rest if right(item, sheet.label)]
+    return len(strict) + len(stand_in) >= len(truths)
+
+
+def _not_testable(sheet: Sheet, true: Effect) -> bool:
+    return any(effect == true[0] and (not joints or not true[1] or set(true[1]) <= set(joints)) for effect, joints in sheet.answer.not_testable)
+
+
+def class_returned(sheet: Sheet) -> bool:
+    """Effect and twin are both there: named, listed as the same, or declared untestable, and one of them is named."""
+    true, rival = _pairs(sheet.label["effects"])[0], _pairs([sheet.label["rival"]])[0]
+    named = sheet.answer.effects
+    met = [any(_covers(item, one) for item in named) for one in (true, rival)]
+    told = [hit or _not_testable(sheet, one) for hit, one in zip(met, (true, rival), strict=True)]
+    return any(met) and all(told)
+
+
+def _covers(named: Named, one: Effect) -> bool:
+    """Three zones of stiffness are a linear spring with room to spare."""
+    zones = ("stiffness_zones", one[1]) if one[0] == "joint_compliance" else one
+    return holds(named, one) or holds(named, zones)
+
+
+def confidently_wrong(sheet: Sheet) -> bool:
+    """Some name is given as all but certain, and the true effect is not in its class."""
+    truths = _pairs(sheet.label["effects"])
+    return any(item.probability > _CONFIDENT and not _excused(sheet, item, truths) for item in sheet.answer.effects)
+
+
+def _excused(sheet: Sheet, item: Named, truths: Sequence[Effect]) -> bool:
+    if any(holds(item, true) or _not_testable(sheet, true) and right(item, sheet.label) for true in truths):
+        return True
+    inside = item.effect == "link_geometry" and any(true[0] == "joint_offset" and set(true[1]) <= set(item.joints) for true in truths)
+    underneath = sheet.label["geometry_underneath"] and item.effect in _GEOMETRY
+    if sheet.label["family"] == "confounded":  # the twin alone, for certain, is what must not be said
+        return inside or underneath
+    return inside or underneath or right(item, sheet.label)
+
+
+def false_alarm(sheet: Sheet) -> bool:
+    """Something is named though nothing is wrong. A wandering frame may be called drift."""
+    allowed = {"drift"} if sheet.label.get("kind") == "drift" else set()
+    return bool(sheet.answer.unknown) or any(item.effect not in allowed for item in sheet.answer.effects)
+
+
+def place_right(sheet: Sheet) -> bool:
+    """Joint and input of an unlisted effect. Of two inputs one is enough if nothing else is said."""
+    if not sheet.answer.unknown:
+        return False
+    found = sheet.answer.unknown[0]
+    wanted, said = set(sheet.label["unlisted_inputs"]), set(found.inputs)
+    inputs = wanted <= said if len(wanted) == 1 else bool(said) and said <= wanted
+    return found.joint == sheet.label["unlisted_joint"] and inputs
+
+
+# ---- The table ---------------------------------------------------------------------------------------------------------------
+
+
+Test = Callable[[Sheet], bool]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A row that is a share: of the sets chosen, those that pass."""
+
+    key: str
+    text: str
+    chosen: Test
+    passed: Test
+    at_least: float = math.nan
+    at_most: float = math.nan
+    good: bool = True  # whether a set that passes is a success (else a failure)
+
+
+def _family(*families: str) -> Test:
+    return lambda s: s.label["family"] in families
+
+
+def _single(sources: Sequence[str], low: float, high: float = math.inf) -> Test:
+    return lambda s: s.label["family"] == "single" and s.label["source"] in sources and low <= s.label["size_over_noise"] < high
+
+
+def _none(*kinds: str) -> Test:
+    return lambda s: s.label["family"] == "none" and s.label["kind"] in kinds
+
+
+def _many(count: int) -> Test:
+    return lambda s: s.label["family"] == "double" and len(s.label["effects"]) == count
+
+
+def _unlisted(s: Sheet) -> bool:
+    return bool(s.label["family"] == "unlisted" and s.label["size_over_noise"] >= 3.0)
+
+
+def _placed(s: Sheet) -> bool:
+    return s.label["family"] in ("single", "double") and bool(counted(s)) and _called(s)
+
+
+def _known_background(s: Sheet) -> bool:
+    """Listed effects on robots that hide nothing else; what real recordings hide nobody knows."""
+    return s.label["family"] in ("single", "double") and s.label["source"] != "spike"
+
+
+def _called(s: Sheet) -> bool:
+    return called_right(counted(s)[0], s.label) and counted(s)[0].effect not in _WHOLE
+
+
+LINES = (
+    Line("first_physics", "first-named effect right, ≥ 1 × noise, physics", _single(["physics"], 1.0), first_right, at_least=0.97),
+    Line("first_departures", "the same on departures and spike-in", _single(["departures", "spike"], 1.0), first_right, at_least=0.90),
+    Line("joint", "joint right given the effect", _placed, lambda s: right(counted(s)[0], s.label), at_least=0.97),
+    Line("two_exact", "two effects: exact set", _many(2), exact_set, at_least=0.85),
+    Line("two_present", "two effects: both present", _many(2), both_present, at_least=0.95),
+    Line("class", "confounded by design: class returned", _family("confounded"), class_returned, at_least=0.90),
+    Line("class_wrong", "confounded by design: confident single wrong name", _family("confounded"), confidently_wrong, at_most=0.02, good=False),
+    Line("alarm_white", "false alarms: white noise", _none("white"), false_alarm, at_most=0.02, good=False),
+    Line("alarm_other", "false alarms: drift, heavy tails, outliers", _none("drift", "heavy", "outliers"), false_alarm, at_most=0.05, good=False),
+    Line("unlisted", "unlisted effect recognised, ≥ 3 × noise", _unlisted, lambda s: bool(s.answer.unknown), at_least=0.90),
+    Line("unknown_of_listed", "“unknown” said of a listed effect", _known_background, lambda s: bool(s.answer.unknown), at_most=0.05, good=False),
+    Line("unlisted_place", "joint and input of the unlisted effect right", lambda s: _unlisted(s) and bool(s.answer.unknown), place_right, at_least=0.80),
+)
+# Told as well, without a target.
+MORE = (
+    Line("first_small", "first-named effect right, 0.5 to 1 × noise", _single(["physics", "departures", "spike"], 0.0, 1.0), first_right),
+    Line("first_spike", "first-named effect right, ≥ 1 × noise, spike-in alone", _single(["spike"], 1.0), first_right),
+    Line("spike_unknown", "“unknown” said beside a spike: the recordings' own secrets", lambda s: s.label["source"] == "spike", lambda s: bool(s.answer.unknown),
+         good=False),
+    Line("first_geometry", "first-named right over wrong geometry, ≥ 1 × noise",
+         lambda s: _single(["physics", "departures"], 1.0)(s) and bool(s.label["geometry_underneath"]), first_right),
+    Line("three_exact", "three effects: exact set", _many(3), exact_set),
+    Line("three_present", "three effects: all present", _many(3), both_present),
+    Line("wrong_law", "right effect named first though its law is wrong", _family("wrong_law"), first_right),
+    Line("companion", "a second effect named beside one of wrong law", _family("wrong_law"), lambda s: len(counted(s)) > 1, good=False),
+    Line("unlisted_wrong", "unlisted effect: a listed one named for certain", _family("unlisted"), confidently_wrong, good=False),
+    Line("missing_wrong", "column withheld: confident wrong name", _family("missing"), confidently_wrong, good=False),
+    Line("missing_told", "column withheld: named, or called not testable", _family("missing"),
+         lambda s: first_right(s) or any(_not_testable(s, true) for true in _pairs(s.label["effects"]))),
+    Line("twenty", "twenty poses: first-named right", _family("twenty"), first_right),
+    Line("twenty_wrong", "twenty poses: confident wrong name", _family("twenty"), confidently_wrong, good=False),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Scores:
+    """The whole table, and who failed."""
+
+    rows: list[Row]
+    others: dict[str, list[Row]]  # of simpler methods, the lines that make sense for them
+    failures: list[dict[str, Any]]
+    sets: int
+    which: str = ""
+    skipped: dict[str, int] = field(default_factory=dict)  # why: number of sets
+
+    def row(self, key: str) -> Row:
+        return next(row for row in self.rows if row.key == key)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "format": "truing-exam/1", "which": self.which, "sets": self.sets, "skipped": self.skipped,
+            "rows": [_row_dict(row) for row in self.rows],
+            "others": {name: [_row_dict(row) for row in rows] for name, rows in self.others.items()},
+            "failures": self.failures,
+        }  # fmt: skip
+
+
+def _row_dict(row: Row) -> dict[str, Any]:
+    low, high = row.interval()
+    told = {"key": row.key, "text": row.text, "target": row.target, "n": row.n, "met": row.met, "value": _none_if_nan(row.value)}
+    return {**told, "hits": row.hits, "low": _none_if_nan(low), "high": _none_if_nan(high)} if row.percent else told
+
+
+def _none_if_nan(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def score(sheets: Sequence[Sheet], which: str = "", skipped: dict[str, int] | None = None) -> Scores:
+    """Every row of the table, from all sheets."""
+    rows = [_share(line, sheets) for line in LINES] + _values(sheets) + [_share(line, sheets) for line in MORE]
+    names = sorted({name for sheet in sheets for name in sheet.others})
+    single = ("first_physics", "first_departures", "joint", "alarm_white", "alarm_other", "first_small", "first_geometry", "wrong_law", "twenty")
+    others = {}
+    for name in names:
+        theirs = [Sheet(s.id, s.label, s.others[name]) for s in sheets if name in s.others]
+        others[name] = [_share(line, theirs) for line in (*LINES, *MORE) if line.key in single]
+    return Scores(rows, others, _failures(sheets), len(sheets), which, dict(skipped or {}))
+
+
+def _share(line: Line, sheets: Sequence[Sheet]) -> Row:
+    chosen = [sheet for sheet in sheets if line.chosen(sheet)]
+    hits = sum(line.passed(sheet) for sheet in chosen)
+    value = hits / len(chosen) if chosen else math.nan
+    target, met = "", None
+    if math.isfinite(line.at_least):
+        target, met = f"≥ {100 * line.at_least:.0f} %", value >= line.at_least
+    elif math.isfinite(line.at_most):
+        target, met = f"≤ {100 * line.at_most:.0f} %", value <= line.at_most
+    return Row(line.key, line.text, target, hits, len(chosen), value, met if chosen else None)
+
+
+def _values(sheets: Sequence[Sheet]) -> list[Row]:
+    # Fresh poses are measured by a quiet instrument: heavy tails and gross errors of the set would be compared with none.
+    told = [s for s in sheets if s.label["family"] != "unlisted" and s.label["noise"] in ("white", "real")]
+    pairs = [(s.answer.shrink, s.answer.realised) for s in told if s.answer.shrink and s.answer.realised is not None]
+    wrong = np.array([abs(shrink[0] - real) for shrink, real in pairs if shrink and real is not None])
+    covered = sum(bool(shrink and real is not None and shrink[1] <= real <= shrink[2]) for shrink, real in pairs)
+    median = 100.0 * float(np.median(wrong)) if len(wrong) else math.nan
+    share = covered / len(pairs) if pairs else math.nan
+    error, n = calibration_error(sheets)
+    seconds = np.array([s.answer.seconds for s in sheets if math.isfinite(s.answer.seconds)])
+    typical, slow = (float(np.median(seconds)), float(np.quantile(seconds, 0.95))) if len(seconds) else (math.nan, math.nan)
+    return [
+        Row("shrink", "predicted shrink against realised: median difference [points]", "≤ 5", n=len(pairs), value=median, met=_met(median <= 5.0, pairs),
+            percent=False),
+        Row("shrink_covered", "predicted shrink: 90 % interval covers", "85-95 %", covered, len(pairs), share, _met(0.85 <= share <= 0.95, pairs)),
+        Row("calibration", "stated confidence against frequency (ECE)", "≤ 0.05", n=n, value=error, met=_met(error <= 0.05, range(n)), percent=False),
+        Row("seconds", "seconds per set, median", "≤ 1", n=len(seconds), value=typical, met=_met(typical <= 1.0, seconds), percent=False),
+        Row("seconds_p95", "seconds per set, 95th percentile", "", n=len(seconds), value=slow, percent=False),
+    ]  # fmt: skip
+
+
+def _met(passed: bool, of: Sequence[Any] | Any) -> bool | None:
+    return bool(passed) if len(of) else None
+
+
+def calibration_error(sheets: Sequence[Sheet]) -> tuple[float, int]:
+    """Expected calibration error of all named effects, in ten bins, and their number. Not of recordings: what else is in these nobody knows."""
+    said, true = [], []
+    for sheet in sheets:
+        if sheet.label["source"] == "spike":
+            continue
+        for item in sheet.answer.effects:
+            said.append(item.probability)
+            underneath = sheet.label["geometry_underneath"] and item.effect in _GEOMETRY
+            drifts = sheet.label.get("kind") == "drift" and item.effect == "drift"
+            true.append(float(underneath or drifts or right(item, sheet.label)))
+    if not said:
+        return math.nan, 0
+    p, hit = np.clip(np.array(said), 0.0, 1.0), np.array(true)
+    bins = np.minimum((p * _BINS).astype(int), _BINS - 1)
+    error = sum(float(np.sum(bins == b)) / len(p) * abs(float(p[bins == b].mean()) - float(hit[bins == b].mean())) for b in range(_BINS) if (bins == b).any())
+    return error, len(p)
+
+
+def _failures(sheets: Sequence[Sheet]) -> list[dict[str, Any]]:
+    """Every set that failed a row, with label and answer."""
+    found = []
+    for sheet in sheets:
+        failed = [line.key for line in (*LINES, *MORE) if line.chosen(sheet) and line.passed(sheet) != line.good]
+        if failed or sheet.answer.error:
+            found.append({"id": sheet.id, "failed": failed, "label": sheet.label, "answer": sheet.answer.to_dict()})
+    return found
+
+
+# ---- Printing ----------------------------------------------------------------------------------------------------------------
+
+
+def _cell(row: Row) -> str:
+    if row.n == 0 or not math.isfinite(row.value):
+        return "–"
+    if not row.percent:
+        return f"{row.value:.3g}"
+    low, high = row.interval()
+    return f"{100 * row.value:.1f} % ({100 * low:.0f}–{100 * high:.0f})"
+
+
+_TITLES = {"gain": "largest gain", "bic": "BIC", "z": "fit all, largest z"}
+
+
+def markdown(scores: Scores) -> str:
+    """The table: every score with its number of sets, 90 % interval, target, and the simpler methods beside it."""
+    names = list(scores.others)
+    head = ["score", "target", "sets", "truing", ""] + [_TITLES.get(name, name) for name in names]
+    lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
+    theirs = {name: {row.key: row for row in rows} for name, rows in scores.others.items()}
+    for row in scores.rows:
+        mark = {True: "met", False: "**missed**", None: ""}[row.met]
+        cells = [row.text, row.target, str(row.n), _cell(row), mark] + [_cell(theirs[n][row.key]) if row.key in theirs[n] else "" for n in names]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def table(scores: Scores) -> list[dict[str, Any]]:
+    """The same as rows of text, `passed` where there is a target."""
+    theirs = {name: {row.key: row for row in rows} for name, rows in scores.others.items()}
+    rows = []
+    for row in scores.rows:
+        cells: dict[str, Any] = {"score": row.text, "target": row.target, "sets": row.n, "truing": _cell(row), "passed": row.met}
+        cells.update({_TITLES.get(name, name): _cell(found[row.key]) if row.key in found else "" for name, found in theirs.items()})
+        rows.append(cells)
+    return rows
+
+
+def plain(scores: Scores) -> str:
+    """The same for a terminal."""
+    width = max(len(row.text) for row in scores.rows)
+    lines = [f"{scores.which}: {scores.sets} sets"] + [f"left out: {count} sets, {why}" for why, count in scores.skipped.items()]
+    for row in scores.rows:
+        mark = {True: "met", False: "MISSED", None: ""}[row.met]
+        lines.append(f"{row.text:{width}}  {row.target:8} {row.n:5}  {_cell(row):22} {mark}")
+    return "\n".join(lines)
+
+
+def write_markdown(path: Path | str, scores: Scores) -> None:
+    """Puts the table between the markers of a page, in place of what stood there."""
+    page = Path(path)
+    text = page.read_text(encoding="utf-8")
+    start, end = (text.find(marker) for marker in MARKER)
+    if start < 0 or end < start:
+        raise ValueError(f"{page} has no place for scores: expected {MARKER[0]} and {MARKER[1]}")
+    page.write_text(text[: start + len(MARKER[0])] + "\n" + markdown(scores) + text[end:], encoding="utf-8")

@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Labels in sealed envelopes: the seal is given away before the answer, the envelope is opened after it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import truing
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """A label, and the salt that keeps it from being guessed by its seal."""
+
+    text: str
+    salt: str
+
+    @property
+    def seal(self) -> str:
+        return hashlib.sha256((self.salt + self.text).encode()).hexdigest()
+
+
+class BrokenSealError(Exception):
+    """A label is not the one that was sealed."""
+
+
+def sealed(label: dict[str, Any]) -> Envelope:
+    return Envelope(json.dumps(label, sort_keys=True), secrets.token_hex(16))
+
+
+def opened(envelope: Envelope, seal: str) -> dict[str, Any]:
+    """The label, if it is the one of `seal`; else BrokenSealError."""
+    if envelope.seal != seal:
+        raise BrokenSealError("the label is not the one that was sealed before the answer")
+    label: dict[str, Any] = json.loads(envelope.text)
+    return label
+
+
+def fingerprint(data: truing.Measurements) -> str:
+    """Of joints and positions: says which data were handed over."""
+    digest = hashlib.sha256(np.ascontiguousarray(data.joints).tobytes())
+    digest.update(np.ascontiguousarray(data.positions).tobytes())
+    return digest.hexdigest()
