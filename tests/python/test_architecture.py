@@ -30,7 +30,8 @@ CPP_LAYERS = [
     ("estimation", ["selection.hpp", "selection.cpp", "solvers.hpp", "levenberg_marquardt.cpp", "ceres_solver.cpp"]),
     ("diagnosis", ["linearise.hpp", "linearise.cpp", "sanity.hpp", "sanity.cpp", "candidates.hpp", "candidates.cpp", "free_search.hpp", "free_search.cpp",
                    "where.hpp", "where.cpp", "next_poses.hpp", "next_poses.cpp"]),
-    ("tasks", ["truing/plan.hpp", "identify.cpp", "plan_poses.hpp", "plan_effects.cpp", "plan.cpp", "diagnose.cpp"]),
+    ("tasks", ["truing/plan.hpp", "identify.cpp", "plan_poses.hpp", "plan_effects.cpp", "plan.cpp", "diagnosis.hpp", "weigh.cpp", "decide.cpp", "sureness.cpp",
+               "refit.cpp", "describe.cpp", "diagnose.cpp"]),
     ("everything", ["truing/truing.hpp"]),
 ]  # fmt: skip
 CPP_RANK = {file: rank for rank, (_, files) in enumerate(CPP_LAYERS) for file in files}
@@ -41,7 +42,7 @@ CPP_ONLY_IN = {
     "urdf_": {"urdf.cpp"},
     "console_bridge/": {"urdf.cpp"},
     "tinyxml2": {"urdf.cpp"},
-    "thread": {"evaluate.cpp", "diagnose.cpp"},
+    "thread": {"evaluate.cpp", "weigh.cpp"},
     "iostream": set[str](),  # the library prints nothing
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
