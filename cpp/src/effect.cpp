@@ -433,8 +433,8 @@ std::vector<Term> thermal(const Robot& robot, std::size_t joint, const Measureme
   std::vector<std::pair<const char*, double>> lengths = {{"a", at.a}, {"d", at.d}};
   if (robot.convention == Convention::urdf)
     lengths = {{"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
-  constexpr double kNoLength = 1e-3;  // [m]: an offset found where the drawing has none does not make it a beam
-  const auto is_zero = [](const auto& length) { return std::abs(length.second) < kNoLength; };
+  // [m]: an offset found where the drawing has none does not make it a beam.
+  const auto is_zero = [](const auto& length) { return std::abs(length.second) < 1e-3; };
   lengths.erase(std::remove_if(lengths.begin(), lengths.end(), is_zero), lengths.end());
   if (lengths.empty()) unsuited("thermal", at, "needs a link with a length; this one has none");
   const Warmth warm = warmth("thermal", robot, at, data);
