@@ -54,7 +54,7 @@ static double solution_of(const Work& work, const Evidence::State& state, const 
 }
 
 /// The chosen groups fitted without linearisation on the training rows.
-Refit refit(const Work& work, const Robot& robot, const Evidence::State& state, const std::vector<int>& groups) {
+static Refit refit_with(const Work& work, const Robot& robot, const Evidence::State& state, const std::vector<int>& groups, bool hold_moments) {
   Refit out;
   Robot start = robot;
   IdentifyOptions options;
@@ -70,7 +70,7 @@ Refit refit(const Work& work, const Robot& robot, const Evidence::State& state, 
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     options.free.insert(options.free.end(), e.model_free.begin(), e.model_free.end());
     const bool many = std::any_of(e.requests.begin(), e.requests.end(), [](const EffectRequest& request) { return request.effect == "gravity_moment"; });
-    if (many) {
+    if (many && hold_moments) {
       // First moments of unknown weights are many and hardly told apart: they stay as the search found them, under its prior.
       for (const EffectRequest& request : e.requests) {
         AppliedEffect applied{request.effect, request.joints, {}};
@@ -108,6 +108,13 @@ Refit refit(const Work& work, const Robot& robot, const Evidence::State& state, 
   Measurements data = work.data;
   data.set = work.frames.set;
   out.found = identify(start, data, options);
+  return out;
+}
+
+Refit refit(const Work& work, const Robot& robot, const Evidence::State& state, const std::vector<int>& groups) {
+  Refit out = refit_with(work, robot, state, groups, true);
+  // Moments that lean on geometry which the fit holds elsewhere do not fit there: then they are fitted with it.
+  if (out.found.train.after.median > work.frames.train.after.median) out = refit_with(work, robot, state, groups, false);
   return out;
 }
 
