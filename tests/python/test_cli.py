@@ -315,10 +315,10 @@ def test_warnings_about_the_input_go_to_stderr_and_into_the_result(capsys: pytes
 
 def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
     program = "import sys; from truing.cli import main; print('ready', flush=True); sys.exit(main(sys.argv[1:]))"
-    arguments = [sys.executable, "-c", program, "plan", str(example("ur10")), "--poses", "20000", "--out", "planned"]
+    arguments = [sys.executable, "-c", program, "plan", str(example("ur10")), "--poses", "40000", "--out", "planned"]
     with subprocess.Popen(arguments, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
         assert process.stdout is not None and process.stdout.readline() == "ready\n"
-        time.sleep(1.0)
+        time.sleep(3.0)  # at work, past its imports
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=30)
     assert process.returncode == 130
