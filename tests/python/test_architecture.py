@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # From the ground up. A file may include files of its own layer and of those above it in this list.
 CPP_LAYERS = [
     ("kernel", ["kernel/kernel.hpp", "kernel/kernel.cpp", "kernel/dispatch.cpp"]),
-    ("tools", ["truing/version.hpp", "text.hpp", "random.hpp", "registration.hpp", "registration.cpp", "observability.hpp", "observability.cpp",
+    ("tools", ["truing/version.hpp", "text.hpp", "random.hpp", "frame.hpp", "dual_quaternion.hpp", "registration.hpp", "registration.cpp", "observability.hpp", "observability.cpp",
                "evidence.hpp", "evidence.cpp"]),
     ("robot", ["truing/robot.hpp", "robot.cpp", "motion.hpp", "truing/urdf.hpp", "urdf.cpp"]),
     ("measurement", ["truing/measurement.hpp", "measurement.cpp"]),
@@ -32,13 +32,16 @@ CPP_LAYERS = [
                    "where.hpp", "where.cpp", "next_poses.hpp", "next_poses.cpp"]),
     ("tasks", ["truing/plan.hpp", "identify.cpp", "plan_poses.hpp", "plan_effects.cpp", "plan.cpp", "diagnosis.hpp", "weigh.cpp", "decide.cpp", "sureness.cpp",
                "refit.cpp", "describe.cpp", "diagnose.cpp"]),
+    ("hand-eye", ["truing/handeye.hpp", "handeye_closed_form.hpp", "handeye_closed_form.cpp", "handeye_consensus.hpp", "handeye_consensus.cpp",
+                  "handeye_readings.hpp", "handeye_readings.cpp", "handeye_refine.hpp", "handeye_refine.cpp", "handeye_images.hpp", "handeye_images.cpp",
+                  "handeye_errors.hpp", "handeye_errors.cpp", "handeye.cpp", "handeye_plan.cpp", "handeye_clock.cpp", "handeye_kinematics.cpp"]),
     ("everything", ["truing/truing.hpp"]),
 ]  # fmt: skip
 CPP_RANK = {file: rank for rank, (_, files) in enumerate(CPP_LAYERS) for file in files}
 
 # Which files may include what comes from elsewhere.
 CPP_ONLY_IN = {
-    "ceres/": {"ceres_solver.cpp"},
+    "ceres/": {"ceres_solver.cpp", "handeye_images.cpp"},
     "urdf_": {"urdf.cpp"},
     "console_bridge/": {"urdf.cpp"},
     "tinyxml2": {"urdf.cpp"},

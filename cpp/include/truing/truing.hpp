@@ -5,6 +5,7 @@
 
 #include "truing/diagnose.hpp"
 #include "truing/effect.hpp"
+#include "truing/handeye.hpp"
 #include "truing/identify.hpp"
 #include "truing/measurement.hpp"
 #include "truing/plan.hpp"
