@@ -35,6 +35,43 @@ static Gram sum_flexible(const Design& design, const std::vector<int>& columns) 
   return sum.finish();
 }
 
+/// Values of one row and kind, as they follow each other in the design.
+struct Block {
+  Eigen::Index first = 0, count = 0;
+  int kind = 0;
+  bool training = false;
+};
+
+static std::vector<Block> blocks_of(const Design& design) {
+  std::vector<Block> out;
+  std::int32_t last = -1;
+  for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const int kind = kind_of(design.component[at]);
+    if (out.empty() || design.row[at] != last || out.back().kind != kind) out.push_back({i, 0, kind, design.fold[at] < design.folds});
+    ++out.back().count;
+    last = design.row[at];
+  }
+  return out;
+}
+
+/// Noise of one value, by kind, from the median length of what a row leaves; 0: no row has this kind. `used`: effective parameters.
+static std::array<double, 3> sigma_of(const std::vector<Block>& blocks, const Eigen::VectorXd& residual, double used) {
+  std::vector<double> lengths[3];
+  double training = 0.0;
+  for (const Block& block : blocks) {
+    if (!block.training) continue;
+    lengths[block.kind].push_back(residual.segment(block.first, block.count).norm());
+    training += static_cast<double>(block.count);
+  }
+  const double inflate = std::sqrt(training / std::max(1.0, training - used));
+  std::array<double, 3> sigma{};
+  for (std::size_t kind = 0; kind < 3; ++kind) {
+    if (!lengths[kind].empty()) sigma[kind] = std::max(median_of(lengths[kind]) / kChiMedian[kind == 2 ? 1 : 3] * inflate, 1e-12);
+  }
+  return sigma;
+}
+
 /// Unit-weight rows: each kind of value by its own noise, what stands far out by less (Huber 1964; the power makes gross
 /// outliers count for nothing). The noise is what the flexible model leaves: everything at once under a ridge prior, so
 /// that an effect is not taken for noise.
@@ -62,8 +99,8 @@ void weigh(Work* work) {
       in[static_cast<std::size_t>(k)] = true;
     }
   }
-  double sigma[3] = {0.0, 0.0, 0.0};
-  Eigen::VectorXd robust = Eigen::VectorXd::Ones(n);
+  const std::vector<Block> blocks = blocks_of(design);
+  std::array<double, 3> sigma{};
   Eigen::VectorXd residual = design.y;
   double used = 0.0;
   const auto p = static_cast<Eigen::Index>(flexible.size());
@@ -71,49 +108,30 @@ void weigh(Work* work) {
   Eigen::VectorXd xy(p);
   double summed_at = 0.0;  // noise that xx and xy were weighted with; 0: weights differ from row to row
   for (int round = 0; round < 4; ++round) {
-    // Noise of each kind from the median length, and the rows that stand out.
-    std::vector<double> lengths[3];
-    std::vector<std::pair<Eigen::Index, Eigen::Index>> blocks;  // values of one row and kind
-    double training = 0.0;
-    for (Eigen::Index i = 0; i < n;) {
-      Eigen::Index j = i;
-      const int kind = kind_of(design.component[static_cast<std::size_t>(i)]);
-      while (j < n && design.row[static_cast<std::size_t>(j)] == design.row[static_cast<std::size_t>(i)] && kind_of(design.component[static_cast<std::size_t>(j)]) == kind) ++j;
-      blocks.emplace_back(i, j - i);
-      if (design.fold[static_cast<std::size_t>(i)] < design.folds) {
-        lengths[kind].push_back((own.segment(i, j - i).cwiseProduct(residual.segment(i, j - i))).norm());
-        training += static_cast<double>(j - i);
-      }
-      i = j;
-    }
-    const double inflate = std::sqrt(training / std::max(1.0, training - used));
-    for (int kind = 0; kind < 3; ++kind) {
-      if (!lengths[kind].empty()) sigma[kind] = std::max(median_of(lengths[kind]) / kChiMedian[kind == 2 ? 1 : 3] * inflate, 1e-12);
-    }
+    // Noise of each kind, and the rows that stand out.
+    sigma = sigma_of(blocks, own.cwiseProduct(residual), used);
     std::size_t far = 0, very_far = 0;
     std::vector<double> distance2(blocks.size());
     for (std::size_t b = 0; b < blocks.size(); ++b) {
-      const auto [first, count] = blocks[b];
-      const int kind = kind_of(design.component[static_cast<std::size_t>(first)]);
-      distance2[b] = own.segment(first, count).cwiseProduct(residual.segment(first, count)).squaredNorm() / (sigma[kind] * sigma[kind]);
+      const auto [first, count, kind, training] = blocks[b];
+      const double noise = sigma[static_cast<std::size_t>(kind)];
+      distance2[b] = own.segment(first, count).cwiseProduct(residual.segment(first, count)).squaredNorm() / (noise * noise);
       const double bound = count == 1 ? 9.0 : 14.2;  // one in 370 of normal noise
       far += distance2[b] > bound ? 1 : 0;
       very_far += distance2[b] > 3.0 * bound ? 1 : 0;
     }
     const bool tails = round > 0 && (very_far > 0 || static_cast<double>(far) > 4.0 + 0.01 * static_cast<double>(blocks.size()));
     for (std::size_t b = 0; b < blocks.size(); ++b) {
-      const auto [first, count] = blocks[b];
-      const int kind = kind_of(design.component[static_cast<std::size_t>(first)]);
+      const auto [first, count, kind, training] = blocks[b];
       const double bound = count == 1 ? 5.0 : 9.0;
       const double root = tails && distance2[b] > bound ? std::pow(bound / distance2[b], 0.75) : 1.0;
       if (round == 3 && root < 0.2) work->outliers.push_back(design.row[static_cast<std::size_t>(first)]);
-      robust.segment(first, count).setConstant(root);
-      design.weight.segment(first, count) = own.segment(first, count) * root / sigma[kind];
+      design.weight.segment(first, count) = own.segment(first, count) * root / sigma[static_cast<std::size_t>(kind)];
     }
     if (round == 3) break;
     // The flexible fit, at noise variance one. As long as all weights are equal, the sums only change their scale.
-    const int kinds = (lengths[0].empty() ? 0 : 1) + (lengths[1].empty() ? 0 : 1) + (lengths[2].empty() ? 0 : 1);
-    const double uniform = kinds == 1 && !tails ? std::max({sigma[0], sigma[1], sigma[2]}) : 0.0;
+    const auto kinds = std::count_if(sigma.begin(), sigma.end(), [](double noise) { return noise > 0.0; });
+    const double uniform = kinds == 1 && !tails ? *std::max_element(sigma.begin(), sigma.end()) : 0.0;
     if (uniform > 0.0 && summed_at > 0.0) {
       const double times = std::pow(summed_at / uniform, 2.0);
       xx *= times;
@@ -138,7 +156,9 @@ void weigh(Work* work) {
       residual[i] = design.y[i] - fitted;
     }
   }
-  work->position_sigma = sigma[0] > 0.0 ? sigma[0] : sigma[2];
+  // In metres, whatever the rows say of themselves: `sigma` has no unit where they bring a sigma of their own.
+  const std::array<double, 3> in_metres = sigma_of(blocks, residual, used);
+  work->position_sigma = in_metres[0] > 0.0 ? in_metres[0] : in_metres[2];
 
   // Rows of one pose that err together count for less than their number.
   double together = 0.0, pairs = 0.0, alone = 0.0, values = 0.0;

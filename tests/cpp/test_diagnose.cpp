@@ -626,6 +626,27 @@ TEST_CASE("diagnose takes the noise from repeats where there are any") {
   CHECK(d.noise_floor == doctest::Approx(std::sqrt(3.0) * kNoise).epsilon(0.15));
 }
 
+TEST_CASE("diagnose says the noise in metres, whatever the rows say of theirs") {
+  Robot truth = light_arm();
+  truth.effects = {backlash("J3", 8e-4)};
+  auto table = measured(truth, 120, 945);
+  const Diagnosis plain = diagnose(light_arm(), table->data);
+  const auto same = [&](const Diagnosis& d) {
+    INFO(names(d));
+    CHECK(d.noise_floor == doctest::Approx(plain.noise_floor).epsilon(0.03));
+    CHECK(d.closable == doctest::Approx(plain.closable).epsilon(0.03));
+    REQUIRE(!d.detectable.empty());
+    REQUIRE(d.detectable.size() == plain.detectable.size());
+    CHECK(d.detectable[0].size == doctest::Approx(plain.detectable[0].size).epsilon(0.03));
+    CHECK(d.detectable[0].size_at_tip == doctest::Approx(plain.detectable[0].size_at_tip).epsilon(0.03));
+  };
+  table->data.weight = table->add(std::vector<double>(120, 4.0));
+  same(diagnose(light_arm(), table->data));
+  table->data.weight = {};
+  table->data.position_sigma = table->add(std::vector<double>(120, 2e-5));
+  same(diagnose(light_arm(), table->data));
+}
+
 TEST_CASE("diagnose is not misled by gross outliers or a wandering frame") {
   auto table = measured(light_arm(), 120, 950);
   std::mt19937_64 random(951);
