@@ -34,7 +34,8 @@ def named(found: truing.Diagnosis) -> str:
 
 
 def unknown(found: truing.Diagnosis) -> str:
-    said = [f"{one.joint} over {' and '.join(one.inputs)}" + (f": {one.looks_like}" if one.looks_like and len(one.inputs) == 1 else "") for one in found.unknown]
+    said = [f"{one.joint} over {' and '.join(one.inputs)}" + (f": {one.looks_like}" if one.looks_like and len(one.inputs) == 1 else "")
+            if one.inputs else "more than repeats show" for one in found.unknown]  # fmt: skip
     return "; ".join(said[:MOST]) or "nothing"
 
 

@@ -268,6 +268,15 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   return out;
 }
 
+UnknownEffect describe_lack_of_fit(const Diagnosis& d, double excess) {
+  UnknownEffect out;
+  out.held_out_before = out.held_out_after = d.gap;
+  const double nats = 0.5 * excess * excess;
+  out.probability = 0.5 + 0.49 * std::min(1.0, nats / 30.0);
+  out.looks_like = "no function of what was recorded, at one joint or the base";
+  return out;
+}
+
 std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidence, const std::vector<Evidence::Gain>& first) {
   const auto& groups = work.design.candidates.groups;
   const auto& named = work.design.candidates.named;
@@ -391,7 +400,9 @@ std::string sentence_of(const Diagnosis& d) {
   } else {
     text = "There is a gap of " + gap + " that no effect of the catalogue explains.";
   }
-  if (!d.unknown.empty()) {
+  if (!d.unknown.empty() && d.unknown[0].inputs.empty()) {
+    text += " Repeats show a noise of " + millimetres(d.noise_floor) + ": something is there that no function of what was recorded describes.";
+  } else if (!d.unknown.empty()) {
     const UnknownEffect& u = d.unknown[0];
     text += " Unknown: " + (u.joint.empty() ? std::string("something") : u.joint) + " moves as a function of " + (u.inputs.size() == 2 ? u.inputs[0] + " and " + u.inputs[1] : u.inputs[0] == "order" ? std::string("the order of the rows") : listed(u.inputs)) +
             (u.looks_like.empty() || u.inputs.size() == 2 || u.joint == "base" ? "" : " (" + u.looks_like + ")") + ".";

@@ -36,6 +36,7 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   using namespace detail;
   using Kind = Explanation::Kind;
   constexpr double kCorrectionShare = 0.05;  // of the gap, from which on a law's correction is something unknown
+  constexpr double kLackOfFit = 4.0;         // standard errors beyond repeats, from which on what is left is no noise
   std::string error;
   if (!options.is_valid(&error)) throw std::invalid_argument("diagnose: " + error);
   validate(robot);
@@ -207,6 +208,11 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
       result.unknown[k].share += result.unknown[m].share;
       result.unknown.erase(result.unknown.begin() + static_cast<std::ptrdiff_t>(m));
     }
+  }
+  // A gap that nothing so far has a shape for, as far as repeats can tell it from noise.
+  if (result.effects.empty() && result.unknown.empty() && result.noise_from_repeats) {
+    const double excess = lack_of_fit(data, result.error_before, result.set, repeats, freedom);
+    if (excess > kLackOfFit) result.unknown.push_back(describe_lack_of_fit(result, excess));
   }
   // Shares that add up: between alone and last, scaled to what all together close.
   const double closed = std::max(0.0, 1.0 - std::pow(result.gap.rms > 0.0 ? result.after_unknown.rms / result.gap.rms : 1.0, 2.0));

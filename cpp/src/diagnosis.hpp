@@ -123,6 +123,7 @@ Refit refit(const Work& work, const Robot& robot, const Evidence::State& state, 
 std::vector<double> lengths_of(const Residuals& residuals, std::size_t rows);
 std::vector<double> held_out(const std::vector<double>& lengths, const std::vector<std::int8_t>& set);
 double repeat_sigma(const Measurements& data, double* freedom);
+double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set, double repeats, double freedom);
 std::vector<std::int32_t> thinned_rows(const Measurements& data, const std::vector<std::int32_t>& cluster, std::size_t most);
 Measurements subset_of(const Measurements& data, const std::vector<std::int32_t>& rows);
 std::vector<Effect> mapped(const std::vector<Effect>& own, const Measurements& whole, const std::vector<std::int32_t>& rows);
@@ -132,6 +133,8 @@ std::vector<Effect> mapped(const std::vector<Effect>& own, const Measurements& w
 FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at, const Sureness& sure, double probability,
                      const Identification& refitted, const Resampled& resampled);
 UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at, const Resampled& resampled);
+/// A gap beyond the noise of repeats that nothing describes; `excess`: in standard errors.
+UnknownEffect describe_lack_of_fit(const Diagnosis& d, double excess);
 std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidence, const std::vector<Evidence::Gain>& first);
 std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidence, const Evidence::State& state, double threshold);
 void add_next_poses(const Work& work, const Measurements& data, const DiagnoseOptions& options, const Decision& decision, Diagnosis* out);

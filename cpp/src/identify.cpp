@@ -25,8 +25,6 @@ namespace {
 
 using kernel::RowLoss;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// Median length of a vector of k standard normal components.
-constexpr double kChiMedian[7] = {0.0, 0.674490, 1.177410, 1.538172, 1.832134, 2.086015, 2.312600};
 
 std::string count_of(std::size_t n, const char* what) { return std::to_string(n) + " " + what + (n == 1 ? "" : "s"); }
 

@@ -136,9 +136,10 @@ std::vector<double> held_out(const std::vector<double>& lengths, const std::vect
   return out;
 }
 
-/// Noise from repeats: rows of one target at equal joints, directions and payload. Degrees of freedom in `freedom`.
+/// Noise from repeats: rows of one target at equal joints, directions and payload; copies of a row are none. Degrees of freedom in `freedom`.
 double repeat_sigma(const Measurements& data, double* freedom) {
-  std::map<std::vector<double>, std::vector<std::size_t>> same;
+  using Measured = std::vector<double>;
+  std::map<std::vector<double>, std::set<Measured>> same;
   for (std::size_t row = 0; row < data.rows; ++row) {
     if (!data.has_position(row) && !data.has_distance(row)) continue;
     std::vector<double> key;
@@ -146,25 +147,41 @@ double repeat_sigma(const Measurements& data, double* freedom) {
     for (const Column& column : data.direction) key.push_back(column ? column[row] : 0.0);
     key.push_back(data.payload ? data.payload[row] : 0.0);
     key.push_back(data.target.empty() ? 0.0 : data.target[row]);
-    same[std::move(key)].push_back(row);
+    key.push_back(data.has_distance(row) ? 1.0 : 3.0);
+    if (data.has_distance(row)) same[std::move(key)].insert({data.distance[row]});
+    else same[std::move(key)].insert({data.position[0][row], data.position[1][row], data.position[2][row]});
   }
-  std::vector<double> squares;  // of pairs' differences, per component
   *freedom = 0.0;
   double sum = 0.0;
-  for (const auto& [key, rows] : same) {
-    if (rows.size() < 2) continue;
-    const bool distance = data.has_distance(rows[0]);
-    const int components = distance ? 1 : 3;
-    for (int c = 0; c < components; ++c) {
-      double mean = 0.0, s = 0.0;
-      const auto value = [&](std::size_t row) { return distance ? data.distance[row] : data.position[static_cast<std::size_t>(c)][row]; };
-      for (const std::size_t row : rows) mean += value(row) / static_cast<double>(rows.size());
-      for (const std::size_t row : rows) s += (value(row) - mean) * (value(row) - mean);
-      sum += s;
-      *freedom += static_cast<double>(rows.size()) - 1.0;
+  for (const auto& [key, repeats] : same) {
+    const auto count = static_cast<double>(repeats.size());
+    const std::size_t components = repeats.begin()->size();
+    for (std::size_t c = 0; c < components && repeats.size() > 1; ++c) {
+      double mean = 0.0;
+      for (const Measured& one : repeats) mean += one[c] / count;
+      for (const Measured& one : repeats) sum += (one[c] - mean) * (one[c] - mean);
+      *freedom += count - 1.0;
     }
   }
   return *freedom > 0.0 ? std::sqrt(sum / *freedom) : 0.0;
+}
+
+/// By how many standard errors held-out errors exceed the noise that repeats show, and the 5 % that fitting a few frames may add.
+/// Of medians: a few rows far out are no lack of fit.
+double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set, double repeats, double freedom) {
+  constexpr double kFitted = 0.05;
+  constexpr double kSpread[2] = {0.562, 1.166};  // sqrt(n) standard errors of the logarithm of a median length: 3 components, 1
+  std::vector<double> sigmas;
+  bool distances = false;
+  for (std::size_t row = 0; row < lengths.size(); ++row) {
+    if (!set[row] || !std::isfinite(lengths[row])) continue;
+    distances |= data.has_distance(row);
+    sigmas.push_back(lengths[row] / kChiMedian[data.has_distance(row) ? 1 : 3]);
+  }
+  if (sigmas.empty() || !(repeats > 0.0)) return 0.0;
+  const double spread = kSpread[distances ? 1 : 0];
+  const double error = std::sqrt(spread * spread / static_cast<double>(sigmas.size()) + 0.5 / freedom);
+  return (std::log(std::max(median_of(sigmas), 1e-300) / repeats) - kFitted) / error;
 }
 
 std::vector<std::int32_t> thinned_rows(const Measurements& data, const std::vector<std::int32_t>& cluster, std::size_t most) {

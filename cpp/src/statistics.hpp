@@ -11,6 +11,9 @@
 
 namespace truing::detail {
 
+/// Median length of a vector of k standard normal components.
+constexpr double kChiMedian[7] = {0.0, 0.674490, 1.177410, 1.538172, 1.832134, 2.086015, 2.312600};
+
 inline double median_of(std::vector<double> values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -17,7 +17,6 @@
 namespace truing::detail {
 
 using Kind = Explanation::Kind;
-constexpr double kChiMedian[4] = {0.0, 0.674490, 1.177410, 1.538172};
 
 /// Sums over the training rows, of some columns.
 static Gram sum_flexible(const Design& design, const std::vector<int>& columns) {

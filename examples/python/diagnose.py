@@ -39,7 +39,7 @@ def main() -> None:
         for other in effect.confounded_with:
             print(f"  these data cannot tell it from {other.effect}: {other.separated_by}")
     for unknown in found.unknown:
-        print(f"unknown: {unknown.joint} moves with {', '.join(unknown.inputs)}: {unknown.looks_like}")
+        print(f"unknown: {unknown.joint or 'something'} moves with {', '.join(unknown.inputs) or 'nothing recorded'}: {unknown.looks_like}")
     for line in sorted({f"{n.effect}: {n.why}" for n in found.not_testable})[:3]:
         print("not testable,", line)
     smallest = next(d for d in found.detectable if d.effect == "gear_ratio")

@@ -53,8 +53,8 @@ std::string summary(const Diagnosis& d) {
     out += "\n";
   }
   for (const UnknownEffect& u : d.unknown)
-    out += "unknown, " + (u.joint.empty() ? "somewhere" : "at " + u.joint) + ", over " + joined(u.inputs) +
-           ": " + u.looks_like + "\n";
+    out += "unknown, " + (u.joint.empty() ? "somewhere" : "at " + u.joint) +
+           (u.inputs.empty() ? "" : ", over " + joined(u.inputs)) + ": " + u.looks_like + "\n";
   for (const SanityFinding& s : d.sanity) out += "look: " + s.text + "\n";
   for (const std::string& w : d.warnings) out += "warning: " + w + "\n";
   return out;
@@ -191,8 +191,9 @@ void bind_findings(py::module_& m) {
                                     "free function of recorded inputs.");
   unknown.def_readonly("joint", &UnknownEffect::joint,
                        "A joint's name, 'base', or '' when only 'somewhere' can be said.");
-  define_names(unknown, "inputs", &UnknownEffect::inputs, "One or two.");
-  unknown.def_readonly("probability", &UnknownEffect::probability, "That there is such a function.");
+  define_names(unknown, "inputs", &UnknownEffect::inputs,
+               "One or two; none: more is left than repeats show, and no function describes it.");
+  unknown.def_readonly("probability", &UnknownEffect::probability, "That there is such a thing.");
   unknown.def_readonly("held_out_before", &UnknownEffect::held_out_before, "Held-out errors without it [m].");
   unknown.def_readonly("held_out_after", &UnknownEffect::held_out_after, "Held-out errors with it [m].");
   unknown.def_readonly("shrink", &UnknownEffect::shrink, "Of the held-out rms: 1 - after / before.");

@@ -1420,7 +1420,7 @@ class UnknownEffect:
     @property
     def inputs(self) -> tuple[str, ...]:
         """
-        One or two.
+        One or two; none: more is left than repeats show, and no function describes it.
         """
     @property
     def joint(self) -> str:
@@ -1435,7 +1435,7 @@ class UnknownEffect:
     @property
     def probability(self) -> float:
         """
-        That there is such a function.
+        That there is such a thing.
         """
     @property
     def share(self) -> float:

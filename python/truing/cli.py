@@ -681,7 +681,7 @@ def diagnosis_table(result: Mapping[str, Any], folder: Path) -> None:
     gap, after, by_all, shrink = result["gap"], result["after"], result["after_unknown"], result["shrink"]
     cells = [("rms", *(_mm(e["rms_m"]) for e in (gap, after, by_all))), ("95 %", *(_mm(e["p95_m"]) for e in (gap, after, by_all))),
              ("noise", _mm(gap["noise_floor_m"]), "", "")]  # fmt: skip
-    shown = [0, 1, *([2] if result["effects"] else []), *([3] if result["unknown"] else [])]
+    shown = [0, 1, *([2] if result["effects"] else []), *([3] if any(u["inputs"] for u in result["unknown"]) else [])]
     heading = ("", "before", "with what is named", "with free functions")
     _table(f"{result['robot']}: error of held-out poses", [heading[k] for k in shown], [[line[k] for k in shown] for line in cells])
     if result["effects"]:
@@ -691,9 +691,9 @@ def diagnosis_table(result: Mapping[str, Any], folder: Path) -> None:
         others = ", ".join(at_joints(other) for other in effect["confounded_with"])
         found.append((at_joints(effect), f"{100 * effect['probability']:.0f} %", size_text(effect), _off(effect["held_out"]), others))
     for unknown in result["unknown"]:
-        place = unknown["joint"] or "somewhere"
-        found.append((f"unknown at {place}", f"{100 * unknown['probability']:.0f} %", unknown["looks_like"] or f"over {', '.join(unknown['inputs'])}",
-                      _off(unknown["held_out"]), ""))  # fmt: skip
+        place = f"at {unknown['joint']}" if unknown["joint"] else "somewhere"
+        found.append((f"unknown {place}", f"{100 * unknown['probability']:.0f} %", unknown["looks_like"] or f"over {', '.join(unknown['inputs'])}",
+                      _off(unknown["held_out"]) if unknown["inputs"] else "", ""))  # fmt: skip
     if found:
         _table("what causes it", ("what", "sure", "size", "off the error", "not told from"), found, words=True)
     if result["not_testable"]:

@@ -141,7 +141,8 @@ def _headline(result: Mapping[str, Any], rows: Rows) -> str:
     if result["verdict"] == "none":
         numbers = f'<b>{length_text(gap["rms_m"])}</b> rms on held-out poses with only base and tool fitted; {floor}.'
     else:
-        numbers = f'Rms error on held-out poses: <span class="before">{length_text(gap["rms_m"])}</span> {_fall(result)}; {floor}.'
+        fall = _fall(result)
+        numbers = f'Rms error on held-out poses: <span class="before">{length_text(gap["rms_m"])}</span>{" " + fall if fall else ""}; {floor}.'
     return (f'<header><p class="kicker">truing diagnose · {escaped(result.get("robot"))} · {counted(rows.count, "row")}'
             f'<span class="verdict {tone}">{label}</span></p><h1{size}>{escaped(first)}</h1>{more}<p class="sub">{numbers}</p></header>')
 
@@ -158,10 +159,16 @@ def _fall(result: Mapping[str, Any]) -> str:
         texts.append(f'→ <span class="after">{length_text(after)}</span> with {"what is" if len(result["effects"]) > 1 else "the effect"} named, {less}' + (f" ({sure})" if same else ""))
         if not same:  # drifts and corrections of laws are no part of a robot
             texts.append(f"{length_text(by_robot)} by robot.yaml alone, {_percent(shrink['value'])} less ({sure})")
-    if result["unknown"]:
-        texts.append(f'{"" if texts else "→ "}<span class="after">{length_text(by_all)}</span> with {"a free function" if len(result["unknown"]) == 1 else "free functions"} '
+    free = _free(result)
+    if free:
+        texts.append(f'{"" if texts else "→ "}<span class="after">{length_text(by_all)}</span> with {"a free function" if len(free) == 1 else "free functions"} '
                      f'for what is unknown{"" if texts else ", not by anything known"}')
     return "; ".join(texts)
+
+
+def _free(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The unknown that functions of the inputs describe: not what is only known to be more than repeats show."""
+    return [unknown for unknown in result["unknown"] if unknown["inputs"]]
 
 
 def trouble(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -332,8 +339,12 @@ def _effect(page: Page, effect: Mapping[str, Any], number: int) -> None:
 
 def _unknown(page: Page, unknown: Mapping[str, Any], number: int) -> None:
     inputs = escaped(" and ".join(_input_name(name) for name in unknown["inputs"]))
-    page.add(f'<section class="card"><h2><i class="dot" style="background:{UNKNOWN}"></i>Unknown {_at(unknown["joint"])}, over {inputs} '
+    page.add(f'<section class="card"><h2><i class="dot" style="background:{UNKNOWN}"></i>Unknown {_at(unknown["joint"])}{", over " + inputs if inputs else ""} '
              f'<span class="muted">{_sure(unknown["probability"])}</span></h2>')
+    if not unknown["inputs"]:
+        page.add("<p>More is left on held-out poses than repeats of one pose show, and neither an effect of the catalogue nor a function of what was recorded, at one joint or "
+                 "the base, describes it. What it goes with may not have been recorded.</p></section>")  # fmt: skip
+        return
     looks = f"Its shape: <b>{escaped(_angles(unknown['looks_like']))}</b>. " if unknown["looks_like"] else ""
     why = (f"<p>{looks}No effect of the catalogue explains it. The robot file leaves it out: a free function says what happens, not why, and knows nothing beyond "
            "the poses that were measured.</p>")  # fmt: skip
@@ -462,7 +473,8 @@ def _left(result: Mapping[str, Any]) -> str:
     checks: list[tuple[int, str, str]] = []
     p = after["remaining_structure_p"]
     if p is not None:
-        checks.append((0, "What is left looks like noise", f"no free function of the inputs explains more than chance would (p = {figures_text(p, 2)})") if p > STRUCTURE else
+        quiet = "No function of the inputs describes what is left" if len(_free(result)) < len(result["unknown"]) else "What is left looks like noise"
+        checks.append((0, quiet, f"no free function of the inputs explains more than chance would (p = {figures_text(p, 2)})") if p > STRUCTURE else
                       (1, "What is left has structure", f"free functions of the inputs explain more than chance would (p = {figures_text(p, 2)})"))  # fmt: skip
     share = near["share"]
     if share is not None:
@@ -471,7 +483,7 @@ def _left(result: Mapping[str, Any]) -> str:
     floor = gap["noise_floor_m"]
     if floor and left:
         ratio = left / floor
-        checks.append((0 if ratio < 1.5 else 1, f"{length_text(left)} rms is left{' with free functions for what is unknown' if result['unknown'] else ''}", f"{figures_text(ratio, 2)} × the noise of {length_text(floor)}, which is "
+        checks.append((0 if ratio < 1.5 else 1, f"{length_text(left)} rms is left{' with free functions for what is unknown' if _free(result) else ''}", f"{figures_text(ratio, 2)} × the noise of {length_text(floor)}, which is "
                        + ("that of repeated poses" if gap["noise_from_repeats"] else "what a flexible fit leaves: without repeated poses it may be too low")))  # fmt: skip
     if result["outliers"]:
         checks.append((0, f"{counted(len(result['outliers']), 'row')} counted for little", f"too far from all others: {_listed(result['outliers'], 15)} (from 0)"))

@@ -626,6 +626,38 @@ TEST_CASE("diagnose takes the noise from repeats where there are any") {
   CHECK(d.noise_floor == doctest::Approx(std::sqrt(3.0) * kNoise).epsilon(0.15));
 }
 
+TEST_CASE("diagnose does not take for noise what repeats show to be a gap") {
+  // Displaced poses, each by something of its own: no effect and no function of the joints describes that.
+  const Robot truth = light_arm();
+  auto poses = measured(truth, 80, 942);
+  std::mt19937_64 random(943);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  Table table(240);
+  const auto repeated = [&](const Column& column, double own, double noise) {
+    std::vector<double> values;
+    for (std::size_t pose = 0; pose < 80; ++pose) {
+      const double displaced = column[pose] + own * normal(random);
+      for (int k = 0; k < 3; ++k) values.push_back(displaced + noise * normal(random));
+    }
+    return table.add(values);
+  };
+  for (const Column& column : poses->data.joints) table.data.joints.push_back(repeated(column, 0.0, 0.0));
+  for (int k = 0; k < 6; ++k) table.data.direction.push_back(table.add(std::vector<double>(240, 1.0)));
+  for (std::size_t k = 0; k < 3; ++k) table.data.position[k] = repeated(poses->data.position[k], 1.5e-4, 2e-5);
+  const Diagnosis d = diagnose(truth, table.data);
+  INFO(names(d));
+  CHECK(d.effects.empty());
+  CHECK(d.noise_from_repeats);
+  CHECK(d.noise_floor == doctest::Approx(std::sqrt(3.0) * 2e-5).epsilon(0.15));
+  CHECK(d.verdict == Verdict::unknown);
+  REQUIRE(d.unknown.size() == 1);
+  CHECK(d.unknown[0].joint.empty());
+  CHECK(d.unknown[0].inputs.empty());
+  CHECK(d.unknown[0].probability > 0.9);
+  CHECK(d.sentence.find("No gap") == std::string::npos);
+  CHECK(d.sentence.find("Repeats show a noise of") != std::string::npos);
+}
+
 TEST_CASE("diagnose says the noise in metres, whatever the rows say of theirs") {
   Robot truth = light_arm();
   truth.effects = {backlash("J3", 8e-4)};

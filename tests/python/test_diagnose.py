@@ -205,6 +205,23 @@ def test_the_robot_file_holds_what_was_named(case: str) -> None:
         assert rms == pytest.approx(result["after"]["rms_m"], rel=1e-6)
 
 
+def test_what_nothing_describes_is_unknown_without_joint_and_input(capsys: pytest.CaptureFixture[str]) -> None:
+    rng = np.random.default_rng(31)
+    robot = truing.load_robot(ROBOT)
+    joints = np.repeat(random_joints(robot, 80, 9), 3, axis=0)
+    places = np.asarray(truing.predict(robot, truing.Measurements(joints)).position) + np.repeat(rng.normal(0, 1.5e-4, (80, 3)), 3, axis=0)
+    data = truing.Measurements(joints, positions=places + rng.normal(0, 2e-5, places.shape), directions=np.ones_like(joints))
+    result = diagnosed(data)
+    check(result, CONTRACT)
+    assert result["verdict"] == "unknown" and "Repeats show a noise of" in result["sentence"]
+    (unknown,) = result["unknown"]
+    assert unknown["joint"] == "" and unknown["inputs"] == [] and unknown["curves"] == []
+    assert "unknown somewhere" in capsys.readouterr().out
+    page = Path("found/report.html").read_text()
+    assert "Unknown somewhere <" in page
+    assert "unknown, somewhere: no function" in truing.diagnose(robot, data).summary()
+
+
 def test_directions_that_were_inferred_are_written_and_serve_the_robot_file() -> None:
     data = in_order()
     given = diagnosed(data)

@@ -83,10 +83,11 @@ struct FoundEffect {
   std::vector<Curve> curves;            ///< the law drawn through what single poses say
 };
 
-/// Something is left: a joint that moves as a smooth, stepwise or two-input function of recorded inputs.
+/// Something is left: a joint that moves as a smooth, stepwise or two-input function of recorded inputs; or more than repeats
+/// show, and no such function describes it.
 struct UnknownEffect {
   std::string joint;                 ///< a joint's name, "base", or "" when only "somewhere" can be said
-  std::vector<std::string> inputs;   ///< one or two
+  std::vector<std::string> inputs;   ///< one or two; none: no function of them describes it
   double probability = 0.0;
   ErrorStatistics held_out_before, held_out_after;
   Share shrink;
