@@ -82,12 +82,6 @@ static bool add_meshes(Work* work, const Evidence& evidence, const Evidence::Sta
 }
 
 
-SearchOptions search_options(const DiagnoseOptions& options) {
-  SearchOptions out;
-  out.most_groups = options.max_effects;
-  return out;
-}
-
 /// Of a free function and what it stands beside, the part that goes in as columns of the design.
 static void append_free(Work* work, const FreeGain& found, std::size_t trials) {
   const Design::Rows columns = free_columns(work->design, found.site_columns, work->inputs, found.what.inputs, found.what.knots);
@@ -357,8 +351,9 @@ static void question_laws(Work* work, const Robot& robot, Decision* decision) {
 
 Decision decide(Work* work, const Robot& robot) {
   const DiagnoseOptions& options = work->options;
-  SearchOptions search = search_options(options);
   Decision out;
+  SearchOptions& search = out.search;
+  search.most_groups = options.max_effects;
   const auto evidence_now = [&] { return Evidence(work->train, work->design.candidates.groups, work->design.nuisance, work->design.prior); };
 
   // Is there a gap at all?

@@ -317,7 +317,8 @@ std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidenc
 }
 
 /// The smallest size of every effect's first parameter that would have passed the threshold, beside what was named.
-std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidence, const Evidence::State& state, double threshold) {
+std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidence, const Decision& decision) {
+  const Evidence::State& state = decision.state;
   const auto& groups = work.design.candidates.groups;
   const auto& named = work.design.candidates.named;
   std::vector<Detectable> out;
@@ -343,7 +344,7 @@ std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidenc
       out.pop_back();
       continue;
     }
-    const double nats = threshold + groups[g].cost + 0.5 * static_cast<double>(groups[g].columns.size()) * std::log(1.0 + evidence.gram().n);
+    const double nats = detection_nats(decision.search.threshold, groups[g].cost, groups[g].columns.size(), evidence.gram().n);
     out.back().size = std::sqrt(2.0 * nats * state.sigma2 / a);
     out.back().size_at_tip = out.back().size * std::sqrt(3.0 * a / std::max(1.0, evidence.gram().n)) * work.position_sigma;
   }

@@ -114,8 +114,7 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   // 3. to 6. What explains it.
   Decision decision = decide(&work, robot);
   const Evidence evidence(work.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
-  const SearchOptions search = search_options(options);
-  const Resampled resampled = resample(work, decision, search);
+  const Resampled resampled = resample(work, decision);
   result.p_gap = decision.p_gap;
   result.remaining_structure_p = decision.p_left;
 
@@ -227,7 +226,7 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   result.verdict = result.effects.empty() ? (result.unknown.empty() ? Verdict::none : Verdict::unknown)
                                           : (result.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown);
   result.candidates = list_candidates(work, evidence, decision.first);
-  result.detectable = smallest_sizes(work, evidence, decision.state, search.threshold);
+  result.detectable = smallest_sizes(work, evidence, decision);
   share_out(work.design, work.inputs, robot, work.deff, options.seed + 17, &result);
   map_workspace(frames.robot, data, result.residuals_before, &result);
   result.neighbour_share = neighbour_share(data, result.set, after_all, &result.neighbour_p95);

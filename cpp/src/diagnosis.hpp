@@ -36,7 +36,7 @@ struct Work {
 /// Everything that was decided.
 struct Decision {
   Evidence::State state;           ///< named, laws and free functions
-  Choice frames_only;
+  SearchOptions search;            ///< with the threshold raised to what noise alone reaches
   double p_gap = 1.0;
   double p_left = 1.0;
   std::vector<Evidence::Gain> first;  ///< every group alone
@@ -87,7 +87,6 @@ inline bool is_named(const Explanation& e) {
 
 /// Index of an input; -1: there is none of that name.
 int input_named(const Work& work, const std::string& name);
-SearchOptions search_options(const DiagnoseOptions& options);
 /// A choice less one group, and less what corrects its law.
 Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std::size_t at);
 /// Sum of squares on every fold of the fit to the others.
@@ -111,7 +110,7 @@ Decision decide(Work* work, const Robot& robot);
 bool same_name(const Explanation& a, const Explanation& b);
 bool contains(const Explanation& large, const Explanation& small);
 Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at);
-Resampled resample(const Work& work, const Decision& decision, const SearchOptions& search);
+Resampled resample(const Work& work, const Decision& decision);
 double came_back(const Work& work, const Resampled& resampled, const Sureness& sure, int group);
 double calibrated(double posterior, double came_back, double removal_loss);
 
@@ -136,7 +135,7 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
 /// A gap beyond the noise of repeats that nothing describes; `excess`: in standard errors.
 UnknownEffect describe_lack_of_fit(const Diagnosis& d, double excess);
 std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidence, const std::vector<Evidence::Gain>& first);
-std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidence, const Evidence::State& state, double threshold);
+std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidence, const Decision& decision);
 void add_next_poses(const Work& work, const Measurements& data, const DiagnoseOptions& options, const Decision& decision, Diagnosis* out);
 std::string sentence_of(const Diagnosis& d);
 

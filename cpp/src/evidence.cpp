@@ -403,6 +403,10 @@ std::vector<double> Evidence::null_scores(const State& state, int count, std::ui
   return out;
 }
 
+double detection_nats(double threshold, double cost, std::size_t columns, double values) {
+  return threshold + cost + 0.5 * static_cast<double>(columns) * std::log(1.0 + values);
+}
+
 double held_out_squares(const Gram& held_out, const std::vector<int>& columns, const Eigen::VectorXd& solution) {
   return held_out.yy - 2.0 * solution.dot(part(held_out.xy, columns)) + solution.dot(block(held_out.xx, columns, columns) * solution);
 }

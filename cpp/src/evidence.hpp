@@ -142,6 +142,10 @@ class Evidence {
   double freedom_ = 0.0;
 };
 
+/// Nats that a group of so many columns has to win from so many values before the search takes it: the threshold, what having looked
+/// at all of them costs, and what its flexibility does (as the evidence of many values has it: half a log of their number a column).
+double detection_nats(double threshold, double cost, std::size_t columns, double values);
+
 /// Sum of squares on `held_out` of the ridge fit `state` made on other rows (same columns).
 double held_out_squares(const Gram& held_out, const std::vector<int>& columns, const Eigen::VectorXd& solution);
 

@@ -13,6 +13,7 @@
 #include <Eigen/QR>
 
 #include "evaluate.hpp"
+#include "evidence.hpp"
 #include "gravity.hpp"
 #include "model.hpp"
 #include "plan_poses.hpp"
@@ -26,8 +27,6 @@ namespace detail {
 namespace {
 
 const char* const kColumns[4] = {"dir", "payload", "temp", "t"};
-/// What diagnose asks of an effect before it is named: nats beyond the price of having looked at all of them.
-constexpr double kThreshold = 4.0;
 /// A column of which less is left (of its square) cannot be seen.
 constexpr double kInvisible = 1e-9;
 /// Unit columns that add less than this to those before them are left out: of base, tool and geometry; of a rival, which would
@@ -352,8 +351,8 @@ View look(const Robot& robot, const std::vector<Planned>& poses, const std::vect
 
 /// Standard errors that diagnose would ask of an effect with so many parameters, out of so many effects.
 double standard_errors(const View& view, std::size_t group, std::size_t groups) {
-  const auto parameters = static_cast<double>(std::max<Index>(1, view.seen[group].basis.cols()));
-  return std::sqrt(2.0 * (kThreshold + std::log(static_cast<double>(groups)) + 0.5 * parameters * std::log(1.0 + view.values)));
+  const auto parameters = static_cast<std::size_t>(std::max<Index>(1, view.seen[group].basis.cols()));
+  return std::sqrt(2.0 * detection_nats(SearchOptions().threshold, std::log(static_cast<double>(groups)), parameters, view.values));
 }
 
 /// Rms motion of the tip by a parameter of one.

@@ -73,7 +73,7 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
   return out;
 }
 
-Resampled resample(const Work& work, const Decision& decision, const SearchOptions& search) {
+Resampled resample(const Work& work, const Decision& decision) {
   constexpr int kSelections = 10;
   Resampled out;
   Random random(work.options.seed + 7);
@@ -87,7 +87,7 @@ Resampled resample(const Work& work, const Decision& decision, const SearchOptio
     }
     return sum;
   };
-  SearchOptions quick = search;
+  SearchOptions quick = decision.search;
   quick.beam = 1;
   const Shortlist list = shortlist(work, decision.state.choice.groups);
   std::vector<Gram> short_folds;
