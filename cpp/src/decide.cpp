@@ -361,12 +361,9 @@ Decision decide(Work* work, const Robot& robot) {
     const Evidence evidence = evidence_now();
     const Evidence::State nothing = evidence.evaluate({});
     out.first = evidence.gains(nothing);
-    double best = -1e300;
-    for (const Evidence::Gain& gain : out.first) {
-      const ColumnGroup& group = work->design.candidates.groups[static_cast<std::size_t>(gain.group)];
-      if (group.parent_kind < 0 && !group.shadow) best = std::max(best, gain.score);
-    }
     const Shortlist list = shortlist(*work, {});
+    double best = -1e300;  // of the groups that the null is drawn over, and no others
+    for (const int g : list.which) best = std::max(best, out.first[static_cast<std::size_t>(g)].score);
     const Gram gram = work->train.of(list.columns);
     const Evidence few(gram, list.groups, list.nuisance, list.prior);
     std::vector<double> null = few.null_scores(few.evaluate({}), kNullDraws, options.seed + 11);
