@@ -17,8 +17,6 @@
 namespace truing::detail {
 namespace {
 
-/// How far off an angle [rad], or a length [m], may well be. Ten times less and less again is tried as well.
-constexpr double kLargest = 1e-2;
 constexpr int kFolds = 12;
 constexpr int kTestFolds = 8;
 /// A joint that moves less stands still [rad | m].
@@ -50,7 +48,7 @@ std::string driver_of(const std::string& effect, const std::string& joint_number
 }
 
 /// Effects whose law is one function of one driver at the joint itself: a number for "driver at joint".
-int kind_number(const std::string& effect, std::size_t joint) {
+int law_number(const std::string& effect, std::size_t joint) {
   static const std::map<std::string, int> kinds = {{"joint_compliance", 0}, {"stiffness_zones", 0}, {"gravity_backlash", 0}, {"backlash", 1},
                                                    {"harmonic", 2},         {"thermal", 3},         {"thermal_zero", 4}};
   const auto found = kinds.find(effect);
@@ -207,7 +205,7 @@ class Builder {
     const std::string number = std::to_string(joint + 1);
     e.driver = joints.empty() && effect.name != "drift" ? "" : driver_of(effect.name, number);
     ColumnGroup group;
-    group.kind_at = joints.empty() ? -1 : kind_number(effect.name, joint);
+    group.law_at = joints.empty() ? -1 : law_number(effect.name, joint);
     if (effect.name == "backlash" && task_.inferred_direction) e.note = "the approach direction was inferred from the order of the poses";
     // An input that never changes: the effect cannot be told from geometry, and is only named beside it.
     const InputColumn* driver = input(e.driver);
@@ -285,7 +283,7 @@ class Builder {
       if (e.knots[0].size() < 3) return;
       for (std::size_t k = 0; k < e.knots[0].size(); ++k) e.parameters.push_back("law." + effect + "." + e.site + "." + std::to_string(k + 1));
       ColumnGroup group;
-      group.parent_kind = group.kind_at = kind_number(effect, joint);
+      group.corrects_law_at = group.law_at = law_number(effect, joint);
       add(std::move(e), std::move(group));
     };
     for (std::size_t k = 0; k < task_.at.joints.size(); ++k) {
@@ -308,8 +306,8 @@ class Builder {
 /// Groups of one kind share the prior: the cost of having looked at all of them.
 void charge_search(Candidates* candidates) {
   double count = 0.0;
-  for (const ColumnGroup& group : candidates->groups) count += group.parent_kind < 0 && !group.shadow ? 1.0 : 0.0;
-  for (ColumnGroup& group : candidates->groups) group.cost += group.parent_kind < 0 ? std::log(std::max(1.0, count)) : std::log(3.0);
+  for (const ColumnGroup& group : candidates->groups) count += group.corrects_law_at < 0 && !group.shadow ? 1.0 : 0.0;
+  for (ColumnGroup& group : candidates->groups) group.cost += group.corrects_law_at < 0 ? std::log(std::max(1.0, count)) : std::log(3.0);
 }
 
 }  // namespace

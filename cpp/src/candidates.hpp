@@ -18,6 +18,9 @@
 
 namespace truing::detail {
 
+/// How far off an angle [rad], or a length [m], may well be. Ten times less and less again is tried as well.
+constexpr double kLargest = 1e-2;
+
 /// A recorded (or derived) input, for every row.
 struct InputColumn {
   std::string name;   ///< q2, dir3, torque2, payload, temp, time, order, or a covariate's

@@ -28,16 +28,15 @@ int input_named(const Work& work, const std::string& name) {
 }
 
 /// Adds columns of one more candidate to the design.
-static void append(Work* work, Explanation what, const Design::Rows& columns, double prior, double cost, int kind_at = -1) {
+static void append(Work* work, Explanation what, const Design::Rows& columns, double cost) {
   Design& design = work->design;
   const Eigen::Index p = design.x.cols();
   design.x.conservativeResize(Eigen::NoChange, p + columns.cols());
   design.x.rightCols(columns.cols()) = columns;
   design.prior.conservativeResize(p + columns.cols());
-  design.prior.tail(columns.cols()).setConstant(prior);
+  design.prior.tail(columns.cols()).setConstant(kLargest);
   ColumnGroup group;
   group.cost = cost;
-  group.kind_at = kind_at;
   for (Eigen::Index k = 0; k < columns.cols(); ++k) {
     group.columns.push_back(static_cast<int>(p + k));
     design.column_names.push_back(what.parameters[static_cast<std::size_t>(k)]);
@@ -75,17 +74,16 @@ static bool add_meshes(Work* work, const Evidence& evidence, const Evidence::Sta
       columns(i, 0) = d * std::cos(mesh.order * q);
       columns(i, 1) = d * std::sin(mesh.order * q);
     }
-    append(work, e, columns, 1e-2, std::log(static_cast<double>(mesh.tried * static_cast<int>(robot.joints.size()))));
+    append(work, e, columns, std::log(static_cast<double>(mesh.tried * static_cast<int>(robot.joints.size()))));
     any = true;
   }
   return any;
 }
 
-
 /// Of a free function and what it stands beside, the part that goes in as columns of the design.
 static void append_free(Work* work, const FreeGain& found, std::size_t trials) {
   const Design::Rows columns = free_columns(work->design, found.site_columns, work->inputs, found.what.inputs, found.what.knots);
-  append(work, found.what, columns, 1e-2, std::log(static_cast<double>(trials)));
+  append(work, found.what, columns, std::log(static_cast<double>(trials)));
 }
 
 Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std::size_t at) {
@@ -93,7 +91,7 @@ Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std
   const ColumnGroup& gone = groups[static_cast<std::size_t>(choice.groups[at])];
   for (std::size_t k = 0; k < choice.groups.size(); ++k) {
     const ColumnGroup& other = groups[static_cast<std::size_t>(choice.groups[k])];
-    const bool orphan = gone.parent_kind < 0 && gone.kind_at >= 0 && other.parent_kind == gone.kind_at;
+    const bool orphan = gone.corrects_law_at < 0 && gone.law_at >= 0 && other.corrects_law_at == gone.law_at;
     if (k == at || orphan) continue;
     out.groups.push_back(choice.groups[k]);
     out.scales.push_back(choice.scales[k]);
@@ -162,7 +160,7 @@ Shortlist shortlist(const Work& work, const std::vector<int>& also) {
     const bool plain = e.kind == Kind::catalogue || e.kind == Kind::all_geometry || (e.kind == Kind::drift && e.knots[0].size() <= 6);
     if (groups[g].shadow || groups[g].columns.empty() || (!wanted && !plain)) continue;
     ColumnGroup group = groups[g];
-    group.parent_kind = -1;
+    group.corrects_law_at = -1;
     for (int& column : group.columns) column = take(column);
     out.groups.push_back(std::move(group));
     out.which.push_back(static_cast<int>(g));
@@ -225,7 +223,7 @@ static int add_fine_function(Work* work, const Robot& robot, std::size_t joint, 
     name += "." + work->inputs[static_cast<std::size_t>(input)].name;
   }
   for (std::size_t k = 0; k < count; ++k) e.parameters.push_back(name + "." + std::to_string(k + 1));
-  append(work, e, free_columns(work->design, work->design.joint_column[joint], work->inputs, e.inputs, e.knots), 1e-2, std::log(300.0));
+  append(work, e, free_columns(work->design, work->design.joint_column[joint], work->inputs, e.inputs, e.knots), std::log(300.0));
   return static_cast<int>(work->design.candidates.groups.size()) - 1;
 }
 
@@ -288,7 +286,7 @@ static void question_laws(Work* work, const Robot& robot, Decision* decision) {
       for (std::size_t g = 0; g < groups.size(); ++g) {
         const Explanation& e = named[g];
         if (e.kind != Kind::catalogue || groups[g].shadow || e.joints != std::vector<std::string>{free.site} || e.effect == "link_geometry" || e.effect.rfind("transmission", 0) == 0) continue;
-        if (free.kind == Kind::law && e.effect != free.effect && groups[g].kind_at != groups[static_cast<std::size_t>(f)].parent_kind) continue;
+        if (free.kind == Kind::law && e.effect != free.effect && groups[g].law_at != groups[static_cast<std::size_t>(f)].corrects_law_at) continue;
         Evidence::Gain gain = evidence.gain(rest, groups[g].columns, groups[g].cost);
         const double share = gain.squares / std::max(together, 1e-300);
         if (share > least_share_of_law(e.effect) && gain.score > best.score) {
@@ -389,7 +387,7 @@ Decision decide(Work* work, const Robot& robot) {
     const bool room = static_cast<int>(out.state.choice.groups.size()) < search.most_groups;
     if (room && !scan.best.empty() && scan.p <= 0.02 && scan.best.front().gain.score > search.threshold + 4.0 && scan.best.front().gain.share > kFreeShare) {
       const FreeGain& best = scan.best.front();
-      append_free(work, best, scan.best.size());
+      append_free(work, best, scan.tried);
       extend_grams(work);
       const Evidence with = evidence_now();
       Choice grown = out.state.choice;

@@ -47,7 +47,7 @@ static Curve curve_of(const Work& work, const Evidence::State& state, const std:
     if (of_group || of_law) own.push_back(c);
   }
   struct Sum {
-    double de = 0.0, dd = 0.0, df = 0.0, variance = 0.0;
+    double de = 0.0, dd = 0.0, df = 0.0;
   };
   std::map<std::int32_t, Sum> poses;  // by row
   for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
@@ -126,7 +126,6 @@ static std::string separated_by(const std::string& a, const std::string& b) {
   return "measure poses where the two differ: see the next poses";
 }
 
-
 /// What the user reads of one group.
 FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at, const Sureness& sure, double probability,
                      const Identification& refitted, const Resampled& resampled) {
@@ -135,7 +134,7 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   const int g = decision.state.choice.groups[at];
   const Explanation& e = named[static_cast<std::size_t>(g)];
   FoundEffect out;
-  out.effect = e.effect.substr(0, e.effect.find('@')) == "transmission_error" ? e.effect : e.effect;
+  out.effect = e.effect;
   out.joints = e.joints;
   out.note = e.note;
   out.probability = probability;
@@ -200,13 +199,13 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
     out.note += (out.note.empty() ? "" : "; ") + std::string("its law is not the simple one: see the curve over ") + driver;
     const int input = input_named(work, driver);
     if (input >= 0 && !e.joints.empty()) {
-      const auto joint = static_cast<std::size_t>(std::find_if(work.frames.robot.joints.begin(), work.frames.robot.joints.end(), [&](const Joint& j) { return j.name == e.joints[0]; }) - work.frames.robot.joints.begin());
+      const std::size_t joint = work.frames.robot.joint_index(e.joints[0]);
       out.curves.push_back(curve_of(work, decision.state, decision.corrects, g, input, work.design.joint_column[joint][0], 0, 0, -1));
     }
   }
   const int driver = input_named(work, e.driver);
   if (driver >= 0 && e.kind == Kind::catalogue && e.joints.size() == 1 && e.effect != "axis_wobble" && e.effect != "thermal" && e.effect != "link_compliance") {
-    const auto joint = static_cast<std::size_t>(std::find_if(work.frames.robot.joints.begin(), work.frames.robot.joints.end(), [&](const Joint& j) { return j.name == e.joints[0]; }) - work.frames.robot.joints.begin());
+    const std::size_t joint = work.frames.robot.joint_index(e.joints[0]);
     const bool drawn = std::any_of(out.curves.begin(), out.curves.end(), [&](const Curve& c) { return c.input == e.driver; });
     if (!drawn) out.curves.push_back(curve_of(work, decision.state, decision.corrects, g, driver, work.design.joint_column[joint][0], 0, 0, -1));
   }
@@ -240,7 +239,7 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   out.probability = std::clamp(0.5 + 0.49 * std::min(1.0, loss / 30.0), 0.0, 0.99);
   std::vector<int> sites = work.design.base_columns;
   if (e.site != "base") {
-    const auto joint = static_cast<std::size_t>(std::find_if(work.frames.robot.joints.begin(), work.frames.robot.joints.end(), [&](const Joint& j) { return j.name == e.site; }) - work.frames.robot.joints.begin());
+    const std::size_t joint = work.frames.robot.joint_index(e.site);
     sites = work.design.joint_column[joint];
   } else if (sites.size() > 3) {
     sites.resize(3);
@@ -294,7 +293,7 @@ std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidenc
   const double without_any = std::max(cross_validated(work, {}), 1e-300);
   std::vector<Candidate> out;
   for (std::size_t g = 0; g < first.size(); ++g) {
-    if (groups[g].parent_kind >= 0 || named[g].kind == Kind::law) continue;
+    if (groups[g].corrects_law_at >= 0 || named[g].kind == Kind::law) continue;
     Candidate c;
     c.effect = named[g].effect;
     c.joints = named[g].joints;

@@ -17,9 +17,10 @@
 namespace truing::detail {
 
 struct Work {
-  const DiagnoseOptions& options;
+  DiagnoseOptions options;
   Measurements data;                       ///< with the better joint record, and approach directions where they could be inferred
   std::vector<std::int32_t> cluster;       ///< pose group of every row
+  std::vector<std::int8_t> set;            ///< 0 train, 1 test, for every row
   std::vector<InputColumn> inputs;
   Identification frames;                   ///< base and targets found, everything else nominal
   Linearisation linear;
@@ -46,6 +47,12 @@ struct Decision {
 struct Refit {
   Identification found;
   std::vector<Effect> own;
+};
+
+/// Noise of one value [m], as rows measured again at the same pose show it.
+struct Repeats {
+  double sigma = 0.0;
+  double freedom = 0.0;   ///< degrees of freedom that it rests on
 };
 
 /// What may stand in a named group's place.
@@ -121,8 +128,8 @@ Share percentile_interval(std::vector<double> values, double center);
 Refit refit(const Work& work, const Robot& robot, const Evidence::State& state, const std::vector<int>& groups);
 std::vector<double> lengths_of(const Residuals& residuals, std::size_t rows);
 std::vector<double> held_out(const std::vector<double>& lengths, const std::vector<std::int8_t>& set);
-double repeat_sigma(const Measurements& data, double* freedom);
-double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set, double repeats, double freedom);
+Repeats noise_of_repeats(const Measurements& data);
+double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set, const Repeats& repeats);
 std::vector<std::int32_t> thinned_rows(const Measurements& data, const std::vector<std::int32_t>& cluster, std::size_t most);
 Measurements subset_of(const Measurements& data, const std::vector<std::int32_t>& rows);
 std::vector<Effect> mapped(const std::vector<Effect>& own, const Measurements& whole, const std::vector<std::int32_t>& rows);

@@ -254,10 +254,10 @@ bool Evidence::may_enter(const State& state, int group) const {
   if (g.shadow || g.columns.empty()) return false;
   const std::vector<int>& in = state.choice.groups;
   if (std::find(in.begin(), in.end(), group) != in.end()) return false;
-  if (g.parent_kind < 0) return true;
+  if (g.corrects_law_at < 0) return true;
   return std::any_of(in.begin(), in.end(), [&](int other) {
     const ColumnGroup& o = groups_[static_cast<std::size_t>(other)];
-    return o.kind_at == g.parent_kind && o.parent_kind < 0;
+    return o.law_at == g.corrects_law_at && o.corrects_law_at < 0;
   });
 }
 
@@ -267,7 +267,7 @@ Evidence::State Evidence::improve(State state, const SearchOptions& options) con
     const ColumnGroup& gone = groups_[static_cast<std::size_t>(choice.groups[at])];
     for (std::size_t k = 0; k < choice.groups.size(); ++k) {
       const ColumnGroup& other = groups_[static_cast<std::size_t>(choice.groups[k])];
-      const bool orphan = gone.parent_kind < 0 && gone.kind_at >= 0 && other.parent_kind == gone.kind_at;
+      const bool orphan = gone.corrects_law_at < 0 && gone.law_at >= 0 && other.corrects_law_at == gone.law_at;
       if (k == at || orphan) continue;
       out.groups.push_back(choice.groups[k]);
       out.scales.push_back(choice.scales[k]);
@@ -321,8 +321,8 @@ Evidence::State Evidence::search(const SearchOptions& options, const Choice& sta
       if (!ranked.empty()) {
         const auto law = std::find_if(ranked.begin(), ranked.end(), [&](const Gain& gain) {
           const ColumnGroup& g = groups_[static_cast<std::size_t>(gain.group)];
-          return g.parent_kind >= 0 || (g.kind_at >= 0 && std::any_of(state.choice.groups.begin(), state.choice.groups.end(), [&](int in) {
-                   return groups_[static_cast<std::size_t>(in)].kind_at == g.kind_at;
+          return g.corrects_law_at >= 0 || (g.law_at >= 0 && std::any_of(state.choice.groups.begin(), state.choice.groups.end(), [&](int in) {
+                   return groups_[static_cast<std::size_t>(in)].law_at == g.law_at;
                  }));
         });
         if (law != ranked.end() && law->score >= options.law_share * ranked[0].score) std::rotate(ranked.begin(), law, law + 1);

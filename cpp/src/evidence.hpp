@@ -52,8 +52,8 @@ class GramSum {
 struct ColumnGroup {
   std::vector<int> columns;
   double cost = 0.0;     ///< nats: log of how many groups of its kind there are, and of what was scanned to find it
-  int parent_kind = -1;  ///< a law's correction: may only enter with a group of this `kind_at`; -1: free to enter
-  int kind_at = -1;      ///< number of "driver at joint" that groups of one law share; -1: none
+  int law_at = -1;       ///< number of "law of a driver at a joint", the same for all groups that are one; -1: none
+  int corrects_law_at = -1;  ///< of a law's correction: may only enter beside a law of this number; -1: free to enter
   bool shadow = false;   ///< never enters; only an alternative
 };
 
@@ -70,7 +70,6 @@ struct Choice {
   std::vector<int> groups;
   std::vector<double> scales;
 };
-
 
 /// One Gram, its groups, and everything that the search asks of them.
 class Evidence {

@@ -211,9 +211,9 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
   Evidence::State scaled = state;
   const double times = 1.0 / (left.share * deff);  // as if all rows were seen, and each counted for as much as it does
   FreeScan out;
-  out.joint_best.assign(robot.joints.size() + 1, -1e300);
+  out.tried = trials.size();
   std::vector<double> largest(static_cast<std::size_t>(options.flips), -1e300);
-  const double cost = options.cost_scale * std::log(static_cast<double>(std::max<std::size_t>(1, trials.size())));
+  const double cost = std::log(static_cast<double>(std::max<std::size_t>(1, out.tried)));
   double observed_residual = left.residual.squaredNorm() * times;
   scaled.rss = std::max(observed_residual, 1e-300);
   scaled.sigma2 = scaled.rss / evidence.freedom();
@@ -224,14 +224,14 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
     const Eigen::MatrixXd half = left.factor.matrixL().solve(c.transpose());
     Eigen::MatrixXd a = (sums.xx - half.transpose() * half) * times;
     for (Eigen::Index i = 0; i < k; ++i) a(i, i) += 1e-9 * sums.xx(i, i) * times;
-    const Eigen::VectorXd prior = Eigen::VectorXd::Constant(k, 1e-2);
+    const Eigen::VectorXd prior = Eigen::VectorXd::Constant(k, kLargest);
     FreeGain found;
     found.gain = evidence.gain_of(scaled, a, sums.right.col(p) * times, prior, cost);
     if (options.flips > 0) {
       // At the scale that the data chose, or noise's own: the smallest.
       for (const double scale : {found.gain.scale, 0.001}) {
         Eigen::MatrixXd m = a;
-        const double ridge = scaled.sigma2 / (scale * scale * 1e-4);
+        const double ridge = scaled.sigma2 / std::pow(scale * kLargest, 2.0);
         m.diagonal().array() += ridge;
         const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(m));
         const double determinants = static_cast<double>(k) * std::log(ridge) - 2.0 * factor.matrixLLT().diagonal().array().log().sum();
@@ -246,8 +246,6 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
     }
     found.what = trial.what;
     found.site_columns = trial.sites;
-    const std::size_t joint = trial.what.site == "base" ? robot.joints.size() : robot.joint_index(trial.what.site);
-    out.joint_best[joint] = std::max(out.joint_best[joint], found.gain.score);
     out.best.push_back(std::move(found));
   }
   std::sort(out.best.begin(), out.best.end(), [](const FreeGain& a, const FreeGain& b) { return a.gain.score > b.gain.score; });
@@ -327,7 +325,7 @@ std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, 
         const Eigen::MatrixXd half = left.factor.matrixL().solve(sums.block(at, 0, 2, left.columns.cols()).transpose());
         const Eigen::MatrixXd a = (xx - half.transpose() * half) * times;
         const Eigen::VectorXd b = sums.block(at, left.columns.cols(), 2, 1) * times;
-        const Evidence::Gain gain = evidence.gain_of(scaled, a, b, Eigen::VectorXd::Constant(2, 1e-2), cost);
+        const Evidence::Gain gain = evidence.gain_of(scaled, a, b, Eigen::VectorXd::Constant(2, kLargest), cost);
         if (gain.score > best.score) {
           best.score = gain.score;
           best.order = orders[first + k];

@@ -20,16 +20,15 @@ struct FreeGain {
 };
 
 struct FreeScan {
-  std::vector<FreeGain> best;      ///< by score, best first
-  double p = 1.0;                  ///< chance of a score as high when the signs of whole poses are random
-  std::vector<double> joint_best;  ///< best score by joint, the base last
+  std::vector<FreeGain> best;  ///< by score, best first; at most 200
+  std::size_t tried = 0;       ///< functions in all
+  double p = 1.0;              ///< chance of a score as high when the signs of whole poses are random
 };
 
 struct FreeScanOptions {
   int flips = 99;
   std::uint64_t seed = 0;
   std::size_t most_values = 20000;  ///< measured values looked at: of more, whole folds are left out
-  double cost_scale = 1.0;
 };
 
 /// Scores free functions on what `state` leaves of the training rows. `deff`: rows that count as one.

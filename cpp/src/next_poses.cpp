@@ -18,7 +18,6 @@ namespace {
 
 constexpr int kTried = 300;  ///< poses to choose from
 
-
 /// Poses drawn within the joints' ranges (their limits, else what the data cover), both directions, light and full payload.
 struct Drawn {
   Measurements data;

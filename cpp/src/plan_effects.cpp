@@ -110,7 +110,6 @@ bool is_named(const std::vector<EffectRequest>& requests, const Group& group) {
   });
 }
 
-
 /// Names that mean nothing are errors that list what there is.
 void check(const Robot& robot, const std::vector<EffectRequest>& separate, const Measurements& data) {
   for (const EffectRequest& request : separate) {

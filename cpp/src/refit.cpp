@@ -45,7 +45,6 @@ Share percentile_interval(std::vector<double> values, double center) {
   return out;
 }
 
-
 /// A column's parameter in the linear model.
 static double solution_of(const Work& work, const Evidence::State& state, const std::string& name) {
   const int column = work.design.column(name);
@@ -106,7 +105,7 @@ static Refit refit_with(const Work& work, const Robot& robot, const Evidence::St
   options.effects = merged;
   out.own = options.own_effects;
   Measurements data = work.data;
-  data.set = work.frames.set;
+  data.set = work.set;
   out.found = identify(start, data, options);
   return out;
 }
@@ -136,8 +135,8 @@ std::vector<double> held_out(const std::vector<double>& lengths, const std::vect
   return out;
 }
 
-/// Noise from repeats: rows of one target at equal joints, directions and payload; copies of a row are none. Degrees of freedom in `freedom`.
-double repeat_sigma(const Measurements& data, double* freedom) {
+/// Rows of one target at equal joints, directions and payload; copies of a row are no repeats.
+Repeats noise_of_repeats(const Measurements& data) {
   using Measured = std::vector<double>;
   std::map<std::vector<double>, std::set<Measured>> same;
   for (std::size_t row = 0; row < data.rows; ++row) {
@@ -151,7 +150,7 @@ double repeat_sigma(const Measurements& data, double* freedom) {
     if (data.has_distance(row)) same[std::move(key)].insert({data.distance[row]});
     else same[std::move(key)].insert({data.position[0][row], data.position[1][row], data.position[2][row]});
   }
-  *freedom = 0.0;
+  Repeats out;
   double sum = 0.0;
   for (const auto& [key, repeats] : same) {
     const auto count = static_cast<double>(repeats.size());
@@ -160,15 +159,16 @@ double repeat_sigma(const Measurements& data, double* freedom) {
       double mean = 0.0;
       for (const Measured& one : repeats) mean += one[c] / count;
       for (const Measured& one : repeats) sum += (one[c] - mean) * (one[c] - mean);
-      *freedom += count - 1.0;
+      out.freedom += count - 1.0;
     }
   }
-  return *freedom > 0.0 ? std::sqrt(sum / *freedom) : 0.0;
+  if (out.freedom > 0.0) out.sigma = std::sqrt(sum / out.freedom);
+  return out;
 }
 
 /// By how many standard errors held-out errors exceed the noise that repeats show, and the 5 % that fitting a few frames may add.
 /// Of medians: a few rows far out are no lack of fit.
-double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set, double repeats, double freedom) {
+double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set, const Repeats& repeats) {
   constexpr double kFitted = 0.05;
   constexpr double kSpread[2] = {0.562, 1.166};  // sqrt(n) standard errors of the logarithm of a median length: 3 components, 1
   std::vector<double> sigmas;
@@ -178,10 +178,10 @@ double lack_of_fit(const Measurements& data, const std::vector<double>& lengths,
     distances |= data.has_distance(row);
     sigmas.push_back(lengths[row] / kChiMedian[data.has_distance(row) ? 1 : 3]);
   }
-  if (sigmas.empty() || !(repeats > 0.0)) return 0.0;
+  if (sigmas.empty() || !(repeats.sigma > 0.0)) return 0.0;
   const double spread = kSpread[distances ? 1 : 0];
-  const double error = std::sqrt(spread * spread / static_cast<double>(sigmas.size()) + 0.5 / freedom);
-  return (std::log(std::max(median_of(sigmas), 1e-300) / repeats) - kFitted) / error;
+  const double error = std::sqrt(spread * spread / static_cast<double>(sigmas.size()) + 0.5 / repeats.freedom);
+  return (std::log(std::max(median_of(sigmas), 1e-300) / repeats.sigma) - kFitted) / error;
 }
 
 std::vector<std::int32_t> thinned_rows(const Measurements& data, const std::vector<std::int32_t>& cluster, std::size_t most) {
@@ -206,7 +206,6 @@ Measurements subset_of(const Measurements& data, const std::vector<std::int32_t>
   auto owned = std::make_shared<SubsetColumns>();
   Measurements out;
   out.rows = rows.size();
-  std::vector<std::pair<Column*, std::size_t>> to_set;
   const auto take = [&](const Column& from, Column* to) {
     if (!from) return;
     std::vector<double> values(rows.size());

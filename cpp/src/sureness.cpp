@@ -45,7 +45,7 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
   for (const Evidence::Gain& gain : evidence.gains(less)) {
     const Explanation& e = named[static_cast<std::size_t>(gain.group)];
     const ColumnGroup& group = groups[static_cast<std::size_t>(gain.group)];
-    if (gain.group == g || group.parent_kind >= 0 || group.columns.empty() || e.kind == Kind::free) continue;
+    if (gain.group == g || group.corrects_law_at >= 0 || group.columns.empty() || e.kind == Kind::free) continue;
     if (same_name(e, named[static_cast<std::size_t>(g)]) || contains(e, named[static_cast<std::size_t>(g)]) || e.kind == Kind::drift) continue;
     if (std::find(less.choice.groups.begin(), less.choice.groups.end(), gain.group) != less.choice.groups.end()) continue;
     Rival rival;

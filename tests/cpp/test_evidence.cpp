@@ -193,8 +193,8 @@ TEST_CASE("the search finds the groups that are there, and none in noise") {
 
 TEST_CASE("a law's correction enters only with its law, a shadow never") {
   Problem problem(100, 61);
-  problem.groups[0].kind_at = 7;                                    // the law
-  problem.groups[1].parent_kind = problem.groups[1].kind_at = 7;    // its correction
+  problem.groups[0].law_at = 7;                                    // the law
+  problem.groups[1].corrects_law_at = problem.groups[1].law_at = 7;    // its correction
   problem.groups[3].shadow = true;
   const Eigen::VectorXd noise = problem.noise(0.1, 62);
   const auto found = [&](const Eigen::VectorXd& y) {
