@@ -103,7 +103,8 @@ void bind_options(py::module_& m) {
   cls.def_readwrite("search_poses", &DiagnoseOptions::search_poses,
                     "Of more pose groups, so many are searched; errors are those of all rows.");
   cls.def_readwrite("resamples", &DiagnoseOptions::resamples,
-                    "Bootstrap samples of pose groups; each repeats the search.");
+                    "Draws of folds of pose groups for the intervals, with what was chosen fitted again; at most 10 "
+                    "more repeat the selection.");
   cls.def_readwrite("rotation_length", &DiagnoseOptions::rotation_length,
                     "[m] a rotation error of 1 rad counts as this length in reported errors.");
   cls.def_readwrite("seed", &DiagnoseOptions::seed, "Of the split and of every simulation.");

@@ -1182,7 +1182,7 @@ class DiagnoseOptions:
     @property
     def resamples(self) -> int:
         """
-        Bootstrap samples of pose groups; each repeats the search.
+        Draws of folds of pose groups for the intervals, with what was chosen fitted again; at most 10 more repeat the selection.
         """
     @resamples.setter
     def resamples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:

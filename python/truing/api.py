@@ -124,7 +124,7 @@ def diagnose(
     false_alarm: chance that a robot without any gap is said to have one. max_effects: at most so many are named.
     test_share: of the pose groups, held out when the data has no `set`.
     search_poses: of more pose groups, so many are searched; errors are those of all rows.
-    resamples: bootstrap samples of pose groups for the intervals; each repeats the search.
+    resamples: draws of folds of pose groups for the intervals, with what was chosen fitted again; at most 10 more repeat the selection.
     rotation_length: [m] a rotation error of 1 rad counts as this length in reported errors.
     seed: of the split and of every simulation; the same seed gives the same result. threads: 0: as many as the machine has.
 

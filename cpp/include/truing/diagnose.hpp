@@ -24,7 +24,7 @@ struct DiagnoseOptions {
   int max_effects = 12;              ///< at most so many are named
   double test_share = 0.2;           ///< of the pose groups, held out when `set` is absent
   std::size_t search_poses = 6000;   ///< of more pose groups, so many are searched; errors are those of all rows
-  int resamples = 60;                ///< bootstrap of pose groups, each repeating the search
+  int resamples = 60;                ///< draws of folds for the intervals, what was chosen fitted again; at most 10 more repeat the selection
   double rotation_length = 0.1;      ///< [m]: a rotation error of 1 rad counts as this length in reported errors
   std::uint64_t seed = 0;            ///< of the split and of every simulation
   int threads = 0;                   ///< 0: as many as the machine has
