@@ -126,6 +126,18 @@ static std::string separated_by(const std::string& a, const std::string& b) {
   return "measure poses where the two differ: see the next poses";
 }
 
+/// The effects that `identify` is to be asked for. None: a frame that wanders freely is no effect of its catalogue.
+static std::string identify_as(const Explanation& e) {
+  if (e.kind == Kind::drift) return "";
+  if (e.kind == Kind::all_geometry) return e.effect;
+  std::string out;
+  for (const EffectRequest& request : e.requests.empty() ? std::vector<EffectRequest>{{e.effect, e.joints}} : e.requests) {
+    out += (out.empty() ? "" : ",") + request.effect;
+    for (std::size_t k = 0; k < request.joints.size(); ++k) out += (k == 0 ? ":" : "+") + request.joints[k];
+  }
+  return out;
+}
+
 /// What the user reads of one group.
 FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at, const Sureness& sure, double probability,
                      const Identification& refitted, const Resampled& resampled) {
@@ -137,6 +149,7 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   out.effect = e.effect;
   out.joints = e.joints;
   out.note = e.note;
+  out.identify_as = identify_as(e);
   out.probability = probability;
   for (const Parameter& parameter : refitted.parameters) {
     if (std::find(e.parameters.begin(), e.parameters.end(), parameter.name) == e.parameters.end()) continue;

@@ -179,6 +179,9 @@ void bind_findings(py::module_& m) {
   found.def_property_readonly(
       "confounded_with", [](const FoundEffect& e) { return tuple_of(e.confounded_with); },
       "Effects that would explain these data as well.");
+  found.def_readonly("identify_as", &FoundEffect::identify_as,
+                     "What `identify(effects=...)` and `--effects` take for it: 'backlash:J3'; empty for a "
+                     "frame that wanders.");
   found.def_readonly("note", &FoundEffect::note, "What else is to be known of it; may be empty.");
   found.def_property_readonly(
       "curves", [](const FoundEffect& e) { return tuple_of(e.curves); },

@@ -1357,6 +1357,11 @@ class FoundEffect:
         Held-out errors without this effect, all others in [m].
         """
     @property
+    def identify_as(self) -> str:
+        """
+        What `identify(effects=...)` and `--effects` take for it: 'backlash:J3'; empty for a frame that wanders.
+        """
+    @property
     def joints(self) -> tuple[str, ...]:
         """
         Where.

@@ -333,6 +333,8 @@ def _effect(page: Page, effect: Mapping[str, Any], number: int) -> None:
     if effect["note"]:
         words.append(f"<p><b>Note:</b> {escaped(effect['note'])}.</p>".replace("..</p>", ".</p>"))
     words.append(_confounded(effect))
+    if effect.get("identify_as"):
+        words.append(f'<p class="muted">To fit it: truing identify … --effects {escaped(effect["identify_as"])}</p>')
     _beside_curves(page, f"effect{number}", effect["curves"], colour, "".join(words), _parameters(effect), small=number >= FIRST_SCREEN)
     page.add("</section>")
 

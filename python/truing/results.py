@@ -401,6 +401,7 @@ def _effect(e: truing.FoundEffect, robot: truing.Robot) -> dict[str, Any]:
         "confounded_with": [{"effect": a.effect, "joints": list(a.joints), "probability": a.probability, "separated_by": a.separated_by}
                             for a in e.confounded_with],
         "note": e.note,
+        "identify_as": e.identify_as,
         "curves": [_curve(c, robot) for c in e.curves],
     }  # fmt: skip
 

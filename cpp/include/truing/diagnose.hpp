@@ -80,6 +80,7 @@ struct FoundEffect {
   double share_last = 0.0;              ///< that it closes when all others are in already
   std::vector<Alternative> confounded_with;
   std::string note;                     ///< "not linear in the torque", "direction inferred from the order of poses" …
+  std::string identify_as;              ///< what `truing identify --effects` takes for it: "backlash:J3"; empty: a frame that wanders
   std::vector<Curve> curves;            ///< the law drawn through what single poses say
 };
 
