@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <string>
 
 #include "arms.hpp"
@@ -149,6 +150,7 @@ TEST_CASE("diagnose names a backlash, its joint, its size, and by how much the e
   CHECK(effect.effect == "backlash");
   CHECK(effect.joints == std::vector<std::string>{"J3"});
   CHECK(effect.probability > 0.9);
+  CHECK(effect.identify_as == "backlash:J3");
   for (const truing::Alternative& other : effect.confounded_with) {  // nothing but what no column was recorded for
     CHECK(other.probability == 0.0);
     CHECK(other.separated_by.find("record") == 0);
@@ -472,17 +474,58 @@ TEST_CASE("diagnose refuses a handful of poses") {
   CHECK_THROWS_WITH_AS(diagnose(light_arm(), repeated->data), doctest::Contains("10 poses are too few"), std::invalid_argument);
 }
 
-TEST_CASE("diagnose finds unequal sides of a palletizer's parallelogram") {
+TEST_CASE("diagnose finds unequal bars of a palletizer's parallelograms") {
+  const std::map<std::string, double> between = {{"linkage.J4.cos", 1.5e-3}, {"linkage.J4.sin", -8e-4}};
+  const std::map<std::string, double> fixed_to_base_and_wrist = {{"linkage.J4.sin_first", 1.5e-3}, {"linkage.J4.cos_sum", -1.5e-3}};
+  for (const auto& bars : {between, fixed_to_base_and_wrist}) {
+    Robot truth = palletizer();
+    truth.effects = {{"linkage", {"J4"}, bars}};
+    const auto table = measured(truth, 160, 800);
+    const Diagnosis d = diagnose(palletizer(), table->data);
+    INFO(names(d));
+    REQUIRE(!d.effects.empty());
+    CHECK(d.effects[0].effect == "linkage");
+    CHECK(d.effects[0].joints == std::vector<std::string>{"J4"});
+    CHECK(d.effects[0].identify_as == "linkage:J4");
+    CHECK(d.effects.size() == 1);
+    CHECK(d.unknown.empty());
+  }
+}
+
+TEST_CASE("diagnose takes a first axis of a DH robot that tilts, wherever its base stands") {
   Robot truth = palletizer();
-  truth.effects = {{"linkage", {"J4"}, {{"linkage.J4.cos", 1.5e-3}, {"linkage.J4.sin", -8e-4}}}};
-  const auto table = measured(truth, 160, 800);
+  truth.joints[0].lower = -2.8;
+  truth.joints[0].upper = 2.8;
+  truth.effects = {{"axis_wobble", {"J1"}, {{"axis_wobble.J1.cos_x", 8e-4}, {"axis_wobble.J1.sin_y", 6e-4}}}};
+  const auto table = measured(truth, 160, 803);
   const Diagnosis d = diagnose(palletizer(), table->data);
   INFO(names(d));
   REQUIRE(!d.effects.empty());
-  CHECK(d.effects[0].effect == "linkage");
-  CHECK(d.effects[0].joints == std::vector<std::string>{"J4"});
+  CHECK(d.effects[0].effect == "axis_wobble");
+  CHECK(d.effects[0].joints == std::vector<std::string>{"J1"});
+  CHECK(d.after.rms < 2.0 * d.noise_floor);
+}
+
+TEST_CASE("diagnose sees that a target has slipped on the last link") {
+  Robot truth = light_arm();
+  auto table = measured(truth, 160, 805);
+  truth.targets[0].T_last_target.translation() += Eigen::Vector3d(6e-4, -8e-4, 3e-4);
+  const auto later = measured(truth, 160, 805);
+  std::vector<double> time(160);
+  for (std::size_t row = 0; row < 160; ++row) time[row] = 20.0 * static_cast<double>(row);
+  table->data.time = table->add(time);
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::vector<double> values(160);
+    for (std::size_t row = 0; row < 160; ++row) values[row] = (row < 90 ? table : later)->data.position[k][row];
+    table->data.position[k] = table->add(values);
+  }
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  INFO(names(d));
+  const truing::FoundEffect* slipped = found(d, "tool_frame", "");
+  REQUIRE(slipped);
+  CHECK(slipped->note.find("target tool moves on the last link") != std::string::npos);
+  CHECK(slipped->identify_as.empty());
   CHECK(d.effects.size() == 1);
-  CHECK(d.unknown.empty());
 }
 
 TEST_CASE("diagnose works on the lengths of a draw-wire") {

@@ -327,6 +327,24 @@ TEST_CASE("law: joints are named only where they mean something, and those that 
   }
 }
 
+TEST_CASE("law: bars of a palletizer's parallelograms turn by the difference of its drivers, by the first and by their sum") {
+  const Robot robot = palletizer();
+  const auto table = full_table(robot, 5, 46);
+  truing::Inputs in;
+  in.data = &table->data;
+  in.joints.resize(5);
+  in.joints << 0.1, 0.2, 0.5, -0.7, 0.3;
+  const std::vector<std::pair<std::string, double>> angles = {{"", 0.5 - 0.2}, {"_first", 0.2}, {"_sum", 0.2 + 0.5}};
+  const auto terms = truing::effect_terms({{"linkage", {"J4"}}}, robot, table->data);
+  REQUIRE(terms.size() == 6);
+  for (std::size_t k = 0; k < 3; ++k) {
+    CHECK(terms[2 * k].parameter == "linkage.J4.cos" + angles[k].first);
+    CHECK(terms[2 * k].basis(in) == doctest::Approx(std::cos(angles[k].second)));
+    CHECK(terms[2 * k + 1].parameter == "linkage.J4.sin" + angles[k].first);
+    CHECK(terms[2 * k + 1].basis(in) == doctest::Approx(std::sin(angles[k].second)));
+  }
+}
+
 TEST_CASE("springs under unknown weights do what a spring under the known ones does") {
   for (Robot robot : {ur10(), palletizer()}) {
     CAPTURE(robot.name);
