@@ -115,7 +115,7 @@ def solve(scene: HandEyeScene, *, pixels: bool = False, exact_hand: bool = False
         return float((residuals(scene, camera, board, own, pixels) ** 2).sum() + (0 if exact_hand else ((own / sigma) ** 2).sum()))
 
     cost, shared = cost_at(camera, board, own), np.eye(12)
-    for iteration in range(1, iterations + 1):
+    for taken in range(1, iterations + 1):
         r = residuals(scene, camera, board, own, pixels)
         J, Jo = np.zeros((n, r.shape[1], 12)), np.zeros((n, r.shape[1], 6))
         for k in range(6):
@@ -151,7 +151,7 @@ def solve(scene: HandEyeScene, *, pixels: bool = False, exact_hand: bool = False
         (camera, board, own), cost = candidate, min(cost, new)
         if done:
             break
-    return Oracle(camera, board, np.linalg.inv(shared), cost, iteration)
+    return Oracle(camera, board, np.asarray(np.linalg.inv(shared), dtype=float), cost, taken)
 
 
 def by_scipy(scene: HandEyeScene, *, pixels: bool = False) -> tuple[Floats, Floats]:
@@ -198,7 +198,8 @@ def main() -> None:
                 steps.append(found.iterations)
             deg, mm = np.median(errors, axis=0)
             what = ("reprojection only" if exact else "pixels and robot") if pixels else "poses"
-            print(f"| {setup}, {what}, {poses} | {trials} | {deg:.4f} | {mm:.3f} | {np.mean(fit):.3f} | {np.median(steps):.0f} | {1e3 * np.median(times):.0f} |", flush=True)
+            print(f"| {setup}, {what}, {poses} | {trials} | {deg:.4f} | {mm:.3f} | {np.mean(fit):.3f} | {np.median(steps):.0f} | "
+                  f"{1e3 * np.median(times):.0f} |", flush=True)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ class Board:
     def points(self) -> Floats:
         """Inner corners or centres of circles, row by row, shape=(rows * columns, 3) [m]."""
         x, y = np.meshgrid(np.arange(self.columns), np.arange(self.rows))
-        return self.spacing * np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+        return np.column_stack([self.spacing * x.ravel(), self.spacing * y.ravel(), np.zeros(x.size)])
 
     @property
     def centre(self) -> Floats:
@@ -76,7 +76,7 @@ class PinholeCamera:
     def project(self, points: Floats) -> Floats:
         """Points in the camera frame, shape=(..., 3) [m], to pixels, shape=(..., 2)."""
         distorted = self._distort(points[..., :2] / points[..., 2:])
-        return distorted * np.array([self.fx, self.fy]) + np.array([self.cx, self.cy])
+        return np.asarray(distorted * np.array([self.fx, self.fy]) + np.array([self.cx, self.cy]))
 
     def rays(self, pixels: Floats) -> Floats:
         """Pixels, shape=(..., 2), to undistorted coordinates x/z, y/z."""
@@ -84,7 +84,7 @@ class PinholeCamera:
         found = wanted.copy()
         for _ in range(20):  # a contraction for every lens that does not fold the image
             found += wanted - self._distort(found)
-        return found
+        return np.asarray(found)
 
     def _distort(self, ideal: Floats) -> Floats:
         k1, k2, p1, p2, k3 = self.distortion

@@ -1,0 +1,424 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""truing's hand-eye calibration beside OpenCV's seven, on the same scenes in one run.
+
+    python bench/handeye.py [--quick] [--only accuracy,images,...] [--write docs/benchmarks-handeye.md]
+
+Needs OpenCV 4 (`pip install "opencv-python-headless<5"`). `--write` puts the tables between the markers of the page.
+Trial k has seed k, in every cell; the oracle of bench/handeye_oracle.py says what can be had when the noises are known.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import platform
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from truing import handeye_simulation as simulation
+from truing.handeye_simulation import Board, HandEyeScene, simulate_handeye
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import handeye_oracle as oracle
+
+Floats = NDArray[np.float64]
+ROOT = Path(__file__).resolve().parent.parent
+NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Found:
+    T_parent_camera: Floats
+    T_parent_board: Floats | None = None
+    # of T_parent_camera: translation in the parent [m], then rotation about the camera's own axes [rad], as handeye_oracle.error_of
+    covariance: Floats | None = None
+    said: str = ""  # warnings, what was rejected, what could not be seen
+
+
+Method = Callable[[HandEyeScene], Found]
+
+
+# ---- truing ----------------------------------------------------------------------------------------------------------
+
+
+def ours_closed_form(scene: HandEyeScene) -> Found:
+    """truing.handeye(..., method="closed-form") on scene.T_base_hand and scene.T_camera_board."""
+    raise NotImplementedError("truing.handeye is not there yet")
+
+
+def ours_refined(scene: HandEyeScene) -> Found:
+    """truing.handeye(..., method="refined"), told scene.hand_m, hand_rad, camera_m, camera_rad."""
+    raise NotImplementedError("truing.handeye is not there yet")
+
+
+def ours_refined_unknown_noise(scene: HandEyeScene) -> Found:
+    """The same, told nothing about the noise."""
+    raise NotImplementedError("truing.handeye is not there yet")
+
+
+def ours_pixels(scene: HandEyeScene) -> Found:
+    """From scene.pixels (n, m, 2), scene.board.points (m, 3) and scene.camera, told scene.hand_m, hand_rad, pixel."""
+    raise NotImplementedError("truing.handeye is not there yet")
+
+
+# ---- Peers -----------------------------------------------------------------------------------------------------------
+
+HAND_EYE = {"Tsai": cv2.CALIB_HAND_EYE_TSAI, "Park": cv2.CALIB_HAND_EYE_PARK, "Horaud": cv2.CALIB_HAND_EYE_HORAUD,
+            "Andreff": cv2.CALIB_HAND_EYE_ANDREFF, "Daniilidis": cv2.CALIB_HAND_EYE_DANIILIDIS}  # fmt: skip
+ROBOT_WORLD = {"Shah": cv2.CALIB_ROBOT_WORLD_HAND_EYE_SHAH, "Li": cv2.CALIB_ROBOT_WORLD_HAND_EYE_LI}
+
+
+def parts(T: Floats) -> tuple[list[Floats], list[Floats]]:
+    return list(T[:, :3, :3]), list(T[:, :3, 3])
+
+
+def frame(R: Any, t: Any) -> Floats:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, np.ravel(t)
+    return T
+
+
+def opencv_hand_eye(method: int) -> Method:
+    def solve(scene: HandEyeScene) -> Found:
+        # For a camera that stands still OpenCV's manual wants base-from-hand turned round, and the camera comes out in the base.
+        hand = scene.T_base_hand if scene.setup == "eye-in-hand" else oracle.inverse(scene.T_base_hand)
+        return Found(frame(*cv2.calibrateHandEye(*parts(hand), *parts(scene.T_camera_board), method=method)))
+
+    return solve
+
+
+def opencv_robot_world(method: int) -> Method:
+    def solve(scene: HandEyeScene) -> Found:
+        # Both setups are A X = Z B; with a camera that stands still the hand carries the board, so hand and base change places.
+        hand = oracle.inverse(scene.T_base_hand) if scene.setup == "eye-in-hand" else scene.T_base_hand
+        R_x, t_x, R_z, t_z = cv2.calibrateRobotWorldHandEye(*parts(scene.T_camera_board), *parts(hand), method=method)
+        return Found(oracle.inverse(frame(R_z, t_z)), oracle.inverse(frame(R_x, t_x)))
+
+    return solve
+
+
+def oracle_poses(scene: HandEyeScene) -> Found:
+    found = oracle.solve(scene.select([k for k in range(scene.poses) if k not in scene.outlier_rows]))
+    return Found(found.T_parent_camera, found.T_parent_board, found.covariance[:6, :6])
+
+
+def oracle_pixels(scene: HandEyeScene) -> Found:
+    found = oracle.solve(scene, pixels=True)
+    return Found(found.T_parent_camera, found.T_parent_board, found.covariance[:6, :6])
+
+
+def reprojection_only(scene: HandEyeScene) -> Found:
+    found = oracle.solve(scene, pixels=True, exact_hand=True)
+    return Found(found.T_parent_camera, found.T_parent_board, found.covariance[:6, :6])
+
+
+OPENCV: dict[str, Method] = {**{f"OpenCV {name}": opencv_hand_eye(which) for name, which in HAND_EYE.items()},
+                             **{f"OpenCV robot-world {name}": opencv_robot_world(which) for name, which in ROBOT_WORLD.items()}}  # fmt: skip
+OURS: dict[str, Method] = {"truing closed form": ours_closed_form, "truing": ours_refined, "truing, noise not told": ours_refined_unknown_noise}
+ORACLE: dict[str, Method] = {"oracle: noises known": oracle_poses}
+ORACLE_PIXELS: dict[str, Method] = {"oracle: reprojection only": reprojection_only, "oracle: pixels and robot": oracle_pixels}
+
+
+def by_pnp(scene: HandEyeScene) -> HandEyeScene:
+    """T_camera_board from the pixels, each image by itself, by OpenCV."""
+    assert scene.pixels is not None
+    seen = []
+    for pixels in scene.pixels:
+        _, turn, t = cv2.solvePnP(scene.board.points, pixels, scene.camera.matrix, np.array(scene.camera.distortion), flags=cv2.SOLVEPNP_ITERATIVE)
+        seen.append(frame(cv2.Rodrigues(turn)[0], t))
+    return replace(scene, T_camera_board=np.array(seen))
+
+
+# ---- Running ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Tally:
+    """Errors and times of one method over the trials of one cell; what failed has an infinite error."""
+
+    degrees: list[float]
+    millimetres: list[float]
+    seconds: list[float]
+    failures: int = 0
+    missing: bool = False
+
+    @property
+    def median(self) -> tuple[float, float]:
+        return (float(np.median(self.degrees)), float(np.median(self.millimetres))) if self.degrees else (math.nan, math.nan)
+
+
+def attempt(method: Method, scene: HandEyeScene) -> Found | str:
+    """What was found, or why nothing was."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            found = method(scene)
+        except (cv2.error, ValueError, RuntimeError, np.linalg.LinAlgError) as error:
+            if isinstance(error, NotImplementedError):
+                raise
+            words = str(getattr(error, "err", error)).strip().splitlines()  # OpenCV: the assertion, without file and line
+            return f"{'OpenCV' if isinstance(error, cv2.error) else type(error).__name__}: {words[0] if words else error}"
+    if not np.isfinite(found.T_parent_camera).all():
+        return "NaN"
+    if np.array_equal(found.T_parent_camera, np.eye(4)):  # how OpenCV's Tsai gives up; a line in its log says so
+        found = replace(found, said="identity")
+    if caught:
+        found = replace(found, said="; ".join([found.said, *(str(one.message) for one in caught)]).strip("; "))
+    return found
+
+
+def tally(methods: Mapping[str, Method], trials: Mapping[str, int], scene_of: Callable[[int], HandEyeScene]) -> dict[str, Tally]:
+    out = {name: Tally([], [], []) for name in methods}
+    for seed in range(max(trials.values())):
+        scene = scene_of(seed)
+        for name, method in methods.items():
+            one = out[name]
+            if seed >= trials[name] or one.missing:
+                continue
+            begun = time.perf_counter()
+            try:
+                found = attempt(method, scene)
+            except NotImplementedError:
+                one.missing = True
+                continue
+            one.seconds.append(time.perf_counter() - begun)
+            if isinstance(found, str):
+                one.failures += 1
+                degrees, millimetres = math.inf, math.inf
+            else:
+                degrees, millimetres = oracle.degrees_millimetres(scene.T_parent_camera, found.T_parent_camera)
+            one.degrees.append(degrees)
+            one.millimetres.append(millimetres)
+    return out
+
+
+def scenes(**options: Any) -> Callable[[int], HandEyeScene]:
+    """Trial k has seed k."""
+    return lambda seed: simulate_handeye(**options, seed=seed)
+
+
+def number(value: float) -> str:
+    return "–" if math.isnan(value) else "failed" if math.isinf(value) else f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+def milliseconds(seconds: list[float]) -> str:
+    return number(1e3 * float(np.median(seconds))) if seconds else "–"
+
+
+def cell(one: Tally) -> str:
+    if one.missing:
+        return "–"
+    return f"{number(one.median[0])} / {number(one.median[1])}" + (f" ({one.failures} failed)" if one.failures else "")
+
+
+def note(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+# ---- Tables ----------------------------------------------------------------------------------------------------------
+
+
+def accuracy(quick: bool) -> Iterator[str]:
+    """Errors and times at several numbers of poses, both setups."""
+    for setup in simulation.SETUPS:
+        results: dict[int, dict[str, Tally]] = {}
+        for poses in (10, 30, 100) if quick else (10, 30, 100, 1000):
+            methods = {**OPENCV, **ORACLE, **OURS}
+            many = (20 if quick else 100) if poses < 1000 else 20
+            trials = {name: many for name in methods}
+            if poses == 1000:
+                for name in HAND_EYE:
+                    trials[f"OpenCV {name}"] = 5  # seconds each, and more than a gigabyte
+            results[poses] = tally(methods, trials, scenes(setup=setup, poses=poses))
+            note(f"{setup}, {poses} poses")
+        yield from ("", f"### {setup}", "")
+        yield "| | " + " | ".join(f"N = {poses}" for poses in results) + " | ms: " + " / ".join(map(str, results)) + " | times truing's |"
+        yield "| --- |" + " --- |" * (len(results) + 2)
+        for name in next(iter(results.values())):
+            yield (f"| {name} | " + " | ".join(cell(result[name]) for result in results.values()) + " | "
+                   + " / ".join(milliseconds(result[name].seconds) for result in results.values()) + f" | {ratios(results, name)} |")  # fmt: skip
+    yield from ("", f"Median rotation [deg] / translation [mm] error of the camera over {20 if quick else 100} scenes; "
+                "at N = 1000 over 20, and 5 for OpenCV's five. Last column: error over truing's (the oracle's where truing has none), "
+                "geometric mean over N, rotation / translation.")  # fmt: skip
+
+
+def ratios(results: Mapping[int, Mapping[str, Tally]], name: str) -> str:
+    against = "truing" if not next(iter(results.values()))["truing"].missing else next(iter(ORACLE))
+    if all(result[name].missing for result in results.values()):
+        return "–"
+    logs = np.log([[result[name].median[k] / result[against].median[k] for k in (0, 1)] for result in results.values()])
+    return " / ".join("failed" if not math.isfinite(value) else f"{math.exp(value):.2f}" for value in logs.mean(axis=0))
+
+
+def outliers(quick: bool) -> Iterator[str]:
+    """10 degrees and 30 mm in a share of the boards; the oracle knows which."""
+    methods = {**OPENCV, **ORACLE, **OURS}
+    trials = {name: 20 if quick else 100 for name in methods}
+    results = {share: tally(methods, trials, scenes(poses=30, outliers=share)) for share in (0.0, 0.1, 0.3)}
+    yield from ("", "| | " + " | ".join(f"{100 * share:.0f} %" for share in results) + " | ms |", "| --- |" + " --- |" * (len(results) + 1))
+    for name in methods:
+        yield f"| {name} | " + " | ".join(cell(result[name]) for result in results.values()) + f" | {milliseconds(results[0.3][name].seconds)} |"
+    yield from ("", "Eye-to-hand, 30 poses; that share of the boards is seen 10 deg and 30 mm off. The oracle is told which.")
+
+
+def images(quick: bool) -> Iterator[str]:
+    """Chessboard corners in pixels."""
+
+    def through_pnp(method: Method) -> Method:
+        return lambda scene: method(by_pnp(scene))
+
+    peers = {f"solvePnP, {name}": through_pnp(method) for name, method in OPENCV.items()}
+    methods = {**peers, **ORACLE_PIXELS, "truing": ours_pixels}
+    trials = {name: 10 if quick else 100 for name in methods}
+    results = {setup: tally(methods, trials, scenes(setup=setup, poses=30, board=Board())) for setup in simulation.SETUPS}
+    yield from ("", "| | " + " | ".join(results) + " | ms |", "| --- |" + " --- |" * (len(results) + 1))
+    for name in methods:
+        yield f"| {name} | " + " | ".join(cell(result[name]) for result in results.values()) + f" | {milliseconds(results['eye-to-hand'][name].seconds)} |"
+    yield from ("", "30 images of a 9 x 6 chessboard of 25 mm, 1280 x 960 pixels, plumb_bob distortion, 0.1 px of noise per axis; robot 0.05 deg, 0.1 mm. "
+                "Times of OpenCV include its 30 solvePnP.")  # fmt: skip
+
+
+def coverage(quick: bool) -> Iterator[str]:
+    """How often the truth lies within the 95 % intervals that a method states."""
+    seeds = 50 if quick else 500
+    cells: list[tuple[str, str, Method, Callable[[int], HandEyeScene]]] = []
+    for setup in simulation.SETUPS:
+        for poses in (10, 30):
+            of_poses = scenes(setup=setup, poses=poses)
+            cells += [(f"{setup}, {poses} poses", name, method, of_poses) for name, method in {**ORACLE, **OURS}.items()]
+    of_pixels = scenes(poses=30, board=Board())
+    cells += [("eye-to-hand, 30 images", name, method, of_pixels) for name, method in {**ORACLE_PIXELS, "truing": ours_pixels}.items()]
+    yield from ("", "| scene | method | seeds | x | y | z | rx | ry | rz | mean squared normalised error / 6 |", "| --- |" + " --- |" * 9)
+    for what, name, method, scene_of in cells:
+        count = max(10, seeds // 5) if "oracle: " in name and "image" in what else seeds  # half a second each
+        inside, squared = [], []
+        for seed in range(count):
+            scene = scene_of(seed)
+            try:
+                found = attempt(method, scene)
+            except NotImplementedError:
+                break
+            if isinstance(found, str) or found.covariance is None:
+                inside.append(np.zeros(6, dtype=bool))
+                continue
+            error = oracle.error_of(scene.T_parent_camera, found.T_parent_camera)
+            inside.append(np.abs(error) < NORMAL_95 * np.sqrt(np.diag(found.covariance)))
+            squared.append(error @ np.linalg.solve(found.covariance, error) / 6)
+        if inside and squared:
+            yield f"| {what} | {name} | {count} | " + " | ".join(f"{100 * share:.1f} %" for share in np.mean(inside, axis=0)) + f" | {np.mean(squared):.3f} |"
+        elif not inside:
+            yield f"| {what} | {name} | – |" + " – |" * 7
+        note(f"coverage: {what}, {name}")
+    yield from ("", f"Of the camera's place in its parent and of its rotation about its own axes. 95 % and 1 are right; with {seeds} seeds 95 % may read "
+                f"{95 - 196 * math.sqrt(0.0475 / seeds):.1f} to {min(100.0, 95 + 196 * math.sqrt(0.0475 / seeds)):.1f} %.")  # fmt: skip
+
+
+def failures(quick: bool) -> Iterator[str]:
+    """What comes out of data that cannot tell, or are wrong, and whether anybody says so."""
+    del quick
+    methods = {**OPENCV, **OURS}
+    for setup in simulation.SETUPS:
+        yield from ("", f"### {setup}", "", "| | " + " | ".join(methods) + " |", "| --- |" + " --- |" * len(methods))
+        bad = {name: make(setup, seed=1) for name, make in simulation.DEGENERATE.items()}
+        bad.update({name: spoil(simulate_handeye(setup, 30, seed=1)) for name, spoil in simulation.MISTAKES.items()})
+        for name, scene in bad.items():
+            words = []
+            for method in methods.values():
+                try:
+                    found = attempt(method, scene)
+                except NotImplementedError:
+                    words.append("–")
+                    continue
+                if isinstance(found, str):
+                    words.append(found.replace("|", "/")[:90])
+                    continue
+                degrees, millimetres = oracle.degrees_millimetres(scene.T_parent_camera, found.T_parent_camera)
+                words.append(f"{number(degrees)} / {number(millimetres)}" + (f": {found.said}".replace("|", "/") if found.said else ""))
+            yield f"| {name} | " + " | ".join(words) + " |"
+    yield from ("", "Error [deg] / [mm] of one scene of 30 poses (seed 1) with the usual noise; a figure alone was given without a word.")
+
+
+def invariance(quick: bool) -> Iterator[str]:
+    """The same poses in another order, and in another unit, should give the same."""
+    seeds = 5 if quick else 20
+    methods = {**OPENCV, **OURS}
+    yield from ("", "| | other order [deg] / [mm] | mm for m, in everything [deg] / [mm] |", "| --- | --- | --- |")
+    for name, method in methods.items():
+        moved: dict[str, list[tuple[float, float]]] = {"order": [], "unit": []}
+        try:
+            for seed in range(seeds):
+                scene = simulate_handeye(poses=30, seed=seed)
+                found = [attempt(method, one) for one in (scene, simulation.shuffled(scene), simulation.scaled(scene))]
+                if any(isinstance(one, str) for one in found):
+                    continue
+                first, order, unit = (one.T_parent_camera for one in found if not isinstance(one, str))
+                unit = unit.copy()
+                unit[:3, 3] /= 1000
+                moved["order"].append(oracle.degrees_millimetres(first, order))
+                moved["unit"].append(oracle.degrees_millimetres(first, unit))
+        except NotImplementedError:
+            yield f"| {name} | – | – |"
+            continue
+        yield f"| {name} | " + " | ".join(" / ".join(f"{value:.2g}" for value in np.max(rows, axis=0)) if rows else "failed" for rows in moved.values()) + " |"
+    yield from ("", f"The largest movement of the camera over {seeds} eye-to-hand scenes of 30 poses. Only the data changes; nothing of it is an error.")
+
+
+TABLES: dict[str, tuple[str, Callable[[bool], Iterator[str]]]] = {
+    "accuracy": ("Accuracy and time", accuracy), "outliers": ("Outliers", outliers), "images": ("From images", images),
+    "coverage": ("Are the intervals true?", coverage), "failures": ("Bad data", failures), "invariance": ("Order and units", invariance),
+}  # fmt: skip
+
+
+def machine() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="ascii", errors="replace").splitlines()
+        processor = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        processor = platform.processor() or platform.machine()
+    return f"{processor}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}, NumPy {np.__version__}, OpenCV {cv2.__version__}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer trials, and no scene of 1000 poses")
+    parser.add_argument("--only", default=",".join(TABLES), help="tables to make, with commas between")
+    parser.add_argument("--write", type=Path, help="the page whose markers <!-- table --> and <!-- end --> take the tables")
+    arguments = parser.parse_args()
+    wanted = arguments.only.split(",")
+    unknown = [name for name in wanted if name not in TABLES]
+    if unknown:
+        parser.error(f"no table {unknown[0]!r}; there are {', '.join(TABLES)}")
+    page = arguments.write.read_text(encoding="utf-8") if arguments.write else ""
+    if arguments.write and not ("<!-- table -->" in page and "<!-- end -->" in page):
+        parser.error(f"{arguments.write} has no markers <!-- table --> and <!-- end -->")
+    cv2.setNumThreads(1)
+    before = os.getloadavg()[0] if hasattr(os, "getloadavg") else math.nan
+    lines = []
+    for name in wanted:
+        title, table = TABLES[name]
+        lines += ["", f"## {title}", *table(arguments.quick)]
+        print("\n".join(lines[-60:]) if not arguments.write else f"{title}: done", file=sys.stdout if not arguments.write else sys.stderr, flush=True)
+        if not arguments.write:
+            lines = []
+    if arguments.write:
+        command = "python bench/handeye.py" + (" --quick" if arguments.quick else "") + (f" --only {arguments.only}" if wanted != list(TABLES) else "")
+        after = os.getloadavg()[0] if hasattr(os, "getloadavg") else math.nan
+        about = [f"From `{command}` on {datetime.now(timezone.utc):%Y-%m-%d}: {machine()}. Load average {before:.1f} before and {after:.1f} after, "
+                 "this program's own work included; above the number of cores, believe no time but in ratio."]  # fmt: skip
+        start, end = page.index("<!-- table -->") + len("<!-- table -->"), page.index("<!-- end -->")
+        arguments.write.write_text(page[:start] + "\n" + "\n".join([*about, *lines]) + "\n" + page[end:], encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
