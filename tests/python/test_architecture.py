@@ -125,6 +125,7 @@ PYTHON_MAY_IMPORT = {
     "truing.api": {"truing._core", "truing.errors", "truing.effects"},
     "truing.files": {"truing._core", "truing.errors", "truing.files"},
     "truing.simulation": {"truing", "truing.errors", "truing.files"},
+    "truing.handeye_simulation": {"truing.errors"},  # no solver: it says what solvers should find
     "truing.results": {"truing", "truing.errors", "truing.files", "truing.report", "truing.diagnose_report"},
     "truing.report": {"truing.results"},
     "truing.diagnose_report": {"truing.results", "truing.report"},
