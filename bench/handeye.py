@@ -326,27 +326,35 @@ def coverage(quick: bool) -> Iterator[str]:
 
 def failures(quick: bool) -> Iterator[str]:
     """What comes out of data that cannot tell, or are wrong, and whether anybody says so."""
-    del quick
+    seeds = range(1, 4 if quick else 12)
     methods = {**OPENCV, **OURS}
     for setup in simulation.SETUPS:
         yield from ("", f"### {setup}", "", "| | " + " | ".join(methods) + " |", "| --- |" + " --- |" * len(methods))
-        bad = {name: make(setup, seed=1) for name, make in simulation.DEGENERATE.items()}
-        bad.update({name: spoil(simulate_handeye(setup, 30, seed=1)) for name, spoil in simulation.MISTAKES.items()})
-        for name, scene in bad.items():
-            words = []
-            for method in methods.values():
-                try:
-                    found = attempt(method, scene)
-                except NotImplementedError:
-                    words.append("–")
-                    continue
-                if isinstance(found, str):
-                    words.append(found.replace("|", "/")[:90])
-                    continue
-                degrees, millimetres = oracle.degrees_millimetres(scene.T_parent_camera, found.T_parent_camera)
-                words.append(f"{number(degrees)} / {number(millimetres)}" + (f": {found.said}".replace("|", "/") if found.said else ""))
-            yield f"| {name} | " + " | ".join(words) + " |"
-    yield from ("", "Error [deg] / [mm] of one scene of 30 poses (seed 1) with the usual noise; a figure alone was given without a word.")
+        bad = {name: [make(setup, seed=seed) for seed in seeds] for name, make in simulation.DEGENERATE.items()}
+        bad.update({name: [spoil(simulate_handeye(setup, 30, seed=seed)) for seed in seeds] for name, spoil in simulation.MISTAKES.items()})
+        for name, scenes in bad.items():
+            yield f"| {name} | " + " | ".join(in_words(method, scenes) for method in methods.values()) + " |"
+    yield from ("", f"Median error [deg] / [mm] of {len(seeds)} scenes of 30 poses (5 equal ones, 2) with the usual noise; a figure alone was given without a "
+                "word. In brackets how often there was none, or what was said; \"identity\": OpenCV gives the identity and writes a line to its log. One rotation "
+                "axis leaves one coordinate open, pure translation three; there every figure but a refusal is luck.")  # fmt: skip
+
+
+def in_words(method: Method, scenes: list[HandEyeScene]) -> str:
+    errors, refusals, remarks = [], [], []
+    for scene in scenes:
+        try:
+            found = attempt(method, scene)
+        except NotImplementedError:
+            return "–"
+        if isinstance(found, str):
+            refusals.append(found.removeprefix("OpenCV: ").strip("> :"))
+            continue
+        errors.append(oracle.degrees_millimetres(scene.T_parent_camera, found.T_parent_camera))
+        if found.said:
+            remarks.append(found.said)
+    figures = " / ".join(number(float(value)) for value in np.median(errors, axis=0)) if errors else ""
+    said = [f"{len(words)} of {len(scenes)}: {words[0]}" for words in (refusals, remarks) if words]
+    return (f"{figures} ({'; '.join(said)})" if figures and said else figures or said[0]).replace("|", "/").replace("\n", " ")
 
 
 def invariance(quick: bool) -> Iterator[str]:
