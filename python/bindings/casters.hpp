@@ -24,6 +24,7 @@
 #include <Eigen/Geometry>
 
 #include "truing/diagnose.hpp"
+#include "truing/handeye.hpp"
 #include "truing/truing.hpp"
 
 namespace truing::python {
@@ -38,6 +39,11 @@ class ArrayLike : public py::object {
 /// One label (or number) per row.
 class Labels : public py::object {
   PYBIND11_OBJECT_DEFAULT(Labels, py::object, [](PyObject* pointer) { return pointer != nullptr; })
+};
+
+/// Frames, shape (n, 4, 4).
+class FrameArray : public py::object {
+  PYBIND11_OBJECT_DEFAULT(FrameArray, py::object, [](PyObject* pointer) { return pointer != nullptr; })
 };
 
 /// A read-only mapping.
@@ -104,6 +110,28 @@ struct Words<Verdict> {
   static constexpr std::array<const char*, 4> list{"none", "effects", "unknown", "effects+unknown"};
   static constexpr auto type =
       py::detail::const_name("typing.Literal['none', 'effects', 'unknown', 'effects+unknown']");
+};
+
+template <>
+struct Words<HandEyeSetup> {
+  static constexpr const char* what = "set-up";
+  static constexpr std::array<const char*, 2> list{"eye-in-hand", "eye-to-hand"};
+  static constexpr auto type = py::detail::const_name("typing.Literal['eye-in-hand', 'eye-to-hand']");
+};
+
+template <>
+struct Words<HandEyeMethod> {
+  static constexpr const char* what = "method";
+  static constexpr std::array<const char*, 2> list{"refined", "closed-form"};
+  static constexpr auto type = py::detail::const_name("typing.Literal['refined', 'closed-form']");
+};
+
+template <>
+struct Words<HandEyeStatus> {
+  static constexpr const char* what = "status";
+  static constexpr std::array<const char*, 4> list{"done", "not observable", "not closing", "not converged"};
+  static constexpr auto type =
+      py::detail::const_name("typing.Literal['done', 'not observable', 'not closing', 'not converged']");
 };
 
 template <class Enum>
@@ -227,6 +255,7 @@ void bind_identify(py::module_& m);
 void bind_plan(py::module_& m);
 void bind_diagnose(py::module_& m);
 void bind_distinguish(py::module_& m);
+void bind_handeye(py::module_& m);
 
 /// A double array of whatever strides, without a copy unless its type or memory layout calls for one.
 py::array float_array(py::handle object, const std::string& name);
@@ -263,6 +292,12 @@ struct handle_type_name<truing::python::Labels> {
   static constexpr auto name = const_name("numpy.typing.ArrayLike | collections.abc.Sequence[str | None]");
 };
 
+template <>
+struct handle_type_name<truing::python::FrameArray> {
+  static constexpr auto name =
+      const_name("typing.Annotated[numpy.typing.ArrayLike, numpy.float64, \"[n, 4, 4]\"]");
+};
+
 template <class Key, class Value>
 struct handle_type_name<truing::python::Mapping<Key, Value>> {
   static constexpr auto name = const_name("types.MappingProxyType[") + make_caster<Key>::name +
@@ -297,6 +332,12 @@ template <>
 struct type_caster<truing::Observability> : word_caster<truing::Observability> {};
 template <>
 struct type_caster<truing::Verdict> : word_caster<truing::Verdict> {};
+template <>
+struct type_caster<truing::HandEyeSetup> : word_caster<truing::HandEyeSetup> {};
+template <>
+struct type_caster<truing::HandEyeMethod> : word_caster<truing::HandEyeMethod> {};
+template <>
+struct type_caster<truing::HandEyeStatus> : word_caster<truing::HandEyeStatus> {};
 
 template <>
 struct type_caster<Eigen::Isometry3d> {

@@ -8,6 +8,7 @@ Exit status: 0 done (a diagnosis that finds nothing, or something unknown, is an
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import math
 import os
 import re
@@ -19,6 +20,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Optional, TypeVar
 
+import numpy as np
 import typer
 
 from truing.errors import InputError, InputWarning
@@ -26,7 +28,7 @@ from truing.errors import InputError, InputWarning
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from truing import Measurements, Robot
+    from truing import ClockOffset, HandEyeData, HandEyePoses, Measurements, Robot
 
 Result = TypeVar("Result")
 
@@ -85,6 +87,20 @@ class RecordName(str, Enum):
     qr = "qr"
 
 
+class SetupName(str, Enum):
+    """--setup"""
+
+    eye_in_hand = "eye-in-hand"
+    eye_to_hand = "eye-to-hand"
+
+
+class MethodName(str, Enum):
+    """--method"""
+
+    refined = "refined"
+    closed_form = "closed-form"
+
+
 class ExamSet(str, Enum):
     """--set"""
 
@@ -109,13 +125,14 @@ _UNITS = {
     "angle": {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6, "deg": math.pi / 180, "°": math.pi / 180},
     "mass": {"kg": 1.0, "g": 1e-3},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0},
+    "pixel": {"px": 1.0},
 }
-_EXAMPLES = {"length": "0.03mm", "angle": "15deg", "mass": "5kg", "time": "40ms"}
+_EXAMPLES = {"length": "0.03mm", "angle": "15deg", "mass": "5kg", "time": "40ms", "pixel": "0.2px"}
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d]*)\s*")
 
 
 def quantity(text: str, kind: str, option: str) -> float:
-    """`text` ("0.03mm", "15deg", "40ms") in SI. `kind`: length, angle, mass or time. Raises InputError that names `option`."""
+    """`text` ("0.03mm", "15deg", "40ms", "0.2px") in SI. `kind`: length, angle, mass, time or pixel. Raises InputError that names `option`."""
     match = _QUANTITY.fullmatch(text)
     units = _UNITS[kind]
     value = float(match[1]) if match else math.nan
@@ -503,6 +520,104 @@ def demo(
 
 
 @app.command()
+def handeye(
+    poses: Annotated[Path, typer.Argument(metavar="POSES", help="CSV or Parquet: hand poses, and board poses or images, one row per robot pose.", show_default=False)],
+    out: Annotated[Optional[Path], _out("handeye")] = None,
+    setup: Annotated[SetupName, typer.Option(help="Camera on the hand and board in the cell, or camera in the cell and board on the hand.")] = SetupName.eye_in_hand,
+    method: Annotated[MethodName, typer.Option(help="Maximum likelihood, or dual quaternions and one SVD alone.")] = MethodName.refined,
+    board: Annotated[str, typer.Option(help="What is in the images: chessboard:9x6:25mm (inner corners), charuco:5x7:40mm:30mm, circles:10x10:25.4mm, acircles:4x11:20mm.", show_default=False)] = "",
+    camera: Annotated[Optional[Path], typer.Option(help="Camera file with focal lengths and distortion. Default: found from the images.", show_default=False)] = None,
+    refine_camera: Annotated[bool, typer.Option("--refine-camera", help="Find the values of the given camera file anew, from the images.")] = False,
+    angles: Annotated[str, typer.Option(help="What columns hand_rx_deg … mean: rotation-vector (UR), zyx (KUKA A B C, Fanuc W P R), xyz, zyz …", show_default=False)] = "",
+    board_poses: Annotated[Optional[Path], typer.Option(help="Board poses with times of their own (t_s); POSES then has times and hand poses. The clocks' offset is found.", show_default=False)] = None,
+    hand_sigma: Annotated[str, typer.Option(metavar="LENGTH,ANGLE", help="Noise of the robot's poses, one component: 0.1mm,0.05deg. Default: found from the data.", show_default=False)] = "",
+    camera_sigma: Annotated[str, typer.Option(metavar="LENGTH,ANGLE", help="Noise of the board's poses, likewise; without images.", show_default=False)] = "",
+    pixel_sigma: Annotated[str, typer.Option(help="Noise of the board's points in images: 0.2px. Default: found from the data.", show_default=False)] = "",
+    working_point: Annotated[str, typer.Option(metavar="X,Y,Z", help="Where accuracy is asked for, in the camera frame: 0,0,800mm. Default: where the board was, on average.", show_default=False)] = "",
+    known_height: Annotated[str, typer.Option(help="Where the hand only turned about parallel axes: the camera's coordinate along them, 850mm.", show_default=False)] = "",
+    keep_all: Annotated[bool, typer.Option("--keep-all", help="Reject no pose.")] = False,
+    reading: Annotated[str, typer.Option(help="Read the numbers otherwise, as an earlier run proposed.", show_default=False)] = "",
+    with_kinematics: Annotated[Optional[Path], typer.Option(metavar="ROBOT", help="Find the robot's own parameters as well, from columns q1_rad … and this robot file.", show_default=False)] = None,
+    free: Annotated[str, typer.Option(help="With --with-kinematics: parameters to find, names and globs. Default: all geometry.", show_default=False)] = "",
+    hold: Annotated[str, typer.Option(help="With --with-kinematics: names and globs that stay at nominal.", show_default=False)] = "",
+    effects: Annotated[str, typer.Option(help="With --with-kinematics: effects to find as well. `truing effects` lists them.", show_default=False)] = "",
+    plan: Annotated[int, typer.Option(help="So many robot poses that would help most are written to next_poses.csv.", min=0, max=100)] = 0,
+    seed: Seed = 0,
+    base_link: BaseLink = "",
+    tip_link: TipLink = "",
+    json: Json = False,
+) -> None:
+    """Find where the camera is, from poses of the hand and of a board, or from images of the board.
+
+    Writes result.json, report.html, residuals.csv; camera.yaml if the camera's values were found, next_poses.csv with --plan, robot.yaml with --with-kinematics.
+    """
+    from truing.files import atomic_output_dir, load_robot
+
+    folder = out or Path("truing-handeye")
+    keywords: dict[str, Any] = {"setup": setup.value, "method": method.value, "reject": not keep_all, "reading": reading}
+    for option, text, names in (("--hand-sigma", hand_sigma, ("hand_m", "hand_rad")), ("--camera-sigma", camera_sigma, ("camera_m", "camera_rad"))):
+        if text:
+            keywords.update(zip(names, _length_and_angle(text, option), strict=True))
+    if pixel_sigma:
+        keywords["pixel"] = _above_zero(quantity(pixel_sigma, "pixel", "--pixel-sigma"), pixel_sigma, "--pixel-sigma")
+    if working_point:
+        keywords["working_point"] = _point(working_point)
+    if known_height:
+        keywords["known_height"] = quantity(known_height, "length", "--known-height")
+    if refine_camera:
+        keywords["refine_camera"] = True
+    _require_sense(board, camera, refine_camera, board_poses, with_kinematics, free or hold or effects, camera_sigma, pixel_sigma)
+    with _warnings_heard() as heard:
+        import truing
+
+        robot = None if with_kinematics is None else load_robot(with_kinematics, base_link, tip_link)
+        data, clock = _handeye_data(poses, board, camera, angles, board_poses, setup.value)
+        if data is None:
+            assert clock is not None
+            with atomic_output_dir(folder) as temporary:
+                from truing.handeye_results import write_without_clock
+
+                result = write_without_clock(temporary, clock, keywords, warnings=heard)
+            _finish_handeye(result, folder, json)
+            return
+        if robot is not None and data.joints is None:
+            raise InputError(f"{poses}: --with-kinematics needs the joints, but there is no column q1_rad (or another unit)")
+        if robot is not None and data.joints is not None and data.joints.shape[1] != robot.driven_count:
+            raise InputError(f"{poses}: has joints q1 to q{data.joints.shape[1]}, but {with_kinematics} has {robot.driven_count} driven joints")
+        options = truing.handeye_options(data, **keywords)
+
+        def work() -> Any:
+            from truing.handeye_results import Solved
+
+            found = truing.handeye(data, **keywords, raise_if_undecided=False)
+            both = None
+            if robot is not None and found.status == "done":
+                both = truing.handeye_with_kinematics(robot, data.joints, data, options=options, free=free, hold=hold, effects=effects, seed=seed)
+            following = truing.handeye_plan(data, found, options=options, count=plan, seed=seed) if plan and found.status == "done" else ()
+            return Solved(data, options, found, following, clock, both, seed)
+
+        solved = _busy("solving", work)
+        with atomic_output_dir(folder) as temporary, _progress("writing"):
+            from truing.handeye_results import write_handeye
+
+            result = write_handeye(temporary, solved, warnings=heard, nominal_file=with_kinematics, base_link=base_link, tip_link=tip_link)
+        if not solved.next_poses:  # those of an earlier run would be taken for this one's
+            (folder / "next_poses.csv").unlink(missing_ok=True)
+    _warn([text for text in result["warnings"] if text not in heard])
+    _finish_handeye(result, folder, json)
+
+
+def _finish_handeye(result: Mapping[str, Any], folder: Path, json: bool) -> None:
+    if json:
+        _print_json(result)
+    else:
+        handeye_table(result, folder)
+    if result["status"] != "done":
+        _err().print(f"truing: {result['status']}: {result['message']}", style="bold red", markup=False, highlight=False)
+        raise typer.Exit(1)
+
+
+@app.command()
 def exam(
     out: Annotated[Optional[Path], _out("exam")] = None,
     which: Annotated[ExamSet, typer.Option("--set", help="The robots, sizes and effects of development, or those kept for the examination.")] = ExamSet.development,
@@ -559,6 +674,79 @@ def _load(robot: Path, data: Path, base_link: str, tip_link: str, joints_only: b
 
 def _words(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _length_and_angle(text: str, option: str) -> tuple[float, float]:
+    """ "0.1mm,0.05deg" in m and rad, both above zero."""
+    parts = _words(text)
+    if len(parts) != 2:
+        raise InputError(f"{option}: found {text!r}, expected a length and an angle such as 0.1mm,0.05deg")
+    return _above_zero(quantity(parts[0], "length", option), parts[0], option), _above_zero(quantity(parts[1], "angle", option), parts[1], option)
+
+
+def _above_zero(value: float, text: str, option: str) -> float:
+    if not value > 0:
+        raise InputError(f"{option}: found {text!r}, expected a standard deviation above zero")
+    return value
+
+
+def _point(text: str) -> list[float]:
+    """ "0,0,800mm" in m: a unit holds for the numbers before it that have none."""
+    parts = _words(text)
+    match = re.fullmatch(r".*?([^\s\d.,]*)\s*", parts[-1]) if parts else None
+    unit = match[1] if match else ""
+    if len(parts) != 3 or not unit:
+        raise InputError(f"--working-point: found {text!r}, expected three lengths with their unit such as 0,0,800mm: x to the right, y down, z out of the lens")
+    return [quantity(part if re.search(r"[^\d.eE+\s-]", part) else part + unit, "length", "--working-point") for part in parts]
+
+
+def _require_sense(board: str, camera: Optional[Path], refine_camera: bool, board_poses: Optional[Path], with_kinematics: Optional[Path], of_robot: str, camera_sigma: str,
+                   pixel_sigma: str) -> None:  # fmt: skip
+    """Raises InputError about options that need others."""
+    if board_poses is not None and (board or camera is not None):
+        raise InputError("--board-poses: board poses are given, so that --board and --camera have no images to be for")
+    if board_poses is not None and with_kinematics is not None:
+        raise InputError("--board-poses: streams have no joints at the camera's times, which --with-kinematics needs")
+    for name, given in (("--camera", camera is not None), ("--refine-camera", refine_camera), ("--pixel-sigma", bool(pixel_sigma))):
+        if given and not board:
+            raise InputError(f"{name}: is about images; say with --board what is in them")
+    if camera_sigma and board:
+        raise InputError("--camera-sigma: is about board poses; with images it is --pixel-sigma")
+    if of_robot and with_kinematics is None:
+        raise InputError("--free, --hold and --effects are about the robot: say which with --with-kinematics")
+
+
+def _handeye_data(poses: Path, board: str, camera: Optional[Path], angles: str, board_poses: Optional[Path], setup: str) -> tuple[Optional[HandEyeData], Optional[ClockOffset]]:
+    """What the files hold; where hand and camera have clocks of their own, hand poses at the camera's times (None: not known), and the offset."""
+    import truing
+    from truing.files import load_stream
+
+    if board_poses is None:
+        with _counting("finding the board") if board else contextlib.nullcontext() as progress:
+            data = truing.load_handeye(poses, board=board or None, camera=camera, angles=angles or None, progress=progress)
+        if data.board_time is None or data.time is None:
+            return data, None
+        hand, seen, where = (data.time, data.poses.T_base_hand), (data.board_time, data.poses.T_camera_board), poses
+    else:
+        streams = load_stream(poses, "hand", angles=angles or None), load_stream(board_poses, "board", angles=angles or None)
+        (hand, seen), where = ((stream.time, stream.T) for stream in streams), board_poses
+    clock = _busy("comparing clocks", lambda: truing.handeye_clock(*hand, *seen, setup=setup))  # type: ignore[arg-type]
+    if not clock.found:
+        return None, clock
+    rows = list(clock.rows)
+    if len(rows) < 3:
+        raise InputError(f"{where}: {len(rows)} board poses lie within the time of the robot's record, expected at least 3")
+    if board_poses is None:
+        return dataclasses.replace(data, poses=data.poses.replace(T_base_hand=clock.T_base_hand, **_picked(data.poses, rows)), rows=data.rows[rows],
+                                   joints=None if data.joints is None else data.joints[rows], images=tuple(data.images[row] for row in rows) if data.images else ()), clock  # fmt: skip
+    aligned = truing.HandEyePoses(clock.T_base_hand, seen[1][rows])
+    return truing.HandEyeData(poses, aligned, np.asarray(rows)), clock
+
+
+def _picked(poses: HandEyePoses, rows: list[int]) -> dict[str, Any]:
+    """The camera's side of some of the poses."""
+    return {"T_camera_board": poses.T_camera_board[rows], "images": None if poses.images is None else [poses.images[row] for row in rows],
+            "set": None if poses.set is None else poses.set[rows]}  # fmt: skip
 
 
 def _geometry_error(text: str) -> tuple[float, float, float]:
@@ -705,6 +893,44 @@ def diagnosis_table(result: Mapping[str, Any], folder: Path) -> None:
     if result["next_measurements"]:
         _say(f"measure next: {folder / 'next_poses.csv'} ({len(result['next_measurements'])} poses)")
     _last_line(folder)
+
+
+def handeye_table(result: Mapping[str, Any], folder: Path) -> None:
+    """The short answer of `truing handeye`, on stdout; the last line is the path of the report."""
+    if result["status"] != "done":
+        for u in result["observability"]["unobservable"]:
+            _say(f"{u['what']} cannot be seen: {u['advice']}")
+        for other in result["convention"]["other_readings"]:
+            _say(f"the loop closes to {_mm(other['rms_m'])} if {other['explanation']}: --reading {other['reading']}")
+    else:
+        camera, point, errors = result["camera"], result["working_point"], result["errors"]
+        lines = [(axis, f"{camera[f'{axis}_m'] * 1e3:.3f} mm", _mm(camera["sigma"][f"{axis}_m"]), _mrad(camera["sigma"][f"r{axis}_rad"])) for axis in "xyz"]
+        _table(f"camera in the {camera['in']}", ("", "position", "sigma", "sigma about it"), lines)
+        _say("quaternion w x y z: " + " ".join(f"{camera[name]:.7f}" for name in ("qw", "qx", "qy", "qz")))
+        _say(f"at the working point, {point['in_camera_m'][2] * 1e3:.0f} mm in front of it: +- {_mm(point['sigma_m'])}, +- {_mrad(point['rotation_sigma_rad'])} (1 sigma)")
+        for name, label in (("left_out", "each pose left out"), ("test", "held-out poses")):
+            if name in errors and errors[name]["n"]:
+                e = errors[name]
+                pixels = f", {e['rms_px']:.3g} px" if e.get("rms_px") is not None else ""
+                _say(f"{label}: {_mm(e['rms_m'])}, {_mrad(e['rotation_rms_rad'])}{pixels} rms over {e['n']}; worst {_mm(e['max_m'])}")
+        if "kinematics" in result:
+            for name, label in (("train", "fitted poses"), ("test", "held-out poses")):
+                if name in result["kinematics"]["errors"]:
+                    e = result["kinematics"]["errors"][name]
+                    _say(f"with the robot's own parameters, {label}: {_mm(e['before']['rms_m'])} -> {_mm(e['after']['rms_m'])} rms")
+        if "clock" in result:
+            _say(f"clocks: t_hand = t_camera {result['clock']['offset_s']:+.4f} s")
+    for pose in result["rejected_poses"][:12]:
+        _say(f"rejected: pose {pose['pose']}{' (' + pose['image'] + ')' if 'image' in pose else ''}: {pose['cause']}")
+    if len(result["rejected_poses"]) > 12:
+        _say(f"and {len(result['rejected_poses']) - 12} more rejected poses: see residuals.csv")
+    if result["next_poses"]:
+        _say(f"measure next: {folder / 'next_poses.csv'} ({len(result['next_poses'])} poses, then +- {_mm(result['next_poses'][-1]['working_point_sigma_m'])})")
+    _last_line(folder)
+
+
+def _mrad(radians: float | None) -> str:
+    return "-" if radians is None else f"{radians * 1e3:.4f} mrad"
 
 
 def _off(held: Mapping[str, Any]) -> str:

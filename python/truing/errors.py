@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from truing._core import Identification
+    from truing._core import HandEyeResult, Identification
 
 
 class InputError(ValueError):
@@ -28,3 +28,11 @@ class NotConvergedError(RuntimeError):
             f"the fit ({solver.name}) did not converge in {solver.iterations} iterations: {solver.stopped_because}. "
             "The exception's `result` has what it came to; raise_if_not_converged=False returns it instead."
         )
+
+
+class UndecidedError(RuntimeError):
+    """Data do not say where the camera is: `result.status` is "not observable", "not closing" or "not converged", and the message says why."""
+
+    def __init__(self, result: HandEyeResult) -> None:
+        self.result = result
+        super().__init__(f"{result.status}: {result.message} (The exception's `result` has the details; raise_if_undecided=False returns it instead.)")

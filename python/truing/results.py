@@ -288,7 +288,7 @@ def write_identification(folder: Path, result: truing.Identification, data: trui
     rows = rows_of(result.before, result.robot, data, test=np.asarray(result.set) == 1, rejected=result.rejected_rows)
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
     held_out = found["errors"].get("test", found["errors"]["train"])
-    _write_robot(folder, result.robot, source, {"rms_m": held_out["after"]["rms_m"], "covariance": "covariance.csv"}, nominal_file, base_link, tip_link)
+    write_robot(folder, result.robot, source, {"rms_m": held_out["after"]["rms_m"], "covariance": "covariance.csv"}, nominal_file, base_link, tip_link)
     write_table(folder / "covariance.csv", covariance_columns(result))
     names = [target.name for target in result.robot.targets]
     write_table(folder / "residuals.csv", residual_columns(rows, data, names))
@@ -297,7 +297,7 @@ def write_identification(folder: Path, result: truing.Identification, data: trui
     return found
 
 
-def _write_robot(folder: Path, robot: truing.Robot, source: str, calibration: dict[str, Any], nominal_file: Path | None, base_link: str,
+def write_robot(folder: Path, robot: truing.Robot, source: str, calibration: dict[str, Any], nominal_file: Path | None, base_link: str,
                  tip_link: str) -> None:  # fmt: skip
     """Writes ``robot.yaml`` in the units of the file that came in, and ``robot.urdf`` too if that was URDF."""
     from datetime import datetime, timezone
@@ -485,7 +485,7 @@ def write_diagnosis(folder: Path, found: truing.Diagnosis, data: truing.Measurem
     rows = diagnosis_rows(found, data)
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     own = found.gap.rms * (1.0 - found.shrink.value)  # the robot file holds no drifts and no free functions
-    _write_robot(folder, found.robot, source, {"rms_m": own}, nominal_file, base_link, tip_link)
+    write_robot(folder, found.robot, source, {"rms_m": own}, nominal_file, base_link, tip_link)
     write_table(folder / "residuals.csv", diagnosis_columns(rows, data, [target.name for target in found.robot.targets], found.directions))
     if found.next_poses:
         write_table(folder / "next_poses.csv", next_pose_columns(found))

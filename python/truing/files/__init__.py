@@ -5,18 +5,25 @@
 from __future__ import annotations
 
 from truing.files.common import Units, atomic_output_dir, atomic_write, write_table
+from truing.files.handeye_file import HandEyeData, Stream, load_camera, load_handeye, load_stream, save_camera
 from truing.files.measurement_file import load_measurements, save_measurements
 from truing.files.robot_file import load_calibration, load_robot, load_units, robot_to_yaml, save_robot
 
 __all__ = [
+    "HandEyeData",
+    "Stream",
     "Units",
     "atomic_output_dir",
     "atomic_write",
     "load_calibration",
+    "load_camera",
+    "load_handeye",
     "load_measurements",
     "load_robot",
+    "load_stream",
     "load_units",
     "robot_to_yaml",
+    "save_camera",
     "save_measurements",
     "save_robot",
     "write_table",

@@ -1,0 +1,654 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Calibration boards: what they are called, where their points are, and how they are found in images (by OpenCV, which is imported only then).
+
+    board = truing.parse_board("chessboard:9x6:25mm")
+    views = truing.find_board(["0.png", "1.png", ...], board)
+
+A board's frame has its origin at the first point, x along a row, y along a column and z into the board, away from the camera. Pixels count from the
+centre of the top left pixel.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing._core import Camera
+from truing.errors import InputError, InputWarning
+
+Floats = NDArray[np.float64]
+Image = NDArray[np.uint8]
+Kind = Literal["chessboard", "charuco", "circles", "acircles"]
+
+_EXPECTED = ("chessboard:9x6:25mm (inner corners, square), charuco:5x7:40mm:30mm (squares, square, marker), circles:10x10:25.4mm (dots, distance) "
+             "or acircles:4x11:20mm (dots in a row, rows, distance of rows)")  # fmt: skip
+_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_FEWEST_VIEWS = 3
+_FEWEST_POINTS = 6  # of a ChArUco board: fewer do not fix its pose well
+_CALIBRATION_VIEWS = 40  # more add little to intrinsics that are refined later
+_TRIED = 4  # images in which another board is looked for
+_SAMPLES = 7  # grey values along a square
+# A pixel is nothing like this far off where the board is the one that was named.
+_BAD_PIXELS = 2.0
+_BAD_SHARE = 0.003  # of the image's width
+_WORTH_A_LOOK = 0.5  # [px] a camera whose rms is below fits well enough to start from
+_LEAST_TILT = math.radians(8)
+_LARGEST_RATIO = 1e4  # of focal length and image size
+
+_FAMILIES = ("4X4", "5X5", "6X6", "7X7")
+_FAMILY_SIZES = (50, 100, 250, 1000)
+_OTHER_DICTIONARIES = ("ARUCO_ORIGINAL", "APRILTAG_36h11", "APRILTAG_25h9", "APRILTAG_16h5")
+
+
+@dataclass(frozen=True)
+class Board:
+    """A flat calibration board. Lengths in m.
+
+    chessboard: `columns` x `rows` inner corners, `size` of a square. charuco: `columns` x `rows` squares, `size` of a square, `marker` of a marker.
+    circles: `columns` x `rows` dots, `size` from dot to dot. acircles: `columns` dots in a row, `rows` rows (an odd number), each shifted by half; `size` from row to
+    row (half the distance of dots in a row).
+    """
+
+    kind: Kind
+    columns: int
+    rows: int
+    size: float
+    marker: float = 0.0
+    dictionary: str = ""  # of a charuco board; empty: found from the images
+    legacy: bool | None = None  # of a charuco board: pattern of OpenCV before 4.6; None: found from the images
+
+    def __str__(self) -> str:
+        text = f"{self.kind}:{self.columns}x{self.rows}:{_length(self.size)}"
+        if self.kind == "charuco":
+            text += f":{_length(self.marker)}" + (f":{self.dictionary}" if self.dictionary else "")
+        return text
+
+    @property
+    def points(self) -> Floats:
+        """All points, row by row, shape=(n, 3) [m] in the board's frame."""
+        if self.kind == "acircles":
+            return np.array([[(2 * j + i % 2) * self.size, i * self.size, 0.0] for i in range(self.rows) for j in range(self.columns)])
+        less = 1 if self.kind == "charuco" else 0
+        first = 1 if self.kind == "charuco" else 0  # a ChArUco board counts from its outer edge
+        x, y = np.meshgrid(np.arange(self.columns - less) + first, np.arange(self.rows - less) + first)
+        return np.column_stack([x.ravel() * self.size, y.ravel() * self.size, np.zeros(x.size)])
+
+    def symmetries(self) -> tuple[Floats, ...]:
+        """Turns after which the board looks the same, T_board_turned, shape=(4, 4), without the identity."""
+        quarter_turns: tuple[int, ...] = ()
+        c, r = self.columns, self.rows
+        if self.kind == "circles":
+            quarter_turns = (1, 2, 3) if c == r else (2,)
+        elif self.kind == "chessboard" and (c + r) % 2 == 0:
+            # A turn by 90 degrees changes black and white unless there is a square in the middle.
+            quarter_turns = (1, 2, 3) if c == r and c % 2 == 0 else (2,)
+        points = self.points
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        turns = []
+        for k in quarter_turns:
+            turned = np.eye(4)
+            cosine, sine = (1, 0, -1, 0)[k], (0, 1, 0, -1)[k]
+            turned[:2, :2] = [[cosine, -sine], [sine, cosine]]
+            turned[:3, 3] = middle - turned[:3, :3] @ middle
+            turns.append(turned)
+        return tuple(turns)
+
+
+@dataclass(frozen=True)
+class BoardViews:
+    """A board as it was found in images. One entry per image in which it was found."""
+
+    board: Board  # with dictionary and pattern, where they were found from the images
+    found: tuple[int, ...]  # numbers of these images
+    missing: tuple[int, ...]  # numbers of the others
+    points: tuple[Floats, ...]  # shape=(m, 3) [m] in the board's frame
+    pixels: tuple[Floats, ...]  # shape=(m, 2) [px]
+    T_camera_board: Floats  # shape=(n, 4, 4), from the points of each image alone
+    rms: Floats  # shape=(n,) [px] of these poses
+    camera: Camera
+    calibrated: bool  # the camera's values were found from these images
+    calibration_rms: float = math.nan  # [px]
+
+
+def parse_board(text: str) -> Board:
+    """A board by its name: chessboard:9x6:25mm (inner corners), charuco:5x7:40mm:30mm[:DICTIONARY] (squares), circles:10x10:25.4mm, acircles:4x11:20mm.
+
+    Raises InputError that says what was expected.
+    """
+
+    def refuse(message: str) -> InputError:
+        return InputError(f"--board: found {text!r}: {message}; expected {_EXPECTED}")
+
+    kind, *parts = (part.strip() for part in text.split(":"))
+    lengths = 2 if kind == "charuco" else 1
+    if kind not in ("chessboard", "charuco", "circles", "acircles"):
+        raise refuse(f"no kind of board is called {kind!r}")
+    if len(parts) < 1 + lengths:
+        raise refuse("something is missing")
+    counts = re.fullmatch(r"([0-9]{1,4})\s*[xX×]\s*([0-9]{1,4})", parts[0])
+    if not counts:
+        raise refuse(f"{parts[0]!r} is no pair of numbers such as 9x6")
+    columns, rows = int(counts[1]), int(counts[2])
+    least = 2 if kind == "circles" else 3 if kind != "acircles" else 2
+    if min(columns, rows) < least or columns * rows > 20_000:
+        raise refuse(f"a board of {columns} x {rows} {'squares' if kind == 'charuco' else 'points'} {'is too small' if min(columns, rows) < least else 'is too large'}")
+    sizes = []
+    for part in parts[1 : 1 + lengths]:
+        match = re.fullmatch(r"([0-9]+\.?[0-9]*|\.[0-9]+)\s*([a-z]*)", part)
+        if not match or match[2] not in _LENGTHS:
+            raise refuse(f"{part!r} is no length with its unit (m, cm, mm)")
+        sizes.append(float(match[1]) * _LENGTHS[match[2]])
+        if not 1e-4 <= sizes[-1] <= 10:
+            raise refuse(f"a distance of {sizes[-1]:g} m is not that of a board")
+    rest = parts[1 + lengths :]
+    dictionary = ""
+    if rest and kind == "charuco":
+        dictionary = rest.pop(0).upper().removeprefix("DICT_")
+        dictionary = next((name for name in _dictionaries() if name.upper() == dictionary), "")
+        if not dictionary:
+            raise refuse(f"there is no dictionary {parts[3]!r}; there are {', '.join(_dictionaries())}")
+    if rest:
+        raise refuse(f"{':'.join(rest)!r} is too much")
+    if kind == "acircles" and rows % 2 == 0:
+        raise refuse(f"of a shifted grid with {rows} rows, an even number, OpenCV finds no order; use an odd number of rows")
+    if kind == "charuco" and sizes[1] >= sizes[0]:
+        raise refuse("the marker is not smaller than its square")
+    return Board(kind, columns, rows, sizes[0], sizes[1] if kind == "charuco" else 0.0, dictionary)  # type: ignore[arg-type]
+
+
+def _dictionaries() -> list[str]:
+    return [f"{family}_{size}" for family in _FAMILIES for size in _FAMILY_SIZES] + list(_OTHER_DICTIONARIES)
+
+
+def _length(metres: float) -> str:
+    return f"{metres * 1e3:.6g}mm"
+
+
+def plausible_camera(camera: Camera) -> tuple[str, str] | None:
+    """Which value of a camera cannot be, and why; None: all can."""
+    for name in ("fx", "fy"):
+        value = getattr(camera, name)
+        if not (value > 0 and camera.width / 100 < value < camera.width * _LARGEST_RATIO):
+            return name, f"found {value:g}, expected a focal length in pixels, of about the image's width ({camera.width})"
+    if not 0.5 < camera.fx / camera.fy < 2:
+        return "fy", f"found {camera.fy:g} beside fx {camera.fx:g}, expected nearly equal focal lengths in pixels"
+    for name, size, what in (("cx", camera.width, "width"), ("cy", camera.height, "height")):
+        if not 0 < getattr(camera, name) < size:
+            return name, f"found {getattr(camera, name):g}, outside the image's {what} of {size} pixels: are these the values of images of another size?"
+    return None
+
+
+# ---- Finding ---------------------------------------------------------------------------------------------------------
+
+
+def _opencv() -> Any:
+    try:
+        import cv2
+    except ImportError as error:
+        missing = error.name == "cv2"
+        why = "which is not installed" if missing else f"which cannot be imported ({error})"
+        raise InputError(f'finding a board in images needs OpenCV, {why}: pip install "truing[images]" (or opencv-python-headless)') from None
+    return cv2
+
+
+def find_board(
+    images: Sequence[Path | str | Image],
+    board: Board | str,
+    *,
+    camera: Camera | None = None,
+    names: Sequence[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    where: str = "",
+) -> BoardViews:
+    """Find a board in images: its points to a fraction of a pixel, and its pose in each.
+
+    images: files, or arrays of grey values (or BGR), shape=(height, width). camera: its values; None: they are found from these images.
+    names: what messages call the images. where: what messages call the camera's file. progress: called with images done, and images in all.
+
+    Images without the board are listed in the result. Raises InputError when fewer than three show it (and says which board they do show),
+    when images differ in size, when the camera is not theirs, or OpenCV is not there.
+    """
+    cv = _opencv()
+    board = parse_board(board) if isinstance(board, str) else board
+    called = [str(name) for name in names] if names is not None else [str(image) if isinstance(image, (str, Path)) else f"image {k}" for k, image in enumerate(images)]
+    total = len(images)
+    size: tuple[int, int] | None = None
+    finder: _Finder | None = None if board.kind == "charuco" else _Finder(cv, board)
+    undecided: list[int] = []
+    seen: dict[int, tuple[Floats, Floats]] = {}
+    if progress is not None:
+        progress(0, total)
+    for number, image in enumerate(images):
+        grey = _grey(cv, image, called[number])
+        shape = (grey.shape[1], grey.shape[0])
+        if size is None:
+            size = shape
+            _check_size(camera, size, called[number], where)
+        elif size != shape:
+            raise InputError(f"{called[number]}: has {shape[0]} x {shape[1]} pixels, but {called[0]} has {size[0]} x {size[1]}: expected images of one camera, all of one size")
+        if finder is None:
+            finder = _charuco_finder(cv, board, grey)
+            if finder is None:
+                undecided.append(number)
+        if finder is not None:
+            hit = finder(grey)
+            if hit is not None:
+                seen[number] = hit
+        if progress is not None:
+            progress(number + 1, total)
+    if finder is not None:
+        board = finder.board
+        for number in undecided:  # before it was known which dictionary this is
+            hit = finder(_grey(cv, images[number], called[number]))
+            if hit is not None:
+                seen[number] = hit
+    assert size is not None or total == 0
+    found = sorted(seen)
+    missing = [number for number in range(total) if number not in seen]
+    if len(found) < _FEWEST_VIEWS:
+        _refuse_too_few(cv, images, called, board, found, missing)
+    assert size is not None
+    points, pixels = [seen[number][0] for number in found], [seen[number][1] for number in found]
+    larger = _larger_board(cv, [images[number] for number in found[:2]], board)
+    if larger is not None:
+        raise InputError(f"the board in the images is larger than {board}: {larger} is found as well, and of {board} nobody knows which part; say --board {larger}")
+    return _with_poses(cv, board, images, called, found, missing, points, pixels, size, camera, where)
+
+
+def _grey(cv: Any, image: Path | str | Image, name: str) -> Image:
+    if isinstance(image, (str, Path)):
+        try:
+            data = np.frombuffer(Path(image).read_bytes(), dtype=np.uint8)
+        except OSError as error:
+            raise InputError(f"{name}: cannot be read: {error.strerror}") from None
+        grey = cv.imdecode(data, cv.IMREAD_GRAYSCALE) if data.size else None
+        if grey is None:
+            raise InputError(f"{name}: is no image that OpenCV can read (PNG, JPEG, TIFF, BMP …)")
+    else:
+        grey = np.asarray(image)
+        if grey.ndim == 3:
+            grey = cv.cvtColor(grey, cv.COLOR_BGR2GRAY)
+        if grey.dtype != np.uint8 or grey.ndim != 2:
+            raise InputError(f"{name}: found an array of {grey.dtype}, shape {grey.shape}, expected grey values of 8 bits, shape (height, width)")
+    if min(grey.shape) < 32:
+        raise InputError(f"{name}: has {grey.shape[1]} x {grey.shape[0]} pixels only")
+    return np.ascontiguousarray(grey)
+
+
+def _check_size(camera: Camera | None, size: tuple[int, int], name: str, where: str) -> None:
+    if camera is None or (camera.width, camera.height) == size:
+        return
+    whose = where or "the camera"
+    ratio = size[0] / camera.width
+    hint = f" If the images were only scaled: fx, fy, cx and cy are those of {whose} times {ratio:.6g}." if abs(size[1] / camera.height - ratio) < 1e-3 else ""
+    raise InputError(f"{name}: has {size[0]} x {size[1]} pixels, but the values of {whose} are for {camera.width} x {camera.height}.{hint} "
+                     "Leave the camera out, and its values are found from the images")  # fmt: skip
+
+
+class _Finder:
+    """Finds one board, image by image: its points, shape=(m, 3) [m], and where they are seen, shape=(m, 2) [px]."""
+
+    def __init__(self, cv: Any, board: Board, *, quick: bool = False) -> None:
+        self.cv = cv
+        self.board = board
+        self._quick = quick
+        self._points = board.points
+        self._detector: Any = _charuco_detector(cv, board) if board.kind == "charuco" else None
+
+    def __call__(self, grey: Image) -> tuple[Floats, Floats] | None:
+        try:
+            if self.board.kind == "charuco":
+                return self._charuco(grey)
+            pixels = self._chessboard(grey) if self.board.kind == "chessboard" else self._circles(grey)
+        except self.cv.error:  # its searches give up on odd images so
+            return None
+        return None if pixels is None else (self._points, pixels)
+
+    # -- chessboard
+
+    def _chessboard(self, grey: Image) -> Floats | None:
+        cv, shape = self.cv, (self.board.columns, self.board.rows)
+        usual = cv.CALIB_CB_NORMALIZE_IMAGE | cv.CALIB_CB_ACCURACY
+        for flags in (usual,) if self._quick else (usual, usual | cv.CALIB_CB_EXHAUSTIVE):
+            found, corners = cv.findChessboardCornersSB(grey, shape, flags=flags)
+            if found:
+                return self._in_order(grey, np.asarray(corners, dtype=np.float64).reshape(-1, 2))
+        if self._quick:
+            return None
+        found, corners = cv.findChessboardCorners(grey, shape, flags=cv.CALIB_CB_ADAPTIVE_THRESH | cv.CALIB_CB_NORMALIZE_IMAGE | cv.CALIB_CB_FAST_CHECK)
+        if not found:
+            return None
+        corners = np.asarray(corners, dtype=np.float32).reshape(-1, 1, 2)
+        step = float(np.median(np.linalg.norm(np.diff(corners.reshape(self.board.rows, self.board.columns, 2), axis=1), axis=2)))
+        half = max(2, min(11, int(step / 3)))
+        corners = cv.cornerSubPix(grey, corners, (half, half), (-1, -1), (cv.TERM_CRITERIA_EPS | cv.TERM_CRITERIA_MAX_ITER, 50, 1e-3))
+        return self._in_order(grey, np.asarray(corners, dtype=np.float64).reshape(-1, 2))
+
+    def _in_order(self, grey: Image, pixels: Floats) -> Floats:
+        """The corners so that the frame is right-handed and the first square is dark: what is left to choose, the board's symmetries are."""
+        grid = _right_handed(pixels.reshape(self.board.rows, self.board.columns, 2))
+        if not _first_square_is_dark(grey, grid):
+            if (self.board.columns + self.board.rows) % 2:
+                grid = grid[::-1, ::-1]
+            elif self.board.columns == self.board.rows:
+                grid = np.transpose(grid, (1, 0, 2))[:, ::-1]  # by 90 degrees
+        return np.ascontiguousarray(grid).reshape(-1, 2)
+
+    # -- dots
+
+    def _circles(self, grey: Image) -> Floats | None:
+        cv, shape = self.cv, (self.board.columns, self.board.rows)
+        flags = cv.CALIB_CB_SYMMETRIC_GRID if self.board.kind == "circles" else cv.CALIB_CB_ASYMMETRIC_GRID
+        tries = [(image, effort, extra) for image in (grey, 255 - grey) for effort, extra in ((0, 0), (1, 0), (1, cv.CALIB_CB_CLUSTERING))]
+        for image, effort, extra in tries[: 1 if self._quick else None]:
+            found, centres = cv.findCirclesGrid(image, shape, flags=flags | extra, blobDetector=self._blobs(grey, effort))
+            if found:
+                pixels = _dot_centres(cv, image, np.asarray(centres, dtype=np.float64).reshape(-1, 2))
+                grid = pixels.reshape(self.board.rows, self.board.columns, 2)
+                return _right_handed(grid).reshape(-1, 2) if self.board.kind == "circles" else self._asymmetric(grid)
+        return None
+
+    def _asymmetric(self, grid: Floats) -> Floats | None:
+        """Of the orders in which the rows may have been counted, the one that a plane shows so."""
+        best: tuple[float, Floats | None] = (math.inf, None)
+        for order in (grid, grid[::-1, ::-1], grid[::-1], grid[:, ::-1]):
+            pixels = np.ascontiguousarray(order).reshape(-1, 2)
+            H, _ = self.cv.findHomography(self._points[:, :2], pixels)
+            if H is None or _handedness(order) <= 0:
+                continue
+            mapped = np.column_stack([self._points[:, :2], np.ones(len(pixels))]) @ np.asarray(H).T
+            off = float(np.sqrt(np.mean(np.sum((mapped[:, :2] / mapped[:, 2:] - pixels) ** 2, axis=1))))
+            if off < 0.9 * best[0]:
+                best = (off, pixels)
+        step = float(np.median(np.linalg.norm(np.diff(grid, axis=1), axis=2)))
+        return best[1] if best[0] < 0.2 * step else None
+
+    def _blobs(self, grey: Image, effort: int) -> Any:
+        parameters = self.cv.SimpleBlobDetector_Params()
+        if effort:
+            cell = grey.size / (self.board.columns * self.board.rows)
+            parameters.minArea, parameters.maxArea = 12.0, max(5000.0, cell)
+            parameters.minDistBetweenBlobs = 4.0
+            parameters.filterByConvexity, parameters.minConvexity = True, 0.85
+            parameters.thresholdStep = 6.0
+        return self.cv.SimpleBlobDetector_create(parameters)
+
+    # -- ChArUco
+
+    def _charuco(self, grey: Image) -> tuple[Floats, Floats] | None:
+        corners, identities, _, _ = self._detector.detectBoard(grey)
+        if identities is None or len(identities) < _FEWEST_POINTS:
+            return None
+        order = np.asarray(identities).ravel()
+        points, pixels = self._points[order], np.asarray(corners, dtype=np.float64).reshape(-1, 2)
+        flat = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if flat[1] < 0.1 * flat[0]:  # corners in one line fix no pose
+            return None
+        # Where the counts are others, numbers belong to other places: no plane shows the corners so.
+        H, _ = self.cv.findHomography(points[:, :2], pixels)
+        if H is None:
+            return None
+        mapped = np.column_stack([points[:, :2], np.ones(len(pixels))]) @ np.asarray(H).T
+        off = float(np.sqrt(np.mean(np.sum((mapped[:, :2] / mapped[:, 2:] - pixels) ** 2, axis=1))))
+        square = self.board.size * float(np.linalg.norm(np.ptp(pixels, axis=0))) / float(np.linalg.norm(np.ptp(points, axis=0)))
+        return (points, pixels) if off < 0.25 * square else None
+
+
+def _charuco_detector(cv: Any, board: Board) -> Any:
+    if not hasattr(cv, "aruco") or not hasattr(cv.aruco, "CharucoDetector"):
+        raise InputError(f"a ChArUco board needs OpenCV 4.8 or newer with its ArUco module, found {cv.__version__}: pip install opencv-python-headless")
+    dictionary = cv.aruco.getPredefinedDictionary(getattr(cv.aruco, f"DICT_{board.dictionary}"))
+    pattern = cv.aruco.CharucoBoard((board.columns, board.rows), board.size, board.marker, dictionary)
+    if hasattr(pattern, "setLegacyPattern"):
+        pattern.setLegacyPattern(bool(board.legacy))
+    parameters = cv.aruco.DetectorParameters()
+    parameters.cornerRefinementMethod = cv.aruco.CORNER_REFINE_NONE  # that of the chessboard corners is another, and always done
+    return cv.aruco.CharucoDetector(pattern, cv.aruco.CharucoParameters(), parameters)
+
+
+def _charuco_finder(cv: Any, board: Board, grey: Image) -> _Finder | None:
+    """The dictionary and pattern (OpenCV changed it in 4.6 for boards with an even number of rows) that explain most of an image; None: no marker there."""
+    markers = board.columns * board.rows // 2
+    sizes = [next((size for size in _FAMILY_SIZES if size >= markers), _FAMILY_SIZES[-1])]
+    dictionaries = [board.dictionary] if board.dictionary else [f"{family}_{size}" for family in _FAMILIES for size in sizes] + list(_OTHER_DICTIONARIES)
+    patterns = [board.legacy] if board.legacy is not None else [False] if board.rows % 2 else [False, True]
+    best: tuple[int, _Finder | None] = (_FEWEST_POINTS - 1, None)
+    for dictionary in dictionaries:
+        for legacy in patterns:
+            finder = _Finder(cv, replace(board, dictionary=dictionary, legacy=bool(legacy)))
+            hit = finder(grey)
+            if hit is not None and len(hit[0]) > best[0]:
+                best = (len(hit[0]), finder)
+    return best[1]
+
+
+def _handedness(grid: Floats) -> float:
+    """Above 0 where columns run clockwise before rows, as on a board seen from its front."""
+    x, y = grid[:, -1].mean(axis=0) - grid[:, 0].mean(axis=0), grid[-1].mean(axis=0) - grid[0].mean(axis=0)
+    return float(x[0] * y[1] - x[1] * y[0])
+
+
+def _right_handed(grid: Floats) -> Floats:
+    return grid if _handedness(grid) > 0 else grid[:, ::-1]
+
+
+def _first_square_is_dark(grey: Image, grid: Floats) -> bool:
+    """Whether squares such as the one between the first four corners are darker than their neighbours."""
+    rows, columns = grid.shape[:2]
+    middles = 0.25 * (grid[:-1, :-1] + grid[1:, :-1] + grid[:-1, 1:] + grid[1:, 1:])
+    place = np.clip(np.rint(middles).astype(np.intp), 0, [grey.shape[1] - 1, grey.shape[0] - 1])
+    values = grey[place[..., 1], place[..., 0]].astype(np.float64)
+    alike = (np.add.outer(np.arange(rows - 1), np.arange(columns - 1)) % 2) == 0
+    return bool(values[alike].mean() < values[~alike].mean())
+
+
+def _dot_centres(cv: Any, grey: Image, centres: Floats) -> Floats:
+    """Centres of gravity of the dots: dark grey values around each, weighed by how dark they are."""
+    nearest = np.linalg.norm(centres[:, None] - centres[None], axis=2)
+    np.fill_diagonal(nearest, np.inf)
+    out = centres.copy()
+    for k, (x, y) in enumerate(centres):
+        half = int(np.clip(0.6 * nearest[k].min(), 3, 200))
+        left, top = max(0, round(x) - half), max(0, round(y) - half)
+        window = grey[top : round(y) + half + 1, left : round(x) + half + 1].astype(np.float64)
+        if min(window.shape) < 5:
+            continue
+        bright, dark = np.percentile(window, 90), np.percentile(window, 2)
+        if bright - dark < 20:
+            continue
+        inside = (window < 0.5 * (bright + dark)).astype(np.uint8)
+        _, labels = cv.connectedComponents(inside, connectivity=4)
+        row, column = round(y) - top, round(x) - left
+        if not (0 <= row < labels.shape[0] and 0 <= column < labels.shape[1]) or labels[row, column] == 0:
+            continue
+        own = (labels == labels[row, column]).astype(np.uint8)
+        if own[0].any() or own[-1].any() or own[:, 0].any() or own[:, -1].any():  # runs into something
+            continue
+        own = cv.dilate(own, np.ones((5, 5), np.uint8))
+        level = np.median(window[(own == 0) & (inside == 0)]) if ((own == 0) & (inside == 0)).any() else bright
+        weight = np.clip(level - window, 0.0, None) * own
+        weight[weight < 0.05 * (level - dark)] = 0.0  # noise of the paper
+        total = weight.sum()
+        if total > 0:
+            yy, xx = np.mgrid[0 : window.shape[0], 0 : window.shape[1]]
+            out[k] = left + (weight * xx).sum() / total, top + (weight * yy).sum() / total
+    return out
+
+
+# ---- Another board than was said -------------------------------------------------------------------------------------
+
+
+def _neighbours(board: Board) -> list[Board]:
+    """What the board may be instead: squares counted for corners, a row too few, rows and columns exchanged, another kind."""
+    c, r = board.columns, board.rows
+    pairs = [(c - 1, r - 1), (c + 1, r + 1), (r, c), (c - 1, r), (c, r - 1), (c + 1, r), (c, r + 1), (r - 1, c - 1), (r + 1, c + 1)]
+    odd = board.kind == "acircles"
+    out = [replace(board, columns=x, rows=y, legacy=None, dictionary="") for x, y in dict.fromkeys(pairs) if min(x, y) >= 3 and (x, y) != (c, r) and not (odd and y % 2 == 0)]
+    if board.kind == "charuco":
+        out = [replace(board, legacy=None, dictionary=""), *out, Board("chessboard", max(2, c - 1), max(2, r - 1), board.size)]
+    elif board.kind == "chessboard":
+        out += [Board("charuco", c + 1, r + 1, board.size, 0.75 * board.size), Board("charuco", c, r, board.size, 0.75 * board.size), Board("circles", c, r, board.size)]
+    elif board.kind == "circles":
+        out += [Board("chessboard", c, r, board.size), *([Board("acircles", c, r, board.size)] if r % 2 else [])]
+    else:
+        out += [Board("circles", c, r, board.size)]
+    return out
+
+
+def _hits(cv: Any, images: Sequence[Image], board: Board) -> tuple[int, int]:
+    """In how many images the board is, and how many points of it in all."""
+    count = points = 0
+    finder = None if board.kind == "charuco" else _Finder(cv, board, quick=True)
+    for grey in images:
+        this = finder if finder is not None else _charuco_finder(cv, board, grey)
+        hit = this(grey) if this is not None else None
+        if hit is not None:
+            count, points = count + 1, points + len(hit[0])
+    return count, points
+
+
+def _refuse_too_few(cv: Any, images: Sequence[Path | str | Image], called: Sequence[str], board: Board, found: Sequence[int], missing: Sequence[int]) -> None:
+    """Raises InputError: which images do not show the board, and which board they seem to show."""
+    which = ", ".join(called[number] for number in missing[:8]) + (f" … ({len(missing)} in all)" if len(missing) > 8 else "")
+    head = f"the board {board} was found in {len(found)} of {len(images)} images, expected at least {_FEWEST_VIEWS}"
+    tried = [_grey(cv, images[number], called[number]) for number in missing[:: max(1, len(missing) // _TRIED)][:_TRIED]]
+    best, most = None, (0, 0)
+    # Of a grid of dots, and of numbered corners, a smaller one is found as well: most points win.
+    for other in _neighbours(board):
+        this = _hits(cv, tried, other)
+        if this > most:
+            best, most = other, this
+    hits = most[0]
+    if best is not None and hits >= 0.5 * len(tried):
+        counting = ""
+        if board.kind == best.kind == "chessboard" and (best.columns - board.columns, best.rows - board.rows) in ((-1, -1), (1, 1)):
+            counting = ": count inner corners, where four squares meet, not squares" if best.columns < board.columns else ": these are one more each way than was said"
+        named = f"{best.kind}:{best.columns}x{best.rows}"
+        say = f"--board {best}" if best.kind == board.kind else f"--board {named}:… with its size"
+        raise InputError(f"{head}; but {named} is in {hits} of the {len(tried)} that were looked at again{counting}. Say {say}")
+    margin = {"chessboard": "its white margin", "charuco": "its markers", "circles": "all of its dots", "acircles": "all of its dots"}[board.kind]
+    raise InputError(f"{head}; not found in {which}. Boards of neighbouring counts are not there either: does every image show the whole board, sharp and evenly lit, with {margin}? "
+                     f"Expected {_EXPECTED}")  # fmt: skip
+
+
+def _larger_board(cv: Any, images: Sequence[Path | str | Image], board: Board) -> Board | None:
+    """A board of more dots that contains the one that was named; of chessboards and ChArUco boards no part is taken for the whole."""
+    if board.kind not in ("circles", "acircles"):
+        return None
+    greys = [_grey(cv, image, "") for image in images]
+    steps = ((1, 1), (1, 0), (0, 1))
+    for wide, high in steps:
+        other = replace(board, columns=board.columns + wide, rows=board.rows + high * (2 if board.kind == "acircles" else 1))
+        if _hits(cv, greys, other)[0] == len(greys):
+            return other
+    return None
+
+
+# ---- Poses and intrinsics --------------------------------------------------------------------------------------------
+
+
+def _matrix(camera: Camera) -> tuple[Floats, Floats]:
+    return np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]]), np.asarray(camera.distortion, dtype=np.float64)
+
+
+def _pose(cv: Any, points: Floats, pixels: Floats, camera: Camera) -> tuple[Floats, float]:
+    """Pose of a flat board from one image, and its rms [px]. Two poses look nearly alike from afar: the one that fits better is taken."""
+    matrix, distortion = _matrix(camera)
+    # The flat-board solver wants the plane through the origin, and is at its best in the middle.
+    middle = points.mean(axis=0)
+    flat, seen = np.ascontiguousarray(points - middle), np.ascontiguousarray(pixels.reshape(-1, 1, 2))
+    best, frame = math.inf, np.eye(4)
+    count, turns, shifts, _ = cv.solvePnPGeneric(flat, seen, matrix, distortion, flags=cv.SOLVEPNP_IPPE)
+    for turn, shift in zip(turns[:count], shifts[:count], strict=True):
+        refined, moved = cv.solvePnPRefineLM(flat, seen, matrix, distortion, np.array(turn, dtype=np.float64), np.array(shift, dtype=np.float64))
+        predicted, _ = cv.projectPoints(flat, refined, moved, matrix, distortion)
+        rms = float(np.sqrt(np.mean(np.sum((np.asarray(predicted).reshape(-1, 2) - pixels) ** 2, axis=1))))
+        rotation, _ = cv.Rodrigues(refined)
+        if math.isfinite(rms) and rms < best and float(np.asarray(moved).ravel()[2]) > 0:
+            best, frame = rms, np.eye(4)
+            frame[:3, :3] = _orthonormal(np.asarray(rotation, dtype=np.float64))
+            frame[:3, 3] = np.asarray(moved, dtype=np.float64).ravel() - frame[:3, :3] @ middle
+    return frame, best
+
+
+def _orthonormal(rotation: Floats) -> Floats:
+    u, _, vt = np.linalg.svd(rotation)
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
+
+
+def _calibrate(cv: Any, points: Sequence[Floats], pixels: Sequence[Floats], size: tuple[int, int]) -> tuple[Camera, float, float]:
+    """Intrinsics from views of a board, their rms [px], and the standard error of the focal length over the focal length."""
+    chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), _CALIBRATION_VIEWS)).astype(np.intp))
+    objects = [np.ascontiguousarray(points[k], dtype=np.float32).reshape(-1, 1, 3) for k in chosen]
+    seen = [np.ascontiguousarray(pixels[k], dtype=np.float32).reshape(-1, 1, 2) for k in chosen]
+    flags = cv.CALIB_FIX_K3 if len(chosen) < 10 else 0  # it bends what few images do not hold
+    rms, matrix, distortion, turns, _, sigma, _, _ = cv.calibrateCameraExtended(objects, seen, size, None, None, flags=flags)
+    coefficients = np.zeros(5)
+    coefficients[: min(5, np.size(distortion))] = np.asarray(distortion).ravel()[:5]
+    camera = Camera(width=size[0], height=size[1], fx=float(matrix[0, 0]), fy=float(matrix[1, 1]), cx=float(matrix[0, 2]), cy=float(matrix[1, 2]), distortion=coefficients.tolist())
+    # Boards seen from the front look the same to every focal length, whatever its standard error says.
+    tilt = max(math.acos(min(1.0, abs(float(np.asarray(cv.Rodrigues(turn)[0])[2, 2])))) for turn in turns)
+    return camera, float(rms), float(np.asarray(sigma).ravel()[0]) / float(matrix[0, 0]) if tilt > _LEAST_TILT else math.inf
+
+
+def _with_poses(cv: Any, board: Board, images: Sequence[Path | str | Image], called: Sequence[str], found: Sequence[int], missing: Sequence[int], points: Sequence[Floats],
+                pixels: Sequence[Floats], size: tuple[int, int], camera: Camera | None, where: str) -> BoardViews:  # fmt: skip
+    given = camera is not None
+    calibration_rms = math.nan
+    limit = max(_BAD_PIXELS, _BAD_SHARE * size[0])
+    if camera is None:
+        try:
+            camera, calibration_rms, focal = _calibrate(cv, points, pixels, size)
+        except cv.error as error:
+            raise InputError(f"the camera's values cannot be found from these images ({str(error).strip().splitlines()[-1][:120]}): give --camera, or images with the board tilted by 20 to 40 "
+                             "degrees about different axes") from None  # fmt: skip
+        if not math.isfinite(calibration_rms) or plausible_camera(camera) is not None or not focal < 0.1:
+            raise InputError(f"the camera's values cannot be found from these images: the focal length came out as {camera.fx:.4g} px{f' ± {focal * camera.fx:.2g}' if math.isfinite(focal) else ', but no board is tilted'}. "
+                             "Tilt the board against the camera by 20 to 40 degrees about different axes, or give --camera")  # fmt: skip
+        if calibration_rms > limit:
+            raise InputError(_bad_fit(cv, images, called, found, board, calibration_rms))
+    frames, rms = [], []
+    for object_points, seen in zip(points, pixels, strict=True):
+        frame, error = _pose(cv, object_points, seen, camera)
+        frames.append(frame)
+        rms.append(error)
+    errors = np.array(rms)
+    usual = float(np.median(errors))
+    if given and usual > _WORTH_A_LOOK:
+        try:
+            _, own, _ = _calibrate(cv, points, pixels, size)
+        except cv.error:
+            own = usual
+        if own > limit:
+            raise InputError(_bad_fit(cv, images, called, found, board, own))
+        if usual > 3 * own:
+            text = (f"{where or 'the camera'} does not fit the images: the board's points are off by {usual:.2g} px (median rms), and by {own:.2g} px with values found from these "
+                    "images; leave the camera out, or have it refined")  # fmt: skip
+            if usual > limit:
+                raise InputError(text)
+            warnings.warn(InputWarning(text), stacklevel=3)
+    good = np.isfinite(errors)
+    if good.sum() < _FEWEST_VIEWS:
+        raise InputError(f"the board {board} was found in {len(found)} images, but its pose could be found in {int(good.sum())} only")
+    keep = np.flatnonzero(good)
+    return BoardViews(board, tuple(found[k] for k in keep), tuple(sorted([*missing, *(found[k] for k in np.flatnonzero(~good))])), tuple(points[k] for k in keep),
+                      tuple(pixels[k] for k in keep), np.array([frames[k] for k in keep]), errors[keep], camera, not given, calibration_rms)  # fmt: skip
+
+
+def _bad_fit(cv: Any, images: Sequence[Path | str | Image], called: Sequence[str], found: Sequence[int], board: Board, rms: float) -> str:
+    """The points are not where a board of this kind has them: says so, and which one they do fit."""
+    tried = [_grey(cv, images[number], called[number]) for number in found[:: max(1, len(found) // _TRIED)][:_TRIED]]
+    for other in _neighbours(board):
+        if _hits(cv, tried, other)[0] == len(tried):
+            return (f"the points found are not those of {board}: no camera sees them so, {rms:.3g} px rms are left; {other.kind}:{other.columns}x{other.rows} is in the images as well: "
+                    "is it this one?")  # fmt: skip
+    return f"the points found are not those of a flat board {board}: no camera sees them so, {rms:.3g} px rms are left. Is the board flat, and are its counts right?"

@@ -1,0 +1,622 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Hand-eye files: poses.csv (one row per robot pose), what a camera saw of a board there, and camera.yaml (format truing-camera/1)."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+import re
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PlainValidator
+
+from truing import _core
+from truing.boards import Board, BoardViews, find_board, parse_board, plausible_camera
+from truing.errors import InputError, InputWarning
+from truing.files.common import PathLike, atomic_write, listed
+from truing.files.table import Codes, Floats, Table
+from truing.files.yaml_tree import Document, FreeMapping, Number, Strict, Text, choice, expected, found
+
+CAMERA_FORMAT = "truing-camera/1"
+_CAMERA = "camera file"
+
+_SIDES = {"hand": "flange in the robot base", "board": "board in the camera"}
+_POSITION = ("x", "y", "z")
+_QUATERNION = ("qw", "qx", "qy", "qz")
+_ANGLES = ("rx", "ry", "rz")
+_LENGTH_UNITS = ("m", "mm")
+_ANGLE_UNITS = ("rad", "deg")
+_JOINT_UNITS = (*_ANGLE_UNITS, *_LENGTH_UNITS)
+_OF_JOINT = re.compile(r"q([1-9][0-9]*)(?:_(.*))?", re.ASCII)
+_SETS = ("train", "test")
+_FEWEST = 3  # poses
+_FARTHEST = 100.0  # [m] no robot's hand and no camera's board spread over more
+_EQUAL = 1e-9  # [m | rad] poses that differ by less are one
+
+# Orders of turned (intrinsic) axes: the letters from left to right are the rotations as they are multiplied.
+EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "xyx", "xzx", "yxy", "yzy", "zxz", "zyz")
+ANGLE_CONVENTIONS = ("rotation-vector", *EULER_ORDERS)
+
+
+@dataclass(frozen=True)
+class HandEyeData:
+    """What a hand-eye file holds, in SI units, ready for `truing.handeye`. One entry per row that is used."""
+
+    path: Path
+    poses: _core.HandEyePoses
+    rows: NDArray[np.intp]  # of the file, counted from 0
+    time: Floats | None = None  # shape=(n,) [s] column t_s: of the hand
+    board_time: Floats | None = None  # shape=(n,) [s] column board_t_s
+    joints: Floats | None = None  # shape=(n, driven joints) [rad | m]
+    images: tuple[str, ...] = ()  # as the file names them
+    views: BoardViews | None = None  # how the board was found in them
+    board: Board | None = None
+    camera_given: bool = True  # False: the camera's values were found from the images
+    unused: tuple[str, ...] = ()  # rows that are not used, in words
+    convention: str = "quaternion"
+
+    @property
+    def count(self) -> int:
+        """Number of poses."""
+        return len(self.rows)
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Poses with times, from one side alone."""
+
+    path: Path
+    time: Floats  # shape=(n,) [s], increasing
+    T: Floats  # shape=(n, 4, 4)
+
+
+# ---- Rotations -------------------------------------------------------------------------------------------------------
+
+
+def rotations_from_quaternions(q: Floats) -> Floats:
+    """shape=(n, 3, 3) of shape=(n, 4), scalar first; brought to unit length first."""
+    w, x, y, z = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
+    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]  # fmt: skip
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def quaternions_from_rotations(rotations: Floats) -> Floats:
+    """shape=(n, 4), scalar first and not negative, of shape=(n, 3, 3)."""
+    r = np.asarray(rotations)
+    trace = np.einsum("nii->n", r)
+    # The largest of four squares is safe to divide by.
+    squares = np.stack([1 + trace, *(1 + 2 * r[:, k, k] - trace for k in range(3))], axis=1)
+    out = np.empty((len(r), 4))
+    best = np.argmax(squares, axis=1)
+    for k in range(4):
+        rows = np.flatnonzero(best == k)
+        if not rows.size:
+            continue
+        m, s = r[rows], 2 * np.sqrt(squares[rows, k])
+        if k == 0:
+            out[rows] = np.stack([s / 4, (m[:, 2, 1] - m[:, 1, 2]) / s, (m[:, 0, 2] - m[:, 2, 0]) / s, (m[:, 1, 0] - m[:, 0, 1]) / s], axis=1)
+        else:
+            i, j, l = k - 1, k % 3, (k + 1) % 3
+            out[rows, 0] = (m[:, l, j] - m[:, j, l]) / s
+            out[rows, 1 + i] = s / 4
+            out[rows, 1 + j] = (m[:, j, i] + m[:, i, j]) / s
+            out[rows, 1 + l] = (m[:, l, i] + m[:, i, l]) / s
+    return out * np.where(out[:, :1] < 0, -1.0, 1.0)
+
+
+def rotations_from_angles(angles: Floats, convention: str) -> Floats:
+    """shape=(n, 3, 3) of three angles a row [rad].
+
+    convention: "rotation-vector" (axis times angle, as Universal Robots), or the order in which rotations about turned axes are multiplied:
+    "zyx" is Rz(rz) Ry(ry) Rx(rx). Where an axis comes twice ("zyz"), the columns rx, ry, rz hold first, second and third angle.
+    """
+    if convention == "rotation-vector":
+        angle = np.linalg.norm(angles, axis=1)
+        half = 0.5 * angle
+        # sin(a/2)/a, also where a is 0
+        scale = np.where(angle > 0, np.sin(half) / np.where(angle > 0, angle, 1.0), 0.5)
+        return rotations_from_quaternions(np.column_stack([np.cos(half), scale[:, None] * angles]))
+    out = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+    twice = len(set(convention)) < 3
+    for place, letter in enumerate(convention):
+        axis = "xyz".index(letter)
+        turn = angles[:, place if twice else axis]
+        c, s = np.cos(turn), np.sin(turn)
+        step = np.zeros((len(angles), 3, 3))
+        j, l = (axis + 1) % 3, (axis + 2) % 3
+        step[:, axis, axis] = 1.0
+        step[:, j, j], step[:, j, l], step[:, l, j], step[:, l, l] = c, -s, s, c
+        out = out @ step
+    return out
+
+
+def check_angles(convention: str | None, *, needed_by: str = "") -> str | None:
+    """A convention of angles by its name; InputError when it is none, or when it is missing and a column needs it."""
+    names = ("rotation-vector (Universal Robots), zyx (KUKA A B C and Fanuc W P R: turned axes z, y, x, which is fixed axes x, y, z), "
+             "xyz (Staubli), zyz (Kawasaki O A T), or another order of turned axes")  # fmt: skip
+    if convention is None or convention == "":
+        if needed_by:
+            raise InputError(f"{needed_by}: angles mean nothing without their convention: say it with --angles (in Python: angles=…), one of {names}")
+        return None
+    if convention in ANGLE_CONVENTIONS:
+        return convention
+    hint = f"; rotations about fixed axes in the order {convention.lower()} are {convention.lower()[::-1]!r} here" if convention.lower() in EULER_ORDERS else ""
+    raise InputError(f"--angles: found {convention!r}, expected {names}{hint}")
+
+
+# ---- Columns ---------------------------------------------------------------------------------------------------------
+
+
+class _Plan:
+    """Which column of the file is what. Refuses names that are almost right."""
+
+    def __init__(self, table: Table, sides: Sequence[str]) -> None:
+        self.table = table
+        self.sides = sides
+        self.columns: dict[str, str] = {}  # "hand_x" -> name in the file
+        self.units: dict[str, str] = {}
+        self.labels: list[str] = []
+        self.joints: dict[int, str] = {}
+        self.times: dict[str, str] = {}
+        self.others: list[str] = []
+        for name in table.names:
+            self._place(name)
+
+    @property
+    def numbers(self) -> list[str]:
+        return [*self.columns.values(), *self.joints.values(), *self.times.values()]
+
+    def _place(self, name: str) -> None:
+        if name in ("image", "set"):
+            self.labels.append(name)
+            return
+        if name in ("t_s", "board_t_s"):
+            self.times[name] = name
+            return
+        side, _, rest = name.partition("_")
+        if side in _SIDES and side in self.sides and rest:
+            self._place_of_side(name, side, rest)
+            return
+        of_joint = _OF_JOINT.fullmatch(name)
+        if of_joint:
+            if of_joint[2] not in _JOINT_UNITS:
+                self._refuse_unit(name, f"q{of_joint[1]}", _JOINT_UNITS)
+            if int(of_joint[1]) in self.joints:
+                self.table.refuse(f"joint {of_joint[1]} has two columns, {self.joints[int(of_joint[1])]!r} and {name!r}: remove one")
+            self.joints[int(of_joint[1])] = name
+            return
+        stem, _, unit = name.partition("_")
+        if stem in ("t", "time") and unit in ("", "ms", "us", "ns"):
+            self._refuse_unit(name, "t", ("s",))
+        self.others.append(name)
+
+    def _place_of_side(self, name: str, side: str, rest: str) -> None:
+        stem, _, unit = rest.partition("_")
+        kinds = {**dict.fromkeys(_POSITION, _LENGTH_UNITS), **dict.fromkeys(_QUATERNION, ("",)), **dict.fromkeys(_ANGLES, _ANGLE_UNITS)}
+        if stem not in kinds:
+            names = [f"{side}_{axis}_m" for axis in _POSITION] + [f"{side}_{part}" for part in _QUATERNION]
+            close = difflib.get_close_matches(name, names, n=1)
+            hint = f"did you mean {close[0]!r}? " if close else ""
+            self.table.refuse(f"unknown column; {hint}of the {side} ({_SIDES[side]}) there are {listed(names)}, or angles: {side}_rx_deg …", column=name)
+        if unit not in kinds[stem]:
+            if kinds[stem] == ("",):
+                self.table.refuse(f"a quaternion has no unit, expected the name {side}_{stem}", column=name)
+            self._refuse_unit(name, f"{side}_{stem}", kinds[stem])
+        role = f"{side}_{stem}"
+        if role in self.columns:
+            self.table.refuse(f"there are two columns for it, {self.columns[role]!r} and {name!r}: remove one", column=name)
+        self.columns[role] = name
+        self.units[role] = unit
+
+    def _refuse_unit(self, name: str, stem: str, units: Sequence[str]) -> None:
+        self.table.refuse(f"no known unit in the name, expected {' or '.join(f'{stem}_{unit}' for unit in units)}", column=name)
+
+    def has(self, side: str) -> bool:
+        return any(role.startswith(f"{side}_") for role in self.columns)
+
+    def require_whole(self, side: str) -> str:
+        """A side has a position and one kind of orientation, each in one unit; "quaternion" or "angles"."""
+        self._require(side, _POSITION, "_m", "a position has three coordinates")
+        quaternion = [part for part in _QUATERNION if f"{side}_{part}" in self.columns]
+        angles = [part for part in _ANGLES if f"{side}_{part}" in self.columns]
+        if quaternion and angles:
+            self.table.refuse(f"the {side} has an orientation twice, {self.columns[f'{side}_{quaternion[0]}']} … and {self.columns[f'{side}_{angles[0]}']} …: remove one")
+        if angles:
+            self._require(side, _ANGLES, "_deg", "an orientation has three angles")
+            return "angles"
+        self._require(side, _QUATERNION, "", "an orientation is a quaternion, scalar first, or three angles with --angles")
+        return "quaternion"
+
+    def _require(self, side: str, stems: Sequence[str], ending: str, why: str) -> None:
+        missing = [stem for stem in stems if f"{side}_{stem}" not in self.columns]
+        if missing:
+            wanted = f"{side}_{missing[0]}{ending}"
+            close = difflib.get_close_matches(wanted, [name for name in self.table.names if name not in self.columns.values()], n=1, cutoff=0.75)
+            hint = f"did you mean {close[0]!r}? " if close else ""
+            self.table.refuse(f"there is no column {wanted} ({_SIDES[side]}: {why}); {hint}the columns are {listed(self.table.names)}")
+        units = {self.units[f"{side}_{stem}"] for stem in stems}
+        if len(units) > 1:
+            names = [self.columns[f"{side}_{stem}"] for stem in stems]
+            self.table.refuse(f"mixed units in {listed(names)}: give all three in one unit")
+
+
+class _Reader:
+    """Takes poses out of a table."""
+
+    def __init__(self, table: Table, plan: _Plan, angles: str | None) -> None:
+        self.table = table
+        self.plan = plan
+        self.angles = angles
+
+    def _columns(self, side: str, stems: Sequence[str], gaps: bool) -> Floats:
+        return np.column_stack([self.table.numbers(self.plan.columns[f"{side}_{stem}"], gaps=gaps) for stem in stems])
+
+    def frames(self, side: str, kind: str, *, gaps: bool = False) -> Floats:
+        """shape=(n, 4, 4); NaN in rows whose cells are all empty, where `gaps` allows them."""
+        position = self._columns(side, _POSITION, gaps)
+        orientation = self._columns(side, _ANGLES if kind == "angles" else _QUATERNION, gaps)
+        names = [self.plan.columns[f"{side}_{stem}"] for stem in (*_POSITION, *(_ANGLES if kind == "angles" else _QUATERNION))]
+        empty = np.isnan(np.column_stack([position, orientation]))
+        absent = empty.all(axis=1)
+        half = empty.any(axis=1) & ~absent
+        if half.any():
+            row = int(np.argmax(half))
+            self.table.refuse(f"found an empty cell, expected a number, or empty cells in all of {listed(names)} where there is no pose", row=row,
+                              column=names[int(np.argmax(empty[row]))])  # fmt: skip
+        if self.plan.units[f"{side}_x"] == "mm":
+            position = position / 1000.0
+        out = np.full((len(position), 4, 4), np.nan)
+        there = np.flatnonzero(~absent)
+        if kind == "angles":
+            rotations = self._from_angles(side, orientation, there)
+        else:
+            self._require_unit_quaternions(side, orientation, there)
+            rotations = rotations_from_quaternions(orientation[there])
+        out[there] = np.eye(4)
+        out[there, :3, :3] = rotations
+        out[there, :3, 3] = position[there]
+        return out
+
+    def _from_angles(self, side: str, angles: Floats, there: NDArray[np.intp]) -> Floats:
+        names = [self.plan.columns[f"{side}_{stem}"] for stem in _ANGLES]
+        convention = check_angles(self.angles, needed_by=f"{self.table.path}, columns {listed(names)}")
+        assert convention is not None
+        values = angles[there]
+        if self.plan.units[f"{side}_rx"] == "rad":
+            beyond = np.abs(values) > 2 * math.pi + 1e-6
+            if beyond.any():
+                place, column = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+                self.table.refuse(f"found {values[place, column]:.6g}, more than a turn: these look like degrees; call the columns "
+                                  f"{listed([name.removesuffix('_rad') + '_deg' for name in names])}, or convert them", row=int(there[place]), column=names[column])  # fmt: skip
+            return rotations_from_angles(values, convention)
+        if len(values) and np.abs(values).max() <= math.pi + 0.01 and np.ptp(values, axis=0).max() > 0.2:
+            self._warn(f"columns {listed(names)}: all values lie within ±{math.pi:.3g}, which is next to no rotation in degrees: are these radians? "
+                       f"Then call them {listed([name.removesuffix('_deg') + '_rad' for name in names])}")  # fmt: skip
+        return rotations_from_angles(np.radians(values), convention)
+
+    def _require_unit_quaternions(self, side: str, q: Floats, there: NDArray[np.intp]) -> None:
+        norm = np.linalg.norm(q[there], axis=1)
+        wrong = np.abs(norm - 1.0) > 1e-3
+        if not wrong.any():
+            return
+        row = int(there[int(np.argmax(wrong))])
+        values, size = q[row], float(norm[int(np.argmax(wrong))])
+        if size < 1e-9:
+            hint = "an empty orientation?"
+        elif abs(size - 1000.0) < 1.0:
+            hint = "it looks like it was converted to mm with the position: a quaternion has no unit"
+        elif np.abs(values).max() > 1.5:
+            hint = f"it looks like angles: call them {side}_rx_deg (or _rad) … and say --angles"
+        elif np.abs(norm - norm[0]).max() < 1e-3 * norm[0]:
+            hint = "all have the same length: scaled?"
+        else:
+            hint = "a column in the wrong place, or too few digits?"
+        self.table.refuse(f"found the {side} quaternion {' '.join(f'{v:.6g}' for v in values)} of length {size:.6g}, expected a unit quaternion (to 1e-3), scalar first "
+                          f"({', '.join(f'{side}_{part}' for part in _QUATERNION)}); {hint}", row=row)  # fmt: skip
+
+    def _warn(self, message: str) -> None:
+        warnings.warn(InputWarning(f"{self.table.path}: {message}"), stacklevel=4)
+
+    def times(self, name: str, *, increasing: bool) -> Floats | None:
+        if name not in self.plan.times:
+            return None
+        values = self.table.numbers(name)
+        if increasing and len(values) > 1:
+            back = np.diff(values) <= 0
+            if back.any():
+                row = int(np.argmax(back)) + 1
+                self.table.refuse(f"found {values[row]:.9g} after {values[row - 1]:.9g}, expected times that increase from row to row", row=row, column=name)
+        return values
+
+    def sets(self) -> NDArray[np.int8] | None:
+        if "set" not in self.plan.labels:
+            return None
+        codes, names = self.table.labels("set")
+        lookup = np.array([*(_SETS.index(name) if name in _SETS else -1 for name in names), -1], dtype=np.int8)
+        sets: Codes = lookup[codes]
+        if (sets < 0).any():
+            self.table.refuse_cell(int(np.argmax(sets < 0)), "set", "train or test")
+        return np.asarray(sets, dtype=np.int8)
+
+    def joints(self) -> Floats | None:
+        numbers = sorted(self.plan.joints)
+        if not numbers:
+            return None
+        if numbers != list(range(1, len(numbers) + 1)):
+            missing = next(k for k in range(1, len(numbers) + 2) if k not in numbers)
+            self.table.refuse(f"there is no column q{missing}_rad (or another unit), but {self.plan.joints[numbers[-1]]}: joints are counted from 1 without gaps")
+        columns = []
+        for number in numbers:
+            name = self.plan.joints[number]
+            values = self.table.numbers(name)
+            unit = name.rpartition("_")[2]
+            if unit == "rad" and np.median(np.abs(values)) > 4 * math.pi:
+                self.table.refuse(f"values from {values.min():.4g} to {values.max():.4g} look like degrees: call the column q{number}_deg, or convert them", column=name)
+            columns.append(np.radians(values) if unit == "deg" else values / 1000.0 if unit == "mm" else values)
+        return np.column_stack(columns)
+
+    def images(self, folder: Path) -> tuple[list[str], list[Path]]:
+        """Names and paths of the images, one per row; all have to be there."""
+        codes, names = self.table.labels("image")
+        if (codes < 0).any():
+            self.table.refuse_cell(int(np.argmax(codes < 0)), "image", "the path of an image, relative to this file")
+        paths = [folder / name for name in names]
+        missing = [k for k, path in enumerate(paths) if not path.is_file()]
+        if missing:
+            row = min(int(np.argmax(codes == k)) for k in missing)
+            first = int(codes[row])
+            rest = [names[k] for k in missing if k != first]
+            more = f"; {len(rest)} more {'are' if len(rest) > 1 else 'is'} missing: {listed(rest, 8)}" if rest else ""
+            self.table.refuse(f"there is no image {names[first]!r} in {folder or Path()}{os.sep} (paths are relative to this file){more}", row=row, column="image")
+        twice = np.flatnonzero(np.bincount(codes, minlength=len(names)) > 1)
+        if twice.size:
+            rows = np.flatnonzero(codes == twice[0])
+            self.table.refuse(f"the image {names[twice[0]]!r} is already that of an earlier row: one image for each pose", row=int(rows[1]), column="image")
+        return [names[code] for code in codes], [paths[code] for code in codes]
+
+
+# ---- Reading ---------------------------------------------------------------------------------------------------------
+
+
+def load_handeye(
+    path: PathLike,
+    *,
+    board: str | Board | None = None,
+    camera: PathLike | _core.Camera | None = None,
+    angles: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> HandEyeData:
+    """Read robot poses, and what the camera saw of the board at each, from CSV or Parquet.
+
+    Columns, with their unit in the name: hand_x_m hand_y_m hand_z_m (or _mm) and hand_qw hand_qx hand_qy hand_qz, the flange in the robot base as
+    the controller reports it; then board_x_m … board_qz, the board in the camera, or `image`, a path relative to the file. Instead of a quaternion
+    hand_rx_deg hand_ry_deg hand_rz_deg (or _rad; board likewise). Optional: t_s, board_t_s, set (train, test), q1_rad … (for
+    `handeye_with_kinematics`). Rows whose board cells are all empty are left out, with a warning.
+
+    board: what is in the images, "chessboard:9x6:25mm" (inner corners), "charuco:5x7:40mm:30mm", "circles:10x10:25.4mm", "acircles:4x11:20mm";
+    needs OpenCV. camera: file, or `Camera`; None: its values are found from the same images.
+    angles: convention of angle columns: "rotation-vector" (UR), or the order of turned axes, "zyx" for Rz Ry Rx (KUKA, Fanuc), "xyz", "zyz" …
+    progress: called with images done, and images in all.
+
+    Raises InputError that names the line, the column, what was found and what was expected.
+    """
+    table = Table(Path(path))
+    plan = _Plan(table, ("hand", "board"))
+    angles = check_angles(angles)
+    parsed = parse_board(board) if isinstance(board, str) else board
+    kind = plan.require_whole("hand")
+    use_images = "image" in plan.labels and (parsed is not None or not plan.has("board"))
+    if not use_images and not plan.has("board"):
+        table.refuse("there is nothing that the camera saw: expected the columns board_x_m … board_qz (board in the camera), or image; "
+                     f"the columns are {listed(table.names)}")  # fmt: skip
+    if use_images and parsed is None:
+        table.refuse("the column image needs to know what is in the images: say it with --board (in Python: board=…), such as chessboard:9x6:25mm (inner corners), "
+                     "charuco:5x7:40mm:30mm or circles:10x10:25.4mm", column="image")  # fmt: skip
+    if not use_images and parsed is not None:
+        table.refuse("a board was named, but there is no column image; the board poses of the file need none")
+    board_kind = "" if use_images else plan.require_whole("board")
+    table.read(plan.numbers, plan.labels)
+    _check_count(table, table.rows)
+    reader = _Reader(table, plan, angles)
+    hand = reader.frames("hand", kind)
+    sets, joints = reader.sets(), reader.joints()
+    streams = "board_t_s" in plan.times
+    if streams and "t_s" not in plan.times:
+        table.refuse("there is no column t_s: board_t_s is the camera's time, and needs the robot's beside it", column="board_t_s")
+    time, board_time = reader.times("t_s", increasing=streams), reader.times("board_t_s", increasing=True)
+    views: BoardViews | None = None
+    symmetries: Sequence[Floats] = ()
+    images: list[str] = []
+    unused: list[str] = []
+    if use_images:
+        images, paths = reader.images(table.path.parent)
+        assert parsed is not None
+        given = load_camera(camera) if camera is not None and not isinstance(camera, _core.Camera) else camera
+        views = find_board(paths, parsed, camera=given, names=images, progress=progress, where=str(camera) if camera is not None and given is not camera else "")
+        rows = np.asarray(views.found, dtype=np.intp)
+        unused = [f"the board was not found in {images[row]}" for row in views.missing]
+        if unused:
+            which = listed([images[row] for row in views.missing], 12)
+            warnings.warn(InputWarning(f"{table.path}: the board was not found in {len(unused)} of {len(images)} images, which are left out: {which}"), stacklevel=2)
+        seen = views.T_camera_board
+        symmetries = parsed.symmetries()
+    else:
+        seen = reader.frames("board", board_kind, gaps=True)
+        rows = np.flatnonzero(np.isfinite(seen[:, 0, 0]))
+        seen = seen[rows]
+        absent = np.setdiff1d(np.arange(table.rows), rows)
+        if absent.size:
+            unused = [f"row {row} (from 0) has no board pose" for row in absent]
+            warnings.warn(InputWarning(f"{table.path}: {absent.size} of {table.rows} rows have no board pose and are left out: {listed([str(r) for r in absent], 12)} "
+                                       "(from 0)"), stacklevel=2)  # fmt: skip
+    _check_count(table, len(rows), "with a board")
+    _check_poses(table, hand[rows], seen, views is not None)
+    poses = _core.HandEyePoses(
+        hand[rows],
+        seen,
+        images=None if views is None else list(zip(views.points, views.pixels, strict=True)),
+        camera=None if views is None else views.camera,
+        set=None if sets is None else sets[rows],
+        board_symmetries=list(symmetries),
+    )
+    return HandEyeData(
+        path=table.path,
+        poses=poses,
+        rows=rows,
+        time=None if time is None else time[rows],
+        board_time=None if board_time is None else board_time[rows],
+        joints=None if joints is None else joints[rows],
+        images=tuple(images[row] for row in rows) if views is not None else (),
+        views=views,
+        board=parsed if views is not None else None,
+        camera_given=views is None or camera is not None,
+        unused=tuple(unused),
+        convention=(angles or "") if "angles" in (kind, board_kind) else "quaternion",
+    )
+
+
+def load_stream(path: PathLike, side: Literal["hand", "board"], *, angles: str | None = None) -> Stream:
+    """Read poses with times: t_s and hand_x_m … hand_qz, or board_x_m … board_qz. Columns as in `load_handeye`; times increase.
+
+    Raises InputError that names the line, the column, what was found and what was expected.
+    """
+    table = Table(Path(path))
+    plan = _Plan(table, ("hand", "board"))
+    if not plan.has(side):
+        table.refuse(f"expected the columns {side}_x_m … {side}_qz ({_SIDES[side]}); the columns are {listed(table.names)}")
+    kind = plan.require_whole(side)
+    if "t_s" not in plan.times:
+        table.refuse(f"there is no column t_s: a stream has a time in every row; the columns are {listed(table.names)}")
+    table.read(plan.numbers, plan.labels)
+    reader = _Reader(table, plan, check_angles(angles))
+    frames = reader.frames(side, kind, gaps=side == "board")
+    time = reader.times("t_s", increasing=True)
+    assert time is not None
+    there = np.isfinite(frames[:, 0, 0])
+    _check_count(table, int(there.sum()))
+    return Stream(table.path, time[there], frames[there])
+
+
+def _check_count(table: Table, count: int, what: str = "") -> None:
+    if count < _FEWEST:
+        table.refuse(f"has {count} {'pose' if count == 1 else 'poses'}{f' {what}' if what else ''}, expected at least {_FEWEST} (better 15 or more, turned about different axes)")
+
+
+def _check_poses(table: Table, hand: Floats, board: Floats, images: bool) -> None:
+    """Values that no hand-eye data has."""
+    if max(np.ptp(hand[:, :3, 3], axis=0).max(), np.abs(hand[:, :3, :3] - hand[0, :3, :3]).max()) < _EQUAL:
+        table.refuse(f"all {len(hand)} robot poses are equal: nothing moved, or one pose was written again and again")
+    if not images and max(np.ptp(board[:, :3, 3], axis=0).max(), np.abs(board[:, :3, :3] - board[0, :3, :3]).max()) < _EQUAL:
+        table.refuse(f"all {len(board)} board poses are equal: the camera did not see the hand move, or one pose was written again and again")
+
+    def spread(frames: Floats) -> float:
+        low, high = np.percentile(frames[:, :3, 3], (10, 90), axis=0)
+        return float(max((high - low).max(), np.median(np.linalg.norm(frames[:, :3, 3], axis=1)) / 10))
+
+    # Where one side alone is in another unit, the loop shows it (and which); where both are, nothing else does.
+    if spread(hand) > _FARTHEST and (images or spread(board) > _FARTHEST):
+        sides = ("hand",) if images else ("hand", "board")
+        names = [f"{side}_x_mm …" for side in sides]
+        table.refuse(f"the hand's positions spread over {spread(hand):.4g} m: these look like millimetres; call the columns {listed(names)}, or convert them")
+
+
+# ---- Cameras ---------------------------------------------------------------------------------------------------------
+
+
+def _pixels(value: object) -> int:
+    if not isinstance(value, Decimal) or not value.is_finite() or value != value.to_integral_value() or not 1 <= value <= 100_000:
+        raise expected(value, "a number of pixels")
+    return int(value)
+
+
+def _coefficients(value: object) -> list[Decimal]:
+    if not isinstance(value, list):
+        raise expected(value, "a list of numbers, [k1, k2, p1, p2, k3]")
+    for item in value:
+        if not isinstance(item, Decimal) or not item.is_finite():
+            raise expected(item, "a finite number")
+    if len(value) not in (4, 5):
+        more = ": more coefficients belong to another model (rational, fisheye), which is not read; calibrate the camera with five" if len(value) > 5 else ""
+        raise expected(value, f"5 coefficients [k1, k2, p1, p2, k3] (or 4, without k3){more}")
+    return value
+
+
+class _Distortion(Strict):
+    model: Annotated[Literal["plumb_bob"], PlainValidator(choice("plumb_bob"))]
+    coefficients: Annotated[list[Decimal], PlainValidator(_coefficients)]
+
+
+class _CameraFile(Strict):
+    format: Text
+    width: Annotated[int, PlainValidator(_pixels)]
+    height: Annotated[int, PlainValidator(_pixels)]
+    fx: Number
+    fy: Number
+    cx: Number
+    cy: Number
+    distortion: _Distortion
+    sigma: FreeMapping = {}
+    calibration: FreeMapping = {}
+
+
+def load_camera(path: PathLike) -> _core.Camera:
+    """Read a camera file (format truing-camera/1): image size, fx fy cx cy [px], distortion k1 k2 p1 p2 k3 (plumb bob, as OpenCV).
+
+    Raises InputError that names the line, what was found and what was expected.
+    """
+    document = Document.read(Path(path), _CAMERA)
+    told = document.value.get("format")
+    if told != CAMERA_FORMAT:
+        document.refuse(("format",) if "format" in document.value else (), f"found {found(told)}, expected {CAMERA_FORMAT}" if "format" in document.value
+                        else f"key 'format' is missing: expected format: {CAMERA_FORMAT}")  # fmt: skip
+    file = document.validated(_CameraFile)
+    camera = _core.Camera(
+        width=file.width,
+        height=file.height,
+        fx=float(file.fx),
+        fy=float(file.fy),
+        cx=float(file.cx),
+        cy=float(file.cy),
+        distortion=[float(value) for value in (*file.distortion.coefficients, Decimal(0))][:5],
+    )
+    wrong = plausible_camera(camera)
+    if wrong:
+        document.refuse((wrong[0],), wrong[1])
+    return camera
+
+
+def save_camera(path: PathLike, camera: _core.Camera, *, sigma: Mapping[str, float] | None = None, calibration: Mapping[str, object] | None = None) -> None:
+    """Write a camera file, atomically. `sigma`: standard errors by name; `calibration`: where the values come from."""
+
+    def number(value: float) -> str:
+        return repr(float(value))
+
+    coefficients = ", ".join(number(value) for value in camera.distortion)
+    lines = [f"format: {CAMERA_FORMAT}", f"width: {camera.width}", f"height: {camera.height}"]
+    lines += [f"{name}: {number(getattr(camera, name))}" for name in ("fx", "fy", "cx", "cy")]
+    lines.append(f"distortion: {{model: plumb_bob, coefficients: [{coefficients}]}}  # k1 k2 p1 p2 k3")
+    for key, mapping in (("sigma", sigma), ("calibration", calibration)):
+        if mapping:
+            lines.append(f"{key}: {{{', '.join(f'{name}: {_scalar(value)}' for name, value in mapping.items())}}}")
+    with atomic_write(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _scalar(value: object) -> str:
+    if isinstance(value, (bool, int)):
+        return str(value).lower()
+    if isinstance(value, float):
+        return repr(value) if math.isfinite(value) else "null"
+    text = str(value)
+    return text if re.fullmatch(r"[A-Za-z][A-Za-z0-9_.-]*", text) else '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
