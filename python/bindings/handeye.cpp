@@ -454,9 +454,10 @@ std::string summary(const HandEyeResult& r) {
   std::string out = r.message + "\n";
   if (r.status == HandEyeStatus::done) {
     const Eigen::Matrix<double, 6, 1> sigma = r.camera.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-    out += "camera at " + position_text(r.camera.T) + ", +- " + millimetres(sigma.head<3>().norm()) + ", " +
-           milliradians(sigma.tail<3>().norm()) + "; at the working point +- " +
-           millimetres(std::sqrt(std::max(0.0, r.working_point_covariance.trace()))) + "\n";
+    const double third = std::sqrt(1.0 / 3.0);
+    out += "camera at " + position_text(r.camera.T) + ", +- " + millimetres(third * sigma.head<3>().norm()) + ", " +
+           milliradians(third * sigma.tail<3>().norm()) + " per axis; at the working point +- " +
+           millimetres(third * std::sqrt(std::max(0.0, r.working_point_covariance.trace()))) + "\n";
     out += closure_text("left out", r.left_out);
     if (r.test) out += closure_text("held out", *r.test);
   }

@@ -612,7 +612,7 @@ def _with_poses(cv: Any, board: Board, images: Sequence[Path | str | Image], cal
             raise InputError(f"the camera's values cannot be found from these images ({str(error).strip().splitlines()[-1][:120]}): give --camera, or images with the board tilted by 20 to 40 "
                              "degrees about different axes") from None  # fmt: skip
         if not math.isfinite(calibration_rms) or plausible_camera(camera) is not None or not focal < 0.1:
-            raise InputError(f"the camera's values cannot be found from these images: the focal length came out as {camera.fx:.4g} px{f' ± {focal * camera.fx:.2g}' if math.isfinite(focal) else ', but no board is tilted'}. "
+            raise InputError(f"the camera's values cannot be found from these images: the focal length came out as {camera.fx:.4g} px" + (f" ± {focal * camera.fx:.2g}" if math.isfinite(focal) else ", but no board is tilted") + ". "
                              "Tilt the board against the camera by 20 to 40 degrees about different axes, or give --camera")  # fmt: skip
         if calibration_rms > limit:
             raise InputError(_bad_fit(cv, images, called, found, board, calibration_rms))

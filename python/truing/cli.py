@@ -899,7 +899,7 @@ def handeye_table(result: Mapping[str, Any], folder: Path) -> None:
     """The short answer of `truing handeye`, on stdout; the last line is the path of the report."""
     if result["status"] != "done":
         for u in result["observability"]["unobservable"]:
-            _say(f"{u['what']} cannot be seen: {u['advice']}")
+            _say(f"{u['what']} cannot be seen: {u['advice'].replace('(known height)', '(--known-height)')}")
         for other in result["convention"]["other_readings"]:
             _say(f"the loop closes to {_mm(other['rms_m'])} if {other['explanation']}: --reading {other['reading']}")
     else:
@@ -907,7 +907,7 @@ def handeye_table(result: Mapping[str, Any], folder: Path) -> None:
         lines = [(axis, f"{camera[f'{axis}_m'] * 1e3:.3f} mm", _mm(camera["sigma"][f"{axis}_m"]), _mrad(camera["sigma"][f"r{axis}_rad"])) for axis in "xyz"]
         _table(f"camera in the {camera['in']}", ("", "position", "sigma", "sigma about it"), lines)
         _say("quaternion w x y z: " + " ".join(f"{camera[name]:.7f}" for name in ("qw", "qx", "qy", "qz")))
-        _say(f"at the working point, {point['in_camera_m'][2] * 1e3:.0f} mm in front of it: +- {_mm(point['sigma_m'])}, +- {_mrad(point['rotation_sigma_rad'])} (1 sigma)")
+        _say(f"at the working point, {point['in_camera_m'][2] * 1e3:.0f} mm in front of it: +- {_mm(point['sigma_m'])}, +- {_mrad(point['rotation_sigma_rad'])} per axis (1 sigma)")
         for name, label in (("left_out", "each pose left out"), ("test", "held-out poses")):
             if name in errors and errors[name]["n"]:
                 e = errors[name]

@@ -43,6 +43,7 @@ Floats = NDArray[np.float64]
 HELD_OUT, SEEN = "#2e8b57", "#d98324"
 TRIADS = ("#c0392b", "#2e8b57", "#2f6fb7")  # x, y, z
 SCENE_POSES = 60
+SCENE_BOARDS = 12
 LISTED = 40
 WORST_IMAGES = 6
 # Where a check turns from good to worth a look, and to bad.
@@ -67,8 +68,9 @@ def handeye_report(result: Mapping[str, Any], scene: Scene | None) -> str:
     if result["status"] == "done":
         page.add('<div class="first">')
         _closures(page, result, scene)
-        page.add(_trust(result))
-        page.add("</div>")
+        page.add(f'<div class="column">{_trust(result)}')
+        _directions(page, result)
+        page.add("</div></div>")
     else:
         page.add(_what_to_do(result))
     if result["status"] == "not closing":
@@ -76,7 +78,7 @@ def handeye_report(result: Mapping[str, Any], scene: Scene | None) -> str:
     if scene is not None:
         page.add('<div class="pair wide">')
         _scene(page, result, scene)
-        _uncertainty(page, result)
+        page.add(_frames(result))
         page.add("</div>")
     elif result["residuals"]:
         page.add("<div>")
@@ -110,11 +112,12 @@ def _headline(result: Mapping[str, Any]) -> str:
         return f'<header>{kicker}<h1 class="long">{escaped(_sentence(result["message"]))}</h1><p class="sub">No camera pose is given: what these data say about it is not to be relied on.</p></header>'
     camera, point = result["camera"], result["working_point"]
     distance = float(np.linalg.norm(point["in_camera_m"]))
-    place = ", ".join(_millimetres(camera[f"{axis}_m"], camera["sigma"][f"{axis}_m"]) for axis in "xyz")
+    digits = _decimals(camera["sigma"])
+    place = ", ".join(_millimetres(camera[f"{axis}_m"], digits) for axis in "xyz")
     first = (f'The camera sits at <span class="after">({place}) mm</span> in {where[camera["in"]]}. At the working point it is known to '
              f'<span class="after">±{length_text(point["sigma_m"])}</span> and <span class="after">±{_mrad(point["rotation_sigma_rad"])}</span>.')  # fmt: skip
     errors = result["errors"]["left_out"]
-    sub = (f"One standard error, all three directions together; the working point is {length_text(distance)} from the camera. A pose that was left out of the fit is predicted to "
+    sub = (f"One standard error of each axis; the working point is {length_text(distance)} from the camera. A pose that was left out of the fit is predicted to "
            f"{length_text(errors['rms_m'])} and {_mrad(errors['rotation_rms_rad'])} rms" + (f", {_pixels_text(errors['rms_px'])}" if errors.get("rms_px") is not None else "") + ".")  # fmt: skip
     return f'<header>{kicker}<h1>{first}</h1><p class="sub">{sub}</p></header>'
 
@@ -123,7 +126,7 @@ def _what_to_do(result: Mapping[str, Any]) -> str:
     items = []
     for u in result["observability"]["unobservable"]:
         size = "" if u["sigma"] is None else f" (± {_mrad(u['sigma']) if u['rotation'] else length_text(u['sigma'])})"
-        items.append(f"<li><b>{escaped(_sentence(u['what'], False))}{size} cannot be seen.</b> {escaped(_sentence(u['advice']))}</li>")
+        items.append(f"<li><b>{escaped(_sentence(u['what'], False))}{size} cannot be seen.</b> {escaped(_sentence(u['advice'].replace('(known height)', '(--known-height)')))}</li>")
     readings = result["convention"]["other_readings"]
     if readings:
         best = readings[0]
@@ -195,7 +198,7 @@ def _trust(result: Mapping[str, Any]) -> str:
     spread = seen["axes_spread"] or 0.0
     grade = 0 if spread > FLAT_AXES else 1 if spread > ONE_AXIS else 2
     checks.append((grade, ("The hand was turned about different axes", "The hand was turned mostly about one axis", "The hand was turned about one axis")[grade],
-                   f"rotation about the second axis is {_percent(spread)} of that about the first"))  # fmt: skip
+                   f"rotation about the second axis is {_percent(spread)} of that about the first, singular gap {figures_text(min(seen['gap'] or 0.0, 1e9), 2)}"))  # fmt: skip
     if "test" in errors and errors["test"]["n"]:
         ratio = errors["test"]["rms_m"] / errors["left_out"]["rms_m"] if errors["left_out"]["rms_m"] else 1.0
         grade = 0 if ratio < WORSE_THAN_NOISE else 1 if ratio < 3 else 2
@@ -269,11 +272,12 @@ def _scene(page: Page, result: Mapping[str, Any], scene: Scene) -> None:
                    "hovertemplate": "%{text}<extra>hand</extra>"})  # fmt: skip
     draw([_frustum(frame, 0.05 * extent if eye_in_hand else 0.1 * extent) for frame in (cameras if eye_in_hand else cameras[:1])], faded(INK, 0.55 if eye_in_hand else 1.0), "camera", 2 if eye_in_hand else 4)
     outline = _outline(scene.board_m)
-    draw([_moved(frame, outline) for frame in (boards[:1] if eye_in_hand else boards)], faded(AFTER, 0.95), "board, predicted", 4)
     shown = np.isfinite(seen[:, 0, 0])
+    some = np.isin(np.arange(len(pick)), subsample(np.arange(len(pick)), SCENE_BOARDS))  # boards one over the other show nothing
     words = ""
+    draw([_moved(frame, outline) for frame in (boards[:1] if eye_in_hand else boards[some])], faded(AFTER, 0.95), "board, predicted", 4)
     if shown.any():
-        draw([_moved(frame, outline) for frame in seen[shown]], faded(SEEN, 0.5), "board, seen", 2)
+        draw([_moved(frame, outline) for frame in seen[shown & some]], faded(SEEN, 0.6), "board, seen", 2)
         off = seen[shown, :3, 3] - boards[shown, :3, 3]
         good = ~rejected[pick][shown]
         longest = float(np.quantile(np.linalg.norm(off[good] if good.any() else off, axis=1), 0.9)) or 1e-9
@@ -312,27 +316,33 @@ def _outline(board: tuple[float, float, float, float]) -> Floats:
     return np.array([[left, top, 0.0], [right, top, 0.0], [right, bottom, 0.0], [left, bottom, 0.0], [left, top, 0.0], middle])
 
 
-def _uncertainty(page: Page, result: Mapping[str, Any]) -> None:
-    """The camera's six numbers, and its error at the working point by direction."""
-    camera, point = result["camera"], result["working_point"]
-    parent = {"hand": "hand", "base": "base"}[camera["in"]]
-    page.add(f'<section class="card"><h2>How sure, by direction</h2><p class="lead">Error of the working point along the axes of the {parent}, and along the three directions in which it is largest and smallest.</p>')
+def _directions(page: Page, result: Mapping[str, Any]) -> None:
+    """Error of the working point by direction."""
+    parent, point = result["camera"]["in"], result["working_point"]
     covariance = np.array(point["covariance_m2"])
-    names = [f"{parent} {axis}" for axis in "xyz"] + [f"({', '.join(f'{v:+.1f}'.replace('-', '−') for v in p['axis'])})" for p in point["principal"]]
+    names = [f"{parent} {axis}" for axis in "xyz"] + ["(" + ", ".join(f"{v:+.1f}".replace("-", "−") for v in p["axis"]) + ")" for p in point["principal"]]
     values = [1e3 * math.sqrt(max(0.0, covariance[k, k])) for k in range(3)] + [1e3 * p["sigma_m"] for p in point["principal"]]
+    page.add('<section class="card"><h2>Error of the working point, by direction</h2>')
     page.chart("directions", [{"type": "bar", "orientation": "h", "y": names, "x": values, "marker": {"color": [AFTER] * 3 + [faded(AFTER, 0.55)] * 3},
                                "hovertemplate": "%{y}: ± %{x:.3g} mm<extra></extra>"}],
-               {"xaxis": {"title": {"text": "one standard error [mm]"}, "rangemode": "tozero"}, "yaxis": {"autorange": "reversed", "type": "category", "ticks": ""}, "bargap": 0.35,
-                "margin": {"l": 110, "r": 12, "t": 6, "b": 42}}, size="pane")  # fmt: skip
-    for what, frame in (("camera", camera), ("board", result["board"])):
-        cells = []
-        for axis in "xyz":
-            cells.append(f"<tr><th>{axis}</th><td>{_millimetres(frame[f'{axis}_m'], frame['sigma'][f'{axis}_m'])} mm</td><td>± {length_text(frame['sigma'][f'{axis}_m'])}</td>"
-                         f"<td>± {_mrad(frame['sigma'][f'r{axis}_rad'])}</td></tr>")  # fmt: skip
-        q = " ".join(f"{frame[name]:+.6f}".replace("-", "−") for name in ("qw", "qx", "qy", "qz"))
-        page.add(f'<h3>{what.capitalize()} in the {frame["in"]}</h3><div class="scroll"><table class="narrow"><thead><tr><th></th><th>position</th><th></th><th>turned about it</th></tr></thead>'
-                 f'<tbody>{"".join(cells)}</tbody></table></div><p class="note">quaternion w x y z: {q}</p>')  # fmt: skip
+               {"xaxis": {"title": {"text": "one standard error [mm]"}, "rangemode": "tozero"}, "yaxis": {"autorange": "reversed", "type": "category", "ticks": "", "dtick": 1}, "bargap": 0.3,
+                "margin": {"l": 110, "r": 12, "t": 4, "b": 40}}, size="bars")  # fmt: skip
     page.add("</section>")
+
+
+def _frames(result: Mapping[str, Any]) -> str:
+    """Camera and board, number by number."""
+    parts = []
+    for what in ("camera", "board"):
+        frame = result[what]
+        digits = _decimals(frame["sigma"])
+        body = "".join(f"<tr><th>{axis}</th><td>{_millimetres(frame[f'{axis}_m'], digits)} mm</td><td>± {length_text(frame['sigma'][f'{axis}_m'])}</td>"
+                       f"<td>± {_mrad(frame['sigma'][f'r{axis}_rad'])}</td></tr>" for axis in "xyz")  # fmt: skip
+        q = " ".join(f"{frame[name]:+.6f}".replace("-", "−") for name in ("qw", "qx", "qy", "qz"))
+        parts.append(f"<h3>{what.capitalize()} in the {frame['in']}</h3>"
+                     '<div class="scroll"><table class="narrow"><thead><tr><th></th><th>position</th><th></th><th>turned about it</th></tr></thead>'
+                     f'<tbody>{body}</tbody></table></div><p class="note">quaternion w x y z: {q}</p>')  # fmt: skip
+    return f'<section class="card"><h2>The frames</h2>{"".join(parts)}<p class="note">One standard error. The covariances are in result.json.</p></section>'
 
 
 # -------------------------------------------------------------------------------------------------------------------- what it rests on
@@ -375,14 +385,14 @@ def _noise(result: Mapping[str, Any]) -> str:
     if scale and scale["sigma"] is not None:
         rows.append(f"<tr><th>board's lengths that fit best</th><td>{figures_text(scale['value'], 5)} ± {figures_text(scale['sigma'], 2)} times as told</td></tr>")
     convention = result["convention"]
-    rows.append(f"<tr><th>read</th><td>{escaped(convention['explanation'] or convention['reading'])}, {escaped(convention['orientation'])}</td></tr>")
+    rows.append(f"<tr><th>read</th><td class=wrap>{escaped(convention['explanation'] or convention['reading'])}, {escaped(convention['orientation'])}</td></tr>")
     clock = result.get("clock")
     if clock:
         text = f"t_hand = t_camera {'+' if clock['offset_s'] >= 0 else '−'} {abs(clock['offset_s']) * 1e3:.2f} ms (± {figures_text((clock['sigma_s'] or 0) * 1e3, 2)})" if clock["found"] else escaped(clock["message"])
         rows.append(f"<tr><th>clocks</th><td>{text}</td></tr>")
     solver = result.get("solver")
     if solver and solver["name"]:
-        rows.append(f"<tr><th>solver</th><td>{escaped(solver['name'])}, {counted(solver['iterations'], 'iteration')}: {escaped(solver['stopped_because'])}</td></tr>")
+        rows.append(f"<tr><th>solver</th><td class=wrap>{escaped(solver['name'])}, {counted(solver['iterations'], 'iteration')}: {escaped(solver['stopped_because'])}</td></tr>")
     return f'<section class="card"><h2>What it rests on</h2><div class="scroll"><table class="facts"><tbody>{"".join(rows)}</tbody></table></div></section>'
 
 
@@ -401,9 +411,10 @@ def _kinematics(result: Mapping[str, Any]) -> str:
         if p["frozen"] or p["sigma"] is None:
             continue
         scale, unit = {"m": (1e3, "mm"), "rad": (1e3, "mrad")}.get(p["unit"], (1.0, "" if p["unit"] == "-" else p["unit"]))
-        change = p["value"] - p["nominal"]
-        parameters.append(f"<tr><th>{escaped(p['name'])}</th>{table_cell(change, f'{change * scale:+.4g} {unit}')}{table_cell(p['sigma'], f'± {figures_text(p["sigma"] * scale, 2)} {unit}')}"
-                          f"{table_cell(abs(change) / p['sigma'] if p['sigma'] else 0, figures_text(min(99999.0, abs(change) / p['sigma']) if p['sigma'] else 0.0, 2) + ' σ')}</tr>")  # fmt: skip
+        change, sigma = p["value"] - p["nominal"], p["sigma"]
+        times = min(99999.0, abs(change) / sigma) if sigma else 0.0
+        parameters.append(f"<tr><th>{escaped(p['name'])}</th>" + table_cell(change, f"{change * scale:+.4g} {unit}".replace("-", "−"))
+                          + table_cell(sigma, f"± {figures_text(sigma * scale, 2)} {unit}") + table_cell(times, f"{figures_text(times, 2)} σ") + "</tr>")  # fmt: skip
     heading = "".join(f'<th><button type="button">{h}</button></th>' for h in ("parameter", "change", "standard error", "significance"))
     return (f'<section class="card"><h2>Camera and robot together</h2><p class="lead">An arm that is off its model puts its error into the camera. Found in one problem: camera, board, and '
             f"{counted(k['rank'], 'value')} of {escaped(k['robot'])} (robot.yaml).</p>"
@@ -504,9 +515,13 @@ def _pixels_text(pixels: float | None) -> str:
     return "–" if pixels is None else f"{figures_text(pixels, 2)}\u202fpx"
 
 
-def _millimetres(metres: float, sigma: float | None) -> str:
-    """In mm, with as many decimals as the standard error has meaning."""
-    decimals = 2 if not sigma or not math.isfinite(sigma) else min(4, max(0, 1 - math.floor(math.log10(1e3 * sigma))))
+def _decimals(sigma: Mapping[str, float | None]) -> int:
+    """Of positions in mm: as many as their standard errors have meaning."""
+    least = min((value for value in (sigma[f"{axis}_m"] for axis in "xyz") if value), default=None)
+    return 2 if least is None else min(4, max(0, 1 - math.floor(math.log10(1e3 * least))))
+
+
+def _millimetres(metres: float, decimals: int) -> str:
     return f"{1e3 * metres:.{decimals}f}".replace("-", "−")
 
 
@@ -527,10 +542,10 @@ _STYLE = """
 .verdict.found{background:var(--good)} .verdict.open{background:var(--look)}
 header h1{font-size:clamp(21px,2.1vw,29px);text-wrap:pretty} header .sub{max-width:none}
 .look{border-top:5px solid #d99a00}
-.chart.close{height:232px} .chart.close.short{height:178px} .chart.pane{height:236px} .chart.scene{height:560px}
+.chart.close{height:232px} .chart.close.short{height:178px} .chart.pane{height:236px} .chart.bars{height:176px} .column{display:grid;gap:18px;align-content:start;min-width:0} .chart.scene{height:560px}
 .pair{display:grid;grid-template-columns:minmax(0,1fr) minmax(0,1fr);gap:18px} .pair.wide{grid-template-columns:minmax(0,1.5fr) minmax(0,1fr)} .pair:empty{display:none}
 .card h3{font-size:16px;margin:14px 0 2px;font-weight:600} h2 .muted{font-weight:400;font-size:15px;margin-left:6px}
-table.left td,table.left th{text-align:left} td.wrap{white-space:normal;text-align:left;min-width:180px} table.narrow{width:auto} table.facts th{font-weight:400;color:var(--muted);text-align:left} table.facts td{white-space:normal;text-align:left}
+table.left td,table.left th{text-align:left} td.wrap{white-space:normal;text-align:left;min-width:180px} table.narrow{width:auto} table.facts th{font-weight:400;color:var(--muted);text-align:left} table.facts th{white-space:normal} table.facts td{text-align:left} table.facts td.wrap{white-space:normal}
 th.in{padding-left:18px!important} tr.missed th,tr.missed td{color:var(--bad)} code{background:#eef0f3;border-radius:5px;padding:1px 6px;font-size:14.5px}
 .fold{margin-top:10px} summary{cursor:pointer;font-weight:600}
 @media(max-width:1000px){.pair,.pair.wide{grid-template-columns:minmax(0,1fr)}}

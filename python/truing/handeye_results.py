@@ -138,12 +138,13 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
         found["board_turned"] = {"poses": [int(data.rows[k]) for k, turn in enumerate(r.symmetry) if turn]}
     if data.views is not None:
         found["images"] = _images(solved)
-    found["next_poses"] = [{**frame_dict(p.T_base_hand), "working_point_sigma_m": p.working_point_sigma} for p in solved.next_poses]
+    found["next_poses"] = [{**frame_dict(p.T_base_hand), "working_point_sigma_m": p.working_point_sigma / math.sqrt(3.0)} for p in solved.next_poses]
     if solved.clock is not None:
         found["clock"] = _clock(solved.clock)
     if solved.kinematics is not None:
         found["kinematics"] = _kinematics(solved.kinematics)
-    found["solver"] = {"name": r.solver.name, "iterations": r.solver.iterations, "converged": r.solver.converged, "stopped_because": r.solver.stopped_because}
+    if r.solver.name:
+        found["solver"] = {"name": r.solver.name, "iterations": r.solver.iterations, "converged": r.solver.converged, "stopped_because": r.solver.stopped_because}
     found["seed"] = solved.seed
     said = [scale_message(r.board_scale, r.board_scale_sigma, "" if data.board is None else str(data.board))] if r.status == "done" else []
     found["warnings"] = [*warnings, *(text for text in said if text)]
@@ -168,11 +169,16 @@ def _working_point(solved: Solved) -> dict[str, Any]:
     values, axes = np.sqrt(np.maximum(values[::-1], 0)), axes[:, ::-1]
     return {
         "in_camera_m": point,
-        "sigma_m": float(np.sqrt(max(0.0, np.trace(covariance)))),
-        "rotation_sigma_rad": float(np.sqrt(max(0.0, np.trace(np.asarray(camera.covariance)[3:, 3:])))),
+        "sigma_m": _per_axis(covariance),
+        "rotation_sigma_rad": _per_axis(np.asarray(camera.covariance)[3:, 3:]),
         "covariance_m2": covariance,
         "principal": [{"sigma_m": float(values[k]), "axis": axes[:, k]} for k in range(3)],
     }
+
+
+def _per_axis(covariance: Floats) -> float:
+    """Standard error of one axis, rms over the three."""
+    return math.sqrt(max(0.0, float(np.trace(covariance))) / 3.0)
 
 
 def _image(data: truing.HandEyeData, k: int) -> dict[str, str]:
@@ -301,7 +307,7 @@ def _board_extent(data: truing.HandEyeData) -> tuple[float, float, float, float]
 
 
 def _pixel_errors(solved: Solved, A: Floats, X: Floats, Y: Floats) -> tuple[Floats, Floats]:
-    """Seen minus predicted pixels with robot poses as found, of poses that were not rejected, and where they are."""
+    """Seen minus predicted pixels with robot poses as found, of poses that were fitted, and where they are."""
     data, r = solved.data, solved.result
     images, given = data.poses.images, data.poses.camera
     if images is None or given is None:
@@ -309,7 +315,7 @@ def _pixel_errors(solved: Solved, A: Floats, X: Floats, Y: Floats) -> tuple[Floa
     camera = r.camera_model if r.camera_model is not None else given
     errors, places = [], []
     for k, (points, pixels) in enumerate(images):
-        if r.residuals[k].rejected:
+        if r.residuals[k].rejected or (data.poses.set is not None and data.poses.set[k] == 1):
             continue
         moving = np.linalg.inv(A[k]) if solved.options.setup == "eye-in-hand" else A[k]
         T = np.linalg.inv(X) @ moving @ Y
@@ -350,7 +356,7 @@ def next_pose_columns(poses: Sequence[truing.NextHandPose]) -> dict[str, Any]:
     """Columns of ``next_poses.csv``: hand poses to drive to, as in poses.csv, and what each leaves at the working point."""
     frames = [frame_dict(pose.T_base_hand) for pose in poses]
     columns = {f"hand_{name}": np.array([frame[name] for frame in frames]) for name in frames[0]}
-    columns["working_point_sigma_m"] = np.array([pose.working_point_sigma for pose in poses])
+    columns["working_point_sigma_m"] = np.array([pose.working_point_sigma / math.sqrt(3.0) for pose in poses])  # per axis, as result.json has it
     return columns
 
 
@@ -365,9 +371,9 @@ def write_handeye(folder: Path, solved: Solved, *, warnings: Iterable[str] = (),
         write_table(folder / "residuals.csv", residual_columns(solved))
     if data.views is not None and r.status == "done" and (r.camera_model is not None or data.views.calibrated):
         camera, sigma = _camera_model(solved)
-        rms = found["errors"]["train"].get("rms_px")
+        noise = found["noise"]["pixel"]
         save_camera(folder / "camera.yaml", camera, sigma=dict(zip(INTRINSICS, sigma, strict=False)) if len(sigma) else None,
-                    calibration={"source": data.path.name, "board": str(data.views.board), "images": len(data.views.found), **({} if rms is None else {"rms_px": float(rms)})})  # fmt: skip
+                    calibration={"source": data.path.name, "board": str(data.views.board), "images": len(data.views.found), **({} if noise is None else {"noise_px": float(noise)})})  # fmt: skip
     if solved.next_poses:
         write_table(folder / "next_poses.csv", next_pose_columns(solved.next_poses))
     if solved.kinematics is not None and nominal_file is not None:

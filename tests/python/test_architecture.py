@@ -123,17 +123,21 @@ PYTHON_MAY_IMPORT = {
     "truing.errors": {"truing._core"},
     "truing.effects": {"truing._core", "truing.errors"},
     "truing.api": {"truing._core", "truing.errors", "truing.effects"},
-    "truing.files": {"truing._core", "truing.errors", "truing.files"},
+    "truing.boards": {"truing._core", "truing.errors"},
+    "truing.files": {"truing._core", "truing.errors", "truing.boards", "truing.files"},
+    "truing.hand_eye": {"truing._core", "truing.errors", "truing.effects", "truing.files"},
     "truing.simulation": {"truing", "truing.errors", "truing.files"},
     "truing.handeye_simulation": {"truing.errors"},  # no solver: it says what solvers should find
     "truing.results": {"truing", "truing.errors", "truing.files", "truing.report", "truing.diagnose_report"},
+    "truing.handeye_results": {"truing", "truing.errors", "truing.files", "truing.results", "truing.handeye_report"},
+    "truing.handeye_report": {"truing.handeye_results", "truing.report"},
     "truing.report": {"truing.results"},
     "truing.diagnose_report": {"truing.results", "truing.report"},
     "truing.demo": {"truing", "truing.errors", "truing.files", "truing.simulation", "truing.results"},
     "truing.exam": {"truing"},  # and of that only containers and readers: test_exam.py
     "truing.cli": {"truing", "truing.errors", "truing.files", "truing.simulation", "truing.results", "truing.report", "truing.diagnose_report",
-                   "truing.demo", "truing.exam"},
-    "truing": {"truing._core", "truing.errors", "truing.effects", "truing.api", "truing.files", "truing.simulation"},
+                   "truing.handeye_results", "truing.demo", "truing.exam"},
+    "truing": {"truing._core", "truing.errors", "truing.effects", "truing.api", "truing.boards", "truing.files", "truing.hand_eye", "truing.simulation"},
 }  # fmt: skip
 
 # Parts of several modules, which may import each other.
@@ -151,6 +155,7 @@ PYTHON_ONLY_IN = {
     "typer": {"truing.cli"},
     "rich": {"truing.cli", "truing.demo"},
     "mujoco": {"truing.exam"},
+    "cv2": {"truing.boards"},
 }
 
 
@@ -219,6 +224,6 @@ def test_nobody_imports_the_command_line() -> None:
 
 def test_importing_truing_stays_cheap() -> None:
     """The package itself needs no plotting, no command line and no report."""
-    later = {"truing.cli", "truing.report", "truing.diagnose_report", "truing.results", "truing.demo", "truing.exam"}
+    later = {"truing.cli", "truing.report", "truing.diagnose_report", "truing.results", "truing.handeye_results", "truing.handeye_report", "truing.demo", "truing.exam"}
     assert not later & PYTHON_MAY_IMPORT["truing"]
     assert not any(part_of(name) in later for name in imports(python_files()["__init__.py"]))
