@@ -491,6 +491,12 @@ ClosedForm handeye_closed_form(const HandEyePoses& poses, HandEyeSetup setup) {
   check_rows(poses, rows);
   const Frames M = moving_frames(poses.T_base_hand, setup);
   const CameraSolution solution = solve_camera(M, poses.T_camera_board, rows);
+  HandEyeOptions options;
+  options.setup = setup;
+  HandEyeResult seen;
+  std::optional<Eigen::Vector3d> axis;
+  look_at_axes(solution, options, &seen, &axis);
+  if (!seen.unobservable.empty()) throw std::invalid_argument(seen.message);
   ClosedForm out;
   out.T_parent_camera = solution.X;
   out.T_parent_board = mean_board(M, poses.T_camera_board, rows, solution.X);

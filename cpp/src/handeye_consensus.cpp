@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kAgreeing = 0.6;        // of the rows must close for a triple to count
 constexpr double kBeyond = 2.5;          // times their distance: rows that do not agree. Six normal errors get there once in a million
+constexpr std::size_t kFewest = 6;       // poses of which some may be left out: fewer agree by chance
 constexpr std::size_t kJudges = 200;     // rows that judge a triple
 constexpr double kTurn = 0.1;            // [rad] poses of a triple differ by more, where there are such
 constexpr double kPi = 3.14159265358979323846;
@@ -109,7 +110,7 @@ Agreement find_agreement(const Frames& M, const Frames& B, const Rows& rows, con
   refit();
   std::vector<double> distances;
   judge_all(&distances);
-  if (!options.search || rows.size() < 5) {
+  if (!options.search || rows.size() < 4 || (symmetries.empty() && rows.size() < kFewest)) {
     std::fill(out.symmetry.begin(), out.symmetry.end(), 0);
     describe(M, judge, &out);
     return out;
@@ -146,7 +147,7 @@ Agreement find_agreement(const Frames& M, const Frames& B, const Rows& rows, con
     judge_all(&distances);
     Rows agreeing;
     for (std::size_t k = 0; k < rows.size(); ++k)
-      if (distances[k] <= kBeyond * out.scale) agreeing.push_back(rows[k]);
+      if (distances[k] <= kBeyond * out.scale || rows.size() < kFewest) agreeing.push_back(rows[k]);
     const bool same = round > 0 && agreeing == out.rows;
     out.rows = agreeing;
     if (same) break;

@@ -34,7 +34,7 @@ struct ConsensusOptions {
 };
 
 /// Deterministic: triples of poses, in an order that depends on nothing but the poses, each solved and judged by how well three of five close
-/// (least quantile of squares, Rousseeuw 1984); the best one is then refitted to the poses that agree with it.
+/// (least quantile of squares, Rousseeuw 1984); the best one is then refitted to the poses that agree with it. Of fewer than six, all do.
 Agreement find_agreement(const Frames& M, const Frames& B, const Rows& rows, const std::vector<Eigen::Isometry3d>& symmetries,
                          const CameraSolver& solve, const ConsensusOptions& options);
 

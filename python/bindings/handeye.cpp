@@ -421,7 +421,6 @@ void bind_parts(py::module_& m) {
   py::class_<ClockOffset> clock(m, "ClockOffset", "Two records of the same motion by two clocks.");
   clock.def_readonly("offset", &ClockOffset::offset, "[s] t_hand = t_camera + offset");
   clock.def_readonly("sigma", &ClockOffset::sigma, "[s]");
-  clock.def_readonly("drift", &ClockOffset::drift, "[s/s]; not fitted when the record is short: 0.");
   clock.def_readonly("correlation", &ClockOffset::correlation,
                      "Of the two angular speeds at that offset.");
   clock.def_readonly("found", &ClockOffset::found, "False: `message` says why.");
@@ -461,6 +460,7 @@ std::string summary(const HandEyeResult& r) {
     out += closure_text("left out", r.left_out);
     if (r.test) out += closure_text("held out", *r.test);
   }
+  for (const std::string& warning : r.warnings) out += "warning: " + warning + "\n";
   for (const std::size_t i : r.rejected)
     out += "rejected pose " + std::to_string(i) + ": " + r.residuals.at(i).cause + "\n";
   for (const Unobservable& u : r.unobservable) out += u.what + ": " + u.advice + "\n";
@@ -476,6 +476,9 @@ void bind_result(py::module_& m) {
                    "'done'; 'not observable' (`unobservable` says which directions, and what to do); 'not closing' "
                    "(`readings` has the reading that closes, if any); 'not converged'.");
   cls.def_readonly("message", &HandEyeResult::message, "One sentence.");
+  cls.def_property_readonly(
+      "warnings", [](const HandEyeResult& r) { return tuple_of(r.warnings); },
+      "What to know or do: a board of another size, a robot that is off, noise told too small ...");
   cls.def_readonly("camera", &HandEyeResult::camera,
                    "In the hand (eye in hand) or in the base. Only with status 'done' or 'not converged'.");
   cls.def_readonly("board", &HandEyeResult::board, "In the base (eye in hand) or in the hand.");
@@ -526,10 +529,17 @@ void bind_result(py::module_& m) {
 
   py::class_<HandEyeKinematics> both(m, "HandEyeKinematics", "What `handeye_with_kinematics` found.");
   both.def_readonly("identification", &HandEyeKinematics::identification,
-                    "robot: calibrated, its tool the flange; nothing of the camera is in it.");
+                    "Of the robot whose tool is the camera (eye in hand) or the board, measured in the frame of the other.");
+  both.def_readonly("robot", &HandEyeKinematics::robot,
+                    "Calibrated, its tool the flange as given, its base the origin. Part of this result: copy() it before "
+                    "changing it.");
   both.def_readonly("camera", &HandEyeKinematics::camera, "As in HandEyeResult, of the calibrated robot.");
   both.def_readonly("board", &HandEyeKinematics::board, "As in HandEyeResult, of the calibrated robot.");
-  both.def_readonly("train_before", &HandEyeKinematics::train_before, "Closure with the nominal robot.");
+  both.def_readonly("working_point", &HandEyeKinematics::working_point, "shape=(3,) [m] in the camera frame.");
+  both.def_readonly("working_point_covariance", &HandEyeKinematics::working_point_covariance,
+                    "shape=(3, 3) [m^2] of that point in the frame that carries the camera.");
+  both.def_readonly("train_before", &HandEyeKinematics::train_before,
+                    "Closure with the robot as it was, base and tool fitted.");
   both.def_readonly("train_after", &HandEyeKinematics::train_after, "Closure with the calibrated robot.");
   both.def_property_readonly(
       "test_before", [](const HandEyeKinematics& k) { return k.test_before; }, "Held-out poses, or None.");

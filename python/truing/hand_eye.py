@@ -149,9 +149,9 @@ def handeye_plan(
     count: int = 5,
     options: HandEyeOptions | None = None,
     setup: Setup = "eye-in-hand",
-    candidates: int = 400,
-    tilt: float = 0.7853981633974483,
-    reach: float = 0.15,
+    candidates: int | None = None,
+    tilt: float | None = None,
+    reach: float | None = None,
     seed: int = 0,
 ) -> tuple[NextHandPose, ...]:
     """Robot poses, one after the other, that shrink the covariance of the working point most.
@@ -159,12 +159,14 @@ def handeye_plan(
     poses, result: what was measured, and what `handeye` made of it. options: those of `handeye`; None: the usual ones with `setup`.
     count: how many. candidates: tried for each. seed: of them.
     tilt: [rad] the board is seen at no more than this from its normal, beyond what was seen. reach: [m] hands stay this close to a measured one.
+    None: the usual ones, see `HandEyePlanOptions` in handeye.hpp.
 
     Raises InputError.
     """
     if options is None:
         options = handeye_options(poses, setup=setup)
-    return _core.handeye_plan(_poses(poses), result, options, count=count, candidates=candidates, tilt=tilt, reach=reach, seed=seed)
+    usual = {"candidates": candidates, "tilt": tilt, "reach": reach}
+    return _core.handeye_plan(_poses(poses), result, options, count=count, seed=seed, **{name: value for name, value in usual.items() if value is not None})  # type: ignore[arg-type]
 
 
 def handeye_clock(

@@ -22,7 +22,6 @@ AXES = ("x", "y", "z")
 CHANGES = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")  # what covariances are of
 INTRINSICS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 CHI3_95 = 2.7955  # [-] 95 % of the lengths of a vector of three unit normals are below
-WORTH_SAYING = 3e-3  # of a board's scale, and four standard errors
 _PIXELS_DRAWN = 4000
 
 Floats = NDArray[np.float64]
@@ -89,15 +88,6 @@ def camera_model_dict(camera: truing.Camera, sigma: Sequence[float] = ()) -> dic
     return found
 
 
-def scale_message(scale: float, sigma: float, board: str = "") -> str:
-    """That the board is not as large as was said; empty where the data do not say so."""
-    if not (math.isfinite(sigma) and sigma > 0) or abs(scale - 1) < max(WORTH_SAYING, 4 * sigma):
-        return ""
-    which = f" ({board})" if board else ""
-    return (f"the board's lengths{which} would fit best if they were {100 * abs(scale - 1):.2g} % {'larger' if scale > 1 else 'smaller'} (± {100 * sigma:.1g} %): "
-            "measure the board with a caliper")  # fmt: skip
-
-
 def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
     """What ``result.json`` of ``truing handeye`` holds. Without status "done" there is no camera in it."""
     data, options, r = solved.data, solved.options, solved.result
@@ -146,25 +136,17 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
     if r.solver.name:
         found["solver"] = {"name": r.solver.name, "iterations": r.solver.iterations, "converged": r.solver.converged, "stopped_because": r.solver.stopped_because}
     found["seed"] = solved.seed
-    said = [scale_message(r.board_scale, r.board_scale_sigma, "" if data.board is None else str(data.board))] if r.status == "done" else []
-    found["warnings"] = [*warnings, *(text for text in said if text)]
+    found["warnings"] = [*warnings, *r.warnings]
     return found
 
 
 def _clock(c: truing.ClockOffset) -> dict[str, Any]:
-    return {"offset_s": c.offset, "sigma_s": c.sigma, "drift": c.drift, "correlation": c.correlation, "found": c.found, "message": c.message, "rows": len(c.rows)}
+    return {"offset_s": c.offset, "sigma_s": c.sigma, "correlation": c.correlation, "found": c.found, "message": c.message, "rows": len(c.rows)}
 
 
 def _working_point(solved: Solved) -> dict[str, Any]:
-    r, k = solved.result, solved.kinematics
-    point, covariance = np.asarray(r.working_point), np.asarray(r.working_point_covariance)
-    camera = r.camera if k is None else k.camera
-    if k is not None:
-        # The point moves with the camera's origin and by its turns, in the parent's axes.
-        arm = np.asarray(camera.T)[:3, :3] @ point
-        cross = np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
-        J = np.hstack([np.eye(3), -cross])
-        covariance = J @ np.asarray(camera.covariance) @ J.T
+    told: truing.HandEyeResult | truing.HandEyeKinematics = solved.result if solved.kinematics is None else solved.kinematics
+    point, covariance, camera = np.asarray(told.working_point), np.asarray(told.working_point_covariance), told.camera
     values, axes = np.linalg.eigh(covariance)
     values, axes = np.sqrt(np.maximum(values[::-1], 0)), axes[:, ::-1]
     return {
@@ -236,7 +218,7 @@ def _kinematics(k: truing.HandEyeKinematics) -> dict[str, Any]:
     if k.test_before is not None and k.test_after is not None:
         errors["test"] = {"before": _errors(k.test_before), "after": _errors(k.test_after)}
     return {
-        "robot": i.robot.name,
+        "robot": k.robot.name,
         "errors": errors,
         "parameters": [{"name": p.name, "nominal": p.nominal, "value": p.value, "sigma": p.sigma, "unit": p.unit, "frozen": p.frozen} for p in i.parameters],
         "frozen": [{"parameter": f.parameter, "combination": dict(f.combination), "why": f.why} for f in i.frozen],
@@ -265,7 +247,9 @@ def scene_of(solved: Solved) -> Scene | None:
     ones = np.ones((data.count, 1, 1))
     eye_in_hand = solved.options.setup == "eye-in-hand"
     camera, predicted = (A @ X, ones * Y) if eye_in_hand else (ones * X, A @ Y)
-    seen = camera @ B if not solved.options.reading else np.full_like(A, np.nan)
+    # A reading that is about the board's poses: what it makes of them only the core knows.
+    as_given = not any(part.startswith("board") for part in solved.options.reading.split("+"))
+    seen = camera @ B if as_given else np.full_like(A, np.nan)
     n = r.noise
     lever = np.linalg.norm((np.linalg.inv(A) @ predicted)[:, :3, 3], axis=1)
     # Two of a position's three components turn with the hand's noise; as if all three had their mean.
@@ -413,4 +397,4 @@ def _write_robot(folder: Path, solved: Solved, found: Mapping[str, Any], nominal
     assert solved.kinematics is not None
     errors = found["kinematics"]["errors"]
     rms = errors.get("test", errors["train"])["after"]["rms_m"]
-    write_robot(folder, solved.kinematics.identification.robot, solved.data.path.name, {"rms_m": rms}, nominal_file, base_link, tip_link)
+    write_robot(folder, solved.kinematics.robot, solved.data.path.name, {"rms_m": rms}, nominal_file, base_link, tip_link)

@@ -501,6 +501,7 @@ TEST_CASE("one axis of rotation: the height along it is refused, or told") {
       REQUIRE(r.unobservable.size() == 1);
       CHECK(std::abs(r.unobservable[0].direction.z()) > 0.999);
       CHECK(r.message.find("known height") != std::string::npos);
+      CHECK_THROWS_WITH_AS(handeye_closed_form(s.poses, setup), doctest::Contains("known height"), std::invalid_argument);
       o.known_height = s.X.translation().z();
       const HandEyeResult told = handeye(s.poses, o);
       CHECK(told.status == HandEyeStatus::done);

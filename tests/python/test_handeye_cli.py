@@ -230,7 +230,7 @@ def test_a_wrong_size_of_the_board_is_said(imaged: tuple[Path, Floats]) -> None:
     code, result = run(folder / "poses.csv", "--board", "circles:8x5:26.5mm", "--camera", str(folder / "camera.yaml"))
     if code == 0:
         assert result["board_scale"]["value"] == pytest.approx(25 / 26.5, abs=0.02)
-        assert any("measure the board with a caliper" in warning for warning in result["warnings"])
+        assert any("check the size of its squares" in warning for warning in result["warnings"])
     else:
         assert result["status"] == "not closing"
 

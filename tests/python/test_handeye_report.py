@@ -18,7 +18,7 @@ from test_diagnose_report import charts_of, visible
 
 import truing
 from truing.handeye_report import handeye_report
-from truing.handeye_results import Scene, Solved, handeye_dict, scale_message, scene_of
+from truing.handeye_results import Scene, Solved, handeye_dict, scene_of
 from truing.results import without_nan
 
 
@@ -103,7 +103,7 @@ def fabricated(result: dict[str, Any]) -> dict[str, Any]:
                       "camera": {"width": 640, "height": 480, "fx": 550.0, "fy": 551.0, "cx": 320.0, "cy": 240.0,
                                  "distortion": {"model": "plumb_bob", "coefficients": [0.1, 0, 0, 0, 0]}, "sigma": {"fx": 0.5, "k1": None}}}  # fmt: skip
     full["next_poses"] = [{"x_m": 0.1, "y_m": -0.2, "z_m": 0.3, "qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0, "working_point_sigma_m": 1e-4}]
-    full["clock"] = {"offset_s": -0.0123, "sigma_s": 1e-4, "drift": 0.0, "correlation": 0.99, "found": True, "message": "", "rows": 24}
+    full["clock"] = {"offset_s": -0.0123, "sigma_s": 1e-4, "correlation": 0.99, "found": True, "message": "", "rows": 24}
     errors = {"before": full["errors"]["train"], "after": full["errors"]["left_out"]}
     parameter = {"name": "J2.offset", "nominal": 0.0, "value": 1e-3, "sigma": 1e-5, "unit": "rad", "frozen": False}
     full["kinematics"] = {"robot": "arm", "errors": {"train": errors, "test": errors}, "parameters": [parameter, parameter | {"name": "J1.a", "sigma": None, "frozen": True}], "frozen": [],
@@ -170,7 +170,3 @@ def test_what_is_not_known_is_left_out_and_breaks_nothing(good: tuple[dict[str, 
     nowhere = dataclasses.replace(scene, T_base_board_seen=np.full_like(scene.T_base_board_seen, np.nan), predicted_m=np.full(24, np.nan), predicted_rad=np.full(24, np.nan))
     assert "The camera sits at" in visible(handeye_report(bare, nowhere))
 
-
-def test_a_board_of_another_size_is_only_said_where_the_data_are_sure() -> None:
-    assert scale_message(1.02, 1e-3, "chessboard:9x6:25mm") == ("the board's lengths (chessboard:9x6:25mm) would fit best if they were 2 % larger (± 0.1 %): measure the board with a caliper")
-    assert scale_message(1.02, 8e-3) == "" and scale_message(1.001, 1e-5) == "" and scale_message(0.5, float("nan")) == ""

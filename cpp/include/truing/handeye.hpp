@@ -186,7 +186,8 @@ struct ClosedForm {
   std::size_t motions = 0;
 };
 
-/// Throws std::invalid_argument as `handeye` does.
+/// Takes the poses as they are: whether the loop closes with them is for `handeye` to say, with HandEyeMethod::closed_form. Throws
+/// std::invalid_argument as `handeye` does, and where the motions do not show the camera's position (one axis of rotation, or none).
 ClosedForm handeye_closed_form(const HandEyePoses& poses, HandEyeSetup setup);
 
 /// All readings that `handeye` tries, in the order tried; closures are not set.
