@@ -4,7 +4,7 @@
 
     python bench/handeye.py [--quick] [--only accuracy,images,...] [--write docs/benchmarks-handeye.md]
 
-Needs OpenCV 4 (`pip install "opencv-python-headless<5"`). `--write` puts the tables between the markers of the page.
+Needs OpenCV 4 (`pip install "opencv-python-headless<5"`: 5.0 has no calibrateHandEye in Python). `--write` puts the tables between the markers of the page.
 Trial k has seed k, in every cell; the oracle of bench/handeye_oracle.py says what can be had when the noises are known.
 """
 
@@ -443,6 +443,8 @@ def main() -> None:
     page = arguments.write.read_text(encoding="utf-8") if arguments.write else ""
     if arguments.write and not ("<!-- table -->" in page and "<!-- end -->" in page):
         parser.error(f"{arguments.write} has no markers <!-- table --> and <!-- end -->")
+    if not hasattr(cv2, "calibrateHandEye"):
+        parser.error(f'OpenCV {cv2.__version__} has no calibrateHandEye: pip install "opencv-python-headless<5"')
     cv2.setNumThreads(1)
     before = os.getloadavg()[0] if hasattr(os, "getloadavg") else math.nan
     lines = []

@@ -181,7 +181,7 @@ def test_projection_is_that_of_opencv() -> None:
     assert scene.pixels is not None
     for T, pixels in zip(scene.true_T_camera_board, scene.pixels, strict=True):
         theirs, _ = cv2.projectPoints(scene.board.points, rotation_vector(T[:3, :3]), T[:3, 3], scene.camera.matrix, np.array(scene.camera.distortion))
-        np.testing.assert_allclose(pixels, theirs[:, 0], atol=1e-9)
+        np.testing.assert_allclose(pixels, theirs.reshape(-1, 2), atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["chessboard", "circles"])
@@ -210,7 +210,7 @@ def test_opencv_finds_the_corners_where_the_projection_says() -> None:
         image = render_board(scene.camera, scene.board, T)
         there, corners = cv2.findChessboardCorners(image, (9, 6))
         assert there
-        corners = cv2.cornerSubPix(image, corners, (5, 5), (-1, -1), (3, 50, 1e-4)).reshape(-1, 2)  # shape=(n, 1, 2) before OpenCV 5
+        corners = cv2.cornerSubPix(image, corners, (5, 5), (-1, -1), (3, 50, 1e-4)).reshape(-1, 2)
         if np.linalg.norm(corners[0] - pixels[0]) > np.linalg.norm(corners[-1] - pixels[0]):
             corners = corners[::-1]  # the other end of a 9 x 6 board looks the same but for its colours
         assert np.sqrt(((corners - pixels) ** 2).mean()) < 0.06
