@@ -23,6 +23,9 @@ from typing import Any
 import numpy as np
 import truing
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import handeye_real
+
 ROOT = Path(__file__).resolve().parent.parent
 BARELY_SEEN = 0.01  # [m | rad]
 
@@ -99,6 +102,7 @@ SOURCES = """\
 | `minimal_poe_uts` | ABB IRB 120, touched points, 36 + 40 poses | [drliaowu/Minimal_Robot_Calibration_Using_Position](https://github.com/drliaowu/Minimal_Robot_Calibration_Using_Position), 376cb83; Wu et al., IEEE T-ASE 12(2), 2015 | none found |
 | `robotcali_irb120_cable` | ABB IRB 120, draw-wire encoder, 1042 poses | [Lizhibing1490183152/RobotCali](https://github.com/Lizhibing1490183152/RobotCali), f260ca8 | none found |
 | `handeye_fr3` | Franka Research 3, RealSense D405 on the flange, 114 poses | [PhilNad/robot-arm-kinematic-calibration](https://github.com/PhilNad/robot-arm-kinematic-calibration), 6e0292a | MIT |
+| `handeye_ros_industrial` | industrial arm, Kinect-class camera, dot grid, 8 images | [ros-industrial/industrial_calibration](https://github.com/ros-industrial/industrial_calibration), fe62b7c | Apache-2.0 |
 | `ipa_ur10_leica` | UR10, Leica tracker with T-Mac, 1489 + 1495 + 2773 + 632 poses | [christianlandgraf/ipa-robot-accuracy](https://github.com/christianlandgraf/ipa-robot-accuracy), 507fba6; Landgraf et al., IEEE CASE 2021 | MIT |
 """
 
@@ -364,7 +368,7 @@ def page(folder: Path) -> str:
     for name, note in NOTES.items():
         if (folder / name).is_dir():
             lines += [note(folder), ""]
-    lines += ["## Sources", "", "The recordings are not part of this repository: most come without a licence, and are used for testing only.", "",
+    lines += [handeye_real.section(folder), "", "## Sources", "", "The recordings are not part of this repository: most come without a licence, and are used for testing only.", "",
               SOURCES, "## Again", "", "    python bench/real_data.py --data FOLDER", ""]  # fmt: skip
     return "\n".join(lines)
 

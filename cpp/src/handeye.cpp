@@ -34,6 +34,7 @@ constexpr double kDoubtful = 0.02;           // closures beyond this, rad or sha
 constexpr double kHopeless = 0.2;            // and beyond this nothing is said
 constexpr double kWidest = 0.1;              // standard errors beyond this share of the distance, or rad, are not an answer
 constexpr double kExact = 1e-8;              // [m], [rad] closures below this are rounding, not noise
+constexpr double kBeyondPixels = 3.0;        // times what pixels can tell of a board's orientation: more is not theirs
 constexpr int kRejectRounds = 10;
 constexpr double kPlainGain = 16.0;          // over the poses: by how much more plain weights must predict better, as a share
 
@@ -212,7 +213,7 @@ LoopNoise noise_asked(const HandEyeOptions& options, const HandEyePoses& poses, 
   LoopNoise noise;
   const auto variance = [](double a) { return std::max(a * a, 1e-24); };
   const double position = std::max(agreement.position, 1e-9), rotation = std::max(agreement.rotation, 1e-9);
-  noise.variance = {variance(0.5 * position), variance(0.3 * rotation), variance(0.3 * rotation)};
+  noise.variance = {variance(0.5 * position), variance(0.3 * rotation), variance(0.3 * rotation), 0.0};
   const bool images = !poses.images.empty();
   const bool position_given = std::isfinite(options.hand_position_sigma) && (images || std::isfinite(options.camera_position_sigma));
   if (position_given)
@@ -237,18 +238,18 @@ std::pair<double, double> left_out_closures(const LoopProblem& problem, const Ro
 /// plain ones. Plain weights are taken where they predict clearly better.
 void question_noise(const HandEyeOptions& options, Work* work, HandEyeResult* result) {
   const LoopEstimate& fit = work->fit;
-  if (!fit.noise.estimate[0] || !fit.noise.estimate[1] || !fit.noise.estimate[2]) return;
+  if (!fit.noise.estimate[0] || !fit.noise.estimate[1] || !fit.noise.estimate[2] || !work->problem.pixel_shape.empty()) return;
   const auto [position, rotation] = left_out_closures(work->problem, work->fitted, fit);
   if (position < kExact && rotation < kExact) return;
   LoopNoise plain;
-  plain.estimate = {false, false, false};
-  plain.variance = {position * position / 3.0, 1e-6 * rotation * rotation, rotation * rotation / 3.0};
+  plain.estimate = {false, false, false, false};
+  plain.variance = {position * position / 3.0, 1e-6 * rotation * rotation, rotation * rotation / 3.0, 0.0};
   LoopEstimate other = refine_loop(work->problem, work->fitted, fit.X, fit.Y, plain, options.max_iterations);
   const auto [plain_position, plain_rotation] = left_out_closures(work->problem, work->fitted, other);
   const double clearly = 1.0 + kPlainGain / static_cast<double>(work->fitted.size());
   if (std::max(position / plain_position, rotation / plain_rotation) < clearly) return;
   const double freedom = 1.0 - 2.0 / static_cast<double>(work->fitted.size());
-  other.noise.variance = {plain_position * plain_position / 3.0 * freedom, plain.variance[1], plain_rotation * plain_rotation / 3.0 * freedom};
+  other.noise.variance = {plain_position * plain_position / 3.0 * freedom, plain.variance[1], plain_rotation * plain_rotation / 3.0 * freedom, 0.0};
   work->fit = refine_loop(work->problem, work->fitted, other.X, other.Y, other.noise, options.max_iterations);
   result->warnings.push_back("What is left does not look like noise of robot and camera poses: plain weights predict poses that were left out better (" +
                              mm(plain_position) + " for " + mm(position) + "). The robot's own kinematics may be off: give joint values and the robot model (with kinematics).");
@@ -273,10 +274,22 @@ void fit_and_reject(const HandEyeOptions& options, const Rows& rows, LoopNoise n
   }
 }
 
+/// Boards that turn about themselves by more than their pixels can tell: lens, board or shutter are not what the pixels are told. Then their noise is
+/// no measure, and the loop's own stands.
+bool beyond_pixels(const LoopProblem& problem, const Rows& rows, const LoopNoise& noise, HandEyeResult* result) {
+  std::vector<double> by_pixels;
+  for (const std::size_t i : rows) by_pixels.push_back(noise.variance[3] * problem.pixel_shape[i].bottomRightCorner<3, 3>().trace() / 3.0);
+  const double pixels = std::sqrt(median_of(by_pixels)), turn = std::sqrt(noise.variance[2]);
+  if (turn < kBeyondPixels * pixels) return false;
+  result->warnings.push_back("Boards scatter by " + deg(turn) + " about what the loop expects, " + number(turn / pixels, 2) + " times what their pixels can tell: is the lens "
+                             "calibrated, the board flat, did anything move while the image was taken? Board poses are weighed by that scatter, not pixels by theirs.");
+  return true;
+}
+
 /// Pixels and all robot poses at once; the closures then with the camera as found.
 void fit_images(const HandEyeOptions& options, Work* work, HandEyeResult* result) {
   const Camera camera = *work->poses.camera;
-  const ImageSigmas sigmas{std::sqrt(work->fit.noise.variance[2]), std::sqrt(work->fit.noise.variance[0]), std::sqrt(work->fit.noise.variance[1])};
+  const ImageSigmas sigmas{std::sqrt(work->fit.noise.variance[3]), std::sqrt(work->fit.noise.variance[0]), std::sqrt(work->fit.noise.variance[1])};
   const ImageEstimate images = refine_images(work->problem, work->poses.images, work->fitted, camera, work->fit.X, work->fit.Y, sigmas,
                                              options.refine_camera, options.max_iterations);
   work->fit.X = images.X, work->fit.Y = images.Y, work->fit.covariance = images.covariance;
@@ -285,8 +298,9 @@ void fit_images(const HandEyeOptions& options, Work* work, HandEyeResult* result
   if (!options.refine_camera) return;
   result->camera_model = images.camera, result->camera_model_sigma = images.camera_sigma;
   work->poses.camera = images.camera;
-  double ignored = 0.0;
-  fit_boards(images.camera, work, &ignored);
+  double pixel_variance = 0.0;
+  fit_boards(images.camera, work, &pixel_variance);
+  if (!std::isfinite(options.pixel_sigma)) work->fit.noise.variance[3] = pixel_variance;
 }
 
 void describe_poses(const HandEyeOptions& options, const Agreement& agreement, const Work& work, HandEyeResult* result) {
@@ -320,13 +334,9 @@ void describe_poses(const HandEyeOptions& options, const Agreement& agreement, c
 
 void describe_noise(const HandEyeOptions& options, const LoopProblem& problem, const LoopNoise& noise, HandEyeResult* result) {
   HandEyeNoise& out = result->noise;
-  out.position = std::sqrt(noise.variance[0]), out.hand_rotation = std::sqrt(noise.variance[1]);
-  if (problem.pixel_shape.empty()) {
-    out.camera_rotation = std::sqrt(noise.variance[2]);
-  } else {
-    out.pixel = std::sqrt(noise.variance[2]);
-  }
-  out.estimated = noise.estimate[0] || noise.estimate[1] || (problem.pixel_shape.empty() ? noise.estimate[2] : !std::isfinite(options.pixel_sigma));
+  out.position = std::sqrt(noise.variance[0]), out.hand_rotation = std::sqrt(noise.variance[1]), out.camera_rotation = std::sqrt(noise.variance[2]);
+  if (!problem.pixel_shape.empty()) out.pixel = std::sqrt(noise.variance[3]);
+  out.estimated = noise.estimate[0] || noise.estimate[1] || noise.estimate[2] || (!problem.pixel_shape.empty() && !std::isfinite(options.pixel_sigma));
 }
 
 /// Where noise was told and the data are worse, standard errors grow by what is missing.
@@ -440,9 +450,9 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
 
   LoopNoise noise = noise_asked(options, work.poses, agreement);
   if (!work.poses.images.empty()) {
-    fit_boards(*work.poses.camera, &work, &noise.variance[2]);
-    noise.estimate[2] = false;  // what pixels scatter about their own board says more than the loop
-    if (std::isfinite(options.pixel_sigma)) noise.variance[2] = options.pixel_sigma * options.pixel_sigma;
+    fit_boards(*work.poses.camera, &work, &noise.variance[3]);  // what pixels scatter about their own board says more than the loop
+    if (std::isfinite(options.pixel_sigma)) noise.variance[3] = options.pixel_sigma * options.pixel_sigma;
+    if (!noise.estimate[0] && !noise.estimate[1]) noise.variance[2] = kExact * kExact, noise.estimate[2] = false;  // all is told
   }
   if (axis) problem.known = LoopProblem::Known{*axis, options.known_height.value_or(0.0), std::max(options.known_height_sigma, 1e-7)};
 
@@ -467,7 +477,13 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
     return result;
   }
   widen(noise, work.fitted, &work.fit, &result);
-  if (!work.poses.images.empty() && options.method == HandEyeMethod::refined) fit_images(options, &work, &result);
+  if (!work.poses.images.empty() && options.method == HandEyeMethod::refined) {
+    if (options.refine_camera) {  // noise is only known once the lens is
+      fit_images(options, &work, &result);
+      work.fit = refine_loop(problem, work.fitted, work.fit.X, work.fit.Y, work.fit.noise, options.max_iterations);
+    }
+    if (!beyond_pixels(problem, work.fitted, work.fit.noise, &result)) fit_images(options, &work, &result);
+  }
 
   result.camera.T = work.fit.X, result.board.T = work.fit.Y;
   result.camera.covariance = work.fit.covariance.topLeftCorner<6, 6>(), result.board.covariance = work.fit.covariance.bottomRightCorner<6, 6>();

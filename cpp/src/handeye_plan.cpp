@@ -87,8 +87,8 @@ std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeR
   LoopProblem problem;
   problem.setup = options.setup;
   LoopNoise noise;
-  noise.variance = {std::pow(result.noise.position, 2), std::pow(result.noise.hand_rotation, 2), std::pow(result.noise.camera_rotation, 2)};
-  if (!poses.images.empty()) noise.variance[2] = std::pow(result.noise.pixel, 2);
+  noise.variance = {std::pow(result.noise.position, 2), std::pow(result.noise.hand_rotation, 2), std::pow(result.noise.camera_rotation, 2),
+                    poses.images.empty() ? 0.0 : std::pow(result.noise.pixel, 2)};
   const auto row_of = [&](const Eigen::Isometry3d& A, const Eigen::Isometry3d& B) {
     problem.A = {A}, problem.M = moving_frames(problem.A, options.setup), problem.B = {B};
     if (!poses.images.empty()) problem.pixel_shape = {board_covariance(*poses.camera, poses.images.front().points, B)};

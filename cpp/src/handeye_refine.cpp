@@ -22,20 +22,18 @@ constexpr double kPriorSpread = 3.0;       // [log of variance] of the weak prio
 constexpr double kLeastVariance = 1e-18;   // [m^2, rad^2, px^2] a nanometre, a nanoradian: data without noise stop there
 constexpr double kSingular = 1e-13;        // smallest eigenvalue of the unit-diagonal information
 
-using Shapes = std::array<Matrix6d, 3>;
+using Shapes = std::array<Matrix6d, kVariances>;
 
 /// V = sum of variance times shape.
 Shapes shapes(const LoopProblem& problem, std::size_t i, const Eigen::Vector3d& w) {
-  Shapes out{Matrix6d::Zero(), Matrix6d::Identity(), Matrix6d::Zero()};
+  Shapes out{Matrix6d::Zero(), Matrix6d::Identity(), Matrix6d::Zero(), Matrix6d::Zero()};
   out[0].topLeftCorner<3, 3>().setIdentity();
   const Eigen::Matrix3d wx = cross_matrix(w);
   out[1].topLeftCorner<3, 3>() = -wx * wx;
   out[1].topRightCorner<3, 3>() = -wx;
   out[1].bottomLeftCorner<3, 3>() = wx;
-  if (problem.pixel_shape.empty())
-    out[2].bottomRightCorner<3, 3>().setIdentity();
-  else
-    out[2] = problem.pixel_shape[i];
+  out[2].bottomRightCorner<3, 3>().setIdentity();
+  if (!problem.pixel_shape.empty()) out[3] = problem.pixel_shape[i];
   return out;
 }
 
@@ -62,7 +60,7 @@ void linearise(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3
 }
 
 Matrix6d weighted_sum(const Shapes& shape, const LoopNoise& noise) {
-  return noise.variance[0] * shape[0] + noise.variance[1] * shape[1] + noise.variance[2] * shape[2];
+  return noise.variance[0] * shape[0] + noise.variance[1] * shape[1] + noise.variance[2] * shape[2] + noise.variance[3] * shape[3];
 }
 
 /// Sums over poses for a step of X, Y and of the variances.
@@ -74,7 +72,7 @@ struct LoopSums {
   std::array<double, 3> trace{};                          // tr W V_k
   std::array<double, 3> square{};                         // e^T W V_k W e
   std::array<Matrix12d, 3> spread{Matrix12d::Zero(), Matrix12d::Zero(), Matrix12d::Zero()};  // J^T W V_k W J
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // tr W V_k W V_l
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // tr W V_k W V_l; k, l < 3: the pixels' noise is known from within images
 };
 
 LoopSums sum_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y, const LoopNoise& noise,

@@ -6,7 +6,8 @@
 /// e = -(G n_A + n_B). With the robot poses eliminated, twelve unknowns are left, and e has the covariance
 ///   V = s_p^2 [I 0; 0 0] + s_A^2 [|w|^2 I - w w^T, -[w]x; [w]x, I] + V_B,     w from the hand to the board in the camera frame:
 /// position noise of hand and camera adds up, a turn of the hand by n moves the board by n x w. V_B is s_B^2 [0 0; 0 I] for board poses (their
-/// position noise is in s_p), and s_px^2 times the inverse of the pixels' information for images.
+/// position noise is in s_p). For images the inverse of the pixels' information comes to that, times s_px^2; s_B^2 is then what lens and board
+/// do beyond the pixels' own noise.
 #pragma once
 
 #include <array>
@@ -34,10 +35,11 @@ struct LoopProblem {
   std::optional<Known> known;
 };
 
-/// Variances: 0 position [m^2], 1 hand rotation [rad^2], 2 camera rotation [rad^2] or pixels [px^2].
+/// Variances: 0 position [m^2], 1 hand rotation [rad^2], 2 camera rotation [rad^2], 3 pixels [px^2], of images only.
+constexpr std::size_t kVariances = 4;
 struct LoopNoise {
-  std::array<double, 3> variance{1e-6, 1e-6, 1e-6};
-  std::array<bool, 3> estimate{true, true, true};
+  std::array<double, kVariances> variance{1e-6, 1e-6, 1e-6, 0.0};
+  std::array<bool, kVariances> estimate{true, true, true, false};
 };
 
 struct LoopEstimate {

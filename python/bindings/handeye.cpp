@@ -382,7 +382,7 @@ void bind_parts(py::module_& m) {
                      "[m] of hand and board pose together; with images of the hand alone.");
   noise.def_readonly("hand_rotation", &HandEyeNoise::hand_rotation, "[rad]");
   noise.def_readonly("camera_rotation", &HandEyeNoise::camera_rotation,
-                     "[rad] of board poses; NaN with images.");
+                     "[rad] of board poses; with images what is beyond their pixels' noise.");
   noise.def_readonly("pixel", &HandEyeNoise::pixel, "[px] NaN without images.");
   noise.def_readonly("estimated", &HandEyeNoise::estimated, "Any of them was found from the data.");
   noise.def("__repr__", [](const HandEyeNoise& n) {

@@ -262,7 +262,7 @@ TEST_CASE("derivatives of the closure agree with differences") {
       V += g * g.transpose();
     }
     LoopNoise noise;
-    noise.variance = {0.0, 1.0, 0.0};
+    noise.variance = {0.0, 1.0, 0.0, 0.0};
     CHECK((loop_row(problem, 1, s.X, s.Y, noise).V - V).norm() < 1e-5);
   }
 }
@@ -596,6 +596,22 @@ TEST_CASE("standard errors from images are the scatter over 60 seeds") {
   CHECK(inside > 0.88 * count);
 }
 
+TEST_CASE("boards that scatter beyond their pixels are said, and weighed by that") {
+  Scene s = make_pixel_scene(25, 1e-4, 0.05 * kDegree, 0.1, 8, kCamera);
+  Random random(1);
+  for (BoardImage& image : s.poses.images) {  // every board bent in its own way: seen turned by half a degree
+    const Eigen::Matrix3d turn = rotation_from_vector(0.5 * kDegree * normal3(&random));
+    image.points = turn.transpose() * image.points;
+  }
+  const HandEyeResult r = handeye(s.poses, options_for(s));
+  REQUIRE(r.status == HandEyeStatus::done);
+  CHECK(std::any_of(r.warnings.begin(), r.warnings.end(), [](const std::string& w) { return w.find("what their pixels can tell") != std::string::npos; }));
+  CHECK(r.noise.camera_rotation == doctest::Approx(0.5 * kDegree).epsilon(0.3));
+  CHECK(position_error(r.camera.T, s.X) < 5e-3);
+  const HandEyeResult clean = handeye(make_pixel_scene(25, 1e-4, 0.05 * kDegree, 0.1, 8, kCamera).poses, options_for(s));
+  CHECK(clean.warnings.empty());
+}
+
 TEST_CASE("the elimination of robot poses finds Ceres' minimum over all of them") {
   // refine_loop holds the board's pixel covariance, refine_images goes through the pixels with every robot pose free.
   const Scene s = make_pixel_scene(20, 1e-4, 0.05 * kDegree, 0.1, 3, kCamera);
@@ -610,7 +626,7 @@ TEST_CASE("the elimination of robot poses finds Ceres' minimum over all of them"
     problem.B[i] = fit.T_camera_board, problem.pixel_shape[i] = fit.shape;
   }
   LoopNoise noise;
-  noise.variance = {1e-8, std::pow(0.05 * kDegree, 2), 0.01}, noise.estimate = {false, false, false};
+  noise.variance = {1e-8, std::pow(0.05 * kDegree, 2), 0.0, 0.01}, noise.estimate = {false, false, false, false};
   const LoopEstimate a = refine_loop(problem, rows, s.X, s.Y, noise, 50);
   const ImageEstimate b = refine_images(problem, s.poses.images, rows, kCamera, s.X, s.Y, {0.1, 1e-4, 0.05 * kDegree}, false, 50);
   const double sigma = std::sqrt(a.covariance.topLeftCorner<3, 3>().trace());

@@ -136,7 +136,7 @@ enum class HandEyeStatus {
 struct HandEyeNoise {
   double position = 0.0;              ///< [m] of hand and board pose together; with images of the hand alone
   double hand_rotation = 0.0;         ///< [rad]
-  double camera_rotation = kEstimate; ///< [rad] of board poses; NaN with images
+  double camera_rotation = kEstimate; ///< [rad] of board poses; with images what is beyond their pixels' noise
   double pixel = kEstimate;           ///< [px] with images
   bool estimated = false;             ///< any of them
 };
