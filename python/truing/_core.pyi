@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Candidate', 'Curve', 'Detectable', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'ErrorStatistics', 'FoundEffect', 'Frozen', 'Identification', 'IdentifyOptions', 'Joint', 'Measurements', 'NextPose', 'NotTestable', 'OwnEffect', 'Parameter', 'PlanOptions', 'PlanResult', 'Prediction', 'Residuals', 'Robot', 'SanityFinding', 'Share', 'SolverSummary', 'Target', 'UnknownEffect', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'catalogue', 'diagnose', 'distinguish', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'identify', 'joint_motion', 'plan', 'pose_groups', 'predict', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Camera', 'Candidate', 'ClockOffset', 'ClosedForm', 'Curve', 'Detectable', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'ErrorStatistics', 'FoundEffect', 'Frozen', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'Joint', 'Measurements', 'NextHandPose', 'NextPose', 'NotTestable', 'OwnEffect', 'Parameter', 'PlanOptions', 'PlanResult', 'Prediction', 'Reading', 'Residuals', 'Robot', 'SanityFinding', 'Share', 'SolverSummary', 'Target', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'catalogue', 'diagnose', 'distinguish', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'joint_motion', 'plan', 'pose_groups', 'predict', 'project', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'version']
 class Joint:
     """
     One joint and the link that belongs to it. Lengths in m, angles in rad, masses in kg.
@@ -2156,6 +2156,791 @@ class Distinction:
         """
         shape=(poses,) [s]
         """
+class Camera:
+    """
+    A pinhole camera with lens distortion k1 k2 p1 p2 k3 (plumb bob, as OpenCV counts them). Focal lengths and centre in pixels.
+    """
+    def __init__(self, *, width: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsInt | typing.SupportsIndex, fx: typing.SupportsFloat | typing.SupportsIndex, fy: typing.SupportsFloat | typing.SupportsIndex, cx: typing.SupportsFloat | typing.SupportsIndex, cy: typing.SupportsFloat | typing.SupportsIndex, distortion: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Camera:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Camera:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def cx(self) -> float:
+        """
+        [px]
+        """
+    @cx.setter
+    def cx(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def cy(self) -> float:
+        """
+        [px]
+        """
+    @cy.setter
+    def cy(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def distortion(self) -> tuple[float, ...]:
+        """
+        k1 k2 p1 p2 k3
+        """
+    @distortion.setter
+    def distortion(self, arg1: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(5)"]) -> None:
+        ...
+    @property
+    def fx(self) -> float:
+        """
+        [px]
+        """
+    @fx.setter
+    def fx(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def fy(self) -> float:
+        """
+        [px]
+        """
+    @fy.setter
+    def fy(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def height(self) -> int:
+        """
+        [px]
+        """
+    @height.setter
+    def height(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def width(self) -> int:
+        """
+        [px]
+        """
+    @width.setter
+    def width(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class HandEyePoses:
+    """
+    One robot pose after the other: where the hand was, and where the camera saw the board.
+    
+    T_base_hand: shape=(n, 4, 4), the flange in the robot base, as the controller reports it.
+    T_camera_board: shape=(n, 4, 4), the board in the camera.
+    images: of each pose, the points of the board, shape=(m, 3) [m] in its frame, and where they were seen, shape=(m, 2) [px];
+        then pixels are what was measured, and T_camera_board is what was found from them. None: board poses were measured.
+    camera: needed with images.
+    set: 0 or 'train', 1 or 'test' (held out) for each pose; None: all are fitted.
+    board_symmetries: turns after which the board looks the same, T_board_turned, shape=(4, 4), without the identity.
+    
+    Raises InputError that names the pose: values that are not finite, rotations that are not orthonormal (to 1e-6) or left-handed.
+    """
+    def __init__(self, T_base_hand: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], T_camera_board: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], *, images: collections.abc.Sequence[tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike]] | None = None, camera: Camera | None = None, set: numpy.typing.ArrayLike | collections.abc.Sequence[str | None] | None = None, board_symmetries: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]] = []) -> None:
+        ...
+    def __len__(self) -> int:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> HandEyePoses:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> HandEyePoses:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def T_base_hand(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, 4, 4): the flange in the robot base.
+        """
+    @property
+    def T_camera_board(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, 4, 4): the board in the camera.
+        """
+    @property
+    def board_symmetries(self) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"], ...]:
+        """
+        Turns after which the board looks the same.
+        """
+    @property
+    def camera(self) -> Camera | None:
+        """
+        None without images.
+        """
+    @property
+    def images(self) -> tuple[tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]], ...] | None:
+        """
+        Of each pose, points shape=(m, 3) [m] and pixels shape=(m, 2) [px]; None without images.
+        """
+    @property
+    def set(self) -> numpy.typing.NDArray[numpy.int8] | None:
+        """
+        shape=(n,): 0 fitted, 1 held out; None: all are fitted.
+        """
+class HandEyeOptions:
+    """
+    How `handeye` works; see the attributes. Noise that is None is estimated.
+    """
+    def __init__(self, *, setup: typing.Literal['eye-in-hand', 'eye-to-hand'] = 'eye-in-hand', method: typing.Literal['refined', 'closed-form'] = 'refined', hand_position_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, hand_rotation_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, camera_position_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, camera_rotation_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, pixel_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, refine_camera: bool = False, working_point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, known_height: typing.SupportsFloat | typing.SupportsIndex | None = None, known_height_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0, reject: bool = True, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 3.0, recognise: bool = True, reading: str = '', max_iterations: typing.SupportsInt | typing.SupportsIndex = 50) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> HandEyeOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> HandEyeOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def camera_position_sigma(self) -> float | None:
+        """
+        [m] of the board's positions, without images; None: estimated.
+        """
+    @camera_position_sigma.setter
+    def camera_position_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def camera_rotation_sigma(self) -> float | None:
+        """
+        [rad] likewise.
+        """
+    @camera_rotation_sigma.setter
+    def camera_rotation_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def hand_position_sigma(self) -> float | None:
+        """
+        [m] standard deviation of one component of the reported robot positions; None: estimated.
+        """
+    @hand_position_sigma.setter
+    def hand_position_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def hand_rotation_sigma(self) -> float | None:
+        """
+        [rad] likewise.
+        """
+    @hand_rotation_sigma.setter
+    def hand_rotation_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def known_height(self) -> float | None:
+        """
+        [m] where all rotation axes are parallel: the camera's coordinate along that axis, in the frame that carries the camera.
+        """
+    @known_height.setter
+    def known_height(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def known_height_sigma(self) -> float:
+        """
+        [m]
+        """
+    @known_height_sigma.setter
+    def known_height_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_iterations(self) -> int:
+        """
+        The fit stops here at the latest.
+        """
+    @max_iterations.setter
+    def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def method(self) -> typing.Literal['refined', 'closed-form']:
+        """
+        'refined' (maximum likelihood) or 'closed-form' (dual quaternions and one SVD alone).
+        """
+    @method.setter
+    def method(self, arg0: typing.Literal['refined', 'closed-form']) -> None:
+        ...
+    @property
+    def pixel_sigma(self) -> float | None:
+        """
+        [px] with images; None: estimated.
+        """
+    @pixel_sigma.setter
+    def pixel_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def reading(self) -> str:
+        """
+        Use the poses in this other reading, a name of `handeye_readings`; '': as given.
+        """
+    @reading.setter
+    def reading(self, arg0: str) -> None:
+        ...
+    @property
+    def recognise(self) -> bool:
+        """
+        Where the loop does not close: try other readings of the same numbers, and name the one that closes.
+        """
+    @recognise.setter
+    def recognise(self, arg0: bool) -> None:
+        ...
+    @property
+    def refine_camera(self) -> bool:
+        """
+        With images: focal lengths, centre and distortion are found as well.
+        """
+    @refine_camera.setter
+    def refine_camera(self, arg0: bool) -> None:
+        ...
+    @property
+    def reject(self) -> bool:
+        """
+        Find poses that do not fit the others, list them, go on without.
+        """
+    @reject.setter
+    def reject(self, arg0: bool) -> None:
+        ...
+    @property
+    def reject_beyond(self) -> float:
+        """
+        Poses whose root mean square of six standardised residuals is larger.
+        """
+    @reject_beyond.setter
+    def reject_beyond(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def setup(self) -> typing.Literal['eye-in-hand', 'eye-to-hand']:
+        """
+        'eye-in-hand' (camera on the hand, board in the cell) or 'eye-to-hand' (camera in the cell, board on the hand).
+        """
+    @setup.setter
+    def setup(self, arg0: typing.Literal['eye-in-hand', 'eye-to-hand']) -> None:
+        ...
+    @property
+    def working_point(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"] | None:
+        """
+        shape=(3,) [m] in the camera frame: where accuracy is asked for; None: the mean of the board's positions.
+        """
+    @working_point.setter
+    def working_point(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None) -> None:
+        ...
+class UncertainFrame:
+    """
+    A frame with its uncertainty.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4), [m].
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+        """
+        shape=(6, 6), of x, y, z [m] and the rotation vector about the parent's axes [rad]: small changes that move the frame's origin, and turn it about that origin.
+        """
+    @property
+    def sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(6,): standard errors of x, y, z [m] and of the turns about x, y, z [rad].
+        """
+class HandEyeResidual:
+    """
+    How far a pose is from closing the loop: seen minus predicted board pose.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def cause(self) -> str:
+        """
+        Of a rejected pose: what it looks like.
+        """
+    @property
+    def distance(self) -> float:
+        """
+        Root mean square of its six standardised residuals; about 1.
+        """
+    @property
+    def pixels(self) -> float:
+        """
+        [px] rms with the robot pose as reported; NaN without images.
+        """
+    @property
+    def pixels_corrected(self) -> float:
+        """
+        [px] rms with the robot pose as found; NaN without images.
+        """
+    @property
+    def position(self) -> float:
+        """
+        [m] length.
+        """
+    @property
+    def position_left_out(self) -> float:
+        """
+        [m] when the pose is left out of the fit (held-out poses: the same as `position`).
+        """
+    @property
+    def rejected(self) -> bool:
+        """
+        Left out of the fit.
+        """
+    @property
+    def rotation(self) -> float:
+        """
+        [rad] angle.
+        """
+    @property
+    def rotation_left_out(self) -> float:
+        """
+        [rad] likewise.
+        """
+class HandEyeErrors:
+    """
+    Closure of the loop over a set of poses.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def n(self) -> int:
+        """
+        Number of poses.
+        """
+    @property
+    def pixel_rms(self) -> float:
+        """
+        [px] NaN without images.
+        """
+    @property
+    def position_max(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def position_mean(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def position_p95(self) -> float:
+        """
+        [m] 95th percentile.
+        """
+    @property
+    def position_rms(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def rotation_rms(self) -> float:
+        """
+        [rad]
+        """
+class Unobservable:
+    """
+    What the motions cannot show.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def advice(self) -> str:
+        """
+        What to do.
+        """
+    @property
+    def direction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,): unit vector in the frame that carries the camera.
+        """
+    @property
+    def rotation(self) -> bool:
+        """
+        About the direction, not along it.
+        """
+    @property
+    def sigma(self) -> float:
+        """
+        [m] or [rad]; infinite: not at all.
+        """
+    @property
+    def what(self) -> str:
+        """
+        In words: "the camera's position along base z".
+        """
+class Reading:
+    """
+    Another reading of the numbers: what it would mean, and how well the loop then closes.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def explanation(self) -> str:
+        """
+        In words.
+        """
+    @property
+    def name(self) -> str:
+        """
+        To be given as `reading`.
+        """
+    @property
+    def position_rms(self) -> float:
+        """
+        [m] median closure.
+        """
+    @property
+    def rotation_rms(self) -> float:
+        """
+        [rad]
+        """
+class HandEyeNoise:
+    """
+    Standard deviations of one component, as told or as found. Position noise of hand and board poses adds up: data see the sum alone.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def camera_rotation(self) -> float:
+        """
+        [rad] of board poses; NaN with images.
+        """
+    @property
+    def estimated(self) -> bool:
+        """
+        Any of them was found from the data.
+        """
+    @property
+    def hand_rotation(self) -> float:
+        """
+        [rad]
+        """
+    @property
+    def pixel(self) -> float:
+        """
+        [px] NaN without images.
+        """
+    @property
+    def position(self) -> float:
+        """
+        [m] of hand and board pose together; with images of the hand alone.
+        """
+class ClosedForm:
+    """
+    The dual-quaternion solution alone, in its parts.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_parent_board(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4): in the base (eye in hand) or in the hand.
+        """
+    @property
+    def T_parent_camera(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4): in the hand (eye in hand) or in the base.
+        """
+    @property
+    def axes_spread(self) -> float:
+        """
+        Second over first principal rotation of the motions: 0 one axis, 1 two alike.
+        """
+    @property
+    def length_scale(self) -> float:
+        """
+        [m] the unit of length in the equations.
+        """
+    @property
+    def motions(self) -> int:
+        """
+        How many were used.
+        """
+    @property
+    def residual(self) -> float:
+        """
+        Of the unit dual quaternion in the equations, per motion.
+        """
+    @property
+    def rotation(self) -> float:
+        """
+        [rad] rms angle of the motions.
+        """
+    @property
+    def singular_values(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[8, 1]"]:
+        """
+        shape=(8,), descending; of exact data the last two are 0.
+        """
+class NextHandPose:
+    """
+    A robot pose that would help.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_base_hand(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4)
+        """
+    @property
+    def T_camera_board(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4): what the camera is expected to see.
+        """
+    @property
+    def working_point_sigma(self) -> float:
+        """
+        [m] root of the trace of the working point's covariance, with this pose and those before it measured.
+        """
+class ClockOffset:
+    """
+    Two records of the same motion by two clocks.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_base_hand(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(rows, 4, 4): hand poses at the times of those rows.
+        """
+    @property
+    def correlation(self) -> float:
+        """
+        Of the two angular speeds at that offset.
+        """
+    @property
+    def found(self) -> bool:
+        """
+        False: `message` says why.
+        """
+    @property
+    def message(self) -> str:
+        """
+        Why not, or how sure.
+        """
+    @property
+    def offset(self) -> float:
+        """
+        [s] t_hand = t_camera + offset
+        """
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """
+        Camera rows (counted from 0) inside the hand's record.
+        """
+    @property
+    def sigma(self) -> float:
+        """
+        [s]
+        """
+class HandEyeResult:
+    """
+    What `handeye` found.
+    """
+    def __repr__(self) -> str:
+        ...
+    def summary(self) -> str:
+        """
+        A few lines for people.
+        """
+    @property
+    def T_base_hand(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, 4, 4): robot poses as found, of fitted poses; as reported elsewhere.
+        """
+    @property
+    def axes_spread(self) -> float:
+        """
+        Second over first principal rotation of the motions: 0 one axis, 1 two alike.
+        """
+    @property
+    def board(self) -> UncertainFrame:
+        """
+        In the base (eye in hand) or in the hand.
+        """
+    @property
+    def board_scale(self) -> float:
+        """
+        Factor on the board's lengths that would fit best; 1: as told.
+        """
+    @property
+    def board_scale_sigma(self) -> float:
+        """
+        Of it; NaN: not known.
+        """
+    @property
+    def camera(self) -> UncertainFrame:
+        """
+        In the hand (eye in hand) or in the base. Only with status 'done' or 'not converged'.
+        """
+    @property
+    def camera_model(self) -> Camera | None:
+        """
+        As refined; or None.
+        """
+    @property
+    def camera_model_sigma(self) -> tuple[float, ...]:
+        """
+        Standard errors of fx fy cx cy [px] k1 k2 p1 p2 k3.
+        """
+    @property
+    def left_out(self) -> HandEyeErrors:
+        """
+        The same, each predicted without itself.
+        """
+    @property
+    def message(self) -> str:
+        """
+        One sentence.
+        """
+    @property
+    def noise(self) -> HandEyeNoise:
+        """
+        Given or found.
+        """
+    @property
+    def readings(self) -> tuple[Reading, ...]:
+        """
+        Other readings that close, best first; 'not closing' only.
+        """
+    @property
+    def rejected(self) -> tuple[int, ...]:
+        """
+        Poses (counted from 0) that do not fit the others.
+        """
+    @property
+    def residuals(self) -> tuple[HandEyeResidual, ...]:
+        """
+        One per pose.
+        """
+    @property
+    def singular_gap(self) -> float:
+        """
+        Sixth over seventh: how clearly two null vectors stand out.
+        """
+    @property
+    def singular_values(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[8, 1]"]:
+        """
+        shape=(8,), of the motions' equations, descending.
+        """
+    @property
+    def solver(self) -> SolverSummary:
+        """
+        How the solver ended.
+        """
+    @property
+    def status(self) -> typing.Literal['done', 'not observable', 'not closing', 'not converged']:
+        """
+        'done'; 'not observable' (`unobservable` says which directions, and what to do); 'not closing' (`readings` has the reading that closes, if any); 'not converged'.
+        """
+    @property
+    def symmetry(self) -> tuple[int, ...]:
+        """
+        Per pose: which of board_symmetries (1 ...) it was read in; 0 as given.
+        """
+    @property
+    def test(self) -> HandEyeErrors | None:
+        """
+        Held-out poses, all of them; or None.
+        """
+    @property
+    def train(self) -> HandEyeErrors:
+        """
+        Poses fitted, without rejected ones.
+        """
+    @property
+    def unobservable(self) -> tuple[Unobservable, ...]:
+        """
+        What the motions cannot show.
+        """
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """
+        What to know or do: a board of another size, a robot that is off, noise told too small ...
+        """
+    @property
+    def working_point(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,) [m] in the camera frame.
+        """
+    @property
+    def working_point_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        shape=(3, 3) [m^2] of that point in the frame that carries the camera.
+        """
+class HandEyeKinematics:
+    """
+    What `handeye_with_kinematics` found.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def board(self) -> UncertainFrame:
+        """
+        As in HandEyeResult, of the calibrated robot.
+        """
+    @property
+    def camera(self) -> UncertainFrame:
+        """
+        As in HandEyeResult, of the calibrated robot.
+        """
+    @property
+    def identification(self) -> Identification:
+        """
+        Of the robot whose tool is the camera (eye in hand) or the board, measured in the frame of the other.
+        """
+    @property
+    def residuals(self) -> tuple[HandEyeResidual, ...]:
+        """
+        One per pose, with the calibrated robot.
+        """
+    @property
+    def robot(self) -> Robot:
+        """
+        Calibrated, its tool the flange as given, its base the origin. Part of this result: copy() it before changing it.
+        """
+    @property
+    def test_after(self) -> HandEyeErrors | None:
+        """
+        Held-out poses, or None.
+        """
+    @property
+    def test_before(self) -> HandEyeErrors | None:
+        """
+        Held-out poses, or None.
+        """
+    @property
+    def train_after(self) -> HandEyeErrors:
+        """
+        Closure with the calibrated robot.
+        """
+    @property
+    def train_before(self) -> HandEyeErrors:
+        """
+        Closure with the robot as it was, base and tool fitted.
+        """
+    @property
+    def working_point(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,) [m] in the camera frame.
+        """
+    @property
+    def working_point_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        shape=(3, 3) [m^2] of that point in the frame that carries the camera.
+        """
 def catalogue() -> list[tuple[str, str]]:
     """
     Name and summary of the effects that truing knows.
@@ -2194,6 +2979,41 @@ def gravity_torques(robot: Robot, q: typing.Annotated[numpy.typing.ArrayLike, nu
     q: shape=(driven joints,) [rad | m]. payload: [kg] at the tool. Returns shape=(joints,) [Nm | N].
     Raises InputError when no mass is known and the payload is zero.
     """
+def handeye(poses: HandEyePoses, options: HandEyeOptions | None = None) -> HandEyeResult:
+    """
+    Where the camera is, from poses of the hand and of a board that the camera sees.
+    
+    Raises InputError on data or options that cannot be used. What the data cannot answer is a status, not a number.
+    """
+def handeye_clock(hand_time: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], T_base_hand: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], camera_time: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], T_camera_board: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], setup: typing.Literal['eye-in-hand', 'eye-to-hand'] = 'eye-in-hand', search: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> ClockOffset:
+    """
+    The offset between the clocks of robot and camera, from the motion that both saw.
+    
+    hand_time, camera_time: [s], increasing. search: [s] offsets up to this are tried. Raises InputError.
+    """
+def handeye_closed_form(poses: HandEyePoses, setup: typing.Literal['eye-in-hand', 'eye-to-hand'] = 'eye-in-hand') -> ClosedForm:
+    """
+    The dual-quaternion solution alone: every pose of the fit counts, none is rejected, nothing is judged.
+    
+    Raises InputError on data that cannot be used.
+    """
+def handeye_plan(poses: HandEyePoses, result: HandEyeResult, options: HandEyeOptions | None = None, *, count: typing.SupportsInt | typing.SupportsIndex = 5, candidates: typing.SupportsInt | typing.SupportsIndex = 400, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.7853981633974483, reach: typing.SupportsFloat | typing.SupportsIndex = 0.15, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> tuple[NextHandPose, ...]:
+    """
+    Robot poses, one after the other, that shrink the covariance of the working point most.
+    
+    count: how many. candidates: tried for each. tilt: [rad] the board is seen at no more than this from its normal, beyond what
+    was seen. reach: [m] hands stay this close to a measured one. Raises InputError.
+    """
+def handeye_readings() -> tuple[Reading, ...]:
+    """
+    All readings of the numbers that `handeye` tries, in the order tried; their closures are not set.
+    """
+def handeye_with_kinematics(robot: Robot, joints: numpy.typing.ArrayLike, poses: HandEyePoses, options: HandEyeOptions | None = None, identify_options: IdentifyOptions | None = None) -> HandEyeKinematics:
+    """
+    Hand-eye, board mount and the robot's own parameters in one problem.
+    
+    joints: shape=(n, driven joints) [rad | m], one row per pose. Raises InputError.
+    """
 def identify(robot: Robot, data: Measurements, options: IdentifyOptions | None = None, own_effects: collections.abc.Sequence[OwnEffect] = []) -> Identification:
     """
     Finds the robot's parameters from measurements. Raises InputError on data or options that cannot be used.
@@ -2218,6 +3038,10 @@ def pose_groups(data: Measurements) -> numpy.typing.NDArray[numpy.int32]:
 def predict(robot: Robot, data: Measurements, own_effects: collections.abc.Sequence[OwnEffect] = [], threads: typing.SupportsInt | typing.SupportsIndex = 0) -> Prediction:
     """
     What the robot predicts for the rows of `data`. Raises InputError on unknown effects or columns that they need.
+    """
+def project(camera: Camera, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Pixels, shape=(m, 2), of points in the camera frame, shape=(m, 3) [m]; z looks out of the lens, x right, y down.
     """
 def residuals(robot: Robot, data: Measurements, own_effects: collections.abc.Sequence[OwnEffect] = [], threads: typing.SupportsInt | typing.SupportsIndex = 0) -> Residuals:
     """

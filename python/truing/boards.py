@@ -393,14 +393,13 @@ class _Finder:
         flat = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if flat[1] < 0.1 * flat[0]:  # corners in one line fix no pose
             return None
-        # Where the counts are others, numbers belong to other places: no plane shows the corners so.
-        H, _ = self.cv.findHomography(points[:, :2], pixels)
+        # Corners that no plane shows so are misplaced; where the counts are others than was said, most are.
+        square = self.board.size * float(np.linalg.norm(np.ptp(pixels, axis=0))) / float(np.linalg.norm(np.ptp(points, axis=0)))
+        H, inside = self.cv.findHomography(points[:, :2], pixels, self.cv.RANSAC, 0.25 * square)
         if H is None:
             return None
-        mapped = np.column_stack([points[:, :2], np.ones(len(pixels))]) @ np.asarray(H).T
-        off = float(np.sqrt(np.mean(np.sum((mapped[:, :2] / mapped[:, 2:] - pixels) ** 2, axis=1))))
-        square = self.board.size * float(np.linalg.norm(np.ptp(pixels, axis=0))) / float(np.linalg.norm(np.ptp(points, axis=0)))
-        return (points, pixels) if off < 0.25 * square else None
+        good = np.asarray(inside).ravel() > 0
+        return (points[good], pixels[good]) if good.sum() >= max(_FEWEST_POINTS, 0.7 * len(good)) else None
 
 
 def _charuco_detector(cv: Any, board: Board) -> Any:
@@ -412,23 +411,40 @@ def _charuco_detector(cv: Any, board: Board) -> Any:
         pattern.setLegacyPattern(bool(board.legacy))
     parameters = cv.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv.aruco.CORNER_REFINE_NONE  # that of the chessboard corners is another, and always done
-    return cv.aruco.CharucoDetector(pattern, cv.aruco.CharucoParameters(), parameters)
+    # The usual ones are quick and miss markers that are small in the image.
+    parameters.adaptiveThreshWinSizeMax, parameters.adaptiveThreshWinSizeStep, parameters.minMarkerPerimeterRate = 43, 4, 0.01
+    corners = cv.aruco.CharucoParameters()
+    corners.minMarkers = 1  # of the two beside a corner: a plane tells below where a corner was misplaced
+    return cv.aruco.CharucoDetector(pattern, corners, parameters)
 
 
 def _charuco_finder(cv: Any, board: Board, grey: Image) -> _Finder | None:
-    """The dictionary and pattern (OpenCV changed it in 4.6 for boards with an even number of rows) that explain most of an image; None: no marker there."""
-    markers = board.columns * board.rows // 2
-    sizes = [next((size for size in _FAMILY_SIZES if size >= markers), _FAMILY_SIZES[-1])]
-    dictionaries = [board.dictionary] if board.dictionary else [f"{family}_{size}" for family in _FAMILIES for size in sizes] + list(_OTHER_DICTIONARIES)
+    """The dictionary and pattern (OpenCV changed it in 4.6 for boards with an even number of rows) that explain most of an image; None: no such board there."""
+    dictionary = board.dictionary or _dictionary(cv, grey, board.columns * board.rows // 2)
     patterns = [board.legacy] if board.legacy is not None else [False] if board.rows % 2 else [False, True]
     best: tuple[int, _Finder | None] = (_FEWEST_POINTS - 1, None)
-    for dictionary in dictionaries:
-        for legacy in patterns:
-            finder = _Finder(cv, replace(board, dictionary=dictionary, legacy=bool(legacy)))
-            hit = finder(grey)
-            if hit is not None and len(hit[0]) > best[0]:
-                best = (len(hit[0]), finder)
+    for legacy in patterns if dictionary else ():
+        finder = _Finder(cv, replace(board, dictionary=dictionary, legacy=bool(legacy)))
+        hit = finder(grey)
+        if hit is not None and len(hit[0]) > best[0]:
+            best = (len(hit[0]), finder)
     return best[1]
+
+
+def _dictionary(cv: Any, grey: Image, markers: int) -> str:
+    """The dictionary that most markers in an image are of, in the smallest size that has so many markers; empty: there are none."""
+    most, best = 1, ""
+    for name in [f"{family}_{_FAMILY_SIZES[-1]}" for family in _FAMILIES] + list(_OTHER_DICTIONARIES):
+        if not hasattr(cv.aruco, f"DICT_{name}"):
+            continue
+        _, identities, _ = cv.aruco.ArucoDetector(cv.aruco.getPredefinedDictionary(getattr(cv.aruco, f"DICT_{name}"))).detectMarkers(grey)
+        count = 0 if identities is None else len(np.unique(identities))
+        if count > most:
+            most, best = count, name
+    family = best.rpartition("_")[0]
+    if family in _FAMILIES:  # a smaller size begins with the same markers
+        best = f"{family}_{next((size for size in _FAMILY_SIZES if size >= markers), _FAMILY_SIZES[-1])}"
+    return best
 
 
 def _handedness(grid: Floats) -> float:
@@ -504,15 +520,15 @@ def _neighbours(board: Board) -> list[Board]:
     return out
 
 
-def _hits(cv: Any, images: Sequence[Image], board: Board) -> tuple[int, int]:
-    """In how many images the board is, and how many points of it in all."""
-    count = points = 0
+def _hits(cv: Any, images: Sequence[Image], board: Board) -> tuple[int, float]:
+    """In how many images the board is, and how much of it: points seen, less half of those that are not."""
+    count, points = 0, 0.0
     finder = None if board.kind == "charuco" else _Finder(cv, board, quick=True)
     for grey in images:
-        this = finder if finder is not None else _charuco_finder(cv, board, grey)
-        hit = this(grey) if this is not None else None
+        finder = finder if finder is not None else _charuco_finder(cv, board, grey)
+        hit = finder(grey) if finder is not None else None
         if hit is not None:
-            count, points = count + 1, points + len(hit[0])
+            count, points = count + 1, points + 1.5 * len(hit[0]) - 0.5 * len(board.points)
     return count, points
 
 
@@ -521,18 +537,28 @@ def _refuse_too_few(cv: Any, images: Sequence[Path | str | Image], called: Seque
     which = ", ".join(called[number] for number in missing[:8]) + (f" … ({len(missing)} in all)" if len(missing) > 8 else "")
     head = f"the board {board} was found in {len(found)} of {len(images)} images, expected at least {_FEWEST_VIEWS}"
     tried = [_grey(cv, images[number], called[number]) for number in missing[:: max(1, len(missing) // _TRIED)][:_TRIED]]
-    best, most = None, (0, 0)
+    best, most = None, (0, -math.inf)
     # Of a grid of dots, and of numbered corners, a smaller one is found as well: most points win.
+    markers = "" if not hasattr(cv, "aruco") else _dictionary(cv, tried[0], 0) if tried else ""
     for other in _neighbours(board):
+        if other.kind == "charuco":
+            if not markers:
+                continue
+            family = markers.rpartition("_")[0]
+            count = other.columns * other.rows // 2
+            other = replace(other, dictionary=f"{family}_{next((s for s in _FAMILY_SIZES if s >= count), _FAMILY_SIZES[-1])}" if family in _FAMILIES else markers)
         this = _hits(cv, tried, other)
         if this > most:
             best, most = other, this
+        if other.kind == "charuco" and most[1] >= 0.85 * len(tried) * len(other.points):
+            break  # a row more would find its corners at this board's edge
     hits = most[0]
     if best is not None and hits >= 0.5 * len(tried):
         counting = ""
         if board.kind == best.kind == "chessboard" and (best.columns - board.columns, best.rows - board.rows) in ((-1, -1), (1, 1)):
             counting = ": count inner corners, where four squares meet, not squares" if best.columns < board.columns else ": these are one more each way than was said"
         named = f"{best.kind}:{best.columns}x{best.rows}"
+        best = replace(best, dictionary="", legacy=None)
         say = f"--board {best}" if best.kind == board.kind else f"--board {named}:… with its size"
         raise InputError(f"{head}; but {named} is in {hits} of the {len(tried)} that were looked at again{counting}. Say {say}")
     margin = {"chessboard": "its white margin", "charuco": "its markers", "circles": "all of its dots", "acircles": "all of its dots"}[board.kind]
@@ -618,9 +644,9 @@ def _with_poses(cv: Any, board: Board, images: Sequence[Path | str | Image], cal
             raise InputError(_bad_fit(cv, images, called, found, board, calibration_rms))
     frames, rms = [], []
     for object_points, seen in zip(points, pixels, strict=True):
-        frame, error = _pose(cv, object_points, seen, camera)
+        frame, off = _pose(cv, object_points, seen, camera)
         frames.append(frame)
-        rms.append(error)
+        rms.append(off)
     errors = np.array(rms)
     usual = float(np.median(errors))
     if given and usual > _WORTH_A_LOOK:
@@ -639,8 +665,8 @@ def _with_poses(cv: Any, board: Board, images: Sequence[Path | str | Image], cal
     good = np.isfinite(errors)
     if good.sum() < _FEWEST_VIEWS:
         raise InputError(f"the board {board} was found in {len(found)} images, but its pose could be found in {int(good.sum())} only")
-    keep = np.flatnonzero(good)
-    return BoardViews(board, tuple(found[k] for k in keep), tuple(sorted([*missing, *(found[k] for k in np.flatnonzero(~good))])), tuple(points[k] for k in keep),
+    keep = np.flatnonzero(good).tolist()
+    return BoardViews(board, tuple(found[k] for k in keep), tuple(sorted([*missing, *(found[k] for k in np.flatnonzero(~good).tolist())])), tuple(points[k] for k in keep),
                       tuple(pixels[k] for k in keep), np.array([frames[k] for k in keep]), errors[keep], camera, not given, calibration_rms)  # fmt: skip
 
 

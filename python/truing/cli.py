@@ -591,7 +591,7 @@ def handeye(
 
             found = truing.handeye(data, **keywords, raise_if_undecided=False)
             both = None
-            if robot is not None and found.status == "done":
+            if robot is not None and data.joints is not None and found.status == "done":
                 both = truing.handeye_with_kinematics(robot, data.joints, data, options=options, free=free, hold=hold, effects=effects, seed=seed)
             following = truing.handeye_plan(data, found, options=options, count=plan, seed=seed) if plan and found.status == "done" else ()
             return Solved(data, options, found, following, clock, both, seed)

@@ -166,7 +166,7 @@ def handeye_plan(
     if options is None:
         options = handeye_options(poses, setup=setup)
     usual = {"candidates": candidates, "tilt": tilt, "reach": reach}
-    return _core.handeye_plan(_poses(poses), result, options, count=count, seed=seed, **{name: value for name, value in usual.items() if value is not None})  # type: ignore[arg-type]
+    return _core.handeye_plan(_poses(poses), result, options, count=count, seed=seed, **{name: value for name, value in usual.items() if value is not None})
 
 
 def handeye_clock(
@@ -217,7 +217,7 @@ def handeye_with_kinematics(
     if own:
         raise InputError(f"handeye_with_kinematics cannot use own effects ({', '.join(effect.name for effect in own)}); name effects of the catalogue")
     fit = _core.IdentifyOptions(
-        free=_names(free),
+        free=[*_names(free), "base.*", "tool.*"] if free else [],  # these two are camera and board
         hold=_names(hold),
         effects=[item for item in asked if not isinstance(item, Effect)],
         loss=loss,

@@ -158,7 +158,7 @@ def _closures(page: Page, result: Mapping[str, Any], scene: Scene | None) -> Non
                                               ("rotation", 1e3, "mrad", None if scene is None else scene.predicted_rad, "close short")):  # fmt: skip
         suffix = "m" if key == "position" else "rad"
         traces: list[dict[str, Any]] = []
-        if predicted is not None and np.isfinite(predicted).all():
+        if predicted is not None and len(predicted) and np.isfinite(predicted).all():
             x = [r["pose"] for r in residuals]
             traces.append({"type": "scatter", "mode": "lines", "x": x, "y": packed(predicted * scale), "line": {"color": MUTED, "width": 1.5, "dash": "dot", "shape": "hvh"},
                            "name": "95 % below, by the noise", "hovertemplate": f"95 % are below %{{y:.3g}} {unit}<extra></extra>"})  # fmt: skip
@@ -171,7 +171,8 @@ def _closures(page: Page, result: Mapping[str, Any], scene: Scene | None) -> Non
                                "marker": {"color": colour, "size": 8 if name != "rejected" else 9, "symbol": symbol, "opacity": 0.85}, "text": [_hover(r) for r in chosen],
                                "hovertemplate": f"%{{text}}<br>%{{y:.3g}} {unit}<extra>{name}</extra>"})  # fmt: skip
         usual = [scale * r[f"{key}_left_out_{suffix}"] for r in residuals if not r["rejected"] and r[f"{key}_left_out_{suffix}"] is not None]
-        most = max([1e-9, *usual, *([] if predicted is None or not len(predicted) else [float(np.nanmax(predicted)) * scale])])
+        known = np.empty(0) if predicted is None else predicted[np.isfinite(predicted)]
+        most = max([1e-9, *usual, *(known * scale).tolist()])
         top = max([scale * r[f"{key}_left_out_{suffix}"] for r in residuals if r[f"{key}_left_out_{suffix}"] is not None] or [most])
         axis: dict[str, Any] = {"title": {"text": unit}, "rangemode": "tozero"}
         if top > 6 * most:  # gross poses would press the others to the floor

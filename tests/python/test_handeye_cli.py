@@ -239,18 +239,19 @@ def test_a_wrong_size_of_the_board_is_said(imaged: tuple[Path, Floats]) -> None:
 
 
 def moving(seconds: float, rate: float, offset: float = 0.0, *, still: bool = False, seed: int = 0) -> tuple[Floats, Floats, Floats]:
-    """Times, hand poses and board poses of a smooth motion; `offset` is added to the times at which the poses are taken."""
+    """Times, hand poses and board poses of an uneven motion; `offset` is added to the times at which the poses are taken."""
     t = np.arange(0, seconds, 1 / rate)
-    A, B = [], []
+    rng = np.random.default_rng(5)  # of the motion: the same for every record of it
+    speed, phase = rng.uniform(0.7, 4.0, (6, 4)), rng.uniform(0, 7, (6, 4))
     Y = frame([0.6, 0.0, 0.0], [3.1, 0, 0])
-    rng = np.random.default_rng(seed)
+    noise = np.random.default_rng(seed)
+    A, B = [], []
     for moment in t + offset:
-        turn = np.zeros(3) if still else 0.5 * np.array([math.sin(1.3 * moment), math.sin(1.7 * moment + 1), math.sin(0.9 * moment + 2)])
-        place = np.array([0.5, 0, 0.4]) + (0 if still else 0.1) * np.array([math.sin(moment), math.cos(1.1 * moment), math.sin(0.7 * moment)])
-        T = frame(place, turn) @ frame([0, 0, 0], [3.0, 0.1, 0.0])
+        swing = np.sin(speed * moment + phase).mean(axis=1) * (0 if still else 1)
+        T = frame(np.array([0.5, 0, 0.4]) + 0.15 * swing[:3], 0.8 * swing[3:]) @ frame([0, 0, 0], [3.0, 0.1, 0.0])
         A.append(T)
         seen = np.linalg.inv(T @ CAMERA_IN_HAND) @ Y
-        seen[:3, 3] += rng.normal(0, 1e-4, 3)
+        seen[:3, 3] += noise.normal(0, 1e-4, 3)
         B.append(seen)
     return t, np.array(A), np.array(B)
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import html
 import json
 import re
 from pathlib import Path
@@ -83,7 +84,7 @@ def test_without_an_answer_it_says_what_to_do_and_gives_no_camera(tmp_path: Path
         s = dataclasses.replace(s, A=s.A[np.random.default_rng(0).permutation(20)])
     result, drawn = solved(tmp_path, s)
     assert drawn is None and "camera" not in result
-    text = visible(handeye_report(result, drawn))
+    text = html.unescape(visible(handeye_report(result, drawn)))
     assert result["message"].rstrip(".")[1:] in text and "No camera pose is given" in text and "The camera sits at" not in text
     assert text.index("What to do") < text.index("What the motions show")
     expected = {"one axis": "cannot be seen", "inverted": "--reading hand-inverted", "mixed up": "No other reading of the numbers closes it either"}

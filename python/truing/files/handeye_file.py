@@ -23,7 +23,7 @@ from truing import _core
 from truing.boards import Board, BoardViews, find_board, parse_board, plausible_camera
 from truing.errors import InputError, InputWarning
 from truing.files.common import PathLike, atomic_write, listed
-from truing.files.table import Codes, Floats, Table
+from truing.files.table import Floats, Table
 from truing.files.yaml_tree import Document, FreeMapping, Number, Strict, Text, choice, expected, found
 
 CAMERA_FORMAT = "truing-camera/1"
@@ -344,7 +344,7 @@ class _Reader:
             return None
         codes, names = self.table.labels("set")
         lookup = np.array([*(_SETS.index(name) if name in _SETS else -1 for name in names), -1], dtype=np.int8)
-        sets: Codes = lookup[codes]
+        sets = lookup[codes]
         if (sets < 0).any():
             self.table.refuse_cell(int(np.argmax(sets < 0)), "set", "train or test")
         return np.asarray(sets, dtype=np.int8)
