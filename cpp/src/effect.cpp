@@ -290,10 +290,56 @@ Vector3d link_start(const Robot& robot, const std::vector<Isometry3d>& frames, s
   return frames[link].translation();
 }
 
-// A link bends: its end turns about the two axes across it by compliance * bending moment. A uniform beam
-// that is loaded at its end turns there by L / EI times the moment at its middle (Euler and Bernoulli), so
-// that is the moment taken: of all links beyond and the payload; the link's own weight is left out. Moment at
-// the end instead would be the next joint's torque, and its spring.
+using Sites = std::array<std::string, 3>;
+
+// Elementary rotations about where a link starts. Nothing turns there after the joint has: so it is the two
+// angles before, and the joint's own.
+Sites start_sites(const Robot& robot, std::size_t link) {
+  const std::string& at = robot.joints[link].name;
+  if (robot.convention == Convention::urdf) return {at + ".rx", at + ".ry", at + ".rz"};
+  if (robot.convention == Convention::mdh) return {at + ".alpha", at + ".beta", at + ".theta"};
+  if (link == 0) return {"base.rx", "base.ry", "base.rz"};
+  return {robot.joints[link - 1].name + ".alpha", robot.joints[link - 1].name + ".beta", at + ".theta"};
+}
+
+// The axes that these turn about, in the measurement frame.
+Eigen::Matrix3d start_axes(const Robot& robot, const std::vector<Isometry3d>& frames, std::size_t link) {
+  if (robot.convention == Convention::dh && link == 0) return Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d before = (link == 0 ? robot.T_measurement_base : frames[link - 1]).linear();
+  if (robot.convention != Convention::mdh) return before;
+  return before * Eigen::AngleAxisd(robot.joints[link].alpha, Vector3d::UnitX()).toRotationMatrix();
+}
+
+// About where it ends, and about the axes of link_end: its last angles, and the next joint's before it turns.
+Sites end_sites(const Robot& robot, std::size_t link) {
+  const std::string &at = robot.joints[link].name, &next = robot.joints[link + 1].name;
+  if (robot.convention == Convention::dh) return {at + ".alpha", at + ".beta", next + ".theta"};
+  if (robot.convention == Convention::mdh) return {next + ".alpha", next + ".beta", next + ".theta"};
+  return {next + ".rx", next + ".ry", next + ".rz"};
+}
+
+// Moment about `axis` through `place` of the weight of all links beyond `link` and of the payload; the link's
+// own weight is left out.
+double moment_beyond(const Robot& robot, const Inputs& in, std::size_t link, const Vector3d& place,
+                     const Vector3d& axis) {
+  const double mass = in.data->payload ? in.data->payload[in.row] : 0.0;
+  Vector3d first_moment = mass * (in.frames.back().translation() - place);
+  double size = first_moment.norm();  // of what adds up
+  for (std::size_t k = link + 1; k < robot.joints.size(); ++k) {
+    const Joint& beyond = robot.joints[k];
+    if (!beyond.mass) continue;
+    const Vector3d part = *beyond.mass * (in.frames[k] * beyond.center_of_mass - place);
+    first_moment += part;
+    size += part.norm();
+  }
+  const Vector3d g = robot.T_measurement_base.linear() * robot.gravity;
+  return detail::without_rounding(axis.dot(first_moment.cross(g)), size * g.norm());
+}
+
+// A link bends about the two axes across it: a uniform beam under what hangs beyond its end (Euler and
+// Bernoulli). The bending moment runs straight from Ms at the start to Me at the end; the end then is displaced
+// and turned as by a turn about the start of c (2 Ms + Me) / 6 and one about the end of c (Ms + 2 Me) / 6, with
+// c = L / EI (conjugate beam, Mohr 1868). A turn about the end alone would be the next joint's spring.
 std::vector<Term> link_compliance(const Robot& robot, std::size_t joint, const Measurements& data) {
   const Joint& at = robot.joints.at(joint);
   if (joint + 1 == robot.joints.size())
@@ -308,35 +354,35 @@ std::vector<Term> link_compliance(const Robot& robot, std::size_t joint, const M
   Eigen::Index lengthwise = 0;
   along.cwiseAbs().maxCoeff(&lengthwise);
 
-  // Elementary rotations about x, y and z of the link's end.
-  const std::string next = robot.joints[joint + 1].name;
-  std::array<std::string, 3> sites = {next + ".rx", next + ".ry", next + ".rz"};
-  if (robot.convention == Convention::dh) sites = {at.name + ".alpha", at.name + ".beta", next + ".theta"};
-  if (robot.convention == Convention::mdh) sites = {next + ".alpha", next + ".beta", next + ".theta"};
   const auto shared = std::make_shared<const Robot>(robot);
-  const Vector3d g = robot.T_measurement_base.linear() * robot.gravity;
+  const auto moment_at_start = [shared, joint](const Inputs& in, const Vector3d& axis) {
+    const double motion = in.joints[static_cast<Eigen::Index>(joint)];
+    return moment_beyond(*shared, in, joint, link_start(*shared, in.frames, joint, motion), axis);
+  };
+  const auto moment_at_end = [shared, joint](const Inputs& in, const Vector3d& axis) {
+    return moment_beyond(*shared, in, joint, link_end(*shared, in.frames, joint).translation(), axis);
+  };
+  const Sites about_start = start_sites(robot, joint), about_end = end_sites(robot, joint);
   std::vector<Term> terms;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     if (axis == lengthwise) continue;
-    const auto moment = [shared, g, joint, axis](const Inputs& in) {
-      const Isometry3d at_end = link_end(*shared, in.frames, joint);
-      const Vector3d start =
-          link_start(*shared, in.frames, joint, in.joints[static_cast<Eigen::Index>(joint)]);
-      const Vector3d middle = 0.5 * (start + at_end.translation());
-      const double mass = in.data->payload ? in.data->payload[in.row] : 0.0;
-      Vector3d first_moment = mass * (in.frames.back().translation() - middle);
-      double size = first_moment.norm();  // of what adds up
-      for (std::size_t k = joint + 1; k < shared->joints.size(); ++k) {
-        const Joint& beyond = shared->joints[k];
-        if (!beyond.mass) continue;
-        const Vector3d part = *beyond.mass * (in.frames[k] * beyond.center_of_mass - middle);
-        first_moment += part;
-        size += part.norm();
-      }
-      return detail::without_rounding(at_end.linear().col(axis).dot(first_moment.cross(g)), size * g.norm());
+    const std::string parameter = "link_compliance." + at.name + ".r" + "xyz"[axis];
+    const auto across = [shared, joint, axis](const Inputs& in) -> Vector3d {
+      return link_end(*shared, in.frames, joint).linear().col(axis);
     };
-    terms.push_back(make_term("link_compliance." + at.name + ".r" + "xyz"[axis], "rad/Nm",
-                              sites[static_cast<std::size_t>(axis)], moment, true));
+    const auto turn_at_end = [=](const Inputs& in) {
+      return (moment_at_start(in, across(in)) + 2.0 * moment_at_end(in, across(in))) / 6.0;
+    };
+    terms.push_back(
+        make_term(parameter, "rad/Nm", about_end[static_cast<std::size_t>(axis)], turn_at_end, true));
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const auto turn_at_start = [=](const Inputs& in) {
+        const double part = start_axes(*shared, in.frames, joint).col(k).dot(across(in));
+        return part * (2.0 * moment_at_start(in, across(in)) + moment_at_end(in, across(in))) / 6.0;
+      };
+      terms.push_back(
+          make_term(parameter, "rad/Nm", about_start[static_cast<std::size_t>(k)], turn_at_start, true));
+    }
   }
   return terms;
 }

@@ -400,25 +400,87 @@ TEST_CASE("a scale stretches every target about the base, wherever the base stan
   CHECK((s.orientation - p.orientation).cwiseAbs().maxCoeff() < 1e-15);
 }
 
-TEST_CASE("a link bends as a beam does, under what hangs at its end") {
-  // Along x, gravity across it: a weight at the end turns the end by L / EI * m g L / 2.
+namespace {
+
+/// By how much the tip moves when the effects are there, row by row.
+Eigen::MatrixXd displacement(Robot robot, const Measurements& data, const truing::AppliedEffect& effect) {
+  const Eigen::MatrixXd before = truing::predict(robot, data).position;
+  robot.effects = {effect};
+  return truing::predict(robot, data).position - before;
+}
+
+}  // namespace
+
+TEST_CASE("a link bends as a finely cut beam does, under what hangs beyond its end") {
+  // In a plane, gravity in it: a beam of 2 m, a stiff link of 0.5 m and a load.
   Robot robot;
   robot.convention = Convention::dh;
   robot.joints = {joint("J1", 0, 0, 2.0, 0), joint("J2", 0, 0, 0.5, 0)};
   robot.gravity = {0.0, -10.0, 0.0};
-  const auto terms = [&](const Measurements& data) { return truing::effect_terms({{"link_compliance", {"J1"}}}, robot, data); };
-  Table table(1);
-  table.data.joints = {table.add({0.0}), table.add({M_PI / 2})};  // the second link is upright: the payload is 2 m from the first axis
-  table.data.payload = table.add({3.0});
-  REQUIRE(terms(table.data).size() == 2);
-  const detail::Model model = detail::make_model(robot, table.data, {{"link_compliance", {"J1"}}});
-  const auto bases = detail::make_bases(model, table.data);
-  CHECK(model.terms[0].parameter == "link_compliance.J1.ry");
-  CHECK(model.terms[0].site == "J1.beta");
-  CHECK(bases[0][0] == doctest::Approx(0.0));
-  CHECK(model.terms[1].parameter == "link_compliance.J1.rz");
-  CHECK(model.terms[1].site == "J2.theta");
-  CHECK(bases[1][0] == doctest::Approx(-3.0 * 10.0 * 1.0));
+  const double load = 3.0, compliance = 1e-7;
+  Table table(4);
+  const std::vector<double> first = {0.0, 0.4, -0.9, 1.2}, second = {M_PI / 2, -0.3, 2.0, 0.7};
+  table.data.joints = {table.add(first), table.add(second)};
+  table.data.payload = table.add(std::vector<double>(4, load));
+  const Eigen::MatrixXd by_law = displacement(robot, table.data, {"link_compliance", {"J1"}, {{"link_compliance.J1.rz", compliance}}});
+  for (std::size_t row = 0; row < 4; ++row) {
+    const double q1 = first[row], q12 = first[row] + second[row];
+    const Eigen::Vector2d tip = 2.0 * Eigen::Vector2d(std::cos(q1), std::sin(q1)) + 0.5 * Eigen::Vector2d(std::cos(q12), std::sin(q12));
+    constexpr int kPieces = 2000;
+    Eigen::Vector2d moved(0.0, 0.0);
+    for (int k = 0; k < kPieces; ++k) {  // each piece turns all that is beyond it
+      const Eigen::Vector2d arm = tip - 2.0 * (k + 0.5) / kPieces * Eigen::Vector2d(std::cos(q1), std::sin(q1));
+      const double turn = compliance / kPieces * -10.0 * load * arm.x();
+      moved += turn * Eigen::Vector2d(-arm.y(), arm.x());
+    }
+    const Eigen::Vector2d law = by_law.row(static_cast<Eigen::Index>(row)).head<2>();
+    CHECK((law - moved).norm() < 1e-4 * moved.norm());
+  }
+}
+
+TEST_CASE("a link bends about both of its ends, in every convention") {
+  for (const Robot& robot : robots()) {
+    CAPTURE(robot.name);
+    const auto table = full_table(robot, 6, 47);
+    const Eigen::Vector3d g = robot.T_measurement_base.linear() * robot.gravity;
+    for (std::size_t link = 0; link + 1 < robot.joints.size(); ++link) {
+      const std::string& name = robot.joints[link].name;
+      CAPTURE(name);
+      if (complaint({"link_compliance", {name}}, robot, table->data) != "") continue;  // has no length
+      std::set<std::string> parameters;
+      for (const truing::Term& term : truing::effect_terms({{"link_compliance", {name}}}, robot, table->data)) parameters.insert(term.parameter);
+      REQUIRE(parameters.size() == 2);
+      for (const std::string& parameter : parameters) {
+        CAPTURE(parameter);
+        const double compliance = 1e-9;
+        const Eigen::MatrixXd by_law = displacement(robot, table->data, {"link_compliance", {name}, {{parameter, compliance}}});
+        for (std::size_t row = 0; row < 6; ++row) {
+          Eigen::VectorXd reading(static_cast<Eigen::Index>(robot.driven_count()));
+          for (Eigen::Index k = 0; k < reading.size(); ++k) reading[k] = table->data.joints[static_cast<std::size_t>(k)][row];
+          const std::vector<Eigen::Isometry3d> frames = truing::forward_kinematics(robot, reading, 0);
+          const Joint &at = robot.joints[link], &next = robot.joints[link + 1];
+          Eigen::Isometry3d end = frames[link];
+          Eigen::Vector3d start = (link == 0 ? robot.T_measurement_base : frames[link - 1]).translation();
+          if (robot.convention == Convention::mdh) {
+            end = end * Eigen::AngleAxisd(next.alpha, Eigen::Vector3d::UnitX()) * Eigen::Translation3d(next.a, 0.0, 0.0);
+            start = frames[link] * Eigen::Vector3d(0.0, 0.0, -at.d);
+          } else if (robot.convention == Convention::urdf) {
+            end = end * Eigen::Translation3d(next.T_parent_joint.translation());
+            start = frames[link].translation();
+          }
+          const Eigen::Vector3d across = end.linear().col(parameter.back() - 'x'), tip = frames.back().translation();
+          const auto moment = [&](const Eigen::Vector3d& place) {
+            Eigen::Vector3d sum = table->data.payload[row] * (tip - place).cross(g);
+            for (std::size_t k = link + 1; k < robot.joints.size(); ++k) sum += *robot.joints[k].mass * (frames[k] * robot.joints[k].center_of_mass - place).cross(g);
+            return across.dot(sum);
+          };
+          const double of_start = moment(start), of_end = moment(end.translation());
+          const Eigen::Vector3d moved = compliance / 6.0 * ((2.0 * of_start + of_end) * across.cross(tip - start) + (of_start + 2.0 * of_end) * across.cross(tip - end.translation()));
+          CHECK((by_law.row(static_cast<Eigen::Index>(row)).transpose() - moved).norm() < 1e-3 * moved.norm() + 1e-12);
+        }
+      }
+    }
+  }
 }
 
 TEST_CASE("base_frame and tool_frame free the model's own parameters") {
