@@ -35,6 +35,7 @@ constexpr double kHopeless = 0.2;            // and beyond this nothing is said
 constexpr double kWidest = 0.1;              // standard errors beyond this share of the distance, or rad, are not an answer
 constexpr double kExact = 1e-8;              // [m], [rad] closures below this are rounding, not noise
 constexpr double kBeyondPixels = 3.0;        // times what pixels can tell of a board's orientation: more is not theirs
+constexpr double kBentLens = 1.2;            // a lens whose pixels scatter with no more than this times the variance fits as well
 constexpr int kRejectRounds = 10;
 constexpr double kPlainGain = 16.0;          // over the poses: by how much more plain weights must predict better, as a share
 
@@ -190,6 +191,7 @@ struct Work {
   LoopProblem problem;
   Rows fitted, held_out;
   LoopEstimate fit;
+  bool lens_stays = false;  // asked to be refined, but poses are not good enough for that
 };
 
 /// Board poses anew from the pixels, with what they weigh.
@@ -274,15 +276,20 @@ void fit_and_reject(const HandEyeOptions& options, const Rows& rows, LoopNoise n
   }
 }
 
-/// Boards that turn about themselves by more than their pixels can tell: lens, board or shutter are not what the pixels are told. Then their noise is
-/// no measure, and the loop's own stands.
-bool beyond_pixels(const LoopProblem& problem, const Rows& rows, const LoopNoise& noise, HandEyeResult* result) {
+/// By how much more boards turn about what the loop expects than their pixels can tell.
+double scatter_beyond_pixels(const LoopProblem& problem, const Rows& rows, const LoopNoise& noise) {
   std::vector<double> by_pixels;
   for (const std::size_t i : rows) by_pixels.push_back(noise.variance[3] * problem.pixel_shape[i].bottomRightCorner<3, 3>().trace() / 3.0);
-  const double pixels = std::sqrt(median_of(by_pixels)), turn = std::sqrt(noise.variance[2]);
-  if (turn < kBeyondPixels * pixels) return false;
-  result->warnings.push_back("Boards scatter by " + deg(turn) + " about what the loop expects, " + number(turn / pixels, 2) + " times what their pixels can tell: is the lens "
-                             "calibrated, the board flat, did anything move while the image was taken? Board poses are weighed by that scatter, not pixels by theirs.");
+  return std::sqrt(noise.variance[2] / median_of(by_pixels));
+}
+
+/// Then lens, board or shutter are not what the pixels are told: their noise is no measure, and the loop's own stands.
+bool beyond_pixels(const LoopProblem& problem, const Rows& rows, const LoopNoise& noise, HandEyeResult* result) {
+  const double times = scatter_beyond_pixels(problem, rows, noise);
+  if (times < kBeyondPixels) return false;
+  result->warnings.push_back("Boards scatter by " + deg(std::sqrt(noise.variance[2])) + " about what the loop expects, " + number(times, 2) +
+                             " times what their pixels can tell: is the lens calibrated, the board flat, did anything move while the image was taken? Board poses are "
+                             "weighed by that scatter, not pixels by theirs.");
   return true;
 }
 
@@ -291,16 +298,30 @@ void fit_images(const HandEyeOptions& options, Work* work, HandEyeResult* result
   const Camera camera = *work->poses.camera;
   const ImageSigmas sigmas{std::sqrt(work->fit.noise.variance[3]), std::sqrt(work->fit.noise.variance[0]), std::sqrt(work->fit.noise.variance[1])};
   const ImageEstimate images = refine_images(work->problem, work->poses.images, work->fitted, camera, work->fit.X, work->fit.Y, sigmas,
-                                             options.refine_camera, options.max_iterations);
+                                             options.refine_camera && !work->lens_stays, options.max_iterations);
   work->fit.X = images.X, work->fit.Y = images.Y, work->fit.covariance = images.covariance;
   result->T_base_hand = images.A;
   result->solver = images.solver;
-  if (!options.refine_camera) return;
+  if (!options.refine_camera || work->lens_stays) return;
   result->camera_model = images.camera, result->camera_model_sigma = images.camera_sigma;
   work->poses.camera = images.camera;
   double pixel_variance = 0.0;
   fit_boards(images.camera, work, &pixel_variance);
   if (!std::isfinite(options.pixel_sigma)) work->fit.noise.variance[3] = pixel_variance;
+}
+
+/// The lens from all poses together, before noise can be known. Where boards scatter beyond their pixels the loop bends it: then the lens that was
+/// given stays, if pixels fit it as well.
+void refine_lens(const HandEyeOptions& options, Work* work, HandEyeResult* result) {
+  const Work before = *work;
+  fit_images(options, work, result);
+  work->fit = refine_loop(work->problem, work->fitted, work->fit.X, work->fit.Y, work->fit.noise, options.max_iterations);
+  if (scatter_beyond_pixels(work->problem, work->fitted, work->fit.noise) < kBeyondPixels ||
+      before.fit.noise.variance[3] > kBentLens * work->fit.noise.variance[3])
+    return;
+  *work = before;
+  work->lens_stays = true;
+  result->camera_model.reset(), result->camera_model_sigma.clear(), result->T_base_hand.clear();
 }
 
 void describe_poses(const HandEyeOptions& options, const Agreement& agreement, const Work& work, HandEyeResult* result) {
@@ -478,10 +499,7 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
   }
   widen(noise, work.fitted, &work.fit, &result);
   if (!work.poses.images.empty() && options.method == HandEyeMethod::refined) {
-    if (options.refine_camera) {  // noise is only known once the lens is
-      fit_images(options, &work, &result);
-      work.fit = refine_loop(problem, work.fitted, work.fit.X, work.fit.Y, work.fit.noise, options.max_iterations);
-    }
+    if (options.refine_camera) refine_lens(options, &work, &result);
     if (!beyond_pixels(problem, work.fitted, work.fit.noise, &result)) fit_images(options, &work, &result);
   }
 

@@ -2615,7 +2615,7 @@ class HandEyeNoise:
     @property
     def camera_rotation(self) -> float:
         """
-        [rad] of board poses; NaN with images.
+        [rad] of board poses; with images what is beyond their pixels' noise.
         """
     @property
     def estimated(self) -> bool:
