@@ -171,7 +171,7 @@ install_truing() {
   wheel=(build/dist/truing-*.whl)
   [[ -e ${wheel[0]} ]] || { rm -f "$stamp"; fail "there is no wheel in build/dist; run the set-up once more"; }
   say "installing truing${extras:+ with what its tests need} into .venv"
-  pip_install "${wheel[0]}${extras:+[$extras]}"
+  pip_install "${wheel[0]}[${extras:-images}]"
   printf '%s\n' "$hash" > "$stamp"
   if [[ -n $extras ]]; then printf '%s\n' "$hash" > "$extras_stamp"; fi
 }

@@ -116,7 +116,9 @@ void refuse(HandEyeResult* result, HandEyeStatus status) {
   result->status = status;
   std::string text;
   for (const Unobservable& u : result->unobservable) text += (text.empty() ? "" : " ") + u.what + " is not observable; " + u.advice + ".";
-  if (!text.empty()) result->message = text;
+  if (text.empty()) return;
+  text[0] = 'T';  // "the camera's …"
+  result->message = text;
 }
 
 // ---- Degenerate motions --------------------------------------------------------------------------------------------
@@ -492,7 +494,7 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
     result.solver.stopped_because = work.fit.converged ? "the step is small beside its standard errors" : "the limit of iterations";
   }
   if (work.fit.singular) {
-    result.unobservable.push_back({"a direction of camera and board together", Eigen::Vector3d::Zero(), false, std::numeric_limits<double>::infinity(),
+    result.unobservable.push_back({"the place of camera and board together", Eigen::Vector3d::Zero(), false, std::numeric_limits<double>::infinity(),
                                    "rotate the hand about two axes by 30 deg or more, and move it"});
     refuse(&result, HandEyeStatus::not_observable);
     return result;

@@ -132,7 +132,7 @@ std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeR
     }
     if (!std::isfinite(least)) break;
     C = best_C;
-    best.working_point_sigma = std::sqrt(least);
+    best.working_point_sigma = std::sqrt(least / 3.0);
     out.push_back(best);
   }
   return out;

@@ -412,7 +412,7 @@ void bind_parts(py::module_& m) {
   next.def_readonly("T_camera_board", &NextHandPose::T_camera_board,
                     "shape=(4, 4): what the camera is expected to see.");
   next.def_readonly("working_point_sigma", &NextHandPose::working_point_sigma,
-                    "[m] root of the trace of the working point's covariance, with this pose and those before "
+                    "[m] standard error of the working point per axis (rms over three), with this pose and those before "
                     "it measured.");
   next.def("__repr__", [](const NextHandPose& p) {
     return "NextHandPose(working point to " + millimetres(p.working_point_sigma) + ")";

@@ -2702,7 +2702,7 @@ class NextHandPose:
     @property
     def working_point_sigma(self) -> float:
         """
-        [m] root of the trace of the working point's covariance, with this pose and those before it measured.
+        [m] standard error of the working point per axis (rms over three), with this pose and those before it measured.
         """
 class ClockOffset:
     """

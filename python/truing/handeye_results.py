@@ -128,7 +128,7 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
         found["board_turned"] = {"poses": [int(data.rows[k]) for k, turn in enumerate(r.symmetry) if turn]}
     if data.views is not None:
         found["images"] = _images(solved)
-    found["next_poses"] = [{**frame_dict(p.T_base_hand), "working_point_sigma_m": p.working_point_sigma / math.sqrt(3.0)} for p in solved.next_poses]
+    found["next_poses"] = [{**frame_dict(p.T_base_hand), "working_point_sigma_m": p.working_point_sigma} for p in solved.next_poses]
     if solved.clock is not None:
         found["clock"] = _clock(solved.clock)
     if solved.kinematics is not None:
@@ -340,7 +340,7 @@ def next_pose_columns(poses: Sequence[truing.NextHandPose]) -> dict[str, Any]:
     """Columns of ``next_poses.csv``: hand poses to drive to, as in poses.csv, and what each leaves at the working point."""
     frames = [frame_dict(pose.T_base_hand) for pose in poses]
     columns = {f"hand_{name}": np.array([frame[name] for frame in frames]) for name in frames[0]}
-    columns["working_point_sigma_m"] = np.array([pose.working_point_sigma / math.sqrt(3.0) for pose in poses])  # per axis, as result.json has it
+    columns["working_point_sigma_m"] = np.array([pose.working_point_sigma for pose in poses])
     return columns
 
 

@@ -197,7 +197,7 @@ std::vector<Reading> handeye_readings();
 struct NextHandPose {
   Eigen::Isometry3d T_base_hand = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d T_camera_board = Eigen::Isometry3d::Identity();  ///< what the camera is expected to see
-  double working_point_sigma = 0.0;  ///< [m] root of the trace of the working point's covariance, this pose and those before it measured
+  double working_point_sigma = 0.0;  ///< [m] standard error of the working point per axis (rms over three), this pose and those before it measured
 };
 
 struct HandEyePlanOptions {
