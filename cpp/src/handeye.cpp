@@ -46,7 +46,7 @@ std::string deg(double angle) { return number(180.0 / kPi * angle, 3) + " deg"; 
 
 void check_frame(const Eigen::Isometry3d& T, const char* what, std::size_t i) {
   const auto fail = [&](const std::string& why) {
-    throw std::invalid_argument(std::string(what) + " of pose " + std::to_string(i + 1) + " " + why);
+    throw std::invalid_argument(std::string(what) + " of pose " + std::to_string(i) + " " + why);
   };
   if (!T.matrix().allFinite()) fail("is not finite");
   if ((T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-6) fail("is not a rotation: its axes are not orthogonal unit vectors");
@@ -67,9 +67,9 @@ void check(const HandEyePoses& poses) {
     if (poses.images.empty()) continue;
     const BoardImage& image = poses.images[i];
     if (image.points.cols() != image.pixels.cols() || image.points.cols() < 4)
-      throw std::invalid_argument("image " + std::to_string(i + 1) + " has " + std::to_string(image.points.cols()) + " points and " +
+      throw std::invalid_argument("image " + std::to_string(i) + " has " + std::to_string(image.points.cols()) + " points and " +
                                   std::to_string(image.pixels.cols()) + " pixels; needed are as many of each, 4 or more");
-    if (!image.points.allFinite() || !image.pixels.allFinite()) throw std::invalid_argument("image " + std::to_string(i + 1) + " is not finite");
+    if (!image.points.allFinite() || !image.pixels.allFinite()) throw std::invalid_argument("image " + std::to_string(i) + " is not finite");
   }
   for (std::size_t k = 0; k < poses.board_symmetries.size(); ++k) check_frame(poses.board_symmetries[k], "board_symmetries", k);
 }
@@ -167,23 +167,13 @@ void look_at_errors(const HandEyeOptions& options, double distance, HandEyeResul
 
 /// The factor on the board's lengths that would close the loop best, beside X and Y.
 void find_board_scale(const LoopProblem& problem, const Rows& rows, const LoopEstimate& fit, HandEyeResult* result) {
-  Eigen::Matrix<double, 13, 13> N = Eigen::Matrix<double, 13, 13>::Zero();
-  Eigen::Matrix<double, 13, 1> g = Eigen::Matrix<double, 13, 1>::Zero();
-  for (const std::size_t i : rows) {
-    const LoopRow row = loop_row(problem, i, fit.X, fit.Y, fit.noise);
-    Eigen::Matrix<double, 6, 13> J;
-    J.leftCols<12>() = row.J;
-    J.col(12) << -problem.B[i].translation(), Eigen::Vector3d::Zero();
-    const Eigen::Matrix<double, 6, 13> WJ = row.V.llt().solve(J);
-    N += J.transpose() * WJ, g += WJ.transpose() * row.e;
-  }
-  const Eigen::Matrix<double, 13, 1> unit = N.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 13, 13>> eigen(unit.asDiagonal() * N * unit.asDiagonal());
-  if (!(eigen.eigenvalues()(0) > 1e-12)) return;
-  const Eigen::Matrix<double, 13, 13> C = unit.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
-                                          eigen.eigenvectors().transpose() * unit.asDiagonal();
-  result->board_scale = 1.0 - C.row(12).dot(g);
-  result->board_scale_sigma = std::sqrt(C(12, 12));
+  const OneMore off = one_more_unknown(problem, rows, fit, [&](std::size_t i) {
+    Vector6d d;
+    d << -problem.B[i].translation(), Eigen::Vector3d::Zero();
+    return d;
+  });
+  if (!std::isfinite(off.value)) return;
+  result->board_scale = 1.0 + off.value, result->board_scale_sigma = off.sigma;
 }
 
 // ---- The work ------------------------------------------------------------------------------------------------------
@@ -204,7 +194,7 @@ void fit_boards(const Camera& camera, Work* work, double* pixel_variance) {
   std::vector<double> per_image;
   for (std::size_t i = 0; i < work->poses.images.size(); ++i) {
     const BoardFit fit = fit_board(camera, work->poses.images[i], work->problem.B[i]);
-    if (!fit.converged) throw std::invalid_argument("the board's pose in image " + std::to_string(i + 1) + " does not fit its pixels: is it behind the camera?");
+    if (!fit.converged) throw std::invalid_argument("the board's pose in image " + std::to_string(i) + " does not fit its pixels: is it behind the camera?");
     work->problem.B[i] = fit.T_camera_board, work->problem.pixel_shape[i] = fit.shape;
     sum += fit.sum, freedom += fit.freedom;
     per_image.push_back(fit.sum / std::max(1, fit.freedom));

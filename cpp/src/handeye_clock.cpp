@@ -6,8 +6,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <Eigen/Cholesky>
-
 #include "frame.hpp"
 #include "handeye_closed_form.hpp"
 #include "handeye_refine.hpp"
@@ -36,9 +34,9 @@ void check(const Record& r, const char* what) {
   if (r.time.size() != r.pose.size()) fail("has " + std::to_string(r.time.size()) + " times and " + std::to_string(r.pose.size()) + " poses");
   if (r.time.size() < 10) fail("has " + std::to_string(r.time.size()) + " poses; a clock offset needs 10 or more");
   for (std::size_t i = 0; i < r.time.size(); ++i) {
-    if (!std::isfinite(r.time[i]) || !r.pose[i].matrix().allFinite()) fail("is not finite in row " + std::to_string(i + 1));
+    if (!std::isfinite(r.time[i]) || !r.pose[i].matrix().allFinite()) fail("is not finite in row " + std::to_string(i));
     if (i > 0 && !(r.time[i] > r.time[i - 1]))
-      fail("goes back in time at row " + std::to_string(i + 1) + ": " + number(r.time[i], 9) + " s after " + number(r.time[i - 1], 9) + " s");
+      fail("goes back in time at row " + std::to_string(i) + ": " + number(r.time[i], 9) + " s after " + number(r.time[i - 1], 9) + " s");
   }
 }
 
@@ -159,22 +157,16 @@ ClockOffset handeye_clock(const std::vector<double>& hand_time, const std::vecto
       return out;
     }
     const Frames M_before = moving_frames(before, setup), M_after = moving_frames(after, setup);
-    Eigen::Matrix<double, 13, 13> N = Eigen::Matrix<double, 13, 13>::Zero();
-    Eigen::Matrix<double, 13, 1> g = Eigen::Matrix<double, 13, 1>::Zero();
-    for (const std::size_t i : rows) {
-      const LoopRow row = loop_row(problem, i, fit.X, fit.Y, fit.noise);
-      Eigen::Matrix<double, 6, 13> J;
-      J.leftCols<12>() = row.J;
-      J.col(12) = (closure(predicted_board(fit.X, M_after[i], fit.Y), problem.B[i]) - closure(predicted_board(fit.X, M_before[i], fit.Y), problem.B[i])) / (2.0 * nudge);
-      const Eigen::Matrix<double, 6, 13> WJ = row.V.llt().solve(J);
-      N += J.transpose() * WJ, g += WJ.transpose() * row.e;
+    const OneMore offset = one_more_unknown(problem, rows, fit, [&](std::size_t i) {
+      return Vector6d((closure(predicted_board(fit.X, M_after[i], fit.Y), problem.B[i]) - closure(predicted_board(fit.X, M_before[i], fit.Y), problem.B[i])) /
+                      (2.0 * nudge));
+    });
+    if (!std::isfinite(offset.value)) {
+      out.message = "the offset cannot be told from where camera and board are: turn the hand back and forth";
+      return out;
     }
-    const Eigen::Matrix<double, 13, 1> unit = N.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-    const Eigen::Matrix<double, 13, 13> C =
-        unit.asDiagonal() * Eigen::MatrixXd(unit.asDiagonal() * N * unit.asDiagonal()).ldlt().solve(Eigen::MatrixXd::Identity(13, 13)) * unit.asDiagonal();
-    const double change = std::clamp(-C.row(12).dot(g), -2.0 * step, 2.0 * step);
-    out.offset += change;
-    out.sigma = std::sqrt(C(12, 12));
+    const double change = std::clamp(offset.value, -2.0 * step, 2.0 * step);
+    out.offset += change, out.sigma = offset.sigma;
     if (std::abs(change) < 1e-3 * out.sigma) break;
   }
   out.found = true;

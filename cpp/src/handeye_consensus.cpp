@@ -175,9 +175,9 @@ std::string likely_cause(const Frames& A, const Frames& B, HandEyeSetup setup, s
   if (std::abs(v.norm() - kPi / 2) < std::max(aligned, 0.1) && std::abs(v.z()) > 0.98 * v.norm())
     return "the board was seen turned by 90 deg about its normal";
   for (const std::size_t j : agreeing)
-    if (same(hand, A[j]) && !same(A[i], A[j])) return "its board belongs to the hand of pose " + std::to_string(j + 1);
+    if (same(hand, A[j]) && !same(A[i], A[j])) return "its board belongs to the hand of pose " + std::to_string(j);
   for (const std::size_t j : agreeing)
-    if (j != i && same(A[i], A[j])) return "its hand is that of pose " + std::to_string(j + 1) + ": had the robot moved on?";
+    if (j != i && same(A[i], A[j])) return "its hand is that of pose " + std::to_string(j) + ": had the robot moved on?";
 
   const Eigen::Vector3d off = A[i].translation() - hand.translation();
   const double turned = angle_between(A[i], hand);

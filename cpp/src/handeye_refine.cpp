@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -205,6 +206,25 @@ LoopRow loop_row(const LoopProblem& problem, std::size_t i, const Eigen::Isometr
   linearise(problem, i, X, Y, &row.e, &row.J, &w);
   row.V = weighted_sum(shapes(problem, i, w), noise);
   return row;
+}
+
+OneMore one_more_unknown(const LoopProblem& problem, const Rows& rows, const LoopEstimate& fit, const std::function<Vector6d(std::size_t)>& derivative) {
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(13, 13);
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(13);
+  for (const std::size_t i : rows) {
+    const LoopRow row = loop_row(problem, i, fit.X, fit.Y, fit.noise);
+    Eigen::Matrix<double, 6, 13> J;
+    J << row.J, derivative(i);
+    const Eigen::Matrix<double, 6, 13> WJ = row.V.llt().solve(J);
+    N += J.transpose() * WJ, g += WJ.transpose() * row.e;
+  }
+  const Eigen::VectorXd unit = N.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit.asDiagonal() * N * unit.asDiagonal());
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  if (!(eigen.eigenvalues()(0) > kSingular * eigen.eigenvalues()(12))) return {nan, nan};
+  // The last row of the inverse.
+  const Eigen::VectorXd last = unit(12) * (unit.asDiagonal() * (eigen.eigenvectors() * (eigen.eigenvectors().row(12).transpose().array() / eigen.eigenvalues().array()).matrix()));
+  return {-last.dot(g), std::sqrt(last(12))};
 }
 
 Vector6d left_out(const LoopRow& row, const Matrix12d& covariance) {

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -63,6 +64,12 @@ struct LoopRow {
   Matrix6d V;
 };
 LoopRow loop_row(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y, const LoopNoise& noise);
+
+/// One more unknown beside X and Y, from zero: its value and standard error by the derivative of every closure. NaN where it cannot be seen.
+struct OneMore {
+  double value, sigma;
+};
+OneMore one_more_unknown(const LoopProblem& problem, const Rows& rows, const LoopEstimate& fit, const std::function<Vector6d(std::size_t)>& derivative);
 
 /// The closure if the pose had not been fitted: (I - J C J^T V^-1)^-1 e.
 Vector6d left_out(const LoopRow& row, const Matrix12d& covariance);

@@ -38,7 +38,7 @@ int main() {
   options.setup = truing::HandEyeSetup::eye_in_hand;
   const truing::HandEyeResult found = truing::handeye(poses, options);
   std::printf("%s\n", found.message.c_str());
-  for (const std::size_t i : found.rejected) std::printf("left out: pose %zu, %s\n", i + 1, found.residuals[i].cause.c_str());
+  for (const std::size_t i : found.rejected) std::printf("left out: pose %zu, %s\n", i, found.residuals[i].cause.c_str());
   const double off = (found.camera.T.translation() - T_hand_camera.translation()).norm();
   std::printf("%.2f mm from where it was put\n", 1e3 * off);
   return found.status == truing::HandEyeStatus::done && found.rejected.size() == 1 && off < 3e-3 ? 0 : 1;

@@ -17,7 +17,7 @@ def main() -> None:
     found = truing.handeye(poses, setup="eye-to-hand", working_point=[0, 0, 0.9])
     print(found.message)
     for row in found.rejected:
-        print(f"left out: pose {row + 1}, {found.residuals[row].cause}")
+        print(f"left out: pose {row}, {found.residuals[row].cause}")
     off = found.camera.T[:3, 3] - scene.T_parent_camera[:3, 3]
     print(f"the camera is {1e3 * np.linalg.norm(off):.2f} mm from where it was put")
 

@@ -44,7 +44,7 @@ struct BoardImage {
   Eigen::Matrix2Xd pixels;  ///< shape=(2, points)
 };
 
-/// One entry per robot pose.
+/// One entry per robot pose. Messages count poses from 0.
 struct HandEyePoses {
   std::vector<Eigen::Isometry3d> T_base_hand;     ///< as the controller reports it
   std::vector<Eigen::Isometry3d> T_camera_board;  ///< as the camera sees it
