@@ -116,9 +116,16 @@ def _headline(result: Mapping[str, Any]) -> str:
     place = ", ".join(_millimetres(camera[f"{axis}_m"], digits) for axis in "xyz")
     first = (f'The camera sits at <span class="after">({place}) mm</span> in {where[camera["in"]]}. At the working point it is known to '
              f'<span class="after">±{length_text(point["sigma_m"])}</span> and <span class="after">±{_mrad(point["rotation_sigma_rad"])}</span>.')  # fmt: skip
-    errors = result["errors"]["left_out"]
-    sub = (f"One standard error of each axis; the working point is {length_text(distance)} from the camera. A pose that was left out of the fit is predicted to "
-           f"{length_text(errors['rms_m'])} and {_mrad(errors['rotation_rms_rad'])} rms" + (f", {_pixels_text(errors['rms_px'])}" if errors.get("rms_px") is not None else "") + ".")  # fmt: skip
+    sub = f"One standard error of each axis; the working point is {length_text(distance)} from the camera. "
+    if "kinematics" in result:
+        name = "test" if "test" in result["kinematics"]["errors"] else "train"
+        both = result["kinematics"]["errors"][name]
+        sub += (f"{'Held-out' if name == 'test' else 'Fitted'} poses close the loop to {length_text(both['after']['rms_m'])} rms with the calibrated robot, "
+                f"{length_text(both['before']['rms_m'])} with the nominal one.")  # fmt: skip
+    else:
+        errors = result["errors"]["left_out"]
+        sub += (f"A pose that was left out of the fit is predicted to {length_text(errors['rms_m'])} and {_mrad(errors['rotation_rms_rad'])} rms"
+                + (f", {_pixels_text(errors['rms_px'])}" if errors.get("rms_px") is not None else "") + ".")  # fmt: skip
     return f'<header>{kicker}<h1>{first}</h1><p class="sub">{sub}</p></header>'
 
 
@@ -152,7 +159,8 @@ def _readings(result: Mapping[str, Any]) -> str:
 
 def _closures(page: Page, result: Mapping[str, Any], scene: Scene | None) -> None:
     """Left-out residuals of every pose, in mm and mrad, against what the noise predicts."""
-    page.add('<section class="card"><h2>How far each pose is from where the others put it</h2>')
+    alone = "kinematics" not in result
+    page.add(f'<section class="card"><h2>How far each pose is from {"where the others put it" if alone else "closing the loop"}</h2>')
     residuals = result["residuals"]
     for key, scale, unit, predicted, size in (("position", 1e3, "mm", None if scene is None else scene.predicted_m, "close"),
                                               ("rotation", 1e3, "mrad", None if scene is None else scene.predicted_rad, "close short")):  # fmt: skip
@@ -162,7 +170,7 @@ def _closures(page: Page, result: Mapping[str, Any], scene: Scene | None) -> Non
             x = [r["pose"] for r in residuals]
             traces.append({"type": "scatter", "mode": "lines", "x": x, "y": packed(predicted * scale), "line": {"color": MUTED, "width": 1.5, "dash": "dot", "shape": "hvh"},
                            "name": "95 % below, by the noise", "hovertemplate": f"95 % are below %{{y:.3g}} {unit}<extra></extra>"})  # fmt: skip
-        for name, colour, symbol, chosen in (("left out", AFTER, "circle", [r for r in residuals if r["set"] == "train" and not r["rejected"]]),
+        for name, colour, symbol, chosen in (("left out" if alone else "fitted", AFTER, "circle", [r for r in residuals if r["set"] == "train" and not r["rejected"]]),
                                              ("held out", HELD_OUT, "diamond", [r for r in residuals if r["set"] == "test" and not r["rejected"]]),
                                              ("rejected", REJECTED, "x", [r for r in residuals if r["rejected"]])):  # fmt: skip
             if chosen:
@@ -170,18 +178,19 @@ def _closures(page: Page, result: Mapping[str, Any], scene: Scene | None) -> Non
                 traces.append({"type": "scatter", "mode": "markers", "x": [r["pose"] for r in chosen], "y": [None if v is None else scale * v for v in values], "name": name,
                                "marker": {"color": colour, "size": 8 if name != "rejected" else 9, "symbol": symbol, "opacity": 0.85}, "text": [_hover(r) for r in chosen],
                                "hovertemplate": f"%{{text}}<br>%{{y:.3g}} {unit}<extra>{name}</extra>"})  # fmt: skip
-        usual = [scale * r[f"{key}_left_out_{suffix}"] for r in residuals if not r["rejected"] and r[f"{key}_left_out_{suffix}"] is not None]
+        every = [r[f"{key}_left_out_{suffix}"] if r[f"{key}_left_out_{suffix}"] is not None else r[f"{key}_{suffix}"] for r in residuals]
+        usual = [scale * value for value, r in zip(every, residuals, strict=True) if not r["rejected"] and value is not None]
         known = np.empty(0) if predicted is None else predicted[np.isfinite(predicted)]
         most = max([1e-9, *usual, *(known * scale).tolist()])
-        top = max([scale * r[f"{key}_left_out_{suffix}"] for r in residuals if r[f"{key}_left_out_{suffix}"] is not None] or [most])
+        top = max([scale * value for value in every if value is not None] or [most])
         axis: dict[str, Any] = {"title": {"text": unit}, "rangemode": "tozero"}
         if top > 6 * most:  # gross poses would press the others to the floor
             low = max(1e-6, min([v for v in usual if v > 0] or [most]) / 1.5)
             axis = {"title": {"text": unit}, "type": "log", "range": [math.log10(low), math.log10(1.6 * top)], "dtick": 1}
         page.chart(f"closure_{key}", traces, {"xaxis": {"title": {"text": "pose" if key == "rotation" else ""}}, "yaxis": axis, "margin": {"l": 56, "r": 10, "t": 30 if key == "position" else 6, "b": 40 if key == "rotation" else 22},
                                               "showlegend": key == "position", "legend": {"orientation": "h", "y": 1.16, "x": 0}}, size=size)  # fmt: skip
-    page.add('<p class="note">Each dot is a pose that was left out, predicted from all the others; held-out poses never took part. Dots far above the dotted line say that '
-             "something moves that the model does not know.</p></section>")  # fmt: skip
+    first = "Each dot is a pose that was left out, predicted from all the others; held-out poses never took part." if alone else "With the calibrated robot; held-out poses never took part in the fit."
+    page.add(f'<p class="note">{first} Dots far above the dotted line say that something moves that the model does not know.</p></section>')
 
 
 def _hover(r: Mapping[str, Any]) -> str:
@@ -201,14 +210,15 @@ def _trust(result: Mapping[str, Any]) -> str:
     checks.append((grade, ("The hand was turned about different axes", "The hand was turned mostly about one axis", "The hand was turned about one axis")[grade],
                    f"rotation about the second axis is {_percent(spread)} of that about the first, singular gap {figures_text(min(seen['gap'] or 0.0, 1e9), 2)}"))  # fmt: skip
     if "test" in errors and errors["test"]["n"]:
-        ratio = errors["test"]["rms_m"] / errors["left_out"]["rms_m"] if errors["left_out"]["rms_m"] else 1.0
+        reference = errors.get("left_out", errors["train"])
+        ratio = errors["test"]["rms_m"] / reference["rms_m"] if reference["rms_m"] else 1.0
         grade = 0 if ratio < WORSE_THAN_NOISE else 1 if ratio < 3 else 2
         checks.append((grade, ("Held-out poses are as good as fitted ones", "Held-out poses are somewhat worse", "Held-out poses are much worse")[grade],
-                       f"{length_text(errors['test']['rms_m'])} rms over {counted(errors['test']['n'], 'held-out pose')}, {length_text(errors['left_out']['rms_m'])} left out"))  # fmt: skip
+                       f"{length_text(errors['test']['rms_m'])} rms over {counted(errors['test']['n'], 'held-out pose')}, {length_text(reference['rms_m'])} {'left out' if 'left_out' in errors else 'fitted'}"))  # fmt: skip
     source = "found from the data" if noise["estimated"] else "as given"
-    by_pixels = noise["pixel"] is not None
-    checks.append((0, f"Noise of {'the robot' if by_pixels else 'robot and camera'} ±{length_text(noise['position_m'])}",
-                   f"per component, {source}; in rotation robot ±{_mrad(noise['hand_rad'])}, " + (f"images ±{_pixels_text(noise['pixel'])}" if by_pixels else f"camera ±{_mrad(noise['camera_rad'])}")))  # fmt: skip
+    rotation = [f"robot ±{_mrad(noise['hand_rad'])}" if noise["camera_rad"] is not None or noise["pixel"] is not None else f"±{_mrad(noise['hand_rad'])}"]
+    rotation += [f"camera ±{_mrad(noise['camera_rad'])}"] if noise["camera_rad"] is not None else [f"images ±{_pixels_text(noise['pixel'])}"] if noise["pixel"] is not None else []
+    checks.append((0, f"Noise of {'the robot' if noise['pixel'] is not None else 'robot and camera'} ±{length_text(noise['position_m'])}", f"per component, {source}; in rotation {', '.join(rotation)}"))
     usual = [r["distance"] for r in result["residuals"] if not r["rejected"] and r["set"] == "train" and r["distance"] is not None]
     if usual and not noise["estimated"]:
         rms = math.sqrt(sum(d * d for d in usual) / len(usual))
@@ -288,7 +298,7 @@ def _scene(page: Page, result: Mapping[str, Any], scene: Scene) -> None:
             draw([np.stack([start[k], start[k] + factor * off[k]]) for k in np.flatnonzero(good)], REJECTED, f"seen less predicted, × {factor:g}", 3)
             words = f" Red strokes: from the predicted to the seen board origin, enlarged {factor:g} times."
     axes = {f"{axis}axis": {"title": {"text": f"{axis} [m]"}, "backgroundcolor": "#fff", "gridcolor": "#e6e9ed"} for axis in "xyz"}
-    page.chart("workspace", traces, {"scene": {**axes, "aspectmode": "data", "camera": {"eye": {"x": 1.3, "y": -1.3, "z": 0.8}}}, "fallback": flat}, size="cloud scene")
+    page.chart("workspace", traces, {"scene": {**axes, "aspectmode": "data", "camera": {"eye": {"x": 1.25, "y": -1.25, "z": 0.75}, "center": {"x": 0, "y": 0, "z": -0.12}}}, "fallback": flat}, size="cloud scene")
     less = f" {counted(len(pick), 'pose')} drawn of {count}." if len(pick) < count else ""
     page.add(f'<p class="note">Robot base and hands as triads (x red, y green, z blue), {"cameras" if eye_in_hand else "camera"} dark, boards as the camera saw them orange, and as they are '
              f"predicted blue.{words}{less}</p></section>")  # fmt: skip
@@ -372,10 +382,11 @@ def _noise(result: Mapping[str, Any]) -> str:
     rows = []
     noise, errors = result.get("noise"), result.get("errors", {})
     if noise:
-        by_pixels = noise["pixel"] is not None
+        by_pixels, by_camera = noise["pixel"] is not None, noise["camera_rad"] is not None
         rows.append(f"<tr><th>noise of {'the robot' if by_pixels else 'robot and camera together'}, position, per axis</th><td>{length_text(noise['position_m'])}</td></tr>")
-        rows.append(f"<tr><th>noise of the robot, rotation, per axis</th><td>{_mrad(noise['hand_rad'])}</td></tr>")
-        rows.append(f"<tr><th>noise of the {'images' if by_pixels else 'camera, rotation, per axis'}</th><td>{_pixels_text(noise['pixel']) if by_pixels else _mrad(noise['camera_rad'])}</td></tr>")
+        rows.append(f"<tr><th>noise {'of the robot' if by_pixels or by_camera else 'of both'}, rotation, per axis</th><td>{_mrad(noise['hand_rad'])}</td></tr>")
+        if by_pixels or by_camera:
+            rows.append(f"<tr><th>noise of the {'images' if by_pixels else 'camera, rotation, per axis'}</th><td>{_pixels_text(noise['pixel']) if by_pixels else _mrad(noise['camera_rad'])}</td></tr>")
     for name, label in (("train", "closure, fitted poses, rms"), ("left_out", "closure, each left out, rms"), ("test", "closure, held-out poses, rms")):
         if name in errors and errors[name]["n"]:
             e = errors[name]
@@ -480,18 +491,19 @@ def _poses(result: Mapping[str, Any]) -> str:
     residuals = result["residuals"]
     if not residuals:
         return ""
-    images = any("image" in r for r in residuals)
+    images, alone = any("image" in r for r in residuals), "kinematics" not in result
     ordered = sorted(residuals, key=lambda r: (not r["rejected"], -(r["distance"] or 0.0)))
     body = []
     for r in ordered[:LISTED]:
         cells = f"<td>{escaped(r['image'])}</td>" if images else ""
         cells += f"<td>{'held out' if r['set'] == 'test' else 'rejected' if r['rejected'] else ''}</td>"
-        cells += table_cell(r["position_left_out_m"] or 0, length_text(r["position_left_out_m"])) + table_cell(r["rotation_left_out_rad"] or 0, _mrad(r["rotation_left_out_rad"]))
+        position, rotation = (r[f"{key}_left_out_{unit}"] if alone else r[f"{key}_{unit}"] for key, unit in (("position", "m"), ("rotation", "rad")))
+        cells += table_cell(position or 0, length_text(position)) + table_cell(rotation or 0, _mrad(rotation))
         if images:
             cells += table_cell(r["pixels"] or 0, _pixels_text(r["pixels"]))
         cells += table_cell(r["distance"] or 0, "–" if r["distance"] is None else figures_text(r["distance"], 2)) + f'<td class="wrap">{escaped(r["cause"])}</td>'
         body.append(f'<tr{" class=missed" if r["rejected"] else ""}><th data-v="{r["pose"]}">{r["pose"]}</th>{cells}</tr>')
-    head = ["pose", *(["image"] if images else []), "", "left out, position", "rotation", *(["image error"] if images else []), "over its noise", "looks like"]
+    head = ["pose", *(["image"] if images else []), "", "left out, position" if alone else "closure, position", "rotation", *(["image error"] if images else []), "over its noise", "looks like"]
     heading = "".join(f'<th><button type="button">{h}</button></th>' for h in head)
     more = f'<p class="note">The {LISTED} worst of {len(residuals)}; residuals.csv has all.</p>' if len(residuals) > LISTED else ""
     return (f'<section class="card"><h2>Every pose</h2><div class="scroll"><table class="sortable"><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table></div>{more}</section>')
@@ -543,10 +555,10 @@ _STYLE = """
 .verdict.found{background:var(--good)} .verdict.open{background:var(--look)}
 header h1{font-size:clamp(21px,2.1vw,29px);text-wrap:pretty} header .sub{max-width:none}
 .look{border-top:5px solid #d99a00}
-.chart.close{height:232px} .chart.close.short{height:178px} .chart.pane{height:236px} .chart.bars{height:176px} .column{display:grid;gap:18px;align-content:start;min-width:0} .chart.scene{height:560px}
+.chart.close{height:262px} .chart.close.short{height:208px} .chart.pane{height:236px} .chart.bars{height:176px} .column{display:grid;gap:18px;align-content:start;min-width:0} .chart.scene{height:560px}
 .pair{display:grid;grid-template-columns:minmax(0,1fr) minmax(0,1fr);gap:18px} .pair.wide{grid-template-columns:minmax(0,1.5fr) minmax(0,1fr)} .pair:empty{display:none}
 .card h3{font-size:16px;margin:14px 0 2px;font-weight:600} h2 .muted{font-weight:400;font-size:15px;margin-left:6px}
-table.left td,table.left th{text-align:left} td.wrap{white-space:normal;text-align:left;min-width:180px} table.narrow{width:auto} table.facts th{font-weight:400;color:var(--muted);text-align:left} table.facts th{white-space:normal} table.facts td{text-align:left} table.facts td.wrap{white-space:normal}
+table.left td,table.left th{text-align:left} td.wrap{white-space:normal;text-align:left;min-width:180px} table.narrow{width:auto} table.facts th{font-weight:400;color:var(--muted);text-align:left} table.facts th{white-space:normal;width:54%} table.facts td{text-align:left} table.facts td.wrap{white-space:normal}
 th.in{padding-left:18px!important} tr.missed th,tr.missed td{color:var(--bad)} code{background:#eef0f3;border-radius:5px;padding:1px 6px;font-size:14.5px}
 .fold{margin-top:10px} summary{cursor:pointer;font-weight:600}
 @media(max-width:1000px){.pair,.pair.wide{grid-template-columns:minmax(0,1fr)}}

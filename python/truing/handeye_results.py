@@ -108,9 +108,10 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
         found["board"] = _uncertain(board, parents[1])
         found["covariance"] = {"of": list(CHANGES), "camera": camera.covariance, "board": board.covariance}
         found["working_point"] = _working_point(solved)
-    residuals = list(r.residuals)
-    found["residuals"] = [_residual(solved, k, residual) for k, residual in enumerate(residuals)]
-    found["rejected_poses"] = [{"pose": int(data.rows[k]), **_image(data, k), "cause": residuals[k].cause} for k in r.rejected]
+    k = solved.kinematics
+    residuals = list(r.residuals if k is None else k.residuals)
+    found["residuals"] = [_residual(solved, row, residual) for row, residual in enumerate(residuals)]
+    found["rejected_poses"] = [{"pose": int(data.rows[row]), **_image(data, row), "cause": residual.cause} for row, residual in enumerate(residuals) if residual.rejected]
     found["observability"] = {
         "singular_values": r.singular_values,
         "gap": r.singular_gap,
@@ -118,11 +119,15 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
         "unobservable": [{"what": u.what, "direction": u.direction, "rotation": u.rotation, "sigma": u.sigma, "advice": u.advice} for u in r.unobservable],
     }
     found["convention"] = _convention(solved)
-    if len(residuals):
-        n = r.noise
-        found["noise"] = {"position_m": n.position, "hand_rad": n.hand_rotation, "camera_rad": n.camera_rotation, "pixel": n.pixel, "estimated": n.estimated}
-        found["errors"] = {name: e for name, e in (("train", _errors(r.train)), ("left_out", _errors(r.left_out)), ("test", _errors(r.test))) if e is not None}
-    if r.status == "done":
+    if k is not None:  # what belongs to the robot as it was is left out
+        n = {"position_m": k.identification.noise_sigma, "hand_rad": k.identification.rotation_noise_sigma, "camera_rad": None, "pixel": None, "estimated": True}
+        found["noise"] = n
+        found["errors"] = _known({"train": k.train_after, "test": k.test_after})
+    elif residuals:
+        found["noise"] = {"position_m": r.noise.position, "hand_rad": r.noise.hand_rotation, "camera_rad": r.noise.camera_rotation, "pixel": r.noise.pixel,
+                          "estimated": r.noise.estimated or not _noise_is_given(options)}  # fmt: skip
+        found["errors"] = _known({"train": r.train, "left_out": r.left_out, "test": r.test})
+    if r.status == "done" and k is None:
         found["board_scale"] = {"value": r.board_scale, "sigma": r.board_scale_sigma}
     if r.symmetry and any(r.symmetry):
         found["board_turned"] = {"poses": [int(data.rows[k]) for k, turn in enumerate(r.symmetry) if turn]}
@@ -136,12 +141,21 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
     if r.solver.name:
         found["solver"] = {"name": r.solver.name, "iterations": r.solver.iterations, "converged": r.solver.converged, "stopped_because": r.solver.stopped_because}
     found["seed"] = solved.seed
-    found["warnings"] = [*warnings, *r.warnings]
+    found["warnings"] = [*warnings, *(r.warnings if k is None else k.identification.warnings)]
     return found
 
 
 def _clock(c: truing.ClockOffset) -> dict[str, Any]:
     return {"offset_s": c.offset, "sigma_s": c.sigma, "correlation": c.correlation, "found": c.found, "message": c.message, "rows": len(c.rows)}
+
+
+def _known(errors: Mapping[str, truing.HandEyeErrors | None]) -> dict[str, Any]:
+    return {name: _errors(e) for name, e in errors.items() if e is not None}
+
+
+def _noise_is_given(options: truing.HandEyeOptions) -> bool:
+    given = (options.hand_position_sigma, options.hand_rotation_sigma, options.camera_position_sigma, options.camera_rotation_sigma, options.pixel_sigma)
+    return any(sigma is not None for sigma in given)
 
 
 def _working_point(solved: Solved) -> dict[str, Any]:
@@ -170,11 +184,12 @@ def _image(data: truing.HandEyeData, k: int) -> dict[str, str]:
 def _residual(solved: Solved, k: int, r: truing.HandEyeResidual) -> dict[str, Any]:
     data = solved.data
     test = data.poses.set is not None and data.poses.set[k] == 1
+    alone = solved.kinematics is None  # with the robot found as well nothing was left out
     found: dict[str, Any] = {"pose": int(data.rows[k]), **_image(data, k), "set": "test" if test else "train", "position_m": r.position, "rotation_rad": r.rotation,
-                             "position_left_out_m": r.position_left_out, "rotation_left_out_rad": r.rotation_left_out}  # fmt: skip
+                             "position_left_out_m": r.position_left_out if alone else None, "rotation_left_out_rad": r.rotation_left_out if alone else None}  # fmt: skip
     if data.images:
         found |= {"pixels": r.pixels, "pixels_corrected": r.pixels_corrected}
-    return {**found, "distance": r.distance, "rejected": r.rejected, "cause": r.cause}
+    return {**found, "distance": r.distance if alone else None, "rejected": r.rejected, "cause": r.cause}
 
 
 def _convention(solved: Solved) -> dict[str, Any]:
@@ -239,11 +254,14 @@ def scene_of(solved: Solved) -> Scene | None:
     if r.status != "done":
         return None
     A = np.asarray(r.T_base_hand if len(r.T_base_hand) == data.count else data.poses.T_base_hand)
+    both = solved.kinematics
+    if both is not None and data.joints is not None:
+        A = np.array([truing.forward_kinematics(both.robot, q)[-1] for q in data.joints])
     B = np.array(data.poses.T_camera_board)
     for k, turn in enumerate(r.symmetry):
         if turn:
             B[k] = B[k] @ np.asarray(data.poses.board_symmetries[turn - 1])
-    X, Y = np.asarray(r.camera.T), np.asarray(r.board.T)
+    X, Y = (np.asarray(frame.T) for frame in ((r.camera, r.board) if both is None else (both.camera, both.board)))
     ones = np.ones((data.count, 1, 1))
     eye_in_hand = solved.options.setup == "eye-in-hand"
     camera, predicted = (A @ X, ones * Y) if eye_in_hand else (ones * X, A @ Y)
@@ -256,9 +274,11 @@ def scene_of(solved: Solved) -> Scene | None:
     spread_m, spread_rad = np.sqrt(n.position**2 + (2.0 / 3.0) * (n.hand_rotation * lever) ** 2), np.full(data.count, n.hand_rotation)
     if data.poses.images is None:
         spread_rad = np.hypot(spread_rad, n.camera_rotation)
-    elif data.poses.camera is not None:
+    elif data.poses.camera is not None and math.isfinite(n.pixel):
         pixel_m, pixel_rad = _by_pixels(data.poses.images, B, data.poses.camera, n.pixel)
         spread_m, spread_rad = np.hypot(spread_m, pixel_m), np.hypot(spread_rad, pixel_rad)
+    if both is not None:
+        spread_m, spread_rad = np.full(data.count, both.identification.noise_sigma), np.full(data.count, both.identification.rotation_noise_sigma)
     board = _board_extent(data)
     errors, places = _pixel_errors(solved, A, X, Y)
     return Scene(A, camera, seen, predicted, CHI3_95 * spread_m, CHI3_95 * spread_rad, board, errors, places)
@@ -321,15 +341,18 @@ def _pixel_errors(solved: Solved, A: Floats, X: Floats, Y: Floats) -> tuple[Floa
 
 def residual_columns(solved: Solved) -> dict[str, Any]:
     """Columns of ``residuals.csv``: every pose that was used, in the order of the file."""
-    data, residuals = solved.data, solved.result.residuals
+    data = solved.data
+    residuals = solved.result.residuals if solved.kinematics is None else solved.kinematics.residuals
     test = np.zeros(data.count, dtype=bool) if data.poses.set is None else np.asarray(data.poses.set) == 1
     columns: dict[str, Any] = {"pose": np.asarray(data.rows), "set": np.where(test, "test", "train")}
     if data.images:
         columns["image"] = list(data.images)
-    names = {"position_m": "position", "rotation_rad": "rotation", "position_left_out_m": "position_left_out", "rotation_left_out_rad": "rotation_left_out"}
+    names = {"position_m": "position", "rotation_rad": "rotation"}
+    if solved.kinematics is None:
+        names |= {"position_left_out_m": "position_left_out", "rotation_left_out_rad": "rotation_left_out", "distance": "distance"}
     if data.images:
         names |= {"rms_px": "pixels", "rms_corrected_px": "pixels_corrected"}
-    for name, attribute in {**names, "distance": "distance"}.items():
+    for name, attribute in names.items():
         columns[name] = np.array([getattr(residual, attribute) for residual in residuals])
     columns["rejected"] = np.array([residual.rejected for residual in residuals], dtype=np.int8)
     columns["cause"] = [residual.cause or None for residual in residuals]

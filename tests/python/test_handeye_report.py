@@ -131,6 +131,20 @@ def test_what_a_run_may_come_to_is_all_said(good: tuple[dict[str, Any], Scene | 
     assert {"reprojection", "places"} <= set(charts_of(page))
 
 
+def test_with_the_robot_found_as_well_nothing_is_called_left_out(good: tuple[dict[str, Any], Scene | None]) -> None:
+    result, scene = good
+    full = fabricated(result)
+    full["errors"].pop("left_out")
+    full["noise"] |= {"camera_rad": None, "pixel": None}
+    for r in full["residuals"]:
+        r |= {"position_left_out_m": None, "rotation_left_out_rad": None}
+    page = handeye_report(full, scene)
+    text = visible(page)
+    assert "close the loop to" in text[:500] and "with the nominal one" in text[:500]
+    assert "How far each pose is from closing the loop" in text and "left out" not in text
+    assert {trace["name"] for trace in charts_of(page)["closure_position"]["data"]} >= {"fitted", "rejected"}
+
+
 def test_the_page_is_one_file_that_needs_no_network(good: tuple[dict[str, Any], Scene | None]) -> None:
     result, scene = good
     page = handeye_report(fabricated(result), with_pixels(scene))
