@@ -216,8 +216,10 @@ def _trust(result: Mapping[str, Any]) -> str:
         checks.append((grade, ("Held-out poses are as good as fitted ones", "Held-out poses are somewhat worse", "Held-out poses are much worse")[grade],
                        f"{length_text(errors['test']['rms_m'])} rms over {counted(errors['test']['n'], 'held-out pose')}, {length_text(reference['rms_m'])} {'left out' if 'left_out' in errors else 'fitted'}"))  # fmt: skip
     source = "found from the data" if noise["estimated"] else "as given"
-    rotation = [f"robot ±{_mrad(noise['hand_rad'])}" if noise["camera_rad"] is not None or noise["pixel"] is not None else f"±{_mrad(noise['hand_rad'])}"]
-    rotation += [f"camera ±{_mrad(noise['camera_rad'])}"] if noise["camera_rad"] is not None else [f"images ±{_pixels_text(noise['pixel'])}"] if noise["pixel"] is not None else []
+    by_both = noise["camera_rad"] is not None or noise["pixel"] is not None
+    rotation = [f"{'robot ' if by_both else ''}±{_mrad(noise['hand_rad'])}"]
+    rotation += [f"camera ±{_mrad(noise['camera_rad'])}"] if noise["camera_rad"] else []
+    rotation += [f"images ±{_pixels_text(noise['pixel'])}"] if noise["pixel"] is not None else []
     checks.append((0, f"Noise of {'the robot' if noise['pixel'] is not None else 'robot and camera'} ±{length_text(noise['position_m'])}", f"per component, {source}; in rotation {', '.join(rotation)}"))
     usual = [r["distance"] for r in result["residuals"] if not r["rejected"] and r["set"] == "train" and r["distance"] is not None]
     if usual and not noise["estimated"]:
@@ -382,11 +384,13 @@ def _noise(result: Mapping[str, Any]) -> str:
     rows = []
     noise, errors = result.get("noise"), result.get("errors", {})
     if noise:
-        by_pixels, by_camera = noise["pixel"] is not None, noise["camera_rad"] is not None
+        by_pixels, by_camera = noise["pixel"] is not None, bool(noise["camera_rad"])
         rows.append(f"<tr><th>noise of {'the robot' if by_pixels else 'robot and camera together'}, position, per axis</th><td>{length_text(noise['position_m'])}</td></tr>")
         rows.append(f"<tr><th>noise {'of the robot' if by_pixels or by_camera else 'of both'}, rotation, per axis</th><td>{_mrad(noise['hand_rad'])}</td></tr>")
-        if by_pixels or by_camera:
-            rows.append(f"<tr><th>noise of the {'images' if by_pixels else 'camera, rotation, per axis'}</th><td>{_pixels_text(noise['pixel']) if by_pixels else _mrad(noise['camera_rad'])}</td></tr>")
+        if by_camera:
+            rows.append(f"<tr><th>noise of the camera{' beyond its pixels' if by_pixels else ''}, rotation, per axis</th><td>{_mrad(noise['camera_rad'])}</td></tr>")
+        if by_pixels:
+            rows.append(f"<tr><th>noise of the images</th><td>{_pixels_text(noise['pixel'])}</td></tr>")
     for name, label in (("train", "closure, fitted poses, rms"), ("left_out", "closure, each left out, rms"), ("test", "closure, held-out poses, rms")):
         if name in errors and errors[name]["n"]:
             e = errors[name]

@@ -272,9 +272,9 @@ def scene_of(solved: Solved) -> Scene | None:
     lever = np.linalg.norm((np.linalg.inv(A) @ predicted)[:, :3, 3], axis=1)
     # Two of a position's three components turn with the hand's noise; as if all three had their mean.
     spread_m, spread_rad = np.sqrt(n.position**2 + (2.0 / 3.0) * (n.hand_rotation * lever) ** 2), np.full(data.count, n.hand_rotation)
-    if data.poses.images is None:
+    if math.isfinite(n.camera_rotation):
         spread_rad = np.hypot(spread_rad, n.camera_rotation)
-    elif data.poses.camera is not None and math.isfinite(n.pixel):
+    if data.poses.images is not None and data.poses.camera is not None and math.isfinite(n.pixel):
         pixel_m, pixel_rad = _by_pixels(data.poses.images, B, data.poses.camera, n.pixel)
         spread_m, spread_rad = np.hypot(spread_m, pixel_m), np.hypot(spread_rad, pixel_rad)
     if both is not None:
