@@ -62,7 +62,7 @@ def poses_of(scene: HandEyeScene, with_pixels: bool = False) -> truing.HandEyePo
     return truing.HandEyePoses(scene.T_base_hand, scene.T_camera_board, images=images, camera=camera)
 
 
-class Refused(Exception):
+class Refused(ValueError):
     pass
 
 
