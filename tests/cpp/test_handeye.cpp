@@ -26,6 +26,13 @@ namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
+// Sanitizers look at memory, not at statistics, and take fifty times as long.
+#if defined(__SANITIZE_ADDRESS__)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+
 struct Noise {
   double hand_position = 0.0, hand_rotation = 0.0, camera_position = 0.0, camera_rotation = 0.0;
 };
@@ -272,7 +279,7 @@ TEST_CASE("standard errors are the scatter over 300 seeds, with noise told and w
     CAPTURE(told);
     double squares = 0.0;
     int inside = 0, count = 0;
-    for (std::uint64_t seed = 100; seed < 400; ++seed) {
+    for (std::uint64_t seed = 100; seed < (kSanitized ? 103 : 400); ++seed) {
       const Scene s = make_scene(HandEyeSetup::eye_to_hand, 25, kUsual, seed);
       HandEyeOptions o = options_for(s);
       if (told)
@@ -286,6 +293,7 @@ TEST_CASE("standard errors are the scatter over 300 seeds, with noise told and w
         squares += z * z, inside += std::abs(z) < 1.96;
       }
     }
+    if (kSanitized) continue;
     CHECK(squares / count == doctest::Approx(1.0).epsilon(told ? 0.15 : 0.3));
     CHECK(inside > 0.92 * count);
     CHECK(inside < 0.98 * count);
@@ -335,7 +343,7 @@ TEST_CASE("noise told too small is said, and standard errors are widened") {
 
 TEST_CASE("gross outliers are all listed, up to three of ten") {
   for (const double share : {0.1, 0.3})
-    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    for (std::uint64_t seed = 1; seed <= (kSanitized ? 2 : 20); ++seed) {
       CAPTURE(share);
       CAPTURE(seed);
       Scene s = make_scene(HandEyeSetup::eye_to_hand, 30, kUsual, seed);
@@ -452,9 +460,10 @@ TEST_CASE("a wrong reading is recognised, named, and closes when it is applied")
     if (name == "hand-millimetres+hand-inverted") each(&hand, [](Eigen::Isometry3d T) { T = T.inverse(); T.translation() *= 1e3; return T; });
   };
   for (const HandEyeSetup setup : kSetups)
-    for (const char* name : {"hand-inverted", "board-inverted", "hand-millimetres", "board-millimetres", "hand-xyzw", "board-xyzw", "hand-left-handed",
+    for (const std::string name : {"hand-inverted", "board-inverted", "hand-millimetres", "board-millimetres", "hand-xyzw", "board-xyzw", "hand-left-handed",
                              "hand-y-negated", "hand-transposed", "hand-zyx-as-xyz", "hand-rotation-vector-as-zyx", "hand-radians-as-degrees",
                              "board-one-later", "hand-millimetres+hand-inverted"}) {
+      if (kSanitized && (setup == HandEyeSetup::eye_in_hand || name.find("board") == std::string::npos)) continue;
       CAPTURE(name);
       Scene s = make_scene(setup, 25, kUsual, 51, {1.2, 1.0, 2.0});
       const Eigen::Isometry3d X = s.X;
@@ -585,7 +594,7 @@ TEST_CASE("pixels without noise give the camera, also when its lens must be foun
 
 TEST_CASE("standard errors from images are the scatter over 60 seeds") {
   int inside = 0, count = 0;
-  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+  for (std::uint64_t seed = 1; seed <= (kSanitized ? 2 : 60); ++seed) {
     const Scene s = make_pixel_scene(15, 1e-4, 0.05 * kDegree, 0.1, seed, kCamera);
     const HandEyeResult r = handeye(s.poses, options_for(s));
     REQUIRE(r.status == HandEyeStatus::done);
@@ -593,7 +602,7 @@ TEST_CASE("standard errors from images are the scatter over 60 seeds") {
     const Eigen::Vector3d e = r.camera.T * r.working_point - s.X * r.working_point;
     for (int k = 0; k < 3; ++k, ++count) inside += std::abs(e(k)) < 1.96 * std::sqrt(r.working_point_covariance(k, k));
   }
-  CHECK(inside > 0.88 * count);
+  if (!kSanitized) CHECK(inside > 0.88 * count);
 }
 
 TEST_CASE("boards that scatter beyond their pixels are said, and weighed by that") {
@@ -664,7 +673,7 @@ TEST_CASE("the offset between two clocks is found within three standard errors, 
                 {0.6 * std::sin(1.1 * t), 0.5 * std::sin(0.7 * t + 1.0) + 0.1 * std::sin(3.1 * t), 0.7 * std::sin(0.43 * t)});
   };
   const Scene s = make_scene(HandEyeSetup::eye_to_hand, 3, {}, 1);
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+  for (std::uint64_t seed = 1; seed <= (kSanitized ? 1 : 10); ++seed) {
     Random random(seed);
     std::vector<double> hand_time, camera_time;
     Frames hand, board;
