@@ -144,6 +144,12 @@ void look_at_axes(const CameraSolution& all, const HandEyeOptions& options, Hand
   refuse(result, HandEyeStatus::not_observable);
 }
 
+void look_at_motions(const CameraSolution& solution, HandEyeResult* result) {
+  result->singular_values = solution.singular_values;
+  result->singular_gap = solution.singular_values(5) / std::max(solution.singular_values(6), 1e-300);
+  result->axes_spread = solution.principal_rotations(1) / std::max(solution.principal_rotations(0), 1e-300);
+}
+
 /// Directions of the camera's position and orientation that stay too wide to be an answer.
 void look_at_errors(const HandEyeOptions& options, double distance, HandEyeResult* result) {
   const std::string parent = names_of(options.setup).camera_parent;
@@ -420,9 +426,7 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
 
   HandEyeResult result;
   const CameraSolution all = solve_camera(problem.M, problem.B, rows);
-  result.singular_values = all.singular_values;
-  result.singular_gap = all.singular_values(5) / std::max(all.singular_values(6), 1e-300);
-  result.axes_spread = all.principal_rotations(1) / std::max(all.principal_rotations(0), 1e-300);
+  look_at_motions(all, &result);
   result.working_point = options.working_point ? *options.working_point : Eigen::Vector3d::Zero();
   if (!options.working_point) {
     for (const std::size_t i : rows) result.working_point += problem.B[i].translation() / static_cast<double>(rows.size());
@@ -454,14 +458,19 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
   if (open > kHopeless) return not_closing(agreement);
 
   result.symmetry = agreement.symmetry;
-  for (const std::size_t i : rows)
-    if (agreement.symmetry[i] > 0) {
-      const Eigen::Isometry3d& turned = work.poses.board_symmetries[static_cast<std::size_t>(agreement.symmetry[i] - 1)];
+  for (const std::size_t i : work.held_out) result.symmetry[i] = nearest_symmetry(problem.M, problem.B, work.poses.board_symmetries, agreement, size, i);
+  for (std::size_t i = 0; i < problem.B.size(); ++i)
+    if (result.symmetry[i] > 0) {
+      const Eigen::Isometry3d& turned = work.poses.board_symmetries[static_cast<std::size_t>(result.symmetry[i] - 1)];
       problem.B[i] = problem.B[i] * turned;
       if (!work.poses.images.empty()) work.poses.images[i].points = turned.inverse(Eigen::Isometry) * work.poses.images[i].points;
     }
 
+  look_at_motions(solve_camera(problem.M, problem.B, agreement.rows), &result);  // of poses that agree: bad ones blur it
+
   LoopNoise noise = noise_asked(options, work.poses, agreement);
+  if (work.poses.images.empty() && std::isfinite(options.hand_position_sigma) != std::isfinite(options.camera_position_sigma))
+    result.warnings.push_back("Position noise was told of one side, robot or camera, only: what acts is their sum, which was found from the data.");
   if (!work.poses.images.empty()) {
     fit_boards(*work.poses.camera, &work, &noise.variance[3]);  // what pixels scatter about their own board says more than the loop
     if (std::isfinite(options.pixel_sigma)) noise.variance[3] = options.pixel_sigma * options.pixel_sigma;

@@ -157,6 +157,13 @@ Agreement find_agreement(const Frames& M, const Frames& B, const Rows& rows, con
   return out;
 }
 
+int nearest_symmetry(const Frames& M, const Frames& B, const std::vector<Eigen::Isometry3d>& symmetries, const Agreement& agreement, double length,
+                     std::size_t i) {
+  int symmetry = 0;
+  Judge(M, B, symmetries, length).distance(agreement.X, agreement.Y, i, &symmetry);
+  return symmetry;
+}
+
 std::string likely_cause(const Frames& A, const Frames& B, HandEyeSetup setup, std::size_t i, const Rows& agreeing, const Eigen::Isometry3d& X,
                          const Eigen::Isometry3d& Y, double position_noise, double rotation_noise) {
   const double near = 6.0 * position_noise + 1e-6, aligned = 6.0 * rotation_noise + 1e-6;

@@ -38,6 +38,10 @@ struct ConsensusOptions {
 Agreement find_agreement(const Frames& M, const Frames& B, const Rows& rows, const std::vector<Eigen::Isometry3d>& symmetries,
                          const CameraSolver& solve, const ConsensusOptions& options);
 
+/// The turn of its board (0 as given) in which a pose closes best: for poses that had no say in the agreement.
+int nearest_symmetry(const Frames& M, const Frames& B, const std::vector<Eigen::Isometry3d>& symmetries, const Agreement& agreement, double length,
+                     std::size_t i);
+
 /// Pose numbers in an order that depends on nothing but the frames.
 Rows canonical_order(const Frames& frames, const Rows& rows);
 

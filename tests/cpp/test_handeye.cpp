@@ -358,6 +358,7 @@ TEST_CASE("gross outliers are all listed, up to three of ten") {
       const HandEyeResult r = handeye(s.poses, options_for(s));
       REQUIRE(r.status == HandEyeStatus::done);
       CHECK(r.rejected == spoilt);
+      CHECK(r.singular_gap > 5.0);  // of the poses that agree
       for (const std::size_t i : r.rejected) CHECK(!r.residuals[i].cause.empty());
       CHECK(position_error(r.camera.T, s.X) < 3e-3);
     }
@@ -407,9 +408,13 @@ TEST_CASE("a board that looks the same turned is read as the loop needs it") {
     const std::uint64_t k = random.below(4);
     if (k > 0) s.poses.T_camera_board[i] = s.poses.T_camera_board[i] * s.poses.board_symmetries[k - 1].inverse();
   }
+  s.poses.set.assign(20, 0);
+  for (const std::size_t i : {3, 8, 14}) s.poses.set[i] = 1;  // held-out boards are read in the turn that closes as well
   const HandEyeResult r = handeye(s.poses, options_for(s));
   CHECK(r.status == HandEyeStatus::done);
   CHECK(r.rejected.empty());
+  REQUIRE(r.test);
+  CHECK(r.test->position_max < 5e-3);
   CHECK(position_error(r.camera.T, straight.camera.T) < 1e-3);  // the board's origin may be another corner: noise acts there
 }
 

@@ -60,7 +60,7 @@ constexpr double kEstimate = std::numeric_limits<double>::quiet_NaN();  ///< a n
 struct HandEyeOptions {
   HandEyeSetup setup = HandEyeSetup::eye_in_hand;
   HandEyeMethod method = HandEyeMethod::refined;
-  // Standard deviations of one component. What is not given is estimated.
+  // Standard deviations of one component. What is not given is estimated. Position noise of hand and board poses adds up: give both, or neither.
   double hand_position_sigma = kEstimate;    ///< [m] of the reported robot pose
   double hand_rotation_sigma = kEstimate;    ///< [rad]
   double camera_position_sigma = kEstimate;  ///< [m] of the board pose; without images
