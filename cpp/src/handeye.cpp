@@ -391,6 +391,63 @@ std::string reading_message(const HandEyeResult& result, const Agreement& agreem
   return given + " It closes to " + mm(best.position_rms) + ", " + deg(best.rotation_rms) + " if " + best.explanation + ": reading \"" + best.name + "\".";
 }
 
+/// Does a reading change board poses?
+bool of_board(const std::string& reading) { return reading.find("board-") != std::string::npos; }
+
+/// With images the boards are what was found in them.
+void check_with_images(const HandEyePoses& poses, const HandEyeOptions& options) {
+  if (poses.images.empty()) return;
+  if (of_board(options.reading)) throw std::invalid_argument("reading '" + options.reading + "' is about board poses; with images they are found, not read: bring hands and images into order instead");
+  if (std::isfinite(options.camera_position_sigma) || std::isfinite(options.camera_rotation_sigma)) {
+    throw std::invalid_argument("camera_position_sigma and camera_rotation_sigma are about board poses; with images give pixel_sigma");
+  }
+}
+
+/// Symmetric boards in the turn that closes the loop, held-out ones too.
+void turn_boards(const Agreement& agreement, double size, Work* work, HandEyeResult* result) {
+  LoopProblem& problem = work->problem;
+  result->symmetry = agreement.symmetry;
+  for (const std::size_t i : work->held_out) result->symmetry[i] = nearest_symmetry(problem.M, problem.B, work->poses.board_symmetries, agreement, size, i);
+  for (std::size_t i = 0; i < problem.B.size(); ++i) {
+    if (result->symmetry[i] <= 0) continue;
+    const Eigen::Isometry3d& turned = work->poses.board_symmetries[static_cast<std::size_t>(result->symmetry[i] - 1)];
+    problem.B[i] = problem.B[i] * turned;
+    if (!work->poses.images.empty()) work->poses.images[i].points = turned.inverse(Eigen::Isometry) * work->poses.images[i].points;
+  }
+}
+
+/// What is told of the noise, and a first idea of what is not.
+LoopNoise noise_to_start_with(const HandEyeOptions& options, const Agreement& agreement, Work* work, HandEyeResult* result) {
+  LoopNoise noise = noise_asked(options, work->poses, agreement);
+  if (work->poses.images.empty()) {
+    if (std::isfinite(options.hand_position_sigma) != std::isfinite(options.camera_position_sigma))
+      result->warnings.push_back("Position noise was told of one side, robot or camera, only: what acts is their sum, which was found from the data.");
+    return noise;
+  }
+  fit_boards(*work->poses.camera, work, &noise.variance[3]);  // what pixels scatter about their own board says more than the loop
+  if (std::isfinite(options.pixel_sigma)) noise.variance[3] = options.pixel_sigma * options.pixel_sigma;
+  if (!noise.estimate[0] && !noise.estimate[1]) noise.variance[2] = kExact * kExact, noise.estimate[2] = false;  // all is told
+  return noise;
+}
+
+/// From the closed form on: as it is, or refined without the poses that do not fit.
+void fit_poses(const HandEyeOptions& options, const Rows& rows, const LoopNoise& noise, const Agreement& agreement, Work* work, HandEyeResult* result) {
+  Agreement start = agreement;
+  std::sort(start.rows.begin(), start.rows.end());
+  if (options.method == HandEyeMethod::closed_form) {
+    work->fitted = start.rows;
+    work->fit = refine_loop(work->problem, work->fitted, start.X, start.Y, noise, options.max_iterations);  // for the noise and what it makes of the result
+    work->fit.X = start.X, work->fit.Y = start.Y;
+    result->solver = {"closed form", 0, true, "one solution"};
+    return;
+  }
+  result->solver.name = "gauss-newton";
+  fit_and_reject(options, rows, noise, start, work);
+  if (!work->fit.singular) question_noise(options, work, result);
+  result->solver.iterations = work->fit.iterations, result->solver.converged = work->fit.converged;
+  result->solver.stopped_because = work->fit.converged ? "the step is small beside its standard errors" : "the limit of iterations";
+}
+
 }  // namespace
 
 bool HandEyeOptions::is_valid(std::string* error) const {
@@ -413,6 +470,7 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
   std::string error;
   if (!options.is_valid(&error)) throw std::invalid_argument(error);
   check(given);
+  check_with_images(given, options);
   Work work;
   work.poses = given;
   apply_reading(options.reading, &work.poses.T_base_hand, &work.poses.T_camera_board);
@@ -434,6 +492,10 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
 
   const auto try_readings = [&](const Agreement& a) {
     if (options.recognise) result.readings = find_readings(problem.A, problem.B, options.setup, rows, a.position, a.rotation);
+    if (!given.images.empty()) {  // boards were found in them, not read: only their order may be wrong
+      const auto impossible = [](const Reading& r) { return of_board(r.name) && r.name.find("board-one-") == std::string::npos; };
+      result.readings.erase(std::remove_if(result.readings.begin(), result.readings.end(), impossible), result.readings.end());
+    }
     return !result.readings.empty();
   };
   const auto not_closing = [&](const Agreement& a) {
@@ -457,41 +519,13 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
   if (!result.unobservable.empty()) return result;
   if (open > kHopeless) return not_closing(agreement);
 
-  result.symmetry = agreement.symmetry;
-  for (const std::size_t i : work.held_out) result.symmetry[i] = nearest_symmetry(problem.M, problem.B, work.poses.board_symmetries, agreement, size, i);
-  for (std::size_t i = 0; i < problem.B.size(); ++i)
-    if (result.symmetry[i] > 0) {
-      const Eigen::Isometry3d& turned = work.poses.board_symmetries[static_cast<std::size_t>(result.symmetry[i] - 1)];
-      problem.B[i] = problem.B[i] * turned;
-      if (!work.poses.images.empty()) work.poses.images[i].points = turned.inverse(Eigen::Isometry) * work.poses.images[i].points;
-    }
-
+  turn_boards(agreement, size, &work, &result);
   look_at_motions(solve_camera(problem.M, problem.B, agreement.rows), &result);  // of poses that agree: bad ones blur it
 
-  LoopNoise noise = noise_asked(options, work.poses, agreement);
-  if (work.poses.images.empty() && std::isfinite(options.hand_position_sigma) != std::isfinite(options.camera_position_sigma))
-    result.warnings.push_back("Position noise was told of one side, robot or camera, only: what acts is their sum, which was found from the data.");
-  if (!work.poses.images.empty()) {
-    fit_boards(*work.poses.camera, &work, &noise.variance[3]);  // what pixels scatter about their own board says more than the loop
-    if (std::isfinite(options.pixel_sigma)) noise.variance[3] = options.pixel_sigma * options.pixel_sigma;
-    if (!noise.estimate[0] && !noise.estimate[1]) noise.variance[2] = kExact * kExact, noise.estimate[2] = false;  // all is told
-  }
+  const LoopNoise noise = noise_to_start_with(options, agreement, &work, &result);
   if (axis) problem.known = LoopProblem::Known{*axis, options.known_height.value_or(0.0), std::max(options.known_height_sigma, 1e-7)};
 
-  result.solver.name = "gauss-newton";
-  Agreement start = agreement;
-  std::sort(start.rows.begin(), start.rows.end());
-  if (options.method == HandEyeMethod::closed_form) {
-    work.fitted = start.rows;
-    work.fit = refine_loop(problem, work.fitted, start.X, start.Y, noise, options.max_iterations);  // for the noise and what it makes of the result
-    work.fit.X = start.X, work.fit.Y = start.Y;
-    result.solver = {"closed form", 0, true, "one solution"};
-  } else {
-    fit_and_reject(options, rows, noise, start, &work);
-    if (!work.fit.singular) question_noise(options, &work, &result);
-    result.solver.iterations = work.fit.iterations, result.solver.converged = work.fit.converged;
-    result.solver.stopped_because = work.fit.converged ? "the step is small beside its standard errors" : "the limit of iterations";
-  }
+  fit_poses(options, rows, noise, agreement, &work, &result);
   if (work.fit.singular) {
     result.unobservable.push_back({"the place of camera and board together", Eigen::Vector3d::Zero(), false, std::numeric_limits<double>::infinity(),
                                    "rotate the hand about two axes by 30 deg or more, and move it"});

@@ -610,6 +610,23 @@ TEST_CASE("standard errors from images are the scatter over 60 seeds") {
   if (!kSanitized) CHECK(inside > 0.88 * count);
 }
 
+TEST_CASE("what is about board poses is refused, and not proposed, where boards were found in images") {
+  Scene s = make_pixel_scene(12, 1e-4, 0.05 * kDegree, 0.1, 9, kCamera);
+  HandEyeOptions options = options_for(s);
+  options.reading = "board-inverted";
+  CHECK_THROWS_AS(handeye(s.poses, options), std::invalid_argument);
+  options.reading = "";
+  options.camera_position_sigma = 1e-3;
+  CHECK_THROWS_AS(handeye(s.poses, options), std::invalid_argument);
+  options.camera_position_sigma = HandEyeOptions().camera_position_sigma;
+  for (Eigen::Isometry3d& T : s.poses.T_base_hand) T = T.inverse();  // the hand's side is the only one that can be read otherwise
+  const HandEyeResult r = handeye(s.poses, options);
+  REQUIRE(r.status == HandEyeStatus::not_closing);
+  for (const Reading& reading : r.readings) CHECK(reading.name.find("board-") == std::string::npos);
+  REQUIRE_FALSE(r.readings.empty());
+  CHECK(r.readings[0].name == "hand-inverted");
+}
+
 TEST_CASE("boards that scatter beyond their pixels are said, and weighed by that") {
   Scene s = make_pixel_scene(25, 1e-4, 0.05 * kDegree, 0.1, 8, kCamera);
   Random random(1);
