@@ -23,8 +23,10 @@
 #include <pybind11/typing.h>
 #include <Eigen/Geometry>
 
+#include "truing/compensate.hpp"
 #include "truing/diagnose.hpp"
 #include "truing/handeye.hpp"
+#include "truing/inverse.hpp"
 #include "truing/truing.hpp"
 
 namespace truing::python {
@@ -134,6 +136,44 @@ struct Words<HandEyeStatus> {
       py::detail::const_name("typing.Literal['done', 'not observable', 'not closing', 'not converged']");
 };
 
+template <>
+struct Words<TaskKind> {
+  static constexpr const char* what = "task";
+  static constexpr std::array<const char*, 3> list{"pose", "torch", "point"};
+  static constexpr auto type = py::detail::const_name("typing.Literal['pose', 'torch', 'point']");
+};
+
+template <>
+struct Words<Choose> {
+  static constexpr const char* what = "choice";
+  static constexpr std::array<const char*, 4> list{"nearest", "limits_margin", "manipulability", "rail_travel"};
+  static constexpr auto type =
+      py::detail::const_name("typing.Literal['nearest', 'limits_margin', 'manipulability', 'rail_travel']");
+};
+
+template <>
+struct Words<Reason> {
+  static constexpr const char* what = "reason";
+  static constexpr std::array<const char*, 6> list{"reached",      "retreated", "interference",
+                                                   "out_of_reach", "limit",     "singular"};
+  static constexpr auto type = py::detail::const_name(
+      "typing.Literal['reached', 'retreated', 'interference', 'out_of_reach', 'limit', 'singular']");
+};
+
+template <>
+struct Words<Shape> {
+  static constexpr const char* what = "shape";
+  static constexpr std::array<const char*, 3> list{"sphere", "capsule", "box"};
+  static constexpr auto type = py::detail::const_name("typing.Literal['sphere', 'capsule', 'box']");
+};
+
+template <>
+struct Words<ClosedFormKind> {
+  static constexpr const char* what = "closed form";
+  static constexpr std::array<const char*, 3> list{"none", "spherical_wrist", "three_parallel"};
+  static constexpr auto type = py::detail::const_name("typing.Literal['none', 'spherical_wrist', 'three_parallel']");
+};
+
 template <class Enum>
 const char* word(Enum value) {
   return Words<Enum>::list.at(static_cast<std::size_t>(value));
@@ -171,6 +211,10 @@ inline void write_frame(const Eigen::Isometry3d& frame, double* out) {
 /// A 4x4 matrix as a frame. What is off orthonormal by no more than rounding in a file (1e-6) becomes exactly
 /// orthonormal; anything worse throws std::invalid_argument.
 Eigen::Isometry3d frame_from(const py::array_t<double, py::array::c_style | py::array::forcecast>& matrix);
+
+/// One frame per pose; an error names the pose and calls the array `name`.
+std::vector<Eigen::Isometry3d> frames_from(const FrameArray& given, const std::string& name);
+py::array_t<double> array_from(const std::vector<Eigen::Isometry3d>& frames);
 
 // ---- Sequences and value semantics
 // ---------------------------------------------------------------------------------
@@ -256,6 +300,7 @@ void bind_plan(py::module_& m);
 void bind_diagnose(py::module_& m);
 void bind_distinguish(py::module_& m);
 void bind_handeye(py::module_& m);
+void bind_inverse(py::module_& m);
 
 /// A double array of whatever strides, without a copy unless its type or memory layout calls for one.
 py::array float_array(py::handle object, const std::string& name);
@@ -338,6 +383,33 @@ template <>
 struct type_caster<truing::HandEyeMethod> : word_caster<truing::HandEyeMethod> {};
 template <>
 struct type_caster<truing::HandEyeStatus> : word_caster<truing::HandEyeStatus> {};
+template <>
+struct type_caster<truing::TaskKind> : word_caster<truing::TaskKind> {};
+template <>
+struct type_caster<truing::Choose> : word_caster<truing::Choose> {};
+template <>
+struct type_caster<truing::Reason> : word_caster<truing::Reason> {};
+template <>
+struct type_caster<truing::Shape> : word_caster<truing::Shape> {};
+template <>
+struct type_caster<truing::ClosedFormKind> : word_caster<truing::ClosedFormKind> {};
+
+/// A window is a pair (lower, upper).
+template <>
+struct type_caster<truing::Window> {
+  PYBIND11_TYPE_CASTER(truing::Window, const_name("tuple[float, float]"));
+
+  bool load(handle source, bool convert) {
+    make_caster<std::pair<double, double>> ends;
+    if (!ends.load(source, convert)) return false;
+    const auto [lower, upper] = cast_op<std::pair<double, double>>(ends);
+    value = {lower, upper};
+    return true;
+  }
+  static handle cast(const truing::Window& source, return_value_policy, handle) {
+    return make_tuple(source.lower, source.upper).release();
+  }
+};
 
 template <>
 struct type_caster<Eigen::Isometry3d> {

@@ -28,4 +28,5 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_diagnose(m);
   truing::python::bind_distinguish(m);
   truing::python::bind_handeye(m);
+  truing::python::bind_inverse(m);
 }

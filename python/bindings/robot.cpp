@@ -53,6 +53,33 @@ Eigen::Isometry3d frame_from(const py::array_t<double, py::array::c_style | py::
   return frame;
 }
 
+std::vector<Eigen::Isometry3d> frames_from(const FrameArray& given, const std::string& name) {
+  using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+  const Array array = Array::ensure(given);
+  if (!array || array.ndim() != 3 || array.shape(1) != 4 || array.shape(2) != 4) {
+    PyErr_Clear();
+    throw std::invalid_argument(name + " must have shape (n, 4, 4): one frame per pose");
+  }
+  std::vector<Eigen::Isometry3d> frames;
+  frames.reserve(static_cast<std::size_t>(array.shape(0)));
+  for (py::ssize_t i = 0; i < array.shape(0); ++i) {
+    const Array matrix({4, 4}, array.data(i, 0, 0));
+    try {
+      frames.push_back(frame_from(matrix));
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(name + ", pose " + std::to_string(i) + ": " + error.what());
+    }
+  }
+  return frames;
+}
+
+py::array_t<double> array_from(const std::vector<Eigen::Isometry3d>& frames) {
+  py::array_t<double> out({frames.size(), std::size_t{4}, std::size_t{4}});
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    write_frame(frames[i], out.mutable_data(static_cast<py::ssize_t>(i), 0, 0));
+  return read_only(std::move(out));
+}
+
 namespace {
 
 using Drivers = std::vector<std::pair<std::string, double>>;

@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Camera', 'Candidate', 'ClockOffset', 'ClosedForm', 'Curve', 'Detectable', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'ErrorStatistics', 'FoundEffect', 'Frozen', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'Joint', 'Measurements', 'NextHandPose', 'NextPose', 'NotTestable', 'OwnEffect', 'Parameter', 'PlanOptions', 'PlanResult', 'Prediction', 'Reading', 'Residuals', 'Robot', 'SanityFinding', 'Share', 'SolverSummary', 'Target', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'catalogue', 'diagnose', 'distinguish', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'joint_motion', 'plan', 'pose_groups', 'predict', 'project', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'Curve', 'Detectable', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'ErrorStatistics', 'FoundEffect', 'Frozen', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'Prediction', 'Reading', 'Residuals', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Solution', 'Solutions', 'SolverSummary', 'Target', 'Task', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'catalogue', 'diagnose', 'distinguish', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'joint_motion', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
 class Joint:
     """
     One joint and the link that belongs to it. Lengths in m, angles in rad, masses in kg.
@@ -2941,6 +2941,909 @@ class HandEyeKinematics:
         """
         shape=(3, 3) [m^2] of that point in the frame that carries the camera.
         """
+class Obstacle:
+    """
+    Something that stands still.
+    
+    shape: 'sphere' (radius about the frame's origin), 'capsule' (radius about the segment from the origin to (0, 0, size[2])) or 'box'
+    (`size` along the frame's axes, its centre at the origin).
+    T_measurement_shape: shape=(4, 4) [m]. size: shape=(3,) [m] whole lengths. radius: [m].
+    """
+    def __init__(self, name: str, *, shape: typing.Literal['sphere', 'capsule', 'box'] = 'box', T_measurement_shape: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Obstacle:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Obstacle:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def T_measurement_shape(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4) [m]
+        """
+    @property
+    def name(self) -> str:
+        """
+        As answers call it.
+        """
+    @property
+    def radius(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def shape(self) -> typing.Literal['sphere', 'capsule', 'box']:
+        """
+        'sphere', 'capsule' or 'box'.
+        """
+    @property
+    def size(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,) [m]
+        """
+class LinkCapsule:
+    """
+    Part of a link: `radius` about the segment between two points.
+    
+    link: the joint whose link carries it, in the frame after it; 'base': the base frame; 'tool': the target's frame.
+    start, end: shape=(3,) [m]. radius: [m].
+    """
+    def __init__(self, name: str, *, link: str, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], radius: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> LinkCapsule:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> LinkCapsule:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def end(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,) [m]
+        """
+    @property
+    def link(self) -> str:
+        """
+        Name of a joint, 'base' or 'tool'.
+        """
+    @property
+    def name(self) -> str:
+        """
+        As answers call it.
+        """
+    @property
+    def radius(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def start(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,) [m]
+        """
+class Scene:
+    """
+    What the robot must not touch, and what of it must not.
+    
+    clearance: [m] what comes nearer than this interferes.
+    ignored: pairs of names that are not looked at. Capsules of one link and of neighbouring links never are, nor is the base's with
+    what stands still.
+    """
+    def __init__(self, *, obstacles: collections.abc.Sequence[Obstacle] = [], capsules: collections.abc.Sequence[LinkCapsule] = [], clearance: typing.SupportsFloat | typing.SupportsIndex = 0.0, ignored: collections.abc.Sequence[tuple[str, str]] = []) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Scene:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Scene:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def capsules(self) -> tuple[LinkCapsule, ...]:
+        """
+        What of the robot must not touch.
+        """
+    @property
+    def clearance(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def ignored(self) -> tuple[tuple[str, str], ...]:
+        """
+        Pairs of names.
+        """
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """
+        What stands still.
+        """
+class Contact:
+    """
+    The pair that interferes most, or comes nearest.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def distance(self) -> float:
+        """
+        [m] between their surfaces; negative: how deep they are in each other.
+        """
+    @property
+    def first(self) -> str:
+        """
+        A capsule.
+        """
+    @property
+    def second(self) -> str:
+        """
+        A capsule or an obstacle.
+        """
+class Task:
+    """
+    What is wanted of one target. `replace(...)` makes another one.
+    
+    T_measurement_target: shape=(4, 4) [m] the wanted pose. Its own axes say what the angles mean.
+    kind: 'pose' (position and orientation), 'torch' (position and the direction of `axis`; roll about it is free) or 'point'.
+    axis: shape=(3,) the tool's axis in the target's frame, unit vector. travel: shape=(3,) the direction that lead is measured in.
+    roll: (lower, upper) [rad] of a torch, the turn about `axis` that takes the wanted frame to the reached one.
+    preferred_roll: [rad] as near to it as can be; None: any.
+    lead, work: (lower, upper) [rad] how far the axis may lean towards `travel` and towards axis x travel.
+    retreat: shape=(3,) unit vector in the wanted frame: where everything interferes, the target is moved along it by the least that
+    frees it, and by no more than longest_retreat [m]; 0: not at all.
+    """
+    def __init__(self, T_measurement_target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"], *, kind: typing.Literal['pose', 'torch', 'point'] = 'pose', axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., travel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., roll: tuple[float, float] = ..., preferred_roll: typing.SupportsFloat | typing.SupportsIndex | None = None, lead: tuple[float, float] = (0.0, 0.0), work: tuple[float, float] = (0.0, 0.0), retreat: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., longest_retreat: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Task:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Task:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def T_measurement_target(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4) [m]
+        """
+    @property
+    def axis(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,)
+        """
+    @property
+    def kind(self) -> typing.Literal['pose', 'torch', 'point']:
+        """
+        'pose', 'torch' or 'point'.
+        """
+    @property
+    def lead(self) -> tuple[float, float]:
+        """
+        (lower, upper) [rad]
+        """
+    @property
+    def longest_retreat(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def preferred_roll(self) -> float | None:
+        """
+        [rad] or None.
+        """
+    @property
+    def retreat(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,)
+        """
+    @property
+    def roll(self) -> tuple[float, float]:
+        """
+        (lower, upper) [rad]
+        """
+    @property
+    def travel(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(3,)
+        """
+    @property
+    def work(self) -> tuple[float, float]:
+        """
+        (lower, upper) [rad]
+        """
+class Conditions:
+    """
+    What acts on the robot besides its joints; only what its effects ask for is looked at.
+    
+    direction: approach direction of every driven joint, -1, 0 or 1; empty: the way from the seed to the answer.
+    payload: [kg] at the tool. temperature: [deg C]. time: [s]. joint_speed: of every driven joint [rad/s | m/s].
+    covariates: what else the effects look at, by column name.
+    """
+    def __init__(self, *, direction: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], payload: typing.SupportsFloat | typing.SupportsIndex = 0.0, temperature: typing.SupportsFloat | typing.SupportsIndex | None = None, time: typing.SupportsFloat | typing.SupportsIndex | None = None, joint_speed: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], covariates: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex] = {}) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Conditions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Conditions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def covariates(self) -> types.MappingProxyType[str, float]:
+        """
+        By column name.
+        """
+    @property
+    def direction(self) -> tuple[int, ...]:
+        """
+        -1, 0 or 1 each.
+        """
+    @property
+    def joint_speed(self) -> tuple[float, ...]:
+        """
+        [rad/s | m/s]
+        """
+    @property
+    def payload(self) -> float:
+        """
+        [kg]
+        """
+    @property
+    def temperature(self) -> float | None:
+        """
+        [deg C] or None.
+        """
+    @property
+    def time(self) -> float | None:
+        """
+        [s] or None.
+        """
+class InverseOptions:
+    """
+    How `InverseSolver` works; see the attributes.
+    """
+    def __init__(self, *, position_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, rotation_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, choose: typing.Literal['nearest', 'limits_margin', 'manipulability', 'rail_travel'] = 'nearest', max_iterations: typing.SupportsInt | typing.SupportsIndex = 60, max_restarts: typing.SupportsInt | typing.SupportsIndex = 200, wrist_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.01, parallel_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, scene: Scene = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> InverseOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> InverseOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def choose(self) -> typing.Literal['nearest', 'limits_margin', 'manipulability', 'rail_travel']:
+        """
+        Which of several answers.
+        
+        'nearest' to the seed; 'limits_margin': furthest from the joint limits; 'manipulability': furthest from singular; 'rail_travel':
+        least way of the prismatic joints from the seed, then nearest.
+        """
+    @choose.setter
+    def choose(self, arg0: typing.Literal['nearest', 'limits_margin', 'manipulability', 'rail_travel']) -> None:
+        ...
+    @property
+    def max_iterations(self) -> int:
+        """
+        Of one descent.
+        """
+    @max_iterations.setter
+    def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_restarts(self) -> int:
+        """
+        Descents from other seeds before a target is given up.
+        """
+    @max_restarts.setter
+    def max_restarts(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def parallel_tolerance(self) -> float:
+        """
+        [rad] axes nearer to parallel than this are taken to be, for the seeds alone.
+        """
+    @parallel_tolerance.setter
+    def parallel_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_tolerance(self) -> float:
+        """
+        [m] a solution misses the task by no more.
+        """
+    @position_tolerance.setter
+    def position_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_tolerance(self) -> float:
+        """
+        [rad]
+        """
+    @rotation_tolerance.setter
+    def rotation_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def scene(self) -> Scene:
+        """
+        What the robot must not touch.
+        """
+    @scene.setter
+    def scene(self, arg1: Scene) -> None:
+        ...
+    @property
+    def wrist_tolerance(self) -> float:
+        """
+        [m] axes that miss each other by no more are taken to meet, for the seeds alone.
+        """
+    @wrist_tolerance.setter
+    def wrist_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class PathOptions:
+    """
+    How `InverseSolver.path` works; see the attributes.
+    """
+    def __init__(self, *, longest_turn: typing.SupportsFloat | typing.SupportsIndex = 0.35, longest_slide: typing.SupportsFloat | typing.SupportsIndex = 0.25, rolls: typing.SupportsInt | typing.SupportsIndex = 24, rail_places: typing.SupportsInt | typing.SupportsIndex = 5, smoothing: typing.SupportsInt | typing.SupportsIndex = 20) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> PathOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> PathOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def longest_slide(self) -> float:
+        """
+        [m] of a sliding joint.
+        """
+    @longest_slide.setter
+    def longest_slide(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def longest_turn(self) -> float:
+        """
+        [rad] of a turning joint between neighbouring targets; more is a gap.
+        """
+    @longest_turn.setter
+    def longest_turn(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rail_places(self) -> int:
+        """
+        Samples of each rail before the arm, over what it can be reached from.
+        """
+    @rail_places.setter
+    def rail_places(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rolls(self) -> int:
+        """
+        Samples of a torch's roll, where it is free.
+        """
+    @rolls.setter
+    def rolls(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def smoothing(self) -> int:
+        """
+        Rounds that even the path out where the task leaves something free.
+        """
+    @smoothing.setter
+    def smoothing(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class CompensateOptions:
+    """
+    How `Compensator` works; see the attributes.
+    """
+    def __init__(self, *, inverse: InverseOptions = ..., in_base: bool = False) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> CompensateOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> CompensateOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def in_base(self) -> bool:
+        """
+        Wanted poses and commands are in each robot's own base frame, as programs have them; else in the measurement frame.
+        """
+    @in_base.setter
+    def in_base(self, arg0: bool) -> None:
+        ...
+    @property
+    def inverse(self) -> InverseOptions:
+        """
+        Of both solvers.
+        """
+    @inverse.setter
+    def inverse(self, arg0: InverseOptions) -> None:
+        ...
+class Solution:
+    """
+    One answer of inverse kinematics.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def branch(self) -> int:
+        """
+        Which of the closed form's branches it came from; -1: by descent.
+        """
+    @property
+    def contact(self) -> tuple[int, int] | None:
+        """
+        With a scene the nearest pair: index of a capsule; of another one, or number of capsules + index of an obstacle.
+        """
+    @property
+    def contact_distance(self) -> float:
+        """
+        [m] between their surfaces; negative: so deep. Infinite without a scene.
+        """
+    @property
+    def direction(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Of a failure, shape=(3,): from the nearest to the wanted, in the measurement frame.
+        """
+    @property
+    def excess(self) -> float:
+        """
+        [rad | m] how far beyond its limit it would have to go.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Of all descents together.
+        """
+    @property
+    def joint(self) -> int:
+        """
+        Driven joint whose limit stands in the way, after them passive ones with limits; -1: none.
+        """
+    @property
+    def joints(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(driven joints,) [rad | m]: readings; of a failure the nearest that was found, within limits.
+        """
+    @property
+    def miss(self) -> float:
+        """
+        Of a failure: [m], or [rad] when the position is reached and the orientation is not.
+        """
+    @property
+    def position_error(self) -> float:
+        """
+        [m] of the task, from a second forward computation.
+        """
+    @property
+    def reached(self) -> bool:
+        """
+        Whether the task is met.
+        """
+    @property
+    def reason(self) -> typing.Literal['reached', 'retreated', 'interference', 'out_of_reach', 'limit', 'singular']:
+        """
+        What came of it.
+        
+        'reached'; 'retreated': the target was moved by `retreat`, and is reached there; 'interference': it could be reached, but a
+        `contact` is in the way; 'out_of_reach': it stays away by `miss` along `direction`, limits aside; 'limit': that of `joint` is in
+        the way, by `excess`; 'singular': the tip cannot move along `direction`.
+        """
+    @property
+    def retreat(self) -> float:
+        """
+        [m] how far the target was moved along `Task.retreat`.
+        """
+    @property
+    def roll(self) -> float:
+        """
+        [rad] torch: the turn about the axis from the wanted frame.
+        """
+    @property
+    def rotation_error(self) -> float:
+        """
+        [rad] of the task: what of the orientation is asked for.
+        """
+class Solutions:
+    """
+    Answers for many targets, in their order: a sequence of `Solution`, and their values as arrays.
+    """
+    def __getitem__(self, k: typing.SupportsInt | typing.SupportsIndex) -> Solution:
+        ...
+    def __iter__(self) -> collections.abc.Iterator[Solution]:
+        ...
+    def __len__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def branch(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        shape=(n,): -1: by descent.
+        """
+    @property
+    def contact_distance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [m]
+        """
+    @property
+    def direction(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, 3)
+        """
+    @property
+    def excess(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [rad | m]
+        """
+    @property
+    def iterations(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        shape=(n,)
+        """
+    @property
+    def joint(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        shape=(n,): whose limit stands in the way; -1: none.
+        """
+    @property
+    def joints(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, driven joints) [rad | m]; of a failure the nearest that was found, within limits.
+        """
+    @property
+    def miss(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [m | rad]
+        """
+    @property
+    def position_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [m]
+        """
+    @property
+    def reached(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        shape=(n,): whether the task is met.
+        """
+    @property
+    def reasons(self) -> tuple[typing.Literal['reached', 'retreated', 'interference', 'out_of_reach', 'limit', 'singular'], ...]:
+        """
+        Of each, as `Solution.reason`.
+        """
+    @property
+    def retreat(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [m]
+        """
+    @property
+    def roll(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [rad]
+        """
+    @property
+    def rotation_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [rad]
+        """
+class Branches:
+    """
+    Answers that differ in configuration.
+    """
+    def __len__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def beyond_limits(self) -> int:
+        """
+        How many further ones are outside the limits.
+        """
+    @property
+    def solutions(self) -> tuple[Solution, ...]:
+        """
+        Those within the joint limits.
+        """
+class PathGap:
+    """
+    Two neighbouring targets that the joints do not pass between.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def joint(self) -> int:
+        """
+        Whose step is too long; -1: one of the two is not reached.
+        """
+    @property
+    def start(self) -> int:
+        """
+        Index of the target before it; the next is start + 1.
+        """
+    @property
+    def step(self) -> float:
+        """
+        [rad | m]
+        """
+class JointPath:
+    """
+    Joints along a chain of targets.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def continuous(self) -> bool:
+        """
+        No gaps.
+        """
+    @property
+    def gaps(self) -> tuple[PathGap, ...]:
+        """
+        Empty: every step is within the bounds.
+        """
+    @property
+    def longest_slide(self) -> float:
+        """
+        [m] of a sliding joint.
+        """
+    @property
+    def longest_turn(self) -> float:
+        """
+        [rad] the longest step of a turning joint that is no gap.
+        """
+    @property
+    def solutions(self) -> Solutions:
+        """
+        One per target.
+        """
+class InverseSolver:
+    """
+    A robot made ready for inverse kinematics, nominal or calibrated, effects included.
+    
+    Built once it does not change, and any number of threads may use it. Where a seed is asked for, None is the middle of every
+    joint's range.
+    conditions: those of every solve that names no others; they also say which inputs there are. target: its index in
+    `robot.targets`. Raises InputError when robot, target or options cannot be used, or effects lack an input.
+    """
+    def __init__(self, robot: Robot, options: InverseOptions | None = None, conditions: Conditions | None = None, *, target: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def branches(self, task: Task, seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None) -> Branches:
+        """
+        Every answer for a full pose; prismatic joints before the arm stay at the seed's.
+        
+        Without a closed form what descents from many seeds found, not known to be all. Raises InputError.
+        """
+    def describe(self, solution: Solution) -> str:
+        """
+        In a sentence: 'J4 would have to go 0.12 rad beyond its limit'.
+        """
+    def follow(self, task: Task, previous: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], conditions: Conditions | None = None) -> Solution:
+        """
+        The next of a chain of poses that lie close together: Newton from `previous`, shape=(driven joints,) [rad | m].
+        
+        It stays on its branch; where it cannot, the reason says why, and nothing else is tried. Raises InputError.
+        """
+    def forward(self, joints: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], conditions: Conditions | None = None) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        Where the target is, shape=(4, 4) [m], effects included: what `predict` says. Raises InputError.
+        """
+    def middle(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(driven joints,) [rad | m]: the middle of every joint's range, or 0.
+        """
+    def path(self, targets: collections.abc.Sequence[Task] | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, options: PathOptions | None = None, conditions: Conditions | None = None, *, like: Task | None = None, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> JointPath:
+        """
+        A path through the targets in steps as short as can be; where none keeps within the bounds, the gap is told.
+        
+        targets, like, progress: as in `solve_batch`. seed: where the robot comes from. Raises InputError.
+        """
+    def solve(self, task: Task, seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None) -> Solution:
+        """
+        One answer. What cannot be reached is told in the result.
+        
+        seed: shape=(driven joints,) [rad | m]. Raises InputError on a seed of the wrong size and on values that are not finite.
+        """
+    def solve_batch(self, targets: collections.abc.Sequence[Task] | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], seeds: numpy.typing.ArrayLike | None = None, conditions: Conditions | collections.abc.Sequence[Conditions] | None = None, *, like: Task | None = None, threads: typing.SupportsInt | typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> Solutions:
+        """
+        One answer per target, the same for any number of threads (0: as many as the machine has).
+        
+        targets: tasks, or shape=(n, 4, 4) [m] poses, each a task like `like` (None: a full pose).
+        seeds: shape=(driven joints,) or (n, driven joints) [rad | m]. conditions: one, or one per target.
+        progress: called with targets done, now and then; what it raises stops the work. Raises InputError.
+        """
+    @property
+    def closed_form(self) -> typing.Literal['none', 'spherical_wrist', 'three_parallel']:
+        """
+        Which closed form the geometry has, once axes that nearly meet are taken to meet.
+        """
+    @property
+    def driven_count(self) -> int:
+        """
+        Number of joints that have a reading.
+        """
+    @property
+    def options(self) -> InverseOptions:
+        """
+        A copy of the options.
+        """
+    @property
+    def robot(self) -> Robot:
+        """
+        A copy of the robot.
+        """
+class Compensated:
+    """
+    What to tell a controller that believes in the nominal robot.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_command(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4) [m]: pose to command; the nominal robot takes these joints for it.
+        """
+    @property
+    def other_configuration(self) -> bool:
+        """
+        The joints are more than half a radian from those that the nominal robot would take: a controller that is given T_command may choose others.
+        """
+    @property
+    def position_before(self) -> float | None:
+        """
+        [m] how far off the real robot would be if the wanted pose were commanded; None: the nominal robot cannot reach it.
+        """
+    @property
+    def rotation_before(self) -> float | None:
+        """
+        [rad] likewise.
+        """
+    @property
+    def sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(6,): standard error of where the target will be, position [m] and rotation [rad] along the measurement frame's axes; NaN: no uncertainty was given.
+        """
+    @property
+    def solution(self) -> Solution:
+        """
+        Of the calibrated robot: joints to command, and whether the target is reached with them.
+        """
+class Compensations:
+    """
+    Of many targets, in their order: a sequence of `Compensated`, and values as arrays.
+    """
+    def __getitem__(self, k: typing.SupportsInt | typing.SupportsIndex) -> Compensated:
+        ...
+    def __iter__(self) -> collections.abc.Iterator[Compensated]:
+        ...
+    def __len__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_command(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, 4, 4) [m]: poses to command.
+        """
+    @property
+    def other_configuration(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        shape=(n,): a controller that is given T_command may choose other joints.
+        """
+    @property
+    def position_before(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [m]; NaN: the nominal robot cannot reach it.
+        """
+    @property
+    def rotation_before(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [rad]; NaN likewise.
+        """
+    @property
+    def sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, 6) [m], [rad]; NaN: no uncertainty was given.
+        """
+    @property
+    def solutions(self) -> Solutions:
+        """
+        Joints to command, as `Solutions`.
+        """
+class Compensator:
+    """
+    Says what to command so that the real robot, which `calibrated` describes, goes where it is wanted.
+    
+    Built once from both robots, then any number of threads may use it. conditions, target: as of `InverseSolver`.
+    Raises InputError when the robots have different joints, or as InverseSolver does.
+    """
+    def __init__(self, nominal: Robot, calibrated: Robot, options: CompensateOptions | None = None, conditions: Conditions | None = None, *, target: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def joints(self, program: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None) -> Compensated:
+        """
+        A joint position of a program, shape=(driven joints,) [rad | m]: the nominal robot's pose there is what is wanted.
+        
+        seed: where the robot comes from; None: it stands there already. Raises InputError.
+        """
+    def joints_batch(self, program: numpy.typing.ArrayLike, conditions: Conditions | collections.abc.Sequence[Conditions] | None = None, *, threads: typing.SupportsInt | typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> Compensations:
+        """
+        One result per row of a program of joint positions, shape=(n, driven joints) [rad | m].
+        
+        The robot comes from the row before; to the first it does not move. Raises InputError.
+        """
+    def pose(self, task: Task, seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None) -> Compensated:
+        """
+        A pose of a program. seed: shape=(driven joints,) [rad | m], where the robot comes from; it decides the configuration.
+        
+        Raises InputError.
+        """
+    def pose_batch(self, targets: collections.abc.Sequence[Task] | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], seeds: numpy.typing.ArrayLike | None = None, conditions: Conditions | collections.abc.Sequence[Conditions] | None = None, *, like: Task | None = None, threads: typing.SupportsInt | typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> Compensations:
+        """
+        One result per target; arguments as of `InverseSolver.solve_batch`. Raises InputError.
+        """
+    def set_uncertainty(self, names: collections.abc.Sequence[str], values: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> None:
+        """
+        What `identify` says of its parameters: names and values of the fitted ones, and their covariance, shape=(n, n).
+        
+        Raises InputError on a parameter that the calibrated robot does not have, or a covariance of another size.
+        """
+    @property
+    def calibrated(self) -> InverseSolver:
+        """
+        The solver of the calibrated robot.
+        """
+    @property
+    def nominal(self) -> InverseSolver:
+        """
+        The solver of the nominal robot.
+        """
 def catalogue() -> list[tuple[str, str]]:
     """
     Name and summary of the effects that truing knows.
@@ -3024,6 +3927,12 @@ def joint_motion(robot: Robot, data: Measurements, joint: str) -> typing.Annotat
     """
     shape=(n,) [rad | m]: motion of a joint as read, of a passive one from its drivers' readings. Raises InputError.
     """
+def nearest_contact(scene: Scene, robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], target: typing.SupportsInt | typing.SupportsIndex = 0) -> Contact:
+    """
+    The nearest pair at these readings, effects left out; without names when there is none to look at.
+    
+    joints: shape=(driven joints,) [rad | m]. target: its index in `robot.targets`. Raises InputError.
+    """
 def plan(robot: Robot, options: PlanOptions | None = None) -> PlanResult:
     """
     Measurement poses by exchange on an observability index.
@@ -3086,6 +3995,10 @@ def validate_robot(robot: Robot) -> None:
     
     The error names the joint and what is wrong: no joints, duplicate or empty names, unknown or circular `driven_by`, values that
     are not finite, an axis that is not of unit length, lower > upper.
+    """
+def validate_scene(scene: Scene, robot: Robot) -> None:
+    """
+    Raises InputError on unknown links, empty or equal names, sizes that are not positive, frames that are not rigid.
     """
 def version() -> str:
     """

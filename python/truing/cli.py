@@ -26,9 +26,11 @@ import typer
 from truing.errors import InputError, InputWarning
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from rich.console import Console
 
-    from truing import ClockOffset, HandEyeData, HandEyePoses, Measurements, Robot
+    from truing import ClockOffset, HandEyeData, HandEyePoses, InverseSolver, Joint, Measurements, Robot, Solution, TargetData, Task
+    from truing.inverse_results import Solved
 
 Result = TypeVar("Result")
 
@@ -101,6 +103,32 @@ class MethodName(str, Enum):
     closed_form = "closed-form"
 
 
+class TaskName(str, Enum):
+    """--task"""
+
+    pose = "pose"
+    torch = "torch"
+    point = "point"
+
+
+class FreeAxis(str, Enum):
+    """--free-axis"""
+
+    none = "none"
+    x = "x"
+    y = "y"
+    z = "z"
+
+
+class ChooseName(str, Enum):
+    """--choose"""
+
+    nearest = "nearest"
+    limits_margin = "limits_margin"
+    manipulability = "manipulability"
+    rail_travel = "rail_travel"
+
+
 class ExamSet(str, Enum):
     """--set"""
 
@@ -116,6 +144,18 @@ class IndexName(str, Enum):
     e = "e"
     inverse_condition = "inverse-condition"
     noise_amplification = "noise-amplification"
+
+
+TargetsFile = Annotated[Path, typer.Argument(metavar="TARGETS", help="CSV or Parquet, one row per target: x_m y_m z_m qw qx qy qz, and what is optional.", show_default=False)]
+TaskKind = Annotated[Optional[TaskName], typer.Option(help="What is wanted: position and orientation, position and the tool's axis (roll about it free), or position alone. Default: pose.", show_default=False)]
+AxisOption = Annotated[Optional[FreeAxis], typer.Option(help="Axis of the tool about which its roll is free; means --task torch. none: a full pose.", show_default=False)]
+SeedJoints = Annotated[str, typer.Option("--seed", metavar="JOINTS", help="Where the robot comes from: 0,-90,90,0,90,0deg, or a CSV with q1_rad … (one row, or one per target). Default: columns q1_rad … of TARGETS, or the middle of the joints' ranges.",
+                                         show_default=False)]  # fmt: skip
+ChooseOption = Annotated[ChooseName, typer.Option(help="Which of several answers: nearest to the seed, furthest from the limits, furthest from singular, least way on the rails.")]
+SceneFile = Annotated[Optional[Path], typer.Option("--scene", help="scene.yaml: what the robot must not touch.", show_default=False)]
+Retreat = Annotated[str, typer.Option(help="Where everything interferes, move the target back along the tool's z by no more than this: 50mm.", show_default=False)]
+TargetName = Annotated[str, typer.Option("--target", help="Which of the robot's targets is brought there. Default: the tool.", show_default=False)]
+Threads = Annotated[int, typer.Option(help="0: as many as the machine has.", min=0)]
 
 
 # ---- Quantities --------------------------------------------------------------------------------------------------------
@@ -618,6 +658,155 @@ def _finish_handeye(result: Mapping[str, Any], folder: Path, json: bool) -> None
 
 
 @app.command()
+def ik(
+    robot: RobotFile,
+    targets: TargetsFile,
+    out: Annotated[Optional[Path], _out("ik")] = None,
+    task: TaskKind = None,
+    free_axis: AxisOption = None,
+    seed: SeedJoints = "",
+    choose: ChooseOption = ChooseName.nearest,
+    all_branches: Annotated[bool, typer.Option("--all-branches", help="Every configuration that reaches a full pose, a row each.")] = False,
+    path: Annotated[bool, typer.Option("--path", help="The targets are a chain: joints in steps as short as can be.")] = False,
+    longest_turn: Annotated[str, typer.Option(help="With --path: a turning joint that moves by more between neighbouring targets is a gap.")] = "20deg",
+    longest_slide: Annotated[str, typer.Option(help="With --path: the same of a sliding joint.")] = "250mm",
+    scene: SceneFile = None,
+    retreat: Retreat = "",
+    target: TargetName = "",
+    base_link: BaseLink = "",
+    tip_link: TipLink = "",
+    threads: Threads = 0,
+    json: Json = False,
+) -> None:
+    """Find the joints that bring the robot, nominal or calibrated, to each target; or say why there are none.
+
+    Writes joints.csv, result.json, report.html. Exit status 1 when a target is not reached, or the path has a gap.
+    """
+    from truing.files import atomic_output_dir, load_robot, load_scene, load_targets
+
+    folder = out or Path("truing-ik")
+    if path and all_branches:
+        raise InputError("--path and --all-branches: a path takes one configuration at every target; choose one of the two")
+    turn, slide = (_more_than_zero(quantity(text, kind, option), text, option) for text, kind, option in
+                   ((longest_turn, "angle", "--longest-turn"), (longest_slide, "length", "--longest-slide")))  # fmt: skip
+    like = _task_like(task, free_axis, retreat)
+    if all_branches and like.kind != "pose":
+        raise InputError(f"--all-branches: is for full poses; a {like.kind} leaves something free, and has endlessly many answers")
+    with _warnings_heard() as heard:
+        import truing
+
+        model = load_robot(robot, base_link, tip_link)
+        index = _target_index(model, target)
+        data = _busy("reading", lambda: load_targets(targets, model, like=like))
+        if all_branches and any(one.kind != "pose" for one in data.tasks):
+            raise InputError(f"{targets}: --all-branches is for full poses, but its column task holds others")
+        start = _seed_joints(seed, model, data)
+        of_path = data.path_conditions() if path else None
+        options = truing.InverseOptions(choose=choose.value, scene=truing.Scene() if scene is None else load_scene(scene, model))
+        solver = truing.InverseSolver(model, options, data.conditions[0] if data.conditions else None, target=index)
+
+        def work(progress: Callable[[int], None]) -> Any:
+            from truing.inverse_results import Solved
+
+            every = np.arange(data.count)
+            if path:
+                steps = truing.PathOptions(longest_turn=turn, longest_slide=slide)
+                first = start if start is None or start.ndim == 1 else start[0]
+                found = solver.path(data.tasks, first, steps, of_path, progress=progress)
+                return Solved(data, solver, list(found.solutions), every, path=found, steps=steps)
+            if all_branches:
+                return _every_branch(solver, data, start, progress)
+            return Solved(data, solver, list(solver.solve_batch(data.tasks, start, data.conditions or None, threads=threads, progress=progress)), every)
+
+        solved = _busy_counting("solving", data.count, work)
+        with atomic_output_dir(folder) as temporary, _progress("writing"):
+            from truing.inverse_results import write_inverse
+
+            result = write_inverse(temporary, solved, warnings=heard)
+    if json:
+        _print_json(result)
+    else:
+        inverse_table(result, folder)
+    _exit_unless_whole(result)
+
+
+@app.command()
+def compensate(
+    nominal: Annotated[Path, typer.Argument(metavar="NOMINAL", help="Robot file that the controller believes in: robot.yaml or URDF.", show_default=False)],
+    calibrated: Annotated[Path, typer.Argument(metavar="CALIBRATED", help="Robot file of the real robot, as `truing identify` or `diagnose` wrote it.", show_default=False)],
+    targets: Annotated[Path, typer.Argument(metavar="TARGETS", help="CSV or Parquet: poses as for `truing ik`, or a program of joint positions (q1_rad …).", show_default=False)],
+    out: Annotated[Optional[Path], _out("compensate")] = None,
+    task: TaskKind = None,
+    free_axis: AxisOption = None,
+    seed: SeedJoints = "",
+    choose: ChooseOption = ChooseName.nearest,
+    uncertainty: Annotated[Optional[Path], typer.Option(metavar="RESULT", help="result.json of `truing identify`, with covariance.csv beside it: for the standard error of what remains.", show_default=False)] = None,
+    in_base: Annotated[bool, typer.Option("--in-base", help="Poses are in the robot's own base frame, as controllers have them; else in the measurement frame.")] = False,
+    scene: SceneFile = None,
+    retreat: Retreat = "",
+    target: TargetName = "",
+    base_link: BaseLink = "",
+    tip_link: TipLink = "",
+    threads: Threads = 0,
+    json: Json = False,
+) -> None:
+    """Say what to command to a controller that believes in the nominal robot, so that the real one goes where it is wanted.
+
+    Writes joints.csv and poses.csv (joints and poses to command), result.json, report.html. Exit status 1 when a target is not reached.
+    """
+    from truing.files import atomic_output_dir, load_robot, load_scene, load_targets, load_uncertainty
+
+    folder = out or Path("truing-compensate")
+    like = _task_like(task, free_axis, retreat)
+    with _warnings_heard() as heard:
+        import truing
+
+        believed, real = load_robot(nominal, base_link, tip_link), _load_calibrated(calibrated, base_link, tip_link)
+        if believed.driven_count != real.driven_count:
+            raise InputError(f"{calibrated}: has {real.driven_count} driven joints, but {nominal} has {believed.driven_count}: these are not the same robot")
+        index = _target_index(believed, target)
+        data = _busy("reading", lambda: load_targets(targets, believed, like=like, program=True, in_base=in_base))
+        start = None if data.is_program else _seed_joints(seed, believed, data)
+        if data.is_program and seed:
+            raise InputError("--seed: a program of joint positions says itself where the robot comes from")
+        options = truing.InverseOptions(choose=choose.value, scene=truing.Scene() if scene is None else load_scene(scene, believed))
+        maker = truing.Compensator(believed, real, truing.CompensateOptions(inverse=options, in_base=in_base), data.conditions[0] if data.conditions else None, target=index)
+        if uncertainty is not None:
+            known = load_uncertainty(uncertainty)
+            try:
+                maker.set_uncertainty(known.names, known.values, known.covariance)
+            except InputError as error:
+                raise InputError(f"{uncertainty}: {error}; was this identification made for {calibrated}?") from None
+
+        def work(progress: Callable[[int], None]) -> Any:
+            if data.is_program:
+                assert data.joints is not None
+                return maker.joints_batch(data.joints, data.conditions or None, threads=threads, progress=progress)
+            return maker.pose_batch(data.tasks, start, data.conditions or None, threads=threads, progress=progress)
+
+        made = _busy_counting("compensating", data.count, work)
+        with atomic_output_dir(folder) as temporary, _progress("writing"):
+            from truing.inverse_results import CompensatedProgram, write_compensation
+
+            result = write_compensation(temporary, CompensatedProgram(data, maker, made, in_base, uncertainty is not None), warnings=heard)
+    if json:
+        _print_json(result)
+    else:
+        compensation_table(result, folder)
+    _exit_unless_whole(result)
+
+
+def _exit_unless_whole(result: Mapping[str, Any]) -> None:
+    missing = result["targets"] - result["reached"]
+    gaps = len(result.get("path", {}).get("gaps", ()))
+    if missing or gaps:
+        words = [f"{missing} of {result['targets']} targets are not reached"] if missing else []
+        words += [f"the path has {gaps} gap{'' if gaps == 1 else 's'}"] if gaps else []
+        _err().print(f"truing: {' and '.join(words)}", style="bold red", markup=False, highlight=False)
+        raise typer.Exit(1)
+
+
+@app.command()
 def exam(
     out: Annotated[Optional[Path], _out("exam")] = None,
     which: Annotated[ExamSet, typer.Option("--set", help="The robots, sizes and effects of development, or those kept for the examination.")] = ExamSet.development,
@@ -670,6 +859,87 @@ def _load(robot: Path, data: Path, base_link: str, tip_link: str, joints_only: b
 
     model = load_robot(robot, base_link, tip_link)
     return model, _busy("reading", lambda: load_measurements(data, model, joints_only=joints_only))
+
+
+def _load_calibrated(path: Path, base_link: str, tip_link: str) -> Robot:
+    """A calibrated robot of convention urdf is written as YAML, which has no links to choose."""
+    from truing.files import load_robot
+
+    is_urdf = path.suffix.lower() in (".urdf", ".xml")
+    return load_robot(path, base_link, tip_link) if is_urdf else load_robot(path)
+
+
+def _task_like(task: Optional[TaskName], free_axis: Optional[FreeAxis], retreat: str) -> Task:
+    """What every row of a target file wants that says nothing else."""
+    from truing import Task
+
+    axis = None if free_axis is None or free_axis is FreeAxis.none else "xyz".index(free_axis.value)
+    if task is not None and free_axis is not None and (axis is not None) != (task is TaskName.torch):
+        raise InputError(f"--free-axis {free_axis.value} and --task {task.value}: a free axis is the task torch, and no other")
+    kind = task.value if task is not None else "pose" if axis is None else "torch"
+    unit = np.eye(3)[2 if axis is None else axis]
+    travel = np.eye(3)[0 if axis is None or axis == 2 else (axis + 1) % 3]
+    longest = _more_than_zero(quantity(retreat, "length", "--retreat"), retreat, "--retreat") if retreat else 0.0
+    return Task(np.eye(4), kind=kind, axis=unit, travel=travel, retreat=-unit, longest_retreat=longest)  # type: ignore[arg-type]
+
+
+def _more_than_zero(value: float, text: str, option: str) -> float:
+    if not value > 0:
+        raise InputError(f"{option}: found {text!r}, expected more than zero")
+    return value
+
+
+def _target_index(robot: Robot, name: str) -> int:
+    names = [target.name for target in robot.targets]
+    if name and name not in names:
+        raise InputError(f"--target: the robot has no target {name!r}; its targets are {', '.join(names)}")
+    return names.index(name) if name else 0
+
+
+def _seed_joints(text: str, robot: Robot, data: TargetData) -> Optional[NDArray[np.float64]]:
+    """--seed, or the joints of the target file; None: the middle of the joints' ranges."""
+    if not text:
+        return data.joints
+    path = Path(text)
+    if path.suffix.lower() in (".csv", ".parquet", ".pq"):
+        from truing.files import load_measurements
+
+        joints = np.asarray(load_measurements(path, robot, joints_only=True).joints)
+        if len(joints) not in (1, data.count):
+            raise InputError(f"{path}: has {len(joints)} rows, expected one, or one for each of {data.count} targets")
+        return joints[0] if len(joints) == 1 else joints
+    driven = [robot.joints[k] for k in robot.driven_joints()]
+    parts = _words(text)
+    if len(parts) != len(driven):
+        raise InputError(f"--seed: found {len(parts)} joints, the robot has {len(driven)}: {', '.join(joint.name for joint in driven)}; expected such as {_seed_example(driven)}, or a .csv file")
+    values, units = [], {"angle": "", "length": ""}
+    for part, joint in zip(reversed(parts), reversed(driven), strict=True):  # a unit holds for the numbers before it that have none
+        kind = "angle" if joint.type == "revolute" else "length"
+        own = re.sub(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", "", part, count=1).strip()
+        units[kind] = own or units[kind]
+        values.append(quantity(part if own else part + units[kind], kind, f"--seed, joint {joint.name}"))
+    return np.array(values[::-1])
+
+
+def _seed_example(joints: Sequence[Joint]) -> str:
+    return ",".join("10deg" if joint.type == "revolute" else "100mm" for joint in joints)
+
+
+def _every_branch(solver: InverseSolver, data: TargetData, start: Optional[NDArray[np.float64]], progress: Callable[[int], None]) -> Solved:
+    """All configurations of every target; of a target without any, why."""
+    from truing.inverse_results import Solved
+
+    solutions: list[Solution] = []
+    owners: list[int] = []
+    for k, task in enumerate(data.tasks):
+        seed = start if start is None or start.ndim == 1 else start[k]
+        conditions = data.conditions[k] if data.conditions else None
+        found = solver.branches(task, seed, conditions).solutions or (solver.solve(task, seed, conditions),)
+        solutions.extend(found)
+        owners.extend([k] * len(found))
+        if k % 16 == 15:
+            progress(k + 1)
+    return Solved(data, solver, solutions, np.array(owners, dtype=np.intp), all_branches=True)
 
 
 def _words(text: str) -> list[str]:
@@ -929,6 +1199,55 @@ def handeye_table(result: Mapping[str, Any], folder: Path) -> None:
     _last_line(folder)
 
 
+def inverse_table(result: Mapping[str, Any], folder: Path) -> None:
+    """The short answer of `truing ik`, on stdout; the last line is the path of the report."""
+    _say_reasons(result, f"{result['robot']}: {result['reached']} of {result['targets']} targets reached")
+    if "branches" in result:
+        _say(f"{result['branches']['rows']} answers in all")
+    worst = result["worst"]
+    if worst["position_m"] is not None:
+        _say(f"the worst that is reached misses its task by {worst['position_m']:.2g} m, {worst['rotation_rad']:.2g} rad")
+    path = result.get("path")
+    if path is not None:
+        slides = f", {_mm(path['longest_slide_m'])}" if any(joint["unit"] == "m" for joint in result["joints"]) else ""
+        _say(f"longest step: {math.degrees(path['longest_turn_rad']):.4g} deg{slides}" + ("" if path["gaps"] else "; the path is continuous"))
+        for gap in path["gaps"][:8]:
+            size = f": {gap['joint']} would step {math.degrees(gap['step_rad']):.4g} deg" if "step_rad" in gap else f": {gap['joint']} would step {_mm(gap['step_m'])}" if "step_m" in gap else ""
+            _say(f"no continuous path from target {gap['from']} to {gap['to']}{size}")
+        if len(path["gaps"]) > 8:
+            _say(f"and {len(path['gaps']) - 8} more gaps: see the report")
+    _say(f"joints: {folder / 'joints.csv'}")
+    _last_line(folder)
+
+
+def compensation_table(result: Mapping[str, Any], folder: Path) -> None:
+    """The short answer of `truing compensate`, on stdout; the last line is the path of the report."""
+    _say_reasons(result, f"{result['calibrated']}: {result['reached']} of {result['targets']} targets reached")
+    before, after, moved = result["before"], result["after"], result["correction"]
+    if after["mean_m"] is not None:
+        lines = [(label, *(_mm(e[key]) for key in ("mean_m", "p95_m", "max_m"))) for label, e in (("error if commanded as it is", before), ("error by the model, compensated", after),
+                                                                                              ("commands are moved by", moved))]  # fmt: skip
+        if "standard_error" in result:
+            lines.append(("standard error of what remains", *(_mm(result["standard_error"]["position_m"][key]) for key in ("mean_m", "p95_m", "max_m"))))
+        _table("compensation", ("", "mean", "95 %", "worst"), lines)
+    others = result["other_configuration"]
+    if others:
+        which = ", ".join(map(str, others[:12])) + (" …" if len(others) > 12 else "")
+        _say(f"joints far from those that the nominal robot would take, so that a controller that is given poses may choose others: targets {which}")
+    _say(f"commands: {folder / 'joints.csv'}, {folder / 'poses.csv'}")
+    _last_line(folder)
+
+
+def _say_reasons(result: Mapping[str, Any], title: str) -> None:
+    """What came of the targets; the first of those that are not reached, in words."""
+    others = [f"{count} {reason.replace('_', ' ')}" for reason, count in result["reasons"].items() if reason != "reached"]
+    _say(title + (f" ({', '.join(others)})" if others else ""))
+    for failure in result["failures"][:8]:
+        _say(f"target {failure['target']}: {failure['text']}")
+    if len(result["failures"]) > 8:
+        _say(f"and {len(result['failures']) - 8} more: see joints.csv")
+
+
 def _mrad(radians: float | None) -> str:
     return "-" if radians is None else f"{radians * 1e3:.4f} mrad"
 
@@ -968,8 +1287,8 @@ def _warnings_heard() -> Iterator[list[str]]:
         yield heard
 
 
-def _busy(what: str, work: Callable[[], Result]) -> Result:
-    """Runs `work` in a thread, so that Ctrl-C works while the core computes; after a second a progress bar says what goes on."""
+def _busy(what: str, work: Callable[[], Result], own_bar: bool = False) -> Result:
+    """Runs `work` in a thread, so that Ctrl-C works while the core computes; after a second a progress bar says what goes on, unless `work` has its `own_bar`."""
     outcome: list[Result] = []
     failure: list[BaseException] = []
 
@@ -983,12 +1302,18 @@ def _busy(what: str, work: Callable[[], Result]) -> Result:
     thread.start()
     thread.join(1.0)
     if thread.is_alive():
-        with _progress(what):
+        with contextlib.nullcontext() if own_bar else _progress(what):
             while thread.is_alive():
                 thread.join(0.1)
     if failure:
         raise failure[0]
     return outcome[0]
+
+
+def _busy_counting(what: str, total: int, work: Callable[[Callable[[int], None]], Result]) -> Result:
+    """The same for `work` that tells how many of `total` are done."""
+    with _counting(what) as show:
+        return _busy(what, lambda: work(lambda done: show(done, total)), own_bar=True)
 
 
 @contextlib.contextmanager

@@ -3,10 +3,13 @@
 /// Everything that truing offers to C++.
 #pragma once
 
+#include "truing/compensate.hpp"
 #include "truing/diagnose.hpp"
 #include "truing/effect.hpp"
 #include "truing/handeye.hpp"
 #include "truing/identify.hpp"
+#include "truing/interference.hpp"
+#include "truing/inverse.hpp"
 #include "truing/measurement.hpp"
 #include "truing/plan.hpp"
 #include "truing/robot.hpp"

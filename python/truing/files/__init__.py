@@ -8,10 +8,15 @@ from truing.files.common import Units, atomic_output_dir, atomic_write, write_ta
 from truing.files.handeye_file import HandEyeData, Stream, load_camera, load_handeye, load_stream, save_camera
 from truing.files.measurement_file import load_measurements, save_measurements
 from truing.files.robot_file import load_calibration, load_robot, load_units, robot_to_yaml, save_robot
+from truing.files.scene_file import load_scene
+from truing.files.target_file import TargetData, load_targets
+from truing.files.uncertainty_file import Uncertainty, load_uncertainty
 
 __all__ = [
     "HandEyeData",
     "Stream",
+    "TargetData",
+    "Uncertainty",
     "Units",
     "atomic_output_dir",
     "atomic_write",
@@ -20,7 +25,10 @@ __all__ = [
     "load_handeye",
     "load_measurements",
     "load_robot",
+    "load_scene",
     "load_stream",
+    "load_targets",
+    "load_uncertainty",
     "load_units",
     "robot_to_yaml",
     "save_camera",

@@ -61,6 +61,35 @@ def check_units_look_right(
                          column="dist_m")  # fmt: skip
 
 
+def check_joint_units_look_right(table: Table, joints: Sequence[_core.Joint], units: Mapping[str, str], readings: NDArray[np.float64]) -> None:
+    """Raises InputError when joint readings, shape=(n, driven joints) [rad | m], are plainly degrees in columns called _rad."""
+    _check_radians(table, joints, units, list(readings.T))
+
+
+def check_targets_look_right(table: Table, robot: _core.Robot, units: Mapping[str, str], positions: NDArray[np.float64], *, in_base: bool = False) -> None:
+    """Raises InputError when wanted positions, shape=(n, 3) [m], are plainly in another unit than their columns say.
+
+    What is merely out of reach is no error. in_base: positions are in the robot's base frame, not in the measurement frame.
+    """
+    joints = [robot.joints[index] for index in robot.driven_joints()]
+    limits = [np.array([joint.lower, joint.upper]) for joint in joints]
+    if not all(np.isfinite(ends).all() for joint, ends in zip(joints, limits, strict=True) if joint.type == "prismatic"):
+        return  # a rail without ends reaches everywhere
+    reach = _reach(robot, joints, limits)
+    base = np.zeros(3) if in_base else robot.T_measurement_base[:3, 3]
+    distance = np.linalg.norm(positions - base, axis=1)
+    names = _names(units, ("x", "y", "z"))
+    far = distance > _ROBOT_REACHES * reach
+    if reach > 0.0 and far.any():
+        row = int(np.argmax(far))
+        look = "it looks like millimetres; call the columns x_mm, y_mm, z_mm" if distance[row] < 1000.0 * _ROBOT_REACHES * reach and units["x"] == "m" else "is its unit right?"
+        table.refuse(f"{names}: this target is {distance[row]:.4g} m from the robot's base, which reaches no further than {reach:.3g} m: {look} (or put the robot's base right)",
+                     row=row)  # fmt: skip
+    if reach > 0.0 and units["x"] == "mm" and (np.linalg.norm(positions, axis=1) < reach / 100.0).all():
+        table.refuse(f"{names}: all targets are within {1000.0 * np.linalg.norm(positions, axis=1).max():.4g} mm of the origin, but the robot reaches {reach:.3g} m: they look like metres; "
+                     "call the columns x_m, y_m, z_m")  # fmt: skip
+
+
 def _names(units: Mapping[str, str], roles: Sequence[str]) -> str:
     return listed([f"{role}_{units[role]}" for role in roles])
 
