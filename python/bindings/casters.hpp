@@ -8,7 +8,6 @@
 
 #include <array>
 #include <functional>
-#include <initializer_list>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -27,6 +26,7 @@
 #include "truing/diagnose.hpp"
 #include "truing/handeye.hpp"
 #include "truing/inverse.hpp"
+#include "truing/streams.hpp"
 #include "truing/truing.hpp"
 
 namespace truing::python {
@@ -216,6 +216,12 @@ Eigen::Isometry3d frame_from(const py::array_t<double, py::array::c_style | py::
 std::vector<Eigen::Isometry3d> frames_from(const FrameArray& given, const std::string& name);
 py::array_t<double> array_from(const std::vector<Eigen::Isometry3d>& frames);
 
+/// Samples from columns: t shape (n,), the others (n, 3) or (n, 4); without arrivals, arrived at once.
+std::vector<ImuSample> imu_samples(const ArrayLike& t, const ArrayLike& gyro, const ArrayLike& accel, const std::optional<ArrayLike>& arrival);
+std::vector<PoseSample> pose_samples(const ArrayLike& t, const ArrayLike& position, const std::optional<ArrayLike>& orientation,
+                                     const std::optional<ArrayLike>& arrival);
+std::vector<FrameSample> frame_samples(const ArrayLike& t, const FrameArray& T, const std::optional<ArrayLike>& arrival, const char* name);
+
 // ---- Sequences and value semantics
 // ---------------------------------------------------------------------------------
 
@@ -263,9 +269,8 @@ inline py::dict keywords_of(const py::object& self, const std::vector<const char
 
 /// `replace`, `copy` and pickling for a class whose constructor takes `fields` as keywords.
 template <class Class>
-void define_value(Class& cls, std::initializer_list<const char*> field_list) {
+void define_value(Class& cls, const std::vector<const char*>& fields) {
   using T = typename Class::type;
-  const std::vector<const char*> fields(field_list);
   cls.def(
       "replace",
       [fields](const py::object& self, const py::KWArgs<py::object>& changes) {
@@ -301,6 +306,8 @@ void bind_diagnose(py::module_& m);
 void bind_distinguish(py::module_& m);
 void bind_handeye(py::module_& m);
 void bind_inverse(py::module_& m);
+void bind_track(py::module_& m);
+void bind_track_calibrate(py::module_& m);
 
 /// A double array of whatever strides, without a copy unless its type or memory layout calls for one.
 py::array float_array(py::handle object, const std::string& name);

@@ -29,4 +29,6 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_distinguish(m);
   truing::python::bind_handeye(m);
   truing::python::bind_inverse(m);
+  truing::python::bind_track(m);
+  truing::python::bind_track_calibrate(m);
 }

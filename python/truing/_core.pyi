@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'Curve', 'Detectable', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'ErrorStatistics', 'FoundEffect', 'Frozen', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'Prediction', 'Reading', 'Residuals', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Solution', 'Solutions', 'SolverSummary', 'Target', 'Task', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'catalogue', 'diagnose', 'distinguish', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'joint_motion', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'joint_motion', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
 class Joint:
     """
     One joint and the link that belongs to it. Lengths in m, angles in rad, masses in kg.
@@ -3844,6 +3844,1770 @@ class Compensator:
         """
         The solver of the nominal robot.
         """
+class FilterOptions:
+    """
+    What the filter takes for granted: noise, gaps, gates. Keywords are the attributes.
+    """
+    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> FilterOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> FilterOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def accel_bias(self) -> float:
+        """
+        [m/s^2]
+        """
+    @accel_bias.setter
+    def accel_bias(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_bias_walk(self) -> float:
+        """
+        [m/s^2/sqrt(s)]
+        """
+    @accel_bias_walk.setter
+    def accel_bias_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_noise(self) -> float:
+        """
+        [m/s^2/sqrt(Hz)]
+        """
+    @accel_noise.setter
+    def accel_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_range(self) -> float:
+        """
+        [m/s^2]
+        """
+    @accel_range.setter
+    def accel_range(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clock_drift(self) -> float:
+        """
+        standard deviation of its drift [s/s]
+        """
+    @clock_drift.setter
+    def clock_drift(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clock_drift_walk(self) -> float:
+        """
+        [1/sqrt(s)]
+        """
+    @clock_drift_walk.setter
+    def clock_drift_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clock_walk(self) -> float:
+        """
+        of the tracker's clock [s/sqrt(s)]
+        """
+    @clock_walk.setter
+    def clock_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def frozen_after(self) -> int:
+        """
+        equal tracker samples in a row, then they are refused
+        """
+    @frozen_after.setter
+    def frozen_after(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def future_limit(self) -> float:
+        """
+        of a stamp against the newest inertial sample [s]
+        """
+    @future_limit.setter
+    def future_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gap_acceleration(self) -> float:
+        """
+        standard deviation of what a gap or saturation hides [m/s^2]
+        """
+    @gap_acceleration.setter
+    def gap_acceleration(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gap_rate(self) -> float:
+        """
+        [rad/s]
+        """
+    @gap_rate.setter
+    def gap_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gate(self) -> float:
+        """
+        tracker samples with a larger normalised innovation squared are outliers
+        """
+    @gate.setter
+    def gate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_bias(self) -> float:
+        """
+        standard deviation before any data [rad/s]
+        """
+    @gyro_bias.setter
+    def gyro_bias(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_bias_walk(self) -> float:
+        """
+        [rad/s/sqrt(s)]
+        """
+    @gyro_bias_walk.setter
+    def gyro_bias_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_noise(self) -> float:
+        """
+        [rad/s/sqrt(Hz)]
+        """
+    @gyro_noise.setter
+    def gyro_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_range(self) -> float:
+        """
+        a component at or beyond is saturated [rad/s]
+        """
+    @gyro_range.setter
+    def gyro_range(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def highest_imu_rate(self) -> float:
+        """
+        sizes the ring buffer [Hz]
+        """
+    @highest_imu_rate.setter
+    def highest_imu_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def highest_pose_rate(self) -> float:
+        """
+        [Hz]
+        """
+    @highest_pose_rate.setter
+    def highest_pose_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def imu_scale(self) -> float:
+        """
+        standard deviation of the scale of gyro and accelerometer, as a share
+        """
+    @imu_scale.setter
+    def imu_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def largest_gap(self) -> float:
+        """
+        between inertial samples, before uncertainty is widened [s]
+        """
+    @largest_gap.setter
+    def largest_gap(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_sigma(self) -> float:
+        """
+        of the tracker, one component [m]
+        """
+    @position_sigma.setter
+    def position_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reacquire_after(self) -> int:
+        """
+        outliers in a row, then the tracker is believed
+        """
+    @reacquire_after.setter
+    def reacquire_after(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def restart_gap(self) -> float:
+        """
+        [s]
+        """
+    @restart_gap.setter
+    def restart_gap(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_sigma(self) -> float:
+        """
+        [rad]
+        """
+    @rotation_sigma.setter
+    def rotation_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slow_position(self) -> float:
+        """
+        standard deviation of the deviation from forward kinematics before any data [m]
+        """
+    @slow_position.setter
+    def slow_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slow_position_walk(self) -> float:
+        """
+        how it wanders [m/sqrt(s)]
+        """
+    @slow_position_walk.setter
+    def slow_position_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slow_rotation(self) -> float:
+        """
+        [rad]
+        """
+    @slow_rotation.setter
+    def slow_rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slow_rotation_walk(self) -> float:
+        """
+        [rad/sqrt(s)]
+        """
+    @slow_rotation_walk.setter
+    def slow_rotation_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sway_correlation(self) -> float:
+        """
+        time over which sway is like itself [s]
+        """
+    @sway_correlation.setter
+    def sway_correlation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sway_position(self) -> float:
+        """
+        standard deviation of the tip about its slow mean, before any data; then as the arm shows it [m]
+        """
+    @sway_position.setter
+    def sway_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sway_rotation(self) -> float:
+        """
+        [rad]
+        """
+    @sway_rotation.setter
+    def sway_rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def window(self) -> float:
+        """
+        measurements up to so late are put at their place [s]
+        """
+    @window.setter
+    def window(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class DeviationOptions:
+    """
+    How the deviation from the plan is modelled. Keywords are the attributes.
+    """
+    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> DeviationOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> DeviationOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def frequency_range(self) -> float:
+        """
+        and how far at most, as a share
+        """
+    @frequency_range.setter
+    def frequency_range(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def frequency_sigma(self) -> float:
+        """
+        standard deviation of the given frequencies, as a share; 0: they stay
+        """
+    @frequency_sigma.setter
+    def frequency_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def frequency_walk(self) -> float:
+        """
+        how they wander, as a share [1/sqrt(s)]
+        """
+    @frequency_walk.setter
+    def frequency_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def grade_time(self) -> float:
+        """
+        over which grades are averaged [s]
+        """
+    @grade_time.setter
+    def grade_time(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def horizon(self) -> float:
+        """
+        for which predictions are graded [s]
+        """
+    @horizon.setter
+    def horizon(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def least_evidence(self) -> float:
+        """
+        predictions of modes are used after so long of grades [s]
+        """
+    @least_evidence.setter
+    def least_evidence(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def mode_noise(self) -> float:
+        """
+        acceleration that drives a mode beside the plan's [m/s^2/sqrt(Hz)]
+        """
+    @mode_noise.setter
+    def mode_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def period(self) -> float:
+        """
+        of the model's steps, on multiples of it [s]
+        """
+    @period.setter
+    def period(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def plan_limit(self) -> float:
+        """
+        plan samples further ahead are refused [s]
+        """
+    @plan_limit.setter
+    def plan_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_noise(self) -> float:
+        """
+        of the filter's position, as the model sees it [m], rotations as 1 m
+        """
+    @position_noise.setter
+    def position_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def settle_time(self) -> float:
+        """
+        after so long no more late samples are waited for, and a prediction is graded [s]
+        """
+    @settle_time.setter
+    def settle_time(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slow_noise(self) -> float:
+        """
+        acceleration that drives the slow part [m/s^2/sqrt(Hz)]
+        """
+    @slow_noise.setter
+    def slow_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def static_time(self) -> float:
+        """
+        over which the static deviation is averaged [s]
+        """
+    @static_time.setter
+    def static_time(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def velocity_noise(self) -> float:
+        """
+        [m/s]
+        """
+    @velocity_noise.setter
+    def velocity_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class WatchOptions:
+    """
+    Watching for jumps of the tracker. Keywords are the attributes.
+    """
+    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> WatchOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> WatchOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def compare(self) -> float:
+        """
+        after a shift, station and receiver are told apart for so long [s]
+        """
+    @compare.setter
+    def compare(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def forget(self) -> float:
+        """
+        after a gap of the tracker longer than this, averages begin anew [s]
+        """
+    @forget.setter
+    def forget(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def threshold(self) -> float:
+        """
+        of averages that are chi-square distributed with six degrees of freedom
+        """
+    @threshold.setter
+    def threshold(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class CorrectionLimits:
+    """
+    Bounds of what is sent to the arm. Keywords are the attributes.
+    """
+    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> CorrectionLimits:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> CorrectionLimits:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def position(self) -> float:
+        """
+        size [m]
+        """
+    @position.setter
+    def position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_jerk(self) -> float:
+        """
+        [m/s^3]
+        """
+    @position_jerk.setter
+    def position_jerk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_rate(self) -> float:
+        """
+        [m/s]
+        """
+    @position_rate.setter
+    def position_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation(self) -> float:
+        """
+        [rad]
+        """
+    @rotation.setter
+    def rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_jerk(self) -> float:
+        """
+        [rad/s^3]
+        """
+    @rotation_jerk.setter
+    def rotation_jerk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_rate(self) -> float:
+        """
+        [rad/s]
+        """
+    @rotation_rate.setter
+    def rotation_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class ImuErrors:
+    """
+    Errors of a simulated inertial sensor. Keywords are the attributes.
+    """
+    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> ImuErrors:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> ImuErrors:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def accel_bias(self) -> float:
+        """
+        [m/s^2]
+        """
+    @accel_bias.setter
+    def accel_bias(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_bias_walk(self) -> float:
+        """
+        [m/s^2/sqrt(s)]
+        """
+    @accel_bias_walk.setter
+    def accel_bias_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_noise(self) -> float:
+        """
+        [m/s^2/sqrt(Hz)]
+        """
+    @accel_noise.setter
+    def accel_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_scale(self) -> float:
+        ...
+    @accel_scale.setter
+    def accel_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_bias(self) -> float:
+        """
+        standard deviation at the start [rad/s]
+        """
+    @gyro_bias.setter
+    def gyro_bias(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_bias_walk(self) -> float:
+        """
+        [rad/s/sqrt(s)]
+        """
+    @gyro_bias_walk.setter
+    def gyro_bias_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_noise(self) -> float:
+        """
+        [rad/s/sqrt(Hz)]
+        """
+    @gyro_noise.setter
+    def gyro_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_scale(self) -> float:
+        """
+        standard deviation of each axis' scale error
+        """
+    @gyro_scale.setter
+    def gyro_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class TrackerErrors:
+    """
+    Errors of a simulated tracker, and of its way to the computer. Keywords are the attributes.
+    """
+    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> TrackerErrors:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> TrackerErrors:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def clock_drift(self) -> float:
+        """
+        [s/s]
+        """
+    @clock_drift.setter
+    def clock_drift(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clock_offset(self) -> float:
+        """
+        t_tracker = t_imu * (1 + clock_drift) + clock_offset [s]
+        """
+    @clock_offset.setter
+    def clock_offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def latency(self) -> float:
+        """
+        [s]
+        """
+    @latency.setter
+    def latency(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def latency_jitter(self) -> float:
+        """
+        standard deviation, never before the sample was taken [s]
+        """
+    @latency_jitter.setter
+    def latency_jitter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def lost(self) -> float:
+        """
+        share of single samples that never arrive
+        """
+    @lost.setter
+    def lost(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def out_of_order(self) -> float:
+        """
+        share of the samples that take 25 ms more
+        """
+    @out_of_order.setter
+    def out_of_order(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_noise(self) -> float:
+        """
+        of one component [m]
+        """
+    @position_noise.setter
+    def position_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_noise(self) -> float:
+        """
+        of one component [rad]
+        """
+    @rotation_noise.setter
+    def rotation_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class TrackSetup:
+    """
+    Where things are, and how clocks differ. `T_a_b` maps b-coordinates into a, shape=(4, 4).
+    
+    t_imu = t_tracker - clock_offset = t_controller - controller_clock_offset; joints are where the plan was `actuator_lag` ago.
+    """
+    def __init__(self, *, T_tracker_base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_receiver: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_tool: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_imu: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, clock_offset_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0, controller_clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, actuator_lag: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> TrackSetup:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> TrackSetup:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def T_flange_imu(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4)
+        """
+    @T_flange_imu.setter
+    def T_flange_imu(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+        ...
+    @property
+    def T_flange_receiver(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4)
+        """
+    @T_flange_receiver.setter
+    def T_flange_receiver(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+        ...
+    @property
+    def T_flange_tool(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4)
+        """
+    @T_flange_tool.setter
+    def T_flange_tool(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+        ...
+    @property
+    def T_tracker_base(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4)
+        """
+    @T_tracker_base.setter
+    def T_tracker_base(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+        ...
+    @property
+    def actuator_lag(self) -> float:
+        """
+        [s] joints are where the plan was so long ago.
+        """
+    @actuator_lag.setter
+    def actuator_lag(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clock_offset(self) -> float:
+        """
+        [s] t_imu = t_tracker - clock_offset
+        """
+    @clock_offset.setter
+    def clock_offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clock_offset_sigma(self) -> float:
+        """
+        [s] its standard error; 0: known, and not estimated.
+        """
+    @clock_offset_sigma.setter
+    def clock_offset_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def controller_clock_offset(self) -> float:
+        """
+        [s] t_imu = t_controller - controller_clock_offset
+        """
+    @controller_clock_offset.setter
+    def controller_clock_offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gravity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,) [m/s^2] in the base frame.
+        """
+    @gravity.setter
+    def gravity(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+class ModalModel:
+    """
+    Sway as damped modes, x'' + 2 zeta omega x' + omega^2 x = gain a_plan + noise, for each component of the deviation from the plan.
+    
+    frequency: shape=(n,) [Hz], n at most 4. damping: shape=(n,) ratio. gain: shape=(n, 6, 3) [-], [rad/m]; None: 0. frequency_sigma: shape=(n,) [Hz] standard error; None: 0.
+    """
+    def __init__(self, frequency: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], gain: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, frequency_sigma: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> ModalModel:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> ModalModel:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def count(self) -> int:
+        """
+        Number of modes.
+        """
+    @property
+    def damping(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) ratios.
+        """
+    @property
+    def frequency(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [Hz], undamped.
+        """
+    @property
+    def frequency_sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n,) [Hz] standard errors.
+        """
+    @property
+    def gain(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, 6, 3): per planned acceleration in the frame of the planned inertial sensor; translation [-], rotation [rad/m].
+        """
+class ModesResult:
+    """
+    What `identify_modes` found.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def error(self) -> tuple[float, ...]:
+        """
+        [m] rms of predictions twice the horizon ahead: of no change, with one mode, two ...
+        """
+    @property
+    def model(self) -> ModalModel:
+        """
+        The modes.
+        """
+    @property
+    def rows(self) -> float:
+        """
+        Number of rows used.
+        """
+    @property
+    def stopped_because(self) -> str:
+        """
+        Why there are no more modes.
+        """
+class TrackOptions:
+    """
+    How `Tracker` works.
+    """
+    def __init__(self, *, filter: FilterOptions = ..., deviation: DeviationOptions = ..., watch: WatchOptions = ..., modes: ModalModel = ..., limits: CorrectionLimits = ..., coast_position: typing.SupportsFloat | typing.SupportsIndex = 0.03, coast_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.02, imu_timeout: typing.SupportsFloat | typing.SupportsIndex = 0.1, joints_timeout: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> TrackOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> TrackOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def coast_position(self) -> float:
+        """
+        [m] without the tracker, estimates with a larger standard deviation are not used.
+        """
+    @coast_position.setter
+    def coast_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def coast_rotation(self) -> float:
+        """
+        [rad]
+        """
+    @coast_rotation.setter
+    def coast_rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def deviation(self) -> DeviationOptions:
+        """
+        The model of the deviation from the plan.
+        """
+    @deviation.setter
+    def deviation(self, arg0: DeviationOptions) -> None:
+        ...
+    @property
+    def filter(self) -> FilterOptions:
+        """
+        Noise, gaps, gates.
+        """
+    @filter.setter
+    def filter(self, arg0: FilterOptions) -> None:
+        ...
+    @property
+    def imu_timeout(self) -> float:
+        """
+        [s] the inertial sensor is taken for dead when it is so much older than the joints.
+        """
+    @imu_timeout.setter
+    def imu_timeout(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def joints_timeout(self) -> float:
+        """
+        [s]
+        """
+    @joints_timeout.setter
+    def joints_timeout(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def limits(self) -> CorrectionLimits:
+        """
+        Bounds of corrections.
+        """
+    @limits.setter
+    def limits(self, arg0: CorrectionLimits) -> None:
+        ...
+    @property
+    def modes(self) -> ModalModel:
+        """
+        Of `identify_modes`; none: predictions at constant acceleration.
+        """
+    @modes.setter
+    def modes(self, arg0: ModalModel) -> None:
+        ...
+    @property
+    def watch(self) -> WatchOptions:
+        """
+        Watching for jumps of the tracker.
+        """
+    @watch.setter
+    def watch(self, arg0: WatchOptions) -> None:
+        ...
+class PosePrediction:
+    """
+    The tool at time `t`, as known at time `made`; the inertial sensor's clock.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_base_tool(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4)
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+        """
+        shape=(6, 6), of position [m] and rotation vector [rad] about the base frame's axes.
+        """
+    @property
+    def made(self) -> float:
+        """
+        [s]
+        """
+    @property
+    def predictor(self) -> typing.Literal['slow', 'acceleration', 'modes']:
+        """
+        What it was made by: 'slow', 'acceleration', 'modes'.
+        """
+    @property
+    def status(self) -> typing.Literal['valid', 'coasting', 'hold', 'lost']:
+        """
+        'valid', 'coasting' (the tracker is away), 'hold' (forward kinematics and the last static deviation), 'lost'.
+        """
+    @property
+    def t(self) -> float:
+        """
+        [s]
+        """
+class Compensation:
+    """
+    What to add to the plan so that the tool is where it was planned.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_base_flange(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4): corrected.
+        """
+    @property
+    def T_base_tool_planned(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4)
+        """
+    @property
+    def correction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
+        """
+        shape=(6,): the same within the limits.
+        """
+    @property
+    def has_plan(self) -> bool:
+        """
+        False: the plan does not reach that far, and nothing is corrected.
+        """
+    @property
+    def limited(self) -> bool:
+        """
+        The two differ by more than 1 mm or 1 mrad.
+        """
+    @property
+    def predicted(self) -> PosePrediction:
+        """
+        The prediction behind it.
+        """
+    @property
+    def wanted(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
+        """
+        shape=(6,) [m], rotation vector [rad]: the correction in the base frame.
+        """
+class ClockEstimate:
+    """
+    The tracker's clock: t_imu = t_tracker - offset.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def drift(self) -> float:
+        """
+        [s/s]
+        """
+    @property
+    def offset(self) -> float:
+        """
+        [s]
+        """
+    @property
+    def sigma(self) -> float:
+        """
+        [s]
+        """
+class Shift:
+    """
+    The last jump of the tracker that was noticed.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def cause(self) -> typing.Literal['station_or_receiver', 'station', 'receiver']:
+        """
+        'station' (constant in the tracker frame), 'receiver' (constant on the flange), or not told apart (yet).
+        """
+    @property
+    def count(self) -> int:
+        """
+        Since the start; 0: none, and the rest means nothing.
+        """
+    @property
+    def flagged(self) -> float:
+        """
+        [s] stamp of the tracker sample that it was noticed by.
+        """
+    @property
+    def jump(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
+        """
+        shape=(6,) [m], rotation vector [rad]: of the receiver as measured, base frame.
+        """
+    @property
+    def odds(self) -> float:
+        """
+        Logarithm of the odds of station against receiver.
+        """
+    @property
+    def t(self) -> float:
+        """
+        [s] when it happened, the inertial sensor's clock.
+        """
+class Tracker:
+    """
+    Fusion and prediction, sample by sample. Samples may come late, twice, or out of order within the window: the result is the same.
+    
+    Stamps are of each device's own clock; the answers' times are of the inertial sensor's. Refused samples change nothing. Not for two threads at once.
+    """
+    def __init__(self, setup: TrackSetup, options: TrackOptions | None = None) -> None:
+        """
+        Raises InputError on options that make no sense.
+        """
+    def compensate(self, t: typing.SupportsFloat | typing.SupportsIndex) -> Compensation:
+        """
+        Prediction, and the correction that it asks for, within limits; to be called at growing times. t: [s].
+        """
+    def predict(self, t: typing.SupportsFloat | typing.SupportsIndex) -> PosePrediction:
+        """
+        The tool at a time of the inertial sensor's clock, past (within the window), now or to come. t: [s].
+        """
+    def push_imu(self, t: typing.SupportsFloat | typing.SupportsIndex, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> typing.Literal['accepted', 'accepted_gap', 'accepted_saturated', 'accepted_restart', 'duplicate', 'backwards', 'future', 'too_late', 'not_finite', 'not_unit', 'frozen']:
+        """
+        t: [s]. gyro: shape=(3,) [rad/s]. accel: shape=(3,) [m/s^2], specific force, +9.81 upward at rest; both in the sensor frame.
+        """
+    def push_imu_rows(self, t: numpy.typing.ArrayLike, gyro: numpy.typing.ArrayLike, accel: numpy.typing.ArrayLike) -> tuple[typing.Literal['accepted', 'accepted_gap', 'accepted_saturated', 'accepted_restart', 'duplicate', 'backwards', 'future', 'too_late', 'not_finite', 'not_unit', 'frozen'], ...]:
+        """
+        Many at once: shape=(n,), (n, 3), (n, 3). What became of each.
+        """
+    def push_joints(self, t: typing.SupportsFloat | typing.SupportsIndex, T_base_flange: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> typing.Literal['accepted', 'accepted_gap', 'accepted_saturated', 'accepted_restart', 'duplicate', 'backwards', 'future', 'too_late', 'not_finite', 'not_unit', 'frozen']:
+        """
+        t: [s] the controller's stamp. T_base_flange: shape=(4, 4), forward kinematics of the encoders.
+        """
+    def push_plan(self, t: typing.SupportsFloat | typing.SupportsIndex, T_base_tool: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> typing.Literal['accepted', 'accepted_gap', 'accepted_saturated', 'accepted_restart', 'duplicate', 'backwards', 'future', 'too_late', 'not_finite', 'not_unit', 'frozen']:
+        """
+        t: [s] the controller's clock, ahead of its time and in order. T_base_tool: shape=(4, 4), planned.
+        """
+    def push_pose(self, t: typing.SupportsFloat | typing.SupportsIndex, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], orientation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"] | None = None) -> typing.Literal['accepted', 'accepted_gap', 'accepted_saturated', 'accepted_restart', 'duplicate', 'backwards', 'future', 'too_late', 'not_finite', 'not_unit', 'frozen']:
+        """
+        t: [s] the tracker's stamp. position: shape=(3,) [m], orientation: shape=(4,) w x y z, the receiver in the tracker frame; None: the tracker gives none.
+        """
+    def push_pose_rows(self, t: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, orientation: numpy.typing.ArrayLike | None = None) -> tuple[typing.Literal['accepted', 'accepted_gap', 'accepted_saturated', 'accepted_restart', 'duplicate', 'backwards', 'future', 'too_late', 'not_finite', 'not_unit', 'frozen'], ...]:
+        """
+        Many at once: shape=(n,), (n, 3), (n, 4).
+        """
+    def set_modes(self, modes: ModalModel) -> None:
+        """
+        Raises InputError.
+        """
+    def take_innovations(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        Settled tracker samples against what was expected of them, since the last call: t [s], nis, dimensions, accepted (1 or 0).
+        """
+    def take_rows(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        Settled rows since the last call, for `identify_modes`: its arguments by name. Call often: few are kept.
+        """
+    @property
+    def clock(self) -> ClockEstimate:
+        """
+        The tracker's clock as it is now estimated.
+        """
+    @property
+    def counters(self) -> dict[str, dict[str, int]]:
+        """
+        Samples by stream and outcome.
+        """
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """
+        [Hz] of the modes, as tracked; 0 beyond them.
+        """
+    @property
+    def now(self) -> float:
+        """
+        [s] stamp of the newest inertial sample.
+        """
+    @property
+    def shift(self) -> Shift:
+        """
+        The last jump of the tracker. After one the filter follows the tracker: calibrate anew.
+        """
+class RecordedStreams:
+    """
+    A recording: samples of all devices, each with its stamp and its arrival. Build it with `streams` or by `set_...`.
+    """
+    def __init__(self) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def set_flange(self, t: numpy.typing.ArrayLike, T_base_flange: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], arrival: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        T_base_flange: shape=(n, 4, 4), forward kinematics of the encoders.
+        """
+    def set_imu(self, t: numpy.typing.ArrayLike, gyro: numpy.typing.ArrayLike, accel: numpy.typing.ArrayLike, arrival: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        t, arrival: shape=(n,) [s]. gyro, accel: shape=(n, 3) [rad/s], [m/s^2]. arrival None: at once.
+        """
+    def set_plan(self, t: numpy.typing.ArrayLike, T_base_tool: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], arrival: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        T_base_tool: shape=(n, 4, 4), planned.
+        """
+    def set_tracker(self, t: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, orientation: numpy.typing.ArrayLike | None = None, arrival: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        position: shape=(n, 3) [m]. orientation: shape=(n, 4) w x y z, or None.
+        """
+    @property
+    def counts(self) -> dict[str, int]:
+        """
+        Samples by stream.
+        """
+class CompensationRow:
+    """
+    A row of the plan: what to add there.
+    """
+    @property
+    def compensation(self) -> Compensation:
+        ...
+    @property
+    def made(self) -> bool:
+        """
+        False: the streams do not reach there.
+        """
+    @property
+    def t(self) -> float:
+        """
+        [s] when the tool is to be there, the inertial sensor's clock.
+        """
+class ReplayResult:
+    """
+    What a replay gave. Times are of the inertial sensor's clock.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def clock(self) -> ClockEstimate:
+        """
+        At the end.
+        """
+    @property
+    def compensation(self) -> dict[str, typing.Any]:
+        """
+        The same as columns: made (bool), t, made_at [s], T_base_tool, T_base_tool_planned, T_base_flange (n, 4, 4), correction, wanted (n, 6), covariance (n, 36), limited, status, predictor.
+        """
+    @property
+    def counters(self) -> dict[str, dict[str, int]]:
+        """
+        Samples by stream and outcome.
+        """
+    @property
+    def graded(self) -> dict[str, typing.Any]:
+        """
+        Predictions against the tracker's later samples, measured minus predicted receiver in the base frame: t, made_at, horizon [s], dimensions (0: lost), position (n, 3) [m], rotation (n, 3) [rad], position_sigma (n, 3) [m], squares, the errors [m] of hold, velocity, fk, fk_velocity (infinite: not to be had), status, predictor.
+        """
+    @property
+    def innovations(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        Tracker samples against the filter: t [s], nis, dimensions, accepted.
+        """
+    @property
+    def modes(self) -> ModesResult:
+        """
+        Identified in the replay; no modes where none were asked for.
+        """
+    @property
+    def modes_from(self) -> float:
+        """
+        [s] they are used from then on; 0: never.
+        """
+    @property
+    def rows(self) -> tuple[CompensationRow, ...]:
+        """
+        One for each row of the plan.
+        """
+    @property
+    def shifts(self) -> tuple[Shift, ...]:
+        """
+        Jumps of the tracker.
+        """
+    @property
+    def timeline(self) -> dict[str, typing.Any]:
+        """
+        Every tenth of a second: t, offset, sigma [s], drift [s/s] of the tracker's clock, frequencies (n, 4) [Hz], status, predictor.
+        """
+class FlexibleMode:
+    """
+    A flexible mode of a simulated arm; vectors in the base axes, slewed with the first joint. See stream_simulation.hpp.
+    """
+    def __init__(self, *, frequency: typing.SupportsFloat | typing.SupportsIndex, damping: typing.SupportsFloat | typing.SupportsIndex, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], participation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], gust: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> FlexibleMode:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> FlexibleMode:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def damping(self) -> float:
+        """
+        Ratio.
+        """
+    @damping.setter
+    def damping(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def direction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,): of the tip's motion, per unit of the mode.
+        """
+    @direction.setter
+    def direction(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def frequency(self) -> float:
+        """
+        [Hz] undamped, at the reference reach.
+        """
+    @frequency.setter
+    def frequency(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gust(self) -> float:
+        """
+        [m] standard deviation of the sway that gusts alone would make.
+        """
+    @gust.setter
+    def gust(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def participation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,): share of the tip's acceleration that drives it.
+        """
+    @participation.setter
+    def participation(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,) [rad/m]: of the tip, per unit of the mode.
+        """
+    @rotation.setter
+    def rotation(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+class StreamSimulationOptions:
+    """
+    A simulated recording; see the attributes.
+    """
+    def __init__(self, *, seconds: typing.SupportsFloat | typing.SupportsIndex = 60.0, motion: typing.Literal['still', 'gentle', 'stop-and-go'] = 'gentle', tip_speed: typing.SupportsFloat | typing.SupportsIndex = 0.3, imu_rate: typing.SupportsFloat | typing.SupportsIndex = 1000.0, tracker_rate: typing.SupportsFloat | typing.SupportsIndex = 100.0, joint_rate: typing.SupportsFloat | typing.SupportsIndex = 250.0, plan_rate: typing.SupportsFloat | typing.SupportsIndex = 100.0, plan_ahead: typing.SupportsFloat | typing.SupportsIndex = 0.5, joint_noise: typing.SupportsFloat | typing.SupportsIndex = 2e-06, actuator_lag: typing.SupportsFloat | typing.SupportsIndex = 0.04, modes: collections.abc.Sequence[FlexibleMode] = [], imu: ImuErrors = ..., tracker: TrackerErrors = ..., dropouts: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = [], shifts: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]]] = [], setup: TrackSetup | None = None, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> StreamSimulationOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> StreamSimulationOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def actuator_lag(self) -> float:
+        """
+        [s] joints follow the plan so late.
+        """
+    @actuator_lag.setter
+    def actuator_lag(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def dropouts(self) -> tuple[tuple[float, float], ...]:
+        """
+        Of the tracker: start and length [s].
+        """
+    @property
+    def imu(self) -> ImuErrors:
+        """
+        Errors of the inertial sensor.
+        """
+    @imu.setter
+    def imu(self, arg0: ImuErrors) -> None:
+        ...
+    @property
+    def imu_rate(self) -> float:
+        """
+        [Hz]
+        """
+    @imu_rate.setter
+    def imu_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def joint_noise(self) -> float:
+        """
+        [rad | m] standard deviation of encoder readings.
+        """
+    @joint_noise.setter
+    def joint_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def joint_rate(self) -> float:
+        """
+        [Hz]
+        """
+    @joint_rate.setter
+    def joint_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def modes(self) -> tuple[FlexibleMode, ...]:
+        """
+        Empty: those of a large boom.
+        """
+    @property
+    def motion(self) -> typing.Literal['still', 'gentle', 'stop-and-go']:
+        """
+        'still', 'gentle' (slow waves of all joints) or 'stop-and-go' (jerk-limited moves with rests).
+        """
+    @motion.setter
+    def motion(self, arg0: typing.Literal['still', 'gentle', 'stop-and-go']) -> None:
+        ...
+    @property
+    def plan_ahead(self) -> float:
+        """
+        [s] a planned pose is known so long before.
+        """
+    @plan_ahead.setter
+    def plan_ahead(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def plan_rate(self) -> float:
+        """
+        [Hz]
+        """
+    @plan_rate.setter
+    def plan_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seconds(self) -> float:
+        """
+        [s]
+        """
+    @seconds.setter
+    def seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of everything that is drawn.
+        """
+    @seed.setter
+    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def setup(self) -> TrackSetup | None:
+        """
+        Where the sensors truly are; None: as on a large arm.
+        """
+    @property
+    def shifts(self) -> tuple[tuple[float, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]], ...]:
+        """
+        From a time [s] on the tracker frame is another: T_old_new, shape=(4, 4).
+        """
+    @property
+    def tip_speed(self) -> float:
+        """
+        [m/s] rms of a gentle motion, highest of stop-and-go.
+        """
+    @tip_speed.setter
+    def tip_speed(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tracker(self) -> TrackerErrors:
+        """
+        Errors of the tracker.
+        """
+    @tracker.setter
+    def tracker(self, arg0: TrackerErrors) -> None:
+        ...
+    @property
+    def tracker_rate(self) -> float:
+        """
+        [Hz]
+        """
+    @tracker_rate.setter
+    def tracker_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class SimulatedStreams:
+    """
+    Streams of a simulated arm, with their truth. Every stream is sorted by arrival.
+    """
+    def __repr__(self) -> str:
+        ...
+    def tool_at(self, t: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(n, 4, 4): the true tool in the base frame. t: shape=(n,) [s], the inertial sensor's clock.
+        """
+    @property
+    def flange(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        t, T_base_flange, arrival: forward kinematics of the joints.
+        """
+    @property
+    def imu(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        t, gyro, accel, arrival: arguments of `RecordedStreams.set_imu`.
+        """
+    @property
+    def joints(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        t, joints (n, driven joints), arrival.
+        """
+    @property
+    def modes(self) -> tuple[FlexibleMode, ...]:
+        """
+        As they were drawn.
+        """
+    @property
+    def plan(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        t, T_base_tool, arrival.
+        """
+    @property
+    def recorded(self) -> RecordedStreams:
+        """
+        What a recording would hold.
+        """
+    @property
+    def setup(self) -> TrackSetup:
+        """
+        True frames, clock offset at t = 0.
+        """
+    @property
+    def tracker(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        t, position, orientation (w x y z), arrival.
+        """
+class RestPose:
+    """
+    A standstill, averaged.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_base_flange(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4)
+        """
+    @property
+    def T_tracker_receiver(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        shape=(4, 4)
+        """
+    @property
+    def end(self) -> float:
+        """
+        [s]
+        """
+    @property
+    def samples(self) -> int:
+        """
+        Of the tracker.
+        """
+    @property
+    def scatter(self) -> float:
+        """
+        [m] of the tracker's position, rms of a component: noise and sway.
+        """
+    @property
+    def start(self) -> float:
+        """
+        [s] the controller's clock.
+        """
+class PositionError:
+    """
+    How far a test position is from the frames found, and what it counted.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def position(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def rotation(self) -> float:
+        """
+        [rad]
+        """
+    @property
+    def weight(self) -> float:
+        """
+        About 1 where errors are usual, towards 0 where they are large.
+        """
+class FramesResult:
+    """
+    Tracker frame and receiver, of `calibrate_frames`.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_flange_receiver(self) -> UncertainFrame:
+        """
+        With covariance.
+        """
+    @property
+    def T_tracker_base(self) -> UncertainFrame:
+        """
+        With covariance.
+        """
+    @property
+    def errors(self) -> tuple[PositionError, ...]:
+        """
+        One per position.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Of the refinement.
+        """
+    @property
+    def message(self) -> str:
+        """
+        One sentence.
+        """
+    @property
+    def position_sigma(self) -> float:
+        """
+        [m] usual error of one component.
+        """
+    @property
+    def rotation_sigma(self) -> float:
+        """
+        [rad]
+        """
+    @property
+    def status(self) -> typing.Literal['done', 'not observable', 'not consistent', 'not converged']:
+        """
+        'done', 'not observable', 'not consistent' (the message names the reading that would close), 'not converged'.
+        """
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """
+        What to know or do.
+        """
+class ToolResult:
+    """
+    The tool on the flange, of `calibrate_tool`.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_flange_tool(self) -> UncertainFrame:
+        """
+        With covariance.
+        """
+    @property
+    def message(self) -> str:
+        """
+        One sentence.
+        """
+    @property
+    def orientation_error(self) -> tuple[float, ...]:
+        """
+        [rad] of every orientation pose.
+        """
+    @property
+    def pivot_error(self) -> tuple[float, ...]:
+        """
+        [m] of every pivot pose.
+        """
+    @property
+    def point(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,) [m] where the tip was, in the base.
+        """
+    @property
+    def status(self) -> typing.Literal['done', 'not observable', 'not consistent', 'not converged']:
+        """
+        'done' or 'not observable'.
+        """
+class InertialResult:
+    """
+    Inertial sensor, gravity and clock, of `calibrate_inertial`.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T_receiver_imu(self) -> UncertainFrame:
+        """
+        With covariance.
+        """
+    @property
+    def accel_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,) [m/s^2]
+        """
+    @property
+    def advice(self) -> str:
+        """
+        What would make it so.
+        """
+    @property
+    def clock_offset(self) -> float:
+        """
+        [s] t_imu = t_tracker - clock_offset
+        """
+    @property
+    def clock_offset_sigma(self) -> float:
+        """
+        [s] standard error.
+        """
+    @property
+    def gravity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,) [m/s^2] in the tracker frame.
+        """
+    @property
+    def gravity_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        shape=(3, 3)
+        """
+    @property
+    def gyro_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,) [rad/s]
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Of the fit.
+        """
+    @property
+    def message(self) -> str:
+        """
+        One sentence.
+        """
+    @property
+    def position_rms(self) -> float:
+        """
+        [m] of one component, what is left.
+        """
+    @property
+    def rich_enough(self) -> bool:
+        """
+        The offset is known as well as wanted.
+        """
+    @property
+    def rotation_rate(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        shape=(3,) [rad/s] rms about the three principal axes, descending.
+        """
+    @property
+    def rotation_rms(self) -> float:
+        """
+        [rad]
+        """
+    @property
+    def status(self) -> typing.Literal['done', 'not observable', 'not consistent', 'not converged']:
+        """
+        'done', 'not observable', 'not consistent', 'not converged'.
+        """
+    @property
+    def tracker_up(self) -> str:
+        """
+        The tracker's axis that points up: '+z', '+y', ...
+        """
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """
+        What to know or do.
+        """
+def assemble_setup(frames: FramesResult, inertial: InertialResult, tool: ToolResult | None = None) -> tuple[TrackSetup, list[str]]:
+    """
+    The parts put together, gravity in the base frame; and what to know, as a base that is not level. Without `tool` it is the flange.
+    """
+def calibrate_frames(T_base_flange: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], T_tracker_receiver: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"]) -> FramesResult:
+    """
+    Tracker frame and receiver on the flange from test positions: closed form, then least squares in which every position counts by its own error.
+    
+    T_base_flange, T_tracker_receiver: shape=(n, 4, 4). Raises InputError.
+    """
+def calibrate_inertial(t: numpy.typing.ArrayLike, gyro: numpy.typing.ArrayLike, accel: numpy.typing.ArrayLike, tracker_t: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, orientation: numpy.typing.ArrayLike, *, clock_search: typing.SupportsFloat | typing.SupportsIndex = 2.0, clock_wanted: typing.SupportsFloat | typing.SupportsIndex = 0.001, segment: typing.SupportsFloat | typing.SupportsIndex = 2.0, gyro_bias: typing.SupportsFloat | typing.SupportsIndex = 0.05, accel_bias: typing.SupportsFloat | typing.SupportsIndex = 0.1, max_iterations: typing.SupportsInt | typing.SupportsIndex = 30) -> InertialResult:
+    """
+    Where the inertial sensor is on the receiver, gravity, and the offset of the clocks, from one motion that both saw.
+    
+    t, gyro, accel: shape=(n,) [s], (n, 3) [rad/s], (n, 3) [m/s^2]. tracker_t, position, orientation: shape=(m,) [s], (m, 3) [m], (m, 4) w x y z.
+    clock_search: [s] offsets up to this are looked for. clock_wanted: [s] a larger standard error is not enough, and advice is given.
+    segment: [s] inertial data are integrated over so long. gyro_bias, accel_bias: [rad/s], [m/s^2] standard deviations before any data.
+    
+    Raises InputError on data that cannot be used.
+    """
+def calibrate_tool(pivot: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], orientation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"] | None = None, prescribed: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]] = []) -> ToolResult:
+    """
+    The tool from poses of the flange.
+    
+    pivot: shape=(n, 4, 4), the tool tip on one point in three or more orientations.
+    orientation: shape=(m, 4, 4), the tool in prescribed orientations; None: the flange's axes are the tool's. prescribed: R_base_tool of those, shape=(3, 3) each.
+    
+    Raises InputError.
+    """
 def catalogue() -> list[tuple[str, str]]:
     """
     Name and summary of the effects that truing knows.
@@ -3859,6 +5623,20 @@ def distinguish(robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, n
     Before any data: which effects a plan can tell apart, how small it would still see them, and the poses to add.
     
     Raises InputError: unknown effects, joints or columns.
+    """
+def find_rests(t: numpy.typing.ArrayLike, T_base_flange: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], tracker_t: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, orientation: numpy.typing.ArrayLike, *, least: typing.SupportsFloat | typing.SupportsIndex = 2.0, margin: typing.SupportsFloat | typing.SupportsIndex = 0.5, moved_by: typing.SupportsFloat | typing.SupportsIndex = 0.0005, turned_by: typing.SupportsFloat | typing.SupportsIndex = 0.0005, clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> tuple[RestPose, ...]:
+    """
+    Standstills of forward kinematics, with what the tracker saw during them.
+    
+    t, tracker_t: shape=(n,), shape=(m,) [s]. T_base_flange: shape=(n, 4, 4). position: shape=(m, 3) [m]. orientation: shape=(m, 4) w x y z.
+    least: [s] shorter ones do not count: sway has to average out. margin: [s] left out after the arm has stopped and before it starts.
+    moved_by, turned_by: [m], [rad] the flange stays within these. clock_offset: [s] t_controller = t_tracker - clock_offset.
+    
+    Raises InputError.
+    """
+def flange_poses(robot: Robot, joints: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    shape=(n, 4, 4): the frame after the last link in the robot base. joints: shape=(n, driven joints) [rad | m].
     """
 def forward_kinematics(robot: Robot, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], target: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -3923,9 +5701,26 @@ def identify(robot: Robot, data: Measurements, options: IdentifyOptions | None =
     
     A fit that did not converge returns with solver.converged == False.
     """
+def identify_modes(t: numpy.typing.ArrayLike, deviation: numpy.typing.ArrayLike, rate: numpy.typing.ArrayLike, plan_acceleration: numpy.typing.ArrayLike, options: DeviationOptions | None = None, most: typing.SupportsInt | typing.SupportsIndex = 4, worth: typing.SupportsFloat | typing.SupportsIndex = 0.03) -> ModesResult:
+    """
+    Frequencies, damping and gains of the sway from what `Tracker.take_rows` gave over a recording.
+    
+    t: shape=(n,) [s], `options.period` apart. deviation, rate: shape=(n, 6) [m, rad], [m/s, rad/s]. plan_acceleration: shape=(n, 3) [m/s^2].
+    most: at most so many modes; another is taken while it lowers the error of predictions by at least the share `worth`.
+    
+    Raises InputError on fewer than 500 rows.
+    """
 def joint_motion(robot: Robot, data: Measurements, joint: str) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     """
     shape=(n,) [rad | m]: motion of a joint as read, of a passive one from its drivers' readings. Raises InputError.
+    """
+def large_boom() -> Robot:
+    """
+    A concrete pump's or crane's arm in its plane: slew, luff, elbow and a levelled tip, 12 m of reach.
+    """
+def large_boom_modes() -> tuple[FlexibleMode, ...]:
+    """
+    Four modes from 0.6 to 6 Hz: lateral, vertical, lateral, vertical.
     """
 def nearest_contact(scene: Scene, robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], target: typing.SupportsInt | typing.SupportsIndex = 0) -> Contact:
     """
@@ -3952,6 +5747,16 @@ def project(camera: Camera, points: numpy.typing.ArrayLike) -> numpy.typing.NDAr
     """
     Pixels, shape=(m, 2), of points in the camera frame, shape=(m, 3) [m]; z looks out of the lens, x right, y down.
     """
+def replay(streams: RecordedStreams, setup: TrackSetup, options: TrackOptions | None = None, *, horizons: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [0.02, 0.04, 0.08], learn_modes: typing.SupportsFloat | typing.SupportsIndex = 0.0, progress: collections.abc.Callable[[float], bool] | None = None) -> ReplayResult:
+    """
+    Plays a recording as it would have gone on the day: nothing is used before it arrived.
+    
+    horizons: [s] at which predictions are graded against the tracker's later samples. Compensations are made `options.deviation.horizon` ahead.
+    learn_modes: [s] modes are identified from so much of the recording's start and used from then on; 0: never.
+    progress: called with the share that is done; it returns False to stop. Ctrl-C stops as well.
+    
+    Raises InputError.
+    """
 def residuals(robot: Robot, data: Measurements, own_effects: collections.abc.Sequence[OwnEffect] = [], threads: typing.SupportsInt | typing.SupportsIndex = 0) -> Residuals:
     """
     Predicted minus measured, NaN where not measured. Raises InputError.
@@ -3975,6 +5780,10 @@ def rotation_from_rpy(rpy: typing.Annotated[numpy.typing.ArrayLike, numpy.float6
 def rpy_from_rotation(rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
     """
     Roll, pitch and yaw of a rotation: shape=(3, 3) to shape=(3,) [rad]. At pitch = +-pi/2 roll is 0.
+    """
+def simulate_streams(robot: Robot, options: StreamSimulationOptions | None = None) -> SimulatedStreams:
+    """
+    Streams of an arm that sways, with known truth; shares no equation with the filter. Raises InputError on options that make no sense.
     """
 def urdf_with_calibration(urdf_text: str, calibrated: Robot, base_link: str = '', tip_link: str = '') -> str:
     """

@@ -36,6 +36,8 @@ Result = TypeVar("Result")
 
 _HELP = "Find how a real robot differs from its model, name the cause, and remove it."
 app = typer.Typer(name="truing", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=_HELP)
+_track = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help="Say where the tool of a swaying arm will be, and what to add to the plan.")
+app.add_typer(_track, name="track")
 
 # Of a click error: in which package click lives is typer's business.
 _ClickException: type[Exception] = typer.BadParameter.__mro__[2]
@@ -127,6 +129,14 @@ class ChooseName(str, Enum):
     limits_margin = "limits_margin"
     manipulability = "manipulability"
     rail_travel = "rail_travel"
+
+
+class MotionName(str, Enum):
+    """--motion"""
+
+    still = "still"
+    gentle = "gentle"
+    stop_and_go = "stop-and-go"
 
 
 class ExamSet(str, Enum):
@@ -378,17 +388,27 @@ def simulate(
     rotation_noise: Annotated[str, typer.Option(help="Standard deviation of measured orientations about each axis.")] = "0.1mrad",
     plan: Annotated[Optional[Path], typer.Option(metavar="POSES.csv", help="Measure these poses (columns q1_rad …) instead.", show_default=False)] = None,
     base_unknown: Annotated[bool, typer.Option("--base-unknown", help="Put the robot somewhere unknown in the measurement frame.")] = False,
+    stream: Annotated[bool, typer.Option("--stream", help="A recording of the swaying arm instead: inertial sensor, tracker, joints, plan. The options below are about it, those above are not.")] = False,
+    seconds: Annotated[str, typer.Option(help="With --stream: how long.")] = "60s",
+    motion: Annotated[MotionName, typer.Option(help="With --stream: slow waves of all joints, moves with rests, or gusts only.")] = MotionName.gentle,
+    tip_speed: Annotated[str, typer.Option(help="With --stream: rms speed of the tip, its highest in stop-and-go.")] = "0.3m/s",
+    clock_offset: Annotated[str, typer.Option(help="With --stream: of the tracker's clock; setup.yaml does not know it.")] = "0ms",
+    dropout: Annotated[Optional[list[str]], typer.Option(help="With --stream: the tracker is away from a time on, 20s:2s; may be repeated.", show_default=False)] = None,
+    station_shift: Annotated[str, typer.Option(help="With --stream: from a time on the tracker frame is another, 30s:5mm:0.1deg.", show_default=False)] = "",
     base_link: BaseLink = "",
     tip_link: TipLink = "",
     json: Json = False,
 ) -> None:
-    """Measure a simulated robot with hidden errors.
+    """Measure a simulated robot with hidden errors; or record one that sways.
 
-    Writes measurements.csv, truth.json, robot.yaml (nominal, as it came in), true_robot.yaml.
+    Writes measurements.csv, truth.json, robot.yaml (nominal, as it came in), true_robot.yaml. With --stream: imu.csv, tracker.csv, joints.csv, plan.csv, setup.yaml, robot.yaml, truth.csv, truth.json.
     """
     from truing.files import atomic_output_dir, load_measurements, load_robot, load_units, save_measurements, save_robot
 
     folder = out or Path("truing-simulate")
+    if stream:
+        _simulate_stream(robot, folder, _stream_options(seconds, motion, tip_speed, clock_offset, dropout or (), station_shift, seed), base_link, tip_link, json)
+        return
     sizes = _geometry_error(geometry_error)
     outlier_share, outlier_length = _outliers(outliers)
     sigma, rotation_sigma = quantity(noise, "length", "--noise"), quantity(rotation_noise, "angle", "--rotation-noise")
@@ -422,6 +442,54 @@ def simulate(
     lines += [(f"  {e.parameter}", f"{e.value:.4g}") for e in simulated.truth.effects]
     _table(f"{model.name}: simulated measurements", ("", ""), lines)
     _say(str(folder / "measurements.csv"))
+
+
+def _stream_options(seconds: str, motion: MotionName, tip_speed: str, clock_offset: str, dropout: Sequence[str], station_shift: str, seed: int) -> Any:
+    import truing
+
+    speed = quantity(tip_speed.strip().removesuffix("/s"), "length", "--tip-speed")
+    shifts = []
+    if station_shift:
+        parts = station_shift.split(":")
+        if len(parts) != 3:
+            raise InputError(f"--station-shift: found {station_shift!r}, expected a time, a length and an angle, such as 30s:5mm:0.1deg")
+        start, length, angle = (quantity(part, kind, "--station-shift") for part, kind in zip(parts, ("time", "length", "angle"), strict=True))
+        shifts.append((start, truing.frame_from_xyz_rpy([length, 0.0, 0.0], [0.0, 0.0, angle])))
+    dropouts = []
+    for text in dropout:
+        parts = text.split(":")
+        if len(parts) != 2:
+            raise InputError(f"--dropout: found {text!r}, expected a time and how long, such as 20s:2s")
+        dropouts.append((quantity(parts[0], "time", "--dropout"), quantity(parts[1], "time", "--dropout")))
+    tracker = truing.TrackerErrors(clock_offset=quantity(clock_offset, "time", "--clock-offset"))
+    return truing.StreamSimulationOptions(seconds=quantity(seconds, "time", "--seconds"), motion=motion.value, tip_speed=speed, tracker=tracker, dropouts=dropouts, shifts=shifts, seed=seed)
+
+
+def _simulate_stream(robot: Path, folder: Path, options: Any, base_link: str, tip_link: str, json: bool) -> None:
+    from truing.files import atomic_output_dir, load_robot, load_units, save_robot
+
+    with _warnings_heard():
+        model = load_robot(robot, base_link, tip_link)
+
+        def work() -> Any:
+            import truing
+
+            return truing.simulate_streams(model, options)
+
+        streams = _busy("simulating", work)
+        with atomic_output_dir(folder) as temporary, _progress("writing"):
+            from truing.track_results import write_simulation
+
+            truth = write_simulation(temporary, model, streams, options)
+            save_robot(temporary / "robot.yaml", model, units=load_units(robot))
+    if json:
+        _print_json(truth)
+        return
+    lines = [(f"{name} samples", str(count)) for name, count in truth["samples"].items()]
+    lines += [("modes", ", ".join(f"{mode['frequency_hz']:.3g} Hz" for mode in truth["modes"]))]
+    _table(f"{model.name}: simulated recording of {truth['seconds']:g} s", ("", ""), lines)
+    _say(f"truing track run {folder / 'robot.yaml'} --setup {folder / 'setup.yaml'} --imu {folder / 'imu.csv'} --tracker {folder / 'tracker.csv'} --joints {folder / 'joints.csv'} "
+         f"--plan {folder / 'plan.csv'} --truth {folder / 'truth.csv'}")  # fmt: skip
 
 
 @app.command()
@@ -654,6 +722,123 @@ def _finish_handeye(result: Mapping[str, Any], folder: Path, json: bool) -> None
         handeye_table(result, folder)
     if result["status"] != "done":
         _err().print(f"truing: {result['status']}: {result['message']}", style="bold red", markup=False, highlight=False)
+        raise typer.Exit(1)
+
+
+ImuFile = Annotated[Path, typer.Option("--imu", metavar="IMU.csv", help="Inertial sensor: t_s, gx_rad_s …, ax_m_s2 …", show_default=False)]
+TrackerFile = Annotated[Path, typer.Option("--tracker", metavar="TRACKER.csv", help="Receiver in the tracker frame: t_s, x_m …, qw …", show_default=False)]
+JointsFile = Annotated[Path, typer.Option("--joints", metavar="JOINTS.csv", help="Encoder readings: t_s, q1_rad …", show_default=False)]
+
+
+@_track.command("calibrate")
+def track_calibrate(
+    robot: RobotFile,
+    joints: JointsFile,
+    tracker: TrackerFile,
+    imu: Annotated[Optional[Path], typer.Option("--imu", metavar="IMU.csv", help="Inertial sensor: t_s, gx_rad_s …, ax_m_s2 … `track run` needs it.", show_default=False)] = None,
+    plan: Annotated[Optional[Path], typer.Option("--plan", metavar="PLAN.csv", help="Planned tool in the base frame: gives the actuators' lag and the modes of the sway.", show_default=False)] = None,
+    tool: Annotated[Optional[Path], typer.Option("--tool", metavar="TOOL.csv", help="Joints at prescribed poses of the tool: q1_rad …, kind (pivot, orientation), qw … Default: the robot file's tool.", show_default=False)] = None,
+    out: Annotated[Optional[Path], _out("track-calibrate")] = None,
+    clock_wanted: Annotated[str, typer.Option(help="A larger standard error of the clock offset is not enough: advice is given.")] = "1ms",
+    base_link: BaseLink = "",
+    tip_link: TipLink = "",
+    json: Json = False,
+) -> None:
+    """Find the frames of tracker, receiver, inertial sensor and tool, gravity, and the clocks, from a recording over test positions.
+
+    The arm goes from one test position to the next and stands still at each for three seconds or more. Writes result.json, report.html, setup.yaml.
+    """
+    from truing.files import atomic_output_dir, load_robot
+    from truing.files.stream_file import load_imu, load_joints, load_plan, load_tool_poses, load_tracker
+
+    folder = out or Path("truing-track-calibrate")
+    wanted = _above_zero(quantity(clock_wanted, "time", "--clock-wanted"), clock_wanted, "--clock-wanted")
+    with _warnings_heard() as heard:
+        model = load_robot(robot, base_link, tip_link)
+        encoders, seen = load_joints(joints, model), load_tracker(tracker)
+        inertial, planned = None if imu is None else load_imu(imu), None if plan is None else load_plan(plan)
+        prescribed = None if tool is None else load_tool_poses(tool, model)
+
+        def work() -> Any:
+            from truing.track import track_calibrate as calibrate
+
+            return calibrate(model, encoders, seen, inertial, plan=planned, tool=prescribed, clock_wanted=wanted)
+
+        found = _busy("calibrating", work)
+        with atomic_output_dir(folder) as temporary, _progress("writing"):
+            from truing.track_results import write_calibration
+
+            result = write_calibration(temporary, model, found, source=tracker.name, warnings=heard)
+        if found.status != "done":  # that of an earlier run would be taken for this one's
+            (folder / "setup.yaml").unlink(missing_ok=True)
+    if json:
+        _print_json(result)
+    else:
+        track_calibrate_table(result, folder)
+    if found.status != "done":
+        _err().print(f"truing: {found.status}: {found.message}", style="bold red", markup=False, highlight=False)
+        raise typer.Exit(1)
+
+
+@_track.command("run")
+def track_run(
+    robot: RobotFile,
+    setup: Annotated[Path, typer.Option("--setup", metavar="SETUP.yaml", help="Where sensors are and how clocks differ, as `truing track calibrate` finds it.", show_default=False)],
+    imu: ImuFile,
+    tracker: TrackerFile,
+    joints: JointsFile,
+    plan: Annotated[Optional[Path], typer.Option("--plan", metavar="PLAN.csv", help="Planned tool in the base frame: t_s, x_m …, qw … Without it nothing is compensated, predictions are graded all the same.", show_default=False)] = None,
+    out: Annotated[Optional[Path], _out("track")] = None,
+    horizon: Annotated[str, typer.Option(help="Compensations are made so long before the instant they are for.")] = "40ms",
+    learn_modes: Annotated[str, typer.Option(help="Modes of the sway are identified from so much of the recording's start, unless setup.yaml has some; 0s: never.")] = "30s",
+    truth: Annotated[Optional[Path], typer.Option(metavar="TRUTH.csv", help="True tool poses, of a simulated recording: for the report.", show_default=False)] = None,
+    base_link: BaseLink = "",
+    tip_link: TipLink = "",
+    json: Json = False,
+) -> None:
+    """Replay a recording: fuse, predict, correct; nothing is used before it arrived.
+
+    Writes result.json, report.html, compensation.csv (one row for each row of the plan), and setup.yaml with the modes where they were identified.
+    """
+    from truing.files import atomic_output_dir, load_robot
+    from truing.files.stream_file import load_imu, load_joints, load_plan, load_setup, load_tracker
+
+    folder = out or Path("truing-track")
+    ahead, learn = _above_zero(quantity(horizon, "time", "--horizon"), horizon, "--horizon"), quantity(learn_modes, "time", "--learn-modes")
+    if ahead > 1.0:
+        raise InputError(f"--horizon: found {horizon!r}, expected at most 1s")
+    if learn < 0:
+        raise InputError(f"--learn-modes: found {learn_modes!r}, expected a time that is not below 0")
+    with _warnings_heard() as heard:
+        model = load_robot(robot, base_link, tip_link)
+        where = load_setup(setup)
+        files: dict[str, Any] = {"imu": load_imu(imu), "tracker": load_tracker(tracker), "joints": load_joints(joints, model)}
+        planned, true = (None if path is None else load_plan(path) for path in (plan, truth))
+
+        def work(progress: Callable[[float], bool]) -> Any:
+            import truing
+            from truing.track_results import Played
+
+            streams = truing.recorded_streams(model, where, **files, plan=planned)
+            options = where.options()
+            options.deviation.horizon = ahead
+            played = truing.replay(streams, where.setup, options, horizons=sorted({0.02, 0.04, 0.08, ahead}), learn_modes=0.0 if where.modes.count or planned is None else learn, progress=progress)
+            return Played(model, where, played, ahead, planned.t if planned is not None else np.empty(0), where.steady(files["tracker"].t) - where.setup.clock_offset, true)
+
+        run = _counted("replaying", work)
+        with atomic_output_dir(folder) as temporary, _progress("writing"):
+            from truing.track_results import write_run
+
+            result = write_run(temporary, run, warnings=heard)
+        for name, stale in (("compensation.csv", planned is None), ("setup.yaml", not result["modes"]["used_from_s"])):
+            if stale and folder / name != setup:  # that of an earlier run would be taken for this one's
+                (folder / name).unlink(missing_ok=True)
+    if json:
+        _print_json(result)
+    else:
+        track_run_table(result, folder)
+    if planned is not None and not result["made"]:
+        _err().print("truing: no row of the plan could be compensated: the streams do not reach it, or the tracker was never there", style="bold red", markup=False, highlight=False)
         raise typer.Exit(1)
 
 
@@ -1258,6 +1443,51 @@ def _off(held: Mapping[str, Any]) -> str:
     return f"{value} % [{low}, {high}]"
 
 
+def track_calibrate_table(result: Mapping[str, Any], folder: Path) -> None:
+    """The short answer of `truing track calibrate`, on stdout; the last line is the path of the report."""
+    if result["frames"]:
+        lines = []
+        for name, frame in result["frames"].items():
+            sigma = frame["sigma"]
+            lines.append((name, *(f"{1e3 * frame[f'{axis}_m']:.2f} mm" + ("" if sigma is None else f" +- {1e3 * sigma[f'{axis}_m']:.2g}") for axis in "xyz")))
+        _table("frames", ("", "x", "y", "z"), lines)
+        positions, clock = result["positions"], result["clock"]
+        what = "test positions" if positions["source"] == "standstills" else "poses of the motion"
+        _say(f"{len(positions['errors'])} {what}: usual error {_mm(positions['position_sigma_m'])}, {_mrad(positions['rotation_sigma_rad'])} a component")
+        if "offset_s" in clock:
+            _say(f"clocks: t_imu = t_tracker {-1e3 * clock['offset_s']:+.3f} ms, +- {1e3 * clock['sigma_s']:.3f} ms. {clock['advice']}".strip())
+        if result["actuator_lag_s"] is not None:
+            _say(f"actuators: {1e3 * result['actuator_lag_s']:.1f} ms behind the plan")
+        if result["modes"] and result["modes"]["modes"]:
+            _say("modes: " + ", ".join(f"{mode['frequency_hz']:.3g} Hz" for mode in result["modes"]["modes"]))
+    for note in result["notes"]:
+        _say(f"note: {note}")
+    _last_line(folder)
+
+
+def track_run_table(result: Mapping[str, Any], folder: Path) -> None:
+    """The short answer of `truing track run`, on stdout; the last line is the path of the report."""
+    names = ("truing", "hold", "velocity", "fk", "fk_velocity")
+    lines = [(f"{1e3 * row['horizon_s']:g} ms", *(_mm(row[name]["rms_m"]) for name in names)) for row in result["errors"]]
+    _table("error of predictions against the tracker's later samples, rms", ("ahead", "truing", "hold", "tracker velocity", "joints", "joints' velocity"), lines)
+    if result["truth"] and result["truth"]["n"]:
+        e = result["truth"]
+        _say(f"true tool, {1e3 * result['horizon_s']:g} ms ahead: {_mm(e['rms_m'])} rms, worst {_mm(e['max_m'])}; away from the plan {_mm(e['without_compensation']['rms_m'])} rms; NEES {e['nees']:.3g} (6 expected)")
+    if result["rows"]:
+        limited = f", {100 * result['correction']['limited']:.0f} % of them limited" if result["correction"]["limited"] > 0.005 else ""
+        _say(f"{result['made']} of {result['rows']} rows of the plan compensated{limited}")
+    clock, modes = result["clock"], result["modes"]["modes"]
+    if clock["estimated"]:
+        _say(f"clocks: t_imu = t_tracker {-1e3 * clock['offset_s']:+.3f} ms, +- {1e3 * clock['sigma_s']:.3f} ms")
+    if modes:
+        _say("modes: " + ", ".join(f"{mode['frequency_hz']:.3g} Hz" for mode in modes) + f" (from {result['modes']['source']})")
+    shares = result["status"]
+    _say("status: " + ", ".join(f"{name} {100 * share:.1f} %" for name, share in shares.items() if share > 0))
+    for shift in result["shifts"]:
+        _say(f"the tracker jumped by {_mm(shift['jump_m'])} at {shift['t_s']:.2f} s ({shift['cause'].replace('_', ' ')}): calibrate anew")
+    _last_line(folder)
+
+
 def exam_table(result: Mapping[str, Any], folder: Path) -> None:
     """The score table of `truing exam`, on stdout; the last line is the path of the report."""
     from truing.diagnose_report import plain
@@ -1314,6 +1544,41 @@ def _busy_counting(what: str, total: int, work: Callable[[Callable[[int], None]]
     """The same for `work` that tells how many of `total` are done."""
     with _counting(what) as show:
         return _busy(what, lambda: work(lambda done: show(done, total)), own_bar=True)
+
+
+def _counted(what: str, work: Callable[[Callable[[float], bool]], Result]) -> Result:
+    """As `_busy`, for work that tells the share that is done; it is told to stop on Ctrl-C."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    share, stop = [0.0], threading.Event()
+
+    def told(done: float) -> bool:
+        share[0] = done
+        return not stop.is_set()
+
+    outcome: list[Result] = []
+    failure: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            outcome.append(work(told))
+        except BaseException as error:  # noqa: BLE001  is raised again below, in the caller's thread
+            failure.append(error)
+
+    thread = threading.Thread(target=run, name=f"truing {what}", daemon=True)
+    thread.start()
+    try:
+        with Progress(TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=_err(), transient=True, disable=not _err().is_terminal) as progress:
+            task = progress.add_task(what, total=1.0)
+            while thread.is_alive():
+                thread.join(0.1)
+                progress.update(task, completed=share[0])
+    except KeyboardInterrupt:
+        stop.set()
+        raise
+    if failure:
+        raise failure[0]
+    return outcome[0]
 
 
 @contextlib.contextmanager

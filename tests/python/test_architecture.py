@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # From the ground up. A file may include files of its own layer and of those above it in this list.
 CPP_LAYERS = [
     ("kernel", ["kernel/kernel.hpp", "kernel/kernel.cpp", "kernel/dispatch.cpp"]),
-    ("tools", ["truing/version.hpp", "text.hpp", "random.hpp", "frame.hpp", "dual_quaternion.hpp", "registration.hpp", "registration.cpp", "observability.hpp", "observability.cpp",
+    ("tools", ["truing/version.hpp", "text.hpp", "random.hpp", "rotation.hpp", "frame.hpp", "dual_quaternion.hpp", "registration.hpp", "registration.cpp", "observability.hpp", "observability.cpp",
                "evidence.hpp", "evidence.cpp", "trigonometry.hpp", "batch.hpp"]),
     ("robot", ["truing/robot.hpp", "robot.cpp", "motion.hpp", "truing/urdf.hpp", "urdf.cpp", "truing/interference.hpp"]),
     ("measurement", ["truing/measurement.hpp", "measurement.cpp"]),
@@ -38,6 +38,10 @@ CPP_LAYERS = [
     ("hand-eye", ["truing/handeye.hpp", "handeye_closed_form.hpp", "handeye_closed_form.cpp", "handeye_consensus.hpp", "handeye_consensus.cpp",
                   "handeye_readings.hpp", "handeye_readings.cpp", "handeye_refine.hpp", "handeye_refine.cpp", "handeye_images.hpp", "handeye_images.cpp",
                   "handeye_errors.hpp", "handeye_errors.cpp", "handeye.cpp", "handeye_plan.cpp", "handeye_clock.cpp", "handeye_kinematics.cpp"]),
+    ("streams", ["truing/streams.hpp", "truing/stream_simulation.hpp", "stream_simulation.cpp"]),
+    ("tracking", ["truing/track.hpp", "pose_filter.hpp", "pose_filter.cpp", "deviation.hpp", "deviation.cpp", "modes.cpp", "track_watch.hpp", "track_watch.cpp", "correction_limiter.hpp", "track.cpp",
+                  "truing/track_calibrate.hpp", "track_calibrate.cpp", "track_calibrate_inertial.cpp"]),
+    ("replay", ["truing/track_replay.hpp", "track_replay.cpp"]),
     ("everything", ["truing/truing.hpp"]),
 ]  # fmt: skip
 CPP_RANK = {file: rank for rank, (_, files) in enumerate(CPP_LAYERS) for file in files}
@@ -130,6 +134,7 @@ PYTHON_MAY_IMPORT = {
     "truing.files": {"truing._core", "truing.errors", "truing.boards", "truing.files"},
     "truing.hand_eye": {"truing._core", "truing.errors", "truing.effects", "truing.files"},
     "truing.inverse_kinematics": {"truing._core", "truing.errors", "truing.files"},
+    "truing.track": {"truing._core", "truing.errors", "truing.files"},
     "truing.simulation": {"truing", "truing.errors", "truing.files"},
     "truing.handeye_simulation": {"truing.errors"},  # no solver: it says what solvers should find
     "truing.results": {"truing", "truing.errors", "truing.files", "truing.report", "truing.diagnose_report"},
@@ -137,13 +142,15 @@ PYTHON_MAY_IMPORT = {
     "truing.inverse_results": {"truing", "truing.files", "truing.results", "truing.inverse_report"},
     "truing.inverse_report": {"truing.inverse_results", "truing.report"},
     "truing.handeye_report": {"truing.handeye_results", "truing.report"},
+    "truing.track_results": {"truing", "truing.files", "truing.track", "truing.results", "truing.handeye_results", "truing.track_report"},
+    "truing.track_report": {"truing.track", "truing.track_results", "truing.report"},
     "truing.report": {"truing.results"},
     "truing.diagnose_report": {"truing.results", "truing.report"},
     "truing.demo": {"truing", "truing.errors", "truing.files", "truing.simulation", "truing.results"},
     "truing.exam": {"truing"},  # and of that only containers and readers: test_exam.py
     "truing.cli": {"truing", "truing.errors", "truing.files", "truing.simulation", "truing.results", "truing.report", "truing.diagnose_report",
-                   "truing.handeye_results", "truing.inverse_results", "truing.demo", "truing.exam"},
-    "truing": {"truing._core", "truing.errors", "truing.effects", "truing.api", "truing.boards", "truing.files", "truing.hand_eye", "truing.inverse_kinematics", "truing.simulation"},
+                   "truing.handeye_results", "truing.inverse_results", "truing.track", "truing.track_results", "truing.demo", "truing.exam"},
+    "truing": {"truing._core", "truing.errors", "truing.effects", "truing.api", "truing.boards", "truing.files", "truing.hand_eye", "truing.inverse_kinematics", "truing.track", "truing.simulation"},
 }  # fmt: skip
 
 # Parts of several modules, which may import each other.
@@ -230,7 +237,7 @@ def test_nobody_imports_the_command_line() -> None:
 
 def test_importing_truing_stays_cheap() -> None:
     """The package itself needs no plotting, no command line and no report."""
-    later = {"truing.cli", "truing.report", "truing.diagnose_report", "truing.results", "truing.handeye_results", "truing.handeye_report", "truing.inverse_results", "truing.inverse_report",
+    later = {"truing.cli", "truing.report", "truing.diagnose_report", "truing.results", "truing.handeye_results", "truing.handeye_report", "truing.inverse_results", "truing.inverse_report", "truing.track_results", "truing.track_report",
              "truing.demo", "truing.exam"}  # fmt: skip
     assert not later & PYTHON_MAY_IMPORT["truing"]
     assert not any(part_of(name) in later for name in imports(python_files()["__init__.py"]))
