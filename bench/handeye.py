@@ -4,8 +4,10 @@
 
     python bench/handeye.py [--quick] [--only accuracy,images,...] [--write docs/benchmarks-handeye.md]
 
-Needs OpenCV 4 (`pip install "opencv-python-headless<5"`: 5.0 has no calibrateHandEye in Python). `--write` puts the tables between the markers of the page.
-Trial k has seed k, in every cell; the oracle of bench/handeye_oracle.py says what can be had when the noises are known.
+Needs OpenCV 4 (`pip install "opencv-python-headless<5"`: 5.0 has no calibrateHandEye in Python). `--write`
+puts the tables between the markers of the page.
+Trial k has seed k, in every cell; the oracle of bench/handeye_oracle.py says what can be had when the noises
+are known.
 """
 
 from __future__ import annotations
@@ -42,7 +44,8 @@ NORMAL_95 = 1.959964
 class Found:
     T_parent_camera: Floats
     T_parent_board: Floats | None = None
-    # of T_parent_camera: translation in the parent [m], then rotation about the camera's own axes [rad], as handeye_oracle.error_of
+    # of T_parent_camera: translation in the parent [m], then rotation about the camera's own axes [rad], as
+    # handeye_oracle.error_of
     covariance: Floats | None = None
     said: str = ""  # warnings, what was rejected, what could not be seen
 
@@ -50,15 +53,22 @@ class Found:
 Method = Callable[[HandEyeScene], Found]
 
 
-# ---- truing ----------------------------------------------------------------------------------------------------------
+# ---- truing
+# ----------------------------------------------------------------------------------------------------------
 
 
 def poses_of(scene: HandEyeScene, with_pixels: bool = False) -> truing.HandEyePoses:
-    images = [(scene.board.points, pixels) for pixels in scene.pixels] if with_pixels and scene.pixels is not None else None
+    images = (
+        [(scene.board.points, pixels) for pixels in scene.pixels]
+        if with_pixels and scene.pixels is not None
+        else None
+    )
     camera = None
     if images is not None:
         c = scene.camera
-        camera = truing.Camera(width=c.width, height=c.height, fx=c.fx, fy=c.fy, cx=c.cx, cy=c.cy, distortion=c.distortion)
+        camera = truing.Camera(
+            width=c.width, height=c.height, fx=c.fx, fy=c.fy, cx=c.cx, cy=c.cy, distortion=c.distortion
+        )
     return truing.HandEyePoses(scene.T_base_hand, scene.T_camera_board, images=images, camera=camera)
 
 
@@ -68,30 +78,49 @@ class Refused(ValueError):
 
 def found_of(result: truing.HandEyeResult) -> Found:
     if result.status not in ("done", "not converged"):
-        raise Refused(f'{result.status}, reading "{result.readings[0].name}"' if result.readings else result.status)
+        raise Refused(
+            f'{result.status}, reading "{result.readings[0].name}"' if result.readings else result.status
+        )
     said = " ".join(result.warnings)
     # Covariances of the library turn about the parent's axes, those of the bench about the camera's own.
     turn = np.eye(6)
     turn[3:, 3:] = result.camera.T[:3, :3].T
-    listed = f"{len(result.rejected)} listed: {result.residuals[result.rejected[0]].cause}. " if result.rejected else ""
+    listed = (
+        f"{len(result.rejected)} listed: {result.residuals[result.rejected[0]].cause}. "
+        if result.rejected
+        else ""
+    )
     return Found(result.camera.T, result.board.T, turn @ result.camera.covariance @ turn.T, listed + said)
 
 
 def ours_closed_form(scene: HandEyeScene) -> Found:
-    """truing.handeye_closed_form on scene.T_base_hand and scene.T_camera_board: the SVD, without a look at whether the loop closes."""
+    """truing.handeye_closed_form on scene.T_base_hand and scene.T_camera_board: the SVD, without a look at
+    whether the loop closes.
+    """
     found = truing.handeye_closed_form(poses_of(scene), scene.setup)
     return Found(found.T_parent_camera, found.T_parent_board)
 
 
 def ours_closed_form_checked(scene: HandEyeScene) -> Found:
     """truing.handeye(..., method="closed-form")."""
-    return found_of(truing.handeye(poses_of(scene), setup=scene.setup, method="closed-form", raise_if_undecided=False))
+    return found_of(
+        truing.handeye(poses_of(scene), setup=scene.setup, method="closed-form", raise_if_undecided=False)
+    )
 
 
 def ours_refined(scene: HandEyeScene) -> Found:
     """truing.handeye, told scene.hand_m, hand_rad, camera_m, camera_rad."""
-    return found_of(truing.handeye(poses_of(scene), setup=scene.setup, hand_m=scene.hand_m, hand_rad=scene.hand_rad, camera_m=scene.camera_m,
-                                   camera_rad=scene.camera_rad, raise_if_undecided=False))  # fmt: skip
+    return found_of(
+        truing.handeye(
+            poses_of(scene),
+            setup=scene.setup,
+            hand_m=scene.hand_m,
+            hand_rad=scene.hand_rad,
+            camera_m=scene.camera_m,
+            camera_rad=scene.camera_rad,
+            raise_if_undecided=False,
+        )
+    )
 
 
 def ours_refined_unknown_noise(scene: HandEyeScene) -> Found:
@@ -100,15 +129,31 @@ def ours_refined_unknown_noise(scene: HandEyeScene) -> Found:
 
 
 def ours_pixels(scene: HandEyeScene) -> Found:
-    """From scene.pixels (n, m, 2), scene.board.points (m, 3) and scene.camera, told scene.hand_m, hand_rad, pixel."""
-    return found_of(truing.handeye(poses_of(scene, with_pixels=True), setup=scene.setup, hand_m=scene.hand_m, hand_rad=scene.hand_rad, pixel=scene.pixel,
-                                   raise_if_undecided=False))  # fmt: skip
+    """From scene.pixels (n, m, 2), scene.board.points (m, 3) and scene.camera, told scene.hand_m, hand_rad,
+    pixel.
+    """
+    return found_of(
+        truing.handeye(
+            poses_of(scene, with_pixels=True),
+            setup=scene.setup,
+            hand_m=scene.hand_m,
+            hand_rad=scene.hand_rad,
+            pixel=scene.pixel,
+            raise_if_undecided=False,
+        )
+    )
 
 
-# ---- Peers -----------------------------------------------------------------------------------------------------------
+# ---- Peers
+# -----------------------------------------------------------------------------------------------------------
 
-HAND_EYE = {"Tsai": cv2.CALIB_HAND_EYE_TSAI, "Park": cv2.CALIB_HAND_EYE_PARK, "Horaud": cv2.CALIB_HAND_EYE_HORAUD,
-            "Andreff": cv2.CALIB_HAND_EYE_ANDREFF, "Daniilidis": cv2.CALIB_HAND_EYE_DANIILIDIS}  # fmt: skip
+HAND_EYE = {
+    "Tsai": cv2.CALIB_HAND_EYE_TSAI,
+    "Park": cv2.CALIB_HAND_EYE_PARK,
+    "Horaud": cv2.CALIB_HAND_EYE_HORAUD,
+    "Andreff": cv2.CALIB_HAND_EYE_ANDREFF,
+    "Daniilidis": cv2.CALIB_HAND_EYE_DANIILIDIS,
+}
 ROBOT_WORLD = {"Shah": cv2.CALIB_ROBOT_WORLD_HAND_EYE_SHAH, "Li": cv2.CALIB_ROBOT_WORLD_HAND_EYE_LI}
 
 
@@ -124,7 +169,8 @@ def frame(R: Any, t: Any) -> Floats:
 
 def opencv_hand_eye(method: int) -> Method:
     def solve(scene: HandEyeScene) -> Found:
-        # For a camera that stands still OpenCV's manual wants base-from-hand turned round, and the camera comes out in the base.
+        # For a camera that stands still OpenCV's manual wants base-from-hand turned round, and the camera
+        # comes out in the base.
         hand = scene.T_base_hand if scene.setup == "eye-in-hand" else oracle.inverse(scene.T_base_hand)
         return Found(frame(*cv2.calibrateHandEye(*parts(hand), *parts(scene.T_camera_board), method=method)))
 
@@ -133,9 +179,12 @@ def opencv_hand_eye(method: int) -> Method:
 
 def opencv_robot_world(method: int) -> Method:
     def solve(scene: HandEyeScene) -> Found:
-        # Both setups are A X = Z B; with a camera that stands still the hand carries the board, so hand and base change places.
+        # Both setups are A X = Z B; with a camera that stands still the hand carries the board, so hand and
+        # base change places.
         hand = oracle.inverse(scene.T_base_hand) if scene.setup == "eye-in-hand" else scene.T_base_hand
-        R_x, t_x, R_z, t_z = cv2.calibrateRobotWorldHandEye(*parts(scene.T_camera_board), *parts(hand), method=method)
+        R_x, t_x, R_z, t_z = cv2.calibrateRobotWorldHandEye(
+            *parts(scene.T_camera_board), *parts(hand), method=method
+        )
         return Found(oracle.inverse(frame(R_z, t_z)), oracle.inverse(frame(R_x, t_x)))
 
     return solve
@@ -156,11 +205,20 @@ def reprojection_only(scene: HandEyeScene) -> Found:
     return Found(found.T_parent_camera, found.T_parent_board, found.covariance[:6, :6])
 
 
-OPENCV: dict[str, Method] = {**{f"OpenCV {name}": opencv_hand_eye(which) for name, which in HAND_EYE.items()},
-                             **{f"OpenCV robot-world {name}": opencv_robot_world(which) for name, which in ROBOT_WORLD.items()}}  # fmt: skip
-OURS: dict[str, Method] = {"truing closed form": ours_closed_form, "truing": ours_refined, "truing, noise not told": ours_refined_unknown_noise}
+OPENCV: dict[str, Method] = {
+    **{f"OpenCV {name}": opencv_hand_eye(which) for name, which in HAND_EYE.items()},
+    **{f"OpenCV robot-world {name}": opencv_robot_world(which) for name, which in ROBOT_WORLD.items()},
+}
+OURS: dict[str, Method] = {
+    "truing closed form": ours_closed_form,
+    "truing": ours_refined,
+    "truing, noise not told": ours_refined_unknown_noise,
+}
 ORACLE: dict[str, Method] = {"oracle: noises known": oracle_poses}
-ORACLE_PIXELS: dict[str, Method] = {"oracle: reprojection only": reprojection_only, "oracle: pixels and robot": oracle_pixels}
+ORACLE_PIXELS: dict[str, Method] = {
+    "oracle: reprojection only": reprojection_only,
+    "oracle: pixels and robot": oracle_pixels,
+}
 
 
 def by_pnp(scene: HandEyeScene) -> HandEyeScene:
@@ -168,12 +226,19 @@ def by_pnp(scene: HandEyeScene) -> HandEyeScene:
     assert scene.pixels is not None
     seen = []
     for pixels in scene.pixels:
-        _, turn, t = cv2.solvePnP(scene.board.points, pixels, scene.camera.matrix, np.array(scene.camera.distortion), flags=cv2.SOLVEPNP_ITERATIVE)
+        _, turn, t = cv2.solvePnP(
+            scene.board.points,
+            pixels,
+            scene.camera.matrix,
+            np.array(scene.camera.distortion),
+            flags=cv2.SOLVEPNP_ITERATIVE,
+        )
         seen.append(frame(cv2.Rodrigues(turn)[0], t))
     return replace(scene, T_camera_board=np.array(seen))
 
 
-# ---- Running ---------------------------------------------------------------------------------------------------------
+# ---- Running
+# ---------------------------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -188,7 +253,11 @@ class Tally:
 
     @property
     def median(self) -> tuple[float, float]:
-        return (float(np.median(self.degrees)), float(np.median(self.millimetres))) if self.degrees else (math.nan, math.nan)
+        return (
+            (float(np.median(self.degrees)), float(np.median(self.millimetres)))
+            if self.degrees
+            else (math.nan, math.nan)
+        )
 
 
 def attempt(method: Method, scene: HandEyeScene) -> Found | str:
@@ -200,18 +269,29 @@ def attempt(method: Method, scene: HandEyeScene) -> Found | str:
         except (cv2.error, ValueError, RuntimeError, np.linalg.LinAlgError) as error:
             if isinstance(error, NotImplementedError):
                 raise
-            words = str(getattr(error, "err", error)).strip().splitlines()  # OpenCV: the assertion, without file and line
-            return f"{'OpenCV' if isinstance(error, cv2.error) else type(error).__name__}: {words[0] if words else error}"
+            words = (
+                str(getattr(error, "err", error)).strip().splitlines()
+            )  # OpenCV: the assertion, without file and line
+            return (
+                f"{'OpenCV' if isinstance(error, cv2.error) else type(error).__name__}:"
+                f" {words[0] if words else error}"
+            )
     if not np.isfinite(found.T_parent_camera).all():
         return "NaN"
-    if np.array_equal(found.T_parent_camera, np.eye(4)):  # how OpenCV's Tsai gives up; a line in its log says so
+    if np.array_equal(
+        found.T_parent_camera, np.eye(4)
+    ):  # how OpenCV's Tsai gives up; a line in its log says so
         found = replace(found, said="identity")
     if caught:
-        found = replace(found, said="; ".join([found.said, *(str(one.message) for one in caught)]).strip("; "))
+        found = replace(
+            found, said="; ".join([found.said, *(str(one.message) for one in caught)]).strip("; ")
+        )
     return found
 
 
-def tally(methods: Mapping[str, Method], trials: Mapping[str, int], scene_of: Callable[[int], HandEyeScene]) -> dict[str, Tally]:
+def tally(
+    methods: Mapping[str, Method], trials: Mapping[str, int], scene_of: Callable[[int], HandEyeScene]
+) -> dict[str, Tally]:
     out = {name: Tally([], [], []) for name in methods}
     for seed in range(max(trials.values())):
         scene = scene_of(seed)
@@ -230,7 +310,9 @@ def tally(methods: Mapping[str, Method], trials: Mapping[str, int], scene_of: Ca
                 one.failures += 1
                 degrees, millimetres = math.inf, math.inf
             else:
-                degrees, millimetres = oracle.degrees_millimetres(scene.T_parent_camera, found.T_parent_camera)
+                degrees, millimetres = oracle.degrees_millimetres(
+                    scene.T_parent_camera, found.T_parent_camera
+                )
             one.degrees.append(degrees)
             one.millimetres.append(millimetres)
     return out
@@ -242,7 +324,15 @@ def scenes(**options: Any) -> Callable[[int], HandEyeScene]:
 
 
 def number(value: float) -> str:
-    return "–" if math.isnan(value) else "failed" if math.isinf(value) else f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+    return (
+        "–"
+        if math.isnan(value)
+        else "failed"
+        if math.isinf(value)
+        else f"{value:.3g}"
+        if value < 1000
+        else f"{value:.0f}"
+    )
 
 
 def milliseconds(seconds: list[float]) -> str:
@@ -252,14 +342,17 @@ def milliseconds(seconds: list[float]) -> str:
 def cell(one: Tally) -> str:
     if one.missing:
         return "–"
-    return f"{number(one.median[0])} / {number(one.median[1])}" + (f" ({one.failures} failed)" if one.failures else "")
+    return f"{number(one.median[0])} / {number(one.median[1])}" + (
+        f" ({one.failures} failed)" if one.failures else ""
+    )
 
 
 def note(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-# ---- Tables ----------------------------------------------------------------------------------------------------------
+# ---- Tables
+# ----------------------------------------------------------------------------------------------------------
 
 
 def accuracy(quick: bool) -> Iterator[str]:
@@ -276,22 +369,42 @@ def accuracy(quick: bool) -> Iterator[str]:
             results[poses] = tally(methods, trials, scenes(setup=setup, poses=poses))
             note(f"{setup}, {poses} poses")
         yield from ("", f"### {setup}", "")
-        yield "| | " + " | ".join(f"N = {poses}" for poses in results) + " | ms: " + " / ".join(map(str, results)) + " | times truing's |"
+        yield (
+            "| | "
+            + " | ".join(f"N = {poses}" for poses in results)
+            + " | ms: "
+            + " / ".join(map(str, results))
+            + " | times truing's |"
+        )
         yield "| --- |" + " --- |" * (len(results) + 2)
         for name in next(iter(results.values())):
-            yield (f"| {name} | " + " | ".join(cell(result[name]) for result in results.values()) + " | "
-                   + " / ".join(milliseconds(result[name].seconds) for result in results.values()) + f" | {ratios(results, name)} |")  # fmt: skip
-    yield from ("", f"Median rotation [deg] / translation [mm] error of the camera over {20 if quick else 100} scenes; "
-                "at N = 1000 over 20, and 5 for OpenCV's five. Last column: error over truing's (the oracle's where truing has none), "
-                "geometric mean over N, rotation / translation.")  # fmt: skip
+            yield (
+                f"| {name} | "
+                + " | ".join(cell(result[name]) for result in results.values())
+                + " | "
+                + " / ".join(milliseconds(result[name].seconds) for result in results.values())
+                + f" | {ratios(results, name)} |"
+            )
+    yield from (
+        "",
+        (
+            f"Median rotation [deg] / translation [mm] error of the camera over {20 if quick else 100}"
+            " scenes; at N = 1000 over 20, and 5 for OpenCV's five. Last column: error over truing's (the"
+            " oracle's where truing has none), geometric mean over N, rotation / translation."
+        ),
+    )
 
 
 def ratios(results: Mapping[int, Mapping[str, Tally]], name: str) -> str:
     against = "truing" if not next(iter(results.values()))["truing"].missing else next(iter(ORACLE))
     if all(result[name].missing for result in results.values()):
         return "–"
-    logs = np.log([[result[name].median[k] / result[against].median[k] for k in (0, 1)] for result in results.values()])
-    return " / ".join("failed" if not math.isfinite(value) else f"{math.exp(value):.2f}" for value in logs.mean(axis=0))
+    logs = np.log(
+        [[result[name].median[k] / result[against].median[k] for k in (0, 1)] for result in results.values()]
+    )
+    return " / ".join(
+        "failed" if not math.isfinite(value) else f"{math.exp(value):.2f}" for value in logs.mean(axis=0)
+    )
 
 
 def outliers(quick: bool) -> Iterator[str]:
@@ -299,10 +412,24 @@ def outliers(quick: bool) -> Iterator[str]:
     methods = {**OPENCV, **ORACLE, **OURS}
     trials = {name: 20 if quick else 100 for name in methods}
     results = {share: tally(methods, trials, scenes(poses=30, outliers=share)) for share in (0.0, 0.1, 0.3)}
-    yield from ("", "| | " + " | ".join(f"{100 * share:.0f} %" for share in results) + " | ms |", "| --- |" + " --- |" * (len(results) + 1))
+    yield from (
+        "",
+        "| | " + " | ".join(f"{100 * share:.0f} %" for share in results) + " | ms |",
+        "| --- |" + " --- |" * (len(results) + 1),
+    )
     for name in methods:
-        yield f"| {name} | " + " | ".join(cell(result[name]) for result in results.values()) + f" | {milliseconds(results[0.3][name].seconds)} |"
-    yield from ("", "Eye-to-hand, 30 poses; that share of the boards is seen 10 deg and 30 mm off. The oracle is told which.")
+        yield (
+            f"| {name} | "
+            + " | ".join(cell(result[name]) for result in results.values())
+            + f" | {milliseconds(results[0.3][name].seconds)} |"
+        )
+    yield from (
+        "",
+        (
+            "Eye-to-hand, 30 poses; that share of the boards is seen 10 deg and 30 mm off. The oracle is told"
+            " which."
+        ),
+    )
 
 
 def images(quick: bool) -> Iterator[str]:
@@ -314,12 +441,24 @@ def images(quick: bool) -> Iterator[str]:
     peers = {f"solvePnP, {name}": through_pnp(method) for name, method in OPENCV.items()}
     methods = {**peers, **ORACLE_PIXELS, "truing": ours_pixels}
     trials = {name: 10 if quick else 100 for name in methods}
-    results = {setup: tally(methods, trials, scenes(setup=setup, poses=30, board=Board())) for setup in simulation.SETUPS}
+    results = {
+        setup: tally(methods, trials, scenes(setup=setup, poses=30, board=Board()))
+        for setup in simulation.SETUPS
+    }
     yield from ("", "| | " + " | ".join(results) + " | ms |", "| --- |" + " --- |" * (len(results) + 1))
     for name in methods:
-        yield f"| {name} | " + " | ".join(cell(result[name]) for result in results.values()) + f" | {milliseconds(results['eye-to-hand'][name].seconds)} |"
-    yield from ("", "30 images of a 9 x 6 chessboard of 25 mm, 1280 x 960 pixels, plumb_bob distortion, 0.1 px of noise per axis; robot 0.05 deg, 0.1 mm. "
-                "Times of OpenCV include its 30 solvePnP.")  # fmt: skip
+        yield (
+            f"| {name} | "
+            + " | ".join(cell(result[name]) for result in results.values())
+            + f" | {milliseconds(results['eye-to-hand'][name].seconds)} |"
+        )
+    yield from (
+        "",
+        (
+            "30 images of a 9 x 6 chessboard of 25 mm, 1280 x 960 pixels, plumb_bob distortion, 0.1 px of"
+            " noise per axis; robot 0.05 deg, 0.1 mm. Times of OpenCV include its 30 solvePnP."
+        ),
+    )
 
 
 def coverage(quick: bool) -> Iterator[str]:
@@ -329,10 +468,20 @@ def coverage(quick: bool) -> Iterator[str]:
     for setup in simulation.SETUPS:
         for poses in (10, 30):
             of_poses = scenes(setup=setup, poses=poses)
-            cells += [(f"{setup}, {poses} poses", name, method, of_poses) for name, method in {**ORACLE, **OURS}.items()]
+            cells += [
+                (f"{setup}, {poses} poses", name, method, of_poses)
+                for name, method in {**ORACLE, **OURS}.items()
+            ]
     of_pixels = scenes(poses=30, board=Board())
-    cells += [("eye-to-hand, 30 images", name, method, of_pixels) for name, method in {**ORACLE_PIXELS, "truing": ours_pixels}.items()]
-    yield from ("", "| scene | method | seeds | x | y | z | rx | ry | rz | mean squared normalised error / 6 |", "| --- |" + " --- |" * 9)
+    cells += [
+        ("eye-to-hand, 30 images", name, method, of_pixels)
+        for name, method in {**ORACLE_PIXELS, "truing": ours_pixels}.items()
+    ]
+    yield from (
+        "",
+        "| scene | method | seeds | x | y | z | rx | ry | rz | mean squared normalised error / 6 |",
+        "| --- |" + " --- |" * 9,
+    )
     for what, name, method, scene_of in cells:
         count = max(10, seeds // 5) if "oracle: " in name and "image" in what else seeds  # half a second each
         inside, squared = [], []
@@ -349,12 +498,22 @@ def coverage(quick: bool) -> Iterator[str]:
             inside.append(np.abs(error) < NORMAL_95 * np.sqrt(np.diag(found.covariance)))
             squared.append(error @ np.linalg.solve(found.covariance, error) / 6)
         if inside and squared:
-            yield f"| {what} | {name} | {count} | " + " | ".join(f"{100 * share:.1f} %" for share in np.mean(inside, axis=0)) + f" | {np.mean(squared):.3f} |"
+            yield (
+                f"| {what} | {name} | {count} | "
+                + " | ".join(f"{100 * share:.1f} %" for share in np.mean(inside, axis=0))
+                + f" | {np.mean(squared):.3f} |"
+            )
         elif not inside:
             yield f"| {what} | {name} | – |" + " – |" * 7
         note(f"coverage: {what}, {name}")
-    yield from ("", f"Of the camera's place in its parent and of its rotation about its own axes. 95 % and 1 are right; with {seeds} seeds 95 % may read "
-                f"{95 - 196 * math.sqrt(0.0475 / seeds):.1f} to {min(100.0, 95 + 196 * math.sqrt(0.0475 / seeds)):.1f} %.")  # fmt: skip
+    yield from (
+        "",
+        (
+            "Of the camera's place in its parent and of its rotation about its own axes. 95 % and 1 are"
+            f" right; with {seeds} seeds 95 % may read {95 - 196 * math.sqrt(0.0475 / seeds):.1f} to"
+            f" {min(100.0, 95 + 196 * math.sqrt(0.0475 / seeds)):.1f} %."
+        ),
+    )
 
 
 def failures(quick: bool) -> Iterator[str]:
@@ -362,14 +521,34 @@ def failures(quick: bool) -> Iterator[str]:
     seeds = range(1, 4 if quick else 12)
     methods = {**OPENCV, "truing closed form": ours_closed_form_checked, "truing": ours_refined_unknown_noise}
     for setup in simulation.SETUPS:
-        yield from ("", f"### {setup}", "", "| | " + " | ".join(methods) + " |", "| --- |" + " --- |" * len(methods))
-        bad = {name: [make(setup, seed=seed) for seed in seeds] for name, make in simulation.DEGENERATE.items()}
-        bad.update({name: [spoil(simulate_handeye(setup, 30, seed=seed)) for seed in seeds] for name, spoil in simulation.MISTAKES.items()})
+        yield from (
+            "",
+            f"### {setup}",
+            "",
+            "| | " + " | ".join(methods) + " |",
+            "| --- |" + " --- |" * len(methods),
+        )
+        bad = {
+            name: [make(setup, seed=seed) for seed in seeds] for name, make in simulation.DEGENERATE.items()
+        }
+        bad.update(
+            {
+                name: [spoil(simulate_handeye(setup, 30, seed=seed)) for seed in seeds]
+                for name, spoil in simulation.MISTAKES.items()
+            }
+        )
         for name, scenes in bad.items():
             yield f"| {name} | " + " | ".join(in_words(method, scenes) for method in methods.values()) + " |"
-    yield from ("", f"Median error [deg] / [mm] of {len(seeds)} scenes of 30 poses (5 equal ones, 2) with the usual noise; a figure alone was given without a "
-                "word. In brackets how often there was none, or what was said; \"identity\": OpenCV gives the identity and writes a line to its log. One rotation "
-                "axis leaves one coordinate open, pure translation three; there every figure but a refusal is luck.")  # fmt: skip
+    yield from (
+        "",
+        (
+            f"Median error [deg] / [mm] of {len(seeds)} scenes of 30 poses (5 equal ones, 2) with the usual"
+            " noise; a figure alone was given without a word. In brackets how often there was none, or what"
+            ' was said; "identity": OpenCV gives the identity and writes a line to its log. One rotation'
+            " axis leaves one coordinate open, pure translation three; there every figure but a refusal is"
+            " luck."
+        ),
+    )
 
 
 def in_words(method: Method, scenes: list[HandEyeScene]) -> str:
@@ -387,20 +566,31 @@ def in_words(method: Method, scenes: list[HandEyeScene]) -> str:
             remarks.append(found.said)
     figures = " / ".join(number(float(value)) for value in np.median(errors, axis=0)) if errors else ""
     said = [f"{len(words)} of {len(scenes)}: {words[0]}" for words in (refusals, remarks) if words]
-    return (f"{figures} ({'; '.join(said)})" if figures and said else figures or said[0]).replace("|", "/").replace("\n", " ")
+    return (
+        (f"{figures} ({'; '.join(said)})" if figures and said else figures or said[0])
+        .replace("|", "/")
+        .replace("\n", " ")
+    )
 
 
 def invariance(quick: bool) -> Iterator[str]:
     """The same poses in another order, and in another unit, should give the same."""
     seeds = 5 if quick else 20
     methods = {**OPENCV, **OURS}
-    yield from ("", "| | other order [deg] / [mm] | mm for m, in everything [deg] / [mm] |", "| --- | --- | --- |")
+    yield from (
+        "",
+        "| | other order [deg] / [mm] | mm for m, in everything [deg] / [mm] |",
+        "| --- | --- | --- |",
+    )
     for name, method in methods.items():
         moved: dict[str, list[tuple[float, float]]] = {"order": [], "unit": []}
         try:
             for seed in range(seeds):
                 scene = simulate_handeye(poses=30, seed=seed)
-                found = [attempt(method, one) for one in (scene, simulation.shuffled(scene), simulation.scaled(scene))]
+                found = [
+                    attempt(method, one)
+                    for one in (scene, simulation.shuffled(scene), simulation.scaled(scene))
+                ]
                 if any(isinstance(one, str) for one in found):
                     continue
                 first, order, unit = (one.T_parent_camera for one in found if not isinstance(one, str))
@@ -411,14 +601,31 @@ def invariance(quick: bool) -> Iterator[str]:
         except NotImplementedError:
             yield f"| {name} | – | – |"
             continue
-        yield f"| {name} | " + " | ".join(" / ".join(f"{value:.2g}" for value in np.max(rows, axis=0)) if rows else "failed" for rows in moved.values()) + " |"
-    yield from ("", f"The largest movement of the camera over {seeds} eye-to-hand scenes of 30 poses. Only the data changes; nothing of it is an error.")
+        yield (
+            f"| {name} | "
+            + " | ".join(
+                " / ".join(f"{value:.2g}" for value in np.max(rows, axis=0)) if rows else "failed"
+                for rows in moved.values()
+            )
+            + " |"
+        )
+    yield from (
+        "",
+        (
+            f"The largest movement of the camera over {seeds} eye-to-hand scenes of 30 poses. Only the data"
+            " changes; nothing of it is an error."
+        ),
+    )
 
 
 TABLES: dict[str, tuple[str, Callable[[bool], Iterator[str]]]] = {
-    "accuracy": ("Accuracy and time", accuracy), "outliers": ("Outliers", outliers), "images": ("From images", images),
-    "coverage": ("Are the intervals true?", coverage), "failures": ("Bad data", failures), "invariance": ("Order and units", invariance),
-}  # fmt: skip
+    "accuracy": ("Accuracy and time", accuracy),
+    "outliers": ("Outliers", outliers),
+    "images": ("From images", images),
+    "coverage": ("Are the intervals true?", coverage),
+    "failures": ("Bad data", failures),
+    "invariance": ("Order and units", invariance),
+}
 
 
 def machine() -> str:
@@ -427,14 +634,21 @@ def machine() -> str:
         processor = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
     except (OSError, StopIteration):
         processor = platform.processor() or platform.machine()
-    return f"{processor}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}, NumPy {np.__version__}, OpenCV {cv2.__version__}"
+    return (
+        f"{processor}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}, NumPy"
+        f" {np.__version__}, OpenCV {cv2.__version__}"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="fewer trials, and no scene of 1000 poses")
     parser.add_argument("--only", default=",".join(TABLES), help="tables to make, with commas between")
-    parser.add_argument("--write", type=Path, help="the page whose markers <!-- table --> and <!-- end --> take the tables")
+    parser.add_argument(
+        "--write", type=Path, help="the page whose markers <!-- table --> and <!-- end --> take the tables"
+    )
     arguments = parser.parse_args()
     wanted = arguments.only.split(",")
     unknown = [name for name in wanted if name not in TABLES]
@@ -444,23 +658,38 @@ def main() -> None:
     if arguments.write and not ("<!-- table -->" in page and "<!-- end -->" in page):
         parser.error(f"{arguments.write} has no markers <!-- table --> and <!-- end -->")
     if not hasattr(cv2, "calibrateHandEye"):
-        parser.error(f'OpenCV {cv2.__version__} has no calibrateHandEye: pip install "opencv-python-headless<5"')
+        parser.error(
+            f'OpenCV {cv2.__version__} has no calibrateHandEye: pip install "opencv-python-headless<5"'
+        )
     cv2.setNumThreads(1)
     before = os.getloadavg()[0] if hasattr(os, "getloadavg") else math.nan
     lines = []
     for name in wanted:
         title, table = TABLES[name]
         lines += ["", f"## {title}", *table(arguments.quick)]
-        print("\n".join(lines[-60:]) if not arguments.write else f"{title}: done", file=sys.stdout if not arguments.write else sys.stderr, flush=True)
+        print(
+            "\n".join(lines[-60:]) if not arguments.write else f"{title}: done",
+            file=sys.stdout if not arguments.write else sys.stderr,
+            flush=True,
+        )
         if not arguments.write:
             lines = []
     if arguments.write:
-        command = "python bench/handeye.py" + (" --quick" if arguments.quick else "") + (f" --only {arguments.only}" if wanted != list(TABLES) else "")
+        command = (
+            "python bench/handeye.py"
+            + (" --quick" if arguments.quick else "")
+            + (f" --only {arguments.only}" if wanted != list(TABLES) else "")
+        )
         after = os.getloadavg()[0] if hasattr(os, "getloadavg") else math.nan
-        about = [f"From `{command}` on {datetime.now(timezone.utc):%Y-%m-%d}: {machine()}. Load average {before:.1f} before and {after:.1f} after, "
-                 "this program's own work included; above the number of cores, believe no time but in ratio."]  # fmt: skip
+        about = [
+            f"From `{command}` on {datetime.now(timezone.utc):%Y-%m-%d}: {machine()}. Load average"
+            f" {before:.1f} before and {after:.1f} after, this program's own work included; above the number"
+            " of cores, believe no time but in ratio."
+        ]
         start, end = page.index("<!-- table -->") + len("<!-- table -->"), page.index("<!-- end -->")
-        arguments.write.write_text(page[:start] + "\n" + "\n".join([*about, *lines]) + "\n" + page[end:], encoding="utf-8")
+        arguments.write.write_text(
+            page[:start] + "\n" + "\n".join([*about, *lines]) + "\n" + page[end:], encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":

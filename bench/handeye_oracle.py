@@ -1,17 +1,21 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maximum-likelihood hand-eye in NumPy, written apart from the library: what can be had from a scene whose noises are known.
+"""Maximum-likelihood hand-eye in NumPy, written apart from the library: what can be had from a scene whose
+noises are known.
 
     python bench/handeye_oracle.py [--trials 100]
 
-Unknown are the camera, the board and a correction of every reported hand pose; residuals are all of unit variance:
+Unknown are the camera, the board and a correction of every reported hand pose; residuals are all of unit
+variance:
 
     hand:    rotation vector and translation of the correction, over the robot's noise
     pose:    seen against predicted board, over the camera's noise
     pixels:  seen against projected points, over the pixel noise
 
-Derivatives are central differences and the corrections are eliminated pose by pose, so there is no derivation here that could be
-wrong in the same way as that of the library. `by_scipy` solves the same problem once more with SciPy's least_squares.
+Derivatives are central differences and the corrections are eliminated pose by pose, so there is no derivation
+here that could be
+wrong in the same way as that of the library. `by_scipy` solves the same problem once more with SciPy's
+least_squares.
 """
 
 from __future__ import annotations
@@ -31,7 +35,9 @@ STEP = 1e-6  # of the differences [m], [rad]
 
 @dataclass(frozen=True)
 class Oracle:
-    """Frames as in HandEyeScene; `covariance` of camera and board, each [m m m rad rad rad]: `error_of` says in which frames."""
+    """Frames as in HandEyeScene; `covariance` of camera and board, each [m m m rad rad rad]: `error_of` says
+    in which frames.
+    """
 
     T_parent_camera: Floats
     T_parent_board: Floats
@@ -57,7 +63,9 @@ def moved(T: Floats, step: Floats) -> Floats:
 
 def error_of(T_true: Floats, T_found: Floats) -> Floats:
     """The step that leads from one to the other: what `covariance` is of."""
-    return np.concatenate([T_found[:3, 3] - T_true[:3, 3], rotation_vector(T_true[:3, :3].T @ T_found[:3, :3])])
+    return np.concatenate(
+        [T_found[:3, 3] - T_true[:3, 3], rotation_vector(T_true[:3, :3].T @ T_found[:3, :3])]
+    )
 
 
 def degrees_millimetres(T_true: Floats, T_found: Floats) -> tuple[float, float]:
@@ -65,18 +73,24 @@ def degrees_millimetres(T_true: Floats, T_found: Floats) -> tuple[float, float]:
     return math.degrees(float(np.linalg.norm(step[3:]))), 1e3 * float(np.linalg.norm(step[:3]))
 
 
-def predicted_boards(scene: HandEyeScene, T_parent_camera: Floats, T_parent_board: Floats, hand: Floats) -> Floats:
+def predicted_boards(
+    scene: HandEyeScene, T_parent_camera: Floats, T_parent_board: Floats, hand: Floats
+) -> Floats:
     if scene.setup == "eye-to-hand":
         return np.asarray(inverse(T_parent_camera) @ hand @ T_parent_board)
     return np.asarray(inverse(T_parent_camera) @ inverse(hand) @ T_parent_board)
 
 
 def start(scene: HandEyeScene, T_camera_board: Floats) -> tuple[Floats, Floats]:
-    """Both rotations by an SVD of the sum of Kronecker products (Shah 2013), then both translations by linear least squares."""
+    """Both rotations by an SVD of the sum of Kronecker products (Shah 2013), then both translations by linear
+    least squares.
+    """
     # H X = Y C for every pose: eye-to-hand H = hand, X = T_hand_board, Y = T_base_camera, C = T_camera_board;
     # eye-in-hand H = inverse hand, X = T_base_board, Y = T_hand_camera.
     H, C = scene.T_base_hand if scene.setup == "eye-to-hand" else inverse(scene.T_base_hand), T_camera_board
-    K = np.einsum("nij,nkl->ikjl", H[:, :3, :3], C[:, :3, :3]).reshape(9, 9)  # sum of kron(R_H, R_C); vec(R_Y) = K vec(R_X), row by row
+    K = np.einsum("nij,nkl->ikjl", H[:, :3, :3], C[:, :3, :3]).reshape(
+        9, 9
+    )  # sum of kron(R_H, R_C); vec(R_Y) = K vec(R_X), row by row
     u, _, vt = np.linalg.svd(K)
     Y, X = u[:, 0].reshape(3, 3), vt[0].reshape(3, 3)
 
@@ -93,26 +107,45 @@ def start(scene: HandEyeScene, T_camera_board: Floats) -> tuple[Floats, Floats]:
     return camera, board
 
 
-def residuals(scene: HandEyeScene, camera: Floats, board: Floats, corrections: Floats, pixels: bool) -> Floats:
+def residuals(
+    scene: HandEyeScene, camera: Floats, board: Floats, corrections: Floats, pixels: bool
+) -> Floats:
     """Of what the camera saw, shape=(n, k)."""
     predicted = predicted_boards(scene, camera, board, moved(scene.T_base_hand, corrections))
     if pixels:
         assert scene.pixels is not None
         points = scene.board.points @ np.swapaxes(predicted[:, :3, :3], 1, 2) + predicted[:, None, :3, 3]
-        return np.asarray(((scene.camera.project(points) - scene.pixels) / scene.pixel).reshape(len(predicted), -1))
+        return np.asarray(
+            ((scene.camera.project(points) - scene.pixels) / scene.pixel).reshape(len(predicted), -1)
+        )
     turned = rotation_vector(np.swapaxes(predicted[:, :3, :3], 1, 2) @ scene.T_camera_board[:, :3, :3])
-    return np.concatenate([(scene.T_camera_board[:, :3, 3] - predicted[:, :3, 3]) / scene.camera_m, turned / scene.camera_rad], axis=1)
+    return np.concatenate(
+        [(scene.T_camera_board[:, :3, 3] - predicted[:, :3, 3]) / scene.camera_m, turned / scene.camera_rad],
+        axis=1,
+    )
 
 
-def solve(scene: HandEyeScene, *, pixels: bool = False, exact_hand: bool = False, iterations: int = 30, T_camera_board: Floats | None = None) -> Oracle:
-    """Gauss-Newton with step halving. `exact_hand` takes reported poses as true; then pixels alone give "reprojection only"."""
+def solve(
+    scene: HandEyeScene,
+    *,
+    pixels: bool = False,
+    exact_hand: bool = False,
+    iterations: int = 30,
+    T_camera_board: Floats | None = None,
+) -> Oracle:
+    """Gauss-Newton with step halving. `exact_hand` takes reported poses as true; then pixels alone give
+    "reprojection only".
+    """
     n = scene.poses
     camera, board = start(scene, scene.T_camera_board if T_camera_board is None else T_camera_board)
     sigma = np.repeat([scene.hand_m, scene.hand_rad], 3)
     own = np.zeros((n, 6))
 
     def cost_at(camera: Floats, board: Floats, own: Floats) -> float:
-        return float((residuals(scene, camera, board, own, pixels) ** 2).sum() + (0 if exact_hand else ((own / sigma) ** 2).sum()))
+        return float(
+            (residuals(scene, camera, board, own, pixels) ** 2).sum()
+            + (0 if exact_hand else ((own / sigma) ** 2).sum())
+        )
 
     cost, shared = cost_at(camera, board, own), np.eye(12)
     for taken in range(1, iterations + 1):
@@ -128,7 +161,9 @@ def solve(scene: HandEyeScene, *, pixels: bool = False, exact_hand: bool = False
             ):
                 if exact_hand and J_of is Jo:
                     continue
-                J_of[..., column] = (residuals(scene, *plus, pixels) - residuals(scene, *minus, pixels)) / (2 * STEP)
+                J_of[..., column] = (residuals(scene, *plus, pixels) - residuals(scene, *minus, pixels)) / (
+                    2 * STEP
+                )
         JT, JoT = np.swapaxes(J, 1, 2), np.swapaxes(Jo, 1, 2)
         shared, g = (JT @ J).sum(axis=0), (JT @ r[..., None]).sum(axis=0)[:, 0]
         if not exact_hand:
@@ -139,10 +174,18 @@ def solve(scene: HandEyeScene, *, pixels: bool = False, exact_hand: bool = False
             shared = shared - (folded @ np.swapaxes(cross, 1, 2)).sum(axis=0)
             g = g - (folded @ g_own[..., None]).sum(axis=0)[:, 0]
         step = -np.linalg.solve(shared, g)
-        step_own = np.zeros((n, 6)) if exact_hand else -np.linalg.solve(inner, (g_own + np.swapaxes(cross, 1, 2) @ step)[..., None])[..., 0]
+        step_own = (
+            np.zeros((n, 6))
+            if exact_hand
+            else -np.linalg.solve(inner, (g_own + np.swapaxes(cross, 1, 2) @ step)[..., None])[..., 0]
+        )
         share = 1.0
         while share > 1e-4:
-            candidate = moved(camera, share * step[:6]), moved(board, share * step[6:]), own + share * step_own
+            candidate = (
+                moved(camera, share * step[:6]),
+                moved(board, share * step[6:]),
+                own + share * step_own,
+            )
             new = cost_at(*candidate)
             if new <= cost * (1 + 1e-12):
                 break
@@ -175,17 +218,31 @@ def by_scipy(scene: HandEyeScene, *, pixels: bool = False) -> tuple[Floats, Floa
         for axis in range(6):
             pattern[k * n + 6 * pose + axis, 12 + 6 * pose + axis] = 1
     scale = np.concatenate([np.full(12, 1e-3), np.ones(6 * n)])
-    found = least_squares(f, np.zeros(12 + 6 * n), jac_sparsity=pattern, x_scale=scale, xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    found = least_squares(
+        f, np.zeros(12 + 6 * n), jac_sparsity=pattern, x_scale=scale, xtol=1e-12, ftol=1e-12, gtol=1e-12
+    )
     return moved(camera, found.x[:6]), moved(board, found.x[6:12])
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--trials", type=int, default=100)
     arguments = parser.parse_args()
-    print("| scene | trials | deg | mm | cost / residuals - 12 | iterations | ms |\n| --- | --- | --- | --- | --- | --- | --- |")
+    print(
+        "| scene | trials | deg | mm | cost / residuals - 12 | iterations | ms |\n| --- | --- | --- | --- |"
+        " --- | --- | --- |"
+    )
     for setup in ("eye-to-hand", "eye-in-hand"):
-        for poses, pixels, exact in ((10, False, False), (30, False, False), (100, False, False), (1000, False, False), (30, True, False), (30, True, True)):
+        for poses, pixels, exact in (
+            (10, False, False),
+            (30, False, False),
+            (100, False, False),
+            (1000, False, False),
+            (30, True, False),
+            (30, True, True),
+        ):
             trials = max(5, arguments.trials // 5) if poses == 1000 else arguments.trials
             errors, fit, steps, times = [], [], [], []
             for seed in range(trials):
@@ -198,8 +255,11 @@ def main() -> None:
                 steps.append(found.iterations)
             deg, mm = np.median(errors, axis=0)
             what = ("reprojection only" if exact else "pixels and robot") if pixels else "poses"
-            print(f"| {setup}, {what}, {poses} | {trials} | {deg:.4f} | {mm:.3f} | {np.mean(fit):.3f} | {np.median(steps):.0f} | "
-                  f"{1e3 * np.median(times):.0f} |", flush=True)  # fmt: skip
+            print(
+                f"| {setup}, {what}, {poses} | {trials} | {deg:.4f} | {mm:.3f} | {np.mean(fit):.3f} |"
+                f" {np.median(steps):.0f} | {1e3 * np.median(times):.0f} |",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

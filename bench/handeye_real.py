@@ -18,11 +18,16 @@ import truing
 
 ROOT = Path(__file__).resolve().parent.parent
 BEGIN, END = "<!-- hand-eye: written by bench/handeye_real.py -->", "<!-- end of hand-eye -->"
-HEADER = ["| | rms | mean | p95 | max [mm] | rotation rms [deg] | poses |", "| --- | --- | --- | --- | --- | --- | --- |"]
+HEADER = [
+    "| | rms | mean | p95 | max [mm] | rotation rms [deg] | poses |",
+    "| --- | --- | --- | --- | --- | --- | --- |",
+]
 
 
 def line(what: str, e: truing.HandEyeErrors) -> str:
-    mm = " | ".join(f"{1e3 * value:.3f}" for value in (e.position_rms, e.position_mean, e.position_p95, e.position_max))
+    mm = " | ".join(
+        f"{1e3 * value:.3f}" for value in (e.position_rms, e.position_mean, e.position_p95, e.position_max)
+    )
     return f"| {what} | {mm} | {math.degrees(e.rotation_rms):.3f} | {e.n} |"
 
 
@@ -40,38 +45,83 @@ def fr3(folder: Path) -> list[str]:
     lines.append("| baseline, least squares | 8.762 | 7.816 | 15.386 | 19.920 | 0.951 | 35 |")
     both = truing.handeye_with_kinematics(robot, joints, data, loss="none")
     assert both.test_after is not None
-    lines += [line("truing, with kinematics", both.test_after), "| baseline, with link parameters | 1.341 | 1.075 | 2.506 | 3.951 | 0.279 | 35 |"]
+    lines += [
+        line("truing, with kinematics", both.test_after),
+        "| baseline, with link parameters | 1.341 | 1.075 | 2.506 | 3.951 | 0.279 | 35 |",
+    ]
     return lines
 
 
 def images(folder: Path) -> list[str]:
     data = truing.load_handeye(folder / "poses.csv", board="circles:10x10:25.4mm")
     poses = data.poses
-    plain = truing.HandEyePoses(poses.T_base_hand, poses.T_camera_board, set=poses.set, board_symmetries=poses.board_symmetries)
-    everything = truing.HandEyePoses(poses.T_base_hand, poses.T_camera_board, board_symmetries=poses.board_symmetries)
-    with_pixels = truing.HandEyePoses(poses.T_base_hand, poses.T_camera_board, images=poses.images, camera=poses.camera, board_symmetries=poses.board_symmetries)
+    plain = truing.HandEyePoses(
+        poses.T_base_hand, poses.T_camera_board, set=poses.set, board_symmetries=poses.board_symmetries
+    )
+    everything = truing.HandEyePoses(
+        poses.T_base_hand, poses.T_camera_board, board_symmetries=poses.board_symmetries
+    )
+    with_pixels = truing.HandEyePoses(
+        poses.T_base_hand,
+        poses.T_camera_board,
+        images=poses.images,
+        camera=poses.camera,
+        board_symmetries=poses.board_symmetries,
+    )
     lines = ["| **Industrial arm, dot grid in images**" + " |" * 7]
-    for name, found in (("truing, closed form on board poses", truing.handeye(plain, method="closed-form")), ("truing, board poses", truing.handeye(plain)),
-                        ("truing, pixels", truing.handeye(data))):  # fmt: skip
+    for name, found in (
+        ("truing, closed form on board poses", truing.handeye(plain, method="closed-form")),
+        ("truing, board poses", truing.handeye(plain)),
+        ("truing, pixels", truing.handeye(data)),
+    ):
         assert found.test is not None
         lines.append(line(name, found.test))
-    lines += ["| baseline, closed form | 12.798 | 10.704 | 19.103 | 20.349 | 0.912 | 3 |", "| baseline, least squares | 8.270 | 7.668 | 11.301 | 11.792 | 0.746 | 3 |"]
-    lines += [line("truing, board poses, each of the eight left out", truing.handeye(everything).left_out),
-              line("truing, pixels, each of the eight left out", truing.handeye(with_pixels).left_out)]  # fmt: skip
+    lines += [
+        "| baseline, closed form | 12.798 | 10.704 | 19.103 | 20.349 | 0.912 | 3 |",
+        "| baseline, least squares | 8.270 | 7.668 | 11.301 | 11.792 | 0.746 | 3 |",
+    ]
+    lines += [
+        line("truing, board poses, each of the eight left out", truing.handeye(everything).left_out),
+        line("truing, pixels, each of the eight left out", truing.handeye(with_pixels).left_out),
+    ]
     return lines
 
 
 def section(folder: Path) -> str:
-    lines = [BEGIN, "## Hand-eye", "", "Closures of the loop hand, camera, board at the board, on poses that were held out; baselines are those of another program on the same split.", "", *HEADER]
+    lines = [
+        BEGIN,
+        "## Hand-eye",
+        "",
+        (
+            "Closures of the loop hand, camera, board at the board, on poses that were held out; baselines"
+            " are those of another program on the same split."
+        ),
+        "",
+        *HEADER,
+    ]
     for name, table in (("handeye_fr3", fr3), ("handeye_ros_industrial", images)):
         lines += table(folder / name) if (folder / name).is_dir() else [f"| not there: `{name}`" + " |" * 7]
-    lines += ["",
-              "**FR3.** What hand-eye alone leaves is the arm, not the camera, and it says so: plain weights predict left-out poses better than weights by any noise of robot and camera,",
-              "and the joint values and the robot model are asked for. With them (`--with-kinematics`) a millimetre is left.",
-              "",
-              "**Dot grid.** Five training images and three to test on: what the three show is a matter of luck, so each of the eight is left out as well. The dots see their board to 0.1 px, and",
-              "yet poses close to 8 mm: the robot's poses, or a camera that moved while it looked, are off by more than the board's poses, and pixels cannot mend that.",
-              END]  # fmt: skip
+    lines += [
+        "",
+        (
+            "**FR3.** What hand-eye alone leaves is the arm, not the camera, and it says so: plain weights"
+            " predict left-out poses better than weights by any noise of robot and camera,"
+        ),
+        (
+            "and the joint values and the robot model are asked for. With them (`--with-kinematics`) a"
+            " millimetre is left."
+        ),
+        "",
+        (
+            "**Dot grid.** Five training images and three to test on: what the three show is a matter of"
+            " luck, so each of the eight is left out as well. The dots see their board to 0.1 px, and"
+        ),
+        (
+            "yet poses close to 8 mm: the robot's poses, or a camera that moved while it looked, are off by"
+            " more than the board's poses, and pixels cannot mend that."
+        ),
+        END,
+    ]
     return "\n".join(lines)
 
 

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Times the inner loop and whole identifications on a UR10 (modified DH + Hayati, 39 columns) and prints one JSON object a line:
+// Times the inner loop and whole identifications on a UR10 (modified DH + Hayati, 39 columns) and prints one JSON
+// object a line:
 // {"name", "value", "unit"}. bench/run.py runs it beside the peers.
 
 #include <sys/resource.h>
@@ -43,7 +44,8 @@ void report(const std::string& name, double value, const char* unit) {
 }
 
 Robot ur10() {
-  const double table[6][3] = {{0, 0, 0.1273}, {M_PI / 2, 0, 0}, {0, -0.612, 0}, {0, -0.5723, 0.163941}, {M_PI / 2, 0, 0.1157}, {-M_PI / 2, 0, 0.0922}};
+  const double table[6][3] = {{0, 0, 0.1273},         {M_PI / 2, 0, 0},      {0, -0.612, 0},
+                              {0, -0.5723, 0.163941}, {M_PI / 2, 0, 0.1157}, {-M_PI / 2, 0, 0.0922}};
   Robot robot;
   robot.name = "ur10";
   robot.convention = Convention::mdh;
@@ -78,7 +80,8 @@ struct Data {
   std::vector<std::vector<double>> q, p;
   Measurements measurements;
 
-  Data(const Robot& truth, std::size_t rows, double sigma, std::mt19937_64* random) : q(6, std::vector<double>(rows)), p(3, std::vector<double>(rows)) {
+  Data(const Robot& truth, std::size_t rows, double sigma, std::mt19937_64* random)
+      : q(6, std::vector<double>(rows)), p(3, std::vector<double>(rows)) {
     std::uniform_real_distribution<double> uniform(-M_PI, M_PI);
     std::normal_distribution<double> normal(0.0, sigma);
     for (auto& column : q) {
@@ -89,7 +92,9 @@ struct Data {
     {
       const Prediction predicted = predict(truth, measurements);
       for (int k = 0; k < 3; ++k) {
-        for (std::size_t i = 0; i < rows; ++i) p[static_cast<std::size_t>(k)][i] = predicted.position(static_cast<Eigen::Index>(i), k) + (sigma > 0.0 ? normal(*random) : 0.0);
+        for (std::size_t i = 0; i < rows; ++i)
+          p[static_cast<std::size_t>(k)][i] =
+              predicted.position(static_cast<Eigen::Index>(i), k) + (sigma > 0.0 ? normal(*random) : 0.0);
       }
     }
     for (std::size_t k = 0; k < 3; ++k) measurements.position[k] = {p[k].data(), 1};
@@ -103,9 +108,7 @@ long peak_kilobytes() {
 }
 
 /// Forgets the peak so far (Linux).
-void reset_peak() {
-  std::ofstream("/proc/self/clear_refs") << "5";
-}
+void reset_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
 long resident_kilobytes(const char* which) {
   std::ifstream status("/proc/self/status");
@@ -123,10 +126,13 @@ struct Problem {
   Eigen::VectorXd values;
   std::vector<std::int32_t> rows;
 
-  Problem(const Robot& robot, const Measurements& data) : model(detail::make_model(robot, data)), bases(detail::make_bases(model, data)) {
+  Problem(const Robot& robot, const Measurements& data)
+      : model(detail::make_model(robot, data)), bases(detail::make_bases(model, data)) {
     for (std::size_t k = 0; k < model.parameters.size(); ++k) {  // 30 link values, 6 base, 3 tool
       const detail::ParameterInfo& info = model.parameters[k];
-      if (info.role == detail::Role::geometry || info.role == detail::Role::base || (info.role == detail::Role::target && !info.rotation)) free.push_back(static_cast<int>(k));
+      if (info.role == detail::Role::geometry || info.role == detail::Role::base ||
+          (info.role == detail::Role::target && !info.rotation))
+        free.push_back(static_cast<int>(k));
     }
     values = detail::initial_values(model);
     rows.resize(data.rows);
@@ -150,11 +156,17 @@ void time_kernel(const Robot& truth, std::mt19937_64* random) {
   const detail::Evaluator evaluator = problem.evaluator(data.measurements, 1);
   report("jacobian_columns", static_cast<double>(problem.free.size()), "1");
   double sum = 0.0;
-  report("fk_jacobian_1000", 1e6 * best_seconds(5000, [&] {
-    evaluator.jacobian_tiles(problem.values, detail::Weighing{}, [&](const double* j, int, int) { sum += j[0]; });
-  }), "us");
+  report("fk_jacobian_1000",
+         1e6 * best_seconds(5000,
+                            [&] {
+                              evaluator.jacobian_tiles(problem.values, detail::Weighing{},
+                                                       [&](const double* j, int, int) { sum += j[0]; });
+                            }),
+         "us");
   detail::NormalEquations normal;
-  report("iteration_1000", 1e6 * best_seconds(2000, [&] { evaluator.normal_equations(problem.values, detail::Weighing{}, &normal); }), "us");
+  report("iteration_1000",
+         1e6 * best_seconds(2000, [&] { evaluator.normal_equations(problem.values, detail::Weighing{}, &normal); }),
+         "us");
   if (sum == 0.123456789) std::puts("");  // the work is not to be optimised away
 }
 
@@ -184,7 +196,9 @@ void time_million(const Robot& nominal, const Robot& truth, std::mt19937_64* ran
     detail::NormalEquations normal;
     for (const int threads : {1, 2}) {
       const detail::Evaluator evaluator = problem.evaluator(data.measurements, threads);
-      report("iteration_1000000_threads_" + std::to_string(threads), 1e3 * best_seconds(15, [&] { evaluator.normal_equations(problem.values, detail::Weighing{}, &normal); }), "ms");
+      report("iteration_1000000_threads_" + std::to_string(threads),
+             1e3 * best_seconds(15, [&] { evaluator.normal_equations(problem.values, detail::Weighing{}, &normal); }),
+             "ms");
     }
   }
   reset_peak();
@@ -200,7 +214,8 @@ void time_identify(const Robot& nominal, const Robot& truth, std::mt19937_64* ra
   IdentifyOptions options;
   options.test_share = 0.0;
   Identification result;
-  report("identify_1000", 1e3 * best_seconds(500, [&] { result = identify(nominal, data.measurements, options); }), "ms");
+  report("identify_1000", 1e3 * best_seconds(500, [&] { result = identify(nominal, data.measurements, options); }),
+         "ms");
   report("identify_1000_rank", result.rank, "1");
   report("identify_1000_columns", result.columns, "1");
   report("identify_1000_iterations", result.solver.iterations, "1");
@@ -217,7 +232,8 @@ void accuracy(const Robot& nominal) {
       IdentifyOptions options;
       options.test_share = 0.0;
       const Identification result = identify(nominal, data.measurements, options);
-      ratios.push_back(rms_against(truth, result.robot, &random) / (3e-5 * std::sqrt(static_cast<double>(result.rank) / static_cast<double>(rows))));
+      ratios.push_back(rms_against(truth, result.robot, &random) /
+                       (3e-5 * std::sqrt(static_cast<double>(result.rank) / static_cast<double>(rows))));
     }
     std::nth_element(ratios.begin(), ratios.begin() + 10, ratios.end());
     report("accuracy_" + std::to_string(rows), ratios[10], "sigma sqrt(p/N)");

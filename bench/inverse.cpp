@@ -1,19 +1,20 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Times inverse kinematics on arms whose every target is the forward kinematics of random joints, and counts the answers that
-// hold when forward_kinematics looks at them again. One line a task: median and 99th percentile of the CPU time, best of
-// several runs for every target; and the share reached.
+// Times inverse kinematics on arms whose every target is the forward kinematics of random joints, and counts the
+// answers that hold when forward_kinematics looks at them again. One line a task: median and 99th percentile of the CPU
+// time, best of several runs for every target; and the share reached.
 //
 //     bench_inverse [NAME] [--quick] [--write FOLDER]
 //
-// NAME: only tasks that have it in their name. --quick: a tenth of the targets. --write: the robots, targets, seeds and answers as
-// well, for bench/inverse.py, which hands the same ones to the peers and looks at all answers with another program's forward kinematics:
+// NAME: only tasks that have it in their name. --quick: a tenth of the targets. --write: the robots, targets, seeds and
+// answers as well, for bench/inverse.py, which hands the same ones to the peers and looks at all answers with another
+// program's forward kinematics:
 //
 //     robots.json             link parameters as written below
-//     SET.cases               doubles, a row a target: joints it was made from, seed, wanted T_measurement_target (4 x 4, row-major)
-//     truing.NAME.answers     doubles, a row an answer: index of the target, 1 if said to be reached, joints, more for some tasks
-//     truing.jsonl            what is printed, one object a task
+//     SET.cases               doubles, a row a target: joints it was made from, seed, wanted T_measurement_target (4 x
+//     4, row-major) truing.NAME.answers     doubles, a row an answer: index of the target, 1 if said to be reached,
+//     joints, more for some tasks truing.jsonl            what is printed, one object a task
 
 #include <time.h>
 
@@ -96,8 +97,11 @@ Robot ur10() {
   Robot robot;
   robot.name = "ur10";
   robot.convention = Convention::mdh;
-  const double table[6][3] = {{0, 0, 0.1273}, {M_PI / 2, 0, 0}, {0, -0.612, 0}, {0, -0.5723, 0.163941}, {M_PI / 2, 0, 0.1157}, {-M_PI / 2, 0, 0.0922}};
-  for (int k = 0; k < 6; ++k) robot.joints.push_back(joint("J" + std::to_string(k + 1), 0, table[k][2], table[k][1], table[k][0], -2 * M_PI, 2 * M_PI));
+  const double table[6][3] = {{0, 0, 0.1273},         {M_PI / 2, 0, 0},      {0, -0.612, 0},
+                              {0, -0.5723, 0.163941}, {M_PI / 2, 0, 0.1157}, {-M_PI / 2, 0, 0.0922}};
+  for (int k = 0; k < 6; ++k)
+    robot.joints.push_back(
+        joint("J" + std::to_string(k + 1), 0, table[k][2], table[k][1], table[k][0], -2 * M_PI, 2 * M_PI));
   robot.targets = {{"tool", frame_from_xyz_rpy({0.03, -0.02, 0.15}, {0.0, 0.5, 0.0})}};
   return robot;
 }
@@ -106,9 +110,12 @@ Robot ur10() {
 Robot irb() {
   Robot robot;
   robot.name = "irb";
-  robot.joints = {joint("J1", 0, 0.495, 0.175, -M_PI / 2, -180 * kDegree, 180 * kDegree), joint("J2", -M_PI / 2, 0, 0.9, 0, -90 * kDegree, 150 * kDegree),
-                  joint("J3", 0, 0, 0.175, -M_PI / 2, -180 * kDegree, 75 * kDegree),      joint("J4", 0, 0.96, 0, M_PI / 2, -400 * kDegree, 400 * kDegree),
-                  joint("J5", 0, 0, 0, -M_PI / 2, -125 * kDegree, 120 * kDegree),         joint("J6", 0, 0.135, 0, 0, -400 * kDegree, 400 * kDegree)};
+  robot.joints = {joint("J1", 0, 0.495, 0.175, -M_PI / 2, -180 * kDegree, 180 * kDegree),
+                  joint("J2", -M_PI / 2, 0, 0.9, 0, -90 * kDegree, 150 * kDegree),
+                  joint("J3", 0, 0, 0.175, -M_PI / 2, -180 * kDegree, 75 * kDegree),
+                  joint("J4", 0, 0.96, 0, M_PI / 2, -400 * kDegree, 400 * kDegree),
+                  joint("J5", 0, 0, 0, -M_PI / 2, -125 * kDegree, 120 * kDegree),
+                  joint("J6", 0, 0.135, 0, 0, -400 * kDegree, 400 * kDegree)};
   robot.targets = {{"tool", frame_from_xyz_rpy({0.05, 0.0, 0.25}, {0.0, 0.6, 0.0})}};
   return robot;
 }
@@ -118,7 +125,8 @@ Robot gantry() {
   Robot robot = irb();
   robot.name = "gantry";
   // DH moves along z of the frame before: x, y, z rails by twisting the frames; the arm hangs head down.
-  std::vector<Joint> rails = {joint("X", 0, 0, 0, -M_PI / 2, 0, 10), joint("Y", M_PI / 2, 0, 0, M_PI / 2, 0, 4), joint("Z", 0, 0, 0, 0, 0, 2)};
+  std::vector<Joint> rails = {joint("X", 0, 0, 0, -M_PI / 2, 0, 10), joint("Y", M_PI / 2, 0, 0, M_PI / 2, 0, 4),
+                              joint("Z", 0, 0, 0, 0, 0, 2)};
   for (Joint& rail : rails) rail.type = JointType::prismatic;
   robot.T_measurement_base = frame_from_xyz_rpy({0, 0, 3}, {0, M_PI / 2, 0});
   robot.joints.insert(robot.joints.begin(), rails.begin(), rails.end());
@@ -129,7 +137,8 @@ Robot gantry() {
 Robot rail() {
   Robot robot = irb();
   robot.name = "rail";
-  Joint x = joint("X", 0, 0, 0, 0, 0, 10);  // along z of the base, which lies along x; the twist puts the arm upright again
+  Joint x =
+      joint("X", 0, 0, 0, 0, 0, 10);  // along z of the base, which lies along x; the twist puts the arm upright again
   x.beta = -M_PI / 2;
   x.type = JointType::prismatic;
   robot.T_measurement_base = frame_from_xyz_rpy({0, 0, 0.3}, {0, M_PI / 2, 0});
@@ -171,7 +180,8 @@ bool holds(const Robot& robot, const Task& task, const Joints& q) {
   const Isometry3d T = forward_kinematics(robot, q).back();
   if ((T.translation() - task.T_measurement_target.translation()).norm() > 1e-6) return false;
   if (task.kind == TaskKind::pose) {
-    return Eigen::Quaterniond(T.linear()).angularDistance(Eigen::Quaterniond(task.T_measurement_target.linear())) <= 1e-6;
+    return Eigen::Quaterniond(T.linear()).angularDistance(Eigen::Quaterniond(task.T_measurement_target.linear())) <=
+           1e-6;
   }
   if (task.kind == TaskKind::torch) {
     const Vector3d a = T.linear() * task.axis, b = task.T_measurement_target.linear() * task.axis;
@@ -185,7 +195,9 @@ struct Case {
   Joints truth, seed;
 };
 
-const char* name_of(TaskKind kind) { return kind == TaskKind::pose ? "pose" : kind == TaskKind::torch ? "torch" : "point"; }
+const char* name_of(TaskKind kind) {
+  return kind == TaskKind::pose ? "pose" : kind == TaskKind::torch ? "torch" : "point";
+}
 
 void write_cases(const std::string& set, const std::vector<Case>& cases) {
   Table table;
@@ -207,7 +219,9 @@ std::vector<Case> make_cases(const Robot& robot, std::size_t count, TaskKind kin
     c.task.kind = kind;
     c.task.T_measurement_target = forward_kinematics(robot, c.truth).back();
     // The roll of the torch is anything: as a program without a wish would have it.
-    if (kind == TaskKind::torch) c.task.T_measurement_target.linear() *= Eigen::AngleAxisd(random.uniform(-3, 3), Vector3d::UnitZ()).toRotationMatrix();
+    if (kind == TaskKind::torch)
+      c.task.T_measurement_target.linear() *=
+          Eigen::AngleAxisd(random.uniform(-3, 3), Vector3d::UnitZ()).toRotationMatrix();
   }
   return cases;
 }
@@ -227,22 +241,24 @@ struct Report {
   std::string name() const { return robot + " " + task; }
 
   void print() const {
-    std::printf("%-40s %9.2f / %9.2f us   %zu of %zu reached, %zu claimed wrongly%s%s\n", name().c_str(), median_us, p99_us, reached, targets, wrong,
-                note.empty() ? "" : ", ", note.c_str());
+    std::printf("%-40s %9.2f / %9.2f us   %zu of %zu reached, %zu claimed wrongly%s%s\n", name().c_str(), median_us,
+                p99_us, reached, targets, wrong, note.empty() ? "" : ", ", note.c_str());
     std::fflush(stdout);
     char line[600];
-    const int length = std::snprintf(line, sizeof line,
-                                     "{\"task\": \"%s\", \"robot\": \"%s\", \"set\": \"%s\", \"targets\": %zu, \"reached\": %zu, \"wrong\": %zu, "
-                                     "\"median_us\": %.4g, \"p99_us\": %.4g, \"grid_us\": %.4g, \"note\": \"%s\"}\n",
-                                     task.c_str(), robot.c_str(), set.c_str(), targets, reached, wrong, median_us, p99_us, grid_us, note.c_str());
+    const int length = std::snprintf(
+        line, sizeof line,
+        "{\"task\": \"%s\", \"robot\": \"%s\", \"set\": \"%s\", \"targets\": %zu, \"reached\": %zu, \"wrong\": %zu, "
+        "\"median_us\": %.4g, \"p99_us\": %.4g, \"grid_us\": %.4g, \"note\": \"%s\"}\n",
+        task.c_str(), robot.c_str(), set.c_str(), targets, reached, wrong, median_us, p99_us, grid_us, note.c_str());
     write_file("truing.jsonl", line, static_cast<std::size_t>(length), "ab");
     answers.write("truing." + name() + ".answers");
   }
 };
 
-/// Median and p99 over the cases: of every case the best of several runs; reading the clock takes time too, so a case is done a few
-/// times in a row.
-void time_cases(std::size_t count, const std::function<void(std::size_t)>& work, Report* report, int runs = 5, int times = 8) {
+/// Median and p99 over the cases: of every case the best of several runs; reading the clock takes time too, so a case
+/// is done a few times in a row.
+void time_cases(std::size_t count, const std::function<void(std::size_t)>& work, Report* report, int runs = 5,
+                int times = 8) {
   std::vector<double> best(count, 1e9);
   for (int run = 0; run < runs; ++run) {
     for (std::size_t k = 0; k < count; ++k) {
@@ -264,7 +280,8 @@ std::string text(const char* format, double a, double b = 0.0, double c = 0.0) {
   return line;
 }
 
-// ---- Tasks -----------------------------------------------------------------------------------------------------------
+// ---- Tasks
+// -----------------------------------------------------------------------------------------------------------
 
 void one_answer(const std::string& task, const Robot& robot, TaskKind kind, const InverseOptions& options = {}) {
   Report report(task, robot.name, name_of(kind), g_arguments.count(10000));
@@ -323,12 +340,14 @@ void all_branches(const Robot& robot) {
 
 /// What Choose looks at, written once more: larger is better.
 double merit(const Robot& robot, const InverseSolver& solver, Choose choose, const Joints& q, const Joints& seed) {
-  if (choose == Choose::manipulability) {  // Yoshikawa 1985, eq. (6), of the joints that turn; the unit of length is a factor of it
+  if (choose == Choose::manipulability) {  // Yoshikawa 1985, eq. (6), of the joints that turn; the unit of length is a
+                                           // factor of it
     TipJacobian J;
     solver.forward(q, &J);
     Eigen::Matrix<double, 6, 6> gram = Eigen::Matrix<double, 6, 6>::Zero();
     for (Eigen::Index j = 0; j < q.size(); ++j) {
-      if (robot.joints[static_cast<std::size_t>(j)].type == JointType::revolute) gram += J.col(j) * J.col(j).transpose();
+      if (robot.joints[static_cast<std::size_t>(j)].type == JointType::revolute)
+        gram += J.col(j) * J.col(j).transpose();
     }
     return std::sqrt(std::max(0.0, gram.determinant()));
   }
@@ -342,16 +361,19 @@ double merit(const Robot& robot, const InverseSolver& solver, Choose choose, con
 }
 
 /// The best of all branches with the rails at every multiple of `spacing`; -infinity: none reaches.
-double best_on_grid(const Robot& robot, const InverseSolver& solver, Choose choose, double spacing, const Case& c, Branches* found) {
+double best_on_grid(const Robot& robot, const InverseSolver& solver, Choose choose, double spacing, const Case& c,
+                    Branches* found) {
   int rails = 0;
   while (robot.joints[static_cast<std::size_t>(rails)].type == JointType::prismatic) ++rails;
   std::vector<int> cells(static_cast<std::size_t>(rails)), at(static_cast<std::size_t>(rails), 0);
-  for (std::size_t r = 0; r < cells.size(); ++r) cells[r] = static_cast<int>(std::lround((robot.joints[r].upper - robot.joints[r].lower) / spacing));
+  for (std::size_t r = 0; r < cells.size(); ++r)
+    cells[r] = static_cast<int>(std::lround((robot.joints[r].upper - robot.joints[r].lower) / spacing));
   // Of a joint's turns those in the middle of its range, where limits are asked about.
   Joints from = choose == Choose::limits_margin ? solver.middle() : c.seed;
   double best = -std::numeric_limits<double>::infinity();
   for (bool more = true; more;) {
-    for (std::size_t r = 0; r < cells.size(); ++r) from[static_cast<Eigen::Index>(r)] = robot.joints[r].lower + spacing * at[r];
+    for (std::size_t r = 0; r < cells.size(); ++r)
+      from[static_cast<Eigen::Index>(r)] = robot.joints[r].lower + spacing * at[r];
     solver.branches(c.task, from, found);
     for (int b = 0; b < found->count; ++b) {
       const Joints& q = found->solution[static_cast<std::size_t>(b)].joints;
@@ -385,7 +407,8 @@ void best_over_rails(const Robot& robot, Choose choose, const char* name, std::s
     const double start = cpu_seconds();
     const double grid = best_on_grid(robot, plain, choose, 0.1, cases[k], &found);
     grid_seconds += cpu_seconds() - start;
-    const double ours = held ? merit(robot, solver, choose, s.joints, cases[k].seed) : -std::numeric_limits<double>::infinity();
+    const double ours =
+        held ? merit(robot, solver, choose, s.joints, cases[k].seed) : -std::numeric_limits<double>::infinity();
     const double short_by = std::isfinite(grid) ? (grid - ours) / std::max(std::abs(grid), 1e-3) : 0.0;
     worse += short_by > 1e-6;
     worst = std::max(worst, short_by);
@@ -396,13 +419,15 @@ void best_over_rails(const Robot& robot, Choose choose, const char* name, std::s
     report.answers.add(grid);
   }
   report.grid_us = 1e6 * grid_seconds / static_cast<double>(count);
-  report.note = text("grid of 0.1 m %.0f us, better than ours on %.0f, by up to %.2g of its merit", report.grid_us, static_cast<double>(worse), worst);
+  report.note = text("grid of 0.1 m %.0f us, better than ours on %.0f, by up to %.2g of its merit", report.grid_us,
+                     static_cast<double>(worse), worst);
   time_cases(report.targets, [&](std::size_t k) { (void)solver.solve(cases[k].task, cases[k].seed); }, &report, 3, 1);
   report.print();
 }
 
 /// Every joint swings about `middle`, by `swing`, so that the elbow and the wrist stay bent.
-std::vector<Case> make_path(const Robot& robot, const std::vector<double>& middle, const std::vector<double>& swing, std::size_t count) {
+std::vector<Case> make_path(const Robot& robot, const std::vector<double>& middle, const std::vector<double>& swing,
+                            std::size_t count) {
   detail::Random random(13);
   const Eigen::Index n = static_cast<Eigen::Index>(middle.size());
   Joints phase(n), turns(n);
@@ -415,7 +440,8 @@ std::vector<Case> make_path(const Robot& robot, const std::vector<double>& middl
     Joints q(n);
     for (Eigen::Index j = 0; j < n; ++j) {
       const double s = static_cast<double>(k) / 1000.0;
-      q[j] = middle[static_cast<std::size_t>(j)] + swing[static_cast<std::size_t>(j)] * std::sin(phase[j] + 2 * M_PI * turns[j] * s);
+      q[j] = middle[static_cast<std::size_t>(j)] +
+             swing[static_cast<std::size_t>(j)] * std::sin(phase[j] + 2 * M_PI * turns[j] * s);
     }
     cases[k].truth = q;
     cases[k].seed = k > 0 ? cases[k - 1].truth : q;
@@ -463,15 +489,17 @@ void smooth_path(const Robot& robot, const std::vector<double>& middle, const st
     whole.answers.add(s.reached() ? 1.0 : 0.0);
     whole.answers.add(s.joints);
   }
-  whole.note = text("%.0f gaps, longest step %.4f rad, %.4f m", static_cast<double>(path.gaps.size()), path.longest_turn, path.longest_slide);
+  whole.note = text("%.0f gaps, longest step %.4f rad, %.4f m", static_cast<double>(path.gaps.size()),
+                    path.longest_turn, path.longest_slide);
   time_cases(1, [&](std::size_t) { (void)solver.path(tasks, cases[0].truth); }, &whole, 3, 1);
   whole.median_us = whole.p99_us /= static_cast<double>(cases.size());
   whole.print();
 }
 
-/// Position that is missed when a controller with the nominal robot is told `T_command`; NaN: it cannot go there. `q`: where it comes from,
-/// and where it goes.
-double missed(const Compensator& compensator, const Isometry3d& T_command, const Isometry3d& T_wanted, Joints* q, Isometry3d* T_real) {
+/// Position that is missed when a controller with the nominal robot is told `T_command`; NaN: it cannot go there. `q`:
+/// where it comes from, and where it goes.
+double missed(const Compensator& compensator, const Isometry3d& T_command, const Isometry3d& T_wanted, Joints* q,
+              Isometry3d* T_real) {
   Task command;
   command.T_measurement_target = T_command;
   const Solution s = compensator.nominal().solve(command, *q);
@@ -486,9 +514,10 @@ double quantile(std::vector<double> values, double share) {
   return values[std::min(values.size() - 1, static_cast<std::size_t>(share * static_cast<double>(values.size())))];
 }
 
-/// The usual way: command the wanted pose less what the real robot was off by, once more and once more. Returned: which are
-/// where they should be to a nanometre after `kMost` corrections.
-std::vector<bool> fake_targets(const Compensator& compensator, const std::vector<Case>& cases, const std::string& robot) {
+/// The usual way: command the wanted pose less what the real robot was off by, once more and once more. Returned: which
+/// are where they should be to a nanometre after `kMost` corrections.
+std::vector<bool> fake_targets(const Compensator& compensator, const std::vector<Case>& cases,
+                               const std::string& robot) {
   constexpr int kMost = 50;
   Report report("fake targets", robot, "compensate", cases.size());
   std::vector<double> first, second, third;
@@ -515,19 +544,23 @@ std::vector<bool> fake_targets(const Compensator& compensator, const std::vector
     report.reached += miss[kMost] <= 1e-9;
     arrived.push_back(miss[kMost] <= 1e-9);
   }
-  report.note = text("medians %.3g m, %.3g m, %.3g m", quantile(first, 0.5), quantile(second, 0.5), quantile(third, 0.5)) +
-                text(" after 0, 1, 2 corrections, after two %.2f %% off by more than 1 um, after 50 %.2f %% by more than 1 nm",
-                     100.0 * static_cast<double>(micrometre) / static_cast<double>(cases.size()),
-                     100.0 * static_cast<double>(never) / static_cast<double>(cases.size()));
-  time_cases(cases.size(), [&](std::size_t k) {
-    const Isometry3d wanted = cases[k].task.T_measurement_target;
-    Isometry3d command = wanted, real = wanted;
-    Joints q = cases[k].seed;
-    for (int n = 0; n < 2; ++n) {  // the third solve is the controller's own
-      if (std::isnan(missed(compensator, command, wanted, &q, &real))) return;
-      command = command * real.inverse() * wanted;
-    }
-  }, &report, 3, 1);
+  report.note =
+      text("medians %.3g m, %.3g m, %.3g m", quantile(first, 0.5), quantile(second, 0.5), quantile(third, 0.5)) +
+      text(" after 0, 1, 2 corrections, after two %.2f %% off by more than 1 um, after 50 %.2f %% by more than 1 nm",
+           100.0 * static_cast<double>(micrometre) / static_cast<double>(cases.size()),
+           100.0 * static_cast<double>(never) / static_cast<double>(cases.size()));
+  time_cases(
+      cases.size(),
+      [&](std::size_t k) {
+        const Isometry3d wanted = cases[k].task.T_measurement_target;
+        Isometry3d command = wanted, real = wanted;
+        Joints q = cases[k].seed;
+        for (int n = 0; n < 2; ++n) {  // the third solve is the controller's own
+          if (std::isnan(missed(compensator, command, wanted, &q, &real))) return;
+          command = command * real.inverse() * wanted;
+        }
+      },
+      &report, 3, 1);
   report.print();
   return arrived;
 }
@@ -560,10 +593,12 @@ void compensate(const Robot& nominal, const Robot& calibrated) {
     report.answers.add(c.solution.reached() ? 1.0 : 0.0);
     report.answers.add(c.solution.joints);
     report.answers.add(c.T_command);
-    if (!c.solution.reached() && labelled == 1) report.note = "the first of them " + compensator.calibrated().describe(c.solution) + "; ";
+    if (!c.solution.reached() && labelled == 1)
+      report.note = "the first of them " + compensator.calibrated().describe(c.solution) + "; ";
   }
-  report.note = text("%.3g m before in the median; %.0f labelled, of which fake targets reach %.0f; ", quantile(before, 0.5), static_cast<double>(labelled),
-                     static_cast<double>(others)) + report.note;
+  report.note = text("%.3g m before in the median; %.0f labelled, of which fake targets reach %.0f; ",
+                     quantile(before, 0.5), static_cast<double>(labelled), static_cast<double>(others)) +
+                report.note;
   time_cases(cases.size(), [&](std::size_t k) { (void)compensator.pose(cases[k].task, cases[k].seed); }, &report);
   report.print();
 }
@@ -580,11 +615,14 @@ void write_robots(const std::vector<Robot>& robots) {
       }
       return "[" + rows + "]";
     };
-    out += (out.size() > 1 ? ",\n\"" : "\n\"") + robot.name + "\": {\"convention\": \"" + (robot.convention == Convention::dh ? "dh" : "mdh") +
-           "\", \"T_measurement_base\": " + frame(base) + ", \"T_last_target\": " + frame(tool) + ", \"joints\": [";
+    out += (out.size() > 1 ? ",\n\"" : "\n\"") + robot.name + "\": {\"convention\": \"" +
+           (robot.convention == Convention::dh ? "dh" : "mdh") + "\", \"T_measurement_base\": " + frame(base) +
+           ", \"T_last_target\": " + frame(tool) + ", \"joints\": [";
     for (const Joint& j : robot.joints) {
-      out += std::string(&j == &robot.joints.front() ? "\n" : ",\n") + " {\"prismatic\": " + (j.type == JointType::prismatic ? "true" : "false") +
-             text(", \"theta\": %.17g, \"d\": %.17g, \"a\": %.17g", j.theta, j.d, j.a) + text(", \"alpha\": %.17g, \"beta\": %.17g", j.alpha, j.beta) +
+      out += std::string(&j == &robot.joints.front() ? "\n" : ",\n") +
+             " {\"prismatic\": " + (j.type == JointType::prismatic ? "true" : "false") +
+             text(", \"theta\": %.17g, \"d\": %.17g, \"a\": %.17g", j.theta, j.d, j.a) +
+             text(", \"alpha\": %.17g, \"beta\": %.17g", j.alpha, j.beta) +
              text(", \"lower\": %.17g, \"upper\": %.17g}", j.lower, j.upper);
     }
     out += "]}";
@@ -618,13 +656,15 @@ void run() {
   write_robots({ur, ur_real, arm, arm_real, portal, portal_real, track, track_real});
 
   for (const Robot* robot : {&ur, &arm, &ur_real, &arm_real}) all_branches(*robot);
-  for (const Robot* robot : {&ur, &arm, &ur_real, &arm_real, &portal, &portal_real}) one_answer("one", *robot, TaskKind::pose);
+  for (const Robot* robot : {&ur, &arm, &ur_real, &arm_real, &portal, &portal_real})
+    one_answer("one", *robot, TaskKind::pose);
   InverseOptions without;
   without.wrist_tolerance = without.parallel_tolerance = 0.0;
   for (const Robot* robot : {&ur_real, &arm_real}) one_answer("one by descent alone", *robot, TaskKind::pose, without);
   for (const Robot* robot : {&ur_real, &arm_real, &portal_real}) one_answer("torch", *robot, TaskKind::torch);
 
-  const std::pair<Choose, const char*> criteria[] = {{Choose::limits_margin, "limits margin"}, {Choose::manipulability, "manipulability"},
+  const std::pair<Choose, const char*> criteria[] = {{Choose::limits_margin, "limits margin"},
+                                                     {Choose::manipulability, "manipulability"},
                                                      {Choose::rail_travel, "rail travel"}};
   for (const Robot* robot : {&track, &track_real}) one_answer("one", *robot, TaskKind::pose);
   for (const Robot* robot : {&track, &track_real}) {
@@ -634,7 +674,8 @@ void run() {
 
   smooth_path(ur_real, {0.0, -1.2, 1.4, -0.8, 1.3, 0.0}, {1.0, 0.4, 0.6, 0.6, 0.6, 1.0});
   smooth_path(arm_real, {0.0, 0.4, -0.3, 0.3, 0.9, 0.0}, {1.0, 0.4, 0.4, 0.8, 0.5, 1.0});
-  smooth_path(portal_real, {5.0, 2.0, 1.0, 0.0, 0.4, -0.3, 0.3, 0.9, 0.0}, {0.8, 0.5, 0.3, 1.0, 0.4, 0.4, 0.8, 0.5, 1.0});
+  smooth_path(portal_real, {5.0, 2.0, 1.0, 0.0, 0.4, -0.3, 0.3, 0.9, 0.0},
+              {0.8, 0.5, 0.3, 1.0, 0.4, 0.4, 0.8, 0.5, 1.0});
 
   compensate(arm, arm_real);
 }

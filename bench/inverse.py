@@ -3,11 +3,15 @@
 """truing's inverse kinematics beside others', on the same robots, targets and seeds in one run.
 
     bench/peers/setup_inverse.sh PEERS                # once: the peers, in an environment of their own
-    python bench/inverse.py --bench build/bench_inverse --peers PEERS [--quick] [--only branches,one,...] [--write docs/benchmarks-inverse.md]
+    python bench/inverse.py --bench build/bench_inverse --peers PEERS [--quick] [--only branches,one,...]
+    [--write docs/benchmarks-inverse.md]
 
-Robots and targets are those of bench/inverse.cpp (seeds 7 and 13; errors of the calibrated robots 11, 12, 14), which writes them and truing's answers
-into a folder; bench/peers/inverse_peers.py hands them to one peer at a time. Every answer, truing's too, is judged here by Pinocchio's
-forward kinematics of a chain that is built from the link parameters apart from the library. `--write` puts the tables between the markers of the page.
+Robots and targets are those of bench/inverse.cpp (seeds 7 and 13; errors of the calibrated robots 11, 12,
+14), which writes them and truing's answers
+into a folder; bench/peers/inverse_peers.py hands them to one peer at a time. Every answer, truing's too, is
+judged here by Pinocchio's
+forward kinematics of a chain that is built from the link parameters apart from the library. `--write` puts
+the tables between the markers of the page.
 """
 
 from __future__ import annotations
@@ -42,11 +46,15 @@ ROUNDING = 1e-9  # a share of the tolerances
 JUMP = 0.1  # on a path whose steps are a tenth of it [rad | m]
 SAME = 1e-4  # branches that differ by less are one [rad]
 NEAR = 1e-2  # and rough ones are near one [rad]
-WITHOUT_LIMITS = ("EAIK",)  # knows none: whole turns are added here, and what stays outside is left out, not held against it
+WITHOUT_LIMITS = (
+    "EAIK",
+)  # knows none: whole turns are added here, and what stays outside is left out, not held against it
 LEFT_OUT = {
     "tracikpy": "pip finds no distribution; pytracik is the same TRAC-IK",
     "kinpy": "minimises by BFGS without joint limits and without a word on success",
-    "Tesseract": "its grid over rails takes files of its own for every robot; rebuilt here from truing's own branches",
+    "Tesseract": (
+        "its grid over rails takes files of its own for every robot; rebuilt here from truing's own branches"
+    ),
 }
 
 
@@ -65,11 +73,14 @@ class Result:
     worst: float = 0.0  # error of the worst of these [m | rad]
     note: str = ""
     branches: list[list[Floats]] = field(default_factory=list)  # those that hold, a list a target
-    rough: list[tuple[int, Floats]] = field(default_factory=list)  # those that the program itself says are not good enough: target, joints
+    rough: list[tuple[int, Floats]] = field(
+        default_factory=list
+    )  # those that the program itself says are not good enough: target, joints
     raw: dict[str, Any] = field(default_factory=dict)  # of truing.jsonl
 
 
-# ---- Judging ---------------------------------------------------------------------------------------------------------
+# ---- Judging
+# ---------------------------------------------------------------------------------------------------------
 
 
 class Oracle:
@@ -91,7 +102,9 @@ class Oracle:
         return bool(np.all(q >= self.chain.lower - BEYOND) and np.all(q <= self.chain.upper + BEYOND))
 
     def miss(self, q: Floats, wanted: Floats, torch: bool) -> float:
-        """How far from the task: the larger of position [m] and angle [rad], of the tool's z alone for a torch; infinite for joints beyond limits."""
+        """How far from the task: the larger of position [m] and angle [rad], of the tool's z alone for a
+        torch; infinite for joints beyond limits.
+        """
         if not np.all(np.isfinite(q)) or not self.within_limits(q):
             return math.inf
         T = self.tip(q)
@@ -141,7 +154,9 @@ def judge(result: Result, chain: Chain, cases: Cases, answers: Floats) -> None:
             result.worst = max(result.worst, miss)
     if result.task == "branches":
         result.branches = good
-        result.reached = float(np.mean([any(apart(q, truth) < SAME for q in found) for found, truth in zip(good, cases.truth)]))
+        result.reached = float(
+            np.mean([any(apart(q, truth) < SAME for q in found) for found, truth in zip(good, cases.truth)])
+        )
     else:
         result.reached = float(np.mean([bool(found) for found in good]))
     if result.task in ("path", "follow"):
@@ -150,10 +165,14 @@ def judge(result: Result, chain: Chain, cases: Cases, answers: Floats) -> None:
         longest = float(np.max(np.abs(np.diff(cases.truth, axis=0))))
         jumps = int(np.sum(steps > JUMP))
         result.raw["jumps"] = jumps
-        result.note = f"{jumps or 'no'} jump{'s' if jumps != 1 else ''}, longest step {np.max(steps):.4f} (of the path itself {longest:.4f})"
+        result.note = (
+            f"{jumps or 'no'} jump{'s' if jumps != 1 else ''}, longest step {np.max(steps):.4f} (of the path"
+            f" itself {longest:.4f})"
+        )
 
 
-# ---- Running ---------------------------------------------------------------------------------------------------------
+# ---- Running
+# ---------------------------------------------------------------------------------------------------------
 
 
 def note(text: str) -> None:
@@ -166,7 +185,16 @@ def run_truing(program: Path, folder: Path, quick: bool) -> list[Result]:
     chains, results = read_chains(folder), []
     for line in (folder / "truing.jsonl").read_text(encoding="utf-8").splitlines():
         raw = json.loads(line)
-        result = Result("truing", raw["task"], raw["robot"], raw["targets"], raw["median_us"], raw["p99_us"], note=raw["note"], raw=raw)
+        result = Result(
+            "truing",
+            raw["task"],
+            raw["robot"],
+            raw["targets"],
+            raw["median_us"],
+            raw["p99_us"],
+            note=raw["note"],
+            raw=raw,
+        )
         chain = chains[raw["robot"]]
         file = folder / f"truing.{raw['robot']} {raw['task']}.answers"
         answers = np.fromfile(file)
@@ -185,8 +213,12 @@ def run_truing(program: Path, folder: Path, quick: bool) -> list[Result]:
     return results
 
 
-def judge_compensation(result: Result, nominal: Chain, calibrated: Chain, cases: Cases, answers: Floats) -> None:
-    """The calibrated robot at the joints is where it is wanted, to 1e-9; the nominal one at the same joints is where it is told to be."""
+def judge_compensation(
+    result: Result, nominal: Chain, calibrated: Chain, cases: Cases, answers: Floats
+) -> None:
+    """The calibrated robot at the joints is where it is wanted, to 1e-9; the nominal one at the same joints
+    is where it is told to be.
+    """
     real, believed, n = Oracle(calibrated), Oracle(nominal), nominal.joints
     held = 0
     for row in answers[answers[:, 1] > 0.5]:
@@ -199,7 +231,9 @@ def judge_compensation(result: Result, nominal: Chain, calibrated: Chain, cases:
     result.raw["labelled"] = int(np.sum(answers[:, 1] < 0.5))
 
 
-def run_peer(name: str, environment: Path, folder: Path, quick: bool, timeout: float) -> tuple[list[Result], dict[str, str]]:
+def run_peer(
+    name: str, environment: Path, folder: Path, quick: bool, timeout: float
+) -> tuple[list[Result], dict[str, str]]:
     """Results, the peer's versions. A peer that cannot run has results without figures, whose notes say why."""
     python, out = environment.absolute() / "bin" / "python", folder / f"{name}.npz"
     cache = environment.absolute() / "share" / "inverse"
@@ -209,9 +243,20 @@ def run_peer(name: str, environment: Path, folder: Path, quick: bool, timeout: f
     else:
         cache.mkdir(parents=True, exist_ok=True)
         one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
-        command = [str(python), str(PEER_FOLDER / "inverse_peers.py"), name, str(folder), str(out), "--cache", str(cache), *(["--quick"] if quick else [])]
+        command = [
+            str(python),
+            str(PEER_FOLDER / "inverse_peers.py"),
+            name,
+            str(folder),
+            str(out),
+            "--cache",
+            str(cache),
+            *(["--quick"] if quick else []),
+        ]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, env={**os.environ, **one_thread})
+            done = subprocess.run(
+                command, capture_output=True, text=True, timeout=timeout, env={**os.environ, **one_thread}
+            )
             if done.returncode:
                 reason = (done.stderr.strip().splitlines() or ["ended without a word"])[-1]
         except subprocess.TimeoutExpired:
@@ -229,14 +274,22 @@ def run_peer(name: str, environment: Path, folder: Path, quick: bool, timeout: f
                     kind = "pose" if job["task"] in ("branches", "one") else job["task"]
                     cases = read_cases(folder, f"{job['robot']}.{kind}", chain.joints).first(job["targets"])
                     times = saved[f"times_{k}"]
-                    result.median_us, result.p99_us = 1e6 * float(np.median(times)), 1e6 * float(np.quantile(times, 0.99))
+                    result.median_us, result.p99_us = (
+                        1e6 * float(np.median(times)),
+                        1e6 * float(np.quantile(times, 0.99)),
+                    )
                     judge(result, chain, cases, saved[f"answers_{k}"])
                 results.append(result)
-    results += [Result(name, task, robot, 0, note=reason) for task, robot in PEERS[name].jobs if (task, robot) not in finished]
+    results += [
+        Result(name, task, robot, 0, note=reason)
+        for task, robot in PEERS[name].jobs
+        if (task, robot) not in finished
+    ]
     return results, versions
 
 
-# ---- Tables ----------------------------------------------------------------------------------------------------------
+# ---- Tables
+# ----------------------------------------------------------------------------------------------------------
 
 
 def number(value: float) -> str:
@@ -256,16 +309,31 @@ def wrong(result: Result) -> str:
         return "–"
     if not result.wrong:
         return "0"
-    return f"{result.wrong} (beyond limits)" if math.isinf(result.worst) else f"{result.wrong} (by up to {result.worst:.2g})"
+    return (
+        f"{result.wrong} (beyond limits)"
+        if math.isinf(result.worst)
+        else f"{result.wrong} (by up to {result.worst:.2g})"
+    )
 
 
-def table(results: list[Result], robots: tuple[str, ...], tasks: tuple[str, ...], reached: str = "reached") -> Iterator[str]:
+def table(
+    results: list[Result], robots: tuple[str, ...], tasks: tuple[str, ...], reached: str = "reached"
+) -> Iterator[str]:
     for robot in robots:
         rows = [one for task in tasks for one in results if one.robot == robot and one.task == task]
-        yield from ("", f"{robot.replace('_', ' ')}:", "", f"| | targets | µs, median / p99 | {reached} | claimed wrongly | |", "| --- |" + " --- |" * 5)
+        yield from (
+            "",
+            f"{robot.replace('_', ' ')}:",
+            "",
+            f"| | targets | µs, median / p99 | {reached} | claimed wrongly | |",
+            "| --- |" + " --- |" * 5,
+        )
         for one in rows:
             name = one.who if one.who != "truing" or one.task == tasks[0] else f"truing, {one.task}"
-            yield f"| {name} | {one.targets or '–'} | {times(one)} | {share(one)} | {wrong(one)} | {one.note.replace('|', '/')} |"
+            yield (
+                f"| {name} | {one.targets or '–'} | {times(one)} | {share(one)} | {wrong(one)} |"
+                f" {one.note.replace('|', '/')} |"
+            )
 
 
 def find(results: list[Result], who: str, task: str, robot: str) -> Result | None:
@@ -292,17 +360,29 @@ def count_branches(results: list[Result]) -> None:
             more = ", limits applied afterwards and not timed" if one.who in WITHOUT_LIMITS else ""
             if one.rough and one.who not in WITHOUT_LIMITS:
                 known = sum(any(apart(q, other) < NEAR for other in union[k]) for k, q in one.rough)
-                more = f", and {len(one.rough)} that it says are off by more than 1e-6, {known} of them near one that somebody found"
+                more = (
+                    f", and {len(one.rough)} that it says are off by more than 1e-6, {known} of them near one"
+                    " that somebody found"
+                )
             one.note = f"{have} of the {there} branches that all together found{more}"
 
 
 def branches(results: list[Result]) -> Iterator[str]:
-    yield from table(results, ("ur10", "irb", "ur10_calibrated", "irb_calibrated"), ("branches",), "own branch found")
-    yield from ("", "Own branch: the joints that the target was made from are among the answers, whole turns aside.")
+    yield from table(
+        results, ("ur10", "irb", "ur10_calibrated", "irb_calibrated"), ("branches",), "own branch found"
+    )
+    yield from (
+        "",
+        "Own branch: the joints that the target was made from are among the answers, whole turns aside.",
+    )
 
 
 def one_answer(results: list[Result]) -> Iterator[str]:
-    yield from table(results, ("ur10", "irb", "ur10_calibrated", "irb_calibrated", "gantry_calibrated"), ("one", "one by descent alone"))
+    yield from table(
+        results,
+        ("ur10", "irb", "ur10_calibrated", "irb_calibrated", "gantry_calibrated"),
+        ("one", "one by descent alone"),
+    )
 
 
 def torch(results: list[Result]) -> Iterator[str]:
@@ -310,20 +390,37 @@ def torch(results: list[Result]) -> Iterator[str]:
 
 
 def rails(results: list[Result]) -> Iterator[str]:
-    yield from ("", "| robot | best by | targets | truing µs, median / p99 | grid of 0.1 m µs, mean | reached | claimed wrongly | worse than the grid's | by up to | better |")
+    yield from (
+        "",
+        (
+            "| robot | best by | targets | truing µs, median / p99 | grid of 0.1 m µs, mean | reached |"
+            " claimed wrongly | worse than the grid's | by up to | better |"
+        ),
+    )
     yield "| --- |" + " --- |" * 9
     for one in results:
         if not one.task.startswith("best"):
             continue
         worse, by, better = compare(one)
-        yield (f"| {one.robot.replace('_', ' ')} | {one.task.removeprefix('best ')} | {one.targets} | {times(one)} | {one.raw['grid_us']:.0f} | {share(one)} | {wrong(one)} | "
-               f"{worse} | {f'{100 * by:.3g} %' if worse else '–'} | {better} |")  # fmt: skip
-    yield from ("", "The grid: all of truing's branches with every rail at multiples of 0.1 m, the best of them taken; one that the grid finds no answer for "
-                "counts as neither. Worse or better: by more than a millionth of the value.")  # fmt: skip
+        yield (
+            f"| {one.robot.replace('_', ' ')} | {one.task.removeprefix('best ')} | {one.targets} |"
+            f" {times(one)} | {one.raw['grid_us']:.0f} | {share(one)} | {wrong(one)} | {worse} |"
+            f" {f'{100 * by:.3g} %' if worse else '–'} | {better} |"
+        )
+    yield from (
+        "",
+        (
+            "The grid: all of truing's branches with every rail at multiples of 0.1 m, the best of them"
+            " taken; one that the grid finds no answer for counts as neither. Worse or better: by more than a"
+            " millionth of the value."
+        ),
+    )
 
 
 def compare(one: Result) -> tuple[int, float, int]:
-    """Targets on which the grid's merit is larger, by which share at most, and targets on which it is smaller."""
+    """Targets on which the grid's merit is larger, by which share at most, and targets on which it is
+    smaller.
+    """
     ours, grid = one.raw["answers"][:, -2], one.raw["answers"][:, -1]
     has = np.isfinite(grid)
     by = (grid[has] - ours[has]) / np.maximum(np.abs(grid[has]), 1e-3)
@@ -332,23 +429,46 @@ def compare(one: Result) -> tuple[int, float, int]:
 
 def paths(results: list[Result]) -> Iterator[str]:
     yield from table(results, ("ur10_calibrated", "irb_calibrated", "gantry_calibrated"), ("follow", "path"))
-    yield from ("", f"A jump: a joint moves by more than {JUMP} rad or m between neighbours. truing's first row is `follow`, from pose to pose as the peers do; the "
-                "second is `path`, which looks over all branches and rail places first, per pose.")  # fmt: skip
+    yield from (
+        "",
+        (
+            f"A jump: a joint moves by more than {JUMP} rad or m between neighbours. truing's first row is"
+            " `follow`, from pose to pose as the peers do; the second is `path`, which looks over all"
+            " branches and rail places first, per pose."
+        ),
+    )
 
 
 def compensation(results: list[Result]) -> Iterator[str]:
-    yield from ("", "| | targets | µs, median / p99 | to 1e-9 m | claimed wrongly | |", "| --- |" + " --- |" * 5)
+    yield from (
+        "",
+        "| | targets | µs, median / p99 | to 1e-9 m | claimed wrongly | |",
+        "| --- |" + " --- |" * 5,
+    )
     for task in ("fake targets", "compensate"):
         for one in results:
             if one.task == task:
-                yield f"| {'truing' if task == 'compensate' else 'fake targets'} | {one.targets} | {times(one)} | {share(one)} | {wrong(one)} | {one.note} |"
-    yield from ("", "Fake targets: both models are truing's, the controller's inverse kinematics takes the answer nearest to the one before; timed with two corrections.")
+                yield (
+                    f"| {'truing' if task == 'compensate' else 'fake targets'} | {one.targets} | {times(one)}"
+                    f" | {share(one)} | {wrong(one)} | {one.note} |"
+                )
+    yield from (
+        "",
+        (
+            "Fake targets: both models are truing's, the controller's inverse kinematics takes the answer"
+            " nearest to the one before; timed with two corrections."
+        ),
+    )
 
 
 TABLES: dict[str, tuple[str, Callable[[list[Result]], Iterator[str]]]] = {
-    "branches": ("All branches", branches), "one": ("One answer from a random seed", one_answer), "torch": ("Torch: roll free", torch),
-    "rails": ("Best over rails", rails), "paths": ("Smooth path", paths), "compensation": ("Compensation", compensation),
-}  # fmt: skip
+    "branches": ("All branches", branches),
+    "one": ("One answer from a random seed", one_answer),
+    "torch": ("Torch: roll free", torch),
+    "rails": ("Best over rails", rails),
+    "paths": ("Smooth path", paths),
+    "compensation": ("Compensation", compensation),
+}
 
 
 @dataclass(frozen=True)
@@ -373,23 +493,80 @@ def nothing_lost(one: Result) -> bool:
 BEST = ("best limits margin", "best manipulability", "best rail travel")
 REACHES = (
     Reach("6R nominal, all branches", "branches", ("branches",), ("ur10", "irb"), 5.0, more="limits applied"),
-    Reach("6R calibrated, all branches", "branches", ("branches",), ("ur10_calibrated", "irb_calibrated"), 30.0, 60.0, "none lost", nothing_lost),
-    Reach("6R calibrated, one answer", "one", ("one",), ("ur10_calibrated", "irb_calibrated"), 20.0, 150.0, "100 %"),
+    Reach(
+        "6R calibrated, all branches",
+        "branches",
+        ("branches",),
+        ("ur10_calibrated", "irb_calibrated"),
+        30.0,
+        60.0,
+        "none lost",
+        nothing_lost,
+    ),
+    Reach(
+        "6R calibrated, one answer",
+        "one",
+        ("one",),
+        ("ur10_calibrated", "irb_calibrated"),
+        20.0,
+        150.0,
+        "100 %",
+    ),
     Reach("3P+6R, one answer", "one", ("one",), ("gantry_calibrated",), 8.0, 60.0, "100 %"),
-    Reach("torch, random roll", "torch", ("torch",), ("ur10_calibrated", "irb_calibrated", "gantry_calibrated"), 20.0, more="100 %, true on the task"),
-    Reach("best over rails", "rails", BEST, ("rail", "rail_calibrated", "gantry_calibrated"), 300.0, more="no worse than the 0.1 m grid's", holds=lambda one: not compare(one)[0]),
-    Reach("path of 1000 poses", "paths", ("follow",), ("ur10_calibrated", "irb_calibrated", "gantry_calibrated"), 3.0, more="no jump",
-          holds=lambda one: int(one.raw.get("jumps", 1)) == 0),
-    Reach("compensation", "compensation", ("compensate",), ("irb_calibrated",), 10.0, more="100 % to 1e-9 m or labelled", share=0.0,
-          holds=lambda one: round(one.reached * one.targets) + one.raw["labelled"] == one.targets),
-)  # fmt: skip
+    Reach(
+        "torch, random roll",
+        "torch",
+        ("torch",),
+        ("ur10_calibrated", "irb_calibrated", "gantry_calibrated"),
+        20.0,
+        more="100 %, true on the task",
+    ),
+    Reach(
+        "best over rails",
+        "rails",
+        BEST,
+        ("rail", "rail_calibrated", "gantry_calibrated"),
+        300.0,
+        more="no worse than the 0.1 m grid's",
+        holds=lambda one: not compare(one)[0],
+    ),
+    Reach(
+        "path of 1000 poses",
+        "paths",
+        ("follow",),
+        ("ur10_calibrated", "irb_calibrated", "gantry_calibrated"),
+        3.0,
+        more="no jump",
+        holds=lambda one: int(one.raw.get("jumps", 1)) == 0,
+    ),
+    Reach(
+        "compensation",
+        "compensation",
+        ("compensate",),
+        ("irb_calibrated",),
+        10.0,
+        more="100 % to 1e-9 m or labelled",
+        share=0.0,
+        holds=lambda one: round(one.reached * one.targets) + one.raw["labelled"] == one.targets,
+    ),
+)
 
 
 def best_peer(results: list[Result], reach: Reach) -> str:
     """The one that reaches most; among those within a thousandth of it, the fastest."""
-    peers = [one for one in results if one.who != "truing" and one.robot in reach.robots and not math.isnan(one.reached)
-             and (one.task in reach.tasks or (reach.table == "paths" and one.task == "path"))]  # fmt: skip
-    grids = [one for one in results if one.task in reach.tasks and one.robot in reach.robots and one.raw.get("grid_us")]
+    peers = [
+        one
+        for one in results
+        if one.who != "truing"
+        and one.robot in reach.robots
+        and not math.isnan(one.reached)
+        and (one.task in reach.tasks or (reach.table == "paths" and one.task == "path"))
+    ]
+    grids = [
+        one
+        for one in results
+        if one.task in reach.tasks and one.robot in reach.robots and one.raw.get("grid_us")
+    ]
     if grids:
         return f"grid of 0.1 m: {number(max(one.raw['grid_us'] for one in grids))} µs"
     if reach.table == "compensation":
@@ -405,16 +582,39 @@ def best_peer(results: list[Result], reach: Reach) -> str:
 def reaches(results: list[Result]) -> Iterator[str]:
     yield from ("| task | best peer in this run | reach | truing, worst robot | |", "| --- |" + " --- |" * 4)
     for reach in REACHES:
-        ours = [one for one in results if one.who == "truing" and one.task in reach.tasks and one.robot in reach.robots]
+        ours = [
+            one
+            for one in results
+            if one.who == "truing" and one.task in reach.tasks and one.robot in reach.robots
+        ]
         if not ours:
             continue
         median, p99 = max(one.median_us for one in ours), max(one.p99_us for one in ours)
         reached, mistaken = min(one.reached for one in ours), sum(one.wrong for one in ours)
-        missed = [why for why, bad in (("median", median > reach.median_us), ("p99", p99 > reach.p99_us), ("share", reached < reach.share), ("wrong claims", mistaken > 0),
-                                       (reach.more, not all(reach.holds(one) for one in ours))) if bad]  # fmt: skip
-        limit = f"≤ {reach.median_us:g}" + (f" / {reach.p99_us:g}" if math.isfinite(reach.p99_us) else "") + " µs" + (f", {reach.more}" if reach.more else "")
-        said = f"{number(median)} / {number(p99)}, {100 * reached:.2f} %" + (f", {mistaken} wrong" if mistaken else "")
-        yield f"| {reach.what} | {best_peer(results, reach)} | {limit} | {said} | {'reached' if not missed else 'missed: ' + ', '.join(missed)} |"
+        missed = [
+            why
+            for why, bad in (
+                ("median", median > reach.median_us),
+                ("p99", p99 > reach.p99_us),
+                ("share", reached < reach.share),
+                ("wrong claims", mistaken > 0),
+                (reach.more, not all(reach.holds(one) for one in ours)),
+            )
+            if bad
+        ]
+        limit = (
+            f"≤ {reach.median_us:g}"
+            + (f" / {reach.p99_us:g}" if math.isfinite(reach.p99_us) else "")
+            + " µs"
+            + (f", {reach.more}" if reach.more else "")
+        )
+        said = f"{number(median)} / {number(p99)}, {100 * reached:.2f} %" + (
+            f", {mistaken} wrong" if mistaken else ""
+        )
+        yield (
+            f"| {reach.what} | {best_peer(results, reach)} | {limit} | {said} |"
+            f" {'reached' if not missed else 'missed: ' + ', '.join(missed)} |"
+        )
 
 
 def machine() -> str:
@@ -423,24 +623,41 @@ def machine() -> str:
         processor = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
     except (OSError, StopIteration):
         processor = platform.processor() or platform.machine()
-    return f"{processor}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}, Pinocchio {pin.__version__} as judge"
+    return (
+        f"{processor}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()},"
+        f" Pinocchio {pin.__version__} as judge"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bench", type=Path, default=Path("build/bench_inverse"), help="the program built from bench/inverse.cpp")
-    parser.add_argument("--peers", type=Path, help="folder given to bench/peers/setup_inverse.sh; none: truing alone")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--bench",
+        type=Path,
+        default=Path("build/bench_inverse"),
+        help="the program built from bench/inverse.cpp",
+    )
+    parser.add_argument(
+        "--peers", type=Path, help="folder given to bench/peers/setup_inverse.sh; none: truing alone"
+    )
     parser.add_argument("--quick", action="store_true", help="a tenth of the targets")
     parser.add_argument("--only", default=",".join(TABLES), help="tables to make, with commas between")
     parser.add_argument("--timeout", type=float, default=1800.0, help="of one peer [s]")
-    parser.add_argument("--write", type=Path, help="the page whose markers <!-- table --> and <!-- end --> take the tables")
+    parser.add_argument(
+        "--write", type=Path, help="the page whose markers <!-- table --> and <!-- end --> take the tables"
+    )
     arguments = parser.parse_args()
     chosen = arguments.only.split(",")
     unknown = [name for name in chosen if name not in TABLES]
     if unknown:
         parser.error(f"no table {unknown[0]!r}; there are {', '.join(TABLES)}")
     if not arguments.bench.exists():
-        parser.error(f"no program {arguments.bench}: cmake -DTRUING_BUILD_BENCHMARKS=ON, then --bench BUILD/bench_inverse")
+        parser.error(
+            f"no program {arguments.bench}: cmake -DTRUING_BUILD_BENCHMARKS=ON, then --bench"
+            " BUILD/bench_inverse"
+        )
     page = arguments.write.read_text(encoding="utf-8") if arguments.write else ""
     if arguments.write and not ("<!-- table -->" in page and "<!-- end -->" in page):
         parser.error(f"{arguments.write} has no markers <!-- table --> and <!-- end -->")
@@ -453,14 +670,25 @@ def main() -> None:
             found, its = run_peer(name, arguments.peers, Path(folder), arguments.quick, arguments.timeout)
             results += found
             versions.update(its)
-            note(f"{name}: {'; '.join(f'{one.task} {one.robot} {times(one)} {share(one)} {one.note}' for one in found)}")
+            note(
+                f"{name}:"
+                f" {'; '.join(f'{one.task} {one.robot} {times(one)} {share(one)} {one.note}' for one in found)}"
+            )
     count_branches(results)
 
-    command = "python bench/inverse.py" + (" --quick" if arguments.quick else "") + (f" --only {arguments.only}" if chosen != list(TABLES) else "")
-    lines = [f"From `{command}` on {datetime.now(timezone.utc):%Y-%m-%d}: {machine()}; peers: "
-             + (", ".join(f"{name} {version}" for name, version in versions.items()) or "none")
-             + f". Load average {before:.1f} before and {os.getloadavg()[0]:.1f} after, this program's own work included; above the number of cores, believe no time "
-             "but in ratio.", "", *reaches(results)]  # fmt: skip
+    command = (
+        "python bench/inverse.py"
+        + (" --quick" if arguments.quick else "")
+        + (f" --only {arguments.only}" if chosen != list(TABLES) else "")
+    )
+    lines = [
+        f"From `{command}` on {datetime.now(timezone.utc):%Y-%m-%d}: {machine()}; peers: "
+        + (", ".join(f"{name} {version}" for name, version in versions.items()) or "none")
+        + f". Load average {before:.1f} before and {os.getloadavg()[0]:.1f} after, this program's own work"
+        " included; above the number of cores, believe no time but in ratio.",
+        "",
+        *reaches(results),
+    ]
     for name in chosen:
         title, make = TABLES[name]
         lines += ["", f"## {title}", *make(results)]

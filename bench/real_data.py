@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calibrates recorded measurements of real robots and writes what is left on poses that were held out: docs/real-data.md.
+"""Calibrates recorded measurements of real robots and writes what is left on poses that were held out:
+docs/real-data.md.
 
     python bench/real_data.py [--data FOLDER]
 
-FOLDER (default: $TRUING_REALDATA, else shared/data beside the checkout) holds a subfolder for each recording. What is
+FOLDER (default: $TRUING_REALDATA, else shared/data beside the checkout) holds a subfolder for each recording.
+What is
 missing is left out and said. tests/python/test_real_data.py holds the same sets to the figures below.
 """
 
@@ -44,9 +46,11 @@ class Figures:
 
 @dataclass(frozen=True)
 class Recording:
-    """One set: its files, and the baseline that an ordinary least-squares fit of the same link parameters reached.
+    """One set: its files, and the baseline that an ordinary least-squares fit of the same link parameters
+    reached.
 
-    The baseline stands in the ORIGIN.md beside the data: same split, same rows, no loss, every link parameter.
+    The baseline stands in the ORIGIN.md beside the data: same split, same rows, no loss, every link
+    parameter.
     """
 
     name: str
@@ -55,42 +59,136 @@ class Recording:
     after: Figures
     robot: str = "robot.yaml"
     measurements: str = "measurements.csv"
-    recorded_joints: bool = False  # take qr1 ..., read back from the controller, in place of q1 ..., commanded
+    recorded_joints: bool = (
+        False  # take qr1 ..., read back from the controller, in place of q1 ..., commanded
+    )
 
 
-def figures(rms: float, mean: float, p95: float, largest: float, median: float = float("nan"), rotation: float = float("nan")) -> Figures:
+def figures(
+    rms: float,
+    mean: float,
+    p95: float,
+    largest: float,
+    median: float = float("nan"),
+    rotation: float = float("nan"),
+) -> Figures:
     return Figures(rms, mean, p95, largest, median, rotation)
 
 
 RECORDINGS = (
-    Recording("IRB 120, tracker, commanded joints", "irb120_faro", figures(0.893, 0.747, 1.619, 3.156, 0.634),
-              figures(0.310, 0.211, 0.479, 1.989, 0.159)),
-    Recording("IRB 120, tracker, recorded joints", "irb120_faro", figures(0.946, 0.828, 1.741, 2.779), figures(0.648, 0.489, 1.299, 3.175),
-              recorded_joints=True),
-    Recording("Motoman right, tracker", "motoman_leica", figures(0.256, 0.239, 0.386, 0.483), figures(0.074, 0.069, 0.113, 0.132),
-              "robot_right.yaml", "measurements_right.csv"),
-    Recording("Motoman left, tracker", "motoman_leica", figures(0.234, 0.211, 0.385, 0.467), figures(0.078, 0.074, 0.111, 0.137),
-              "robot_left.yaml", "measurements_left.csv"),
-    Recording("Motoman right, whole workspace", "motoman_leica", figures(3.114, 2.646, 6.001, 10.138), figures(2.316, 2.051, 3.775, 7.604),
-              "robot_right.yaml", "measurements_wide.csv"),
-    Recording("Agile Justin right, Vicon", "dlr_agile_justin_vicon", figures(23.695, 21.984, 38.791, 50.483), figures(12.475, 11.020, 22.310, 32.598),
-              "robot_right.yaml", "measurements_right.csv"),
-    Recording("Agile Justin left, Vicon", "dlr_agile_justin_vicon", figures(19.811, 17.654, 35.458, 49.902), figures(12.329, 10.663, 23.662, 33.357),
-              "robot_left.yaml", "measurements_left.csv"),
-    Recording("TALOS arm, link table", "figaroh_talos_contact", figures(6.290, 5.717, 9.964, 11.558), figures(0.878, 0.785, 1.399, 1.465)),
-    Recording("TALOS arm, URDF", "figaroh_talos_contact", figures(6.290, 5.717, 9.964, 11.558), figures(0.878, 0.785, 1.399, 1.465), "arm.urdf"),
-    Recording("IRB 120, touched points", "minimal_poe_uts", figures(5.255, 4.826, 8.979, 11.293), figures(0.347, 0.315, 0.572, 0.656)),
-    Recording("IRB 120, draw-wire", "robotcali_irb120_cable", figures(1.924, 1.689, 3.203, 6.150), figures(1.465, 1.081, 3.019, 5.936)),
-    Recording("FR3, camera, seen at the camera", "handeye_fr3", Figures(3.90, rotation=1.21), Figures(2.21, rotation=0.29)),
-    Recording("UR10 series a, tracker 6D", "ipa_ur10_leica", figures(0.841, 0.757, 1.438, 1.962, rotation=0.1149),
-              figures(0.449, 0.409, 0.762, 1.044, rotation=0.0592), measurements="measurements_series_a.csv"),
-    Recording("UR10 series b, tracker 6D", "ipa_ur10_leica", figures(1.089, 1.036, 1.563, 1.884, rotation=0.0855),
-              figures(0.421, 0.383, 0.698, 0.996, rotation=0.0517), measurements="measurements_series_b.csv"),
-    Recording("UR10 series c, tracker 6D", "ipa_ur10_leica", figures(1.001, 0.918, 1.600, 2.245, rotation=0.0801),
-              figures(0.508, 0.452, 0.889, 1.369, rotation=0.0585), measurements="measurements_series_c.csv"),
-    Recording("UR10 series d, tracker 6D", "ipa_ur10_leica", figures(0.738, 0.690, 1.180, 1.427, rotation=0.1041),
-              figures(0.398, 0.351, 0.691, 1.186, rotation=0.0622), measurements="measurements_series_d.csv"),
-)  # fmt: skip
+    Recording(
+        "IRB 120, tracker, commanded joints",
+        "irb120_faro",
+        figures(0.893, 0.747, 1.619, 3.156, 0.634),
+        figures(0.310, 0.211, 0.479, 1.989, 0.159),
+    ),
+    Recording(
+        "IRB 120, tracker, recorded joints",
+        "irb120_faro",
+        figures(0.946, 0.828, 1.741, 2.779),
+        figures(0.648, 0.489, 1.299, 3.175),
+        recorded_joints=True,
+    ),
+    Recording(
+        "Motoman right, tracker",
+        "motoman_leica",
+        figures(0.256, 0.239, 0.386, 0.483),
+        figures(0.074, 0.069, 0.113, 0.132),
+        "robot_right.yaml",
+        "measurements_right.csv",
+    ),
+    Recording(
+        "Motoman left, tracker",
+        "motoman_leica",
+        figures(0.234, 0.211, 0.385, 0.467),
+        figures(0.078, 0.074, 0.111, 0.137),
+        "robot_left.yaml",
+        "measurements_left.csv",
+    ),
+    Recording(
+        "Motoman right, whole workspace",
+        "motoman_leica",
+        figures(3.114, 2.646, 6.001, 10.138),
+        figures(2.316, 2.051, 3.775, 7.604),
+        "robot_right.yaml",
+        "measurements_wide.csv",
+    ),
+    Recording(
+        "Agile Justin right, Vicon",
+        "dlr_agile_justin_vicon",
+        figures(23.695, 21.984, 38.791, 50.483),
+        figures(12.475, 11.020, 22.310, 32.598),
+        "robot_right.yaml",
+        "measurements_right.csv",
+    ),
+    Recording(
+        "Agile Justin left, Vicon",
+        "dlr_agile_justin_vicon",
+        figures(19.811, 17.654, 35.458, 49.902),
+        figures(12.329, 10.663, 23.662, 33.357),
+        "robot_left.yaml",
+        "measurements_left.csv",
+    ),
+    Recording(
+        "TALOS arm, link table",
+        "figaroh_talos_contact",
+        figures(6.290, 5.717, 9.964, 11.558),
+        figures(0.878, 0.785, 1.399, 1.465),
+    ),
+    Recording(
+        "TALOS arm, URDF",
+        "figaroh_talos_contact",
+        figures(6.290, 5.717, 9.964, 11.558),
+        figures(0.878, 0.785, 1.399, 1.465),
+        "arm.urdf",
+    ),
+    Recording(
+        "IRB 120, touched points",
+        "minimal_poe_uts",
+        figures(5.255, 4.826, 8.979, 11.293),
+        figures(0.347, 0.315, 0.572, 0.656),
+    ),
+    Recording(
+        "IRB 120, draw-wire",
+        "robotcali_irb120_cable",
+        figures(1.924, 1.689, 3.203, 6.150),
+        figures(1.465, 1.081, 3.019, 5.936),
+    ),
+    Recording(
+        "FR3, camera, seen at the camera",
+        "handeye_fr3",
+        Figures(3.90, rotation=1.21),
+        Figures(2.21, rotation=0.29),
+    ),
+    Recording(
+        "UR10 series a, tracker 6D",
+        "ipa_ur10_leica",
+        figures(0.841, 0.757, 1.438, 1.962, rotation=0.1149),
+        figures(0.449, 0.409, 0.762, 1.044, rotation=0.0592),
+        measurements="measurements_series_a.csv",
+    ),
+    Recording(
+        "UR10 series b, tracker 6D",
+        "ipa_ur10_leica",
+        figures(1.089, 1.036, 1.563, 1.884, rotation=0.0855),
+        figures(0.421, 0.383, 0.698, 0.996, rotation=0.0517),
+        measurements="measurements_series_b.csv",
+    ),
+    Recording(
+        "UR10 series c, tracker 6D",
+        "ipa_ur10_leica",
+        figures(1.001, 0.918, 1.600, 2.245, rotation=0.0801),
+        figures(0.508, 0.452, 0.889, 1.369, rotation=0.0585),
+        measurements="measurements_series_c.csv",
+    ),
+    Recording(
+        "UR10 series d, tracker 6D",
+        "ipa_ur10_leica",
+        figures(0.738, 0.690, 1.180, 1.427, rotation=0.1041),
+        figures(0.398, 0.351, 0.691, 1.186, rotation=0.0622),
+        measurements="measurements_series_d.csv",
+    ),
+)
 
 SOURCES = """\
 | folder | robot and instrument | from | licence |
@@ -107,7 +205,8 @@ SOURCES = """\
 """
 
 
-# ---- Reading and fitting ---------------------------------------------------------------------------------------------
+# ---- Reading and fitting
+# ---------------------------------------------------------------------------------------------
 
 
 def default_folder() -> Path:
@@ -118,7 +217,9 @@ def load(folder: Path, recording: Recording) -> tuple[truing.Robot, truing.Measu
     robot = truing.load_robot(folder / recording.folder / recording.robot)
     data = truing.load_measurements(folder / recording.folder / recording.measurements, robot)
     if recording.recorded_joints:
-        data = data.replace(joints=np.column_stack([data.covariates[f"qr{k + 1}_rad"] for k in range(robot.driven_count)]))
+        data = data.replace(
+            joints=np.column_stack([data.covariates[f"qr{k + 1}_rad"] for k in range(robot.driven_count)])
+        )
     return robot, data
 
 
@@ -131,7 +232,14 @@ def on_test(found: truing.Identification) -> tuple[Figures, Figures]:
     assert found.test is not None
 
     def of(e: truing.ErrorStatistics) -> Figures:
-        return Figures(1e3 * e.rms, 1e3 * e.mean, 1e3 * e.p95, 1e3 * e.max, 1e3 * e.median, float(np.degrees(e.rotation_rms)))
+        return Figures(
+            1e3 * e.rms,
+            1e3 * e.mean,
+            1e3 * e.p95,
+            1e3 * e.max,
+            1e3 * e.median,
+            float(np.degrees(e.rotation_rms)),
+        )
 
     return of(found.test.before), of(found.test.after)
 
@@ -143,29 +251,46 @@ def lengths(robot: truing.Robot, data: truing.Measurements) -> np.ndarray[Any, n
 
 
 def summary(error: np.ndarray[Any, np.dtype[np.float64]]) -> Figures:
-    return Figures(float(np.sqrt(np.mean(error**2))), float(error.mean()), float(np.quantile(error, 0.95)), float(error.max()), float(np.median(error)))
+    return Figures(
+        float(np.sqrt(np.mean(error**2))),
+        float(error.mean()),
+        float(np.quantile(error, 0.95)),
+        float(error.max()),
+        float(np.median(error)),
+    )
 
 
-# ---- Fewer parameters ------------------------------------------------------------------------------------------------
+# ---- Fewer parameters
+# ------------------------------------------------------------------------------------------------
 
 
-def hold_what_is_barely_seen(robot: truing.Robot, data: truing.Measurements, limit: float = BARELY_SEEN, **options: Any) -> list[str]:
-    """Link parameters to leave at nominal: one after another that with the largest standard error, until none is above `limit`.
+def hold_what_is_barely_seen(
+    robot: truing.Robot, data: truing.Measurements, limit: float = BARELY_SEEN, **options: Any
+) -> list[str]:
+    """Link parameters to leave at nominal: one after another that with the largest standard error, until none
+    is above `limit`.
 
-    A value that the data leave open by more than 10 mm or 10 mrad is known better from the drawing. Uses training rows alone.
+    A value that the data leave open by more than 10 mm or 10 mrad is known better from the drawing. Uses
+    training rows alone.
     """
     held: list[str] = []
     while True:
         found = fit(robot, data, hold=held, **options)
         link = tuple(f"{joint.name}." for joint in robot.joints)
-        worst = max((p for p in found.parameters if not p.frozen and p.name.startswith(link)), key=lambda p: p.sigma)
+        worst = max(
+            (p for p in found.parameters if not p.frozen and p.name.startswith(link)), key=lambda p: p.sigma
+        )
         if worst.sigma <= limit:
             return held
         held.append(worst.name)
 
 
-def cross_validated_rms(robot: truing.Robot, data: truing.Measurements, hold: bool, folds: int = 5, seed: int = 1) -> float:
-    """Rms over training rows, each predicted by a fit without its fold [mm]. The test rows stay out of it altogether."""
+def cross_validated_rms(
+    robot: truing.Robot, data: truing.Measurements, hold: bool, folds: int = 5, seed: int = 1
+) -> float:
+    """Rms over training rows, each predicted by a fit without its fold [mm]. The test rows stay out of it
+    altogether.
+    """
     train = np.flatnonzero(np.asarray(data.set) == 0)
     q, p, d = np.asarray(data.joints)[train], data.positions, data.distances
     columns = {"positions": None if p is None else p[train], "distances": None if d is None else d[train]}
@@ -180,7 +305,8 @@ def cross_validated_rms(robot: truing.Robot, data: truing.Measurements, hold: bo
     return float(np.sqrt(squares / len(train)))
 
 
-# ---- The page --------------------------------------------------------------------------------------------------------
+# ---- The page
+# --------------------------------------------------------------------------------------------------------
 
 
 def cell(value: float, digits: int = 3) -> str:
@@ -188,7 +314,10 @@ def cell(value: float, digits: int = 3) -> str:
 
 
 def line(what: str, f: Figures, more: str = "| | |") -> str:
-    return f"| {what} | {cell(f.rms)} | {cell(f.mean)} | {cell(f.median)} | {cell(f.p95)} | {cell(f.max)} | {cell(f.rotation, 4)} {more} |"
+    return (
+        f"| {what} | {cell(f.rms)} | {cell(f.mean)} | {cell(f.median)} | {cell(f.p95)} | {cell(f.max)} |"
+        f" {cell(f.rotation, 4)} {more} |"
+    )
 
 
 def rejected(found: truing.Identification) -> str:
@@ -197,7 +326,10 @@ def rejected(found: truing.Identification) -> str:
 
 
 def table(folder: Path) -> Iterator[str]:
-    yield "| | rms | mean | median | p95 | max [mm] | rotation rms [deg] | rank of columns | iterations | rows |"
+    yield (
+        "| | rms | mean | median | p95 | max [mm] | rotation rms [deg] | rank of columns | iterations |"
+        " rows |"
+    )
     yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     for recording in RECORDINGS:
         if not (folder / recording.folder).is_dir():
@@ -214,8 +346,16 @@ def table(folder: Path) -> Iterator[str]:
             if same and loss == "reject":
                 continue
             solver = f"{found.solver.iterations}{'' if found.solver.converged else ', not converged'}"
-            name = "truing (`--loss none` and default: nothing rejected)" if same else "truing, `--loss none`" if loss == "none" else "truing, default"
-            yield line(name, on_test(found)[1], f"| {found.rank} of {found.columns} | {solver} | {rejected(found)}")
+            name = (
+                "truing (`--loss none` and default: nothing rejected)"
+                if same
+                else "truing, `--loss none`"
+                if loss == "none"
+                else "truing, default"
+            )
+            yield line(
+                name, on_test(found)[1], f"| {found.rank} of {found.columns} | {solver} | {rejected(found)}"
+            )
         print(f"  {recording.name}", flush=True)
 
 
@@ -236,7 +376,14 @@ beyond 0.7 mm, {len(np.unique(pose[bad & test]))} of them in the test part, the 
 
 
 def motoman(folder: Path) -> str:
-    robot, data = load(folder, next(r for r in RECORDINGS if r.measurements == "measurements_right.csv" and r.folder == "motoman_leica"))
+    robot, data = load(
+        folder,
+        next(
+            r
+            for r in RECORDINGS
+            if r.measurements == "measurements_right.csv" and r.folder == "motoman_leica"
+        ),
+    )
     found = fit(robot, data)
     frozen = ", ".join(sorted(f.parameter for f in found.frozen if f.parameter.startswith("E.")))
     wide_robot, wide = load(folder, next(r for r in RECORDINGS if r.measurements == "measurements_wide.csv"))
@@ -259,12 +406,23 @@ def talos(folder: Path) -> str:
     inner = {hold: cross_validated_rms(robot, data, hold) for hold in (False, True)}
     others = []
     for other in RECORDINGS:
-        if other.name in ("Motoman right, tracker", "Motoman left, tracker", "IRB 120, draw-wire") and (folder / other.folder).is_dir():
+        if (
+            other.name in ("Motoman right, tracker", "Motoman left, tracker", "IRB 120, draw-wire")
+            and (folder / other.folder).is_dir()
+        ):
             theirs = load(folder, other)
-            others.append(f"{other.name} {cell(cross_validated_rms(*theirs, False))} and {cell(cross_validated_rms(*theirs, True))}")
-    rows = "\n".join(f"| {name} | {found.rank} | {cell(inside)} | {cell(1e3 * found.train.after.rms)} | {cell(after.rms)} | {cell(after.mean)} | {cell(after.p95)} |"
-                     for name, found, inside, after in (("everything", everything, inner[False], on_test(everything)[1]),
-                                                        (f"{len(held)} held", fewer, inner[True], on_test(fewer)[1])))  # fmt: skip
+            others.append(
+                f"{other.name} {cell(cross_validated_rms(*theirs, False))} and"
+                f" {cell(cross_validated_rms(*theirs, True))}"
+            )
+    rows = "\n".join(
+        f"| {name} | {found.rank} | {cell(inside)} | {cell(1e3 * found.train.after.rms)} | {cell(after.rms)}"
+        f" | {cell(after.mean)} | {cell(after.p95)} |"
+        for name, found, inside, after in (
+            ("everything", everything, inner[False], on_test(everything)[1]),
+            (f"{len(held)} held", fewer, inner[True], on_test(fewer)[1]),
+        )
+    )
     return f"""\
 **TALOS.** 42 training postures for 39 observable parameters, 19 to test on. truing says so: *{next((w for w in everything.warnings if "cannot support" in w), "nothing")}*.
 The baseline is better in the third digit because it stopped after 60 damped steps, which is a weak pull to nominal. The honest way to fewer
@@ -287,7 +445,10 @@ def cable(folder: Path) -> str:
     block = (pose >= 140) & (pose <= 220)
     plain, robust = fit(robot, data, loss="none"), fit(robot, data)
     inside = int(block[list(robust.rejected_rows)].sum())
-    off = {name: summary(lengths(found.robot, data)[test & ~block]) for name, found in (("none", plain), ("default", robust))}
+    off = {
+        name: summary(lengths(found.robot, data)[test & ~block])
+        for name, found in (("none", plain), ("default", robust))
+    }
     return f"""\
 **Draw-wire.** Rows 140 to 220 are 2 to 3 mm off as a block: somebody moved the set-up. The default rejects {len(robust.rejected_rows)} rows, {inside} of the
 {int((block & ~test).sum())} training rows of that block among them. The held-out rows of the block then show what they are, which makes rms, p95 and max of the
@@ -299,8 +460,11 @@ only; joints are rounded to 0.1 degree, up to 0.4 mm each."""
 def touched(folder: Path) -> str:
     robot, data = load(folder, next(r for r in RECORDINGS if r.folder == "minimal_poe_uts"))
     found = fit(robot, data)
-    zeros = ", ".join(f"{p.name.split('.')[0]} {np.degrees(p.value - p.nominal):.1f}" for p in found.parameters
-                      if p.name.endswith(".theta") and not p.frozen)  # fmt: skip
+    zeros = ", ".join(
+        f"{p.name.split('.')[0]} {np.degrees(p.value - p.nominal):.1f}"
+        for p in found.parameters
+        if p.name.endswith(".theta") and not p.frozen
+    )
     return f"""\
 **IRB 120, touched points.** Joint zeros are off by degrees (found: {zeros}): one linear step from nominal does not do, {found.solver.iterations} iterations do.
 The two test points have one training row each, so their places on the tool carry its error."""
@@ -320,9 +484,17 @@ def at_the_board(robot: truing.Robot, data: truing.Measurements) -> np.ndarray[A
 
     def matrices(q: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         w, x, y, z = q.T
-        return np.moveaxis(np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]), 2, 0)  # fmt: skip
+        return np.moveaxis(
+            np.array(
+                [
+                    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+                ]
+            ),
+            2,
+            0,
+        )
 
     p = truing.predict(robot, data)
     assert data.orientations is not None and data.positions is not None
@@ -354,28 +526,70 @@ def ur10(folder: Path) -> str:
 leaves (per axis, mm: {", ".join(lines)}) is some 25 times the scatter of a measurement, 0.01 mm: the link table is not all that this arm lacks."""
 
 
-NOTES = {"irb120_faro": irb120, "motoman_leica": motoman, "dlr_agile_justin_vicon": justin, "figaroh_talos_contact": talos, "minimal_poe_uts": touched,
-         "robotcali_irb120_cable": cable, "handeye_fr3": fr3, "ipa_ur10_leica": ur10}  # fmt: skip
+NOTES = {
+    "irb120_faro": irb120,
+    "motoman_leica": motoman,
+    "dlr_agile_justin_vicon": justin,
+    "figaroh_talos_contact": talos,
+    "minimal_poe_uts": touched,
+    "robotcali_irb120_cable": cable,
+    "handeye_fr3": fr3,
+    "ipa_ur10_leica": ur10,
+}
 
 
 def page(folder: Path) -> str:
-    lines = ["# Real robots", "", "<!-- Written by bench/real_data.py: change that file, not this one. -->", "",
-             f"Errors on poses that the fit has not seen, truing {truing.__version__}, {datetime.now(timezone.utc):%Y-%m-%d}. *before*: the nominal robot with base and",
-             "target fitted. *baseline*: an ordinary least-squares fit of the same link parameters by another program on the same split (no loss, every",
-             "link parameter). *truing, default* finds gross outliers in the training rows, lists them and fits without; no test row is ever left out of",
-             "the figures, outlier or not. Splits are by pose, and come with the data.", "", *table(folder), "",
-             "## What each of them shows", ""]  # fmt: skip
+    lines = [
+        "# Real robots",
+        "",
+        "<!-- Written by bench/real_data.py: change that file, not this one. -->",
+        "",
+        (
+            f"Errors on poses that the fit has not seen, truing {truing.__version__},"
+            f" {datetime.now(timezone.utc):%Y-%m-%d}. *before*: the nominal robot with base and"
+        ),
+        (
+            "target fitted. *baseline*: an ordinary least-squares fit of the same link parameters by another"
+            " program on the same split (no loss, every"
+        ),
+        (
+            "link parameter). *truing, default* finds gross outliers in the training rows, lists them and"
+            " fits without; no test row is ever left out of"
+        ),
+        "the figures, outlier or not. Splits are by pose, and come with the data.",
+        "",
+        *table(folder),
+        "",
+        "## What each of them shows",
+        "",
+    ]
     for name, note in NOTES.items():
         if (folder / name).is_dir():
             lines += [note(folder), ""]
-    lines += [handeye_real.section(folder), "", "## Sources", "", "The recordings are not part of this repository: most come without a licence, and are used for testing only.", "",
-              SOURCES, "## Again", "", "    python bench/real_data.py --data FOLDER", ""]  # fmt: skip
+    lines += [
+        handeye_real.section(folder),
+        "",
+        "## Sources",
+        "",
+        (
+            "The recordings are not part of this repository: most come without a licence, and are used for"
+            " testing only."
+        ),
+        "",
+        SOURCES,
+        "## Again",
+        "",
+        "    python bench/real_data.py --data FOLDER",
+        "",
+    ]
     return "\n".join(lines)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--data", type=Path, default=default_folder(), help="folder with a subfolder for each recording")
+    parser.add_argument(
+        "--data", type=Path, default=default_folder(), help="folder with a subfolder for each recording"
+    )
     parser.add_argument("--page", type=Path, default=ROOT / "docs/real-data.md")
     args = parser.parse_args()
     if not args.data.is_dir():

@@ -29,18 +29,34 @@ def millimetres(statistics: truing.ErrorStatistics) -> str:
 
 
 def named(found: truing.Diagnosis) -> str:
-    names = [f"{effect.effect}{' ' + '+'.join(effect.joints) if 0 < len(effect.joints) <= 2 else ''} ({effect.probability:.2f})" for effect in found.effects]
-    return ", ".join(names[:MOST]) + (f" and {len(names) - MOST} more" if len(names) > MOST else "") or "nothing"
+    names = [
+        f"{effect.effect}{' ' + '+'.join(effect.joints) if 0 < len(effect.joints) <= 2 else ''}"
+        f" ({effect.probability:.2f})"
+        for effect in found.effects
+    ]
+    return (
+        ", ".join(names[:MOST]) + (f" and {len(names) - MOST} more" if len(names) > MOST else "") or "nothing"
+    )
 
 
 def unknown(found: truing.Diagnosis) -> str:
-    said = [f"{one.joint} over {' and '.join(one.inputs)}" + (f": {one.looks_like}" if one.looks_like and len(one.inputs) == 1 else "")
-            if one.inputs else "more than repeats show" for one in found.unknown]  # fmt: skip
+    said = [
+        (
+            f"{one.joint} over {' and '.join(one.inputs)}"
+            + (f": {one.looks_like}" if one.looks_like and len(one.inputs) == 1 else "")
+            if one.inputs
+            else "more than repeats show"
+        )
+        for one in found.unknown
+    ]
     return "; ".join(said[:MOST]) or "nothing"
 
 
 def rows(folder: Path) -> Iterator[str]:
-    yield "| set | base and tool | geometry | named effects | and unknown ones | named (probability) | unknown | left to a nearest neighbour | seconds |"
+    yield (
+        "| set | base and tool | geometry | named effects | and unknown ones | named (probability) | unknown"
+        " | left to a nearest neighbour | seconds |"
+    )
     yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     for recording in RECORDINGS:
         line = one(folder, recording)
@@ -57,12 +73,17 @@ def one(folder: Path, recording: Recording) -> str:
     found = truing.diagnose(robot, data)
     seconds = time.perf_counter() - started
     geometry = fit(robot, data).test
-    return (f"| {recording.name} | {millimetres(found.gap)} | {millimetres(geometry.after) if geometry else '–'} | {millimetres(found.after)} | "
-            f"{millimetres(found.after_unknown)} | {named(found)} | {unknown(found)} | {100 * found.neighbour_share:.0f} % | {seconds:.1f} |")  # fmt: skip
+    return (
+        f"| {recording.name} | {millimetres(found.gap)} | {millimetres(geometry.after) if geometry else '–'}"
+        f" | {millimetres(found.after)} | {millimetres(found.after_unknown)} | {named(found)} |"
+        f" {unknown(found)} | {100 * found.neighbour_share:.0f} % | {seconds:.1f} |"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--data", type=Path, default=default_folder())
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "real-diagnosis.md")
     arguments = parser.parse_args()

@@ -4,8 +4,10 @@
 
     scripts/bench.sh [--quick]       # builds everything, then calls this
 
-What is compared was measured in one run on one machine: nothing is taken from earlier runs. BLAS is timed before and after
-our part, the C++ bench twice, and of both the better time counts. Times are the best of several runs, ours and those of fast peers alike.
+What is compared was measured in one run on one machine: nothing is taken from earlier runs. BLAS is timed
+before and after
+our part, the C++ bench twice, and of both the better time counts. Times are the best of several runs, ours
+and those of fast peers alike.
 """
 
 from __future__ import annotations
@@ -33,7 +35,15 @@ sys.path.insert(0, str(PEERS))
 from make_data import make  # noqa: E402  (shared with the peers)
 from result import score  # noqa: E402
 
-FIT_PEERS = ("numpy", "numpy-2-threads", "robotkinecal", "figaroh", "figaroh-excitation", "pybotics-trf", "pybotics-lm")
+FIT_PEERS = (
+    "numpy",
+    "numpy-2-threads",
+    "robotkinecal",
+    "figaroh",
+    "figaroh-excitation",
+    "pybotics-trf",
+    "pybotics-lm",
+)
 CPP = "build/bench/bench_identify"
 AVX2 = "TRUING_KERNEL=avx2 " + CPP
 PYTHON = "python bench/run.py"
@@ -41,7 +51,9 @@ PYTHON = "python bench/run.py"
 
 @dataclass(frozen=True)
 class Row:
-    """One figure; `reach` is the bound that we set ourselves, `ratio` what a peer takes as a multiple of ours."""
+    """One figure; `reach` is the bound that we set ourselves, `ratio` what a peer takes as a multiple of
+    ours.
+    """
 
     name: str
     value: float
@@ -63,7 +75,8 @@ class Row:
         return self.value <= float(limit) if sign == "<=" else self.value >= float(limit)
 
 
-# ---- Running things --------------------------------------------------------------------------------------------------
+# ---- Running things
+# --------------------------------------------------------------------------------------------------
 
 
 def processor() -> str:
@@ -75,7 +88,10 @@ def processor() -> str:
 
 
 def machine() -> str:
-    return f"{processor()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}, NumPy {np.__version__}"
+    return (
+        f"{processor()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()},"
+        f" NumPy {np.__version__}"
+    )
 
 
 def run_cpp(program: Path, kernel: str = "") -> dict[str, Any]:
@@ -92,12 +108,27 @@ def run_cpp(program: Path, kernel: str = "") -> dict[str, Any]:
 
 def better(one: dict[str, Any], two: dict[str, Any]) -> dict[str, Any]:
     """Of two runs of the C++ bench the better of every time; what is no time is the same in both."""
-    return {name: value if isinstance(value, str) else (max if name.startswith("threads_speedup") else min)(value, two[name])
-            for name, value in one.items()}  # fmt: skip
+    return {
+        name: (
+            value
+            if isinstance(value, str)
+            else (max if name.startswith("threads_speedup") else min)(value, two[name])
+        )
+        for name, value in one.items()
+    }
 
 
 def run_peers(data: Path, envs: Path, out: Path, *options: str) -> list[dict[str, Any]]:
-    command = [sys.executable, str(PEERS / "peers.py"), str(data), "--envs", str(envs), "--out", str(out), *options]
+    command = [
+        sys.executable,
+        str(PEERS / "peers.py"),
+        str(data),
+        "--envs",
+        str(envs),
+        "--out",
+        str(out),
+        *options,
+    ]
     if subprocess.run(command).returncode != 0 or not out.exists():
         return [{"peer": "all", "error": "bench/peers/peers.py failed"}]
     results: list[dict[str, Any]] = json.loads(out.read_text(encoding="utf-8"))["results"]
@@ -114,7 +145,9 @@ class OtherWork:
     def _now() -> tuple[float, float, float]:
         own = os.times()
         try:
-            user, nice, system, _, _, irq, softirq, steal = map(int, Path("/proc/stat").read_text(encoding="ascii").split("\n")[0].split()[1:9])
+            user, nice, system, _, _, irq, softirq, steal = map(
+                int, Path("/proc/stat").read_text(encoding="ascii").split("\n")[0].split()[1:9]
+            )
             busy = (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
         except (OSError, ValueError):
             busy = float("nan")
@@ -136,15 +169,24 @@ def best_seconds(runs: int, work: Callable[[], Any]) -> float:
     return min(times)
 
 
-# ---- truing from Python ----------------------------------------------------------------------------------------------
+# ---- truing from Python
+# ----------------------------------------------------------------------------------------------
 
 
 def nominal_robot(data: dict[str, Any]) -> truing.Robot:
-    joints = [truing.Joint(f"J{k}", alpha=alpha, a=a, beta=beta, theta=theta, d=d)
-              for k, (alpha, a, beta, theta, d) in enumerate(np.asarray(data["dh"]).tolist(), 1)]  # fmt: skip
+    joints = [
+        truing.Joint(f"J{k}", alpha=alpha, a=a, beta=beta, theta=theta, d=d)
+        for k, (alpha, a, beta, theta, d) in enumerate(np.asarray(data["dh"]).tolist(), 1)
+    ]
     tool = np.eye(4)
     tool[:3, 3] = data["tool"]
-    return truing.Robot("ur10", convention="mdh", joints=joints, targets=[truing.Target("tool", tool)], T_measurement_base=data["base"])
+    return truing.Robot(
+        "ur10",
+        convention="mdh",
+        joints=joints,
+        targets=[truing.Target("tool", tool)],
+        T_measurement_base=data["base"],
+    )
 
 
 def time_python(data: dict[str, Any]) -> dict[str, Any]:
@@ -156,8 +198,16 @@ def time_python(data: dict[str, Any]) -> dict[str, Any]:
 
     seconds = best_seconds(100, fit)
     found = fit()
-    scored = score(data, np.asarray(truing.predict(found.robot, truing.Measurements(data["q_test"])).position))
-    return {"seconds": seconds, "rank": found.rank, "columns": found.columns, "iterations": found.solver.iterations, **scored}
+    scored = score(
+        data, np.asarray(truing.predict(found.robot, truing.Measurements(data["q_test"])).position)
+    )
+    return {
+        "seconds": seconds,
+        "rank": found.rank,
+        "columns": found.columns,
+        "iterations": found.solver.iterations,
+        **scored,
+    }
 
 
 def time_csv(folder: Path, rows: int) -> dict[str, float]:
@@ -169,7 +219,10 @@ def time_csv(folder: Path, rows: int) -> dict[str, float]:
     robot = nominal_robot(data)
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (rows, 6))
     p = np.asarray(truing.predict(robot, truing.Measurements(q)).position)
-    columns = {**{f"q{k + 1}_rad": q[:, k] for k in range(6)}, **{f"{axis}_m": p[:, k] for k, axis in enumerate("xyz")}}
+    columns = {
+        **{f"q{k + 1}_rad": q[:, k] for k in range(6)},
+        **{f"{axis}_m": p[:, k] for k, axis in enumerate("xyz")},
+    }
     path = folder / "million.csv"
     pa.csv.write_csv(pa.table(columns), path)
     megabytes = path.stat().st_size / 1e6
@@ -181,59 +234,150 @@ def time_csv(folder: Path, rows: int) -> dict[str, float]:
     return {"megabytes": megabytes, "seconds": seconds}
 
 
-# ---- The table -------------------------------------------------------------------------------------------------------
+# ---- The table
+# -------------------------------------------------------------------------------------------------------
 
 
-def collect(cpp: dict[str, Any], avx2: dict[str, Any], python: dict[str, Any], csv: dict[str, float], blas: list[dict[str, Any]],
-            peers: list[dict[str, Any]]) -> list[Row]:  # fmt: skip
+def collect(
+    cpp: dict[str, Any],
+    avx2: dict[str, Any],
+    python: dict[str, Any],
+    csv: dict[str, float],
+    blas: list[dict[str, Any]],
+    peers: list[dict[str, Any]],
+) -> list[Row]:
     here = machine()
     rows: list[Row] = []
 
     def add(name: str, value: float, unit: str, reach: str = "", command: str = CPP, note: str = "") -> None:
         rows.append(Row(name, value, unit, reach, machine=here, command=command, note=note))
 
-    def against(name: str, value: float, unit: str, reach: str, command: str, task: str, wanted: tuple[str, ...], scale: float) -> None:
+    def against(
+        name: str,
+        value: float,
+        unit: str,
+        reach: str,
+        command: str,
+        task: str,
+        wanted: tuple[str, ...],
+        scale: float,
+    ) -> None:
         """A row for every peer, those without a figure included."""
         there = [r for r in peers if r["peer"] in wanted and r.get("task", task) == task]
         for r in there or [{"peer": "", "error": "no peer was run"}]:
             theirs = r["seconds"] * scale if "seconds" in r else None
             note = r.get("note", r.get("error", r.get("skipped", "")))
-            rows.append(Row(name, value, unit, reach, r["peer"], theirs, theirs and theirs / value, here, command, note))
+            rows.append(
+                Row(
+                    name,
+                    value,
+                    unit,
+                    reach,
+                    r["peer"],
+                    theirs,
+                    theirs and theirs / value,
+                    here,
+                    command,
+                    note,
+                )
+            )
 
-    kernels: list[tuple[dict[str, Any], str]] = [(cpp, CPP)] + ([(avx2, AVX2)] if avx2 and cpp["kernel"] != "avx2" else [])
+    kernels: list[tuple[dict[str, Any], str]] = [(cpp, CPP)] + (
+        [(avx2, AVX2)] if avx2 and cpp["kernel"] != "avx2" else []
+    )
     for figures, command in kernels:
         kernel = figures["kernel"]
         reach = {"avx512": "<= 40", "avx2": "<= 80"}.get(kernel, "")
-        against(f"FK and position Jacobian, {cpp['jacobian_columns']:g} columns, 1000 poses, one core, {kernel}", figures["fk_jacobian_1000"],
-                "us", reach, command, "fk+regressor", ("pinocchio",), 1e6)  # fmt: skip
-        against(rows[-1].name, figures["fk_jacobian_1000"], "us", reach, command, "fk+jacobian", ("numpy",), 1e6)
-    what = f"identification, 1000 poses, {cpp['identify_1000_rank']:g} parameters of {cpp['identify_1000_columns']:g}, rank and covariance"
+        against(
+            f"FK and position Jacobian, {cpp['jacobian_columns']:g} columns, 1000 poses, one core, {kernel}",
+            figures["fk_jacobian_1000"],
+            "us",
+            reach,
+            command,
+            "fk+regressor",
+            ("pinocchio",),
+            1e6,
+        )
+        against(
+            rows[-1].name, figures["fk_jacobian_1000"], "us", reach, command, "fk+jacobian", ("numpy",), 1e6
+        )
+    what = (
+        f"identification, 1000 poses, {cpp['identify_1000_rank']:g} parameters of"
+        f" {cpp['identify_1000_columns']:g}, rank and covariance"
+    )
     against(f"{what}, C++, {cpp['kernel']}", cpp["identify_1000"], "ms", "<= 2", CPP, "fit", FIT_PEERS, 1e3)
     if len(kernels) == 2:
         add(f"{what}, C++, avx2", avx2["identify_1000"], "ms", "", AVX2)
-    what = f"identification, 1000 poses, {python['rank']} parameters of {python['columns']}, from NumPy arrays"
+    what = (
+        f"identification, 1000 poses, {python['rank']} parameters of {python['columns']}, from NumPy arrays"
+    )
     against(what, 1e3 * python["seconds"], "ms", "<= 5", PYTHON, "fit", FIT_PEERS, 1e3)
     for poses in (200, 1000):
-        add(f"rms error on fresh noise-free poses, median of 20 seeds, {poses} poses", cpp[f"accuracy_{poses}"], "sigma sqrt(p/N)", "<= 1.1")
+        add(
+            f"rms error on fresh noise-free poses, median of 20 seeds, {poses} poses",
+            cpp[f"accuracy_{poses}"],
+            "sigma sqrt(p/N)",
+            "<= 1.1",
+        )
     grams = [r for r in blas if "seconds" in r]
     for figures, command in kernels:
         iteration = figures["iteration_1000000_threads_2"]
-        name = f"one iteration, 1 000 000 poses x {cpp['jacobian_columns']:g} columns, 2 threads, {figures['kernel']}"
+        name = (
+            f"one iteration, 1 000 000 poses x {cpp['jacobian_columns']:g} columns, 2 threads,"
+            f" {figures['kernel']}"
+        )
         add(name, iteration, "ms", "", command)
         if not grams:
-            rows.append(Row(f"{name}, over BLAS dsyrk of 3 000 000 x 39", float("nan"), "x", "<= 0.4", "blas", None, None, here, command,
-                            "; ".join(str(r.get("error", r.get("skipped"))) for r in blas)))  # fmt: skip
+            rows.append(
+                Row(
+                    f"{name}, over BLAS dsyrk of 3 000 000 x 39",
+                    float("nan"),
+                    "x",
+                    "<= 0.4",
+                    "blas",
+                    None,
+                    None,
+                    here,
+                    command,
+                    "; ".join(str(r.get("error", r.get("skipped"))) for r in blas),
+                )
+            )
             continue
         best = min(grams, key=lambda r: float(r["seconds"]))
         dsyrk = 1e3 * float(best["seconds"])
         # the reach is stated for the widest kernel; the narrower one is shown beside it
-        rows.append(Row(f"{name}, over BLAS dsyrk of 3 000 000 x 39", iteration / dsyrk, "x", "<= 0.4" if command == CPP else "", "blas", 1.0, dsyrk / iteration,
-                        here, command, f"dsyrk {dsyrk:.0f} ms: {best['note']}; the better of {len(grams)} timings before and after ours"))  # fmt: skip
-    add("identification, 1 000 000 poses", cpp["identify_1000000"], "s", "<= 1", note=f"{cpp['identify_1000000_iterations']:g} iterations")
+        rows.append(
+            Row(
+                f"{name}, over BLAS dsyrk of 3 000 000 x 39",
+                iteration / dsyrk,
+                "x",
+                "<= 0.4" if command == CPP else "",
+                "blas",
+                1.0,
+                dsyrk / iteration,
+                here,
+                command,
+                f"dsyrk {dsyrk:.0f} ms: {best['note']}; the better of {len(grams)} timings before and after"
+                " ours",
+            )
+        )
+    add(
+        "identification, 1 000 000 poses",
+        cpp["identify_1000000"],
+        "s",
+        "<= 1",
+        note=f"{cpp['identify_1000000_iterations']:g} iterations",
+    )
     add("memory above the data, 1 000 000 poses", cpp["identify_1000000_memory"], "MB", "<= 50")
     add("two threads against one, 100 000 poses", cpp["threads_speedup_100000"], "x", ">= 1.8")
-    add("CSV of 1 000 000 rows", csv["megabytes"] / csv["seconds"], "MB/s", ">= 50", PYTHON,
-        f"{csv['megabytes']:.0f} MB in {csv['seconds']:.2f} s, all checks included")  # fmt: skip
+    add(
+        "CSV of 1 000 000 rows",
+        csv["megabytes"] / csv["seconds"],
+        "MB/s",
+        ">= 50",
+        PYTHON,
+        f"{csv['megabytes']:.0f} MB in {csv['seconds']:.2f} s, all checks included",
+    )
     return rows
 
 
@@ -251,7 +395,11 @@ def shown(value: float | None, unit: str) -> str:
 
 
 def bound(row: Row) -> str:
-    return f"{row.reach.replace('<=', '≤').replace('>=', '≥')} {_SYMBOLS.get(row.unit, row.unit)}" if row.reach else ""
+    return (
+        f"{row.reach.replace('<=', '≤').replace('>=', '≥')} {_SYMBOLS.get(row.unit, row.unit)}"
+        if row.reach
+        else ""
+    )
 
 
 def print_table(rows: list[Row]) -> None:
@@ -267,55 +415,128 @@ def print_table(rows: list[Row]) -> None:
             print(f"{'':8}{row.peer:20} {row.note}")
 
 
-def markdown(rows: list[Row], python: dict[str, Any], peers: list[dict[str, Any]], about: dict[str, Any]) -> str:
-    lines = ["# Benchmarks", "", "<!-- Written by bench/run.py: change that file, not this one. -->", "",
-             f"From `{about['command']}` on {about['date']}: {machine()}.",
-             f"Load average {about['load_before']:.1f} before and {about['load_after']:.1f} after, the bench's own work included."]  # fmt: skip
+def markdown(
+    rows: list[Row], python: dict[str, Any], peers: list[dict[str, Any]], about: dict[str, Any]
+) -> str:
+    lines = [
+        "# Benchmarks",
+        "",
+        "<!-- Written by bench/run.py: change that file, not this one. -->",
+        "",
+        f"From `{about['command']}` on {about['date']}: {machine()}.",
+        (
+            f"Load average {about['load_before']:.1f} before and {about['load_after']:.1f} after, the bench's"
+            " own work included."
+        ),
+    ]
     other = about["other_work"]
     if other is not None:
         lines.append(f"While truing and BLAS were timed, other programs kept {other:.1f} cores busy.")
     lines.append("")
     if other is None or other > 0.1 * (os.cpu_count() or 1):
-        lines += ["So absolute times are too long, and two threads had less than two cores. Ratios within this run say more, and they too are uneven.", ""]
+        lines += [
+            (
+                "So absolute times are too long, and two threads had less than two cores. Ratios within this"
+                " run say more, and they too are uneven."
+            ),
+            "",
+        ]
     if about["quick"]:
         lines += ["`--quick`: peers that take more than 20 s were left out.", ""]
-    lines += ["The robot is a UR10: modified DH with Hayati's beta, base and tool unknown. Times are the best of several runs, ours, and those of peers that take less than a "
-              "second. Files, peers and their fairness: [bench/peers](../bench/peers/README.md).", "",
-              "## What we set out to reach", "", "| | measured | reach | |", "| --- | --- | --- | --- |"]  # fmt: skip
+    lines += [
+        (
+            "The robot is a UR10: modified DH with Hayati's beta, base and tool unknown. Times are the best"
+            " of several runs, ours, and those of peers that take less than a second. Files, peers and their"
+            " fairness: [bench/peers](../bench/peers/README.md)."
+        ),
+        "",
+        "## What we set out to reach",
+        "",
+        "| | measured | reach | |",
+        "| --- | --- | --- | --- |",
+    ]
     seen = set()
     for row in rows:
         if row.reach and row.name not in seen:
             seen.add(row.name)
-            lines.append(f"| {row.name} | {shown(row.value, row.unit)} | {bound(row)} | {'reached' if row.met else '**missed**'} |")
-    lines += ["", "## Beside others", "", "| | truing | | peer | times ours | |", "| --- | --- | --- | --- | --- | --- |"]
+            lines.append(
+                f"| {row.name} | {shown(row.value, row.unit)} | {bound(row)} |"
+                f" {'reached' if row.met else '**missed**'} |"
+            )
+    lines += [
+        "",
+        "## Beside others",
+        "",
+        "| | truing | | peer | times ours | |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
     for row in rows:
         if row.peer or not row.reach:
             theirs = shown(row.peer_value, row.unit) if row.peer_value is not None else "–"
-            lines.append(f"| {row.name} | {shown(row.value, row.unit)} | {row.peer} | {theirs} | {number(row.ratio)} | {row.note} |")
-    lines += ["", "## The same file, fitted by all", "",
-              "1000 poses with 0.03 mm of noise per axis; errors on 300 other poses against the points without noise.", "",
-              "| | time | mean | rms | max [µm] | |", "| --- | --- | --- | --- | --- | --- |",
-              f"| truing, from Python | {1e3 * python['seconds']:.2f} ms | {1e6 * python['test_mean_m']:.1f} | {1e6 * python['test_rms_m']:.1f} | "
-              f"{1e6 * python['test_max_m']:.1f} | rank {python['rank']}, {python['iterations']} iterations |"]  # fmt: skip
+            lines.append(
+                f"| {row.name} | {shown(row.value, row.unit)} | {row.peer} | {theirs} | {number(row.ratio)} |"
+                f" {row.note} |"
+            )
+    lines += [
+        "",
+        "## The same file, fitted by all",
+        "",
+        (
+            "1000 poses with 0.03 mm of noise per axis; errors on 300 other poses against the points without"
+            " noise."
+        ),
+        "",
+        "| | time | mean | rms | max [µm] | |",
+        "| --- | --- | --- | --- | --- | --- |",
+        (
+            f"| truing, from Python | {1e3 * python['seconds']:.2f} ms | {1e6 * python['test_mean_m']:.1f} |"
+            f" {1e6 * python['test_rms_m']:.1f} | {1e6 * python['test_max_m']:.1f} | rank {python['rank']},"
+            f" {python['iterations']} iterations |"
+        ),
+    ]
     for r in peers:
         if r.get("task") == "fit":
             took = f"{r['seconds']:.1f} s" if r["seconds"] >= 1 else f"{1e3 * r['seconds']:.1f} ms"
-            lines.append(f"| {r['peer']} | {took} | {1e6 * r['test_mean_m']:.1f} | {1e6 * r['test_rms_m']:.1f} | {1e6 * r['test_max_m']:.1f} | {r['note']} |")
+            lines.append(
+                f"| {r['peer']} | {took} | {1e6 * r['test_mean_m']:.1f} | {1e6 * r['test_rms_m']:.1f} |"
+                f" {1e6 * r['test_max_m']:.1f} | {r['note']} |"
+            )
         elif "error" in r or "skipped" in r:
-            lines.append(f"| {r['peer']} | – | – | – | – | {'failed: ' + r['error'] if 'error' in r else 'left out: ' + r['skipped']} |")
-    versions = sorted({f"{name} {version}" for r in peers for name, version in r.get("versions", {}).items() if version})
-    lines += ["", f"Versions: {', '.join(versions)}." if versions else "No peer ran.", "",
-              "## Again", "", "    scripts/bench.sh            # everything, into bench/results.json and this page",
-              "    scripts/bench.sh --quick    # without the slow peers", f"    {CPP}", f"    {AVX2}", ""]  # fmt: skip
+            lines.append(
+                f"| {r['peer']} | – | – | – | – |"
+                f" {'failed: ' + r['error'] if 'error' in r else 'left out: ' + r['skipped']} |"
+            )
+    versions = sorted(
+        {f"{name} {version}" for r in peers for name, version in r.get("versions", {}).items() if version}
+    )
+    lines += [
+        "",
+        f"Versions: {', '.join(versions)}." if versions else "No peer ran.",
+        "",
+        "## Again",
+        "",
+        "    scripts/bench.sh            # everything, into bench/results.json and this page",
+        "    scripts/bench.sh --quick    # without the slow peers",
+        f"    {CPP}",
+        f"    {AVX2}",
+        "",
+    ]
     return "\n".join(lines)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="leave out peers that take more than 20 s")
-    parser.add_argument("--no-peers", action="store_true", help="time truing and nothing else (the tables will say so)")
+    parser.add_argument(
+        "--no-peers", action="store_true", help="time truing and nothing else (the tables will say so)"
+    )
     parser.add_argument("--cpp", type=Path, default=ROOT / CPP, help="the C++ bench")
-    parser.add_argument("--envs", type=Path, default=ROOT / "build/peers", help="the peers' environments, made by bench/peers/setup_peers.sh")
+    parser.add_argument(
+        "--envs",
+        type=Path,
+        default=ROOT / "build/peers",
+        help="the peers' environments, made by bench/peers/setup_peers.sh",
+    )
     parser.add_argument("--timeout", type=float, default=600, help="limit for one peer [s]")
     parser.add_argument("--rows", type=int, default=1_000_000, help="of the CSV")
     parser.add_argument("--results", type=Path, default=HERE / "results.json")
@@ -332,7 +553,9 @@ def main() -> None:
     def peers(*options: str) -> list[dict[str, Any]]:
         if args.no_peers:
             return [{"peer": "all", "skipped": "--no-peers"}]
-        return run_peers(folder / "ur10.npz", args.envs, folder / "peers.json", "--timeout", str(args.timeout), *options)
+        return run_peers(
+            folder / "ur10.npz", args.envs, folder / "peers.json", "--timeout", str(args.timeout), *options
+        )
 
     other_work = OtherWork()
     print("BLAS, before ...", flush=True)
@@ -353,18 +576,43 @@ def main() -> None:
     others = peers("--only", names, *(("--quick",) if args.quick else ()))
 
     rows = collect(cpp, avx2, python, csv, blas, others)
-    about = {"command": " ".join(["scripts/bench.sh", *sys.argv[1:]]), "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
-             "load_before": load_before, "load_after": os.getloadavg()[0], "quick": args.quick, "other_work": busy}  # fmt: skip
+    about = {
+        "command": " ".join(["scripts/bench.sh", *sys.argv[1:]]),
+        "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
+        "load_before": load_before,
+        "load_after": os.getloadavg()[0],
+        "quick": args.quick,
+        "other_work": busy,
+    }
     print()
     print_table(rows)
-    args.results.write_text(json.dumps([{k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in asdict(row).items()} for row in rows],
-                                       indent=1, ensure_ascii=False) + "\n", encoding="utf-8")  # fmt: skip
+    args.results.write_text(
+        json.dumps(
+            [
+                {
+                    k: None if isinstance(v, float) and not np.isfinite(v) else v
+                    for k, v in asdict(row).items()
+                }
+                for row in rows
+            ],
+            indent=1,
+            ensure_ascii=False,
+        )
+        + "\n",
+        encoding="utf-8",
+    )
     args.page.parent.mkdir(parents=True, exist_ok=True)
     args.page.write_text(markdown(rows, python, others, about), encoding="utf-8")
     if busy is not None:
-        print(f"\nwhile truing and BLAS were timed, other programs kept {busy:.1f} of {os.cpu_count()} cores busy")
+        print(
+            f"\nwhile truing and BLAS were timed, other programs kept {busy:.1f} of {os.cpu_count()} cores"
+            " busy"
+        )
     missed = {row.name for row in rows if row.met is False}
-    print(f"\nwritten: {args.results}, {args.page}" + (f"\n{len(missed)} missed: " + "; ".join(sorted(missed)) if missed else ""))
+    print(
+        f"\nwritten: {args.results}, {args.page}"
+        + (f"\n{len(missed)} missed: " + "; ".join(sorted(missed)) if missed else "")
+    )
 
 
 if __name__ == "__main__":

@@ -1,12 +1,14 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Tracking of simulated swaying arms with known truth: every row has its target, and what other programs do is implemented beside it.
+// Tracking of simulated swaying arms with known truth: every row has its target, and what other programs do is
+// implemented beside it.
 //
-//     bench_track [seeds, default 5] [seeds of consistency, default 100] [part of a row's name, default all] [hours of watching, default 8] [first seed, default 1]
+//     bench_track [seeds, default 5] [seeds of consistency, default 100] [part of a row's name, default all] [hours of
+//     watching, default 8] [first seed, default 1]
 //
-// Seeds: the arm of row seed s is drawn by s; its recording for the modes is made by s, what is predicted by 1000 + s; ten minutes of watching
-// are drawn by 5000 + s. Times are CPU times. bench/track.py makes a page of the output.
+// Seeds: the arm of row seed s is drawn by s; its recording for the modes is made by s, what is predicted by 1000 + s;
+// ten minutes of watching are drawn by 5000 + s. Times are CPU times. bench/track.py makes a page of the output.
 
 #include <sys/resource.h>
 
@@ -48,15 +50,19 @@ double cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// ---- Playing streams in the order of their arrival -------------------------------------------------------------------------
+// ---- Playing streams in the order of their arrival
+// -------------------------------------------------------------------------
 
 /// Pushes everything that has arrived before each inertial sample, then that sample, then calls `then` with it.
 void play(const SimulatedStreams& streams, Tracker* tracker, const std::function<void(const ImuSample&)>& then) {
   std::size_t pose = 0, flange = 0, plan = 0;
   for (const ImuSample& sample : streams.imu) {
-    for (; plan < streams.plan.size() && streams.plan[plan].arrival < sample.arrival; ++plan) tracker->push_plan(streams.plan[plan].t, streams.plan[plan].T_base_frame);
-    for (; pose < streams.tracker.size() && streams.tracker[pose].arrival < sample.arrival; ++pose) tracker->push_pose(streams.tracker[pose]);
-    for (; flange < streams.flange.size() && streams.flange[flange].arrival < sample.arrival; ++flange) tracker->push_joints(streams.flange[flange].t, streams.flange[flange].T_base_frame);
+    for (; plan < streams.plan.size() && streams.plan[plan].arrival < sample.arrival; ++plan)
+      tracker->push_plan(streams.plan[plan].t, streams.plan[plan].T_base_frame);
+    for (; pose < streams.tracker.size() && streams.tracker[pose].arrival < sample.arrival; ++pose)
+      tracker->push_pose(streams.tracker[pose]);
+    for (; flange < streams.flange.size() && streams.flange[flange].arrival < sample.arrival; ++flange)
+      tracker->push_joints(streams.flange[flange].t, streams.flange[flange].T_base_frame);
     tracker->push_imu(sample);
     then(sample);
   }
@@ -65,7 +71,8 @@ void play(const SimulatedStreams& streams, Tracker* tracker, const std::function
 /// The true deviation from what is predicted: position [m] and rotation vector [rad] in the base frame.
 Vector6d error_of(const Isometry3d& truth, const Isometry3d& predicted) {
   Vector6d out;
-  out << truth.translation() - predicted.translation(), log_rotation(Quaterniond(truth.linear() * predicted.linear().transpose()));
+  out << truth.translation() - predicted.translation(),
+      log_rotation(Quaterniond(truth.linear() * predicted.linear().transpose()));
   return out;
 }
 
@@ -84,7 +91,8 @@ void line(const char* what, double value, const char* unit) {
   std::fflush(stdout);
 }
 
-// ---- What others do ------------------------------------------------------------------------------------------------------------
+// ---- What others do
+// --------------------------------------------------------------------------------------------------------------------
 
 /// Constant velocity or acceleration of the pose from the filter's state, at the tool.
 Isometry3d extrapolated(const Motion& motion, double h, bool acceleration, const Isometry3d& T_imu_tool) {
@@ -117,7 +125,8 @@ class FiniteDifference {
   double before_t_ = -1.0, t_ = 0.0;
 };
 
-// ---- Recordings ------------------------------------------------------------------------------------------------------------------
+// ---- Recordings
+// --------------------------------------------------------------------------------------------------------------------
 
 StreamSimulationOptions arm(SimulatedMotion motion, std::uint64_t seed, double seconds) {
   StreamSimulationOptions options;
@@ -140,16 +149,19 @@ ModesResult modes_of(const SimulatedStreams& recording, const TrackOptions& opti
     const int n = tracker.take_rows(buffer, 64);
     rows.insert(rows.end(), buffer, buffer + n);
   });
-  rows.erase(rows.begin(), std::upper_bound(rows.begin(), rows.end(), 3.0, [](double t, const DeviationRow& r) { return t < r.t; }));
+  rows.erase(rows.begin(),
+             std::upper_bound(rows.begin(), rows.end(), 3.0, [](double t, const DeviationRow& r) { return t < r.t; }));
   return identify_modes(rows, options.deviation);
 }
 
 ModalModel with_error(ModalModel model, double share) {
-  for (std::size_t k = 0; k < static_cast<std::size_t>(model.count); ++k) model.frequency[k] *= k % 2 == 0 ? 1.0 + share : 1.0 - share;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(model.count); ++k)
+    model.frequency[k] *= k % 2 == 0 ? 1.0 + share : 1.0 - share;
   return model;
 }
 
-// ---- Rows ----------------------------------------------------------------------------------------------------------------------
+// ---- Rows
+// --------------------------------------------------------------------------------------------------------------------
 
 /// Predictions of the tool, ours and others', over seeds.
 void predictions(SimulatedMotion motion, double horizon, int seeds, double frequency_error) {
@@ -164,7 +176,8 @@ void predictions(SimulatedMotion motion, double horizon, int seeds, double frequ
     const ModesResult found = modes_of(recording, options);
     for (std::size_t k = 0; k < static_cast<std::size_t>(found.model.count); ++k) {
       double nearest = 1e9;
-      for (const FlexibleMode& mode : recording.modes) nearest = std::min(nearest, std::abs(found.model.frequency[k] / mode.frequency - 1.0));
+      for (const FlexibleMode& mode : recording.modes)
+        nearest = std::min(nearest, std::abs(found.model.frequency[k] / mode.frequency - 1.0));
       frequency.add(nearest);
     }
     simulation.modes = recording.modes;
@@ -183,8 +196,10 @@ void predictions(SimulatedMotion motion, double horizon, int seeds, double frequ
     Sum own, acceleration;
     int k = 0;
     play(streams, &tracker, [&](const ImuSample& sample) {
-      for (; plan < streams.plan.size() && streams.plan[plan].arrival < sample.arrival; ++plan) without.push_plan(streams.plan[plan].t, streams.plan[plan].T_base_frame);
-      for (; flange < streams.flange.size() && streams.flange[flange].arrival < sample.arrival; ++flange) without.push_joints(streams.flange[flange].t, streams.flange[flange].T_base_frame);
+      for (; plan < streams.plan.size() && streams.plan[plan].arrival < sample.arrival; ++plan)
+        without.push_plan(streams.plan[plan].t, streams.plan[plan].T_base_frame);
+      for (; flange < streams.flange.size() && streams.flange[flange].arrival < sample.arrival; ++flange)
+        without.push_joints(streams.flange[flange].t, streams.flange[flange].T_base_frame);
       for (; pose < streams.tracker.size() && streams.tracker[pose].arrival < sample.arrival; ++pose) {
         replay.push_pose(streams.tracker[pose]);
         without.push_pose(streams.tracker[pose]);
@@ -203,13 +218,17 @@ void predictions(SimulatedMotion motion, double horizon, int seeds, double frequ
       const PosePrediction ours = tracker.predict(t), no_modes = without.predict(t);
       if (sample.t < kWarmUp || t > simulation.seconds) return;
       const Isometry3d truth = streams.tool_at(t);
-      const auto add = [&](int method, const Isometry3d& T) { errors[method].add((truth.translation() - T.translation()).norm()); };
+      const auto add = [&](int method, const Isometry3d& T) {
+        errors[method].add((truth.translation() - T.translation()).norm());
+      };
       add(kHold, difference.held() * streams.setup.T_flange_tool);
       add(kNow, extrapolated(late.motion_at(sample.t), horizon, false, T_imu_tool));
       add(kDifference, difference.at(t) * streams.setup.T_flange_tool);
       add(kVelocity, extrapolated(replay.motion_at(sample.t), horizon, false, T_imu_tool));
       add(kAcceleration, extrapolated(replay.motion_at(sample.t), horizon, true, T_imu_tool));
-      acceleration.add((truth.translation() - extrapolated(replay.motion_at(sample.t), horizon, true, T_imu_tool).translation()).norm());
+      acceleration.add(
+          (truth.translation() - extrapolated(replay.motion_at(sample.t), horizon, true, T_imu_tool).translation())
+              .norm());
       add(kNoModes, no_modes.T_base_tool);
       add(kOurs, ours.T_base_tool);
       const Vector6d e = error_of(truth, ours.T_base_tool);
@@ -221,7 +240,8 @@ void predictions(SimulatedMotion motion, double horizon, int seeds, double frequ
     worst_ratio = std::max(worst_ratio, own.rms() / acceleration.rms());
   }
   const bool gentle = motion == SimulatedMotion::gentle;
-  std::printf("%s motion, %.0f ms ahead, position error of the tool, rms over %d seeds\n", gentle ? "gentle" : "stop-and-go", 1e3 * horizon, seeds);
+  std::printf("%s motion, %.0f ms ahead, position error of the tool, rms over %d seeds\n",
+              gentle ? "gentle" : "stop-and-go", 1e3 * horizon, seeds);
   line("hold: the last tracker sample", 1e3 * errors[kHold].rms(), "mm");
   line("filter, late pose used as if now, constant velocity", 1e3 * errors[kNow].rms(), "mm");
   line("tracker and finite-difference velocity", 1e3 * errors[kDifference].rms(), "mm");
@@ -229,10 +249,14 @@ void predictions(SimulatedMotion motion, double horizon, int seeds, double frequ
   line("filter with replay, constant acceleration", 1e3 * errors[kAcceleration].rms(), "mm");
   line("truing without modes (plan, deviation at constant acceleration)", 1e3 * errors[kNoModes].rms(), "mm");
   char what[120];
-  std::snprintf(what, sizeof what, "truing, identified modes%s", frequency_error > 0.0 ? " with 5 % frequency error" : "");
-  if (gentle && horizon < 0.05) row(what, 1e3 * errors[kOurs].rms(), "mm", "<= 0.5 mm", errors[kOurs].rms() <= 0.5e-3);
-  else if (!gentle && horizon > 0.05) row(what, 1e3 * errors[kOurs].rms(), "mm", "<= 1.0 mm", errors[kOurs].rms() <= 1.0e-3);
-  else line(what, 1e3 * errors[kOurs].rms(), "mm");
+  std::snprintf(what, sizeof what, "truing, identified modes%s",
+                frequency_error > 0.0 ? " with 5 % frequency error" : "");
+  if (gentle && horizon < 0.05)
+    row(what, 1e3 * errors[kOurs].rms(), "mm", "<= 0.5 mm", errors[kOurs].rms() <= 0.5e-3);
+  else if (!gentle && horizon > 0.05)
+    row(what, 1e3 * errors[kOurs].rms(), "mm", "<= 1.0 mm", errors[kOurs].rms() <= 1.0e-3);
+  else
+    line(what, 1e3 * errors[kOurs].rms(), "mm");
   row("worst seed against constant acceleration", worst_ratio, "", "<= 1.10", worst_ratio <= 1.1);
   line("predictions by modes", 100.0 * used_modes / std::max(1.0, made), "%");
   line("mean NEES of predictions (6 expected, below: cautious)", nees / std::max(1.0, made), "");
@@ -259,7 +283,8 @@ void consistency(int seeds, double offset, double drift, bool estimate) {
     std::size_t pose = 0;
     Belief belief;
     for (const ImuSample& sample : streams.imu) {
-      for (; pose < streams.tracker.size() && streams.tracker[pose].arrival < sample.arrival; ++pose) filter.push_pose(streams.tracker[pose]);
+      for (; pose < streams.tracker.size() && streams.tracker[pose].arrival < sample.arrival; ++pose)
+        filter.push_pose(streams.tracker[pose]);
       filter.push_imu(sample);
       if (static_cast<long>(sample.t * 1000.0 + 0.5) % 500 != 0 || sample.t < kWarmUp) continue;
       filter.update();
@@ -273,11 +298,12 @@ void consistency(int seeds, double offset, double drift, bool estimate) {
     found.translation() = belief.x.p;
     found.linear() = belief.x.q.toRotationMatrix();
     Matrix6d P;
-    P << belief.P.block<3, 3>(detail::kP, detail::kP), belief.P.block<3, 3>(detail::kP, detail::kTheta), belief.P.block<3, 3>(detail::kTheta, detail::kP),
-        belief.P.block<3, 3>(detail::kTheta, detail::kTheta);
+    P << belief.P.block<3, 3>(detail::kP, detail::kP), belief.P.block<3, 3>(detail::kP, detail::kTheta),
+        belief.P.block<3, 3>(detail::kTheta, detail::kP), belief.P.block<3, 3>(detail::kTheta, detail::kTheta);
     const Vector6d e = error_of(truth, found);
     nees += e.dot(P.ldlt().solve(e)) / seeds;
-    const double error = belief.x.clock - (offset + drift * belief.t), sigma = std::sqrt(belief.P(detail::kClock, detail::kClock));
+    const double error = belief.x.clock - (offset + drift * belief.t),
+                 sigma = std::sqrt(belief.P(detail::kClock, detail::kClock));
     clock.add(error);
     if (sigma > 0.0) clock_worst = std::max(clock_worst, std::abs(error) / sigma);
     if (std::abs(error) <= 3.0 * sigma) clock_within += 1.0;
@@ -287,12 +313,17 @@ void consistency(int seeds, double offset, double drift, bool estimate) {
   const double low = 6.0 * std::pow(centre - spread, 3), high = 6.0 * std::pow(centre + spread, 3);
   char band[40];
   std::snprintf(band, sizeof band, "%.2f-%.2f", low, high);
-  std::printf("clock offset %.0f ms, drift %.0f ppm, %s, %d seeds\n", 1e3 * offset, 1e6 * drift, estimate ? "estimated" : "not estimated", seeds);
-  if (estimate || offset == 0.0) row("NEES of the pose at the end of the run", nees, "", band, nees >= low && nees <= high);
-  else line("NEES of the pose at the end of the run", nees, "");
+  std::printf("clock offset %.0f ms, drift %.0f ppm, %s, %d seeds\n", 1e3 * offset, 1e6 * drift,
+              estimate ? "estimated" : "not estimated", seeds);
+  if (estimate || offset == 0.0)
+    row("NEES of the pose at the end of the run", nees, "", band, nees >= low && nees <= high);
+  else
+    line("NEES of the pose at the end of the run", nees, "");
   const double rms = position.rms();
-  if (estimate) row("position error now", 1e3 * rms, "mm", "<= 1.0 mm", rms <= 1e-3);
-  else line("position error now", 1e3 * rms, "mm");
+  if (estimate)
+    row("position error now", 1e3 * rms, "mm", "<= 1.0 mm", rms <= 1e-3);
+  else
+    line("position error now", 1e3 * rms, "mm");
   if (estimate) {
     line("clock offset, rms error", 1e3 * clock.rms(), "ms");
     row("clock offset within 3 sigma", 100.0 * clock_within / seeds, "%", ">= 99 %", clock_within >= 0.99 * seeds);
@@ -313,30 +344,42 @@ void order(int seeds) {
     Belief end[2];
     for (int shuffled = 0; shuffled < 2; ++shuffled) {
       detail::Random random(static_cast<std::uint64_t>(seed));
-      struct Item { double arrival; bool pose; std::size_t k; };
+      struct Item {
+        double arrival;
+        bool pose;
+        std::size_t k;
+      };
       std::vector<Item> items;
-      for (std::size_t k = 0; k < streams.tracker.size(); ++k) items.push_back({streams.tracker[k].t + (shuffled ? random.uniform(0.0, 0.45) : 0.01), true, k});
-      for (std::size_t k = 0; k < streams.flange.size(); ++k) items.push_back({streams.flange[k].t + (shuffled ? random.uniform(0.0, 0.45) : 0.01), false, k});
+      for (std::size_t k = 0; k < streams.tracker.size(); ++k)
+        items.push_back({streams.tracker[k].t + (shuffled ? random.uniform(0.0, 0.45) : 0.01), true, k});
+      for (std::size_t k = 0; k < streams.flange.size(); ++k)
+        items.push_back({streams.flange[k].t + (shuffled ? random.uniform(0.0, 0.45) : 0.01), false, k});
       std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.arrival < b.arrival; });
       PoseFilter filter(setup, FilterOptions());
       std::size_t item = 0;
       for (const ImuSample& sample : streams.imu) {
         for (; item < items.size() && items[item].arrival < sample.t; ++item) {
-          if (items[item].pose) filter.push_pose(streams.tracker[items[item].k]);
-          else filter.push_flange(streams.flange[items[item].k].t, streams.flange[items[item].k].T_base_frame);
+          if (items[item].pose)
+            filter.push_pose(streams.tracker[items[item].k]);
+          else
+            filter.push_flange(streams.flange[items[item].k].t, streams.flange[items[item].k].T_base_frame);
         }
         filter.push_imu(sample);
         if (static_cast<long>(sample.t * 1000.0 + 0.5) % 37 == 0) filter.update();
       }
       for (; item < items.size(); ++item) {
-        if (items[item].pose) filter.push_pose(streams.tracker[items[item].k]);
-        else filter.push_flange(streams.flange[items[item].k].t, streams.flange[items[item].k].T_base_frame);
+        if (items[item].pose)
+          filter.push_pose(streams.tracker[items[item].k]);
+        else
+          filter.push_flange(streams.flange[items[item].k].t, streams.flange[items[item].k].T_base_frame);
       }
       filter.update();
       end[shuffled] = filter.belief_at(filter.newest_imu());
     }
-    largest = std::max({largest, (end[0].x.p - end[1].x.p).cwiseAbs().maxCoeff(), (end[0].x.v - end[1].x.v).cwiseAbs().maxCoeff(),
-                        (end[0].x.q.coeffs() - end[1].x.q.coeffs()).cwiseAbs().maxCoeff(), (end[0].P - end[1].P).cwiseAbs().maxCoeff()});
+    largest = std::max({largest, (end[0].x.p - end[1].x.p).cwiseAbs().maxCoeff(),
+                        (end[0].x.v - end[1].x.v).cwiseAbs().maxCoeff(),
+                        (end[0].x.q.coeffs() - end[1].x.q.coeffs()).cwiseAbs().maxCoeff(),
+                        (end[0].P - end[1].P).cwiseAbs().maxCoeff()});
   }
   std::printf("order of arrival, delays up to 0.45 s in a window of 0.5 s, %d seeds\n", seeds);
   row("largest difference from in-order (1e-12)", largest * 1e12, "", "<= 1", largest <= 1e-12);
@@ -381,7 +424,8 @@ void dropouts(double seconds, int seeds) {
   std::printf("dropout of %.1f s in stop-and-go motion, %d seeds\n", seconds, seeds);
   line("position error during it, rms", 1e3 * error.rms(), "mm");
   line("position error during it, largest", 1e3 * error.largest, "mm");
-  row("components outside 3 sigma (0.27 % expected, errors of one run are alike)", 100.0 * outside / std::max(1.0, graded), "%", "<= 0.5 %", outside <= 0.005 * graded);
+  row("components outside 3 sigma (0.27 % expected, errors of one run are alike)",
+      100.0 * outside / std::max(1.0, graded), "%", "<= 0.5 %", outside <= 0.005 * graded);
   line("dropouts with a component outside 3 sigma at any moment", runs_outside, "");
   line("largest error in sigmas", worst, "");
   row("highest rate sent around it", rate, "m/s", "<= limit", rate <= 1.001 * options.limits.position_rate);
@@ -399,8 +443,10 @@ void watch(int seeds, double hours) {
     play(streams, &tracker, [&](const ImuSample& sample) {
       if (++k % 50 != 0) return;
       const std::uint64_t count = tracker.shift().count;
-      if (sample.t < start) before = count;
-      else if (count > before && *delay < 0.0) *delay = sample.t - start;
+      if (sample.t < start)
+        before = count;
+      else if (count > before && *delay < 0.0)
+        *delay = sample.t - start;
     });
     return before;
   };
@@ -413,8 +459,10 @@ void watch(int seeds, double hours) {
         const Vector3d direction = Vector3d(random.normal(), random.normal(), random.normal()).normalized();
         StationShift shift;
         shift.start = 20.0;
-        if (turned) shift.T_old_new.linear() = exp_rotation(M_PI / 1800.0 * direction).toRotationMatrix();
-        else shift.T_old_new.translation() = 0.005 * direction;
+        if (turned)
+          shift.T_old_new.linear() = exp_rotation(M_PI / 1800.0 * direction).toRotationMatrix();
+        else
+          shift.T_old_new.translation() = 0.005 * direction;
         simulation.shifts = {shift};
         double delay = 0.0;
         early += static_cast<double>(told(simulation, 20.0, &delay));
@@ -423,12 +471,14 @@ void watch(int seeds, double hours) {
       }
     }
   }
-  std::printf("base station shifted by 5 mm or 0.1 degrees in any direction, gentle and stop-and-go, %d seeds\n", seeds);
+  std::printf("base station shifted by 5 mm or 0.1 degrees in any direction, gentle and stop-and-go, %d seeds\n",
+              seeds);
   row("not noticed", missed, "", "0", missed == 0.0);
   row("slowest", slowest, "s", "< 2 s", slowest < 2.0);
   double alarms = early, seconds = 0.0;
   for (std::uint64_t seed = 5000 + static_cast<std::uint64_t>(first_seed); seconds < 3600.0 * hours; ++seed) {
-    StreamSimulationOptions simulation = arm(seed % 2 == 0 ? SimulatedMotion::gentle : SimulatedMotion::stop_and_go, seed, 600.0);
+    StreamSimulationOptions simulation =
+        arm(seed % 2 == 0 ? SimulatedMotion::gentle : SimulatedMotion::stop_and_go, seed, 600.0);
     simulation.tracker.lost = 0.01;
     if (seed % 4 < 2) simulation.dropouts = {{100.0, 0.5}, {200.0, 2.0}, {300.0, 10.0}};
     double delay = 0.0;
@@ -458,15 +508,18 @@ void cost() {
   const auto samples = static_cast<double>(streams.imu.size() + streams.tracker.size() + streams.flange.size());
   // A late update: one tracker sample held back by 30 to 80 ms or by up to 0.45 s, and a prediction right after it.
   std::printf("cost on one core, 1 kHz inertial, 100 Hz tracker, 250 Hz joints, prediction every 10 ms, four modes\n");
-  row("a sample (of any sensor), predictions included", 1e6 * best / samples, "us", "<= 2 us", 1e6 * best / samples <= 2.0);
+  row("a sample (of any sensor), predictions included", 1e6 * best / samples, "us", "<= 2 us",
+      1e6 * best / samples <= 2.0);
   line("an inertial sample, everything else included", 1e6 * best / static_cast<double>(streams.imu.size()), "us");
   for (const double delay : {0.03, 0.45}) {
     Tracker tracker(streams.setup, options);
     std::vector<double> times;
     std::size_t pose = 0, flange = 0, plan = 0;
     for (const ImuSample& sample : streams.imu) {
-      for (; plan < streams.plan.size() && streams.plan[plan].arrival < sample.arrival; ++plan) tracker.push_plan(streams.plan[plan].t, streams.plan[plan].T_base_frame);
-      for (; flange < streams.flange.size() && streams.flange[flange].arrival < sample.arrival; ++flange) tracker.push_joints(streams.flange[flange].t, streams.flange[flange].T_base_frame);
+      for (; plan < streams.plan.size() && streams.plan[plan].arrival < sample.arrival; ++plan)
+        tracker.push_plan(streams.plan[plan].t, streams.plan[plan].T_base_frame);
+      for (; flange < streams.flange.size() && streams.flange[flange].arrival < sample.arrival; ++flange)
+        tracker.push_joints(streams.flange[flange].t, streams.flange[flange].T_base_frame);
       tracker.push_imu(sample);
       // With the long delay every tenth sample is that late, the others are not: the whole window is worked off again.
       for (; pose < streams.tracker.size() && streams.tracker[pose].t + 0.03 < sample.t; ++pose) {
@@ -497,7 +550,9 @@ int main(int argc, char** argv) {
   std::printf("command: bench_track");
   for (int k = 1; k < argc; ++k) std::printf(" %s", argv[k][0] == '\0' ? "\"\"" : argv[k]);
   std::printf("\n");
-  const auto wanted = [&](const char* name) { return only.empty() || std::string(name).find(only) != std::string::npos; };
+  const auto wanted = [&](const char* name) {
+    return only.empty() || std::string(name).find(only) != std::string::npos;
+  };
   if (wanted("gentle")) {
     predictions(SimulatedMotion::gentle, 0.04, seeds, 0.0);
     predictions(SimulatedMotion::gentle, 0.08, seeds, 0.05);

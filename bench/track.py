@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Puts what `bench_track` prints into a page.
 
-    (bench_track 5 100 gentle 8 101; bench_track 5 100 stop 8 101) | python bench/track.py --write docs/benchmarks-track.md
+    (bench_track 5 100 gentle 8 101; bench_track 5 100 stop 8 101) | python bench/track.py --write
+    docs/benchmarks-track.md
 
-Reads the output of one run or of several from standard input; `--write` puts the tables between the markers of the page, without it they are printed.
+Reads the output of one run or of several from standard input; `--write` puts the tables between the markers
+of the page, without it they are printed.
 Every line must be one that `bench_track` writes; anything else ends it with exit 2 and nothing written.
 """
 
@@ -18,7 +20,10 @@ import sys
 from datetime import datetime, timezone
 from pathlib import Path
 
-ROW = re.compile(r"^  (?P<what>.{74}) +(?P<value>-?[0-9.]+|-?nan|-?inf) (?P<unit>\S*)\s*(?:target (?P<target>.+?)\s+(?P<verdict>reached|MISSED))?$")
+ROW = re.compile(
+    r"^  (?P<what>.{74}) +(?P<value>-?[0-9.]+|-?nan|-?inf) (?P<unit>\S*)\s*(?:target"
+    r" (?P<target>.+?)\s+(?P<verdict>reached|MISSED))?$"
+)
 START, END = "<!-- table -->", "<!-- end -->"
 
 
@@ -40,22 +45,43 @@ def tables(text: str) -> tuple[list[str], int, int]:
         if line.startswith("command: "):
             commands.append(line.removeprefix("command: "))
         elif line and not line.startswith(" "):
-            lines += ["", f"## {line[0].upper()}{line[1:]}", "", f"`{commands[-1]}`" if commands else "", "", "| | measured | to reach | |", "| --- | --- | --- | --- |"]
+            lines += [
+                "",
+                f"## {line[0].upper()}{line[1:]}",
+                "",
+                f"`{commands[-1]}`" if commands else "",
+                "",
+                "| | measured | to reach | |",
+                "| --- | --- | --- | --- |",
+            ]
         elif match := ROW.match(line):
-            what, value, unit, target, verdict = (match[name] or "" for name in ("what", "value", "unit", "target", "verdict"))
+            what, value, unit, target, verdict = (
+                match[name] or "" for name in ("what", "value", "unit", "target", "verdict")
+            )
             reached += verdict == "reached"
             missed += verdict == "MISSED"
-            lines.append(f"| {what.strip()} | {value} {unit} | {target} | {'**missed**' if verdict == 'MISSED' else verdict} |".replace("  ", " "))
+            lines.append(
+                f"| {what.strip()} | {value} {unit} | {target} |"
+                f" {'**missed**' if verdict == 'MISSED' else verdict} |".replace("  ", " ")
+            )
         else:
-            raise ValueError(f"standard input, line {number}: found {line!r}, expected a line of bench_track's output")
+            raise ValueError(
+                f"standard input, line {number}: found {line!r}, expected a line of bench_track's output"
+            )
     if not reached + missed:
-        raise ValueError("standard input: no row with a target; pipe the output of bench_track into this program")
+        raise ValueError(
+            "standard input: no row with a target; pipe the output of bench_track into this program"
+        )
     return lines, reached, missed
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", type=Path, help=f"the page whose markers {START} and {END} take the tables")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--write", type=Path, help=f"the page whose markers {START} and {END} take the tables"
+    )
     arguments = parser.parse_args()
     page = arguments.write.read_text(encoding="utf-8") if arguments.write else ""
     if arguments.write and not (START in page and END in page):
@@ -64,7 +90,10 @@ def main() -> None:
         lines, reached, missed = tables(sys.stdin.read())
     except ValueError as error:
         parser.error(str(error))
-    about = f"Made on {datetime.now(timezone.utc):%Y-%m-%d}: {machine()}. {reached} targets reached, {missed} missed."
+    about = (
+        f"Made on {datetime.now(timezone.utc):%Y-%m-%d}: {machine()}. {reached} targets reached, {missed}"
+        " missed."
+    )
     text = "\n".join([about, *lines])
     if arguments.write:
         start, end = page.index(START) + len(START), page.index(END)

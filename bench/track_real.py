@@ -4,7 +4,8 @@
 
     python bench/track_real.py --data FOLDER
 
-FOLDER as for bench/real_data.py. Clocks and frames are found from the first part of the time; predictions are graded on the rest, against the tracker's own later samples.
+FOLDER as for bench/real_data.py. Clocks and frames are found from the first part of the time; predictions are
+graded on the rest, against the tracker's own later samples.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ Floats = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parent.parent
 BEGIN, END = "<!-- track: written by bench/track_real.py -->", "<!-- end of track -->"
 FITTED = 0.5  # share of the tracker's time that clocks and frames are found from
-IMU_SCALE = 0.015  # what the sensor's data sheet allows its scale to be off: the recording does not show it apart from gravity
+# what the sensor's data sheet allows its scale to be off: the recording does not show it apart from gravity
+IMU_SCALE = 0.015
 HORIZONS = [0.02, 0.04, 0.08]
 LOW_PASS = 6.0  # [Hz] of the baseline for the inertial part
 TRAINED = 0.7
@@ -36,20 +38,43 @@ TRAINED = 0.7
 
 def cut(data: Any, keep: NDArray[np.bool_]) -> Any:
     """Some rows of a stream."""
-    return dataclasses.replace(data, **{f.name: getattr(data, f.name)[keep] for f in dataclasses.fields(data) if isinstance(getattr(data, f.name), np.ndarray)})
+    return dataclasses.replace(
+        data,
+        **{
+            f.name: getattr(data, f.name)[keep]
+            for f in dataclasses.fields(data)
+            if isinstance(getattr(data, f.name), np.ndarray)
+        },
+    )
 
 
 def with_tracker(folder: Path) -> tuple[truing.TrackCalibration, list[dict[str, Any]], truing.ReplayResult]:
     """What was found on the first part, and errors of predictions on the rest."""
     robot = truing.load_robot(folder / "robot.yaml")
-    imu, tracker, joints = truing.load_imu(folder / "imu.csv"), truing.load_tracker(folder / "tracker.csv"), truing.load_joints(folder / "joints.csv", robot)
+    imu, tracker, joints = (
+        truing.load_imu(folder / "imu.csv"),
+        truing.load_tracker(folder / "tracker.csv"),
+        truing.load_joints(folder / "joints.csv", robot),
+    )
     middle = tracker.t[0] + FITTED * (tracker.t[-1] - tracker.t[0])
-    whole = truing.track_calibrate(robot, joints, tracker, imu)  # for the offsets alone: where to cut the other streams
-    shift, between = float(middle - (whole.where.steady(np.array([middle])) - whole.where.setup.clock_offset)[0]), whole.where.setup.controller_clock_offset
-    found = truing.track_calibrate(robot, cut(joints, joints.t - between < middle - shift), cut(tracker, tracker.t < middle), cut(imu, imu.t < middle - shift))
+    whole = truing.track_calibrate(
+        robot, joints, tracker, imu
+    )  # for the offsets alone: where to cut the other streams
+    shift, between = (
+        float(middle - (whole.where.steady(np.array([middle])) - whole.where.setup.clock_offset)[0]),
+        whole.where.setup.controller_clock_offset,
+    )
+    found = truing.track_calibrate(
+        robot,
+        cut(joints, joints.t - between < middle - shift),
+        cut(tracker, tracker.t < middle),
+        cut(imu, imu.t < middle - shift),
+    )
     where = dataclasses.replace(found.where, filter={**found.where.filter, "imu_scale": IMU_SCALE})
     later = imu.t >= middle - shift, tracker.t >= middle, joints.t - between >= middle - shift
-    streams = truing.recorded_streams(robot, where, imu=cut(imu, later[0]), tracker=cut(tracker, later[1]), joints=cut(joints, later[2]))
+    streams = truing.recorded_streams(
+        robot, where, imu=cut(imu, later[0]), tracker=cut(tracker, later[1]), joints=cut(joints, later[2])
+    )
     played = truing.replay(streams, where.setup, where.options(), horizons=HORIZONS)
     return found, horizon_errors(played.graded), played
 
@@ -69,21 +94,31 @@ def turned_alike(gyro: Floats, rates: Floats) -> tuple[Floats, Floats]:
 
 
 def without_tracker(folder: Path) -> tuple[truing.InertialResult, float, float, float]:
-    """The inertial sensor against the flange of the encoders, which stands in for the tracker; then by turning rates alone: t_imu = t_joints - offset [s], rms of the gyro's misfit on the last
+    """The inertial sensor against the flange of the encoders, which stands in for the tracker; then by
+    turning rates alone: t_imu = t_joints - offset [s], rms of the gyro's misfit on the last
     part, and of the rates [rad/s]."""
     robot = truing.load_robot(folder / "robot.yaml")
     imu, joints = truing.load_imu(folder / "imu.csv"), truing.load_joints(folder / "joints.csv", robot)
     flange = truing.flange_poses(robot, joints.joints)
     middle, rate = joints.t[0] + TRAINED * (joints.t[-1] - joints.t[0]), 100.0
     early = joints.t < middle
-    found = truing.calibrate_inertial(imu.t, imu.gyro, imu.accel, joints.t[early], flange[early, :3, 3], quaternions_from_rotations(flange[early, :3, :3]))
+    found = truing.calibrate_inertial(
+        imu.t,
+        imu.gyro,
+        imu.accel,
+        joints.t[early],
+        flange[early, :3, 3],
+        quaternions_from_rotations(flange[early, :3, :3]),
+    )
 
     def pair(start: float, end: float, offset: float) -> tuple[Floats, Floats]:
         """Gyro and the model's rates in the flange, low-passed."""
         t, h = np.arange(start, end, 1.0 / rate), 0.5 / rate
         before, after = (interpolated(joints.t, flange, t + offset + step)[:, :3, :3] for step in (-h, h))
         gyro = np.column_stack([np.interp(t, imu.t, imu.gyro[:, k]) for k in range(3)])
-        return low_passed(gyro, rate), low_passed(rotation_vectors(np.swapaxes(before, 1, 2) @ after) * rate, rate)
+        return low_passed(gyro, rate), low_passed(
+            rotation_vectors(np.swapaxes(before, 1, 2) @ after) * rate, rate
+        )
 
     def misfit(gyro: Floats, rates: Floats, R: Floats, b: Floats) -> float:
         return float(np.sqrt(np.mean(np.sum((gyro - rates @ R - b) ** 2, axis=1))))
@@ -104,38 +139,99 @@ def section(data: Path) -> str:
         found, errors, played = with_tracker(folder)
         clock, frames, inertial = found.joints_clock, found.frames, found.inertial
         assert clock is not None and inertial is not None
-        sigma = np.sqrt(np.diag(frames.T_tracker_base.covariance)), np.sqrt(np.diag(frames.T_flange_receiver.covariance))
+        sigma = (
+            np.sqrt(np.diag(frames.T_tracker_base.covariance)),
+            np.sqrt(np.diag(frames.T_flange_receiver.covariance)),
+        )
         setup = found.where.setup
         lines += [
-            f"**Aubo i5 with inertial sensor and Polaris tracker, three clocks.** Clocks and frames from the first {100 * FITTED:.0f} % of the time, and nothing was told beforehand:",
+            (
+                "**Aubo i5 with inertial sensor and Polaris tracker, three clocks.** Clocks and frames from"
+                f" the first {100 * FITTED:.0f} % of the time, and nothing was told beforehand:"
+            ),
             "",
             "| | found | standard error | told by the recording's notes |",
             "| --- | --- | --- | --- |",
-            f"| joints against tracker | t_joints = t_tracker {clock.offset:+.4f} s | {1e3 * clock.sigma:.1f} ms | −6.9 s |",
-            f"| drift of the tracker's clock | {1e6 * found.where.clock_drift:+.0f} ppm: its stamps say 60 Hz, it ran at {60.0 * (1.0 + found.where.clock_drift):.2f} Hz | | not mentioned |",
-            f"| inertial sensor against joints | t_imu = t_joints {-setup.controller_clock_offset:+.4f} s | {1e3 * np.hypot(clock.sigma, inertial.clock_offset_sigma):.1f} ms | lags by 0.13 s |",
-            f"| inertial sensor against tracker | t_imu = t_tracker {-setup.clock_offset:+.4f} s | {1e3 * inertial.clock_offset_sigma:.1f} ms | |",
-            f"| base in the tracker frame | {', '.join(f'{1e3 * v:.1f}' for v in np.asarray(setup.T_tracker_base)[:3, 3])} mm | {', '.join(f'{1e3 * v:.2f}' for v in sigma[0][:3])} mm; {', '.join(f'{1e3 * v:.2f}' for v in sigma[0][3:])} mrad | |",
-            f"| receiver on the flange | {', '.join(f'{1e3 * v:.1f}' for v in np.asarray(setup.T_flange_receiver)[:3, 3])} mm | {', '.join(f'{1e3 * v:.2f}' for v in sigma[1][:3])} mm; {', '.join(f'{1e3 * v:.2f}' for v in sigma[1][3:])} mrad | |",
-            f"| inertial sensor on the flange | {', '.join(f'{1e3 * v:.1f}' for v in np.asarray(setup.T_flange_imu)[:3, 3])} mm | {', '.join(f'{1e3 * v:.1f}' for v in np.sqrt(np.diag(found.where.covariance['T_flange_imu']))[:3])} mm | |",
-            f"| gravity in the base | {', '.join(f'{v:.3f}' for v in np.asarray(setup.gravity))} m/s² | | along −z |",
-            f"| encoders against tracker, with these frames | {1e3 * frames.position_sigma:.2f} mm a component | | 4.3 mm |",
+            (
+                f"| joints against tracker | t_joints = t_tracker {clock.offset:+.4f} s |"
+                f" {1e3 * clock.sigma:.1f} ms | −6.9 s |"
+            ),
+            (
+                f"| drift of the tracker's clock | {1e6 * found.where.clock_drift:+.0f} ppm: its stamps say"
+                f" 60 Hz, it ran at {60.0 * (1.0 + found.where.clock_drift):.2f} Hz | | not mentioned |"
+            ),
+            (
+                f"| inertial sensor against joints | t_imu = t_joints {-setup.controller_clock_offset:+.4f} s"
+                f" | {1e3 * np.hypot(clock.sigma, inertial.clock_offset_sigma):.1f} ms | lags by 0.13 s |"
+            ),
+            (
+                f"| inertial sensor against tracker | t_imu = t_tracker {-setup.clock_offset:+.4f} s |"
+                f" {1e3 * inertial.clock_offset_sigma:.1f} ms | |"
+            ),
+            (
+                "| base in the tracker frame |"
+                f" {', '.join(f'{1e3 * v:.1f}' for v in np.asarray(setup.T_tracker_base)[:3, 3])} mm |"
+                f" {', '.join(f'{1e3 * v:.2f}' for v in sigma[0][:3])} mm;"
+                f" {', '.join(f'{1e3 * v:.2f}' for v in sigma[0][3:])} mrad | |"
+            ),
+            (
+                "| receiver on the flange |"
+                f" {', '.join(f'{1e3 * v:.1f}' for v in np.asarray(setup.T_flange_receiver)[:3, 3])} mm |"
+                f" {', '.join(f'{1e3 * v:.2f}' for v in sigma[1][:3])} mm;"
+                f" {', '.join(f'{1e3 * v:.2f}' for v in sigma[1][3:])} mrad | |"
+            ),
+            (
+                "| inertial sensor on the flange |"
+                f" {', '.join(f'{1e3 * v:.1f}' for v in np.asarray(setup.T_flange_imu)[:3, 3])} mm |"
+                f" {', '.join(f'{1e3 * v:.1f}' for v in np.sqrt(np.diag(found.where.covariance['T_flange_imu']))[:3])}"
+                " mm | |"
+            ),
+            (
+                f"| gravity in the base | {', '.join(f'{v:.3f}' for v in np.asarray(setup.gravity))} m/s² | |"
+                " along −z |"
+            ),
+            (
+                f"| encoders against tracker, with these frames | {1e3 * frames.position_sigma:.2f} mm a"
+                " component | | 4.3 mm |"
+            ),
             "",
-            "Predictions of the receiver on the rest of the time, against the tracker's own later samples, position error in mm:",
+            (
+                "Predictions of the receiver on the rest of the time, against the tracker's own later"
+                " samples, position error in mm:"
+            ),
             "",
             "| ahead | | rms | median | 95 % | max | samples |",
             "| --- | --- | --- | --- | --- | --- | --- |",
-        ]  # fmt: skip
-        names = {"truing": "truing", "hold": "hold: the last tracker sample", "velocity": "tracker, finite-difference velocity", "fk": "forward kinematics with fitted frames", "fk_velocity": "the same at constant velocity"}
+        ]
+        names = {
+            "truing": "truing",
+            "hold": "hold: the last tracker sample",
+            "velocity": "tracker, finite-difference velocity",
+            "fk": "forward kinematics with fitted frames",
+            "fk_velocity": "the same at constant velocity",
+        }
         for row in errors:
             for name, words in names.items():
                 e = row[name]
-                lines.append(f"| {1e3 * row['horizon_s']:.0f} ms | {words} | " + " | ".join(f"{1e3 * e[key]:.2f}" for key in ("rms_m", "median_m", "p95_m", "max_m")) + f" | {e['n']} |")
+                lines.append(
+                    f"| {1e3 * row['horizon_s']:.0f} ms | {words} | "
+                    + " | ".join(f"{1e3 * e[key]:.2f}" for key in ("rms_m", "median_m", "p95_m", "max_m"))
+                    + f" | {e['n']} |"
+                )
         at = next(row for row in errors if row["horizon_s"] == 0.04)
         best = min(BASELINES, key=lambda name: at[name]["rms_m"])
         verdict = "better" if at["truing"]["rms_m"] < at[best]["rms_m"] else "no better"
-        lines += ["", f"There is no plan in this recording, so what will be commanded is not known to any of them. 40 ms ahead truing is {verdict} than the best of the others ({names[best]}): {1e3 * at['truing']['rms_m']:.2f} against "
-                  f"{1e3 * at[best]['rms_m']:.2f} mm rms. Errors squared are {at['squares_per_dimension']:.2g} of what was predicted; samples of tracker and inertial sensor arrive at their stamps, as the recording has no others.", ""]  # fmt: skip
+        lines += [
+            "",
+            (
+                "There is no plan in this recording, so what will be commanded is not known to any of them."
+                f" 40 ms ahead truing is {verdict} than the best of the others ({names[best]}):"
+                f" {1e3 * at['truing']['rms_m']:.2f} against {1e3 * at[best]['rms_m']:.2f} mm rms. Errors"
+                f" squared are {at['squares_per_dimension']:.2g} of what was predicted; samples of tracker"
+                " and inertial sensor arrive at their stamps, as the recording has no others."
+            ),
+            "",
+        ]
     else:
         lines += ["Not there: `aubo_i5_run0_60hz`.", ""]
     folder = data / "aubo_i5_run1"
@@ -143,11 +239,26 @@ def section(data: Path) -> str:
         inertial, offset, misfit, rates = without_tracker(folder)
         T = np.asarray(inertial.T_receiver_imu.T)
         lines += [
-            f"**Aubo i5 without tracker, 600 s.** The flange by forward kinematics stands in for the tracker: t_imu = t_joints {-inertial.clock_offset:+.4f} s, standard error {1e3 * inertial.clock_offset_sigma:.1f} ms;",
-            f"by turning rates alone {-offset:+.4f} s (told: the inertial sensor lags by about 0.08 s): accelerometer and gyro of this sensor have filters of their own, and one offset cannot serve both. The sensor is at",
-            f"{', '.join(f'{1e3 * v:.0f}' for v in T[:3, 3])} mm on the flange; gravity {np.linalg.norm(inertial.gravity):.3f} m/s². Gyro against the model's angular velocity below {LOW_PASS:.0f} Hz, offset, one rotation and one bias found on the",
-            f"first {100 * TRAINED:.0f} % of the time, on the rest: **{misfit:.4f} rad/s** rms of {rates:.2f} (baseline 0.0140, without the offset 0.0827).",
-        ]  # fmt: skip
+            (
+                "**Aubo i5 without tracker, 600 s.** The flange by forward kinematics stands in for the"
+                f" tracker: t_imu = t_joints {-inertial.clock_offset:+.4f} s, standard error"
+                f" {1e3 * inertial.clock_offset_sigma:.1f} ms;"
+            ),
+            (
+                f"by turning rates alone {-offset:+.4f} s (told: the inertial sensor lags by about 0.08 s):"
+                " accelerometer and gyro of this sensor have filters of their own, and one offset cannot"
+                " serve both. The sensor is at"
+            ),
+            (
+                f"{', '.join(f'{1e3 * v:.0f}' for v in T[:3, 3])} mm on the flange; gravity"
+                f" {np.linalg.norm(inertial.gravity):.3f} m/s². Gyro against the model's angular velocity"
+                f" below {LOW_PASS:.0f} Hz, offset, one rotation and one bias found on the"
+            ),
+            (
+                f"first {100 * TRAINED:.0f} % of the time, on the rest: **{misfit:.4f} rad/s** rms of"
+                f" {rates:.2f} (baseline 0.0140, without the offset 0.0827)."
+            ),
+        ]
     else:
         lines += ["Not there: `aubo_i5_run1`."]
     return "\n".join([*lines, END])

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that every relative link in the repository's *.md files leads to a file, and every #anchor to a heading."""
+"""Checks that every relative link in the repository's *.md files leads to a file, and every #anchor to a
+heading.
+"""
 
 from __future__ import annotations
 

@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""One peer of bench/inverse.py, in a process of its own: answers and CPU times on the targets that bench/inverse.cpp wrote.
+"""One peer of bench/inverse.py, in a process of its own: answers and CPU times on the targets that
+bench/inverse.cpp wrote.
 
     python inverse_peers.py "PEER" FOLDER OUT.npz [--quick] [--cache FOLDER]
 
-OUT.npz holds `summary` (JSON: a list of jobs with their notes, versions) and for job k `times_k` (m,) [s] and `answers_k`: rows of target,
+OUT.npz holds `summary` (JSON: a list of jobs with their notes, versions) and for job k `times_k` (m,) [s] and
+`answers_k`: rows of target,
 1 if said to be reached, joints. Nothing is judged here. Needs NumPy and the peer.
 """
 
@@ -27,7 +29,18 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from inverse_chain import Cases, Chain, Floats, mjcf_of, quaternion_of, read_cases, read_chains, urdf_of, write_cases, write_chain
+from inverse_chain import (
+    Cases,
+    Chain,
+    Floats,
+    mjcf_of,
+    quaternion_of,
+    read_cases,
+    read_chains,
+    urdf_of,
+    write_cases,
+    write_chain,
+)
 
 Answers = list[tuple[bool, Floats]]  # what the peer says of it, joints
 
@@ -58,11 +71,17 @@ def eaik(chain: Chain, task: str) -> Solver:
     if not robot.hasKnownDecomposition():
         raise Refused(f"refuses: {robot.getKinematicFamily()}")
 
-    return Solver(robot.IK, lambda found: [(not bad, q) for q, bad in zip(found.Q, found.is_LS)], lambda wanted, seed: (wanted,))
+    return Solver(
+        robot.IK,
+        lambda found: [(not bad, q) for q, bad in zip(found.Q, found.is_LS)],
+        lambda wanted, seed: (wanted,),
+    )
 
 
 def ssik(chain: Chain, task: str) -> Solver:
-    """From an artifact of `ssik build`, which is kept: a general six-axis arm takes minutes. Answers come with their residual, and are taken by it."""
+    """From an artifact of `ssik build`, which is kept: a general six-axis arm takes minutes. Answers come
+    with their residual, and are taken by it.
+    """
     urdf = urdf_of(chain)
     stem = f"ssik_{chain.name}_{hashlib.sha256(urdf.encode()).hexdigest()[:8]}"
     artifact = CACHE / f"{stem}.py"
@@ -70,7 +89,18 @@ def ssik(chain: Chain, task: str) -> Solver:
         raise Refused("left out with --quick: its build takes minutes")
     if not artifact.exists():
         (CACHE / f"{stem}.urdf").write_text(urdf, encoding="utf-8")
-        command = [str(Path(sys.executable).parent / "ssik"), "build", f"{stem}.urdf", "--base", "base", "--ee", "tool", "--out", artifact.name, "--no-validate"]
+        command = [
+            str(Path(sys.executable).parent / "ssik"),
+            "build",
+            f"{stem}.urdf",
+            "--base",
+            "base",
+            "--ee",
+            "tool",
+            "--out",
+            artifact.name,
+            "--no-validate",
+        ]
         built = subprocess.run(command, cwd=CACHE, capture_output=True, text=True)
         if not artifact.exists():
             raise Refused("ssik build: " + (built.stderr.strip().splitlines() or ["no artifact"])[-1])
@@ -79,8 +109,11 @@ def ssik(chain: Chain, task: str) -> Solver:
     module = importlib.util.module_from_spec(spec)
     sys.modules[stem] = module
     spec.loader.exec_module(module)
-    return Solver(lambda wanted: module.solve(wanted, enumerate_windings=False), lambda found: [(one.fk_residual <= METRES, one.q) for one in found],
-                  lambda wanted, seed: (wanted,))  # fmt: skip
+    return Solver(
+        lambda wanted: module.solve(wanted, enumerate_windings=False),
+        lambda found: [(one.fk_residual <= METRES, one.q) for one in found],
+        lambda wanted, seed: (wanted,),
+    )
 
 
 def robotics_toolbox(chain: Chain, task: str) -> Solver:
@@ -96,14 +129,19 @@ def robotics_toolbox(chain: Chain, task: str) -> Solver:
     if task == "torch":
         options["mask"] = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
 
-    return Solver(lambda wanted, seed: ets.ik_LM(wanted, q0=seed, **options), lambda found: [(bool(found.success), found.q)])
+    return Solver(
+        lambda wanted, seed: ets.ik_LM(wanted, q0=seed, **options),
+        lambda found: [(bool(found.success), found.q)],
+    )
 
 
 def trac_ik(seconds: float) -> Callable[[Chain, str], Solver]:
     def make(chain: Chain, task: str) -> Solver:
         import pytracik
 
-        solver = pytracik.TRAC_IK("base", "tool", urdf_of(chain), seconds, 0.5 * METRES, pytracik.SolveType.Speed)
+        solver = pytracik.TRAC_IK(
+            "base", "tool", urdf_of(chain), seconds, 0.5 * METRES, pytracik.SolveType.Speed
+        )
 
         def arguments(wanted: Floats, seed: Floats) -> tuple[Any, ...]:
             w, x, y, z = quaternion_of(wanted)
@@ -121,20 +159,37 @@ def roboplan(chain: Chain, task: str) -> Solver:
     scene = core.Scene(chain.name, core.loadUrdfSceneDescriptionFromXml(urdf_of(chain)))
     names = scene.getJointNames()
     # Tuned: whole steps, next to no damping, restarts until a tenth of a second is over.
-    solver = SimpleIk(scene, SimpleIkOptions(max_iters=100, max_time=0.1, max_restarts=200, step_size=1.0, damping=1e-6, max_linear_error_norm=METRES,
-                                             max_angular_error_norm=RADIANS, check_collisions=False))  # fmt: skip
+    solver = SimpleIk(
+        scene,
+        SimpleIkOptions(
+            max_iters=100,
+            max_time=0.1,
+            max_restarts=200,
+            step_size=1.0,
+            damping=1e-6,
+            max_linear_error_norm=METRES,
+            max_angular_error_norm=RADIANS,
+            check_collisions=False,
+        ),
+    )
     solver.setRngSeed(1)
 
     found = core.JointConfiguration(names, np.zeros(chain.joints))
 
     def arguments(wanted: Floats, seed: Floats) -> tuple[Any, ...]:
-        return core.CartesianConfiguration("base", "tool", np.asfortranarray(wanted)), core.JointConfiguration(names, seed), found
+        return (
+            core.CartesianConfiguration("base", "tool", np.asfortranarray(wanted)),
+            core.JointConfiguration(names, seed),
+            found,
+        )
 
     return Solver(solver.solveIk, lambda reached: [(bool(reached), np.array(found.positions))], arguments)
 
 
 def mink_ik(chain: Chain, task: str) -> Solver:
-    """A site's pose without cost on its turn about z, limits in the quadratic program; up to 200 steps from the seed."""
+    """A site's pose without cost on its turn about z, limits in the quadratic program; up to 200 steps from
+    the seed.
+    """
     import mink
     import mujoco
 
@@ -152,7 +207,9 @@ def mink_ik(chain: Chain, task: str) -> Solver:
             reached = bool(np.linalg.norm(error[:3]) <= METRES and np.linalg.norm(error[3:5]) <= RADIANS)
             if reached:
                 break
-            configuration.integrate_inplace(mink.solve_ik(configuration, [aim], 1.0, "daqp", damping=1e-6, limits=limits), 1.0)
+            configuration.integrate_inplace(
+                mink.solve_ik(configuration, [aim], 1.0, "daqp", damping=1e-6, limits=limits), 1.0
+            )
         return [(reached, configuration.q.copy())]
 
     return Solver(solve, lambda found: found)
@@ -175,7 +232,9 @@ def drake(chain: Chain, task: str) -> Solver:
     def solve(wanted: Floats, seed: Floats) -> Answers:
         problem = InverseKinematics(plant, with_joint_limits=True)
         within = np.full(3, METRES / 2.0)
-        problem.AddPositionConstraint(tool, np.zeros(3), plant.world_frame(), wanted[:3, 3] - within, wanted[:3, 3] + within)
+        problem.AddPositionConstraint(
+            tool, np.zeros(3), plant.world_frame(), wanted[:3, 3] - within, wanted[:3, 3] + within
+        )
         problem.AddAngleBetweenVectorsConstraint(plant.world_frame(), wanted[:3, 2], tool, z, 0.0, RADIANS)
         start = seed
         for _ in range(1 + RESTARTS):
@@ -208,21 +267,29 @@ REAL = (*REAL_ARMS, "gantry_calibrated")
 PEERS = {
     "EAIK": Peer(("eaik",), jobs("branches", *ARMS, *REAL_ARMS), eaik, runs=5, times=8),
     "ssik": Peer(("ssik",), jobs("branches", *ARMS, *REAL_ARMS), ssik),
-    "Robotics Toolbox": Peer(("roboticstoolbox-python",), jobs("one", *ARMS, *REAL) + jobs("torch", *REAL) + jobs("path", *REAL), robotics_toolbox),
+    "Robotics Toolbox": Peer(
+        ("roboticstoolbox-python",),
+        jobs("one", *ARMS, *REAL) + jobs("torch", *REAL) + jobs("path", *REAL),
+        robotics_toolbox,
+    ),
     "Pinocchio CLIK": Peer(("pin",), jobs("one", *ARMS, *REAL) + jobs("path", *REAL), None, runs=2),
-    "TRAC-IK 5 ms": Peer(("pytracik",), jobs("one", *REAL) + jobs("path", *REAL), trac_ik(0.005), runs=1, most=2000),
+    "TRAC-IK 5 ms": Peer(
+        ("pytracik",), jobs("one", *REAL) + jobs("path", *REAL), trac_ik(0.005), runs=1, most=2000
+    ),
     "TRAC-IK 50 ms": Peer(("pytracik",), jobs("one", *REAL), trac_ik(0.05), runs=1, most=2000),
     "RoboPlan": Peer(("roboplan",), jobs("one", *REAL), roboplan, runs=1, most=2000),
     "mink": Peer(("mink", "mujoco", "daqp"), jobs("torch", *REAL), mink_ik, runs=1, most=200),
     "Drake": Peer(("drake",), jobs("torch", *REAL), drake, runs=1, most=200),
-}  # fmt: skip
+}
 SETS = {"branches": "pose", "one": "pose", "torch": "torch", "path": "path"}
 
 
 def run_solver(solver: Solver, cases: Cases, task: str, peer: Peer) -> tuple[Floats, Floats]:
     """Seconds of the whole process, its other threads included, best of the runs (m,); answers of the first."""
     best, rows = np.full(len(cases.wanted), np.inf), []
-    solver.call(*solver.arguments(cases.wanted[0], cases.seed[0]))  # what is prepared at the first call is not counted
+    solver.call(
+        *solver.arguments(cases.wanted[0], cases.seed[0])
+    )  # what is prepared at the first call is not counted
     for run in range(peer.runs):
         previous = cases.truth[0]
         for k, (wanted, seed) in enumerate(zip(cases.wanted, cases.seed)):
@@ -248,13 +315,17 @@ def run_clik(chain: Chain, cases: Cases, task: str, peer: Peer) -> tuple[Floats,
     files = [CACHE / f"clik_{name}" for name in ("chain", "cases", "answers")]
     write_chain(chain, files[0])
     write_cases(cases, files[1])
-    subprocess.run([str(program), *map(str, files), "path" if task == "path" else "one", str(peer.runs)], check=True)
+    subprocess.run(
+        [str(program), *map(str, files), "path" if task == "path" else "one", str(peer.runs)], check=True
+    )
     rows = np.fromfile(files[2]).reshape(len(cases.wanted), -1)
     return rows[:, -1], np.column_stack([np.arange(len(rows)), rows[:, :-1]])
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("peer", choices=PEERS)
     parser.add_argument("folder", type=Path)
     parser.add_argument("out", type=Path)
@@ -274,7 +345,11 @@ def main() -> None:
             cases = cases.first(most // 10 if arguments.quick else most)
         job: dict[str, Any] = {"task": task, "robot": robot, "targets": len(cases.wanted), "note": ""}
         try:
-            times, answers = run_clik(chain, cases, task, peer) if peer.make is None else run_solver(peer.make(chain, task), cases, task, peer)
+            times, answers = (
+                run_clik(chain, cases, task, peer)
+                if peer.make is None
+                else run_solver(peer.make(chain, task), cases, task, peer)
+            )
             arrays[f"times_{len(summary)}"], arrays[f"answers_{len(summary)}"] = times, answers
         except Refused as refused:
             job["note"] = str(refused)

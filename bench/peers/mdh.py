@@ -109,15 +109,17 @@ def urdf(dh, tool=np.zeros(3)):
 
     Numbers are written in full, so that the URDF is the same arm to 1e-15.
     """
-    inertia = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+    inertia = (
+        "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+    )
     limit = "<axis xyz='0 0 1'/><limit lower='-3.2' upper='3.2' effort='1' velocity='1'/>"
     parts = ["<robot name='arm'><link name='link0'/>"]
 
     def joint(name, kind, parent, child, xyz, rpy, rest=""):
         xyz, rpy = (" ".join(repr(float(v)) for v in values) for values in (xyz, rpy))
         parts.append(
-            f"<link name='{child}'>{inertia}</link><joint name='{name}' type='{kind}'><parent link='{parent}'/>"
-            f"<child link='{child}'/><origin xyz='{xyz}' rpy='{rpy}'/>{rest}</joint>"
+            f"<link name='{child}'>{inertia}</link><joint name='{name}' type='{kind}'><parent"
+            f" link='{parent}'/><child link='{child}'/><origin xyz='{xyz}' rpy='{rpy}'/>{rest}</joint>"
         )
 
     for i, row in enumerate(dh):

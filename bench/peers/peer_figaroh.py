@@ -32,7 +32,9 @@ def config(samples, method):
         },
         "kinematics": {"base_frame": "universe", "tool_frame": "link6"},
         "measurements": {
-            "markers": [{"name": "point", "reference_joint": "joint6", "measurable_dof": [True] * 3 + [False] * 3}],
+            "markers": [
+                {"name": "point", "reference_joint": "joint6", "measurable_dof": [True] * 3 + [False] * 3}
+            ],
             "poses": {"base_pose": [0.0] * 6, "tool_pose": [0.0] * 6},
         },
         "joints": {"active_joints": JOINTS},
@@ -79,7 +81,9 @@ def run(data, method):
             calibration.solve(enable_logging=False)
             end = time.perf_counter()
             test = dict(calibration.calib_config, NbSample=len(data["q_test"]))
-            predicted = calc_updated_fkm(calibration.model, calibration.data, calibration.var_, data["q_test"], test)
+            predicted = calc_updated_fkm(
+                calibration.model, calibration.data, calibration.var_, data["q_test"], test
+            )
         finally:
             os.chdir(here)
     return [
@@ -87,7 +91,10 @@ def run(data, method):
             "task": "fit",
             "seconds": end - start,
             **score(data, predicted.reshape(3, -1).T),
-            "note": f"estimation.method '{method}', {len(calibration.var_)} parameters, frames from its own closed form; "
-            f"initialize {chosen - start:.1f} s, solve {end - chosen:.1f} s; {calibration.STATUS}",
+            "note": (
+                f"estimation.method '{method}', {len(calibration.var_)} parameters, frames from its own"
+                f" closed form; initialize {chosen - start:.1f} s, solve {end - chosen:.1f} s;"
+                f" {calibration.STATUS}"
+            ),
         }
     ]

@@ -52,7 +52,10 @@ def run(data):
             "seconds": seconds,
             **score(data, positions(fdh, fbase, ftool, data["q_test"])),
             "rank": rank,
-            "note": f"analytic Jacobian, QR + SVD, rank {rank} of {6 + dh.size + 3}, {iterations} iterations, base from Kabsch; best of up to 20",
+            "note": (
+                f"analytic Jacobian, QR + SVD, rank {rank} of {6 + dh.size + 3}, {iterations} iterations,"
+                " base from Kabsch; best of up to 20"
+            ),
         },
         {
             "task": "fk+jacobian",

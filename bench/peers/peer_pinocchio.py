@@ -41,7 +41,11 @@ def run(data):
 
     shape = pin.computeJointKinematicRegressor(model, work, last, pin.LOCAL_WORLD_ALIGNED, placement).shape
     return [
-        {"task": "fk", "seconds": best_of(30, kinematics)[0], "note": f"{len(q)} poses, a Python loop; best of 30"},
+        {
+            "task": "fk",
+            "seconds": best_of(30, kinematics)[0],
+            "note": f"{len(q)} poses, a Python loop; best of 30",
+        },
         {
             "task": "fk+regressor",
             "seconds": best_of(30, regressor)[0],

@@ -53,7 +53,9 @@ def run(data, method):
             "task": "fit",
             "seconds": seconds,
             **score(data, predicted),
-            "note": f"least_squares(method='{method}'), default tolerances, {len(result.x)} free parameters, "
-            f"base from Kabsch; {result.nfev} evaluations, {result.message}",
+            "note": (
+                f"least_squares(method='{method}'), default tolerances, {len(result.x)} free parameters, "
+                f"base from Kabsch; {result.nfev} evaluations, {result.message}"
+            ),
         }
     ]

@@ -45,7 +45,9 @@ def run(data):
             "task": "fit",
             "seconds": seconds,
             **score(data, predicted @ base[:3, :3].T + base[:3, 3]),
-            "note": f"{calibration.N_PARAMS} parameters, base from Kabsch, {result.nb_iterations_executed} iterations, "
-            f"converged: {result.has_converged}" + (f"; it says: {said}" if said else ""),
+            "note": (
+                f"{calibration.N_PARAMS} parameters, base from Kabsch, {result.nb_iterations_executed}"
+                f" iterations, converged: {result.has_converged}" + (f"; it says: {said}" if said else "")
+            ),
         }
     ]

@@ -41,9 +41,15 @@ PEERS = {
     "numpy-2-threads": Peer("numpy2", "peer_numpy", (), 2, False, ("numpy",)),
     "pinocchio": Peer("numpy2", "peer_pinocchio", (), 1, False, ("pin", "numpy")),
     "blas": Peer("numpy2", "peer_blas", (), 2, False, ("scipy", "numpy")),
-    "robotkinecal": Peer("numpy1", "peer_robotkinecal", (), 1, False, ("robotkinecal", "roboticstoolbox-python", "numpy")),
-    "figaroh": Peer("numpy2", "peer_figaroh", ("structural",), 1, False, ("figaroh", "pin", "scipy", "numpy")),
-    "figaroh-excitation": Peer("numpy2", "peer_figaroh", ("excitation",), 1, True, ("figaroh", "pin", "scipy", "numpy")),
+    "robotkinecal": Peer(
+        "numpy1", "peer_robotkinecal", (), 1, False, ("robotkinecal", "roboticstoolbox-python", "numpy")
+    ),
+    "figaroh": Peer(
+        "numpy2", "peer_figaroh", ("structural",), 1, False, ("figaroh", "pin", "scipy", "numpy")
+    ),
+    "figaroh-excitation": Peer(
+        "numpy2", "peer_figaroh", ("excitation",), 1, True, ("figaroh", "pin", "scipy", "numpy")
+    ),
     "pybotics-trf": Peer("numpy1", "peer_pybotics", ("trf",), 1, True, ("pybotics", "scipy", "numpy")),
     "pybotics-lm": Peer("numpy1", "peer_pybotics", ("lm",), 1, True, ("pybotics", "scipy", "numpy")),
 }
@@ -140,7 +146,10 @@ def main():
                 continue
             line = f"{name:20} {result['task']:20} {result['seconds'] * 1e3:12.2f} ms"
             if "test_mean_m" in result:
-                line += f"   test mean {result['test_mean_m'] * 1e6:6.1f} um, noisy {result['test_noisy_mean_m'] * 1e6:6.1f} um"
+                line += (
+                    f"   test mean {result['test_mean_m'] * 1e6:6.1f} um, noisy"
+                    f" {result['test_noisy_mean_m'] * 1e6:6.1f} um"
+                )
             if "gflops" in result:
                 line += f"   {result['gflops']:.1f} GFLOP/s"
             print(line)

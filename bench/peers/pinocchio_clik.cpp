@@ -1,13 +1,14 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Closed-loop inverse kinematics as Pinocchio's manual writes it (its example "inverse kinematics": log6, Jlog6, damped least
-// squares), with whole steps, joints clamped to their limits, and restarts from random joints. CPU time of every target.
+// Closed-loop inverse kinematics as Pinocchio's manual writes it (its example "inverse kinematics": log6, Jlog6, damped
+// least squares), with whole steps, joints clamped to their limits, and restarts from random joints. CPU time of every
+// target.
 //
 //     pinocchio_clik CHAIN CASES ANSWERS MODE RUNS
 //
-// CHAIN and CASES are doubles as bench/peers/inverse_chain.py writes them; ANSWERS gets a row a target: 1 if reached, joints, seconds
-// (best of RUNS). MODE: `one` (up to 100 restarts) or `path` (from the answer before, no restart).
+// CHAIN and CASES are doubles as bench/peers/inverse_chain.py writes them; ANSWERS gets a row a target: 1 if reached,
+// joints, seconds (best of RUNS). MODE: `one` (up to 100 restarts) or `path` (from the answer before, no restart).
 
 #include <time.h>
 
@@ -76,7 +77,9 @@ struct Arm {
 
 class Clik {
  public:
-  explicit Clik(const Arm& arm) : arm_(arm), data_(arm.model), J_(6, arm.n), J_tip_(6, arm.n), random_(1) { J_.setZero(); }
+  explicit Clik(const Arm& arm) : arm_(arm), data_(arm.model), J_(6, arm.n), J_tip_(6, arm.n), random_(1) {
+    J_.setZero();
+  }
 
   bool descend(const pinocchio::SE3& wanted, Eigen::VectorXd* q) {
     constexpr int kIterations = 100;
@@ -104,7 +107,8 @@ class Clik {
       if (descend(wanted, q)) return true;
       if (k == restarts) return false;
       for (int j = 0; j < arm_.n; ++j) {
-        (*q)[j] = std::uniform_real_distribution<double>(arm_.model.lowerPositionLimit[j], arm_.model.upperPositionLimit[j])(random_);
+        (*q)[j] = std::uniform_real_distribution<double>(arm_.model.lowerPositionLimit[j],
+                                                         arm_.model.upperPositionLimit[j])(random_);
       }
     }
   }
@@ -146,7 +150,8 @@ int main(int argc, char** argv) {
     }
   }
   std::FILE* file = std::fopen(argv[3], "wb");
-  if (!file || std::fwrite(answers.data(), sizeof(double), answers.size(), file) != answers.size() || std::fclose(file) != 0) {
+  if (!file || std::fwrite(answers.data(), sizeof(double), answers.size(), file) != answers.size() ||
+      std::fclose(file) != 0) {
     std::fprintf(stderr, "cannot write %s\n", argv[3]);
     return 2;
   }

@@ -26,10 +26,15 @@ Matrix3d z_to_axis(Motion motion) {
   Matrix3d R = Matrix3d::Identity();
   switch (motion) {
     case Motion::rotate_x:
-    case Motion::translate_x: R << 0, 0, 1, 1, 0, 0, 0, 1, 0; break;
+    case Motion::translate_x:
+      R << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+      break;
     case Motion::rotate_y:
-    case Motion::translate_y: R << 0, 1, 0, 0, 0, 1, 1, 0, 0; break;
-    default: break;
+    case Motion::translate_y:
+      R << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+      break;
+    default:
+      break;
   }
   return R;
 }
@@ -46,8 +51,8 @@ JointFrame joint_frame(Convention convention, const Joint& joint) {
                     AngleAxisd(joint.beta, Vector3d::UnitY());
       break;
     case Convention::mdh:
-      frame.before = Isometry3d(AngleAxisd(joint.alpha, Vector3d::UnitX())) * link * AngleAxisd(joint.beta, Vector3d::UnitY()) *
-                     about_z(joint.theta) * along_z(joint.d);
+      frame.before = Isometry3d(AngleAxisd(joint.alpha, Vector3d::UnitX())) * link *
+                     AngleAxisd(joint.beta, Vector3d::UnitY()) * about_z(joint.theta) * along_z(joint.d);
       break;
     case Convention::urdf: {
       const Isometry3d z_to_joint(Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), joint.axis));
@@ -69,7 +74,8 @@ void add_columns(const Conditions& available, EffectScratch* scratch) {
   if (std::isfinite(available.temperature)) scratch->data.temperature = {&scratch->temperature, 1};
   if (std::isfinite(available.time)) scratch->data.time = {&scratch->time, 1};
   std::size_t at = 0;
-  for (const auto& covariate : available.covariates) scratch->data.covariates[covariate.first] = {&scratch->covariates[at++], 1};
+  for (const auto& covariate : available.covariates)
+    scratch->data.covariates[covariate.first] = {&scratch->covariates[at++], 1};
 }
 
 std::unique_ptr<EffectScratch> scratch_for(const Conditions& available, std::size_t driven) {
@@ -87,8 +93,8 @@ Model model_for(const Robot& robot, const Conditions& available, const std::vect
   const std::size_t driven = robot.driven_count();
   if (driven == 0) throw std::invalid_argument("the robot has no joint with a reading");
   if (driven > static_cast<std::size_t>(kMaxDrivenJoints)) {
-    throw std::invalid_argument("the robot has " + std::to_string(driven) + " driven joints; inverse kinematics takes at most " +
-                                std::to_string(kMaxDrivenJoints));
+    throw std::invalid_argument("the robot has " + std::to_string(driven) +
+                                " driven joints; inverse kinematics takes at most " + std::to_string(kMaxDrivenJoints));
   }
   const std::unique_ptr<EffectScratch> scratch = scratch_for(available, driven);
   return make_model(robot, scratch->data, {}, own_effects);
@@ -97,7 +103,10 @@ Model model_for(const Robot& robot, const Conditions& available, const std::vect
 }  // namespace
 
 Arm::Arm(const Robot& robot, const Conditions& available, std::size_t target, const std::vector<Effect>& own_effects)
-    : model_(model_for(robot, available, own_effects)), available_(available), target_(target), driven_(static_cast<int>(robot.driven_count())) {
+    : model_(model_for(robot, available, own_effects)),
+      available_(available),
+      target_(target),
+      driven_(static_cast<int>(robot.driven_count())) {
   if (target >= model_.robot.targets.size()) {
     throw std::invalid_argument("target " + std::to_string(target) + " does not exist; the robot has " +
                                 std::to_string(model_.robot.targets.size()) + " targets, counted from 0");
@@ -117,7 +126,8 @@ Arm::Arm(const Robot& robot, const Conditions& available, std::size_t target, co
   for (const Coordinate& coordinate : model_.coordinates) {
     for (const auto& [site, weight] : coordinate.sites) {
       if (coordinate.offset >= 0) moved[site].constant += weight * values[coordinate.offset];
-      if (coordinate.reading >= 0) moved[site].joints.push_back({coordinate.reading, weight * values[coordinate.ratio]});
+      if (coordinate.reading >= 0)
+        moved[site].joints.push_back({coordinate.reading, weight * values[coordinate.ratio]});
       for (const int term : coordinate.terms) {
         const double theta = values[model_.term_parameter[term]];
         if (theta == 0.0) continue;
@@ -178,7 +188,8 @@ void Arm::add_step(const Isometry3d& fixed, bool prismatic) {
   step.first_term = steps_.empty() ? 0 : steps_.back().end_term;
   step.end_term = static_cast<int>(term_weights_.size());
   steps_.push_back(step);
-  if (steps_.size() > static_cast<std::size_t>(kMostSteps)) throw std::invalid_argument("too many moving transforms: fewer effects, please");
+  if (steps_.size() > static_cast<std::size_t>(kMostSteps))
+    throw std::invalid_argument("too many moving transforms: fewer effects, please");
 }
 
 template <bool with_columns>
@@ -189,8 +200,10 @@ Tip Arm::sweep(const double* readings, EffectScratch* scratch, Columns* columns)
   for (int k = 0; k < count; ++k) {
     const Step& step = steps_[static_cast<std::size_t>(k)];
     value[k] = 0.0;
-    for (int i = step.first_joint; i < step.end_joint; ++i) value[k] += joint_weights_[i].second * readings[joint_weights_[i].first];
-    for (int i = step.first_term; i < step.end_term; ++i) value[k] += term_weights_[i].second * scratch->basis[term_weights_[i].first];
+    for (int i = step.first_joint; i < step.end_joint; ++i)
+      value[k] += joint_weights_[i].second * readings[joint_weights_[i].first];
+    for (int i = step.first_term; i < step.end_term; ++i)
+      value[k] += term_weights_[i].second * scratch->basis[term_weights_[i].first];
   }
   sines_cosines(value, count, sine, cosine);
 
@@ -296,7 +309,8 @@ void Arm::parameter_motions(const double* readings, EffectScratch* scratch, cons
   for (const Coordinate& coordinate : model_.coordinates) {
     double value = coordinate.offset < 0 ? 0.0 : values[coordinate.offset];
     if (coordinate.reading >= 0) value += values[coordinate.ratio] * readings[coordinate.reading];
-    for (const int term : coordinate.terms) value += values[model_.term_parameter[term]] * scratch->basis[static_cast<std::size_t>(term)];
+    for (const int term : coordinate.terms)
+      value += values[model_.term_parameter[term]] * scratch->basis[static_cast<std::size_t>(term)];
     for (const auto& [site, weight] : coordinate.sites) site_value[static_cast<std::size_t>(site)] += weight * value;
   }
 
@@ -315,7 +329,8 @@ void Arm::parameter_motions(const double* readings, EffectScratch* scratch, cons
     axis[at] = T.linear() * to_axis.linear().col(2);
     origin[at] = T.translation();
     passed[at] = true;
-    T = T * to_axis * (is_rotation(site.motion) ? about_z(site_value[at]) : along_z(site_value[at])) * to_axis.inverse();
+    T = T * to_axis * (is_rotation(site.motion) ? about_z(site_value[at]) : along_z(site_value[at])) *
+        to_axis.inverse();
   };
   for (int s = 0; s < model_.common_sites; ++s) pass(s);
   for (int s = model_.target_first[target_]; s < model_.target_first[target_ + 1]; ++s) pass(s);
@@ -325,7 +340,9 @@ void Arm::parameter_motions(const double* readings, EffectScratch* scratch, cons
     if (parameters[k] < 0) continue;
     auto motion = motions->col(static_cast<Eigen::Index>(k));
     for (const ColumnTerm& column : model_.parameters[static_cast<std::size_t>(parameters[k])].columns) {
-      const double basis = column.reading >= 0 ? readings[column.reading] : column.term >= 0 ? scratch->basis[static_cast<std::size_t>(column.term)] : 1.0;
+      const double basis = column.reading >= 0 ? readings[column.reading]
+                           : column.term >= 0  ? scratch->basis[static_cast<std::size_t>(column.term)]
+                                               : 1.0;
       for (const auto& [site, weight] : column.sites) {
         const auto at = static_cast<std::size_t>(site);
         if (!passed[at]) continue;
@@ -393,7 +410,9 @@ void Arm::set_conditions(const Conditions& conditions, EffectScratch* scratch) c
     std::copy(conditions.joint_speed.begin(), conditions.joint_speed.end(), scratch->speed.begin());
   }
   const auto require_finite = [](const char* what, double value) {
-    if (!std::isfinite(value)) throw std::invalid_argument(std::string(what) + " is not a finite number, but the robot's effects were built with one");
+    if (!std::isfinite(value))
+      throw std::invalid_argument(std::string(what) +
+                                  " is not a finite number, but the robot's effects were built with one");
   };
   require_finite("payload", conditions.payload);
   if (scratch->data.temperature) require_finite("temperature", conditions.temperature);
@@ -404,7 +423,8 @@ void Arm::set_conditions(const Conditions& conditions, EffectScratch* scratch) c
   std::size_t at = 0;
   for (const auto& covariate : available_.covariates) {
     const auto found = conditions.covariates.find(covariate.first);
-    if (found == conditions.covariates.end()) throw std::invalid_argument("conditions lack the covariate '" + covariate.first + "'");
+    if (found == conditions.covariates.end())
+      throw std::invalid_argument("conditions lack the covariate '" + covariate.first + "'");
     scratch->covariates[at++] = found->second;
   }
 }

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A robot compiled for one configuration at a time: where its target is and how it moves, in a few hundred nanoseconds and
-// without allocation. The kernel does the same for tiles of poses.
+// A robot compiled for one configuration at a time: where its target is and how it moves, in a few hundred nanoseconds
+// and without allocation. The kernel does the same for tiles of poses.
 
 #include <memory>
 #include <mutex>
@@ -55,7 +55,8 @@ struct JointFrame {
 
 class Arm {
  public:
-  /// `available`: the inputs there will be. Throws std::invalid_argument when effects need others, or there are too many joints.
+  /// `available`: the inputs there will be. Throws std::invalid_argument when effects need others, or there are too
+  /// many joints.
   Arm(const Robot& robot, const Conditions& available, std::size_t target, const std::vector<Effect>& own_effects);
 
   const Robot& robot() const { return model_.robot; }
@@ -77,8 +78,9 @@ class Arm {
   const Eigen::VectorXd& motion_constants() const { return motion_constants_; }
 
   const Model& model() const { return model_; }
-  /// What each of these parameters of the model does to the target: linear [m] above angular [rad] motion per unit. Anchors,
-  /// points and indices below zero do nothing. Not for inner loops: it goes through every elementary transform.
+  /// What each of these parameters of the model does to the target: linear [m] above angular [rad] motion per unit.
+  /// Anchors, points and indices below zero do nothing. Not for inner loops: it goes through every elementary
+  /// transform.
   void parameter_motions(const double* readings, EffectScratch* scratch, const std::vector<int>& parameters,
                          Eigen::Matrix<double, 6, Eigen::Dynamic>* motions) const;
 

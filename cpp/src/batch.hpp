@@ -13,14 +13,15 @@
 
 namespace truing::detail {
 
-/// Calls work(k) for every k below count, on so many threads (0: as many as the machine has). What work(k) does must not
-/// depend on the others, and then nothing depends on the number of threads. `progress` is called by the calling thread; false
-/// stops. The first exception comes out when all threads have ended.
+/// Calls work(k) for every k below count, on so many threads (0: as many as the machine has). What work(k) does must
+/// not depend on the others, and then nothing depends on the number of threads. `progress` is called by the calling
+/// thread; false stops. The first exception comes out when all threads have ended.
 inline void for_each_on_threads(std::size_t count, int threads, const std::function<bool(std::size_t)>& progress,
                                 const std::function<void(std::size_t)>& work) {
   constexpr std::size_t kChunk = 64;
   const std::size_t chunks = (count + kChunk - 1) / kChunk;
-  std::size_t workers = threads > 0 ? static_cast<std::size_t>(threads) : std::max(1u, std::thread::hardware_concurrency());
+  std::size_t workers =
+      threads > 0 ? static_cast<std::size_t>(threads) : std::max(1u, std::thread::hardware_concurrency());
   workers = std::max<std::size_t>(1, std::min(workers, chunks));
   std::atomic<std::size_t> next{0}, done{0};
   std::atomic<bool> stop{false};

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// The best of all answers by a criterion: over the branches of the closed form, over the rails before the arm, over the roll
-// of a torch.
+// The best of all answers by a criterion: over the branches of the closed form, over the rails before the arm, over the
+// roll of a torch.
 
 #include <Eigen/LU>
 
@@ -22,7 +22,9 @@ struct Summit {
 };
 
 /// What is left of a joint's range on its nearer side, as a share of it.
-double limit_share(const Limits& limits, int j, double q) { return std::min(q - limits.lower[j], limits.upper[j] - q) / (limits.upper[j] - limits.lower[j]); }
+double limit_share(const Limits& limits, int j, double q) {
+  return std::min(q - limits.lower[j], limits.upper[j] - q) / (limits.upper[j] - limits.lower[j]);
+}
 
 constexpr int kSummits = 2;
 
@@ -33,7 +35,8 @@ void find_hills(const Height& height, const Box& box, int cells, Summit* hills) 
   for (int k = 0; k < box.count; ++k) places *= cells;
   for (int place = 0; place < places; ++place) {
     Summit here;
-    for (int k = 0, rest = place; k < box.count; ++k, rest /= cells) here.x[k] = box.low[k] + (box.high[k] - box.low[k]) * (rest % cells + 0.5) / cells;
+    for (int k = 0, rest = place; k < box.count; ++k, rest /= cells)
+      here.x[k] = box.low[k] + (box.high[k] - box.low[k]) * (rest % cells + 0.5) / cells;
     here.height = height(here.x);
     if (here.height == kNone) continue;
     const auto same_hill = [&](const Summit& other) {
@@ -45,12 +48,14 @@ void find_hills(const Height& height, const Box& box, int cells, Summit* hills) 
     };
     Summit* const end = hills + kSummits;
     Summit* slot = std::find_if(hills, end, same_hill);
-    if (slot == end) slot = std::min_element(hills, end, [](const Summit& a, const Summit& b) { return a.height < b.height; });
+    if (slot == end)
+      slot = std::min_element(hills, end, [](const Summit& a, const Summit& b) { return a.height < b.height; });
     if (here.height > slot->height) *slot = here;
   }
 }
 
-/// Uphill along one variable after the other, then along two at once where that leads nowhere (ridges), then in steps half as long.
+/// Uphill along one variable after the other, then along two at once where that leads nowhere (ridges), then in steps
+/// half as long.
 template <typename Height>
 Summit climb(const Height& height, const Box& box, Summit at, const double* first_step, int halvings) {
   double step[kMostFree];
@@ -105,7 +110,8 @@ int Reach::nearest_to_limit(const double* q) const {
 
 double Reach::merit(const Search& search, const double* q) const {
   switch (options.choose) {
-    case Choose::nearest: return -distance2(q, search.seed);
+    case Choose::nearest:
+      return -distance2(q, search.seed);
     case Choose::rail_travel: {
       double way = 0.0;
       for (int j = 0; j < driven(); ++j) {
@@ -126,7 +132,8 @@ double Reach::merit(const Search& search, const double* q) const {
         J.conservativeResize(6, J.cols() + 1);
         J.col(J.cols() - 1) << columns.linear[j] / scales.length, columns.angular[j];
       }
-      const double squared = J.cols() < 6 ? Gram(J.transpose().lazyProduct(J)).determinant() : Eigen::Matrix<double, 6, 6>(J.lazyProduct(J.transpose())).determinant();
+      const double squared = J.cols() < 6 ? Gram(J.transpose().lazyProduct(J)).determinant()
+                                          : Eigen::Matrix<double, 6, 6>(J.lazyProduct(J.transpose())).determinant();
       return std::sqrt(std::max(0.0, squared));
     }
   }
@@ -154,7 +161,8 @@ bool Reach::solve_for_best_of_many(Search* search, Solution* solution) const {
   return most > kNone;
 }
 
-/// What is free: rails, only as far as the arm can reach from them, then the roll of a torch. False: there is no place at all.
+/// What is free: rails, only as far as the arm can reach from them, then the roll of a torch. False: there is no place
+/// at all.
 bool Reach::find_free(const Goal& goal, Box* free) const {
   for (int k = 0; k < closed.rails(); ++k) {
     double low = 0.0, high = 0.0;
@@ -173,8 +181,10 @@ bool Reach::find_free(const Goal& goal, Box* free) const {
   return true;
 }
 
-/// The best branch at one place, limits and interference looked at; `search->seed`: where the turns of joints are taken nearest to.
-double Reach::best_branch(Search* search, const Search& asked, const Box& free, const double* x, Candidate* best) const {
+/// The best branch at one place, limits and interference looked at; `search->seed`: where the turns of joints are taken
+/// nearest to.
+double Reach::best_branch(Search* search, const Search& asked, const Box& free, const double* x,
+                          Candidate* best) const {
   const Goal& goal = search->goal;
   const Goal pose = free.rolls ? pose_at_roll(goal, x[free.count - 1]) : goal;
   Candidate found[ClosedForm::kMost];
@@ -214,8 +224,8 @@ double Reach::best_answer(Search* search, const Search& asked, const double* x, 
   return most;
 }
 
-/// Towards what is better, as far as the task lets the joints follow: a joint is moved, and a descent brings the tip back by the least
-/// motion of all, limits kept.
+/// Towards what is better, as far as the task lets the joints follow: a joint is moved, and a descent brings the tip
+/// back by the least motion of all, limits kept.
 void Reach::pull(Search* search, Solution* solution) const {
   if (options.choose != Choose::rail_travel && options.choose != Choose::limits_margin) return;
   double share = 0.5, most = merit(*search, solution->joints.data());
@@ -251,7 +261,8 @@ bool Reach::solve_for_best(Search* search, Solution* solution) const {
   Joints middle(driven());
   for (int j = 0; j < driven(); ++j) {
     const bool limited = std::isfinite(limits.lower[j]) && std::isfinite(limits.upper[j]);
-    middle[j] = limited && options.choose == Choose::limits_margin ? 0.5 * (limits.lower[j] + limits.upper[j]) : search->seed[j];
+    middle[j] = limited && options.choose == Choose::limits_margin ? 0.5 * (limits.lower[j] + limits.upper[j])
+                                                                   : search->seed[j];
   }
   Search from_middle{goal, middle.data(), search->scratch};
   Candidate candidate{};
@@ -259,12 +270,15 @@ bool Reach::solve_for_best(Search* search, Solution* solution) const {
 
   constexpr int kCells[kMostFree + 1] = {1, 40, 9, 5, 4};  // in each direction: as many as there is time for
   constexpr double kFine = 0.1;                            // one rail by itself [m]
-  const int cells = free.count == 1 && !free.rolls ? std::clamp(static_cast<int>((free.high[0] - free.low[0]) / kFine) + 1, 16, 64) : kCells[free.count];
+  const int cells = free.count == 1 && !free.rolls
+                        ? std::clamp(static_cast<int>((free.high[0] - free.low[0]) / kFine) + 1, 16, 64)
+                        : kCells[free.count];
   Summit start[kSummits + 1];
   find_hills(branch_at, free, cells, start);
   // Where the rails are now: nothing is nearer.
   if (options.choose == Choose::rail_travel) {
-    for (int k = 0; k < closed.rails(); ++k) start[kSummits].x[k] = std::clamp(search->seed[k], free.low[k], free.high[k]);
+    for (int k = 0; k < closed.rails(); ++k)
+      start[kSummits].x[k] = std::clamp(search->seed[k], free.low[k], free.high[k]);
     start[kSummits].height = branch_at(start[kSummits].x);
   }
   double step[kMostFree];
@@ -289,8 +303,8 @@ bool Reach::solve_for_best(Search* search, Solution* solution) const {
   constexpr double kMuch = 0.002;  // less than the closed form says
   top.height = answer_at(top.x);
   if (!closed.exact() && free.count > 0) {
-    // A branch that ends just here for the closed form may end short of it for the robot: from the foot of the hill as near to the top as it lasts.
-    // The foot itself may lie beyond that end: then a cell aside.
+    // A branch that ends just here for the closed form may end short of it for the robot: from the foot of the hill as
+    // near to the top as it lasts. The foot itself may lie beyond that end: then a cell aside.
     const double expected = foot.height;
     foot.height = answer_at(foot.x);
     if (foot.height < expected - kMuch * (1.0 + std::abs(expected))) {

@@ -36,10 +36,16 @@ std::vector<double> distinct(std::vector<double> sorted, std::size_t most) {
 }
 
 std::string driver_of(const std::string& effect, const std::string& joint_number) {
-  static const std::map<std::string, std::string> drivers = {
-      {"joint_compliance", "torque"}, {"stiffness_zones", "torque"}, {"gravity_backlash", "torque"}, {"gravity_moment", "torque"},
-      {"link_compliance", "torque"},  {"backlash", "dir"},           {"harmonic", "q"},              {"gear_ratio", "q"},
-      {"axis_wobble", "q"},           {"windup", "tau"}};
+  static const std::map<std::string, std::string> drivers = {{"joint_compliance", "torque"},
+                                                             {"stiffness_zones", "torque"},
+                                                             {"gravity_backlash", "torque"},
+                                                             {"gravity_moment", "torque"},
+                                                             {"link_compliance", "torque"},
+                                                             {"backlash", "dir"},
+                                                             {"harmonic", "q"},
+                                                             {"gear_ratio", "q"},
+                                                             {"axis_wobble", "q"},
+                                                             {"windup", "tau"}};
   if (effect == "thermal" || effect == "thermal_zero") return "temp";
   if (effect == "drift") return "time";
   if (effect.rfind("transmission_error", 0) == 0) return "q" + joint_number;
@@ -49,15 +55,17 @@ std::string driver_of(const std::string& effect, const std::string& joint_number
 
 /// Effects whose law is one function of one driver at the joint itself: a number for "driver at joint".
 int law_number(const std::string& effect, std::size_t joint) {
-  static const std::map<std::string, int> kinds = {{"joint_compliance", 0}, {"stiffness_zones", 0}, {"gravity_backlash", 0}, {"backlash", 1},
-                                                   {"harmonic", 2},         {"thermal", 3},         {"thermal_zero", 4}};
+  static const std::map<std::string, int> kinds = {
+      {"joint_compliance", 0}, {"stiffness_zones", 0}, {"gravity_backlash", 0}, {"backlash", 1},
+      {"harmonic", 2},         {"thermal", 3},         {"thermal_zero", 4}};
   const auto found = kinds.find(effect);
   return found == kinds.end() ? -1 : static_cast<int>(joint) * 8 + found->second;
 }
 
 double root_mean_square(const std::vector<double>& values, const std::vector<std::int32_t>& rows) {
   double sum = 0.0;
-  for (const std::int32_t row : rows) sum += values[static_cast<std::size_t>(row)] * values[static_cast<std::size_t>(row)];
+  for (const std::int32_t row : rows)
+    sum += values[static_cast<std::size_t>(row)] * values[static_cast<std::size_t>(row)];
   return std::sqrt(sum / std::max<double>(1.0, static_cast<double>(rows.size())));
 }
 
@@ -67,7 +75,8 @@ std::vector<std::string> frame_coordinates(const std::string& site) {
   if (site != "base" && dot == std::string::npos) return {};
   const std::string frame = site.substr(0, dot);
   std::vector<std::string> out;
-  for (int k = 0; k < (site.size() > 4 && dot != std::string::npos && site.size() == dot + 4 ? 3 : 6); ++k) out.push_back(frame + "." + kFrame[k]);
+  for (int k = 0; k < (site.size() > 4 && dot != std::string::npos && site.size() == dot + 4 ? 3 : 6); ++k)
+    out.push_back(frame + "." + kFrame[k]);
   return out;
 }
 
@@ -80,7 +89,8 @@ class Builder {
       moves_.push_back(!motion || !motion->constant);
       if (motion && motion->constant) {
         const Joint& joint = task.at.joints[k];
-        if (!joint.passive()) out_.not_testable.push_back({"every effect but its zero", {joint.name}, joint.name + " does not move"});
+        if (!joint.passive())
+          out_.not_testable.push_back({"every effect but its zero", {joint.name}, joint.name + " does not move"});
       }
     }
   }
@@ -89,8 +99,8 @@ class Builder {
     geometry();
     for (const Effect& effect : catalogue()) {
       if (left_out(effect.name)) continue;
-      if (effect.name == "base_frame" || effect.name == "tool_frame" || effect.name == "link_geometry" || effect.name == "gravity_moment" ||
-          effect.name == "transmission_error")
+      if (effect.name == "base_frame" || effect.name == "tool_frame" || effect.name == "link_geometry" ||
+          effect.name == "gravity_moment" || effect.name == "transmission_error")
         continue;
       add_effect(effect, false);
     }
@@ -104,7 +114,8 @@ class Builder {
 
  private:
   bool left_out(const std::string& name) const {
-    return std::find(task_.options.leave_out.begin(), task_.options.leave_out.end(), name) != task_.options.leave_out.end();
+    return std::find(task_.options.leave_out.begin(), task_.options.leave_out.end(), name) !=
+           task_.options.leave_out.end();
   }
 
   const InputColumn* input(const std::string& name) const {
@@ -164,17 +175,21 @@ class Builder {
     if (!any && !missing.empty()) out_.not_testable.push_back({effect.name, {}, missing});
   }
 
-  bool try_terms(const Effect& effect, bool own, const std::vector<std::size_t>& joints, std::string* missing = nullptr) {
+  bool try_terms(const Effect& effect, bool own, const std::vector<std::size_t>& joints,
+                 std::string* missing = nullptr) {
     Explanation e;
     e.effect = effect.name;
     for (const std::size_t k : joints) e.joints.push_back(task_.at.joints[k].name);
     const std::size_t joint = joints.empty() ? 0 : joints[0];
     try {
       if ((effect.name == "thermal" || effect.name == "thermal_zero") && task_.data.temperature && !input("temp")) {
-        throw std::invalid_argument("the column temp_C has rows without a number: fill or remove it to test " + effect.name);
+        throw std::invalid_argument("the column temp_C has rows without a number: fill or remove it to test " +
+                                    effect.name);
       }
       if ((effect.name == "stiffness_zones" || effect.name == "gravity_backlash") && !knows_mass(task_.at)) {
-        throw std::invalid_argument(effect.name + " needs the links' mass and com: the payload's torque alone does not say in which zone, or on which side, a joint is");
+        throw std::invalid_argument(effect.name +
+                                    " needs the links' mass and com: the payload's torque alone does not say in which "
+                                    "zone, or on which side, a joint is");
       }
       // Weights that nobody knows: the compliance finds the first moments itself.
       const bool weights_missing = effect.name == "joint_compliance" && !knows_mass(task_.at);
@@ -183,15 +198,18 @@ class Builder {
       if (!weights_missing || task_.data.payload) requests.push_back({effect.name, e.joints});
       e.requests = requests;
       effect_terms(requests, task_.nominal, task_.data, own ? task_.options.own_effects : std::vector<Effect>{});
-      const std::vector<Term> terms = effect_terms(requests, task_.at, task_.data, own ? task_.options.own_effects : std::vector<Effect>{});
-      if (weights_missing) e.note = "the links' masses are not known: their first moments are found as well (gravity_moment)";
+      const std::vector<Term> terms =
+          effect_terms(requests, task_.at, task_.data, own ? task_.options.own_effects : std::vector<Effect>{});
+      if (weights_missing)
+        e.note = "the links' masses are not known: their first moments are found as well (gravity_moment)";
       if (effect.name == "gear_ratio") {
         e.parameters = e.model_free = {e.joints[0] + ".ratio"};
       } else if (effect.name == "joint_offset") {
         e.parameters = e.model_free = {e.joints[0] + ".offset"};
       } else {
         for (const Term& term : terms) {
-          if (std::find(e.parameters.begin(), e.parameters.end(), term.parameter) == e.parameters.end()) e.parameters.push_back(term.parameter);
+          if (std::find(e.parameters.begin(), e.parameters.end(), term.parameter) == e.parameters.end())
+            e.parameters.push_back(term.parameter);
         }
       }
     } catch (const Unsuited&) {
@@ -206,16 +224,19 @@ class Builder {
     e.driver = joints.empty() && effect.name != "drift" ? "" : driver_of(effect.name, number);
     ColumnGroup group;
     group.law_at = joints.empty() ? -1 : law_number(effect.name, joint);
-    if (effect.name == "backlash" && task_.inferred_direction) e.note = "the approach direction was inferred from the order of the poses";
+    if (effect.name == "backlash" && task_.inferred_direction)
+      e.note = "the approach direction was inferred from the order of the poses";
     // An input that never changes: the effect cannot be told from geometry, and is only named beside it.
     const InputColumn* driver = input(e.driver);
     if (effect.name == "backlash" && driver && driver->constant) {
       group.shadow = true;
-      out_.not_testable.push_back({effect.name, e.joints, "every pose was approached from the same side: the same as a joint zero"});
+      out_.not_testable.push_back(
+          {effect.name, e.joints, "every pose was approached from the same side: the same as a joint zero"});
     }
     if ((effect.name == "thermal" || effect.name == "thermal_zero") && driver && driver->constant) {
       group.shadow = true;
-      if (joint == 0) out_.not_testable.push_back({effect.name, {}, "the temperature is constant: the same as geometry"});
+      if (joint == 0)
+        out_.not_testable.push_back({effect.name, {}, "the temperature is constant: the same as geometry"});
     }
     if (effect.name == "drift" && driver && driver->constant) return false;
     add(std::move(e), std::move(group));
@@ -231,7 +252,8 @@ class Builder {
     if (by_order) out_.not_testable.push_back({"drift", {}, "no column t_s: the order of the rows stands for time"});
     for (const int most : {6, 12, 24}) {
       const std::vector<double> knots = knots_of(task_.inputs[static_cast<std::size_t>(time)], task_.rows, most);
-      if (static_cast<int>(knots.size()) < std::min(most, 4) || (most > 6 && static_cast<int>(knots.size()) < most)) continue;
+      if (static_cast<int>(knots.size()) < std::min(most, 4) || (most > 6 && static_cast<int>(knots.size()) < most))
+        continue;
       for (const int coordinates : {3, 6}) {
         Explanation e;
         e.kind = Explanation::Kind::drift;
@@ -240,11 +262,12 @@ class Builder {
         e.inputs = {time};
         e.knots = {knots};
         e.driver = task_.inputs[static_cast<std::size_t>(time)].name;
-        e.note = std::string("the frame wanders: a free function of ") + (by_order ? "the order of the rows" : "time") + ", " +
-                 std::to_string(knots.size()) + " knots";
+        e.note = std::string("the frame wanders: a free function of ") + (by_order ? "the order of the rows" : "time") +
+                 ", " + std::to_string(knots.size()) + " knots";
         for (int c = 0; c < coordinates; ++c) {
           for (std::size_t k = 0; k < knots.size(); ++k) {
-            e.parameters.push_back("drift_" + std::to_string(knots.size()) + "_" + std::to_string(coordinates) + ".base." + kFrame[c] + "." + std::to_string(k + 1));
+            e.parameters.push_back("drift_" + std::to_string(knots.size()) + "_" + std::to_string(coordinates) +
+                                   ".base." + kFrame[c] + "." + std::to_string(k + 1));
           }
         }
         add(std::move(e), {});
@@ -259,8 +282,10 @@ class Builder {
         e.inputs = {time};
         e.knots = {knots};
         e.driver = task_.inputs[static_cast<std::size_t>(time)].name;
-        e.note = "target " + target.name + " moves on the last link: a free function of " + (by_order ? "the order of the rows" : "time");
-        for (std::size_t k = 0; k < 3 * knots.size(); ++k) e.parameters.push_back("wander." + target.name + "." + std::to_string(k + 1));
+        e.note = "target " + target.name + " moves on the last link: a free function of " +
+                 (by_order ? "the order of the rows" : "time");
+        for (std::size_t k = 0; k < 3 * knots.size(); ++k)
+          e.parameters.push_back("wander." + target.name + "." + std::to_string(k + 1));
         add(std::move(e), {});
       }
     }
@@ -281,7 +306,8 @@ class Builder {
       e.law_form = form;
       e.knots = {knots_of(task_.inputs[static_cast<std::size_t>(at)], task_.rows, form == 1 ? 5 : 8)};
       if (e.knots[0].size() < 3) return;
-      for (std::size_t k = 0; k < e.knots[0].size(); ++k) e.parameters.push_back("law." + effect + "." + e.site + "." + std::to_string(k + 1));
+      for (std::size_t k = 0; k < e.knots[0].size(); ++k)
+        e.parameters.push_back("law." + effect + "." + e.site + "." + std::to_string(k + 1));
       ColumnGroup group;
       group.corrects_law_at = group.law_at = law_number(effect, joint);
       add(std::move(e), std::move(group));
@@ -307,7 +333,8 @@ class Builder {
 void charge_search(Candidates* candidates) {
   double count = 0.0;
   for (const ColumnGroup& group : candidates->groups) count += group.corrects_law_at < 0 && !group.shadow ? 1.0 : 0.0;
-  for (ColumnGroup& group : candidates->groups) group.cost += group.corrects_law_at < 0 ? std::log(std::max(1.0, count)) : std::log(3.0);
+  for (ColumnGroup& group : candidates->groups)
+    group.cost += group.corrects_law_at < 0 ? std::log(std::max(1.0, count)) : std::log(3.0);
 }
 
 }  // namespace
@@ -316,7 +343,8 @@ std::vector<InputColumn> make_inputs(const Robot& robot, const Measurements& dat
   std::vector<InputColumn> out;
   const std::size_t n = data.rows, joints = robot.joints.size();
   const std::vector<std::size_t> driven = robot.driven_joints();
-  const auto add = [&](const std::string& name, const std::string& unit, int joint, std::vector<double> values, double least) {
+  const auto add = [&](const std::string& name, const std::string& unit, int joint, std::vector<double> values,
+                       double least) {
     const bool finite = std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
     if (finite) out.push_back({name, unit, joint, is_constant(values, least), std::move(values)});
   };
@@ -340,7 +368,8 @@ std::vector<InputColumn> make_inputs(const Robot& robot, const Measurements& dat
     const Eigen::VectorXd q = joint_motions(plain, reading);
     for (std::size_t k = 0; k < joints; ++k) motion[k][row] = q[static_cast<Eigen::Index>(k)];
     if (!weights) continue;
-    gravity_torques_at(robot, coupling, forward_kinematics(robot, reading, 0), data.payload ? data.payload[row] : 0.0, moment);
+    gravity_torques_at(robot, coupling, forward_kinematics(robot, reading, 0), data.payload ? data.payload[row] : 0.0,
+                       moment);
     for (std::size_t k = 0; k < joints; ++k) torque[k][row] = moment[static_cast<Eigen::Index>(k)];
   }
   for (std::size_t k = 0; k < joints; ++k) {
@@ -348,13 +377,19 @@ std::vector<InputColumn> make_inputs(const Robot& robot, const Measurements& dat
     add("q" + std::to_string(k + 1), revolute ? "rad" : "m", static_cast<int>(k), std::move(motion[k]), kStandstill);
   }
   for (std::size_t k = 0; k < driven.size() && k < data.direction.size(); ++k) {
-    if (data.direction[k]) add("dir" + std::to_string(driven[k] + 1), "", static_cast<int>(driven[k]), copy(data.direction[k]), 0.5);
+    if (data.direction[k])
+      add("dir" + std::to_string(driven[k] + 1), "", static_cast<int>(driven[k]), copy(data.direction[k]), 0.5);
   }
   for (std::size_t k = 0; k < driven.size() && k < data.joint_speed.size(); ++k) {
-    if (data.joint_speed[k]) add("speed" + std::to_string(driven[k] + 1), "rad/s", static_cast<int>(driven[k]), copy(data.joint_speed[k]), 1e-6);
+    if (data.joint_speed[k])
+      add("speed" + std::to_string(driven[k] + 1), "rad/s", static_cast<int>(driven[k]), copy(data.joint_speed[k]),
+          1e-6);
   }
   for (std::size_t k = 0; k < torque.size(); ++k) {
-    const double size = torque[k].empty() ? 0.0 : std::abs(*std::max_element(torque[k].begin(), torque[k].end(), [](double a, double b) { return std::abs(a) < std::abs(b); }));
+    const double size = torque[k].empty()
+                            ? 0.0
+                            : std::abs(*std::max_element(torque[k].begin(), torque[k].end(),
+                                                         [](double a, double b) { return std::abs(a) < std::abs(b); }));
     if (size > 0.0) add("torque" + std::to_string(k + 1), "Nm", static_cast<int>(k), std::move(torque[k]), 1e-6 * size);
   }
   if (data.payload) add("payload", "kg", -1, copy(data.payload), 1e-6);
@@ -374,7 +409,8 @@ std::vector<InputColumn> make_inputs(const Robot& robot, const Measurements& dat
       const std::size_t k = static_cast<std::size_t>(std::stoi(name.substr(2)));
       if (k >= 1 && k <= driven.size()) {
         for (std::size_t row = 0; row < n; ++row) values[row] -= data.joints[k - 1][row];
-        add("qr" + std::to_string(k) + "-q" + std::to_string(k), "rad", static_cast<int>(driven[k - 1]), std::move(values), 1e-7);
+        add("qr" + std::to_string(k) + "-q" + std::to_string(k), "rad", static_cast<int>(driven[k - 1]),
+            std::move(values), 1e-7);
       }
       continue;
     }
@@ -442,9 +478,11 @@ Gram Design::gram_of_fold(int wanted) const {
   return sum.finish();
 }
 
-Design::Rows free_columns(const Design& design, const std::vector<int>& site_columns, const std::vector<InputColumn>& inputs,
-                          const std::vector<int>& which, const std::vector<std::vector<double>>& knots) {
-  Eigen::Index k1 = static_cast<Eigen::Index>(knots[0].size()), k2 = which.size() > 1 ? static_cast<Eigen::Index>(knots[1].size()) : 1;
+Design::Rows free_columns(const Design& design, const std::vector<int>& site_columns,
+                          const std::vector<InputColumn>& inputs, const std::vector<int>& which,
+                          const std::vector<std::vector<double>>& knots) {
+  Eigen::Index k1 = static_cast<Eigen::Index>(knots[0].size()),
+               k2 = which.size() > 1 ? static_cast<Eigen::Index>(knots[1].size()) : 1;
   Design::Rows out(design.x.rows(), static_cast<Eigen::Index>(site_columns.size()) * k1 * k2);
   std::vector<double> first(static_cast<std::size_t>(k1)), second(static_cast<std::size_t>(k2), 1.0);
   std::int32_t last = -1;
@@ -452,7 +490,9 @@ Design::Rows free_columns(const Design& design, const std::vector<int>& site_col
     const std::int32_t row = design.row[static_cast<std::size_t>(i)];
     if (row != last) {
       hats_at(knots[0], inputs[static_cast<std::size_t>(which[0])].values[static_cast<std::size_t>(row)], first.data());
-      if (which.size() > 1) hats_at(knots[1], inputs[static_cast<std::size_t>(which[1])].values[static_cast<std::size_t>(row)], second.data());
+      if (which.size() > 1)
+        hats_at(knots[1], inputs[static_cast<std::size_t>(which[1])].values[static_cast<std::size_t>(row)],
+                second.data());
       last = row;
     }
     Eigen::Index at = 0;
@@ -460,14 +500,16 @@ Design::Rows free_columns(const Design& design, const std::vector<int>& site_col
       const double d = design.x(i, site);
       for (Eigen::Index a = 0; a < k1; ++a) {
         const double value = d * first[static_cast<std::size_t>(a)];
-        for (Eigen::Index b = 0; b < k2; ++b) out(i, at++) = value == 0.0 ? 0.0 : value * second[static_cast<std::size_t>(b)];
+        for (Eigen::Index b = 0; b < k2; ++b)
+          out(i, at++) = value == 0.0 ? 0.0 : value * second[static_cast<std::size_t>(b)];
       }
     }
   }
   return out;
 }
 
-Effect free_effect(const Explanation& candidate, const Eigen::VectorXd& coefficients, const std::vector<InputColumn>& inputs) {
+Effect free_effect(const Explanation& candidate, const Eigen::VectorXd& coefficients,
+                   const std::vector<InputColumn>& inputs) {
   Effect effect;
   const std::string& first_name = candidate.parameters.front();
   effect.name = first_name.substr(0, first_name.rfind('.')) + "!";  // no name of the catalogue
@@ -482,9 +524,11 @@ Effect free_effect(const Explanation& candidate, const Eigen::VectorXd& coeffici
     } else if (candidate.law_form == 2) {
       const Joint& link = of.joints[of.joint_index(candidate.site)];
       const Eigen::Vector3d origin = link.T_parent_joint.translation();
-      const std::pair<const char*, double> lengths[5] = {{"a", link.a}, {"d", link.d}, {"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
+      const std::pair<const char*, double> lengths[5] = {
+          {"a", link.a}, {"d", link.d}, {"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
       for (const auto& [value, length] : lengths) {
-        if ((value[0] >= 'x') == (of.convention == Convention::urdf) && length != 0.0) places.push_back({candidate.site + "." + value, length});
+        if ((value[0] >= 'x') == (of.convention == Convention::urdf) && length != 0.0)
+          places.push_back({candidate.site + "." + value, length});
       }
     } else {
       places.push_back({candidate.site, 1.0});
@@ -493,7 +537,8 @@ Effect free_effect(const Explanation& candidate, const Eigen::VectorXd& coeffici
     if (candidate.law_form == 1) {
       const std::vector<std::size_t> driven = of.driven_joints();
       const auto joint = static_cast<std::size_t>(inputs[static_cast<std::size_t>(candidate.inputs[0])].joint);
-      direction = data.direction[static_cast<std::size_t>(std::find(driven.begin(), driven.end(), joint) - driven.begin())];
+      direction =
+          data.direction[static_cast<std::size_t>(std::find(driven.begin(), driven.end(), joint) - driven.begin())];
     }
     const auto k1 = candidate.knots[0].size(), k2 = candidate.knots.size() > 1 ? candidate.knots[1].size() : 1;
     std::vector<Term> terms;
@@ -504,14 +549,16 @@ Effect free_effect(const Explanation& candidate, const Eigen::VectorXd& coeffici
       term.unit = "-";
       term.site = places[s].first;
       const std::vector<double>* first = &inputs[static_cast<std::size_t>(candidate.inputs[0])].values;
-      const std::vector<double>* second = candidate.inputs.size() > 1 ? &inputs[static_cast<std::size_t>(candidate.inputs[1])].values : nullptr;
+      const std::vector<double>* second =
+          candidate.inputs.size() > 1 ? &inputs[static_cast<std::size_t>(candidate.inputs[1])].values : nullptr;
       term.basis = [=, times = places[s].second, knots = candidate.knots](const Inputs& in) {
         std::vector<double> a(k1), b(k2, 1.0);
         hats_at(knots[0], (*first)[in.row], a.data());
         if (second) hats_at(knots[1], (*second)[in.row], b.data());
         double value = 0.0;
         for (std::size_t m = 0; m < k1; ++m) {
-          for (std::size_t n = 0; n < k2 && a[m] != 0.0; ++n) value += a[m] * b[n] * coefficients[static_cast<Eigen::Index>(from + m * k2 + n)];
+          for (std::size_t n = 0; n < k2 && a[m] != 0.0; ++n)
+            value += a[m] * b[n] * coefficients[static_cast<Eigen::Index>(from + m * k2 + n)];
         }
         return times * value * (direction ? 0.5 * direction[in.row] : 1.0);
       };
@@ -532,7 +579,8 @@ Design make_design(const DesignTask& task) {
   std::set<std::pair<std::string, std::string>> asked;
   for (const Explanation& e : out.candidates.named) {
     for (const EffectRequest& request : e.requests) {
-      if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second) requests.push_back(request);
+      if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second)
+        requests.push_back(request);
     }
   }
   const Model model = make_model(task.at, task.data, requests, task.options.own_effects);
@@ -550,17 +598,22 @@ Design make_design(const DesignTask& task) {
   };
   for (std::size_t k = 0; k < model.parameters.size(); ++k) {
     const ParameterInfo& info = model.parameters[k];
-    const bool seen = (info.role == Role::base && content.frame) || (info.role == Role::anchor && content.distance) ||
-                      (info.role == Role::point && content.point[static_cast<std::size_t>(info.owner)]) ||
-                      (info.role == Role::target && (info.rotation ? content.target_rotation : content.target)[static_cast<std::size_t>(info.owner)]);
+    const bool seen =
+        (info.role == Role::base && content.frame) || (info.role == Role::anchor && content.distance) ||
+        (info.role == Role::point && content.point[static_cast<std::size_t>(info.owner)]) ||
+        (info.role == Role::target &&
+         (info.rotation ? content.target_rotation : content.target)[static_cast<std::size_t>(info.owner)]);
     if (seen) out.nuisance.push_back(want(static_cast<int>(k)));
   }
-  for (int k = 0; k < 6 && content.frame; ++k) out.base_columns.push_back(want(model.parameter_index(std::string("base.") + kFrame[k])));
-  for (const Joint& joint : task.at.joints) out.joint_column.push_back({want(model.parameter_index(joint.name + ".offset"))});
+  for (int k = 0; k < 6 && content.frame; ++k)
+    out.base_columns.push_back(want(model.parameter_index(std::string("base.") + kFrame[k])));
+  for (const Joint& joint : task.at.joints)
+    out.joint_column.push_back({want(model.parameter_index(joint.name + ".offset"))});
   for (std::size_t g = 0; g < out.candidates.named.size(); ++g) {
     const Explanation& e = out.candidates.named[g];
     if (e.kind != Explanation::Kind::catalogue && e.kind != Explanation::Kind::all_geometry) continue;
-    for (const std::string& name : e.parameters) out.candidates.groups[g].columns.push_back(want(model.parameter_index(name)));
+    for (const std::string& name : e.parameters)
+      out.candidates.groups[g].columns.push_back(want(model.parameter_index(name)));
   }
   // The evaluator wants its parameters in order.
   std::vector<int> order(free);
@@ -580,7 +633,8 @@ Design make_design(const DesignTask& task) {
   Eigen::Index derived = 0;
   for (const Explanation& e : out.candidates.named) {
     if (e.kind == Explanation::Kind::drift && !content.frame) continue;
-    if (e.kind == Explanation::Kind::drift || e.kind == Explanation::Kind::law) derived += static_cast<Eigen::Index>(e.parameters.size());
+    if (e.kind == Explanation::Kind::drift || e.kind == Explanation::Kind::law)
+      derived += static_cast<Eigen::Index>(e.parameters.size());
   }
 
   const Evaluator evaluator(model, task.data, bases, segments, order, task.options.threads);
@@ -624,10 +678,12 @@ Design make_design(const DesignTask& task) {
     out.column_units.push_back(info.unit);
     double size = 0.0;
     for (const ColumnTerm& column : info.columns) {
-      if (column.term >= 0) size = std::max(size, root_mean_square(bases[static_cast<std::size_t>(column.term)], task.rows));
+      if (column.term >= 0)
+        size = std::max(size, root_mean_square(bases[static_cast<std::size_t>(column.term)], task.rows));
       if (column.reading >= 0) {
         std::vector<double> reading(task.data.rows);
-        for (std::size_t row = 0; row < reading.size(); ++row) reading[row] = task.data.joints[static_cast<std::size_t>(column.reading)][row];
+        for (std::size_t row = 0; row < reading.size(); ++row)
+          reading[row] = task.data.joints[static_cast<std::size_t>(column.reading)][row];
         size = std::max(size, root_mean_square(reading, task.rows));
       }
     }
@@ -663,16 +719,22 @@ Design make_design(const DesignTask& task) {
       columns = free_columns(out, sites, task.inputs, e.inputs, e.knots);
     } else if (e.law_form == 2) {
       const std::string joint = e.site;
-      const int length_columns[5] = {out.column(joint + ".a"), out.column(joint + ".d"), out.column(joint + ".x"), out.column(joint + ".y"), out.column(joint + ".z")};
+      const int length_columns[5] = {out.column(joint + ".a"), out.column(joint + ".d"), out.column(joint + ".x"),
+                                     out.column(joint + ".y"), out.column(joint + ".z")};
       const Joint& link = task.at.joints[task.at.joint_index(joint)];
-      const double lengths[5] = {link.a, link.d, link.T_parent_joint.translation().x(), link.T_parent_joint.translation().y(), link.T_parent_joint.translation().z()};
+      const double lengths[5] = {link.a, link.d, link.T_parent_joint.translation().x(),
+                                 link.T_parent_joint.translation().y(), link.T_parent_joint.translation().z()};
       for (int k = 0; k < 5; ++k) {
-        if (length_columns[k] < 0 || lengths[k] == 0.0 || (k >= 2) != (task.at.convention == Convention::urdf)) continue;
+        if (length_columns[k] < 0 || lengths[k] == 0.0 || (k >= 2) != (task.at.convention == Convention::urdf))
+          continue;
         const Design::Rows one = lengths[k] * free_columns(out, {length_columns[k]}, task.inputs, e.inputs, e.knots);
-        if (columns.size() == 0) columns = one;
-        else columns += one;
+        if (columns.size() == 0)
+          columns = one;
+        else
+          columns += one;
       }
-      if (columns.size() == 0) columns = Design::Rows::Zero(out.x.rows(), static_cast<Eigen::Index>(e.parameters.size()));
+      if (columns.size() == 0)
+        columns = Design::Rows::Zero(out.x.rows(), static_cast<Eigen::Index>(e.parameters.size()));
     } else {
       columns = free_columns(out, out.joint_column[task.at.joint_index(e.site)], task.inputs, e.inputs, e.knots);
       if (e.law_form == 1) {
@@ -681,7 +743,9 @@ Design make_design(const DesignTask& task) {
         const auto number = static_cast<std::size_t>(std::find(driven.begin(), driven.end(), k) - driven.begin());
         const bool known = number < task.data.direction.size() && task.data.direction[number];
         for (Eigen::Index i = 0; i < columns.rows(); ++i) {
-          columns.row(i) *= known ? 0.5 * task.data.direction[number][static_cast<std::size_t>(out.row[static_cast<std::size_t>(i)])] : 0.0;
+          columns.row(i) *=
+              known ? 0.5 * task.data.direction[number][static_cast<std::size_t>(out.row[static_cast<std::size_t>(i)])]
+                    : 0.0;
         }
       }
     }
@@ -701,14 +765,16 @@ Design make_design(const DesignTask& task) {
   std::vector<std::int32_t> groups_of[2];
   for (const std::int32_t row : out.row) {
     const std::int32_t cluster = task.cluster[static_cast<std::size_t>(row)];
-    if (fold_of.emplace(cluster, -1).second) groups_of[task.set[static_cast<std::size_t>(row)] ? 1 : 0].push_back(cluster);
+    if (fold_of.emplace(cluster, -1).second)
+      groups_of[task.set[static_cast<std::size_t>(row)] ? 1 : 0].push_back(cluster);
   }
   Random random(task.options.seed + 0x7f4a7c15u);
   for (int part = 0; part < 2; ++part) {
     std::vector<std::int32_t>& clusters = groups_of[part];
     for (std::size_t k = clusters.size(); k > 1; --k) std::swap(clusters[k - 1], clusters[random.below(k)]);
     for (std::size_t k = 0; k < clusters.size(); ++k) {
-      fold_of[clusters[k]] = part == 0 ? static_cast<std::int32_t>(k % kFolds) : kFolds + static_cast<std::int32_t>(k % kTestFolds);
+      fold_of[clusters[k]] =
+          part == 0 ? static_cast<std::int32_t>(k % kFolds) : kFolds + static_cast<std::int32_t>(k % kTestFolds);
     }
   }
   for (const std::int32_t row : out.row) {

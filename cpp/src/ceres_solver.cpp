@@ -38,8 +38,11 @@ class TileCost : public ceres::CostFunction {
 class PoseCost : public ceres::CostFunction {
  public:
   PoseCost(const Evaluator& problem, int tile, int pose, const Weighing& weighing, const Eigen::VectorXd& start)
-      : tile_(problem, tile, weighing, start), pose_(pose), components_(problem.tile_components(tile)),
-        rows_(problem.tile_rows(tile) * components_), columns_(static_cast<int>(problem.free().size())) {
+      : tile_(problem, tile, weighing, start),
+        pose_(pose),
+        components_(problem.tile_components(tile)),
+        rows_(problem.tile_rows(tile) * components_),
+        columns_(static_cast<int>(problem.free().size())) {
     set_num_residuals(components_);
     mutable_parameter_block_sizes()->push_back(columns_);
   }
@@ -50,7 +53,9 @@ class PoseCost : public ceres::CostFunction {
     double* const block[1] = {j.data()};
     tile_.Evaluate(parameters, r.data(), jacobians ? const_cast<double**>(block) : nullptr);
     std::copy_n(r.begin() + pose_ * components_, components_, residuals);
-    if (jacobians && jacobians[0]) std::copy_n(j.begin() + static_cast<std::ptrdiff_t>(pose_) * components_ * columns_, components_ * columns_, jacobians[0]);
+    if (jacobians && jacobians[0])
+      std::copy_n(j.begin() + static_cast<std::ptrdiff_t>(pose_) * components_ * columns_, components_ * columns_,
+                  jacobians[0]);
     return true;
   }
 
@@ -61,18 +66,22 @@ class PoseCost : public ceres::CostFunction {
 
 std::unique_ptr<ceres::LossFunction> make_loss(const Weighing& weighing) {
   switch (weighing.loss) {
-    case kernel::RowLoss::none: break;
-    case kernel::RowLoss::huber: return std::make_unique<ceres::HuberLoss>(weighing.loss_scale);
-    case kernel::RowLoss::cauchy: return std::make_unique<ceres::CauchyLoss>(weighing.loss_scale);
-    case kernel::RowLoss::tukey: return std::make_unique<ceres::TukeyLoss>(weighing.loss_scale);
+    case kernel::RowLoss::none:
+      break;
+    case kernel::RowLoss::huber:
+      return std::make_unique<ceres::HuberLoss>(weighing.loss_scale);
+    case kernel::RowLoss::cauchy:
+      return std::make_unique<ceres::CauchyLoss>(weighing.loss_scale);
+    case kernel::RowLoss::tukey:
+      return std::make_unique<ceres::TukeyLoss>(weighing.loss_scale);
   }
   return nullptr;
 }
 
 }  // namespace
 
-SolverSummary solve_with_ceres(const Evaluator& evaluator, const Model& model, const Weighing& weighing, const IdentifyOptions& options,
-                               Eigen::VectorXd* values) {
+SolverSummary solve_with_ceres(const Evaluator& evaluator, const Model& model, const Weighing& weighing,
+                               const IdentifyOptions& options, Eigen::VectorXd* values) {
   SolverSummary summary;
   summary.name = "ceres";
   if (evaluator.free().empty()) {

@@ -9,9 +9,9 @@
 
 #include "trigonometry.hpp"
 
-// Product of exponentials (Brockett 1984): T(q) = e1(q1) ... e6(q6) T(0), e_k a turn about axis k where it stands at zero.
-// Solved by the subproblems of Paden and Kahan (Murray, Li, Sastry 1994, ch. 3.3; further ones: Elias and Wen 2022), all of
-// which come down to one equation A cos + B sin = C. Angles stay pairs (cosine, sine) until the end.
+// Product of exponentials (Brockett 1984): T(q) = e1(q1) ... e6(q6) T(0), e_k a turn about axis k where it stands at
+// zero. Solved by the subproblems of Paden and Kahan (Murray, Li, Sastry 1994, ch. 3.3; further ones: Elias and Wen
+// 2022), all of which come down to one equation A cos + B sin = C. Angles stay pairs (cosine, sine) until the end.
 
 namespace truing::detail {
 namespace {
@@ -34,7 +34,9 @@ Vector2d turned_on(const Vector2d& q, int places) {
 inline Vector3d turned(const Vector3d& h, const Vector2d& q, const Vector3d& v) {
   return q[0] * v + q[1] * h.cross(v) + ((1.0 - q[0]) * h.dot(v)) * h;
 }
-inline Vector3d turned_back(const Vector3d& h, const Vector2d& q, const Vector3d& v) { return turned(h, {q[0], -q[1]}, v); }
+inline Vector3d turned_back(const Vector3d& h, const Vector2d& q, const Vector3d& v) {
+  return turned(h, {q[0], -q[1]}, v);
+}
 
 /// The part of v across h.
 inline Vector3d across(const Vector3d& h, const Vector3d& v) { return v - h.dot(v) * h; }
@@ -47,9 +49,9 @@ struct Angles {
   bool doubtful = false;  ///< the two may be one, or none
 };
 
-/// A cos + B sin = C. Its two angles lie to both sides of that of (A, B), sine squared D / (A^2 + B^2) away. `doubt`: how far
-/// that may be off for the robot as it is. A D within the doubt may be of either sign there, and gives two seeds apart; one
-/// that is negative by rounding is zero.
+/// A cos + B sin = C. Its two angles lie to both sides of that of (A, B), sine squared D / (A^2 + B^2) away. `doubt`:
+/// how far that may be off for the robot as it is. A D within the doubt may be of either sign there, and gives two
+/// seeds apart; one that is negative by rounding is zero.
 Angles solve_trigonometric(double A, double B, double C, double doubt) {
   constexpr double kRounding = 1e-11;
   Angles out;
@@ -139,7 +141,9 @@ Vector3d meeting_point(const Vector3d* h, const Vector3d* o, std::initializer_li
   return A.ldlt().solve(b);
 }
 
-double distance_to_line(const Vector3d& point, const Vector3d& h, const Vector3d& o) { return across(h, point - o).norm(); }
+double distance_to_line(const Vector3d& point, const Vector3d& h, const Vector3d& o) {
+  return across(h, point - o).norm();
+}
 
 double angle_between(const Vector3d& a, const Vector3d& b) { return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))); }
 
@@ -158,7 +162,8 @@ ClosedForm::ClosedForm(const Arm& arm, const InverseOptions& options) {
   for (std::size_t k = 0; k + 1 < axes.size();) {
     HomeAxis& a = axes[k];
     const HomeAxis& b = axes[k + 1];
-    const bool same = !a.prismatic && !b.prismatic && angle_between(a.direction, b.direction) < options.parallel_tolerance &&
+    const bool same = !a.prismatic && !b.prismatic &&
+                      angle_between(a.direction, b.direction) < options.parallel_tolerance &&
                       distance_to_line(b.point, a.direction, a.point) < options.wrist_tolerance;
     if (!same) {
       ++k;
@@ -166,7 +171,8 @@ ClosedForm::ClosedForm(const Arm& arm, const InverseOptions& options) {
     }
     const double sign = a.direction.dot(b.direction) < 0.0 ? -1.0 : 1.0;
     for (const auto& [joint, weight] : b.joints) a.joints.push_back({joint, sign * weight});
-    deviation_ = std::max({deviation_, angle_between(a.direction, b.direction), distance_to_line(b.point, a.direction, a.point)});
+    deviation_ = std::max(
+        {deviation_, angle_between(a.direction, b.direction), distance_to_line(b.point, a.direction, a.point)});
     axes.erase(axes.begin() + static_cast<std::ptrdiff_t>(k) + 1);
   }
   if (axes.size() != 6 || arm.driven() != rails_ + 6) return;
@@ -269,7 +275,8 @@ bool ClosedForm::find_shoulder(const InverseOptions& options) {
 }
 
 bool ClosedForm::find_three_parallel(const InverseOptions& options) {
-  const double angle = std::max({angle_between(h_[1], h_[2]), angle_between(h_[1], h_[3]), angle_between(h_[2], h_[3])});
+  const double angle =
+      std::max({angle_between(h_[1], h_[2]), angle_between(h_[1], h_[3]), angle_between(h_[2], h_[3])});
   if (angle > options.parallel_tolerance || angle_between(h_[4], h_[5]) < 0.1) return false;
   const Vector3d point = meeting_point(h_, o_, {4, 5});
   const double miss = std::max(distance_to_line(point, h_[4], o_[4]), distance_to_line(point, h_[5], o_[5]));
@@ -287,7 +294,8 @@ bool ClosedForm::find_three_parallel(const InverseOptions& options) {
 
 /// Are both angles of axis 5 so close together that an inexact arm may have them elsewhere?
 bool ClosedForm::nearly_singular(const Eigen::Vector2d* q, int count) const {
-  return count == 2 && std::abs(q[0][0] * q[1][1] - q[0][1] * q[1][0]) < 6.0 * doubt_;  // sine of twice the angle from the singularity
+  return count == 2 && std::abs(q[0][0] * q[1][1] - q[0][1] * q[1][0]) <
+                           6.0 * doubt_;  // sine of twice the angle from the singularity
 }
 
 /// e1 e2 e3 w = wanted for the wrist's centre w: at most four ways.
@@ -299,7 +307,8 @@ int ClosedForm::solve_positions(const Vector3d& wanted, Position* found) const {
   };
   switch (shoulder_) {
     case Shoulder::parallel_23: {
-      // Axes 2 and 3 leave the height along h as it is: h . e1^-1 wanted = h . w gives q1; then a planar arm of two links.
+      // Axes 2 and 3 leave the height along h as it is: h . e1^-1 wanted = h . w gives q1; then a planar arm of two
+      // links.
       const Vector3d& h = h_[1];
       const Angles first = solve_shoulder(wanted - o_[0], h_[0], h, h.dot(w - o_[0]), doubt_);
       for (int i = 0; i < first.count; ++i) {
@@ -370,13 +379,16 @@ int ClosedForm::solve_spherical(const Matrix3d& R, const Vector3d& p, double hol
   int count = 0;
   for (int k = 0; k < position_count; ++k) {
     const Vector2d* q = positions[k].q;
-    const auto back = [&](const Vector3d& v) { return turned_back(h_[2], q[2], turned_back(h_[1], q[1], turned_back(h_[0], q[0], v))); };
+    const auto back = [&](const Vector3d& v) {
+      return turned_back(h_[2], q[2], turned_back(h_[1], q[1], turned_back(h_[0], q[0], v)));
+    };
     const Vector3d R_h6 = back(G_h6), R_u = back(G_u);  // R = R4 R5 R6
     const Angles fifth = solve_projection(h_[3], h_[4], h_[5], h_[3].dot(R_h6), doubt_ * doubt_);
     for (int i = 0; i < fifth.count; ++i) {
       Vector2d fourth;
       // Where axes 4 and 6 line up, q4 stays where it is; q6 always makes up for what q4 leaves.
-      if (!solve_turn(h_[3], turned(h_[4], fifth.q[i], h_[5]), R_h6, &fourth)) fourth = {std::cos(hold), std::sin(hold)};
+      if (!solve_turn(h_[3], turned(h_[4], fifth.q[i], h_[5]), R_h6, &fourth))
+        fourth = {std::cos(hold), std::sin(hold)};
       // Where they nearly do, the robot as it is may have q4 anywhere: seeds all around.
       const bool shoulder = positions[k].place >= 0;
       const int places = !shoulder && i == 0 && nearly_singular(fifth.q, fifth.count) ? kPlaces : 1;
@@ -451,7 +463,8 @@ int ClosedForm::solve_parallel(const Matrix3d& R, const Vector3d& p, double hold
       add(q1, fifth.q[k], q6, places, i | k << 2, 2 * i);
     }
   }
-  // Where axis 1 is in doubt, it may stand so that axis 6 is parallel to the other three, which neither of its two angles shows.
+  // Where axis 1 is in doubt, it may stand so that axis 6 is parallel to the other three, which neither of its two
+  // angles shows.
   for (int way = 0; way < 2 && first.doubtful && !circles; ++way) {
     const Vector3d parallel = way == 0 ? G_h6 : Vector3d(-G_h6);
     Vector2d q1, q5, q6;
@@ -486,7 +499,9 @@ void ClosedForm::rail_range(int k, const Tip& wanted, bool turned, double* lower
     own -= others.col(i).dot(own) * others.col(i);
   }
   const double length = own.norm();
-  const Vector3d c = turned ? Vector3d(wanted.position + wanted.rotation * home_rotation_.transpose() * (o_[4] - home_position_)) : wanted.position;
+  const Vector3d c =
+      turned ? Vector3d(wanted.position + wanted.rotation * home_rotation_.transpose() * (o_[4] - home_position_))
+             : wanted.position;
   const double middle = own.dot(c - o_[0]) / (length * length), half = (turned ? reach_[0] : reach_[1]) / length;
   *lower = (middle - half) / rail_weight_[k];
   *upper = (middle + half) / rail_weight_[k];

@@ -14,14 +14,15 @@ namespace truing::detail {
 
 /// One configuration: angles of the arm's six axes, each but for whole turns.
 ///
-/// Near a singularity an arm that is not quite the closed form's may have one angle anywhere. Then there is a whole circle of
-/// seeds, `place` by place, of which those where the robot's own equation passes through zero are worth a descent.
+/// Near a singularity an arm that is not quite the closed form's may have one angle anywhere. Then there is a whole
+/// circle of seeds, `place` by place, of which those where the robot's own equation passes through zero are worth a
+/// descent.
 struct Configuration {
   double angle[6];  ///< [rad], in (-pi, pi]
   int branch;       ///< bits: shoulder, elbow, wrist
   int circle;       ///< -1: not one of many
   int place, places;
-  int about;        ///< the axis whose angle goes round
+  int about;  ///< the axis whose angle goes round
 };
 
 class ClosedForm {
@@ -41,17 +42,17 @@ class ClosedForm {
   bool exact() const { return doubt_ == 0.0; }
   int rails() const { return rails_; }  ///< prismatic joints before the arm: the first driven joints
 
-  /// Configurations for which the arm, its rails at `readings`, brings the target to `wanted`; if inexact, also those that are
-  /// lost by a little, and more than one where a wrist is nearly singular. A wrist that is singular keeps `hold`, the angle of
-  /// axis 4 (spherical wrist) or 6 (three parallel axes).
+  /// Configurations for which the arm, its rails at `readings`, brings the target to `wanted`; if inexact, also those
+  /// that are lost by a little, and more than one where a wrist is nearly singular. A wrist that is singular keeps
+  /// `hold`, the angle of axis 4 (spherical wrist) or 6 (three parallel axes).
   int solve(const Tip& wanted, const double* readings, double hold, Configuration* found) const;
 
-  /// Readings of the arm's joints for angles of the axes, each plus whole turns so as to come nearest to `seed` within the
-  /// limits. False: one of them cannot; `excess` says by how much, at worst, and readings are the nearest.
-  bool readings_near(const Configuration& found, const double* seed, const double* lower, const double* upper, double* readings,
-                     double* excess) const;
-  /// Readings of rail `k` between which the arm may reach: the wrist's centre lies within its reach of the first axis, wherever
-  /// the other rails are. Without `turned` the orientation is not known, and the reach is that of the target.
+  /// Readings of the arm's joints for angles of the axes, each plus whole turns so as to come nearest to `seed` within
+  /// the limits. False: one of them cannot; `excess` says by how much, at worst, and readings are the nearest.
+  bool readings_near(const Configuration& found, const double* seed, const double* lower, const double* upper,
+                     double* readings, double* excess) const;
+  /// Readings of rail `k` between which the arm may reach: the wrist's centre lies within its reach of the first axis,
+  /// wherever the other rails are. Without `turned` the orientation is not known, and the reach is that of the target.
   void rail_range(int k, const Tip& wanted, bool turned, double* lower, double* upper) const;
 
   /// The angle of axis `k` at these readings.
@@ -62,7 +63,7 @@ class ClosedForm {
   struct Position {
     Eigen::Vector2d q[3];  ///< cosine and sine of the first three angles
     int branch;
-    int place;             ///< on the shoulder's circle; -1: there is none
+    int place;  ///< on the shoulder's circle; -1: there is none
   };
 
   void find_rails(const std::vector<HomeAxis>& axes);
@@ -82,11 +83,11 @@ class ClosedForm {
   Eigen::Vector3d rail_[3];
   double reach_[2] = {0.0, 0.0};  ///< of the wrist's centre from the first axis' point, and of the target [m]
   double rail_weight_[3] = {1.0, 1.0, 1.0};
-  Eigen::Vector3d h_[6];  ///< directions of the axes at zero
-  Eigen::Vector3d o_[6];  ///< points on them
+  Eigen::Vector3d h_[6];           ///< directions of the axes at zero
+  Eigen::Vector3d o_[6];           ///< points on them
   Eigen::Matrix3d home_rotation_;  ///< of the target at zero
   Eigen::Vector3d home_position_;
-  double weight_[6][6];  ///< angle k = sum of weight_[k][j] * reading of arm joint j, j <= k
+  double weight_[6][6];                          ///< angle k = sum of weight_[k][j] * reading of arm joint j, j <= k
   double per_angle_[6], turn_[6], per_turn_[6];  ///< reading per angle; per whole turn, and its inverse
 };
 

@@ -29,7 +29,8 @@ int orientation_axis(const ParameterInfo& info) {
 
 void require_one_or_each(const char* what, std::size_t found, std::size_t rows) {
   if (found == 1 || found == rows) return;
-  throw std::invalid_argument("got " + std::to_string(found) + " " + what + " for " + std::to_string(rows) + " rows: give one, or one for each");
+  throw std::invalid_argument("got " + std::to_string(found) + " " + what + " for " + std::to_string(rows) +
+                              " rows: give one, or one for each");
 }
 
 const Conditions* one_or_each(const std::vector<Conditions>& conditions, std::size_t k) {
@@ -42,7 +43,9 @@ bool same_configuration(const Robot& robot, const Joints& a, const Joints& b) {
   constexpr double kSlide = 0.1;  // [m]
   Eigen::Index k = 0;
   for (const std::size_t joint : robot.driven_joints()) {
-    if (std::abs(a[k] - b[k]) > (robot.joints[joint].type == JointType::prismatic ? kSlide : kTurn * std::abs(1.0 / robot.joints[joint].ratio))) return false;
+    if (std::abs(a[k] - b[k]) >
+        (robot.joints[joint].type == JointType::prismatic ? kSlide : kTurn * std::abs(1.0 / robot.joints[joint].ratio)))
+      return false;
     ++k;
   }
   return true;
@@ -64,12 +67,13 @@ struct Compensator::Impl {
   CompensateOptions options;
   Conditions conditions;
   InverseSolver nominal, calibrated;
-  Arm arm;                         ///< the calibrated one, for what its parameters do
+  Arm arm;  ///< the calibrated one, for what its parameters do
   mutable ScratchPool pool;
-  std::vector<int> parameters;     ///< of the model, those that are known but for `covariance`
-  Eigen::MatrixXd covariance;      ///< of the parameters' own motions: rotation vectors turned into rotations
+  std::vector<int> parameters;  ///< of the model, those that are known but for `covariance`
+  Eigen::MatrixXd covariance;   ///< of the parameters' own motions: rotation vectors turned into rotations
 
-  Impl(const Robot& n, const Robot& c, const CompensateOptions& o, const Conditions& given, std::size_t target, const std::vector<Effect>& own)
+  Impl(const Robot& n, const Robot& c, const CompensateOptions& o, const Conditions& given, std::size_t target,
+       const std::vector<Effect>& own)
       : options(o),
         conditions(given),
         nominal(n, o.inverse, given, target, own),
@@ -77,17 +81,19 @@ struct Compensator::Impl {
         arm(c, given, target, own),
         pool(arm) {
     if (nominal.driven_count() != calibrated.driven_count()) {
-      throw std::invalid_argument("the nominal robot has " + std::to_string(nominal.driven_count()) + " driven joints, the calibrated one " +
-                                  std::to_string(calibrated.driven_count()));
+      throw std::invalid_argument("the nominal robot has " + std::to_string(nominal.driven_count()) +
+                                  " driven joints, the calibrated one " + std::to_string(calibrated.driven_count()));
     }
   }
 
   /// The way from the seed, where effects ask for it and nobody said: as the nominal robot goes.
-  const Conditions* with_direction(const Conditions& given, const Joints& seed, const Joints& way_to, Conditions* own) const {
+  const Conditions* with_direction(const Conditions& given, const Joints& seed, const Joints& way_to,
+                                   Conditions* own) const {
     if (!arm.has_effects() || !given.direction.empty()) return &given;
     *own = given;
     own->direction.resize(static_cast<std::size_t>(seed.size()));
-    for (Eigen::Index j = 0; j < seed.size(); ++j) own->direction[static_cast<std::size_t>(j)] = way_to[j] > seed[j] ? 1 : way_to[j] < seed[j] ? -1 : 0;
+    for (Eigen::Index j = 0; j < seed.size(); ++j)
+      own->direction[static_cast<std::size_t>(j)] = way_to[j] > seed[j] ? 1 : way_to[j] < seed[j] ? -1 : 0;
     return own;
   }
 
@@ -114,8 +120,8 @@ struct Compensator::Impl {
   }
 };
 
-Compensator::Compensator(const Robot& nominal, const Robot& calibrated, const CompensateOptions& options, const Conditions& conditions,
-                         std::size_t target, const std::vector<Effect>& own_effects)
+Compensator::Compensator(const Robot& nominal, const Robot& calibrated, const CompensateOptions& options,
+                         const Conditions& conditions, std::size_t target, const std::vector<Effect>& own_effects)
     : impl_(std::make_unique<Impl>(nominal, calibrated, options, conditions, target, own_effects)) {}
 Compensator::~Compensator() = default;
 Compensator::Compensator(Compensator&&) noexcept = default;
@@ -137,8 +143,9 @@ void Compensator::set_uncertainty(const std::vector<Parameter>& parameters, cons
     known.push_back(index);
   }
   if (covariance.rows() != static_cast<Eigen::Index>(known.size()) || covariance.cols() != covariance.rows()) {
-    throw std::invalid_argument("the covariance is " + std::to_string(covariance.rows()) + " x " + std::to_string(covariance.cols()) + ", but " +
-                                std::to_string(known.size()) + " parameters are not frozen");
+    throw std::invalid_argument("the covariance is " + std::to_string(covariance.rows()) + " x " +
+                                std::to_string(covariance.cols()) + ", but " + std::to_string(known.size()) +
+                                " parameters are not frozen");
   }
   // Orientations are reported as rotation vectors; what moves the target is the rotation on top.
   Eigen::MatrixXd T = Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols());
@@ -156,7 +163,8 @@ void Compensator::set_uncertainty(const std::vector<Parameter>& parameters, cons
       if (known[k] < 0) continue;
       const ParameterInfo& other = model.parameters[known[k]];
       if (orientation_axis(other) < 0 || frame_of(other.name) != frame) continue;
-      T(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = J(orientation_axis(model.parameters[known[i]]), orientation_axis(other));
+      T(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+          J(orientation_axis(model.parameters[known[i]]), orientation_axis(other));
     }
   }
   impl_->parameters = known;
@@ -177,7 +185,8 @@ Compensated Compensator::pose(const Task& task, const Joints& seed, const Condit
   const Conditions* with = impl_->with_direction(given, seed, from, &own);
   if (believed.reached()) impl_->before(real_task, from, with, &out);
   out.solution = impl_->calibrated.solve(real_task, from, with);
-  out.other_configuration = believed.reached() && !same_configuration(impl_->calibrated.robot(), out.solution.joints, from);
+  out.other_configuration =
+      believed.reached() && !same_configuration(impl_->calibrated.robot(), out.solution.joints, from);
   impl_->finish(with, &out);
   return out;
 }
@@ -189,7 +198,8 @@ Compensated Compensator::joints(const Joints& program, const Joints& seed, const
   Task task;
   task.T_measurement_target = impl_->nominal.forward(program, with);
   if (impl_->options.in_base) {
-    task.T_measurement_target = impl_->calibrated.robot().T_measurement_base * impl_->nominal.robot().T_measurement_base.inverse() * task.T_measurement_target;
+    task.T_measurement_target = impl_->calibrated.robot().T_measurement_base *
+                                impl_->nominal.robot().T_measurement_base.inverse() * task.T_measurement_target;
   }
   Compensated out;
   impl_->before(task, program, with, &out);
@@ -203,22 +213,26 @@ Compensated Compensator::joints(const Joints& program, const Joints& seed, const
   return out;
 }
 
-std::vector<Compensated> Compensator::pose_batch(const std::vector<Task>& tasks, const std::vector<Joints>& seeds, const std::vector<Conditions>& conditions,
-                                                 int threads, const std::function<bool(std::size_t)>& progress) const {
+std::vector<Compensated> Compensator::pose_batch(const std::vector<Task>& tasks, const std::vector<Joints>& seeds,
+                                                 const std::vector<Conditions>& conditions, int threads,
+                                                 const std::function<bool(std::size_t)>& progress) const {
   require_one_or_each("seeds", seeds.size(), tasks.size());
   if (!conditions.empty()) require_one_or_each("conditions", conditions.size(), tasks.size());
   std::vector<Compensated> results(tasks.size());
-  for_each_on_threads(tasks.size(), threads, progress,
-                      [&](std::size_t k) { results[k] = pose(tasks[k], seeds[seeds.size() == 1 ? 0 : k], one_or_each(conditions, k)); });
+  for_each_on_threads(tasks.size(), threads, progress, [&](std::size_t k) {
+    results[k] = pose(tasks[k], seeds[seeds.size() == 1 ? 0 : k], one_or_each(conditions, k));
+  });
   return results;
 }
 
-std::vector<Compensated> Compensator::joints_batch(const std::vector<Joints>& program, const std::vector<Conditions>& conditions, int threads,
+std::vector<Compensated> Compensator::joints_batch(const std::vector<Joints>& program,
+                                                   const std::vector<Conditions>& conditions, int threads,
                                                    const std::function<bool(std::size_t)>& progress) const {
   if (!conditions.empty()) require_one_or_each("conditions", conditions.size(), program.size());
   std::vector<Compensated> results(program.size());
-  for_each_on_threads(program.size(), threads, progress,
-                      [&](std::size_t k) { results[k] = joints(program[k], program[k == 0 ? 0 : k - 1], one_or_each(conditions, k)); });
+  for_each_on_threads(program.size(), threads, progress, [&](std::size_t k) {
+    results[k] = joints(program[k], program[k == 0 ? 0 : k - 1], one_or_each(conditions, k));
+  });
   return results;
 }
 

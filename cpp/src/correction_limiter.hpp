@@ -10,8 +10,9 @@
 
 namespace truing::detail {
 
-/// Follows a wanted correction within limits on size, rate and jerk: three nested loops, from position to rate to acceleration to jerk, each
-/// with a bound on what it asks of the next. The wanted correction's own speed is fed forward, so that a sway is followed without lag.
+/// Follows a wanted correction within limits on size, rate and jerk: three nested loops, from position to rate to
+/// acceleration to jerk, each with a bound on what it asks of the next. The wanted correction's own speed is fed
+/// forward, so that a sway is followed without lag.
 class CorrectionLimiter {
  public:
   explicit CorrectionLimiter(const CorrectionLimits& limits) : limits_(limits) {}
@@ -25,8 +26,10 @@ class CorrectionLimiter {
     const double dt = std::clamp(t - t_, 0.0, 1.0);
     t_ = t;
     if (dt > 0.0) {
-      part(wanted.head<3>(), last_wanted_.head<3>(), dt, limits_.position, limits_.position_rate, limits_.position_jerk, &position_);
-      part(wanted.tail<3>(), last_wanted_.tail<3>(), dt, limits_.rotation, limits_.rotation_rate, limits_.rotation_jerk, &rotation_);
+      part(wanted.head<3>(), last_wanted_.head<3>(), dt, limits_.position, limits_.position_rate, limits_.position_jerk,
+           &position_);
+      part(wanted.tail<3>(), last_wanted_.tail<3>(), dt, limits_.rotation, limits_.rotation_rate, limits_.rotation_jerk,
+           &rotation_);
       last_wanted_ = wanted;
     }
     Vector6d out;
@@ -39,8 +42,10 @@ class CorrectionLimiter {
   Eigen::Vector3d rate() const { return position_.v; }
 
  private:
-  struct Part { Eigen::Vector3d x = Eigen::Vector3d::Zero(), v = Eigen::Vector3d::Zero(), a = Eigen::Vector3d::Zero(); };
-  static constexpr double kStep = 1e-3;                         // of the integration [s]
+  struct Part {
+    Eigen::Vector3d x = Eigen::Vector3d::Zero(), v = Eigen::Vector3d::Zero(), a = Eigen::Vector3d::Zero();
+  };
+  static constexpr double kStep = 1e-3;                                   // of the integration [s]
   static constexpr double kFirst = 30.0, kSecond = 90.0, kThird = 270.0;  // of the loops [1/s]
 
   static Eigen::Vector3d bounded(const Eigen::Vector3d& v, double length) {
@@ -48,7 +53,8 @@ class CorrectionLimiter {
     return norm > length ? Eigen::Vector3d(v * (length / norm)) : v;
   }
 
-  static void part(const Eigen::Vector3d& wanted, const Eigen::Vector3d& before, double dt, double size, double rate, double jerk, Part* p) {
+  static void part(const Eigen::Vector3d& wanted, const Eigen::Vector3d& before, double dt, double size, double rate,
+                   double jerk, Part* p) {
     const Eigen::Vector3d target = bounded(wanted, size), from = bounded(before, size);
     Eigen::Vector3d speed = (target - from) / dt;
     if (speed.norm() > rate) speed.setZero();  // a step has no speed to feed forward

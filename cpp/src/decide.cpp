@@ -16,9 +16,10 @@ namespace truing::detail {
 
 using Kind = Explanation::Kind;
 constexpr int kNullDraws = 200;
-constexpr double kNoBetter = 1.004;   ///< a group must lower the cross-validated sum of squares by more than this
-constexpr double kFreeShare = 0.04;   ///< of what is left, that a free function must explain
-constexpr double kMeshNats = 5.0;     ///< beyond the threshold, that a mesh order must win: waves this short fit anything a little
+constexpr double kNoBetter = 1.004;  ///< a group must lower the cross-validated sum of squares by more than this
+constexpr double kFreeShare = 0.04;  ///< of what is left, that a free function must explain
+constexpr double kMeshNats =
+    5.0;  ///< beyond the threshold, that a mesh order must win: waves this short fit anything a little
 
 int input_named(const Work& work, const std::string& name) {
   for (std::size_t k = 0; k < work.inputs.size(); ++k) {
@@ -47,7 +48,8 @@ static void append(Work* work, Explanation what, const Design::Rows& columns, do
 }
 
 /// Mesh orders that win on what is left become candidates. True: there were some.
-static bool add_meshes(Work* work, const Evidence& evidence, const Evidence::State& state, const Robot& robot, double threshold) {
+static bool add_meshes(Work* work, const Evidence& evidence, const Evidence::State& state, const Robot& robot,
+                       double threshold) {
   const auto& left_out = work->options.leave_out;
   if (std::find(left_out.begin(), left_out.end(), "transmission_error") != left_out.end()) return false;
   bool any = false;
@@ -56,9 +58,10 @@ static bool add_meshes(Work* work, const Evidence& evidence, const Evidence::Sta
     Explanation e;
     const std::string& joint = robot.joints[mesh.joint].name;
     e.effect = "transmission_error@" + exact_number(mesh.order);
-    const bool known = std::any_of(work->design.candidates.named.begin(), work->design.candidates.named.end(), [&](const Explanation& other) {
-      return other.effect == e.effect && other.joints == std::vector<std::string>{joint};
-    });
+    const bool known = std::any_of(work->design.candidates.named.begin(), work->design.candidates.named.end(),
+                                   [&](const Explanation& other) {
+                                     return other.effect == e.effect && other.joints == std::vector<std::string>{joint};
+                                   });
     if (known) continue;
     e.joints = {joint};
     e.requests = {{e.effect, {joint}}};
@@ -67,7 +70,8 @@ static bool add_meshes(Work* work, const Evidence& evidence, const Evidence::Sta
     e.note = "the order " + number(mesh.order) + " per turn was found by trying " + std::to_string(mesh.tried);
     const Eigen::Index n = work->design.x.rows();
     Design::Rows columns(n, 2);
-    const auto input = std::find_if(work->inputs.begin(), work->inputs.end(), [&](const InputColumn& c) { return c.name == e.driver; });
+    const auto input = std::find_if(work->inputs.begin(), work->inputs.end(),
+                                    [&](const InputColumn& c) { return c.name == e.driver; });
     for (Eigen::Index i = 0; i < n; ++i) {
       const double q = input->values[static_cast<std::size_t>(work->design.row[static_cast<std::size_t>(i)])];
       const double d = work->design.x(i, work->design.joint_column[mesh.joint][0]);
@@ -82,7 +86,8 @@ static bool add_meshes(Work* work, const Evidence& evidence, const Evidence::Sta
 
 /// Of a free function and what it stands beside, the part that goes in as columns of the design.
 static void append_free(Work* work, const FreeGain& found, std::size_t trials) {
-  const Design::Rows columns = free_columns(work->design, found.site_columns, work->inputs, found.what.inputs, found.what.knots);
+  const Design::Rows columns =
+      free_columns(work->design, found.site_columns, work->inputs, found.what.inputs, found.what.knots);
   append(work, found.what, columns, std::log(static_cast<double>(trials)));
 }
 
@@ -103,7 +108,9 @@ Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std
 double cross_validated(const Work& work, const Choice& choice) {
   const auto& groups = work.design.candidates.groups;
   std::vector<int> columns = work.design.nuisance;
-  for (const int g : choice.groups) columns.insert(columns.end(), groups[static_cast<std::size_t>(g)].columns.begin(), groups[static_cast<std::size_t>(g)].columns.end());
+  for (const int g : choice.groups)
+    columns.insert(columns.end(), groups[static_cast<std::size_t>(g)].columns.begin(),
+                   groups[static_cast<std::size_t>(g)].columns.end());
   const Evidence whole(work.train, groups, work.design.nuisance, work.design.prior);
   const Evidence::State state = whole.evaluate(choice);
   const Gram all = work.train.of(columns);
@@ -157,7 +164,8 @@ Shortlist shortlist(const Work& work, const std::vector<int>& also) {
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const Explanation& e = work.design.candidates.named[g];
     const bool wanted = std::find(also.begin(), also.end(), static_cast<int>(g)) != also.end();
-    const bool plain = e.kind == Kind::catalogue || e.kind == Kind::all_geometry || (e.kind == Kind::drift && e.knots[0].size() <= 6);
+    const bool plain =
+        e.kind == Kind::catalogue || e.kind == Kind::all_geometry || (e.kind == Kind::drift && e.knots[0].size() <= 6);
     if (groups[g].shadow || groups[g].columns.empty() || (!wanted && !plain)) continue;
     ColumnGroup group = groups[g];
     group.corrects_law_at = -1;
@@ -166,20 +174,23 @@ Shortlist shortlist(const Work& work, const std::vector<int>& also) {
     out.which.push_back(static_cast<int>(g));
   }
   out.prior.resize(static_cast<Eigen::Index>(out.columns.size()));
-  for (Eigen::Index k = 0; k < out.prior.size(); ++k) out.prior[k] = work.design.prior[out.columns[static_cast<std::size_t>(k)]];
+  for (Eigen::Index k = 0; k < out.prior.size(); ++k)
+    out.prior[k] = work.design.prior[out.columns[static_cast<std::size_t>(k)]];
   return out;
 }
 
-/// Of the motion that a law and its correction make together, the part that the plain law must make to keep its name. What a
-/// joint does with its own angle can be anything: there the bar is higher.
+/// Of the motion that a law and its correction make together, the part that the plain law must make to keep its name.
+/// What a joint does with its own angle can be anything: there the bar is higher.
 static double least_share_of_law(const std::string& effect) {
-  const bool own_motion = effect == "harmonic" || effect == "gear_ratio" || effect == "joint_offset" || effect == "axis_wobble" || effect == "link_geometry";
+  const bool own_motion = effect == "harmonic" || effect == "gear_ratio" || effect == "joint_offset" ||
+                          effect == "axis_wobble" || effect == "link_geometry";
   return own_motion ? 0.92 : 0.65;
 }
 
 /// Effects that are functions of where the joints stand, and of nothing else that is recorded.
 static bool follows_configuration(const std::string& effect) {
-  static const std::set<std::string> names = {"harmonic", "gear_ratio", "joint_offset", "axis_wobble", "joint_compliance", "stiffness_zones", "gravity_backlash"};
+  static const std::set<std::string> names = {"harmonic",         "gear_ratio",      "joint_offset",    "axis_wobble",
+                                              "joint_compliance", "stiffness_zones", "gravity_backlash"};
   return names.count(effect) > 0;
 }
 
@@ -206,7 +217,8 @@ static Choice without_these(const Choice& choice, const std::vector<int>& gone) 
 static int add_fine_function(Work* work, const Robot& robot, std::size_t joint, const std::vector<int>& which) {
   std::vector<std::int32_t> rows;
   for (std::size_t i = 0; i < work->design.row.size(); ++i) {
-    if (work->design.fold[i] < work->design.folds && (i == 0 || work->design.row[i] != work->design.row[i - 1])) rows.push_back(work->design.row[i]);
+    if (work->design.fold[i] < work->design.folds && (i == 0 || work->design.row[i] != work->design.row[i - 1]))
+      rows.push_back(work->design.row[i]);
   }
   Explanation e;
   e.kind = Kind::free;
@@ -223,7 +235,8 @@ static int add_fine_function(Work* work, const Robot& robot, std::size_t joint, 
     name += "." + work->inputs[static_cast<std::size_t>(input)].name;
   }
   for (std::size_t k = 0; k < count; ++k) e.parameters.push_back(name + "." + std::to_string(k + 1));
-  append(work, e, free_columns(work->design, work->design.joint_column[joint], work->inputs, e.inputs, e.knots), std::log(300.0));
+  append(work, e, free_columns(work->design, work->design.joint_column[joint], work->inputs, e.inputs, e.knots),
+         std::log(300.0));
   return static_cast<int>(work->design.candidates.groups.size()) - 1;
 }
 
@@ -258,8 +271,8 @@ static void drop_contained(Work* work, Decision* decision) {
   }
 }
 
-/// A law and a free function at one joint: either the law is right but for a correction, or it is not this law and its name
-/// would be wrong. Decided by how much of the motion the plain law makes.
+/// A law and a free function at one joint: either the law is right but for a correction, or it is not this law and its
+/// name would be wrong. Decided by how much of the motion the plain law makes.
 static void question_laws(Work* work, const Robot& robot, Decision* decision) {
   drop_contained(work, decision);
   for (int round = 0; round < 6; ++round) {
@@ -270,13 +283,15 @@ static void question_laws(Work* work, const Robot& robot, Decision* decision) {
     bool changed = false;
     for (const int f : choice.groups) {
       const Explanation& free = named[static_cast<std::size_t>(f)];
-      if ((free.kind != Kind::free && free.kind != Kind::law) || free.site == "base" || decision->corrects.count(f)) continue;
+      if ((free.kind != Kind::free && free.kind != Kind::law) || free.site == "base" || decision->corrects.count(f))
+        continue;
       const std::size_t joint = robot.joint_index(free.site);
       // Laws at this joint, in or out, against the function and them together.
       std::vector<int> here = {f};
       for (const int g : choice.groups) {
         const Explanation& e = named[static_cast<std::size_t>(g)];
-        if (g != f && (e.kind == Kind::catalogue || e.kind == Kind::law) && e.joints == std::vector<std::string>{free.site} && e.effect != "link_geometry" &&
+        if (g != f && (e.kind == Kind::catalogue || e.kind == Kind::law) &&
+            e.joints == std::vector<std::string>{free.site} && e.effect != "link_geometry" &&
             e.effect.rfind("transmission", 0) != 0)
           here.push_back(g);
       }
@@ -285,8 +300,12 @@ static void question_laws(Work* work, const Robot& robot, Decision* decision) {
       Evidence::Gain best;
       for (std::size_t g = 0; g < groups.size(); ++g) {
         const Explanation& e = named[g];
-        if (e.kind != Kind::catalogue || groups[g].shadow || e.joints != std::vector<std::string>{free.site} || e.effect == "link_geometry" || e.effect.rfind("transmission", 0) == 0) continue;
-        if (free.kind == Kind::law && e.effect != free.effect && groups[g].law_at != groups[static_cast<std::size_t>(f)].corrects_law_at) continue;
+        if (e.kind != Kind::catalogue || groups[g].shadow || e.joints != std::vector<std::string>{free.site} ||
+            e.effect == "link_geometry" || e.effect.rfind("transmission", 0) == 0)
+          continue;
+        if (free.kind == Kind::law && e.effect != free.effect &&
+            groups[g].law_at != groups[static_cast<std::size_t>(f)].corrects_law_at)
+          continue;
         Evidence::Gain gain = evidence.gain(rest, groups[g].columns, groups[g].cost);
         const double share = gain.squares / std::max(together, 1e-300);
         if (share > least_share_of_law(e.effect) && gain.score > best.score) {
@@ -322,8 +341,12 @@ static void question_laws(Work* work, const Robot& robot, Decision* decision) {
       std::vector<int> gone = {f};
       for (const int g : here) {
         const std::string& driver = named[static_cast<std::size_t>(g)].driver;
-        const bool of_these = std::any_of(inputs.begin(), inputs.end(), [&](int i) { return work->inputs[static_cast<std::size_t>(i)].name == driver; });
-        if (g != f && (of_these || (by_configuration && follows_configuration(named[static_cast<std::size_t>(g)].effect)))) gone.push_back(g);
+        const bool of_these = std::any_of(inputs.begin(), inputs.end(), [&](int i) {
+          return work->inputs[static_cast<std::size_t>(i)].name == driver;
+        });
+        if (g != f &&
+            (of_these || (by_configuration && follows_configuration(named[static_cast<std::size_t>(g)].effect))))
+          gone.push_back(g);
       }
       if (gone.size() == 1 && free.kind == Kind::free) continue;
       const Choice remaining = without_these(choice, gone);
@@ -352,7 +375,9 @@ Decision decide(Work* work, const Robot& robot) {
   Decision out;
   SearchOptions& search = out.search;
   search.most_groups = options.max_effects;
-  const auto evidence_now = [&] { return Evidence(work->train, work->design.candidates.groups, work->design.nuisance, work->design.prior); };
+  const auto evidence_now = [&] {
+    return Evidence(work->train, work->design.candidates.groups, work->design.nuisance, work->design.prior);
+  };
 
   // Is there a gap at all?
   {
@@ -371,7 +396,8 @@ Decision decide(Work* work, const Robot& robot) {
     std::sort(null.begin(), null.end());
     // The threshold that noise alone passes as often as is allowed.
     if (!null.empty()) {
-      const double at = null[static_cast<std::size_t>(std::min<double>(static_cast<double>(null.size()) - 1.0, (1.0 - options.false_alarm) * static_cast<double>(null.size())))];
+      const double at = null[static_cast<std::size_t>(std::min<double>(
+          static_cast<double>(null.size()) - 1.0, (1.0 - options.false_alarm) * static_cast<double>(null.size())))];
       search.threshold = std::max(search.threshold, at);
     }
   }
@@ -385,7 +411,8 @@ Decision decide(Work* work, const Robot& robot) {
     const FreeScan scan = scan_free(work->design, evidence, out.state, work->inputs, robot, work->deff, scan_options);
     out.p_left = scan.p;
     const bool room = static_cast<int>(out.state.choice.groups.size()) < search.most_groups;
-    if (room && !scan.best.empty() && scan.p <= 0.02 && scan.best.front().gain.score > search.threshold + 4.0 && scan.best.front().gain.share > kFreeShare) {
+    if (room && !scan.best.empty() && scan.p <= 0.02 && scan.best.front().gain.score > search.threshold + 4.0 &&
+        scan.best.front().gain.share > kFreeShare) {
       const FreeGain& best = scan.best.front();
       append_free(work, best, scan.tried);
       extend_grams(work);
@@ -408,7 +435,9 @@ Decision decide(Work* work, const Robot& robot) {
   }
   question_laws(work, robot, &out);
   if (out.p_gap > options.false_alarm) {
-    const bool only_named = std::all_of(out.state.choice.groups.begin(), out.state.choice.groups.end(), [&](int g) { return is_named(work->design.candidates.named[static_cast<std::size_t>(g)]); });
+    const bool only_named = std::all_of(out.state.choice.groups.begin(), out.state.choice.groups.end(), [&](int g) {
+      return is_named(work->design.candidates.named[static_cast<std::size_t>(g)]);
+    });
     if (only_named && !out.state.choice.groups.empty()) out.state = evidence_now().evaluate({});
   }
   return out;

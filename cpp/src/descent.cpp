@@ -26,7 +26,8 @@ Vector3d swing_between(const Vector3d& a, const Vector3d& b) {
   return cosine > 0.0 ? n : Vector3d(kPi * a.unitOrthogonal());
 }
 
-/// How far `value` must move to be in the window, 0 inside. Aims `inside` the edge, or at the middle of what is narrower.
+/// How far `value` must move to be in the window, 0 inside. Aims `inside` the edge, or at the middle of what is
+/// narrower.
 double way_into(const Window& window, double value, double inside) {
   if (value >= window.lower && value <= window.upper) return 0.0;
   inside = std::min(inside, 0.5 * (window.upper - window.lower));
@@ -182,9 +183,9 @@ bool solve_positive(int n, double (*A)[kMostRows], double* b) {
   return true;
 }
 
-/// dq = W J^T (J W J^T + damping I)^-1 error over the joints that are free to move: the damped pseudo-inverse with joint
-/// scales W. A joint that would pass its limit goes to the limit and no further, and the others are solved for again with
-/// what is then left of the error: an active set, so that the error is redistributed and not cut off.
+/// dq = W J^T (J W J^T + damping I)^-1 error over the joints that are free to move: the damped pseudo-inverse with
+/// joint scales W. A joint that would pass its limit goes to the limit and no further, and the others are solved for
+/// again with what is then left of the error: an active set, so that the error is redistributed and not cut off.
 bool solve_step(const Problem& problem, const Rows& rows, const double* q, double damping, double* step) {
   const int n = problem.arm.driven(), m = rows.count;
   const double* scale = problem.scales.joint;
@@ -208,7 +209,8 @@ bool solve_step(const Problem& problem, const Rows& rows, const double* q, doubl
     if (!free[j]) continue;
     double downhill = 0.0;
     for (int r = 0; r < m; ++r) downhill += rows.column[j][r] * error[r];
-    const bool at_limit = !problem.options.ignore_limits && ((q[j] >= upper[j] && downhill > 0.0) || (q[j] <= lower[j] && downhill < 0.0));
+    const bool at_limit = !problem.options.ignore_limits &&
+                          ((q[j] >= upper[j] && downhill > 0.0) || (q[j] <= lower[j] && downhill < 0.0));
     free[j] = !at_limit;
     if (free[j]) add_joint(j, 1.0);
   }
@@ -299,7 +301,8 @@ Miss miss_of(const Goal& goal, const Tip& tip) {
     } else {
       miss.rotation = swing_between(tip.rotation * goal.axis, goal.rotation * goal.axis).norm();
     }
-    if (goal.rolls) miss.rotation = std::max(miss.rotation, std::abs(way_into(goal.roll, roll_near(goal.roll, miss.roll), 0.0)));
+    if (goal.rolls)
+      miss.rotation = std::max(miss.rotation, std::abs(way_into(goal.roll, roll_near(goal.roll, miss.roll), 0.0)));
   }
   return miss;
 }
@@ -321,10 +324,10 @@ double Limits::excess(int driven, const double* readings, int* joint) const {
   return worst;
 }
 
-// Levenberg-Marquardt whose damping follows the squared error (Sugihara 2011): far away it is careful, near the goal it is
-// Newton. A step that does not lower the cost is taken back and the damping raised.
-void descend(const Arm& arm, const Limits& limits, const Scales& scales, const Goal& goal, const DescentOptions& options,
-             EffectScratch* scratch, Descent* out) {
+// Levenberg-Marquardt whose damping follows the squared error (Sugihara 2011): far away it is careful, near the goal it
+// is Newton. A step that does not lower the cost is taken back and the damping raised.
+void descend(const Arm& arm, const Limits& limits, const Scales& scales, const Goal& goal,
+             const DescentOptions& options, EffectScratch* scratch, Descent* out) {
   const Problem problem{arm, limits, scales, goal, options, scratch};
   const int n = arm.driven();
   double* q = out->readings;

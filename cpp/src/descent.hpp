@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// From a seed to the nearest joints that fulfil a task, within limits: damped least squares on the rows that the task needs.
+// From a seed to the nearest joints that fulfil a task, within limits: damped least squares on the rows that the task
+// needs.
 
 #include <limits>
 #include <vector>
@@ -20,11 +21,11 @@ struct Goal {
   Eigen::Matrix3d rotation;  ///< wanted
   Eigen::Vector3d position;
   Eigen::Vector3d axis, travel, across;  ///< torch: a right-handed frame (travel, across, axis) on the target
-  bool leans = false;        ///< lead or work may be other than zero
+  bool leans = false;                    ///< lead or work may be other than zero
   Window roll, lead, work;
-  bool rolls = false;        ///< roll has a window
+  bool rolls = false;                                             ///< roll has a window
   double wanted_roll = std::numeric_limits<double>::quiet_NaN();  ///< NaN: anywhere in the window
-  Eigen::Vector3d retreat;   ///< unit vector
+  Eigen::Vector3d retreat;                                        ///< unit vector
   double longest_retreat = 0.0;
 
   explicit Goal(const Task& task);
@@ -57,18 +58,18 @@ struct Limits {
 
 /// What a descent needs to know of a robot beside its kinematics.
 struct Scales {
-  double length = 1.0;                     ///< so many metres count as a radian
-  double joint[kMaxDrivenJoints];          ///< a radian's worth of each joint: 1, or `length` for prismatic ones
+  double length = 1.0;             ///< so many metres count as a radian
+  double joint[kMaxDrivenJoints];  ///< a radian's worth of each joint: 1, or `length` for prismatic ones
 };
 
 struct DescentOptions {
   int max_iterations = 60;
-  double tolerance = 1e-10;       ///< done when position [m] and rotation [rad] rows are no longer
-  double rotation_weight = 1.0;   ///< of a radian against `length` metres
+  double tolerance = 1e-10;      ///< done when position [m] and rotation [rad] rows are no longer
+  double rotation_weight = 1.0;  ///< of a radian against `length` metres
   bool ignore_limits = false;
-  int fixed_joints = 0;           ///< so many first joints stay where they are
-  int patience = 6;               ///< given up after so many steps in a row that gain less than a tenth
-  double longest_step = 1.0;      ///< of any joint, in radians' worth
+  int fixed_joints = 0;       ///< so many first joints stay where they are
+  int patience = 6;           ///< given up after so many steps in a row that gain less than a tenth
+  double longest_step = 1.0;  ///< of any joint, in radians' worth
 };
 
 struct Descent {
@@ -79,7 +80,7 @@ struct Descent {
 };
 
 /// Descends from `out->readings`, which is first brought within limits.
-void descend(const Arm& arm, const Limits& limits, const Scales& scales, const Goal& goal, const DescentOptions& options,
-             EffectScratch* scratch, Descent* out);
+void descend(const Arm& arm, const Limits& limits, const Scales& scales, const Goal& goal,
+             const DescentOptions& options, EffectScratch* scratch, Descent* out);
 
 }  // namespace truing::detail

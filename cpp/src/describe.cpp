@@ -20,8 +20,8 @@ namespace truing::detail {
 using Kind = Explanation::Kind;
 
 /// Motion of a site, pose by pose, as the measurements say it, and the fitted function through it.
-static Curve curve_of(const Work& work, const Evidence::State& state, const std::map<int, int>& corrects, int group, int input, int site_column,
-               double second_low, double second_high, int second) {
+static Curve curve_of(const Work& work, const Evidence::State& state, const std::map<int, int>& corrects, int group,
+                      int input, int site_column, double second_low, double second_high, int second) {
   const Design& design = work.design;
   Curve out;
   const InputColumn& along = work.inputs[static_cast<std::size_t>(input)];
@@ -29,7 +29,8 @@ static Curve curve_of(const Work& work, const Evidence::State& state, const std:
   out.input_unit = along.unit;
   out.unit = design.column_units[static_cast<std::size_t>(site_column)];
   out.site = design.column_names[static_cast<std::size_t>(site_column)];
-  if (out.site.size() > 7 && out.site.compare(out.site.size() - 7, 7, ".offset") == 0) out.site.resize(out.site.size() - 7);
+  if (out.site.size() > 7 && out.site.compare(out.site.size() - 7, 7, ".offset") == 0)
+    out.site.resize(out.site.size() - 7);
   if (second >= 0) {
     out.second_input = work.inputs[static_cast<std::size_t>(second)].name;
     out.second_low = second_low;
@@ -42,7 +43,8 @@ static Curve curve_of(const Work& work, const Evidence::State& state, const std:
     bool of_law = false;
     for (const auto& [other, corrected] : corrects) {
       const ColumnGroup& o = design.candidates.groups[static_cast<std::size_t>(other)];
-      of_law |= corrected == group && std::find(o.columns.begin(), o.columns.end(), state.columns[c]) != o.columns.end();
+      of_law |=
+          corrected == group && std::find(o.columns.begin(), o.columns.end(), state.columns[c]) != o.columns.end();
     }
     if (of_group || of_law) own.push_back(c);
   }
@@ -57,7 +59,8 @@ static Curve curve_of(const Work& work, const Evidence::State& state, const std:
       if (value < second_low || value > second_high) continue;
     }
     double e = design.y[i], f = 0.0;
-    for (std::size_t c = 0; c < state.columns.size(); ++c) e -= design.x(i, state.columns[c]) * state.solution[static_cast<Eigen::Index>(c)];
+    for (std::size_t c = 0; c < state.columns.size(); ++c)
+      e -= design.x(i, state.columns[c]) * state.solution[static_cast<Eigen::Index>(c)];
     for (const std::size_t c : own) f += design.x(i, state.columns[c]) * state.solution[static_cast<Eigen::Index>(c)];
     const double w = design.weight[i], d = w * design.x(i, site_column);
     Sum& sum = poses[row];
@@ -75,7 +78,8 @@ static Curve curve_of(const Work& work, const Evidence::State& state, const std:
   std::vector<Sample> samples;
   for (const auto& [row, sum] : poses) {
     if (!(sum.dd > least) || !(sum.dd > 0.0)) continue;
-    samples.push_back({along.values[static_cast<std::size_t>(row)], (sum.de + sum.df) / sum.dd, sum.df / sum.dd, sum.dd});
+    samples.push_back(
+        {along.values[static_cast<std::size_t>(row)], (sum.de + sum.df) / sum.dd, sum.df / sum.dd, sum.dd});
   }
   if (samples.empty()) return out;
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.x < b.x; });
@@ -89,7 +93,8 @@ static Curve curve_of(const Work& work, const Evidence::State& state, const std:
   const std::size_t bins = std::min<std::size_t>(distinct.size(), 24);
   const double sigma = std::sqrt(state.sigma2);
   for (std::size_t b = 0; b < bins; ++b) {
-    const std::size_t from = distinct.size() <= 24 ? 0 : b * samples.size() / bins, to = distinct.size() <= 24 ? samples.size() : (b + 1) * samples.size() / bins;
+    const std::size_t from = distinct.size() <= 24 ? 0 : b * samples.size() / bins,
+                      to = distinct.size() <= 24 ? samples.size() : (b + 1) * samples.size() / bins;
     double x = 0.0, f = 0.0, weight = 0.0, lever = 0.0;
     for (std::size_t k = from; k < to; ++k) {
       if (distinct.size() <= 24 && std::abs(samples[k].x - distinct[b]) > 1e-9) continue;
@@ -115,12 +120,15 @@ static std::string separated_by(const std::string& a, const std::string& b) {
   const auto pair_is = [&](const char* x, const char* y) { return (a == x && b == y) || (a == y && b == x); };
   const auto one_is = [&](const char* x) { return a == x || b == x; };
   if (one_is("backlash")) return "approach the same poses from both sides";
-  if (pair_is("thermal", "drift") || pair_is("thermal_zero", "drift")) return "measure during warm-up and cool-down, or touch a fixed nest again and again";
+  if (pair_is("thermal", "drift") || pair_is("thermal_zero", "drift"))
+    return "measure during warm-up and cool-down, or touch a fixed nest again and again";
   if (one_is("thermal") || one_is("thermal_zero")) return "measure at two temperatures";
   if (one_is("scale")) return "measure a scale bar of known length";
   if (one_is("drift")) return "measure fixed points again and again";
   if (pair_is("joint_compliance", "link_compliance")) return "put a target on the elbow, or measure orientations";
-  if (one_is("joint_compliance") || one_is("link_compliance") || one_is("stiffness_zones") || one_is("gravity_backlash")) return "repeat the same poses with another payload";
+  if (one_is("joint_compliance") || one_is("link_compliance") || one_is("stiffness_zones") ||
+      one_is("gravity_backlash"))
+    return "repeat the same poses with another payload";
   if (one_is("gear_ratio") || one_is("harmonic")) return "use the joint's full range, both turns";
   if (one_is("axis_wobble")) return "measure orientations as well";
   return "measure poses where the two differ: see the next poses";
@@ -131,7 +139,8 @@ static std::string identify_as(const Explanation& e) {
   if (e.kind == Kind::drift) return "";
   if (e.kind == Kind::all_geometry) return e.effect;
   std::string out;
-  for (const EffectRequest& request : e.requests.empty() ? std::vector<EffectRequest>{{e.effect, e.joints}} : e.requests) {
+  for (const EffectRequest& request :
+       e.requests.empty() ? std::vector<EffectRequest>{{e.effect, e.joints}} : e.requests) {
     out += (out.empty() ? "" : ",") + request.effect;
     for (std::size_t k = 0; k < request.joints.size(); ++k) out += (k == 0 ? ":" : "+") + request.joints[k];
   }
@@ -139,8 +148,9 @@ static std::string identify_as(const Explanation& e) {
 }
 
 /// What the user reads of one group.
-FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at, const Sureness& sure, double probability,
-                     const Identification& refitted, const Resampled& resampled) {
+FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
+                     const Sureness& sure, double probability, const Identification& refitted,
+                     const Resampled& resampled) {
   const auto& groups = work.design.candidates.groups;
   const auto& named = work.design.candidates.named;
   const int g = decision.state.choice.groups[at];
@@ -159,11 +169,14 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   if (out.parameters.empty() && e.kind == Kind::catalogue) {  // found by the search
     for (const std::string& name : e.parameters) {
       const int column = work.design.column(name);
-      const auto k = std::find(decision.state.columns.begin(), decision.state.columns.end(), column) - decision.state.columns.begin();
+      const auto k = std::find(decision.state.columns.begin(), decision.state.columns.end(), column) -
+                     decision.state.columns.begin();
       if (column < 0 || k >= static_cast<std::ptrdiff_t>(decision.state.columns.size())) continue;
       const Eigen::VectorXd unit = Eigen::VectorXd::Unit(decision.state.solution.size(), static_cast<Eigen::Index>(k));
       const double variance = decision.state.sigma2 * unit.dot(decision.state.factor.solve(unit));
-      out.parameters.push_back({name, 0.0, decision.state.solution[static_cast<Eigen::Index>(k)], std::sqrt(std::max(variance, 0.0)), work.design.column_units[static_cast<std::size_t>(column)], false});
+      out.parameters.push_back({name, 0.0, decision.state.solution[static_cast<Eigen::Index>(k)],
+                                std::sqrt(std::max(variance, 0.0)),
+                                work.design.column_units[static_cast<std::size_t>(column)], false});
     }
   }
   const Evidence::State less = evidence.evaluate(without(decision.state.choice, groups, at));
@@ -171,7 +184,8 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   out.held_out_after = error_statistics(held_out_lengths(work.design, decision.state));
   const double shrink = out.held_out_before.rms > 0.0 ? 1.0 - out.held_out_after.rms / out.held_out_before.rms : 0.0;
   const auto spread = resampled.shrink_of.find(g);
-  out.shrink = percentile_interval(spread == resampled.shrink_of.end() ? std::vector<double>{} : spread->second, shrink);
+  out.shrink =
+      percentile_interval(spread == resampled.shrink_of.end() ? std::vector<double>{} : spread->second, shrink);
   const Evidence::State nothing = evidence.evaluate({});
   Choice only;
   only.groups = {g};
@@ -180,7 +194,9 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   if (gap > 0.0) {
     const Evidence::State alone = evidence.evaluate(only);
     out.share_alone = std::max(0.0, 1.0 - held_out_squares(work.test, alone.columns, alone.solution) / gap);
-    out.share_last = std::max(0.0, (held_out_squares(work.test, less.columns, less.solution) - held_out_squares(work.test, decision.state.columns, decision.state.solution)) / gap);
+    out.share_last = std::max(0.0, (held_out_squares(work.test, less.columns, less.solution) -
+                                    held_out_squares(work.test, decision.state.columns, decision.state.solution)) /
+                                       gap);
   }
   std::set<std::pair<std::string, std::vector<std::string>>> listed_already;
   double rest = 0.0;
@@ -188,20 +204,30 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   for (const Rival& rival : sure.rivals) {
     const Explanation& other = named[static_cast<std::size_t>(rival.group)];
     if (!rival.in_class || !listed_already.insert({other.effect, other.joints}).second) continue;
-    out.confounded_with.push_back({other.effect, other.joints, probability * std::exp(-0.5 * std::max(0.0, rival.loss)) / (1.0 + rest), separated_by(e.effect, other.effect)});
+    out.confounded_with.push_back({other.effect, other.joints,
+                                   probability * std::exp(-0.5 * std::max(0.0, rival.loss)) / (1.0 + rest),
+                                   separated_by(e.effect, other.effect)});
     if (out.confounded_with.size() >= 8) break;
   }
   // What was not recorded may do the same.
-  static const std::map<std::string, std::vector<std::string>> mimics = {
-      {"backlash", {"windup", "time_offset"}}, {"drift", {"thermal", "thermal_zero"}}, {"thermal", {"drift"}}, {"thermal_zero", {"drift"}}, {"joint_compliance", {"windup"}},
-      {"stiffness_zones", {"windup"}}, {"gravity_backlash", {"windup"}}};
+  static const std::map<std::string, std::vector<std::string>> mimics = {{"backlash", {"windup", "time_offset"}},
+                                                                         {"drift", {"thermal", "thermal_zero"}},
+                                                                         {"thermal", {"drift"}},
+                                                                         {"thermal_zero", {"drift"}},
+                                                                         {"joint_compliance", {"windup"}},
+                                                                         {"stiffness_zones", {"windup"}},
+                                                                         {"gravity_backlash", {"windup"}}};
   const auto mimic = mimics.find(e.effect);
   for (std::size_t k = 0; mimic != mimics.end() && k < mimic->second.size(); ++k) {
-    const auto untested = std::find_if(work.design.candidates.not_testable.begin(), work.design.candidates.not_testable.end(),
-                                       [&](const NotTestable& n) { return n.effect == mimic->second[k] && n.why.find("column") != std::string::npos; });
+    const auto untested =
+        std::find_if(work.design.candidates.not_testable.begin(), work.design.candidates.not_testable.end(),
+                     [&](const NotTestable& n) {
+                       return n.effect == mimic->second[k] && n.why.find("column") != std::string::npos;
+                     });
     if (untested == work.design.candidates.not_testable.end()) continue;
     const bool whole_robot = mimic->second[k] == "time_offset" || mimic->second[k] == "drift";
-    out.confounded_with.push_back({mimic->second[k], whole_robot ? std::vector<std::string>{} : e.joints, 0.0, "record what it needs: " + untested->why});
+    out.confounded_with.push_back({mimic->second[k], whole_robot ? std::vector<std::string>{} : e.joints, 0.0,
+                                   "record what it needs: " + untested->why});
   }
   // The law, drawn.
   for (const int other : decision.state.choice.groups) {
@@ -209,18 +235,24 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
     if (corrected == decision.corrects.end() || corrected->second != g) continue;
     const Explanation& correction = named[static_cast<std::size_t>(other)];
     const std::string driver = work.inputs[static_cast<std::size_t>(correction.inputs[0])].name;
-    out.note += (out.note.empty() ? "" : "; ") + std::string("its law is not the simple one: see the curve over ") + driver;
+    out.note +=
+        (out.note.empty() ? "" : "; ") + std::string("its law is not the simple one: see the curve over ") + driver;
     const int input = input_named(work, driver);
     if (input >= 0 && !e.joints.empty()) {
       const std::size_t joint = work.frames.robot.joint_index(e.joints[0]);
-      out.curves.push_back(curve_of(work, decision.state, decision.corrects, g, input, work.design.joint_column[joint][0], 0, 0, -1));
+      out.curves.push_back(
+          curve_of(work, decision.state, decision.corrects, g, input, work.design.joint_column[joint][0], 0, 0, -1));
     }
   }
   const int driver = input_named(work, e.driver);
-  if (driver >= 0 && e.kind == Kind::catalogue && e.joints.size() == 1 && e.effect != "axis_wobble" && e.effect != "thermal" && e.effect != "link_compliance") {
+  if (driver >= 0 && e.kind == Kind::catalogue && e.joints.size() == 1 && e.effect != "axis_wobble" &&
+      e.effect != "thermal" && e.effect != "link_compliance") {
     const std::size_t joint = work.frames.robot.joint_index(e.joints[0]);
-    const bool drawn = std::any_of(out.curves.begin(), out.curves.end(), [&](const Curve& c) { return c.input == e.driver; });
-    if (!drawn) out.curves.push_back(curve_of(work, decision.state, decision.corrects, g, driver, work.design.joint_column[joint][0], 0, 0, -1));
+    const bool drawn =
+        std::any_of(out.curves.begin(), out.curves.end(), [&](const Curve& c) { return c.input == e.driver; });
+    if (!drawn)
+      out.curves.push_back(
+          curve_of(work, decision.state, decision.corrects, g, driver, work.design.joint_column[joint][0], 0, 0, -1));
   }
   if (e.effect == "drift" && driver >= 0) {
     for (std::size_t c = 0; c < 3 && c < work.design.base_columns.size(); ++c) {
@@ -231,7 +263,8 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   return out;
 }
 
-UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at, const Resampled& resampled) {
+UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
+                               const Resampled& resampled) {
   const auto& groups = work.design.candidates.groups;
   const int g = decision.state.choice.groups[at];
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
@@ -243,10 +276,13 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   out.held_out_after = error_statistics(held_out_lengths(work.design, decision.state));
   const double shrink = out.held_out_before.rms > 0.0 ? 1.0 - out.held_out_after.rms / out.held_out_before.rms : 0.0;
   const auto spread = resampled.shrink_of.find(g);
-  out.shrink = percentile_interval(spread == resampled.shrink_of.end() ? std::vector<double>{} : spread->second, shrink);
+  out.shrink =
+      percentile_interval(spread == resampled.shrink_of.end() ? std::vector<double>{} : spread->second, shrink);
   const double gap = held_out_squares(work.test, evidence.evaluate({}).columns, evidence.evaluate({}).solution);
   if (gap > 0.0) {
-    out.share = std::max(0.0, held_out_squares(work.test, less.columns, less.solution) - held_out_squares(work.test, decision.state.columns, decision.state.solution)) / gap;
+    out.share = std::max(0.0, held_out_squares(work.test, less.columns, less.solution) -
+                                  held_out_squares(work.test, decision.state.columns, decision.state.solution)) /
+                gap;
   }
   const double loss = decision.state.score - less.score;
   out.probability = std::clamp(0.5 + 0.49 * std::min(1.0, loss / 30.0), 0.0, 0.99);
@@ -270,7 +306,8 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
     edges[1] = quantile(&values, 1.0 / 3.0);
     edges[2] = quantile(&values, 2.0 / 3.0);
     for (int k = 0; k < 3; ++k) {
-      Curve curve = curve_of(work, decision.state, decision.corrects, g, e.inputs[0], site, edges[k], edges[k + 1], e.inputs[1]);
+      Curve curve =
+          curve_of(work, decision.state, decision.corrects, g, e.inputs[0], site, edges[k], edges[k + 1], e.inputs[1]);
       if (!curve.points.empty()) out.curves.push_back(std::move(curve));
     }
   }
@@ -289,7 +326,8 @@ UnknownEffect describe_lack_of_fit(const Diagnosis& d, double excess) {
   return out;
 }
 
-std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidence, const std::vector<Evidence::Gain>& first) {
+std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidence,
+                                       const std::vector<Evidence::Gain>& first) {
   const auto& groups = work.design.candidates.groups;
   const auto& named = work.design.candidates.named;
   // Everything at once, under a wide prior: what "fit all and read the table" would show.
@@ -320,8 +358,11 @@ std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidenc
       c.held_out_gain = 1.0 - cross_validated(work, alone) / without_any;
     }
     for (std::size_t k = 0; k < all.columns.size(); ++k) {
-      const bool mine = std::find(groups[g].columns.begin(), groups[g].columns.end(), all.columns[k]) != groups[g].columns.end();
-      if (mine) c.largest_z = std::max(c.largest_z, std::abs(all.solution[static_cast<Eigen::Index>(k)]) / sigma[static_cast<Eigen::Index>(k)]);
+      const bool mine =
+          std::find(groups[g].columns.begin(), groups[g].columns.end(), all.columns[k]) != groups[g].columns.end();
+      if (mine)
+        c.largest_z = std::max(
+            c.largest_z, std::abs(all.solution[static_cast<Eigen::Index>(k)]) / sigma[static_cast<Eigen::Index>(k)]);
     }
     out.push_back(std::move(c));
   }
@@ -336,7 +377,9 @@ std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidenc
   std::vector<Detectable> out;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const Explanation& e = named[g];
-    if (e.kind != Kind::catalogue || groups[g].columns.empty() || groups[g].shadow || e.effect.rfind("transmission_error", 0) == 0) continue;
+    if (e.kind != Kind::catalogue || groups[g].columns.empty() || groups[g].shadow ||
+        e.effect.rfind("transmission_error", 0) == 0)
+      continue;
     const std::vector<int>& chosen = state.choice.groups;
     if (std::find(chosen.begin(), chosen.end(), static_cast<int>(g)) != chosen.end()) continue;
     // The single column that shows best.
@@ -350,39 +393,50 @@ std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidenc
       }
     }
     if (column < 0) continue;
-    out.push_back({e.effect, e.joints.empty() ? "" : e.joints[0], work.design.column_names[static_cast<std::size_t>(column)], work.design.column_units[static_cast<std::size_t>(column)], 0.0, 0.0});
+    out.push_back({e.effect, e.joints.empty() ? "" : e.joints[0],
+                   work.design.column_names[static_cast<std::size_t>(column)],
+                   work.design.column_units[static_cast<std::size_t>(column)], 0.0, 0.0});
     const double a = evidence.visible(state, column);
     if (!(a > 1e-6 * evidence.gram().xx(column, column))) {
       out.pop_back();
       continue;
     }
-    const double nats = detection_nats(decision.search.threshold, groups[g].cost, groups[g].columns.size(), evidence.gram().n);
+    const double nats =
+        detection_nats(decision.search.threshold, groups[g].cost, groups[g].columns.size(), evidence.gram().n);
     out.back().size = std::sqrt(2.0 * nats * state.sigma2 / a);
-    out.back().size_at_tip = out.back().size * std::sqrt(3.0 * a / std::max(1.0, evidence.gram().n)) * work.position_sigma;
+    out.back().size_at_tip =
+        out.back().size * std::sqrt(3.0 * a / std::max(1.0, evidence.gram().n)) * work.position_sigma;
   }
-  std::stable_sort(out.begin(), out.end(), [](const Detectable& a, const Detectable& b) { return a.effect != b.effect ? a.effect < b.effect : a.size_at_tip < b.size_at_tip; });
+  std::stable_sort(out.begin(), out.end(), [](const Detectable& a, const Detectable& b) {
+    return a.effect != b.effect ? a.effect < b.effect : a.size_at_tip < b.size_at_tip;
+  });
   return out;
 }
 
 /// For the first named effect that something else could stand for: the poses that would tell.
-void add_next_poses(const Work& work, const Measurements& data, const DiagnoseOptions& options, const Decision& decision, Diagnosis* out) {
+void add_next_poses(const Work& work, const Measurements& data, const DiagnoseOptions& options,
+                    const Decision& decision, Diagnosis* out) {
   for (const FoundEffect& effect : out->effects) {
     for (const Alternative& other : effect.confounded_with) {
-      const auto request_of = [&](const std::string& name, const std::vector<std::string>& joints) -> const Explanation* {
+      const auto request_of = [&](const std::string& name,
+                                  const std::vector<std::string>& joints) -> const Explanation* {
         for (const Explanation& e : work.design.candidates.named) {
           if (e.kind == Kind::catalogue && e.effect == name && e.joints == joints) return &e;
         }
         return nullptr;
       };
-      const Explanation *first = request_of(effect.effect, effect.joints), *second = request_of(other.effect, other.joints);
+      const Explanation *first = request_of(effect.effect, effect.joints),
+                        *second = request_of(other.effect, other.joints);
       if (!first || !second) continue;
       Rivals rivals;
       rivals.name = effect.effect + at_joints(effect.joints);
       rivals.other_name = other.effect + at_joints(other.joints);
       rivals.first = {first->parameters, first->requests};
       rivals.other = {second->parameters, second->requests};
-      for (const Parameter& parameter : effect.parameters) rivals.parameters[parameter.name] = parameter.value - parameter.nominal;
-      out->next_poses = next_poses(work.linear.at, data, rivals, options, 6, work.position_sigma * std::sqrt(decision.state.sigma2));
+      for (const Parameter& parameter : effect.parameters)
+        rivals.parameters[parameter.name] = parameter.value - parameter.nominal;
+      out->next_poses =
+          next_poses(work.linear.at, data, rivals, options, 6, work.position_sigma * std::sqrt(decision.state.sigma2));
       if (!out->next_poses.empty()) return;
     }
   }
@@ -392,20 +446,31 @@ std::string sentence_of(const Diagnosis& d) {
   const std::string gap = millimetres(d.gap.rms);
   std::string text;
   if (d.verdict == Verdict::none) {
-    text = "No gap beyond noise: " + gap + " rms on held-out poses, of which noise is " + millimetres(d.noise_floor) + ".";
+    text =
+        "No gap beyond noise: " + gap + " rms on held-out poses, of which noise is " + millimetres(d.noise_floor) + ".";
     if (!d.detectable.empty()) {
-      const auto easiest = std::min_element(d.detectable.begin(), d.detectable.end(), [](const Detectable& a, const Detectable& b) { return (a.effect == "backlash" ? 0.0 : 1.0) + a.size_at_tip < (b.effect == "backlash" ? 0.0 : 1.0) + b.size_at_tip; });
+      const auto easiest =
+          std::min_element(d.detectable.begin(), d.detectable.end(), [](const Detectable& a, const Detectable& b) {
+            return (a.effect == "backlash" ? 0.0 : 1.0) + a.size_at_tip <
+                   (b.effect == "backlash" ? 0.0 : 1.0) + b.size_at_tip;
+          });
       const bool angle = easiest->unit == "rad";
-      text += " A " + easiest->effect + (easiest->joint.empty() ? "" : " at " + easiest->joint) + " above " + number(angle ? 1e3 * easiest->size : easiest->size, 2) + (angle ? " mrad" : " " + easiest->unit) + " would have shown.";
+      text += " A " + easiest->effect + (easiest->joint.empty() ? "" : " at " + easiest->joint) + " above " +
+              number(angle ? 1e3 * easiest->size : easiest->size, 2) + (angle ? " mrad" : " " + easiest->unit) +
+              " would have shown.";
     }
     return text;
   }
   if (!d.effects.empty()) {
     text = "The gap of " + gap + " shrinks to " + millimetres(d.after.rms) + ": ";
     for (std::size_t k = 0; k < d.effects.size() && k < 4; ++k) {
-      text += (k == 0 ? "" : k + 1 == std::min<std::size_t>(d.effects.size(), 4) ? " and " : ", ") + d.effects[k].effect + at_joints(d.effects[k].joints);
+      text += (k == 0                                                ? ""
+               : k + 1 == std::min<std::size_t>(d.effects.size(), 4) ? " and "
+                                                                     : ", ") +
+              d.effects[k].effect + at_joints(d.effects[k].joints);
       if (!d.effects[k].confounded_with.empty() && d.effects[k].confounded_with[0].probability > 0.0) {
-        text += " (or " + d.effects[k].confounded_with[0].effect + at_joints(d.effects[k].confounded_with[0].joints) + ": these data cannot tell)";
+        text += " (or " + d.effects[k].confounded_with[0].effect + at_joints(d.effects[k].confounded_with[0].joints) +
+                ": these data cannot tell)";
       }
     }
     if (d.effects.size() > 4) text += " and " + std::to_string(d.effects.size() - 4) + " more";
@@ -414,10 +479,14 @@ std::string sentence_of(const Diagnosis& d) {
     text = "There is a gap of " + gap + " that no effect of the catalogue explains.";
   }
   if (!d.unknown.empty() && d.unknown[0].inputs.empty()) {
-    text += " Repeats show a noise of " + millimetres(d.noise_floor) + ": something is there that no function of what was recorded describes.";
+    text += " Repeats show a noise of " + millimetres(d.noise_floor) +
+            ": something is there that no function of what was recorded describes.";
   } else if (!d.unknown.empty()) {
     const UnknownEffect& u = d.unknown[0];
-    text += " Unknown: " + (u.joint.empty() ? std::string("something") : u.joint) + " moves as a function of " + (u.inputs.size() == 2 ? u.inputs[0] + " and " + u.inputs[1] : u.inputs[0] == "order" ? std::string("the order of the rows") : listed(u.inputs)) +
+    text += " Unknown: " + (u.joint.empty() ? std::string("something") : u.joint) + " moves as a function of " +
+            (u.inputs.size() == 2     ? u.inputs[0] + " and " + u.inputs[1]
+             : u.inputs[0] == "order" ? std::string("the order of the rows")
+                                      : listed(u.inputs)) +
             (u.looks_like.empty() || u.inputs.size() == 2 || u.joint == "base" ? "" : " (" + u.looks_like + ")") + ".";
   }
   return text;

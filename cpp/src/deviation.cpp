@@ -15,12 +15,14 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kTwoPi = 6.283185307179586;
-constexpr double kColoured = 4.0;  // innovations come from another filter and resemble their neighbours: so many say as much as one
+constexpr double kColoured =
+    4.0;  // innovations come from another filter and resemble their neighbours: so many say as much as one
 constexpr double kChord = 0.02;  // frames are extrapolated by their speed over so long [s]
 
 }  // namespace
 
-// ---- Planned frames ----------------------------------------------------------------------------------------------------------
+// ---- Planned frames
+// ----------------------------------------------------------------------------------------------------------
 
 Outcome FrameBuffer::push(double t, const Isometry3d& T) {
   if (!std::isfinite(t) || !T.matrix().allFinite()) return Outcome::not_finite;
@@ -46,7 +48,8 @@ bool FrameBuffer::at(double t, PlanPoint* out, double extrapolate) const {
   const double beyond = std::max(0.0, t - newest());  // at constant velocity from the newest sample
   const double at = t - beyond;
   const Row& center = row(low);
-  Vector3d p = Vector3d::Zero(), v = Vector3d::Zero(), a = Vector3d::Zero(), turn = Vector3d::Zero(), turn_rate = Vector3d::Zero();
+  Vector3d p = Vector3d::Zero(), v = Vector3d::Zero(), a = Vector3d::Zero(), turn = Vector3d::Zero(),
+           turn_rate = Vector3d::Zero();
   for (int i = 0; i < 4; ++i) {
     const Row& r = row(start + i);
     double x[3], scale = 1.0;
@@ -55,7 +58,8 @@ bool FrameBuffer::at(double t, PlanPoint* out, double extrapolate) const {
       x[n++] = at - row(start + j).t;
       scale *= r.t - row(start + j).t;
     }
-    const double weight = x[0] * x[1] * x[2] / scale, slope = (x[0] * x[1] + x[0] * x[2] + x[1] * x[2]) / scale, bend = 2.0 * (x[0] + x[1] + x[2]) / scale;
+    const double weight = x[0] * x[1] * x[2] / scale, slope = (x[0] * x[1] + x[0] * x[2] + x[1] * x[2]) / scale,
+                 bend = 2.0 * (x[0] + x[1] + x[2]) / scale;
     p += weight * r.p;
     v += slope * r.p;
     a += bend * r.p;
@@ -78,7 +82,8 @@ bool FrameBuffer::at(double t, PlanPoint* out, double extrapolate) const {
   return true;
 }
 
-// ---- Slow part and damped modes ------------------------------------------------------------------------------------------------
+// ---- Slow part and damped modes
+// ------------------------------------------------------------------------------------------------
 
 OscillatorStep oscillator_step(double omega, double damping, double dt) {
   OscillatorStep out;
@@ -108,13 +113,15 @@ ModalFilter::ModalFilter(const ModalModel& model) : parts(1 + model.count) {
 }
 
 void ModalFilter::steps(double dt, ModalSteps* out) const {
-  for (std::size_t k = 0; k < static_cast<std::size_t>(parts); ++k) (*out)[k] = oscillator_step(omega[k], damping[k], dt);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(parts); ++k)
+    (*out)[k] = oscillator_step(omega[k], damping[k], dt);
 }
 
 void ModalFilter::predict_covariance(const ModalSteps& steps, double dt, const DeviationOptions& options) {
   for (int k = 0; k < parts; ++k) {
     const Eigen::Matrix2d& F = steps[static_cast<std::size_t>(k)].transition;
-    const Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, kModalStates> x = P.row(2 * k), v = P.row(2 * k + 1);
+    const Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, kModalStates> x = P.row(2 * k),
+                                                                                     v = P.row(2 * k + 1);
     P.row(2 * k) = F(0, 0) * x + F(0, 1) * v;
     P.row(2 * k + 1) = F(1, 0) * x + F(1, 1) * v;
   }
@@ -149,7 +156,8 @@ FrequencyTracker::FrequencyTracker(const ModalFilter& filter, double sigma) {
   }
 }
 
-// ---- The deviation, step by step -----------------------------------------------------------------------------------------------
+// ---- The deviation, step by step
+// -----------------------------------------------------------------------------------------------
 
 Deviation deviation_of(const Motion& motion, const PlanPoint& plan) {
   const Matrix3d back = plan.T.linear().transpose();
@@ -194,7 +202,9 @@ Outcome DeviationModel::push_plan(double t, const Isometry3d& T_base_tool, doubl
   return plan_.push(at, T_base_tool * T_tool_imu_);
 }
 
-void DeviationModel::push_flange(double t, const Isometry3d& T_base_flange) { flange_.push(t, T_base_flange * T_flange_imu_); }
+void DeviationModel::push_flange(double t, const Isometry3d& T_base_flange) {
+  flange_.push(t, T_base_flange * T_flange_imu_);
+}
 
 bool DeviationModel::reference_at(double t, PlanPoint* out, double extrapolate) const {
   return plan_.empty() ? flange_.at(t, out, extrapolate) : plan_.at(t, out, 0.0);
@@ -217,7 +227,8 @@ void DeviationModel::update(const PoseFilter& filter, double changed) {
   }
   const std::int64_t done = tick_count_;
   std::int64_t k = tick_count_;
-  const std::int64_t oldest = std::max<std::int64_t>(settled_, tick_count_ - static_cast<std::int64_t>(ticks_.size()) + 1);
+  const std::int64_t oldest =
+      std::max<std::int64_t>(settled_, tick_count_ - static_cast<std::int64_t>(ticks_.size()) + 1);
   while (k > oldest && tick(k - 1).t >= changed) --k;
   for (;; ++k) {
     const double t = static_cast<double>(first_index_ + k) * options_.period;
@@ -279,7 +290,9 @@ void DeviationModel::run(std::int64_t k, const PoseFilter& filter) {
     for (int m = 1; m < now.filter.parts; ++m) {
       const auto i = static_cast<std::size_t>(m);
       const double nominal = kTwoPi * modes_.frequency[i - 1];
-      now.filter.omega[i] = std::clamp(now.filter.omega[i] + now.frequencies.change[m - 1], nominal * (1.0 - options_.frequency_range), nominal * (1.0 + options_.frequency_range));
+      now.filter.omega[i] =
+          std::clamp(now.filter.omega[i] + now.frequencies.change[m - 1], nominal * (1.0 - options_.frequency_range),
+                     nominal * (1.0 + options_.frequency_range));
     }
   }
   if (age < kCoastingAge) now.mean += options_.period / options_.static_time * (now.z.d - now.mean);
@@ -287,36 +300,44 @@ void DeviationModel::run(std::int64_t k, const PoseFilter& filter) {
 
 DeviationModel::Forces DeviationModel::forces_of(const Vector3d& push) const {
   Forces forces = Forces::Zero();
-  for (std::size_t k = 0; k < static_cast<std::size_t>(modes_.count); ++k) forces.row(static_cast<Eigen::Index>(k + 1)) = (modes_.gain[k] * push).transpose();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(modes_.count); ++k)
+    forces.row(static_cast<Eigen::Index>(k + 1)) = (modes_.gain[k] * push).transpose();
   return forces;
 }
 
 /// Derivative of a step's transition with respect to omega, its decay left as it is.
 Eigen::Matrix2d slope_of(double omega, double damping, double dt) {
-  const double decay = std::exp(-damping * omega * dt), c = decay * std::cos(omega * dt), s = decay * std::sin(omega * dt);
+  const double decay = std::exp(-damping * omega * dt), c = decay * std::cos(omega * dt),
+               s = decay * std::sin(omega * dt);
   Eigen::Matrix2d out;
   out << -dt * s, (dt * c - s / omega) / omega, -s - omega * dt * c, -dt * s;
   return out;
 }
 
-/// How the state depends on every frequency, over a step: the recursive prediction error method (Ljung 1999, section 11.2) on the modes' frequencies.
-/// A mode turns about its equilibrium under the plan's acceleration, which is taken to stay.
-void FrequencyTracker::step(const ModalSteps& steps, const ModalFilter& filter, const ModalState<6>& before, const Eigen::Matrix<double, kParts, 6>& forces, double dt, double walk) {
+/// How the state depends on every frequency, over a step: the recursive prediction error method (Ljung 1999,
+/// section 11.2) on the modes' frequencies. A mode turns about its equilibrium under the plan's acceleration, which is
+/// taken to stay.
+void FrequencyTracker::step(const ModalSteps& steps, const ModalFilter& filter, const ModalState<6>& before,
+                            const Eigen::Matrix<double, kParts, 6>& forces, double dt, double walk) {
   Eigen::Matrix<double, kParts, 3> none = Eigen::Matrix<double, kParts, 3>::Zero();
   for (int k = 1; k < filter.parts; ++k) {
     const auto m = static_cast<std::size_t>(k);
     ModalState<3>& S = sensitivity[m];
     step_state<3>(steps, filter.parts, none, &S);
     const Eigen::Matrix2d slope = slope_of(filter.omega[m], filter.damping[m], dt);
-    const Eigen::Matrix<double, 1, 3> x = before.row(2 * k).head<3>() - forces.row(k).head<3>() / (filter.omega[m] * filter.omega[m]), v = before.row(2 * k + 1).head<3>();
+    const Eigen::Matrix<double, 1, 3> x = before.row(2 * k).head<3>() -
+                                          forces.row(k).head<3>() / (filter.omega[m] * filter.omega[m]),
+                                      v = before.row(2 * k + 1).head<3>();
     S.row(2 * k) += slope(0, 0) * x + slope(0, 1) * v;
     S.row(2 * k + 1) += slope(1, 0) * x + slope(1, 1) * v;
     P(k - 1, k - 1) += walk * walk * filter.omega[m] * filter.omega[m] * dt;
   }
 }
 
-/// Innovations e of displacement (first = 0) or speed (first = 1), of variance `variance`, say how wrong the frequencies are; `gain` is the state's.
-void FrequencyTracker::observe(int first, const Eigen::Matrix<double, 1, 3>& e, double variance, const ModalVector& gain, int parts) {
+/// Innovations e of displacement (first = 0) or speed (first = 1), of variance `variance`, say how wrong the
+/// frequencies are; `gain` is the state's.
+void FrequencyTracker::observe(int first, const Eigen::Matrix<double, 1, 3>& e, double variance,
+                               const ModalVector& gain, int parts) {
   Eigen::Matrix<double, ModalModel::kMost, 3> slopes = Eigen::Matrix<double, ModalModel::kMost, 3>::Zero();
   for (int k = 1; k < parts; ++k) {
     ModalState<3>& S = sensitivity[static_cast<std::size_t>(k)];
@@ -347,7 +368,8 @@ bool DeviationModel::predict(Predictor predictor, double from, const Deviation& 
       break;
   }
   if (last.filter.parts == 1) return false;
-  // From the newest step to `from`, then on to t in steps of the period: what the model adds in between is added to the deviation now.
+  // From the newest step to `from`, then on to t in steps of the period: what the model adds in between is added to the
+  // deviation now.
   ModalState<6> X = last.X;
   ModalSteps steps;
   double at = last.t, step = 0.0;
@@ -385,7 +407,8 @@ void DeviationModel::settle(double now) {
   for (; settled_ < tick_count_ && tick(settled_).t < now - options_.settle_time; ++settled_) {
     const Tick& done = tick(settled_);
     if (!done.observed) continue;
-    if (row_count_ < static_cast<int>(rows_.size())) rows_[static_cast<std::size_t>(row_count_++)] = {done.t, done.z.d, done.z.rate, done.push};
+    if (row_count_ < static_cast<int>(rows_.size()))
+      rows_[static_cast<std::size_t>(row_count_++)] = {done.t, done.z.d, done.z.rate, done.push};
     Guess& guess = guesses_[static_cast<std::size_t>(settled_) % guesses_.size()];
     if (!guess.made || std::abs(guess.t - done.t) > 0.5 * options_.period) continue;
     guess.made = false;
@@ -413,11 +436,14 @@ void DeviationModel::choose() {
   }
 }
 
-Vector6d DeviationModel::slow() const { return tick_count_ == 0 ? Vector6d(Vector6d::Zero()) : tick(tick_count_ - 1).mean; }
+Vector6d DeviationModel::slow() const {
+  return tick_count_ == 0 ? Vector6d(Vector6d::Zero()) : tick(tick_count_ - 1).mean;
+}
 
 std::array<double, ModalModel::kMost> DeviationModel::frequencies() const {
   std::array<double, ModalModel::kMost> out{};
-  for (std::size_t m = 0; m < static_cast<std::size_t>(modes_.count); ++m) out[m] = tick_count_ == 0 ? modes_.frequency[m] : tick(tick_count_ - 1).filter.omega[m + 1] / kTwoPi;
+  for (std::size_t m = 0; m < static_cast<std::size_t>(modes_.count); ++m)
+    out[m] = tick_count_ == 0 ? modes_.frequency[m] : tick(tick_count_ - 1).filter.omega[m + 1] / kTwoPi;
   return out;
 }
 

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The deviation of the moving sensor from where the plan has it, and its prediction. Time is the inertial sensor's clock.
+// The deviation of the moving sensor from where the plan has it, and its prediction. Time is the inertial sensor's
+// clock.
 
 #include <algorithm>
 #include <array>
@@ -25,7 +26,8 @@ struct PlanPoint {
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< base frame [m/s^2]
 };
 
-/// Frames over time, by a cubic through the four samples around (Lagrange); orientations as rotation vectors from the nearest one before.
+/// Frames over time, by a cubic through the four samples around (Lagrange); orientations as rotation vectors from the
+/// nearest one before.
 class FrameBuffer {
  public:
   explicit FrameBuffer(int capacity) : rows_(static_cast<std::size_t>(capacity)) {}
@@ -38,14 +40,19 @@ class FrameBuffer {
   void clear() { count_ = 0; }
 
  private:
-  struct Row { double t = 0.0; Eigen::Vector3d p; Eigen::Quaterniond q; };
+  struct Row {
+    double t = 0.0;
+    Eigen::Vector3d p;
+    Eigen::Quaterniond q;
+  };
   const Row& row(std::int64_t k) const { return rows_[static_cast<std::size_t>(k) % rows_.size()]; }
   std::int64_t first() const { return std::max<std::int64_t>(0, count_ - static_cast<std::int64_t>(rows_.size())); }
   std::vector<Row> rows_;
   std::int64_t count_ = 0;
 };
 
-// ---- Slow part and damped modes, for all six components at once ------------------------------------------------------------
+// ---- Slow part and damped modes, for all six components at once
+// ------------------------------------------------------------
 
 constexpr int kParts = 1 + ModalModel::kMost;  ///< the slow one, then the modes
 constexpr int kModalStates = 2 * kParts;
@@ -55,7 +62,8 @@ using ModalState = Eigen::Matrix<double, Eigen::Dynamic, Columns, 0, kModalState
 using ModalCovariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kModalStates, kModalStates>;
 using ModalVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kModalStates, 1>;
 
-/// A damped oscillator over a step, input held: state <- transition * state + input * force. With omega = 0 it drifts: the slow part.
+/// A damped oscillator over a step, input held: state <- transition * state + input * force. With omega = 0 it drifts:
+/// the slow part.
 struct OscillatorStep {
   Eigen::Matrix2d transition;
   Eigen::Vector2d input;
@@ -63,7 +71,8 @@ struct OscillatorStep {
 OscillatorStep oscillator_step(double omega, double damping, double dt);
 using ModalSteps = std::array<OscillatorStep, kParts>;
 
-/// The model's Kalman filter. All components have the same dynamics and the same ratio of noises, so one covariance and one gain serve them all.
+/// The model's Kalman filter. All components have the same dynamics and the same ratio of noises, so one covariance and
+/// one gain serve them all.
 struct ModalFilter {
   int parts = 1;
   std::array<double, kParts> omega{}, damping{};
@@ -75,7 +84,8 @@ struct ModalFilter {
   void steps(double dt, ModalSteps* out) const;
   /// Covariance over one step.
   void predict_covariance(const ModalSteps& steps, double dt, const DeviationOptions& options);
-  /// Gain for an observation of displacement (first = 0) or speed (first = 1), and the innovation's variance; the covariance is updated.
+  /// Gain for an observation of displacement (first = 0) or speed (first = 1), and the innovation's variance; the
+  /// covariance is updated.
   double observe(int first, double variance, ModalVector* gain);
 };
 
@@ -98,25 +108,35 @@ Eigen::Matrix<double, 1, Columns> sum_of(const ModalState<Columns>& X, int first
   return out;
 }
 template <int Columns>
-Eigen::Matrix<double, 1, Columns> displacement_of(const ModalState<Columns>& X) { return sum_of<Columns>(X, 0); }
+Eigen::Matrix<double, 1, Columns> displacement_of(const ModalState<Columns>& X) {
+  return sum_of<Columns>(X, 0);
+}
 template <int Columns>
-Eigen::Matrix<double, 1, Columns> speed_of(const ModalState<Columns>& X) { return sum_of<Columns>(X, 1); }
+Eigen::Matrix<double, 1, Columns> speed_of(const ModalState<Columns>& X) {
+  return sum_of<Columns>(X, 1);
+}
 
 /// The modes' frequencies, followed by what their errors do to the innovations.
 struct FrequencyTracker {
-  std::array<ModalState<3>, kParts> sensitivity;  ///< derivative of the translation's state with respect to the frequency of every mode
-  Eigen::Matrix<double, ModalModel::kMost, ModalModel::kMost> P = Eigen::Matrix<double, ModalModel::kMost, ModalModel::kMost>::Zero();
-  Eigen::Matrix<double, ModalModel::kMost, 1> change = Eigen::Matrix<double, ModalModel::kMost, 1>::Zero();  ///< of this step [rad/s]
+  std::array<ModalState<3>, kParts>
+      sensitivity;  ///< derivative of the translation's state with respect to the frequency of every mode
+  Eigen::Matrix<double, ModalModel::kMost, ModalModel::kMost> P =
+      Eigen::Matrix<double, ModalModel::kMost, ModalModel::kMost>::Zero();
+  Eigen::Matrix<double, ModalModel::kMost, 1> change =
+      Eigen::Matrix<double, ModalModel::kMost, 1>::Zero();  ///< of this step [rad/s]
 
   FrequencyTracker() = default;
   FrequencyTracker(const ModalFilter& filter, double sigma);
-  void step(const ModalSteps& steps, const ModalFilter& filter, const ModalState<6>& before, const Eigen::Matrix<double, kParts, 6>& forces, double dt, double walk);
+  void step(const ModalSteps& steps, const ModalFilter& filter, const ModalState<6>& before,
+            const Eigen::Matrix<double, kParts, 6>& forces, double dt, double walk);
   void observe(int first, const Eigen::Matrix<double, 1, 3>& e, double variance, const ModalVector& gain, int parts);
 };
 
-// ---- The deviation, step by step -------------------------------------------------------------------------------------------
+// ---- The deviation, step by step
+// -------------------------------------------------------------------------------------------
 
-/// Deviation of a moving sensor from a planned one, in the planned one's frame: translation and rotation vector, their rates and second derivative.
+/// Deviation of a moving sensor from a planned one, in the planned one's frame: translation and rotation vector, their
+/// rates and second derivative.
 struct Deviation {
   Vector6d d = Vector6d::Zero(), rate = Vector6d::Zero(), acceleration = Vector6d::Zero();
 };
@@ -138,7 +158,8 @@ class DeviationModel {
 
   /// Runs the steps up to the newest inertial sample; those after `changed` again.
   void update(const PoseFilter& filter, double changed);
-  /// Deviation at t by one predictor, from the newest step; `now`: the deviation at the filter's newest time. False when nothing is known yet.
+  /// Deviation at t by one predictor, from the newest step; `now`: the deviation at the filter's newest time. False
+  /// when nothing is known yet.
   bool predict(Predictor predictor, double from, const Deviation& now, double t, Vector6d* d) const;
 
   /// Mean square of graded errors at the nominal horizon, per component; of the best predictor.
@@ -163,8 +184,15 @@ class DeviationModel {
     ModalFilter filter;
     FrequencyTracker frequencies;
   };
-  struct Guess { double t = -1e300; std::array<Vector6d, kPredictors> d; bool made = false; };
-  struct Grade { Vector6d mean_square = Vector6d::Zero(); double seconds = 0.0; };
+  struct Guess {
+    double t = -1e300;
+    std::array<Vector6d, kPredictors> d;
+    bool made = false;
+  };
+  struct Grade {
+    Vector6d mean_square = Vector6d::Zero();
+    double seconds = 0.0;
+  };
 
   const Tick& tick(std::int64_t k) const { return ticks_[static_cast<std::size_t>(k) % ticks_.size()]; }
   Tick& tick(std::int64_t k) { return ticks_[static_cast<std::size_t>(k) % ticks_.size()]; }

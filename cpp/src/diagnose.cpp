@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Where the gap lies, which effect causes it, how far it shrinks. The procedure is that of docs/diagnose.md, section by section.
+// Where the gap lies, which effect causes it, how far it shrinks. The procedure is that of docs/diagnose.md, section by
+// section.
 
 #include "truing/diagnose.hpp"
 
@@ -32,8 +33,12 @@ void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, co
   validate(robot);
   validate(data, robot);
   bool measured = false;
-  for (std::size_t row = 0; row < data.rows && !measured; ++row) measured = !data.has_fixed_point(row) && (data.has_position(row) || data.has_distance(row));
-  if (!measured) throw std::invalid_argument("diagnose needs measured positions, poses or distances: touched fixed points alone show no scale, and are for identify");
+  for (std::size_t row = 0; row < data.rows && !measured; ++row)
+    measured = !data.has_fixed_point(row) && (data.has_position(row) || data.has_distance(row));
+  if (!measured)
+    throw std::invalid_argument(
+        "diagnose needs measured positions, poses or distances: touched fixed points alone show no scale, and are for "
+        "identify");
   for (const std::string& name : options.leave_out) find_effect(name, options.own_effects);
 }
 
@@ -77,27 +82,34 @@ void prepare(Work* work) {
   const Robot& robot = work->frames.robot;
   work->linear = linearise(robot, work->data, train_rows, work->options.rotation_length, work->options.threads);
   work->inputs = make_inputs(work->linear.at, work->data);
-  work->design = make_design({robot, work->linear.at, work->linear.shift, work->data, work->inputs, every_row, work->set, work->cluster, work->options, work->inferred_direction});
+  work->design = make_design({robot, work->linear.at, work->linear.shift, work->data, work->inputs, every_row,
+                              work->set, work->cluster, work->options, work->inferred_direction});
   weigh(work);
   make_grams(work);
 }
 
 void say_what_is_not_testable(const Work& work, Diagnosis* out) {
   for (const NotTestable& n : work.design.candidates.not_testable) {
-    const bool twice = std::any_of(out->not_testable.begin(), out->not_testable.end(), [&](const NotTestable& other) { return other.effect == n.effect && other.joints == n.joints; });
+    const bool twice = std::any_of(out->not_testable.begin(), out->not_testable.end(), [&](const NotTestable& other) {
+      return other.effect == n.effect && other.joints == n.joints;
+    });
     if (!twice) out->not_testable.push_back(n);
   }
   if (work.inferred_direction) {
-    out->not_testable.push_back({"backlash", {}, "no columns dir1 …: only a direction inferred from the order of the rows could be tried"});
+    out->not_testable.push_back(
+        {"backlash", {}, "no columns dir1 …: only a direction inferred from the order of the rows could be tried"});
   }
 }
 
 void say_outliers(const Work& work, const std::vector<std::int32_t>& rows, Diagnosis* out) {
   std::set<std::size_t> outliers;
-  for (const std::int32_t row : work.outliers) outliers.insert(static_cast<std::size_t>(rows[static_cast<std::size_t>(row)]));
+  for (const std::int32_t row : work.outliers)
+    outliers.insert(static_cast<std::size_t>(rows[static_cast<std::size_t>(row)]));
   out->outliers.assign(outliers.begin(), outliers.end());
   if (outliers.empty()) return;
-  out->sanity.push_back({"outliers", std::to_string(outliers.size()) + " rows stand so far out that they count for little: look at them first if they are many.",
+  out->sanity.push_back({"outliers",
+                         std::to_string(outliers.size()) +
+                             " rows stand so far out that they count for little: look at them first if they are many.",
                          outliers.size() <= 50 ? out->outliers : std::vector<std::size_t>{}});
 }
 
@@ -108,7 +120,8 @@ struct Named {
 };
 
 /// Takes back, one at a time, names that are more likely wrong than right. By group: how sure those are that stay.
-std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evidence, const Resampled& resampled, Decision* decision) {
+std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evidence, const Resampled& resampled,
+                                         Decision* decision) {
   for (;;) {
     std::map<int, Named> out;
     for (std::size_t at = 0; at < decision->state.choice.groups.size(); ++at) {
@@ -117,12 +130,15 @@ std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evide
       const Sureness sure = how_sure(work, evidence, decision->state, at);
       out[g] = {sure, calibrated(sure.raw, came_back(work, resampled, sure, g), sure.removal_loss)};
     }
-    const auto least = std::min_element(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.second.probability < b.second.probability; });
+    const auto least = std::min_element(out.begin(), out.end(), [](const auto& a, const auto& b) {
+      return a.second.probability < b.second.probability;
+    });
     if (least == out.end() || least->second.probability >= kNamed) return out;
     const int gone = least->first;
     const std::vector<int>& chosen = decision->state.choice.groups;
     const auto at = std::find(chosen.begin(), chosen.end(), gone) - chosen.begin();
-    decision->state = evidence.evaluate(without(decision->state.choice, work.design.candidates.groups, static_cast<std::size_t>(at)));
+    decision->state =
+        evidence.evaluate(without(decision->state.choice, work.design.candidates.groups, static_cast<std::size_t>(at)));
     for (auto& [correction, corrected] : decision->corrects) corrected = corrected == gone ? -1 : corrected;
   }
 }
@@ -138,7 +154,9 @@ bool corrects_a_law(const Decision& decision, int group) {
 /// Drifts, corrections and free functions are functions of inputs.
 bool has_functions(const Work& work, const Decision& decision) {
   const std::vector<int>& chosen = decision.state.choice.groups;
-  return std::any_of(chosen.begin(), chosen.end(), [&](int g) { return !is_in_catalogue(work.design.candidates.named[static_cast<std::size_t>(g)]); });
+  return std::any_of(chosen.begin(), chosen.end(), [&](int g) {
+    return !is_in_catalogue(work.design.candidates.named[static_cast<std::size_t>(g)]);
+  });
 }
 
 /// The decision fitted without linearisation to all rows: what a robot file can hold, what has a name, everything.
@@ -147,7 +165,8 @@ struct Fitted {
   Residuals after_all;
 };
 
-Fitted fit_exactly(const Work& whole, const Robot& robot, const Decision& decision, const Resampled& resampled, Diagnosis* out) {
+Fitted fit_exactly(const Work& whole, const Robot& robot, const Decision& decision, const Resampled& resampled,
+                   Diagnosis* out) {
   const std::vector<int>& every_group = decision.state.choice.groups;
   std::vector<int> named_groups, catalogue_groups;
   for (const int g : every_group) {
@@ -157,10 +176,14 @@ Fitted fit_exactly(const Work& whole, const Robot& robot, const Decision& decisi
   }
   Fitted fitted;
   fitted.by_catalogue = refit(whole, robot, decision.state, catalogue_groups);
-  fitted.by_named = named_groups.size() > catalogue_groups.size() ? refit(whole, robot, decision.state, named_groups) : fitted.by_catalogue;
-  fitted.by_all = every_group.size() > named_groups.size() ? refit(whole, robot, decision.state, every_group) : fitted.by_named;
+  fitted.by_named = named_groups.size() > catalogue_groups.size() ? refit(whole, robot, decision.state, named_groups)
+                                                                  : fitted.by_catalogue;
+  fitted.by_all =
+      every_group.size() > named_groups.size() ? refit(whole, robot, decision.state, every_group) : fitted.by_named;
 
-  const auto left_by = [&](const Robot& of, const std::vector<Effect>& own) { return residuals(of, whole.data, own, whole.options.threads); };
+  const auto left_by = [&](const Robot& of, const std::vector<Effect>& own) {
+    return residuals(of, whole.data, own, whole.options.threads);
+  };
   const auto lengths = [&](const Residuals& of) { return lengths_of(of, whole.data.rows); };
   const auto judged = [&](const std::vector<double>& errors) { return error_statistics(held_out(errors, whole.set)); };
   out->robot = fitted.by_catalogue.found.robot;
@@ -178,12 +201,15 @@ Fitted fit_exactly(const Work& whole, const Robot& robot, const Decision& decisi
   return fitted;
 }
 
-/// Noise from repeats where there are enough, else what the chosen model leaves; and how much of the gap beyond it is closed.
+/// Noise from repeats where there are enough, else what the chosen model leaves; and how much of the gap beyond it is
+/// closed.
 void judge_noise(const Repeats& repeats, const Work& work, const Decision& decision, Diagnosis* out) {
   const double components = work.data.distance ? 1.0 : 3.0;
   out->noise_from_repeats = repeats.freedom >= 20.0;
-  out->noise_floor = std::sqrt(components) * (out->noise_from_repeats ? repeats.sigma : work.position_sigma * std::sqrt(decision.state.sigma2));
-  const double gap2 = std::pow(out->gap.rms, 2.0), floor2 = std::pow(out->noise_floor, 2.0), after2 = std::pow(out->after.rms, 2.0);
+  out->noise_floor = std::sqrt(components) *
+                     (out->noise_from_repeats ? repeats.sigma : work.position_sigma * std::sqrt(decision.state.sigma2));
+  const double gap2 = std::pow(out->gap.rms, 2.0), floor2 = std::pow(out->noise_floor, 2.0),
+               after2 = std::pow(out->after.rms, 2.0);
   out->closable = gap2 > floor2 ? std::clamp((gap2 - after2) / (gap2 - floor2), 0.0, 1.0) : 0.0;
 }
 
@@ -212,18 +238,22 @@ void merge_the_same(Diagnosis* out) {
 
 /// Shares that add up: between alone and last, scaled to what all together close.
 void share_the_gap(Diagnosis* out) {
-  const double closed = std::max(0.0, 1.0 - std::pow(out->gap.rms > 0.0 ? out->after_unknown.rms / out->gap.rms : 1.0, 2.0));
+  const double closed =
+      std::max(0.0, 1.0 - std::pow(out->gap.rms > 0.0 ? out->after_unknown.rms / out->gap.rms : 1.0, 2.0));
   double total = 0.0;
   for (const FoundEffect& effect : out->effects) total += 0.5 * (effect.share_alone + effect.share_last);
   for (const UnknownEffect& unknown : out->unknown) total += unknown.share;
-  for (FoundEffect& effect : out->effects) effect.share = total > 0.0 ? closed * 0.5 * (effect.share_alone + effect.share_last) / total : 0.0;
+  for (FoundEffect& effect : out->effects)
+    effect.share = total > 0.0 ? closed * 0.5 * (effect.share_alone + effect.share_last) / total : 0.0;
   for (UnknownEffect& unknown : out->unknown) unknown.share = total > 0.0 ? closed * unknown.share / total : 0.0;
-  std::stable_sort(out->effects.begin(), out->effects.end(), [](const FoundEffect& a, const FoundEffect& b) { return a.share > b.share; });
-  std::stable_sort(out->unknown.begin(), out->unknown.end(), [](const UnknownEffect& a, const UnknownEffect& b) { return a.probability > b.probability; });
+  std::stable_sort(out->effects.begin(), out->effects.end(),
+                   [](const FoundEffect& a, const FoundEffect& b) { return a.share > b.share; });
+  std::stable_sort(out->unknown.begin(), out->unknown.end(),
+                   [](const UnknownEffect& a, const UnknownEffect& b) { return a.probability > b.probability; });
 }
 
-void describe_all(const Work& work, const Evidence& evidence, const Decision& decision, const Resampled& resampled, const std::map<int, Named>& names,
-                  const Identification& refitted, Diagnosis* out) {
+void describe_all(const Work& work, const Evidence& evidence, const Decision& decision, const Resampled& resampled,
+                  const std::map<int, Named>& names, const Identification& refitted, Diagnosis* out) {
   for (std::size_t at = 0; at < decision.state.choice.groups.size(); ++at) {
     const int g = decision.state.choice.groups[at];
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
@@ -233,7 +263,8 @@ void describe_all(const Work& work, const Evidence& evidence, const Decision& de
       if (!corrects_a_law(decision, g) || unknown.share > kCorrectionShare) out->unknown.push_back(std::move(unknown));
     } else {
       const Named& named = names.at(g);
-      out->effects.push_back(describe(work, evidence, decision, at, named.sure, named.probability, refitted, resampled));
+      out->effects.push_back(
+          describe(work, evidence, decision, at, named.sure, named.probability, refitted, resampled));
     }
   }
 }
@@ -302,7 +333,9 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   // 1. and 2. Columns, noise and weights, of all rows or, of very many, evenly some.
   const std::vector<std::int32_t> rows = thinned_rows(whole.data, whole.cluster, options.search_poses);
   const bool thinned = rows.size() < whole.data.rows;
-  if (thinned) result.warnings.push_back("searched on " + std::to_string(rows.size()) + " of " + std::to_string(whole.data.rows) + " rows; fitted and judged on all");
+  if (thinned)
+    result.warnings.push_back("searched on " + std::to_string(rows.size()) + " of " + std::to_string(whole.data.rows) +
+                              " rows; fitted and judged on all");
   Work work = part_of(whole, rows);
   prepare(&work);
   say_what_is_not_testable(work, &result);

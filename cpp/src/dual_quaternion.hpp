@@ -6,7 +6,8 @@
 
 namespace truing::detail {
 
-/// A rigid motion as unit dual quaternion q + e q', e^2 = 0 (Daniilidis 1999, section 3): real part the rotation, dual part t q / 2.
+/// A rigid motion as unit dual quaternion q + e q', e^2 = 0 (Daniilidis 1999, section 3): real part the rotation, dual
+/// part t q / 2.
 struct DualQuaternion {
   Eigen::Quaterniond real{1.0, 0.0, 0.0, 0.0};
   Eigen::Quaterniond dual{0.0, 0.0, 0.0, 0.0};

@@ -46,21 +46,18 @@ void require_driven(const char* effect, const Joint& joint) {
   if (!joint.passive()) return;
   std::vector<std::string> drivers;
   for (const auto& driver : joint.driven_by) drivers.push_back(driver.first);
-  unsuited(effect, joint,
-           "needs a joint with a reading; " + joint.name + " is passive, driven by " + listed(drivers));
+  unsuited(effect, joint, "needs a joint with a reading; " + joint.name + " is passive, driven by " + listed(drivers));
 }
 
 void require_revolute(const char* effect, const Joint& joint, const std::string& why) {
-  if (!is_revolute(joint))
-    unsuited(effect, joint, "needs a revolute joint; " + joint.name + " is prismatic" + why);
+  if (!is_revolute(joint)) unsuited(effect, joint, "needs a revolute joint; " + joint.name + " is prismatic" + why);
 }
 
 void require_weight(const char* effect, const Robot& robot, const Joint& joint, const Measurements& data,
                     const std::string& or_else = "") {
   if (detail::knows_mass(robot) || data.payload) return;
-  refuse(
-      effect, joint,
-      "needs gravity torques: give the links' mass and com in the robot, or the column payload_kg" + or_else);
+  refuse(effect, joint,
+         "needs gravity torques: give the links' mass and com in the robot, or the column payload_kg" + or_else);
 }
 
 // Place of a driven joint among the driven ones: the number in its column names, less one.
@@ -160,8 +157,7 @@ std::vector<Term> harmonic(const Robot& robot, std::size_t joint, const Measurem
 // no mass is known, the payload's torque alone.
 std::vector<Term> joint_compliance(const Robot& robot, std::size_t joint, const Measurements& data) {
   const Joint& at = robot.joints.at(joint);
-  require_weight("joint_compliance", robot, at, data,
-                 ", or ask for gravity_moment, which finds the moments itself");
+  require_weight("joint_compliance", robot, at, data, ", or ask for gravity_moment, which finds the moments itself");
   const auto index = static_cast<Eigen::Index>(joint);
   Term term;
   term.parameter = "joint_compliance." + at.name;
@@ -189,8 +185,7 @@ std::vector<Term> stiffness_zones(const Robot& robot, std::size_t joint, const M
       Eigen::VectorXd reading(static_cast<Eigen::Index>(data.joints.size()));
       Eigen::VectorXd torque(static_cast<Eigen::Index>(robot.joints.size()));
       for (std::size_t row = 0; row < data.rows; row += step) {
-        for (Eigen::Index k = 0; k < reading.size(); ++k)
-          reading[k] = data.joints[static_cast<std::size_t>(k)][row];
+        for (Eigen::Index k = 0; k < reading.size(); ++k) reading[k] = data.joints[static_cast<std::size_t>(k)][row];
         detail::gravity_torques_at(robot, coupling, forward_kinematics(robot, reading, 0),
                                    data.payload ? data.payload[row] : 0.0, torque);
         sizes.push_back(std::abs(torque[index]));
@@ -199,10 +194,8 @@ std::vector<Term> stiffness_zones(const Robot& robot, std::size_t joint, const M
     }
     return sizes.empty() ? 0.0 : sizes[static_cast<std::size_t>(share * static_cast<double>(sizes.size()))];
   };
-  const double first =
-      remembered(robot, "stiffness_zones", prefix + ".T1", [&] { return quantile(1.0 / 3.0); });
-  const double second =
-      remembered(robot, "stiffness_zones", prefix + ".T2", [&] { return quantile(2.0 / 3.0); });
+  const double first = remembered(robot, "stiffness_zones", prefix + ".T1", [&] { return quantile(1.0 / 3.0); });
+  const double second = remembered(robot, "stiffness_zones", prefix + ".T2", [&] { return quantile(2.0 / 3.0); });
   const double edges[4] = {0.0, first, second, std::numeric_limits<double>::infinity()};
   std::vector<Term> terms;
   for (int zone = 0; zone < 3; ++zone) {
@@ -248,9 +241,7 @@ std::vector<Term> gravity_moment(const Robot& robot, std::size_t joint, const Me
     for (int axis = 0; axis < 3; ++axis) {
       terms.push_back(make_term(
           prefix + robot.joints[link].name + "." + "xyz"[axis], "rad kg/N", at.name,
-          [torque, link, axis](const Inputs& in) {
-            return torque(in, link, in.frames[link].linear().col(axis));
-          },
+          [torque, link, axis](const Inputs& in) { return torque(in, link, in.frames[link].linear().col(axis)); },
           true));
     }
     if (is_revolute(robot.joints[link])) continue;
@@ -271,13 +262,12 @@ Isometry3d link_end(const Robot& robot, const std::vector<Isometry3d>& frames, s
   const Joint& next = robot.joints[link + 1];
   if (robot.convention == Convention::urdf)
     return frames[link] * Eigen::Translation3d(next.T_parent_joint.translation());
-  return frames[link] * Eigen::AngleAxisd(next.alpha, Vector3d::UnitX()) *
-         Eigen::Translation3d(next.a, 0.0, 0.0) * Eigen::AngleAxisd(next.beta, Vector3d::UnitY());
+  return frames[link] * Eigen::AngleAxisd(next.alpha, Vector3d::UnitX()) * Eigen::Translation3d(next.a, 0.0, 0.0) *
+         Eigen::AngleAxisd(next.beta, Vector3d::UnitY());
 }
 
 // Where it starts: at its own joint.
-Vector3d link_start(const Robot& robot, const std::vector<Isometry3d>& frames, std::size_t link,
-                    double motion) {
+Vector3d link_start(const Robot& robot, const std::vector<Isometry3d>& frames, std::size_t link, double motion) {
   const Joint& joint = robot.joints[link];
   switch (robot.convention) {
     case Convention::dh:
@@ -347,8 +337,7 @@ std::vector<Term> link_compliance(const Robot& robot, std::size_t joint, const M
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.driven_count()));
   const std::vector<Isometry3d> frames = forward_kinematics(robot, zero, 0);
   const Isometry3d end = link_end(robot, frames, joint);
-  const Vector3d along =
-      end.linear().transpose() * (end.translation() - link_start(robot, frames, joint, 0.0));
+  const Vector3d along = end.linear().transpose() * (end.translation() - link_start(robot, frames, joint, 0.0));
   if (along.norm() < 5e-3) unsuited("link_compliance", at, "needs a link with a length; this one has none");
   require_weight("link_compliance", robot, at, data);
   Eigen::Index lengthwise = 0;
@@ -373,15 +362,13 @@ std::vector<Term> link_compliance(const Robot& robot, std::size_t joint, const M
     const auto turn_at_end = [=](const Inputs& in) {
       return (moment_at_start(in, across(in)) + 2.0 * moment_at_end(in, across(in))) / 6.0;
     };
-    terms.push_back(
-        make_term(parameter, "rad/Nm", about_end[static_cast<std::size_t>(axis)], turn_at_end, true));
+    terms.push_back(make_term(parameter, "rad/Nm", about_end[static_cast<std::size_t>(axis)], turn_at_end, true));
     for (Eigen::Index k = 0; k < 3; ++k) {
       const auto turn_at_start = [=](const Inputs& in) {
         const double part = start_axes(*shared, in.frames, joint).col(k).dot(across(in));
         return part * (2.0 * moment_at_start(in, across(in)) + moment_at_end(in, across(in))) / 6.0;
       };
-      terms.push_back(
-          make_term(parameter, "rad/Nm", about_start[static_cast<std::size_t>(k)], turn_at_start, true));
+      terms.push_back(make_term(parameter, "rad/Nm", about_start[static_cast<std::size_t>(k)], turn_at_start, true));
     }
   }
   return terms;
@@ -404,18 +391,15 @@ std::vector<Term> gravity_backlash(const Robot& robot, std::size_t joint, const 
 std::vector<Term> windup(const Robot& robot, std::size_t joint, const Measurements& data) {
   const Joint& at = robot.joints.at(joint);
   require_driven("windup", at);
-  const std::string name =
-      "tau" + std::to_string(driven_number(robot, joint) + 1) + (is_revolute(at) ? "_Nm" : "_N");
-  if (data.covariates.count(name) == 0)
-    refuse("windup", at, "needs the column " + name + " (torque of the joint)");
+  const std::string name = "tau" + std::to_string(driven_number(robot, joint) + 1) + (is_revolute(at) ? "_Nm" : "_N");
+  if (data.covariates.count(name) == 0) refuse("windup", at, "needs the column " + name + " (torque of the joint)");
   return {make_term("windup." + at.name, is_revolute(at) ? "rad/Nm" : "m/N", at.name,
                     [name](const Inputs& in) { return in.data->covariates.at(name)[in.row]; })};
 }
 
 constexpr const char* kTransmission = "transmission_error";
 
-std::vector<Term> transmission_error_at(const std::string& name, double order, const Robot& robot,
-                                        std::size_t joint) {
+std::vector<Term> transmission_error_at(const std::string& name, double order, const Robot& robot, std::size_t joint) {
   const Joint& at = robot.joints.at(joint);
   require_revolute(kTransmission, at, " and has no turn to be periodic in");
   const auto index = static_cast<Eigen::Index>(joint);
@@ -477,8 +461,7 @@ std::vector<Term> thermal(const Robot& robot, std::size_t joint, const Measureme
   const Joint& at = robot.joints.at(joint);
   const Vector3d origin = at.T_parent_joint.translation();
   std::vector<std::pair<const char*, double>> lengths = {{"a", at.a}, {"d", at.d}};
-  if (robot.convention == Convention::urdf)
-    lengths = {{"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
+  if (robot.convention == Convention::urdf) lengths = {{"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
   // [m]: an offset found where the drawing has none does not make it a beam.
   const auto is_zero = [](const auto& length) { return std::abs(length.second) < 1e-3; };
   lengths.erase(std::remove_if(lengths.begin(), lengths.end(), is_zero), lengths.end());
@@ -538,18 +521,17 @@ std::vector<Term> joint_coupling(const Robot& robot, std::size_t, const Measurem
   return terms;
 }
 
-// Four-bar linkages whose opposite bars are not quite equal: to first order the passive joint errs by a cos u + b sin u, u an
-// angle between two bars: the difference of its first and last driver (q3 - q2 of a palletizer), or, where one bar is fixed to
-// the base or the wrist, the first driver's angle or their sum.
+// Four-bar linkages whose opposite bars are not quite equal: to first order the passive joint errs by a cos u + b sin
+// u, u an angle between two bars: the difference of its first and last driver (q3 - q2 of a palletizer), or, where one
+// bar is fixed to the base or the wrist, the first driver's angle or their sum.
 std::vector<Term> linkage(const Robot& robot, std::size_t joint, const Measurements&) {
   const Joint& at = robot.joints.at(joint);
-  if (!at.passive())
-    unsuited("linkage", at, "needs a passive joint; " + at.name + " has a reading of its own");
+  if (!at.passive()) unsuited("linkage", at, "needs a passive joint; " + at.name + " has a reading of its own");
   std::vector<Eigen::Index> drivers;
-  for (const auto& driver : at.driven_by)
-    drivers.push_back(static_cast<Eigen::Index>(robot.joint_index(driver.first)));
+  for (const auto& driver : at.driven_by) drivers.push_back(static_cast<Eigen::Index>(robot.joint_index(driver.first)));
   const auto [first, last] = std::minmax_element(drivers.begin(), drivers.end());
-  std::vector<std::tuple<std::string, double, double>> angles = {{"", -1.0, 1.0}, {"_first", 1.0, 0.0}, {"_sum", 1.0, 1.0}};
+  std::vector<std::tuple<std::string, double, double>> angles = {
+      {"", -1.0, 1.0}, {"_first", 1.0, 0.0}, {"_sum", 1.0, 1.0}};
   if (*first == *last) angles = {{"", 0.0, 1.0}};
   std::vector<Term> terms;
   for (const auto& [suffix, of_first, of_last] : angles) {
@@ -573,11 +555,9 @@ std::vector<Term> axis_wobble(const Robot& robot, std::size_t joint, const Measu
   // Elementary rotations there are, and what each of the two tilts is in these.
   std::vector<std::string> sites;
   Eigen::Matrix<double, 3, 2> tilts = Eigen::Matrix<double, 3, 2>::Identity();
-  const auto about_any_axis = [&](const std::string& frame, const Eigen::Matrix3d& rotation,
-                                  const Vector3d& axis) {
+  const auto about_any_axis = [&](const std::string& frame, const Eigen::Matrix3d& rotation, const Vector3d& axis) {
     sites = {frame + ".rx", frame + ".ry", frame + ".rz"};
-    const Eigen::Matrix3d from_z =
-        Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
+    const Eigen::Matrix3d from_z = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
     tilts = (rotation * from_z).leftCols<2>();
   };
   switch (robot.convention) {
@@ -629,9 +609,7 @@ std::vector<Term> scale(const Robot& robot, std::size_t, const Measurements&) {
     for (int axis = 0; axis < 3; ++axis) {
       terms.push_back(make_term(
           "scale", "-", target + "." + "xyz"[axis],
-          [last, base, axis](const Inputs& in) {
-            return in.frames[last].linear().col(axis).dot(in.tip - base);
-          },
+          [last, base, axis](const Inputs& in) { return in.frames[last].linear().col(axis).dot(in.tip - base); },
           true));
     }
   }
@@ -646,11 +624,11 @@ std::vector<Term> time_offset(const Robot& robot, std::size_t, const Measurement
   for (std::size_t k = 0; k < driven.size(); ++k) {
     const Joint& at = robot.joints[driven[k]];
     if (k >= data.joint_speed.size() || !data.joint_speed[k]) {
-      throw std::invalid_argument("time_offset needs the column qd" + std::to_string(k + 1) + "_" +
-                                  motion_unit(at) + "_s (speed of joint " + at.name + ")");
+      throw std::invalid_argument("time_offset needs the column qd" + std::to_string(k + 1) + "_" + motion_unit(at) +
+                                  "_s (speed of joint " + at.name + ")");
     }
-    terms.push_back(make_term("time_offset", "s", at.name,
-                              [k](const Inputs& in) { return in.data->joint_speed[k][in.row]; }));
+    terms.push_back(
+        make_term("time_offset", "s", at.name, [k](const Inputs& in) { return in.data->joint_speed[k][in.row]; }));
   }
   return terms;
 }
@@ -658,17 +636,14 @@ std::vector<Term> time_offset(const Robot& robot, std::size_t, const Measurement
 // Parameters of the model, as the first three: identify frees base and targets.
 std::vector<Term> no_terms(const Robot&, std::size_t, const Measurements&) { return {}; }
 
-constexpr std::size_t kRobot =
-    std::numeric_limits<std::size_t>::max();  // in place of a joint: the robot as a whole
+constexpr std::size_t kRobot = std::numeric_limits<std::size_t>::max();  // in place of a joint: the robot as a whole
 
 // Terms of one effect at one joint, or of the robot as a whole.
-std::vector<Term> terms_at(const Effect& effect, const Robot& robot, std::size_t joint,
-                           const Measurements& data) {
+std::vector<Term> terms_at(const Effect& effect, const Robot& robot, std::size_t joint, const Measurements& data) {
   std::vector<Term> terms = effect.terms(robot, joint == kRobot ? 0 : joint, data);
   for (Term& term : terms) {
     if (term.parameter.empty() || !term.basis) {
-      throw std::invalid_argument("effect '" + effect.name +
-                                  "' gives a term without parameter name or basis");
+      throw std::invalid_argument("effect '" + effect.name + "' gives a term without parameter name or basis");
     }
     term.joint = joint == kRobot ? "" : robot.joints[joint].name;
   }
@@ -700,8 +675,7 @@ std::vector<Place> requested_places(const EffectRequest& request, const Effect& 
                                     const Measurements& data) {
   if (!effect.per_joint) {
     if (!request.joints.empty()) {
-      throw std::invalid_argument(effect.name +
-                                  " belongs to the robot as a whole: ask for it without joints, not at " +
+      throw std::invalid_argument(effect.name + " belongs to the robot as a whole: ask for it without joints, not at " +
                                   listed(request.joints));
     }
     return {{kRobot, terms_at(effect, robot, kRobot, data)}};
@@ -742,8 +716,7 @@ const std::vector<Effect>& catalogue() {
       {"gravity_moment", "the joint gives way under weights that are not known", gravity_moment},
       {"link_compliance", "the link bends under the weight that hangs beyond it", link_compliance},
       {"harmonic", "error once and twice per turn: eccentric gear or encoder disc", harmonic},
-      {"transmission_error",
-       "error that repeats with the gear's teeth; name the order: transmission_error@96",
+      {"transmission_error", "error that repeats with the gear's teeth; name the order: transmission_error@96",
        transmission_error_without_order},
       {"backlash", "the joint's play, seen when poses are approached from both sides", backlash},
       {"gravity_backlash", "the joint's play, taken up by the weight", gravity_backlash},
@@ -773,19 +746,17 @@ const Effect& find_effect(const std::string& name, const std::vector<Effect>& ow
     }
   }
   if (found == nullptr) found = transmission_error_of(name);
-  if (found == nullptr)
-    throw std::invalid_argument("effect '" + name + "' does not exist; there are " + listed(names));
+  if (found == nullptr) throw std::invalid_argument("effect '" + name + "' does not exist; there are " + listed(names));
   return *found;
 }
 
-std::vector<Term> effect_terms(const std::vector<EffectRequest>& requests, const Robot& robot,
-                               const Measurements& data, const std::vector<Effect>& own) {
+std::vector<Term> effect_terms(const std::vector<EffectRequest>& requests, const Robot& robot, const Measurements& data,
+                               const std::vector<Effect>& own) {
   std::vector<Term> all;
   std::set<std::pair<std::string, std::size_t>> seen;
   for (const EffectRequest& request : requests) {
     const Effect& effect = find_effect(request.effect, own);
-    if (!effect.terms)
-      throw std::invalid_argument("effect '" + effect.name + "' has no function that gives its terms");
+    if (!effect.terms) throw std::invalid_argument("effect '" + effect.name + "' has no function that gives its terms");
     for (Place& place : requested_places(request, effect, robot, data)) {
       // Twice the same columns would make both parameters invisible.
       if (!seen.insert({effect.name, place.first}).second) {

@@ -25,7 +25,7 @@ using kernel::Kind;
 using kernel::kMaxComponents;
 using kernel::kTilePoses;
 
-constexpr int kSlots = 64;         // partial sums, whatever the number of threads: the bits do not depend on it
+constexpr int kSlots = 64;  // partial sums, whatever the number of threads: the bits do not depend on it
 constexpr int kTilesPerReduce = 16;
 constexpr int kTilesForThreads = 100;
 
@@ -60,16 +60,17 @@ struct ConstantSource {
 struct Compiled {
   std::vector<kernel::Step> prefix;  ///< the same for all poses: base, and what stands before the first joint
   std::vector<kernel::Step> steps;
-  std::vector<int> fixed_slots, start_slots;  ///< what the prefix leaves behind for good, and for the steps to write over
+  std::vector<int> fixed_slots,
+      start_slots;  ///< what the prefix leaves behind for good, and for the steps to write over
   int tip_slots[4];
   std::vector<double> constants;  ///< fixed rotations are in place already
   std::vector<ConstantSource> sources;
   std::vector<DynamicSite> dynamic;
   std::vector<kernel::Part> parts;
   std::vector<kernel::ColumnPlan> columns;
-  std::vector<int> column_free;  ///< which free parameter each column belongs to
+  std::vector<int> column_free;            ///< which free parameter each column belongs to
   std::vector<std::pair<int, int>> bases;  ///< (reading, term) of each basis row, one of them -1
-  std::vector<int> left_out;     ///< parameters whose sites move nothing because they are zero, and must stay so
+  std::vector<int> left_out;  ///< parameters whose sites move nothing because they are zero, and must stay so
   int slot_count = 0;
 };
 
@@ -78,17 +79,23 @@ int axis_of(Motion motion) { return static_cast<int>(motion) % 3; }
 /// Does a free parameter have a column in this segment?
 bool is_seen(const ParameterInfo& info, const Segment& segment) {
   switch (info.role) {
-    case Role::anchor: return segment.kind == Kind::distance;
-    case Role::point: return info.owner == segment.point;
-    case Role::target: return info.owner == segment.target && (!info.rotation || segment.kind == Kind::pose);
-    default: return true;
+    case Role::anchor:
+      return segment.kind == Kind::distance;
+    case Role::point:
+      return info.owner == segment.point;
+    case Role::target:
+      return info.owner == segment.target && (!info.rotation || segment.kind == Kind::pose);
+    default:
+      return true;
   }
 }
 
-Compiled compile(const Model& model, const Segment& segment, const std::vector<int>& free, const Eigen::VectorXd& values) {
+Compiled compile(const Model& model, const Segment& segment, const std::vector<int>& free,
+                 const Eigen::VectorXd& values) {
   Compiled out;
   std::vector<std::vector<SiteWeight>> moved_by(model.sites.size());
-  std::vector<bool> dynamic(model.sites.size(), false), wanted(model.sites.size(), false), is_free(model.sites.size(), false);
+  std::vector<bool> dynamic(model.sites.size(), false), wanted(model.sites.size(), false),
+      is_free(model.sites.size(), false);
   for (std::size_t k = 0; k < model.coordinates.size(); ++k) {
     const Coordinate& coordinate = model.coordinates[k];
     for (const auto& [site, weight] : coordinate.sites) {
@@ -135,12 +142,14 @@ Compiled compile(const Model& model, const Segment& segment, const std::vector<i
       if (is_rotation(site.motion)) origin_slot[index] = keep(3);
       if (in_prefix) {
         for (const int slot : {axis_slot[index], origin_slot[index]}) {
-          if (slot >= 0 && std::find(out.fixed_slots.begin(), out.fixed_slots.end(), slot) == out.fixed_slots.end()) out.fixed_slots.push_back(slot);
+          if (slot >= 0 && std::find(out.fixed_slots.begin(), out.fixed_slots.end(), slot) == out.fixed_slots.end())
+            out.fixed_slots.push_back(slot);
         }
       }
     }
     // A value that is zero and stays zero moves nothing.
-    if (!dynamic[index] && !is_free[index] && site.motion != Motion::fixed && (site.parameter < 0 || values[site.parameter] == 0.0)) {
+    if (!dynamic[index] && !is_free[index] && site.motion != Motion::fixed &&
+        (site.parameter < 0 || values[site.parameter] == 0.0)) {
       if (site.parameter >= 0) out.left_out.push_back(site.parameter);
       return;
     }
@@ -211,7 +220,8 @@ Compiled compile(const Model& model, const Segment& segment, const std::vector<i
 }  // namespace
 
 /// The prefix, once for all poses: what it leaves in its slots.
-static void sweep_prefix(const Compiled& program, const std::vector<double>& constants, std::vector<double>* start_vectors, std::vector<double>* fixed_vectors) {
+static void sweep_prefix(const Compiled& program, const std::vector<double>& constants,
+                         std::vector<double>* start_vectors, std::vector<double>* fixed_vectors) {
   Eigen::Matrix3Xd slots = Eigen::Matrix3Xd::Zero(3, program.slot_count);
   slots.leftCols<3>().setIdentity();
   for (const kernel::Step& step : program.prefix) {
@@ -222,9 +232,12 @@ static void sweep_prefix(const Compiled& program, const std::vector<double>& con
         slots.col(step.out[0]) = constant[0] * a + constant[1] * b;
         slots.col(step.out[1]) = constant[0] * b - constant[1] * a;
         break;
-      case Code::translate: slots.col(step.out[0]) = a + constant[0] * b; break;
+      case Code::translate:
+        slots.col(step.out[0]) = a + constant[0] * b;
+        break;
       case Code::fixed:
-        for (int k = 0; k < 3; ++k) slots.col(step.out[k]) = constant[3 * k] * a + constant[3 * k + 1] * b + constant[3 * k + 2] * c;
+        for (int k = 0; k < 3; ++k)
+          slots.col(step.out[k]) = constant[3 * k] * a + constant[3 * k + 1] * b + constant[3 * k + 2] * c;
         break;
     }
   }
@@ -264,7 +277,8 @@ std::vector<Segment> make_segments(const Measurements& data, const std::vector<s
 std::vector<std::vector<double>> make_bases(const Model& model, const Measurements& data) {
   std::vector<std::vector<double>> bases(model.terms.size(), std::vector<double>(data.rows));
   if (model.terms.empty()) return bases;
-  const bool gravity = std::any_of(model.terms.begin(), model.terms.end(), [](const Term& t) { return t.needs_gravity; });
+  const bool gravity =
+      std::any_of(model.terms.begin(), model.terms.end(), [](const Term& t) { return t.needs_gravity; });
   Inputs inputs;
   inputs.data = &data;
   Eigen::VectorXd reading(static_cast<Eigen::Index>(data.joints.size()));
@@ -291,13 +305,16 @@ std::vector<std::vector<double>> make_bases(const Model& model, const Measuremen
     if (gravity) {
       inputs.frames = forward_kinematics(model.robot, reading, 0);
       const auto target = data.target.empty() ? 0 : static_cast<std::size_t>(data.target[row]);
-      inputs.tip = inputs.frames[model.robot.joints.size() - 1] * model.robot.targets[target].T_last_target.translation();
-      gravity_torques_at(model.robot, coupling, inputs.frames, data.payload ? data.payload[row] : 0.0, inputs.gravity_torque);
+      inputs.tip =
+          inputs.frames[model.robot.joints.size() - 1] * model.robot.targets[target].T_last_target.translation();
+      gravity_torques_at(model.robot, coupling, inputs.frames, data.payload ? data.payload[row] : 0.0,
+                         inputs.gravity_torque);
     }
     for (std::size_t t = 0; t < model.terms.size(); ++t) {
       const double value = model.terms[t].basis(inputs);
       if (!std::isfinite(value)) {
-        throw std::invalid_argument("effect term " + model.terms[t].parameter + " is not finite at row " + std::to_string(row));
+        throw std::invalid_argument("effect term " + model.terms[t].parameter + " is not finite at row " +
+                                    std::to_string(row));
       }
       bases[t][row] = value;
     }
@@ -316,13 +333,18 @@ struct Evaluator::Impl {
   int threads;
   const kernel::Functions& run;
   std::vector<Compiled> compiled;
-  struct TileRange { int segment; std::int32_t first; int count; };
+  struct TileRange {
+    int segment;
+    std::int32_t first;
+    int count;
+  };
   std::vector<TileRange> tiles;
   std::size_t components = 0;
 
   /// What one thread needs.
   struct Workspace {
-    Buffer values, bases, coordinates, measured, position_weight, rotation_weight, slots, jacobian, squared_norm, tip, accumulator;
+    Buffer values, bases, coordinates, measured, position_weight, rotation_weight, slots, jacobian, squared_norm, tip,
+        accumulator;
     std::vector<double> local;
     std::vector<std::vector<double>> constants, starts, fixed_vectors;  ///< per segment
     double anchor[4] = {0, 0, 0, 0};
@@ -332,7 +354,8 @@ struct Evaluator::Impl {
   std::vector<std::vector<double>> slot_sums;  ///< [slot] (p + 1)^2 and the loss
   mutable std::mutex busy;                     ///< one evaluation at a time: the workspaces are shared
 
-  Impl(const Model& m, const Measurements& d, const std::vector<std::vector<double>>& b, std::vector<Segment> s, std::vector<int> f, int t)
+  Impl(const Model& m, const Measurements& d, const std::vector<std::vector<double>>& b, std::vector<Segment> s,
+       std::vector<int> f, int t)
       : model(m), data(d), bases(b), segments(std::move(s)), free(std::move(f)), threads(t), run(kernel::functions()) {
     const Eigen::VectorXd values = initial_values(model);
     std::size_t most_columns = 0, most_dynamic = 0, most_bases = 0, most_slots = 0;
@@ -381,7 +404,8 @@ struct Evaluator::Impl {
   void set_values(const Eigen::VectorXd& values, Workspace* w) const {
     for (std::size_t k = 0; k < compiled.size(); ++k) {
       for (const int parameter : compiled[k].left_out) {
-        if (values[parameter] != 0.0) throw std::logic_error("parameter " + model.parameters[parameter].name + " was compiled as zero and is not");
+        if (values[parameter] != 0.0)
+          throw std::logic_error("parameter " + model.parameters[parameter].name + " was compiled as zero and is not");
       }
       for (const ConstantSource& source : compiled[k].sources) {
         const double value = source.parameter < 0 ? 0.0 : values[source.parameter];
@@ -396,11 +420,13 @@ struct Evaluator::Impl {
       sweep_prefix(compiled[k], w->constants[k], &w->starts[k], &w->fixed_vectors[k]);
     }
     for (std::size_t i = 0; i < model.parameters.size(); ++i) {
-      if (model.parameters[i].role == Role::anchor) w->anchor[model.parameters[i].axis] = values[static_cast<Eigen::Index>(i)];
+      if (model.parameters[i].role == Role::anchor)
+        w->anchor[model.parameters[i].axis] = values[static_cast<Eigen::Index>(i)];
     }
   }
 
-  /// Inputs and measurements of a tile, pose by pose into lanes; the last pose fills what is left over, with weight zero.
+  /// Inputs and measurements of a tile, pose by pose into lanes; the last pose fills what is left over, with weight
+  /// zero.
   void gather(const TileRange& range, const Eigen::VectorXd& values, bool with_measurements, Workspace* w) const {
     const Segment& segment = segments[range.segment];
     const Compiled& program = compiled[range.segment];
@@ -458,7 +484,8 @@ struct Evaluator::Impl {
       std::fill(measured, measured + 12 * kTilePoses, 0.0);
     } else if (segment.point >= 0) {
       for (int k = 0; k < 3; ++k) {
-        std::fill(measured + k * kTilePoses, measured + (k + 1) * kTilePoses, values[point_parameter(segment.point, k)]);
+        std::fill(measured + k * kTilePoses, measured + (k + 1) * kTilePoses,
+                  values[point_parameter(segment.point, k)]);
       }
     } else if (segment.kind == Kind::distance) {
       fill(measured, data.distance, 1.0, 0.0);
@@ -467,7 +494,8 @@ struct Evaluator::Impl {
       if (segment.kind == Kind::pose) {
         for (int i = 0; i < kTilePoses; ++i) {
           const auto row = static_cast<std::size_t>(rows[std::min(i, range.count - 1)]);
-          const Eigen::Quaterniond q(data.orientation[0][row], data.orientation[1][row], data.orientation[2][row], data.orientation[3][row]);
+          const Eigen::Quaterniond q(data.orientation[0][row], data.orientation[1][row], data.orientation[2][row],
+                                     data.orientation[3][row]);
           const Eigen::Matrix3d R = q.normalized().toRotationMatrix();
           for (int k = 0; k < 9; ++k) measured[(3 + k) * kTilePoses + i] = R(k % 3, k / 3);
         }
@@ -493,8 +521,8 @@ struct Evaluator::Impl {
     return true;
   }
 
-  void evaluate_tile(const TileRange& range, const Eigen::VectorXd& values, const Weighing& weighing, bool with_jacobian,
-                     bool with_measurements, Workspace* w) const {
+  void evaluate_tile(const TileRange& range, const Eigen::VectorXd& values, const Weighing& weighing,
+                     bool with_jacobian, bool with_measurements, Workspace* w) const {
     const Segment& segment = segments[range.segment];
     const Compiled& program = compiled[range.segment];
     gather(range, values, with_measurements, w);
@@ -569,9 +597,12 @@ struct Evaluator::Impl {
   double loss_of(const Weighing& weighing, double s2) const {
     const double c2 = weighing.loss_scale * weighing.loss_scale;
     switch (weighing.loss) {
-      case kernel::RowLoss::none: break;
-      case kernel::RowLoss::huber: return s2 <= c2 ? s2 : 2.0 * weighing.loss_scale * std::sqrt(s2) - c2;
-      case kernel::RowLoss::cauchy: return c2 * std::log1p(s2 / c2);
+      case kernel::RowLoss::none:
+        break;
+      case kernel::RowLoss::huber:
+        return s2 <= c2 ? s2 : 2.0 * weighing.loss_scale * std::sqrt(s2) - c2;
+      case kernel::RowLoss::cauchy:
+        return c2 * std::log1p(s2 / c2);
       case kernel::RowLoss::tukey: {
         const double v = s2 < c2 ? 1.0 - s2 / c2 : 0.0;
         return c2 / 3.0 * (1.0 - v * v * v);
@@ -608,7 +639,8 @@ struct Evaluator::Impl {
       evaluate_tile(range, values, weighing, true, true, w);
       const int rows_per_pose = components_of(segments[range.segment].kind);
       const int columns = static_cast<int>(compiled[range.segment].columns.size()) + 1;
-      run.gram_add(w->jacobian.get(), rows_per_pose * kTilePoses, columns, rows_per_pose * kTilePoses, w->accumulator.get());
+      run.gram_add(w->jacobian.get(), rows_per_pose * kTilePoses, columns, rows_per_pose * kTilePoses,
+                   w->accumulator.get());
       if (weighing.loss != kernel::RowLoss::none) {
         for (int i = 0; i < range.count; ++i) sums.back() += loss_of(weighing, w->squared_norm.get()[i]);
       }
@@ -653,8 +685,10 @@ void Evaluator::normal_equations(const Eigen::VectorXd& values, const Weighing& 
   const std::vector<double>& sums = impl.slot_sums[0];
   for (Eigen::Index j = 0; j < p; ++j) {
     for (Eigen::Index i = 0; i < p; ++i) {
-      // A block of columns is in the order of free parameters, so the upper triangle of the sums is the upper triangle here.
-      out->gram(i, j) = i <= j ? sums[static_cast<std::size_t>(j * size + i)] : sums[static_cast<std::size_t>(i * size + j)];
+      // A block of columns is in the order of free parameters, so the upper triangle of the sums is the upper triangle
+      // here.
+      out->gram(i, j) =
+          i <= j ? sums[static_cast<std::size_t>(j * size + i)] : sums[static_cast<std::size_t>(i * size + j)];
     }
     out->gradient[j] = sums[static_cast<std::size_t>(p * size + j)];
   }
@@ -662,7 +696,8 @@ void Evaluator::normal_equations(const Eigen::VectorXd& values, const Weighing& 
   out->cost = weighing.loss == kernel::RowLoss::none ? out->squares : sums.back();
 }
 
-void Evaluator::residual_norms(const Eigen::VectorXd& values, const Weighing& weighing, std::vector<double>* norms) const {
+void Evaluator::residual_norms(const Eigen::VectorXd& values, const Weighing& weighing,
+                               std::vector<double>* norms) const {
   const std::lock_guard<std::mutex> lock(impl_->busy);
   Impl& impl = *impl_;
   impl.for_slots(values, [&](int slot, Impl::Workspace* w) {
@@ -723,16 +758,20 @@ void Evaluator::jacobian_tiles(const Eigen::VectorXd& values, const Weighing& we
     for (std::size_t k = begin; k < end; ++k) {
       impl.evaluate_tile(impl.tiles[k], values, weighing, true, true, w);
       const int segment = impl.tiles[k].segment;
-      sink(w->jacobian.get(), static_cast<int>(impl.compiled[segment].columns.size()), components_of(impl.segments[segment].kind));
+      sink(w->jacobian.get(), static_cast<int>(impl.compiled[segment].columns.size()),
+           components_of(impl.segments[segment].kind));
     }
   });
 }
 
 int Evaluator::tile_count() const { return static_cast<int>(impl_->tiles.size()); }
 int Evaluator::tile_rows(int tile) const { return impl_->tiles[tile].count; }
-int Evaluator::tile_components(int tile) const { return components_of(impl_->segments[impl_->tiles[tile].segment].kind); }
+int Evaluator::tile_components(int tile) const {
+  return components_of(impl_->segments[impl_->tiles[tile].segment].kind);
+}
 
-void Evaluator::tile(int tile, const Eigen::VectorXd& values, const Weighing& weighing, double* residual, double* jacobian) const {
+void Evaluator::tile(int tile, const Eigen::VectorXd& values, const Weighing& weighing, double* residual,
+                     double* jacobian) const {
   const std::lock_guard<std::mutex> lock(impl_->busy);
   Impl& impl = *impl_;
   const Impl::TileRange& range = impl.tiles[tile];

@@ -75,7 +75,8 @@ void GramSum::push() {
 
 void GramSum::fold_in() {
   if (filled_ < kLength) buffer_.bottomRows(kLength - filled_).setZero();
-  kernel::functions().gram_add(buffer_.data(), kLength, static_cast<int>(columns_ + 1), static_cast<int>((filled_ + 7) / 8 * 8), sums_.data());
+  kernel::functions().gram_add(buffer_.data(), kLength, static_cast<int>(columns_ + 1),
+                               static_cast<int>((filled_ + 7) / 8 * 8), sums_.data());
   filled_ = 0;
 }
 
@@ -93,13 +94,14 @@ Gram GramSum::finish() {
 
 Gram Gram::of(const std::vector<int>& columns) const { return {block(xx, columns, columns), part(xy, columns), yy, n}; }
 
-Evidence::Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance, const Eigen::VectorXd& prior)
+Evidence::Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance,
+                   const Eigen::VectorXd& prior)
     : gram_(gram), groups_(groups), nuisance_(std::move(nuisance)), prior_(prior) {
   freedom_ = std::max(1.0, gram.n - static_cast<double>(nuisance_.size()));
 }
 
-// log p(y) = -nu/2 log(y^T y - m^T X^T y) - 1/2 log|X^T X + s^2 P| + 1/2 log|s^2 P| (MacKay 1992, eq. 4.10, with the noise
-// variance s^2 at its most probable value).
+// log p(y) = -nu/2 log(y^T y - m^T X^T y) - 1/2 log|X^T X + s^2 P| + 1/2 log|s^2 P| (MacKay 1992, eq. 4.10, with the
+// noise variance s^2 at its most probable value).
 Evidence::State Evidence::evaluate(const Choice& choice) const {
   State out;
   out.choice = choice;
@@ -153,14 +155,15 @@ Evidence::Projected Evidence::project(const State& state) const {
   Projected out;
   const auto p = static_cast<Eigen::Index>(state.columns.size());
   out.v.resize(p, gram_.xx.cols());
-  for (Eigen::Index i = 0; i < p; ++i) out.v.row(i) = gram_.xx.col(state.columns[static_cast<std::size_t>(i)]).transpose();
+  for (Eigen::Index i = 0; i < p; ++i)
+    out.v.row(i) = gram_.xx.col(state.columns[static_cast<std::size_t>(i)]).transpose();
   state.factor.matrixL().solveInPlace(out.v);
   out.u = state.factor.matrixL().solve(part(gram_.xy, state.columns));
   return out;
 }
 
-Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& prior,
-                                 double cost) const {
+Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
+                                 const Eigen::VectorXd& prior, double cost) const {
   Gain best;
   Eigen::LLT<Eigen::MatrixXd> factor;
   Eigen::MatrixXd m;
@@ -204,16 +207,19 @@ Evidence::Gain Evidence::gain(const State& state, const std::vector<int>& column
   const Projected projected = project(state);
   Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
   for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
-  return gain_of(state, block(gram_.xx, columns, columns) - v.transpose() * v, part(gram_.xy, columns) - v.transpose() * projected.u, part(prior_, columns), cost);
+  return gain_of(state, block(gram_.xx, columns, columns) - v.transpose() * v,
+                 part(gram_.xy, columns) - v.transpose() * projected.u, part(prior_, columns), cost);
 }
 
 double Evidence::visible(const State& state, int column) const {
   Eigen::VectorXd cross(static_cast<Eigen::Index>(state.columns.size()));
-  for (Eigen::Index k = 0; k < cross.size(); ++k) cross[k] = gram_.xx(state.columns[static_cast<std::size_t>(k)], column);
+  for (Eigen::Index k = 0; k < cross.size(); ++k)
+    cross[k] = gram_.xx(state.columns[static_cast<std::size_t>(k)], column);
   return gram_.xx(column, column) - state.factor.matrixL().solve(cross).squaredNorm();
 }
 
-double Evidence::explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta, const std::vector<int>& by) const {
+double Evidence::explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta,
+                           const std::vector<int>& by) const {
   const Projected projected = project(state);
   const auto columns = [&](const std::vector<int>& which) {
     Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(which.size()));
@@ -224,7 +230,8 @@ double Evidence::explained(const State& state, const std::vector<int>& what, con
   const Eigen::MatrixXd aa = block(gram_.xx, what, what) - v.transpose() * v;
   const Eigen::MatrixXd ab = block(gram_.xx, what, by) - v.transpose() * w;
   Eigen::MatrixXd bb = block(gram_.xx, by, by) - w.transpose() * w;
-  for (Eigen::Index k = 0; k < bb.rows(); ++k) bb(k, k) += 1e-9 * gram_.xx(by[static_cast<std::size_t>(k)], by[static_cast<std::size_t>(k)]) + 1e-300;
+  for (Eigen::Index k = 0; k < bb.rows(); ++k)
+    bb(k, k) += 1e-9 * gram_.xx(by[static_cast<std::size_t>(k)], by[static_cast<std::size_t>(k)]) + 1e-300;
   const double all = theta.dot(aa * theta);
   const Eigen::VectorXd right = ab.transpose() * theta;
   return all > 0.0 ? std::min(1.0, right.dot(bb.ldlt().solve(right)) / all) : 0.0;
@@ -238,7 +245,8 @@ std::vector<Evidence::Gain> Evidence::gains(const State& state) const {
     Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
     for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
     const Eigen::MatrixXd a = block(gram_.xx, columns, columns) - v.transpose() * v;
-    out[g] = gain_of(state, a, part(gram_.xy, columns) - v.transpose() * projected.u, part(prior_, columns), groups_[g].cost);
+    out[g] = gain_of(state, a, part(gram_.xy, columns) - v.transpose() * projected.u, part(prior_, columns),
+                     groups_[g].cost);
     if (columns.empty()) out[g].evidence = out[g].score = -1e300;
     out[g].group = static_cast<int>(g);
     for (std::size_t k = 0; k < columns.size(); ++k) {
@@ -287,7 +295,8 @@ Evidence::State Evidence::improve(State state, const SearchOptions& options) con
       if (before - after > 1) continue;  // a law with its correction is not swapped
       Gain best;
       for (const Gain& gain : gains(less)) {
-        if (may_enter(less, gain.group) && gain.group != state.choice.groups[at] && gain.score > best.score) best = gain;
+        if (may_enter(less, gain.group) && gain.group != state.choice.groups[at] && gain.score > best.score)
+          best = gain;
       }
       if (best.group < 0) continue;
       Choice swapped = less.choice;
@@ -314,20 +323,24 @@ Evidence::State Evidence::search(const SearchOptions& options, const Choice& sta
     for (const State& state : beam) {
       std::vector<Gain> ranked;
       for (const Gain& gain : gains(state)) {
-        if (may_enter(state, gain.group) && gain.score > options.threshold && gain.share > options.least_share) ranked.push_back(gain);
+        if (may_enter(state, gain.group) && gain.score > options.threshold && gain.share > options.least_share)
+          ranked.push_back(gain);
       }
       std::sort(ranked.begin(), ranked.end(), [](const Gain& a, const Gain& b) { return a.score > b.score; });
       // The law of what is in already is questioned before a second effect is believed.
       if (!ranked.empty()) {
         const auto law = std::find_if(ranked.begin(), ranked.end(), [&](const Gain& gain) {
           const ColumnGroup& g = groups_[static_cast<std::size_t>(gain.group)];
-          return g.corrects_law_at >= 0 || (g.law_at >= 0 && std::any_of(state.choice.groups.begin(), state.choice.groups.end(), [&](int in) {
-                   return groups_[static_cast<std::size_t>(in)].law_at == g.law_at;
-                 }));
+          return g.corrects_law_at >= 0 ||
+                 (g.law_at >= 0 && std::any_of(state.choice.groups.begin(), state.choice.groups.end(), [&](int in) {
+                    return groups_[static_cast<std::size_t>(in)].law_at == g.law_at;
+                  }));
         });
-        if (law != ranked.end() && law->score >= options.law_share * ranked[0].score) std::rotate(ranked.begin(), law, law + 1);
+        if (law != ranked.end() && law->score >= options.law_share * ranked[0].score)
+          std::rotate(ranked.begin(), law, law + 1);
       }
-      const std::size_t width = state.choice.groups.empty() ? static_cast<std::size_t>(2 * options.beam) : static_cast<std::size_t>(options.beam);
+      const std::size_t width = state.choice.groups.empty() ? static_cast<std::size_t>(2 * options.beam)
+                                                            : static_cast<std::size_t>(options.beam);
       for (std::size_t k = 0; k < std::min(ranked.size(), width); ++k) {
         Choice grown = state.choice;
         grown.groups.push_back(ranked[k].group);
@@ -341,8 +354,10 @@ Evidence::State Evidence::search(const SearchOptions& options, const Choice& sta
     }
     std::sort(next.begin(), next.end(), [](const State& a, const State& b) { return a.score > b.score; });
     if (next.size() > static_cast<std::size_t>(options.beam)) next.resize(static_cast<std::size_t>(options.beam));
-    if (!next.empty() && next[0].score > best.score) best = next[0];
-    else if (!next.empty() && next[0].score < best.score - 1.0) break;
+    if (!next.empty() && next[0].score > best.score)
+      best = next[0];
+    else if (!next.empty() && next[0].score < best.score - 1.0)
+      break;
     beam = std::move(next);
   }
   return improve(best, options);
@@ -369,7 +384,8 @@ std::vector<double> Evidence::null_scores(const State& state, int count, std::ui
     Prepared one;
     one.group = &groups_[g];
     one.v.resize(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
-    for (Eigen::Index i = 0; i < one.v.cols(); ++i) one.v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
+    for (Eigen::Index i = 0; i < one.v.cols(); ++i)
+      one.v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
     const Eigen::MatrixXd a = block(gram_.xx, columns, columns) - one.v.transpose() * one.v;
     const Eigen::VectorXd size = part(prior_, columns);
     for (std::size_t s = 0; s < kScales.size(); ++s) {
@@ -395,7 +411,8 @@ std::vector<double> Evidence::null_scores(const State& state, int count, std::ui
       const Eigen::VectorXd b = part(xy, one.group->columns) - one.v.transpose() * u;
       for (std::size_t s = 0; s < kScales.size(); ++s) {
         const double fall = std::min(one.factor[s].matrixL().solve(b).squaredNorm(), 0.99 * rss);
-        largest = std::max(largest, -0.5 * freedom_ * std::log1p(-fall / rss) + 0.5 * one.determinants[s] - one.group->cost);
+        largest =
+            std::max(largest, -0.5 * freedom_ * std::log1p(-fall / rss) + 0.5 * one.determinants[s] - one.group->cost);
       }
     }
     out.push_back(largest);
@@ -408,7 +425,8 @@ double detection_nats(double threshold, double cost, std::size_t columns, double
 }
 
 double held_out_squares(const Gram& held_out, const std::vector<int>& columns, const Eigen::VectorXd& solution) {
-  return held_out.yy - 2.0 * solution.dot(part(held_out.xy, columns)) + solution.dot(block(held_out.xx, columns, columns) * solution);
+  return held_out.yy - 2.0 * solution.dot(part(held_out.xy, columns)) +
+         solution.dot(block(held_out.xx, columns, columns) * solution);
 }
 
 }  // namespace truing::detail

@@ -3,7 +3,8 @@
 #pragma once
 
 // Which groups of columns explain the data: Gaussian evidence from the Gram matrix alone, and a search over subsets.
-// (MacKay 1992, Bayesian interpolation; the noise is integrated out, each group's prior scale is chosen from a short list.)
+// (MacKay 1992, Bayesian interpolation; the noise is integrated out, each group's prior scale is chosen from a short
+// list.)
 
 #include <cstdint>
 #include <vector>
@@ -44,23 +45,24 @@ class GramSum {
   Eigen::Index columns_;
   Eigen::Index filled_ = 0;
   double n_ = 0.0;
-  Eigen::MatrixXd buffer_;       ///< shape (kLength, columns + 1)
-  std::vector<double> sums_;     ///< the kernel's own
+  Eigen::MatrixXd buffer_;    ///< shape (kLength, columns + 1)
+  std::vector<double> sums_;  ///< the kernel's own
 };
 
 /// Columns that come and go together, as the search sees them.
 struct ColumnGroup {
   std::vector<int> columns;
-  double cost = 0.0;     ///< nats: log of how many groups of its kind there are, and of what was scanned to find it
-  int law_at = -1;       ///< number of "law of a driver at a joint", the same for all groups that are one; -1: none
+  double cost = 0.0;         ///< nats: log of how many groups of its kind there are, and of what was scanned to find it
+  int law_at = -1;           ///< number of "law of a driver at a joint", the same for all groups that are one; -1: none
   int corrects_law_at = -1;  ///< of a law's correction: may only enter beside a law of this number; -1: free to enter
-  bool shadow = false;   ///< never enters; only an alternative
+  bool shadow = false;       ///< never enters; only an alternative
 };
 
 struct SearchOptions {
   double threshold = 4.0;      ///< nats that a group must win beyond its cost
   double least_share = 0.015;  ///< of what is unexplained, that a group must explain
-  double law_share = 0.75;     ///< a law's correction goes before a second effect if it wins at least this part of what that one would
+  double law_share =
+      0.75;  ///< a law's correction goes before a second effect if it wins at least this part of what that one would
   int beam = 3;
   int most_groups = 12;
 };
@@ -74,20 +76,22 @@ struct Choice {
 /// One Gram, its groups, and everything that the search asks of them.
 class Evidence {
  public:
-  /// `nuisance`: columns that are always in, with a flat prior. `prior[k]`: the size that column k's parameter may have.
-  Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance, const Eigen::VectorXd& prior);
+  /// `nuisance`: columns that are always in, with a flat prior. `prior[k]`: the size that column k's parameter may
+  /// have.
+  Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance,
+           const Eigen::VectorXd& prior);
 
   /// A choice evaluated.
   struct State {
     Choice choice;
-    std::vector<int> columns;    ///< nuisance, then the groups'
-    Eigen::VectorXd precision;   ///< prior precision of each column, times the noise variance it has to be multiplied by
+    std::vector<int> columns;   ///< nuisance, then the groups'
+    Eigen::VectorXd precision;  ///< prior precision of each column, times the noise variance it has to be multiplied by
     Eigen::LLT<Eigen::MatrixXd> factor;  ///< of X^T X + sigma^2 P
     Eigen::VectorXd solution;
-    double rss = 0.0;            ///< penalised
+    double rss = 0.0;  ///< penalised
     double sigma2 = 0.0;
-    double evidence = 0.0;       ///< log, but for a constant of the Gram
-    double score = 0.0;          ///< evidence less the groups' costs
+    double evidence = 0.0;  ///< log, but for a constant of the Gram
+    double score = 0.0;     ///< evidence less the groups' costs
   };
 
   State evaluate(const Choice& choice) const;
@@ -105,7 +109,8 @@ class Evidence {
   std::vector<Gain> gains(const State& state) const;
 
   /// The same for columns outside the Gram: theirs (X^T X, X^T y) after projection on the state, and their priors.
-  Gain gain_of(const State& state, const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& prior, double cost) const;
+  Gain gain_of(const State& state, const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& prior,
+               double cost) const;
 
   /// What adding columns of the Gram would win.
   Gain gain(const State& state, const std::vector<int>& columns, double cost) const;
@@ -114,7 +119,8 @@ class Evidence {
   double visible(const State& state, int column) const;
 
   /// Share of what columns `what` times `theta` do, beyond the state's own columns, that columns `by` can do as well.
-  double explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta, const std::vector<int>& by) const;
+  double explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta,
+                   const std::vector<int>& by) const;
 
   /// Forward with a beam, then backward and swap until nothing helps.
   State search(const SearchOptions& options, const Choice& start = {}) const;
@@ -141,8 +147,9 @@ class Evidence {
   double freedom_ = 0.0;
 };
 
-/// Nats that a group of so many columns has to win from so many values before the search takes it: the threshold, what having looked
-/// at all of them costs, and what its flexibility does (as the evidence of many values has it: half a log of their number a column).
+/// Nats that a group of so many columns has to win from so many values before the search takes it: the threshold, what
+/// having looked at all of them costs, and what its flexibility does (as the evidence of many values has it: half a log
+/// of their number a column).
 double detection_nats(double threshold, double cost, std::size_t columns, double values);
 
 /// Sum of squares on `held_out` of the ridge fit `state` made on other rows (same columns).

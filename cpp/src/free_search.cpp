@@ -16,11 +16,11 @@ namespace {
 
 /// The rows that are looked at, weighted, with what the state's columns are on them.
 struct Left {
-  std::vector<Eigen::Index> at;      ///< rows of the design
-  Eigen::MatrixXd columns;           ///< weighted columns of the state, shape (rows, columns)
-  Eigen::VectorXd residual;          ///< weighted
+  std::vector<Eigen::Index> at;  ///< rows of the design
+  Eigen::MatrixXd columns;       ///< weighted columns of the state, shape (rows, columns)
+  Eigen::VectorXd residual;      ///< weighted
   Eigen::LLT<Eigen::MatrixXd> factor;
-  double share = 1.0;                ///< of the training rows
+  double share = 1.0;  ///< of the training rows
 };
 
 Left what_is_left(const Design& design, const Evidence::State& state, std::size_t most) {
@@ -28,9 +28,11 @@ Left what_is_left(const Design& design, const Evidence::State& state, std::size_
   std::size_t training = 0;
   for (const std::int32_t fold : design.fold) training += fold < design.folds ? 1 : 0;
   int folds = design.folds;
-  while (folds > 2 && training * static_cast<std::size_t>(folds) / static_cast<std::size_t>(design.folds) > most) --folds;
+  while (folds > 2 && training * static_cast<std::size_t>(folds) / static_cast<std::size_t>(design.folds) > most)
+    --folds;
   for (std::size_t i = 0; i < design.fold.size(); ++i) {
-    if (design.fold[i] < folds && design.weight[static_cast<Eigen::Index>(i)] > 0.0) out.at.push_back(static_cast<Eigen::Index>(i));
+    if (design.fold[i] < folds && design.weight[static_cast<Eigen::Index>(i)] > 0.0)
+      out.at.push_back(static_cast<Eigen::Index>(i));
   }
   out.share = static_cast<double>(out.at.size()) / static_cast<double>(std::max<std::size_t>(1, training));
   const auto p = static_cast<Eigen::Index>(state.columns.size());
@@ -38,7 +40,8 @@ Left what_is_left(const Design& design, const Evidence::State& state, std::size_
   out.residual.resize(out.columns.rows());
   for (Eigen::Index k = 0; k < out.columns.rows(); ++k) {
     const Eigen::Index i = out.at[static_cast<std::size_t>(k)];
-    for (Eigen::Index c = 0; c < p; ++c) out.columns(k, c) = design.weight[i] * design.x(i, state.columns[static_cast<std::size_t>(c)]);
+    for (Eigen::Index c = 0; c < p; ++c)
+      out.columns(k, c) = design.weight[i] * design.x(i, state.columns[static_cast<std::size_t>(c)]);
     out.residual[k] = design.weight[i] * design.y[i];
   }
   Eigen::MatrixXd d = out.columns.transpose() * out.columns;
@@ -54,7 +57,8 @@ struct Trial {
   std::vector<int> sites;
 };
 
-std::vector<Trial> make_trials(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot, std::size_t clusters) {
+std::vector<Trial> make_trials(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot,
+                               std::size_t clusters) {
   std::vector<Trial> out;
   std::vector<std::int32_t> rows;
   for (std::size_t i = 0; i < design.row.size(); ++i) {
@@ -103,7 +107,9 @@ std::vector<Trial> make_trials(const Design& design, const std::vector<InputColu
         if (second.constant || b == a) continue;
         const bool motion = second.name[0] == 'q' && second.name.find('-') == std::string::npos;
         if (motion && b < a) continue;
-        if (second.name.rfind("torque", 0) == 0 || second.name.find('-') != std::string::npos || second.name == "time" || second.name == "order") continue;
+        if (second.name.rfind("torque", 0) == 0 || second.name.find('-') != std::string::npos ||
+            second.name == "time" || second.name == "order")
+          continue;
         const bool own = first.joint == static_cast<int>(joint);
         const bool direction = second.name.rfind("dir", 0) == 0;
         if (!motion && direction && second.joint != static_cast<int>(joint)) continue;
@@ -115,7 +121,8 @@ std::vector<Trial> make_trials(const Design& design, const std::vector<InputColu
   if (!design.base_columns.empty()) {
     for (int a = 0; a < number_of_inputs; ++a) {
       const InputColumn& first = inputs[static_cast<std::size_t>(a)];
-      if (first.constant || first.name.rfind("torque", 0) == 0 || first.name == "order" || first.name == "time") continue;
+      if (first.constant || first.name.rfind("torque", 0) == 0 || first.name == "order" || first.name == "time")
+        continue;
       fine[static_cast<std::size_t>(a)] = knots_of(first, rows, std::min(one, 5));
       add("base", design.base_columns, {a});
     }
@@ -125,12 +132,12 @@ std::vector<Trial> make_trials(const Design& design, const std::vector<InputColu
 
 /// X^T v of a trial's columns for every column v of `right`, and X^T X, without ever storing X.
 struct Sums {
-  Eigen::MatrixXd xx;      ///< shape (k, k)
-  Eigen::MatrixXd right;   ///< shape (k, columns of right)
+  Eigen::MatrixXd xx;     ///< shape (k, k)
+  Eigen::MatrixXd right;  ///< shape (k, columns of right)
 };
 
-Sums sums_of(const Trial& trial, const Design& design, const std::vector<InputColumn>& inputs, const std::vector<Eigen::Index>& at,
-             const Design::Rows& right) {
+Sums sums_of(const Trial& trial, const Design& design, const std::vector<InputColumn>& inputs,
+             const std::vector<Eigen::Index>& at, const Design::Rows& right) {
   const auto k1 = static_cast<Eigen::Index>(trial.what.knots[0].size());
   const auto k2 = trial.what.knots.size() > 1 ? static_cast<Eigen::Index>(trial.what.knots[1].size()) : 1;
   const Eigen::Index per_site = k1 * k2, k = per_site * static_cast<Eigen::Index>(trial.sites.size());
@@ -145,8 +152,13 @@ Sums sums_of(const Trial& trial, const Design& design, const std::vector<InputCo
     const std::int32_t row = design.row[static_cast<std::size_t>(i)];
     if (row != last) {
       last = row;
-      hats_at(trial.what.knots[0], inputs[static_cast<std::size_t>(trial.what.inputs[0])].values[static_cast<std::size_t>(row)], first.data());
-      if (k2 > 1) hats_at(trial.what.knots[1], inputs[static_cast<std::size_t>(trial.what.inputs[1])].values[static_cast<std::size_t>(row)], second.data());
+      hats_at(trial.what.knots[0],
+              inputs[static_cast<std::size_t>(trial.what.inputs[0])].values[static_cast<std::size_t>(row)],
+              first.data());
+      if (k2 > 1)
+        hats_at(trial.what.knots[1],
+                inputs[static_cast<std::size_t>(trial.what.inputs[1])].values[static_cast<std::size_t>(row)],
+                second.data());
       hats.clear();
       for (Eigen::Index a = 0; a < k1; ++a) {
         for (Eigen::Index b = 0; b < k2; ++b) {
@@ -158,7 +170,8 @@ Sums sums_of(const Trial& trial, const Design& design, const std::vector<InputCo
     values.clear();
     for (std::size_t s = 0; s < trial.sites.size(); ++s) {
       const double d = design.weight[i] * design.x(i, trial.sites[s]);
-      for (const auto& [hat, value] : hats) values.emplace_back(static_cast<Eigen::Index>(s) * per_site + hat, d * value);
+      for (const auto& [hat, value] : hats)
+        values.emplace_back(static_cast<Eigen::Index>(s) * per_site + hat, d * value);
     }
     for (const auto& [a, x] : values) {
       for (const auto& [b, z] : values) out.xx(a, b) += x * z;
@@ -186,7 +199,8 @@ Design::Rows right_sides(const Design& design, const Left& left, int flips, std:
     for (double& s : sign) s = random.next() & 1u ? 1.0 : -1.0;
     Eigen::VectorXd flipped(left.residual.size());
     for (Eigen::Index n = 0; n < flipped.size(); ++n) {
-      const auto c = std::lower_bound(known.begin(), known.end(), clusters[static_cast<std::size_t>(n)]) - known.begin();
+      const auto c =
+          std::lower_bound(known.begin(), known.end(), clusters[static_cast<std::size_t>(n)]) - known.begin();
       flipped[n] = sign[static_cast<std::size_t>(c)] * left.residual[n];
     }
     // A fit would have taken its share of this noise, too.
@@ -198,8 +212,9 @@ Design::Rows right_sides(const Design& design, const Left& left, int flips, std:
 
 }  // namespace
 
-FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidence::State& state, const std::vector<InputColumn>& inputs,
-                   const Robot& robot, double deff, const FreeScanOptions& options) {
+FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidence::State& state,
+                   const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                   const FreeScanOptions& options) {
   const Left left = what_is_left(design, state, options.most_values);
   std::vector<std::int32_t> clusters;
   for (const Eigen::Index i : left.at) clusters.push_back(design.cluster[static_cast<std::size_t>(i)]);
@@ -234,7 +249,8 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
         const double ridge = scaled.sigma2 / std::pow(scale * kLargest, 2.0);
         m.diagonal().array() += ridge;
         const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(m));
-        const double determinants = static_cast<double>(k) * std::log(ridge) - 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+        const double determinants =
+            static_cast<double>(k) * std::log(ridge) - 2.0 * factor.matrixLLT().diagonal().array().log().sum();
         Eigen::MatrixXd flipped = sums.right.rightCols(options.flips) * times;
         factor.matrixL().solveInPlace(flipped);
         for (int f = 0; f < options.flips; ++f) {
@@ -248,7 +264,8 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
     found.site_columns = trial.sites;
     out.best.push_back(std::move(found));
   }
-  std::sort(out.best.begin(), out.best.end(), [](const FreeGain& a, const FreeGain& b) { return a.gain.score > b.gain.score; });
+  std::sort(out.best.begin(), out.best.end(),
+            [](const FreeGain& a, const FreeGain& b) { return a.gain.score > b.gain.score; });
   if (!out.best.empty() && options.flips > 0) {
     int above = 1;
     for (const double score : largest) above += score >= out.best[0].gain.score ? 1 : 0;
@@ -259,7 +276,8 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
 }
 
 std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, const Evidence::State& state,
-                                const std::vector<InputColumn>& inputs, const Robot& robot, double deff, std::size_t most_values) {
+                                const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                                std::size_t most_values) {
   const Left left = what_is_left(design, state, most_values);
   const double times = 1.0 / (left.share * deff);
   Evidence::State scaled = state;
@@ -281,9 +299,14 @@ std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, 
     // Angles that crowd at a few places cannot show a short wave: any order would do.
     std::vector<double> sorted(q);
     std::sort(sorted.begin(), sorted.end());
-    sorted.erase(std::unique(sorted.begin(), sorted.end(), [](double a, double b) { return b - a < 0.01; }), sorted.end());
+    sorted.erase(std::unique(sorted.begin(), sorted.end(), [](double a, double b) { return b - a < 0.01; }),
+                 sorted.end());
     std::size_t poses = 0;
-    for (std::size_t n = 0; n < left.at.size(); ++n) poses += n == 0 || design.cluster[static_cast<std::size_t>(left.at[n])] != design.cluster[static_cast<std::size_t>(left.at[n - 1])] ? 1 : 0;
+    for (std::size_t n = 0; n < left.at.size(); ++n)
+      poses += n == 0 || design.cluster[static_cast<std::size_t>(left.at[n])] !=
+                             design.cluster[static_cast<std::size_t>(left.at[n - 1])]
+                   ? 1
+                   : 0;
     if (static_cast<double>(sorted.size()) < std::min(0.3 * static_cast<double>(poses), 100.0)) continue;
     const auto [low, high] = std::minmax_element(q.begin(), q.end());
     const double step = *high - *low > 6.6 ? 0.5 : 1.0;
@@ -338,7 +361,8 @@ std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, 
   return out;
 }
 
-// --- what a curve looks like --------------------------------------------------------------------------------------------
+// --- what a curve looks like
+// --------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -349,7 +373,8 @@ double left_by(const Curve& curve, const std::vector<std::vector<double>>& colum
   Eigen::VectorXd y(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     y[i] = curve.samples[static_cast<std::size_t>(i)][1];
-    for (Eigen::Index c = 0; c < x.cols(); ++c) x(i, c) = columns[static_cast<std::size_t>(c)][static_cast<std::size_t>(i)];
+    for (Eigen::Index c = 0; c < x.cols(); ++c)
+      x(i, c) = columns[static_cast<std::size_t>(c)][static_cast<std::size_t>(i)];
   }
   Eigen::MatrixXd xx = x.transpose() * x;
   xx.diagonal() *= 1.0 + 1e-12;
@@ -380,7 +405,8 @@ std::string shape_of(const Curve& curve) {
   const std::size_t stride = std::max<std::size_t>(1, n / 80);
   for (std::size_t k = stride; k < n; k += stride) {
     const double at = 0.5 * (curve.samples[k - 1][0] + curve.samples[k][0]);
-    shapes.push_back({left_by(curve, {one, column([at](double x) { return x > at ? 1.0 : 0.0; })}), 3, "a step at " + curve.input + " = " + number(at, 3) + unit});
+    shapes.push_back({left_by(curve, {one, column([at](double x) { return x > at ? 1.0 : 0.0; })}), 3,
+                      "a step at " + curve.input + " = " + number(at, 3) + unit});
     if (k > 3 * stride && k + 3 * stride < n) {
       const double corner = curve.samples[k][0];
       shapes.push_back({left_by(curve, {one, column([corner](double x) { return std::max(0.0, x - corner); })}), 3.5,
@@ -390,16 +416,20 @@ std::string shape_of(const Curve& curve) {
     }
   }
   const double low = curve.samples.front()[0], span = curve.samples.back()[0] - low;
-  shapes.push_back({left_by(curve, {one, column([&](double x) { return x; }), column([&](double x) { return x * x; })}), 3, "quadratic in " + curve.input});
+  shapes.push_back({left_by(curve, {one, column([&](double x) { return x; }), column([&](double x) { return x * x; })}),
+                    3, "quadratic in " + curve.input});
   for (int k = 1; k < 8 && curve.input[0] == 'q'; ++k) {
-    shapes.push_back({left_by(curve, {one, column([k](double x) { return std::cos(k * x); }), column([k](double x) { return std::sin(k * x); })}), 3.5,
-                      "a wave of " + std::to_string(k) + " per turn of " + curve.input});
+    shapes.push_back({left_by(curve, {one, column([k](double x) { return std::cos(k * x); }),
+                                      column([k](double x) { return std::sin(k * x); })}),
+                      3.5, "a wave of " + std::to_string(k) + " per turn of " + curve.input});
   }
   for (std::size_t k = 1; k + 1 < curve.points.size(); ++k) {
     for (const double width : {0.08, 0.15, 0.25}) {
       const double at = curve.points[k][0];
-      shapes.push_back({left_by(curve, {one, column([&](double x) { return std::exp(-0.5 * std::pow((x - at) / (width * span), 2.0)); })}), 4,
-                        "a bump at " + curve.input + " = " + number(at, 3) + unit});
+      shapes.push_back({left_by(curve, {one, column([&](double x) {
+                                          return std::exp(-0.5 * std::pow((x - at) / (width * span), 2.0));
+                                        })}),
+                        4, "a bump at " + curve.input + " = " + number(at, 3) + unit});
     }
   }
   // What the free curve leaves is noise: chi-squared and two for each parameter (Akaike 1974).
@@ -411,7 +441,8 @@ std::string shape_of(const Curve& curve) {
     hats_at(knots, curve.samples[i][0], values.data());
     for (std::size_t k = 0; k < knots.size(); ++k) hats[k][i] = values[k];
   }
-  const double noise = left_by(curve, hats), unit2 = std::max(noise / std::max(1.0, static_cast<double>(n - std::min(n - 1, knots.size()))), 1e-300);
+  const double noise = left_by(curve, hats),
+               unit2 = std::max(noise / std::max(1.0, static_cast<double>(n - std::min(n - 1, knots.size()))), 1e-300);
   const auto best = std::min_element(shapes.begin(), shapes.end(), [unit2](const Shape& a, const Shape& b) {
     return a.left / unit2 + 2.0 * a.parameters < b.left / unit2 + 2.0 * b.parameters;
   });

@@ -32,8 +32,9 @@ struct FreeScanOptions {
 };
 
 /// Scores free functions on what `state` leaves of the training rows. `deff`: rows that count as one.
-FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidence::State& state, const std::vector<InputColumn>& inputs,
-                   const Robot& robot, double deff, const FreeScanOptions& options);
+FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidence::State& state,
+                   const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                   const FreeScanOptions& options);
 
 /// Mesh orders of every revolute joint scanned on what is left: the best order of each joint [per turn], if any wins.
 struct MeshGain {
@@ -43,7 +44,8 @@ struct MeshGain {
   int tried = 0;
 };
 std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, const Evidence::State& state,
-                                const std::vector<InputColumn>& inputs, const Robot& robot, double deff, std::size_t most_values = 20000);
+                                const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                                std::size_t most_values = 20000);
 
 /// "a step at q4 = 0.41 rad", "linear in temp", … from points (input, value, standard error).
 std::string shape_of(const Curve& curve);

@@ -75,8 +75,8 @@ Eigen::VectorXd gravity_torques(const Robot& robot, const Eigen::VectorXd& readi
         "payload is zero");
   }
   Eigen::VectorXd torque(static_cast<Eigen::Index>(robot.joints.size()));
-  detail::gravity_torques_at(robot, detail::coupling_matrix(robot), forward_kinematics(robot, reading, 0),
-                             payload, torque);
+  detail::gravity_torques_at(robot, detail::coupling_matrix(robot), forward_kinematics(robot, reading, 0), payload,
+                             torque);
   return torque;
 }
 

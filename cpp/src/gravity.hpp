@@ -22,9 +22,7 @@ Axis joint_axis(const Robot& robot, const std::vector<Eigen::Isometry3d>& frames
 
 /// `value`, or zero when it is rounding of terms as large as `size`: the weight on a vertical axis must be
 /// none, or what is left of it (and its sign) would be fitted as a column like any other.
-inline double without_rounding(double value, double size) {
-  return std::abs(value) <= 1e-12 * size ? 0.0 : value;
-}
+inline double without_rounding(double value, double size) { return std::abs(value) <= 1e-12 * size ? 0.0 : value; }
 
 /// True when some link of the robot has a mass.
 bool knows_mass(const Robot& robot);

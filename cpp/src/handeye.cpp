@@ -27,17 +27,19 @@ using namespace detail;
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kLeastRotation = 1e-6;      // [rad] axes about which motions turn less than this do not count, noise or not
-constexpr double kOverNoise = 3.0;           // and no less than so many times the noise of the angles
-constexpr double kLargestNoise = 0.01;       // [rad] angle noise beyond this is a wrong reading, not noise
-constexpr double kDoubtful = 0.02;           // closures beyond this, rad or shares of the motion's size, make us try other readings
-constexpr double kHopeless = 0.2;            // and beyond this nothing is said
-constexpr double kWidest = 0.1;              // standard errors beyond this share of the distance, or rad, are not an answer
-constexpr double kExact = 1e-8;              // [m], [rad] closures below this are rounding, not noise
-constexpr double kBeyondPixels = 3.0;        // times what pixels can tell of a board's orientation: more is not theirs
-constexpr double kBentLens = 1.2;            // a lens whose pixels scatter with no more than this times the variance fits as well
+constexpr double kLeastRotation =
+    1e-6;                               // [rad] axes about which motions turn less than this do not count, noise or not
+constexpr double kOverNoise = 3.0;      // and no less than so many times the noise of the angles
+constexpr double kLargestNoise = 0.01;  // [rad] angle noise beyond this is a wrong reading, not noise
+constexpr double kDoubtful =
+    0.02;  // closures beyond this, rad or shares of the motion's size, make us try other readings
+constexpr double kHopeless = 0.2;      // and beyond this nothing is said
+constexpr double kWidest = 0.1;        // standard errors beyond this share of the distance, or rad, are not an answer
+constexpr double kExact = 1e-8;        // [m], [rad] closures below this are rounding, not noise
+constexpr double kBeyondPixels = 3.0;  // times what pixels can tell of a board's orientation: more is not theirs
+constexpr double kBentLens = 1.2;  // a lens whose pixels scatter with no more than this times the variance fits as well
 constexpr int kRejectRounds = 10;
-constexpr double kPlainGain = 16.0;          // over the poses: by how much more plain weights must predict better, as a share
+constexpr double kPlainGain = 16.0;  // over the poses: by how much more plain weights must predict better, as a share
 
 std::string mm(double metres) { return number(1e3 * metres, 3) + " mm"; }
 std::string deg(double angle) { return number(180.0 / kPi * angle, 3) + " deg"; }
@@ -49,14 +51,17 @@ void check_frame(const Eigen::Isometry3d& T, const char* what, std::size_t i) {
     throw std::invalid_argument(std::string(what) + " of pose " + std::to_string(i) + " " + why);
   };
   if (!T.matrix().allFinite()) fail("is not finite");
-  if ((T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-6) fail("is not a rotation: its axes are not orthogonal unit vectors");
+  if ((T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-6)
+    fail("is not a rotation: its axes are not orthogonal unit vectors");
   if (T.linear().determinant() < 0.0) fail("is left-handed: its determinant is -1");
 }
 
 void check(const HandEyePoses& poses) {
   const std::size_t n = poses.T_base_hand.size();
   const auto same = [&](std::size_t count, const char* what) {
-    if (count != n) throw std::invalid_argument(std::string("there are ") + std::to_string(n) + " hand poses and " + std::to_string(count) + " " + what);
+    if (count != n)
+      throw std::invalid_argument(std::string("there are ") + std::to_string(n) + " hand poses and " +
+                                  std::to_string(count) + " " + what);
   };
   same(poses.T_camera_board.size(), "board poses");
   if (!poses.images.empty()) same(poses.images.size(), "images");
@@ -67,11 +72,14 @@ void check(const HandEyePoses& poses) {
     if (poses.images.empty()) continue;
     const BoardImage& image = poses.images[i];
     if (image.points.cols() != image.pixels.cols() || image.points.cols() < 4)
-      throw std::invalid_argument("image " + std::to_string(i) + " has " + std::to_string(image.points.cols()) + " points and " +
-                                  std::to_string(image.pixels.cols()) + " pixels; needed are as many of each, 4 or more");
-    if (!image.points.allFinite() || !image.pixels.allFinite()) throw std::invalid_argument("image " + std::to_string(i) + " is not finite");
+      throw std::invalid_argument("image " + std::to_string(i) + " has " + std::to_string(image.points.cols()) +
+                                  " points and " + std::to_string(image.pixels.cols()) +
+                                  " pixels; needed are as many of each, 4 or more");
+    if (!image.points.allFinite() || !image.pixels.allFinite())
+      throw std::invalid_argument("image " + std::to_string(i) + " is not finite");
   }
-  for (std::size_t k = 0; k < poses.board_symmetries.size(); ++k) check_frame(poses.board_symmetries[k], "board_symmetries", k);
+  for (std::size_t k = 0; k < poses.board_symmetries.size(); ++k)
+    check_frame(poses.board_symmetries[k], "board_symmetries", k);
 }
 
 Rows rows_of(const HandEyePoses& poses, bool test) {
@@ -85,10 +93,14 @@ void check_rows(const HandEyePoses& poses, const Rows& rows) {
   if (rows.size() < 3)
     throw std::invalid_argument("hand-eye needs three poses or more to fit, found " + std::to_string(rows.size()) +
                                 ": move the hand to at least three that differ in orientation about two axes");
-  const auto equal = [](const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) { return (a.matrix() - b.matrix()).norm() < 1e-12; };
-  if (std::all_of(rows.begin(), rows.end(), [&](std::size_t i) { return equal(poses.T_base_hand[i], poses.T_base_hand[rows[0]]); }))
+  const auto equal = [](const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+    return (a.matrix() - b.matrix()).norm() < 1e-12;
+  };
+  if (std::all_of(rows.begin(), rows.end(),
+                  [&](std::size_t i) { return equal(poses.T_base_hand[i], poses.T_base_hand[rows[0]]); }))
     throw std::invalid_argument("all hand poses are equal: the robot has not moved, or its pose was not read anew");
-  if (std::all_of(rows.begin(), rows.end(), [&](std::size_t i) { return equal(poses.T_camera_board[i], poses.T_camera_board[rows[0]]); }))
+  if (std::all_of(rows.begin(), rows.end(),
+                  [&](std::size_t i) { return equal(poses.T_camera_board[i], poses.T_camera_board[rows[0]]); }))
     throw std::invalid_argument("all board poses are equal: the camera's result was not read anew");
 }
 
@@ -97,7 +109,9 @@ void check_rows(const HandEyePoses& poses, const Rows& rows) {
 struct Names {
   std::string camera_parent, board_parent;
 };
-Names names_of(HandEyeSetup setup) { return setup == HandEyeSetup::eye_in_hand ? Names{"flange", "base"} : Names{"base", "flange"}; }
+Names names_of(HandEyeSetup setup) {
+  return setup == HandEyeSetup::eye_in_hand ? Names{"flange", "base"} : Names{"base", "flange"};
+}
 
 /// "base z", or the vector where it is not near an axis.
 std::string direction_name(const Eigen::Vector3d& d, const std::string& frame) {
@@ -115,7 +129,8 @@ Eigen::Vector3d with_positive_largest(Eigen::Vector3d d) {
 void refuse(HandEyeResult* result, HandEyeStatus status) {
   result->status = status;
   std::string text;
-  for (const Unobservable& u : result->unobservable) text += (text.empty() ? "" : " ") + u.what + " is not observable; " + u.advice + ".";
+  for (const Unobservable& u : result->unobservable)
+    text += (text.empty() ? "" : " ") + u.what + " is not observable; " + u.advice + ".";
   if (text.empty()) return;
   text[0] = 'T';  // "the camera's …"
   result->message = text;
@@ -124,23 +139,29 @@ void refuse(HandEyeResult* result, HandEyeStatus status) {
 // ---- Degenerate motions --------------------------------------------------------------------------------------------
 
 /// Motions without two axes of rotation. Nothing found: the axis, where there is one only.
-void look_at_axes(const CameraSolution& all, const HandEyeOptions& options, HandEyeResult* result, std::optional<Eigen::Vector3d>* axis) {
+void look_at_axes(const CameraSolution& all, const HandEyeOptions& options, HandEyeResult* result,
+                  std::optional<Eigen::Vector3d>* axis) {
   const double noise = std::max(kLeastRotation, kOverNoise * std::min(all.incongruence, kLargestNoise));
   const std::string parent = names_of(options.setup).camera_parent;
   if (all.principal_rotations(0) < noise) {
     for (int k = 0; k < 3; ++k)
-      result->unobservable.push_back({"the camera's position along " + direction_name(Eigen::Vector3d::Unit(k), parent), Eigen::Vector3d::Unit(k), false,
-                                      std::numeric_limits<double>::infinity(), "the hand did not turn: rotate it by 30 deg or more about two axes"});
+      result->unobservable.push_back({"the camera's position along " + direction_name(Eigen::Vector3d::Unit(k), parent),
+                                      Eigen::Vector3d::Unit(k), false, std::numeric_limits<double>::infinity(),
+                                      "the hand did not turn: rotate it by 30 deg or more about two axes"});
     result->status = HandEyeStatus::not_observable;
-    result->message = "The camera's position is not observable: the hand moved without turning. Rotate it by 30 deg or more about two axes.";
+    result->message =
+        "The camera's position is not observable: the hand moved without turning. Rotate it by 30 deg or more about "
+        "two axes.";
     return;
   }
   if (all.principal_rotations(1) >= noise) return;
   const Eigen::Vector3d only = with_positive_largest(all.principal_axes.col(0));
   *axis = only;
   if (options.known_height) return;
-  result->unobservable.push_back({"the camera's height along " + direction_name(only, parent), only, false, std::numeric_limits<double>::infinity(),
-                                  "all rotations are about this one axis: rotate about a second one by 30 deg, or tell the height (known height)"});
+  result->unobservable.push_back({"the camera's height along " + direction_name(only, parent), only, false,
+                                  std::numeric_limits<double>::infinity(),
+                                  "all rotations are about this one axis: rotate about a second one by 30 deg, or tell "
+                                  "the height (known height)"});
   refuse(result, HandEyeStatus::not_observable);
 }
 
@@ -159,9 +180,12 @@ void look_at_errors(const HandEyeOptions& options, double distance, HandEyeResul
       const double sigma = std::sqrt(std::max(0.0, eigen.eigenvalues()(k)));
       if (sigma <= limit) continue;
       const Eigen::Vector3d d = with_positive_largest(eigen.eigenvectors().col(k));
-      result->unobservable.push_back({std::string("the camera's ") + (rotation ? "rotation about " : "position along ") + direction_name(d, parent), d, rotation,
-                                      sigma, "its standard error would be " + (rotation ? deg(sigma) : mm(sigma)) +
-                                      ": turn the hand further, by 30 deg or more about two axes, or take more poses"});
+      result->unobservable.push_back(
+          {std::string("the camera's ") + (rotation ? "rotation about " : "position along ") +
+               direction_name(d, parent),
+           d, rotation, sigma,
+           "its standard error would be " + (rotation ? deg(sigma) : mm(sigma)) +
+               ": turn the hand further, by 30 deg or more about two axes, or take more poses"});
     }
   };
   look(result->working_point_covariance, false, kWidest * distance);
@@ -185,7 +209,7 @@ void find_board_scale(const LoopProblem& problem, const Rows& rows, const LoopEs
 // ---- The work ------------------------------------------------------------------------------------------------------
 
 struct Work {
-  HandEyePoses poses;       // in the reading chosen, boards turned as the agreement has it
+  HandEyePoses poses;  // in the reading chosen, boards turned as the agreement has it
   LoopProblem problem;
   Rows fitted, held_out;
   LoopEstimate fit;
@@ -200,7 +224,9 @@ void fit_boards(const Camera& camera, Work* work, double* pixel_variance) {
   std::vector<double> per_image;
   for (std::size_t i = 0; i < work->poses.images.size(); ++i) {
     const BoardFit fit = fit_board(camera, work->poses.images[i], work->problem.B[i]);
-    if (!fit.converged) throw std::invalid_argument("the board's pose in image " + std::to_string(i) + " does not fit its pixels: is it behind the camera?");
+    if (!fit.converged)
+      throw std::invalid_argument("the board's pose in image " + std::to_string(i) +
+                                  " does not fit its pixels: is it behind the camera?");
     work->problem.B[i] = fit.T_camera_board, work->problem.pixel_shape[i] = fit.shape;
     sum += fit.sum, freedom += fit.freedom;
     per_image.push_back(fit.sum / std::max(1, fit.freedom));
@@ -215,11 +241,16 @@ LoopNoise noise_asked(const HandEyeOptions& options, const HandEyePoses& poses, 
   const double position = std::max(agreement.position, 1e-9), rotation = std::max(agreement.rotation, 1e-9);
   noise.variance = {variance(0.5 * position), variance(0.3 * rotation), variance(0.3 * rotation), 0.0};
   const bool images = !poses.images.empty();
-  const bool position_given = std::isfinite(options.hand_position_sigma) && (images || std::isfinite(options.camera_position_sigma));
+  const bool position_given =
+      std::isfinite(options.hand_position_sigma) && (images || std::isfinite(options.camera_position_sigma));
   if (position_given)
-    noise.variance[0] = variance(options.hand_position_sigma) + (images ? 0.0 : variance(options.camera_position_sigma)), noise.estimate[0] = false;
-  if (std::isfinite(options.hand_rotation_sigma)) noise.variance[1] = variance(options.hand_rotation_sigma), noise.estimate[1] = false;
-  if (!images && std::isfinite(options.camera_rotation_sigma)) noise.variance[2] = variance(options.camera_rotation_sigma), noise.estimate[2] = false;
+    noise.variance[0] =
+        variance(options.hand_position_sigma) + (images ? 0.0 : variance(options.camera_position_sigma)),
+    noise.estimate[0] = false;
+  if (std::isfinite(options.hand_rotation_sigma))
+    noise.variance[1] = variance(options.hand_rotation_sigma), noise.estimate[1] = false;
+  if (!images && std::isfinite(options.camera_rotation_sigma))
+    noise.variance[2] = variance(options.camera_rotation_sigma), noise.estimate[2] = false;
   return noise;
 }
 
@@ -234,11 +265,12 @@ std::pair<double, double> left_out_closures(const LoopProblem& problem, const Ro
   return {std::sqrt(position / n), std::sqrt(rotation / n)};
 }
 
-/// What noise cannot make, a robot with wrong lengths can: then the noise found has the shape of those errors, and weights by it predict worse than
-/// plain ones. Plain weights are taken where they predict clearly better.
+/// What noise cannot make, a robot with wrong lengths can: then the noise found has the shape of those errors, and
+/// weights by it predict worse than plain ones. Plain weights are taken where they predict clearly better.
 void question_noise(const HandEyeOptions& options, Work* work, HandEyeResult* result) {
   const LoopEstimate& fit = work->fit;
-  if (!fit.noise.estimate[0] || !fit.noise.estimate[1] || !fit.noise.estimate[2] || !work->problem.pixel_shape.empty()) return;
+  if (!fit.noise.estimate[0] || !fit.noise.estimate[1] || !fit.noise.estimate[2] || !work->problem.pixel_shape.empty())
+    return;
   const auto [position, rotation] = left_out_closures(work->problem, work->fitted, fit);
   if (position < kExact && rotation < kExact) return;
   LoopNoise plain;
@@ -249,24 +281,30 @@ void question_noise(const HandEyeOptions& options, Work* work, HandEyeResult* re
   const double clearly = 1.0 + kPlainGain / static_cast<double>(work->fitted.size());
   if (std::max(position / plain_position, rotation / plain_rotation) < clearly) return;
   const double freedom = 1.0 - 2.0 / static_cast<double>(work->fitted.size());
-  other.noise.variance = {plain_position * plain_position / 3.0 * freedom, plain.variance[1], plain_rotation * plain_rotation / 3.0 * freedom, 0.0};
+  other.noise.variance = {plain_position * plain_position / 3.0 * freedom, plain.variance[1],
+                          plain_rotation * plain_rotation / 3.0 * freedom, 0.0};
   work->fit = refine_loop(work->problem, work->fitted, other.X, other.Y, other.noise, options.max_iterations);
-  result->warnings.push_back("What is left does not look like noise of robot and camera poses: plain weights predict poses that were left out better (" +
-                             mm(plain_position) + " for " + mm(position) + "). The robot's own kinematics may be off: give joint values and the robot model (with kinematics).");
+  result->warnings.push_back(
+      "What is left does not look like noise of robot and camera poses: plain weights predict poses that were left out "
+      "better (" +
+      mm(plain_position) + " for " + mm(position) +
+      "). The robot's own kinematics may be off: give joint values and the robot model (with kinematics).");
 }
 
 /// Fit, leave out what does not fit, take back what does, until nothing changes.
 void fit_and_reject(const HandEyeOptions& options, const Rows& rows, LoopNoise noise, Agreement start, Work* work) {
   Rows agreeing = start.rows;
   for (int round = 0; round < kRejectRounds; ++round) {
-    work->fit = refine_loop(work->problem, agreeing, round == 0 ? start.X : work->fit.X, round == 0 ? start.Y : work->fit.Y,
-                            round == 0 ? noise : work->fit.noise, options.max_iterations);
+    work->fit =
+        refine_loop(work->problem, agreeing, round == 0 ? start.X : work->fit.X, round == 0 ? start.Y : work->fit.Y,
+                    round == 0 ? noise : work->fit.noise, options.max_iterations);
     work->fitted = agreeing;
     if (work->fit.singular || !options.reject || rows.size() < 6) return;
     Rows next;
     for (const std::size_t i : rows) {
       const bool in = std::binary_search(agreeing.begin(), agreeing.end(), i);
-      if (standardised(loop_row(work->problem, i, work->fit.X, work->fit.Y, work->fit.noise), work->fit.covariance, in) <= options.reject_beyond)
+      if (standardised(loop_row(work->problem, i, work->fit.X, work->fit.Y, work->fit.noise), work->fit.covariance,
+                       in) <= options.reject_beyond)
         next.push_back(i);
     }
     if (next == agreeing || next.size() < std::max<std::size_t>(4, rows.size() / 2)) return;
@@ -277,7 +315,8 @@ void fit_and_reject(const HandEyeOptions& options, const Rows& rows, LoopNoise n
 /// By how much more boards turn about what the loop expects than their pixels can tell.
 double scatter_beyond_pixels(const LoopProblem& problem, const Rows& rows, const LoopNoise& noise) {
   std::vector<double> by_pixels;
-  for (const std::size_t i : rows) by_pixels.push_back(noise.variance[3] * problem.pixel_shape[i].bottomRightCorner<3, 3>().trace() / 3.0);
+  for (const std::size_t i : rows)
+    by_pixels.push_back(noise.variance[3] * problem.pixel_shape[i].bottomRightCorner<3, 3>().trace() / 3.0);
   return std::sqrt(noise.variance[2] / median_of(by_pixels));
 }
 
@@ -285,8 +324,10 @@ double scatter_beyond_pixels(const LoopProblem& problem, const Rows& rows, const
 bool beyond_pixels(const LoopProblem& problem, const Rows& rows, const LoopNoise& noise, HandEyeResult* result) {
   const double times = scatter_beyond_pixels(problem, rows, noise);
   if (times < kBeyondPixels) return false;
-  result->warnings.push_back("Boards scatter by " + deg(std::sqrt(noise.variance[2])) + " about what the loop expects, " + number(times, 2) +
-                             " times what their pixels can tell: is the lens calibrated, the board flat, did anything move while the image was taken? Board poses are "
+  result->warnings.push_back("Boards scatter by " + deg(std::sqrt(noise.variance[2])) +
+                             " about what the loop expects, " + number(times, 2) +
+                             " times what their pixels can tell: is the lens calibrated, the board flat, did anything "
+                             "move while the image was taken? Board poses are "
                              "weighed by that scatter, not pixels by theirs.");
   return true;
 }
@@ -294,9 +335,11 @@ bool beyond_pixels(const LoopProblem& problem, const Rows& rows, const LoopNoise
 /// Pixels and all robot poses at once; the closures then with the camera as found.
 void fit_images(const HandEyeOptions& options, Work* work, HandEyeResult* result) {
   const Camera camera = *work->poses.camera;
-  const ImageSigmas sigmas{std::sqrt(work->fit.noise.variance[3]), std::sqrt(work->fit.noise.variance[0]), std::sqrt(work->fit.noise.variance[1])};
-  const ImageEstimate images = refine_images(work->problem, work->poses.images, work->fitted, camera, work->fit.X, work->fit.Y, sigmas,
-                                             options.refine_camera && !work->lens_stays, options.max_iterations);
+  const ImageSigmas sigmas{std::sqrt(work->fit.noise.variance[3]), std::sqrt(work->fit.noise.variance[0]),
+                           std::sqrt(work->fit.noise.variance[1])};
+  const ImageEstimate images =
+      refine_images(work->problem, work->poses.images, work->fitted, camera, work->fit.X, work->fit.Y, sigmas,
+                    options.refine_camera && !work->lens_stays, options.max_iterations);
   work->fit.X = images.X, work->fit.Y = images.Y, work->fit.covariance = images.covariance;
   result->T_base_hand = images.A;
   result->solver = images.solver;
@@ -308,12 +351,13 @@ void fit_images(const HandEyeOptions& options, Work* work, HandEyeResult* result
   if (!std::isfinite(options.pixel_sigma)) work->fit.noise.variance[3] = pixel_variance;
 }
 
-/// The lens from all poses together, before noise can be known. Where boards scatter beyond their pixels the loop bends it: then the lens that was
-/// given stays, if pixels fit it as well.
+/// The lens from all poses together, before noise can be known. Where boards scatter beyond their pixels the loop bends
+/// it: then the lens that was given stays, if pixels fit it as well.
 void refine_lens(const HandEyeOptions& options, Work* work, HandEyeResult* result) {
   const Work before = *work;
   fit_images(options, work, result);
-  work->fit = refine_loop(work->problem, work->fitted, work->fit.X, work->fit.Y, work->fit.noise, options.max_iterations);
+  work->fit =
+      refine_loop(work->problem, work->fitted, work->fit.X, work->fit.Y, work->fit.noise, options.max_iterations);
   if (scatter_beyond_pixels(work->problem, work->fitted, work->fit.noise) < kBeyondPixels ||
       before.fit.noise.variance[3] > kBentLens * work->fit.noise.variance[3])
     return;
@@ -322,7 +366,8 @@ void refine_lens(const HandEyeOptions& options, Work* work, HandEyeResult* resul
   result->camera_model.reset(), result->camera_model_sigma.clear(), result->T_base_hand.clear();
 }
 
-void describe_poses(const HandEyeOptions& options, const Agreement& agreement, const Work& work, HandEyeResult* result) {
+void describe_poses(const HandEyeOptions& options, const Agreement& agreement, const Work& work,
+                    HandEyeResult* result) {
   const std::size_t n = work.problem.A.size();
   result->residuals.resize(n);
   const double position_noise = std::max(agreement.position, 1e-6), rotation_noise = std::max(agreement.rotation, 1e-6);
@@ -337,11 +382,13 @@ void describe_poses(const HandEyeOptions& options, const Agreement& agreement, c
     r.distance = standardised(row, work.fit.covariance, fitted);
     r.rejected = !fitted && !held_out;
     if (r.rejected || (held_out && r.distance > options.reject_beyond))
-      r.cause = likely_cause(work.problem.A, work.problem.B, options.setup, i, work.fitted, work.fit.X, work.fit.Y, position_noise, rotation_noise);
+      r.cause = likely_cause(work.problem.A, work.problem.B, options.setup, i, work.fitted, work.fit.X, work.fit.Y,
+                             position_noise, rotation_noise);
     if (r.rejected) result->rejected.push_back(i);
     if (work.poses.images.empty()) continue;
     const auto pixels = [&](const Eigen::Isometry3d& A) {
-      return pixel_rms(*work.poses.camera, work.poses.images[i], predicted_board(work.fit.X, moving_frames({A}, options.setup)[0], work.fit.Y));
+      return pixel_rms(*work.poses.camera, work.poses.images[i],
+                       predicted_board(work.fit.X, moving_frames({A}, options.setup)[0], work.fit.Y));
     };
     r.pixels = pixels(work.problem.A[i]);
     r.pixels_corrected = fitted && !result->T_base_hand.empty() ? pixels(result->T_base_hand[i]) : r.pixels;
@@ -351,44 +398,57 @@ void describe_poses(const HandEyeOptions& options, const Agreement& agreement, c
   if (!work.held_out.empty()) result->test = errors_of(result->residuals, work.held_out, true);
 }
 
-void describe_noise(const HandEyeOptions& options, const LoopProblem& problem, const LoopNoise& noise, HandEyeResult* result) {
+void describe_noise(const HandEyeOptions& options, const LoopProblem& problem, const LoopNoise& noise,
+                    HandEyeResult* result) {
   HandEyeNoise& out = result->noise;
-  out.position = std::sqrt(noise.variance[0]), out.hand_rotation = std::sqrt(noise.variance[1]), out.camera_rotation = std::sqrt(noise.variance[2]);
+  out.position = std::sqrt(noise.variance[0]), out.hand_rotation = std::sqrt(noise.variance[1]),
+  out.camera_rotation = std::sqrt(noise.variance[2]);
   if (!problem.pixel_shape.empty()) out.pixel = std::sqrt(noise.variance[3]);
-  out.estimated = noise.estimate[0] || noise.estimate[1] || noise.estimate[2] || (!problem.pixel_shape.empty() && !std::isfinite(options.pixel_sigma));
+  out.estimated = noise.estimate[0] || noise.estimate[1] || noise.estimate[2] ||
+                  (!problem.pixel_shape.empty() && !std::isfinite(options.pixel_sigma));
 }
 
 /// Where noise was told and the data are worse, standard errors grow by what is missing.
 void widen(const LoopNoise& noise, const Rows& rows, LoopEstimate* fit, HandEyeResult* result) {
   if (noise.estimate[0] || noise.estimate[1]) return;
-  const double freedom = std::max(1.0, 6.0 * static_cast<double>(rows.size()) - 12.0), per_freedom = fit->chi2 / freedom;
+  const double freedom = std::max(1.0, 6.0 * static_cast<double>(rows.size()) - 12.0),
+               per_freedom = fit->chi2 / freedom;
   if (per_freedom <= 1.0) return;
   fit->covariance *= per_freedom;
   if (per_freedom > 1.0 + 5.0 * std::sqrt(2.0 / freedom))  // five standard deviations of chi^2
-    result->warnings.push_back("The poses scatter " + number(std::sqrt(per_freedom), 3) + " times as much as the noise that was told; standard errors are widened by that.");
+    result->warnings.push_back("The poses scatter " + number(std::sqrt(per_freedom), 3) +
+                               " times as much as the noise that was told; standard errors are widened by that.");
 }
 
 void look_at_board_scale(HandEyeResult* result) {
   const double off = result->board_scale - 1.0;
   if (!(std::abs(off) > std::max(4.0 * result->board_scale_sigma, 0.002))) return;
-  result->warnings.push_back("The loop closes better with a board " + number(100.0 * std::abs(off), 3) + " % " + (off > 0.0 ? "larger" : "smaller") +
-                             " than told (standard error " + number(100.0 * result->board_scale_sigma, 2) + " %): check the size of its squares.");
+  result->warnings.push_back("The loop closes better with a board " + number(100.0 * std::abs(off), 3) + " % " +
+                             (off > 0.0 ? "larger" : "smaller") + " than told (standard error " +
+                             number(100.0 * result->board_scale_sigma, 2) + " %): check the size of its squares.");
 }
 
 /// Hand and board poses both inverted close the loop as well, with camera and board in each other's place.
 void look_behind(const Frames& B, const Rows& rows, HandEyeResult* result) {
-  const auto behind = static_cast<std::size_t>(std::count_if(rows.begin(), rows.end(), [&](std::size_t i) { return !(B[i].translation().z() > 0.0); }));
+  const auto behind = static_cast<std::size_t>(
+      std::count_if(rows.begin(), rows.end(), [&](std::size_t i) { return !(B[i].translation().z() > 0.0); }));
   if (behind > rows.size() / 2)
-    result->warnings.push_back(std::to_string(behind) + " of " + std::to_string(rows.size()) + " boards lie behind the camera (z of the board pose is not "
-                               "positive): does its z axis look out of the lens? If hand and board poses are both inverted, camera and board have changed places.");
+    result->warnings.push_back(std::to_string(behind) + " of " + std::to_string(rows.size()) +
+                               " boards lie behind the camera (z of the board pose is not "
+                               "positive): does its z axis look out of the lens? If hand and board poses are both "
+                               "inverted, camera and board have changed places.");
 }
 
 std::string reading_message(const HandEyeResult& result, const Agreement& agreement) {
-  const std::string given = "The loop does not close as given (median " + mm(agreement.position) + ", " + deg(agreement.rotation) + ").";
+  const std::string given =
+      "The loop does not close as given (median " + mm(agreement.position) + ", " + deg(agreement.rotation) + ").";
   if (result.readings.empty())
-    return given + " No other reading of the poses that was tried closes it: check that every board belongs to its hand pose, and how orientations are written.";
+    return given +
+           " No other reading of the poses that was tried closes it: check that every board belongs to its hand pose, "
+           "and how orientations are written.";
   const Reading& best = result.readings.front();
-  return given + " It closes to " + mm(best.position_rms) + ", " + deg(best.rotation_rms) + " if " + best.explanation + ": reading \"" + best.name + "\".";
+  return given + " It closes to " + mm(best.position_rms) + ", " + deg(best.rotation_rms) + " if " + best.explanation +
+         ": reading \"" + best.name + "\".";
 }
 
 /// Does a reading change board poses?
@@ -397,9 +457,13 @@ bool of_board(const std::string& reading) { return reading.find("board-") != std
 /// With images the boards are what was found in them.
 void check_with_images(const HandEyePoses& poses, const HandEyeOptions& options) {
   if (poses.images.empty()) return;
-  if (of_board(options.reading)) throw std::invalid_argument("reading '" + options.reading + "' is about board poses; with images they are found, not read: bring hands and images into order instead");
+  if (of_board(options.reading))
+    throw std::invalid_argument(
+        "reading '" + options.reading +
+        "' is about board poses; with images they are found, not read: bring hands and images into order instead");
   if (std::isfinite(options.camera_position_sigma) || std::isfinite(options.camera_rotation_sigma)) {
-    throw std::invalid_argument("camera_position_sigma and camera_rotation_sigma are about board poses; with images give pixel_sigma");
+    throw std::invalid_argument(
+        "camera_position_sigma and camera_rotation_sigma are about board poses; with images give pixel_sigma");
   }
 }
 
@@ -407,36 +471,45 @@ void check_with_images(const HandEyePoses& poses, const HandEyeOptions& options)
 void turn_boards(const Agreement& agreement, double size, Work* work, HandEyeResult* result) {
   LoopProblem& problem = work->problem;
   result->symmetry = agreement.symmetry;
-  for (const std::size_t i : work->held_out) result->symmetry[i] = nearest_symmetry(problem.M, problem.B, work->poses.board_symmetries, agreement, size, i);
+  for (const std::size_t i : work->held_out)
+    result->symmetry[i] = nearest_symmetry(problem.M, problem.B, work->poses.board_symmetries, agreement, size, i);
   for (std::size_t i = 0; i < problem.B.size(); ++i) {
     if (result->symmetry[i] <= 0) continue;
     const Eigen::Isometry3d& turned = work->poses.board_symmetries[static_cast<std::size_t>(result->symmetry[i] - 1)];
     problem.B[i] = problem.B[i] * turned;
-    if (!work->poses.images.empty()) work->poses.images[i].points = turned.inverse(Eigen::Isometry) * work->poses.images[i].points;
+    if (!work->poses.images.empty())
+      work->poses.images[i].points = turned.inverse(Eigen::Isometry) * work->poses.images[i].points;
   }
 }
 
 /// What is told of the noise, and a first idea of what is not.
-LoopNoise noise_to_start_with(const HandEyeOptions& options, const Agreement& agreement, Work* work, HandEyeResult* result) {
+LoopNoise noise_to_start_with(const HandEyeOptions& options, const Agreement& agreement, Work* work,
+                              HandEyeResult* result) {
   LoopNoise noise = noise_asked(options, work->poses, agreement);
   if (work->poses.images.empty()) {
     if (std::isfinite(options.hand_position_sigma) != std::isfinite(options.camera_position_sigma))
-      result->warnings.push_back("Position noise was told of one side, robot or camera, only: what acts is their sum, which was found from the data.");
+      result->warnings.push_back(
+          "Position noise was told of one side, robot or camera, only: what acts is their sum, which was found from "
+          "the data.");
     return noise;
   }
-  fit_boards(*work->poses.camera, work, &noise.variance[3]);  // what pixels scatter about their own board says more than the loop
+  fit_boards(*work->poses.camera, work,
+             &noise.variance[3]);  // what pixels scatter about their own board says more than the loop
   if (std::isfinite(options.pixel_sigma)) noise.variance[3] = options.pixel_sigma * options.pixel_sigma;
-  if (!noise.estimate[0] && !noise.estimate[1]) noise.variance[2] = kExact * kExact, noise.estimate[2] = false;  // all is told
+  if (!noise.estimate[0] && !noise.estimate[1])
+    noise.variance[2] = kExact * kExact, noise.estimate[2] = false;  // all is told
   return noise;
 }
 
 /// From the closed form on: as it is, or refined without the poses that do not fit.
-void fit_poses(const HandEyeOptions& options, const Rows& rows, const LoopNoise& noise, const Agreement& agreement, Work* work, HandEyeResult* result) {
+void fit_poses(const HandEyeOptions& options, const Rows& rows, const LoopNoise& noise, const Agreement& agreement,
+               Work* work, HandEyeResult* result) {
   Agreement start = agreement;
   std::sort(start.rows.begin(), start.rows.end());
   if (options.method == HandEyeMethod::closed_form) {
     work->fitted = start.rows;
-    work->fit = refine_loop(work->problem, work->fitted, start.X, start.Y, noise, options.max_iterations);  // for the noise and what it makes of the result
+    work->fit = refine_loop(work->problem, work->fitted, start.X, start.Y, noise,
+                            options.max_iterations);  // for the noise and what it makes of the result
     work->fit.X = start.X, work->fit.Y = start.Y;
     result->solver = {"closed form", 0, true, "one solution"};
     return;
@@ -445,7 +518,8 @@ void fit_poses(const HandEyeOptions& options, const Rows& rows, const LoopNoise&
   fit_and_reject(options, rows, noise, start, work);
   if (!work->fit.singular) question_noise(options, work, result);
   result->solver.iterations = work->fit.iterations, result->solver.converged = work->fit.converged;
-  result->solver.stopped_because = work->fit.converged ? "the step is small beside its standard errors" : "the limit of iterations";
+  result->solver.stopped_because =
+      work->fit.converged ? "the step is small beside its standard errors" : "the limit of iterations";
 }
 
 }  // namespace
@@ -455,9 +529,13 @@ bool HandEyeOptions::is_valid(std::string* error) const {
     if (error) *error = text;
     return false;
   };
-  for (const auto& [value, name] : {std::pair<double, const char*>{hand_position_sigma, "hand_position_sigma"}, {hand_rotation_sigma, "hand_rotation_sigma"},
-                                    {camera_position_sigma, "camera_position_sigma"}, {camera_rotation_sigma, "camera_rotation_sigma"}, {pixel_sigma, "pixel_sigma"}})
-    if (std::isinf(value) || value <= 0.0) return fail(std::string(name) + " must be greater than 0; leave it out to have it estimated");
+  for (const auto& [value, name] : {std::pair<double, const char*>{hand_position_sigma, "hand_position_sigma"},
+                                    {hand_rotation_sigma, "hand_rotation_sigma"},
+                                    {camera_position_sigma, "camera_position_sigma"},
+                                    {camera_rotation_sigma, "camera_rotation_sigma"},
+                                    {pixel_sigma, "pixel_sigma"}})
+    if (std::isinf(value) || value <= 0.0)
+      return fail(std::string(name) + " must be greater than 0; leave it out to have it estimated");
   if (!(reject_beyond > 1.0)) return fail("reject_beyond must be greater than 1");
   if (max_iterations < 1) return fail("max_iterations must be 1 or more");
   if (!(known_height_sigma >= 0.0)) return fail("known_height_sigma must be 0 or more");
@@ -480,21 +558,27 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
 
   LoopProblem& problem = work.problem;
   problem.setup = options.setup;
-  problem.A = work.poses.T_base_hand, problem.M = moving_frames(problem.A, options.setup), problem.B = work.poses.T_camera_board;
+  problem.A = work.poses.T_base_hand, problem.M = moving_frames(problem.A, options.setup),
+  problem.B = work.poses.T_camera_board;
 
   HandEyeResult result;
   const CameraSolution all = solve_camera(problem.M, problem.B, rows);
   look_at_motions(all, &result);
   result.working_point = options.working_point ? *options.working_point : Eigen::Vector3d::Zero();
   if (!options.working_point) {
-    for (const std::size_t i : rows) result.working_point += problem.B[i].translation() / static_cast<double>(rows.size());
+    for (const std::size_t i : rows)
+      result.working_point += problem.B[i].translation() / static_cast<double>(rows.size());
   }
 
   const auto try_readings = [&](const Agreement& a) {
-    if (options.recognise) result.readings = find_readings(problem.A, problem.B, options.setup, rows, a.position, a.rotation);
+    if (options.recognise)
+      result.readings = find_readings(problem.A, problem.B, options.setup, rows, a.position, a.rotation);
     if (!given.images.empty()) {  // boards were found in them, not read: only their order may be wrong
-      const auto impossible = [](const Reading& r) { return of_board(r.name) && r.name.find("board-one-") == std::string::npos; };
-      result.readings.erase(std::remove_if(result.readings.begin(), result.readings.end(), impossible), result.readings.end());
+      const auto impossible = [](const Reading& r) {
+        return of_board(r.name) && r.name.find("board-one-") == std::string::npos;
+      };
+      result.readings.erase(std::remove_if(result.readings.begin(), result.readings.end(), impossible),
+                            result.readings.end());
     }
     return !result.readings.empty();
   };
@@ -508,7 +592,8 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
   look_at_axes(all, options, &result, &axis);
   CameraSolver solve;
   if (axis) solve = {*axis, options.known_height.value_or(0.0)};
-  const Agreement agreement = find_agreement(problem.M, problem.B, rows, work.poses.board_symmetries, solve, {options.reject, 200});
+  const Agreement agreement =
+      find_agreement(problem.M, problem.B, rows, work.poses.board_symmetries, solve, {options.reject, 200});
   const double size = make_screws(problem.M, problem.B, agreement.rows).length;
   const double open = std::hypot(agreement.position / size, agreement.rotation);
   const bool angles_differ = all.incongruence > kLargestNoise;
@@ -520,14 +605,18 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
   if (open > kHopeless) return not_closing(agreement);
 
   turn_boards(agreement, size, &work, &result);
-  look_at_motions(solve_camera(problem.M, problem.B, agreement.rows), &result);  // of poses that agree: bad ones blur it
+  look_at_motions(solve_camera(problem.M, problem.B, agreement.rows),
+                  &result);  // of poses that agree: bad ones blur it
 
   const LoopNoise noise = noise_to_start_with(options, agreement, &work, &result);
-  if (axis) problem.known = LoopProblem::Known{*axis, options.known_height.value_or(0.0), std::max(options.known_height_sigma, 1e-7)};
+  if (axis)
+    problem.known =
+        LoopProblem::Known{*axis, options.known_height.value_or(0.0), std::max(options.known_height_sigma, 1e-7)};
 
   fit_poses(options, rows, noise, agreement, &work, &result);
   if (work.fit.singular) {
-    result.unobservable.push_back({"the place of camera and board together", Eigen::Vector3d::Zero(), false, std::numeric_limits<double>::infinity(),
+    result.unobservable.push_back({"the place of camera and board together", Eigen::Vector3d::Zero(), false,
+                                   std::numeric_limits<double>::infinity(),
                                    "rotate the hand about two axes by 30 deg or more, and move it"});
     refuse(&result, HandEyeStatus::not_observable);
     return result;
@@ -539,7 +628,8 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
   }
 
   result.camera.T = work.fit.X, result.board.T = work.fit.Y;
-  result.camera.covariance = work.fit.covariance.topLeftCorner<6, 6>(), result.board.covariance = work.fit.covariance.bottomRightCorner<6, 6>();
+  result.camera.covariance = work.fit.covariance.topLeftCorner<6, 6>(),
+  result.board.covariance = work.fit.covariance.bottomRightCorner<6, 6>();
   result.working_point_covariance = at_working_point(result.camera, result.working_point);
   describe_noise(options, problem, work.fit.noise, &result);
   describe_poses(options, agreement, work, &result);

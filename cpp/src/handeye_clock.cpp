@@ -19,10 +19,10 @@ using namespace detail;
 
 namespace {
 
-constexpr double kAlike = 0.6;          // least correlation of two angular speeds that are of one motion
-constexpr double kStandsOut = 0.05;     // by which it must exceed the next peak
-constexpr std::size_t kFitted = 400;    // camera poses in the fit
-constexpr double kGap = 5.0;            // median steps: holes in the hand's record that are not bridged
+constexpr double kAlike = 0.6;        // least correlation of two angular speeds that are of one motion
+constexpr double kStandsOut = 0.05;   // by which it must exceed the next peak
+constexpr std::size_t kFitted = 400;  // camera poses in the fit
+constexpr double kGap = 5.0;          // median steps: holes in the hand's record that are not bridged
 
 struct Record {
   const std::vector<double>& time;
@@ -31,12 +31,14 @@ struct Record {
 
 void check(const Record& r, const char* what) {
   const auto fail = [&](const std::string& text) { throw std::invalid_argument(std::string(what) + " " + text); };
-  if (r.time.size() != r.pose.size()) fail("has " + std::to_string(r.time.size()) + " times and " + std::to_string(r.pose.size()) + " poses");
+  if (r.time.size() != r.pose.size())
+    fail("has " + std::to_string(r.time.size()) + " times and " + std::to_string(r.pose.size()) + " poses");
   if (r.time.size() < 10) fail("has " + std::to_string(r.time.size()) + " poses; a clock offset needs 10 or more");
   for (std::size_t i = 0; i < r.time.size(); ++i) {
     if (!std::isfinite(r.time[i]) || !r.pose[i].matrix().allFinite()) fail("is not finite in row " + std::to_string(i));
     if (i > 0 && !(r.time[i] > r.time[i - 1]))
-      fail("goes back in time at row " + std::to_string(i) + ": " + number(r.time[i], 9) + " s after " + number(r.time[i - 1], 9) + " s");
+      fail("goes back in time at row " + std::to_string(i) + ": " + number(r.time[i], 9) + " s after " +
+           number(r.time[i - 1], 9) + " s");
   }
 }
 
@@ -57,7 +59,8 @@ bool pose_at(const Record& r, double t, double largest_gap, Eigen::Isometry3d* o
   if (r.time[j] - r.time[i] > largest_gap) return false;
   const double share = (t - r.time[i]) / (r.time[j] - r.time[i]);
   out->setIdentity();
-  out->linear() = Eigen::Quaterniond(r.pose[i].linear()).slerp(share, Eigen::Quaterniond(r.pose[j].linear())).toRotationMatrix();
+  out->linear() =
+      Eigen::Quaterniond(r.pose[i].linear()).slerp(share, Eigen::Quaterniond(r.pose[j].linear())).toRotationMatrix();
   out->translation() = (1.0 - share) * r.pose[i].translation() + share * r.pose[j].translation();
   return true;
 }
@@ -74,7 +77,8 @@ std::vector<double> angular_speed(const Record& r, double begin, double step, st
 }
 
 /// Correlation of hand[k + shift] with camera[k] where both are; -1 where that is less than two fifths of the shorter.
-double correlation(const std::vector<double>& hand, const std::vector<double>& camera, std::ptrdiff_t shift, std::size_t shorter) {
+double correlation(const std::vector<double>& hand, const std::vector<double>& camera, std::ptrdiff_t shift,
+                   std::size_t shorter) {
   double n = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
   for (std::size_t k = 0; k < camera.size(); ++k) {
     const std::ptrdiff_t j = static_cast<std::ptrdiff_t>(k) + shift;
@@ -90,8 +94,8 @@ double correlation(const std::vector<double>& hand, const std::vector<double>& c
 }  // namespace
 
 ClockOffset handeye_clock(const std::vector<double>& hand_time, const std::vector<Eigen::Isometry3d>& T_base_hand,
-                          const std::vector<double>& camera_time, const std::vector<Eigen::Isometry3d>& T_camera_board, HandEyeSetup setup,
-                          double search) {
+                          const std::vector<double>& camera_time, const std::vector<Eigen::Isometry3d>& T_camera_board,
+                          HandEyeSetup setup, double search) {
   const Record hand{hand_time, T_base_hand}, camera{camera_time, T_camera_board};
   check(hand, "the hand's record"), check(camera, "the camera's record");
   if (!(search > 0.0)) throw std::invalid_argument("search must be greater than 0 s");
@@ -102,14 +106,16 @@ ClockOffset handeye_clock(const std::vector<double>& hand_time, const std::vecto
   const auto reach = static_cast<std::ptrdiff_t>(std::ceil(search / step));
   const auto count = static_cast<std::size_t>((camera_time.back() - camera_time.front()) / step) + 1;
   const std::vector<double> camera_speed = angular_speed(camera, camera_time.front(), step, count);
-  const std::vector<double> hand_speed =
-      angular_speed(hand, camera_time.front() - step * static_cast<double>(reach), step, count + 2 * static_cast<std::size_t>(reach));
+  const std::vector<double> hand_speed = angular_speed(hand, camera_time.front() - step * static_cast<double>(reach),
+                                                       step, count + 2 * static_cast<std::size_t>(reach));
   const auto known = [](const std::vector<double>& speed) {
-    return static_cast<std::size_t>(std::count_if(speed.begin(), speed.end(), [](double v) { return std::isfinite(v); }));
+    return static_cast<std::size_t>(
+        std::count_if(speed.begin(), speed.end(), [](double v) { return std::isfinite(v); }));
   };
   const std::size_t shorter = std::max<std::size_t>(10, std::min(known(camera_speed), known(hand_speed)));
   std::vector<double> peak;
-  for (std::ptrdiff_t shift = 0; shift <= 2 * reach; ++shift) peak.push_back(correlation(hand_speed, camera_speed, shift, shorter));
+  for (std::ptrdiff_t shift = 0; shift <= 2 * reach; ++shift)
+    peak.push_back(correlation(hand_speed, camera_speed, shift, shorter));
   const auto top = std::max_element(peak.begin(), peak.end());
   const std::ptrdiff_t at = top - peak.begin();
   out.offset = step * static_cast<double>(at - reach);
@@ -117,13 +123,16 @@ ClockOffset handeye_clock(const std::vector<double>& hand_time, const std::vecto
   // The next peak: away from this one's own slopes.
   std::ptrdiff_t left = at, right = at;
   while (left > 0 && peak[static_cast<std::size_t>(left - 1)] < peak[static_cast<std::size_t>(left)]) --left;
-  while (right + 1 < static_cast<std::ptrdiff_t>(peak.size()) && peak[static_cast<std::size_t>(right + 1)] < peak[static_cast<std::size_t>(right)]) ++right;
+  while (right + 1 < static_cast<std::ptrdiff_t>(peak.size()) &&
+         peak[static_cast<std::size_t>(right + 1)] < peak[static_cast<std::size_t>(right)])
+    ++right;
   double next = -1.0;
   for (std::ptrdiff_t k = 0; k < static_cast<std::ptrdiff_t>(peak.size()); ++k)
     if (k < left || k > right) next = std::max(next, peak[static_cast<std::size_t>(k)]);
   if (out.correlation < kAlike || out.correlation - next < kStandsOut) {
-    out.message = "the turning of hand and board do not show which times belong together (correlation " + number(out.correlation, 3) + " at " +
-                  number(out.offset, 4) + " s, " + number(next, 3) + " elsewhere): turn the hand back and forth, at 1 rad/s or more, unevenly, within " +
+    out.message = "the turning of hand and board do not show which times belong together (correlation " +
+                  number(out.correlation, 3) + " at " + number(out.offset, 4) + " s, " + number(next, 3) +
+                  " elsewhere): turn the hand back and forth, at 1 rad/s or more, unevenly, within " +
                   number(search, 3) + " s of both records' common time";
     return out;
   }
@@ -139,7 +148,8 @@ ClockOffset handeye_clock(const std::vector<double>& hand_time, const std::vecto
     for (std::size_t i = 0; i < camera_time.size(); i += stride) {
       Eigen::Isometry3d A, a, b;
       const double t = camera_time[i] + out.offset;
-      if (!pose_at(hand, t, gap, &A) || !pose_at(hand, t - nudge, gap, &a) || !pose_at(hand, t + nudge, gap, &b)) continue;
+      if (!pose_at(hand, t, gap, &A) || !pose_at(hand, t - nudge, gap, &a) || !pose_at(hand, t + nudge, gap, &b))
+        continue;
       problem.A.push_back(A), problem.B.push_back(T_camera_board[i]), before.push_back(a), after.push_back(b);
     }
     if (problem.A.size() < 10) {
@@ -158,7 +168,8 @@ ClockOffset handeye_clock(const std::vector<double>& hand_time, const std::vecto
     }
     const Frames M_before = moving_frames(before, setup), M_after = moving_frames(after, setup);
     const OneMore offset = one_more_unknown(problem, rows, fit, [&](std::size_t i) {
-      return Vector6d((closure(predicted_board(fit.X, M_after[i], fit.Y), problem.B[i]) - closure(predicted_board(fit.X, M_before[i], fit.Y), problem.B[i])) /
+      return Vector6d((closure(predicted_board(fit.X, M_after[i], fit.Y), problem.B[i]) -
+                       closure(predicted_board(fit.X, M_before[i], fit.Y), problem.B[i])) /
                       (2.0 * nudge));
     });
     if (!std::isfinite(offset.value)) {
@@ -170,7 +181,8 @@ ClockOffset handeye_clock(const std::vector<double>& hand_time, const std::vecto
     if (std::abs(change) < 1e-3 * out.sigma) break;
   }
   out.found = true;
-  out.message = "hand time = camera time + " + number(out.offset, 5) + " s, standard error " + number(out.sigma, 2) + " s";
+  out.message =
+      "hand time = camera time + " + number(out.offset, 5) + " s, standard error " + number(out.sigma, 2) + " s";
   for (std::size_t i = 0; i < camera_time.size(); ++i) {
     Eigen::Isometry3d A;
     if (!pose_at(hand, camera_time[i] + out.offset, gap, &A)) continue;

@@ -18,20 +18,22 @@
 namespace truing::detail {
 namespace {
 
-constexpr std::size_t kAllPairs = 64;     // poses up to which every pair is a motion
-constexpr std::size_t kPartners = 12;     // of a pose, beyond that
-constexpr std::size_t kCandidates = 36;   // that the partners are chosen from
-constexpr double kNearHalfTurn = 0.1;     // |cos(angle / 2)| below which noise may turn the sign of a motion's real part
+constexpr std::size_t kAllPairs = 64;    // poses up to which every pair is a motion
+constexpr std::size_t kPartners = 12;    // of a pose, beyond that
+constexpr std::size_t kCandidates = 36;  // that the partners are chosen from
+constexpr double kNearHalfTurn = 0.1;    // |cos(angle / 2)| below which noise may turn the sign of a motion's real part
 
-double real_part(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) { return a.coeffs().dot(b.coeffs()); }  // of a b*
+double real_part(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
+  return a.coeffs().dot(b.coeffs());
+}  // of a b*
 
 void flip(DualQuaternion* a) {
   a->real.coeffs() *= -1.0;
   a->dual.coeffs() *= -1.0;
 }
 
-/// Both signs of a quaternion are the same rotation. B's are chosen so that motions of hand and camera have real parts of one sign: from a pose
-/// whose sign is settled to the next that is not half a turn away.
+/// Both signs of a quaternion are the same rotation. B's are chosen so that motions of hand and camera have real parts
+/// of one sign: from a pose whose sign is settled to the next that is not half a turn away.
 void align_signs(const std::vector<DualQuaternion>& M, std::vector<DualQuaternion>* B) {
   const std::size_t n = M.size();
   std::vector<std::size_t> settled{0}, open(n - 1);
@@ -40,7 +42,8 @@ void align_signs(const std::vector<DualQuaternion>& M, std::vector<DualQuaternio
     for (std::size_t from = 0; from < settled.size() && !open.empty(); ++from) {
       const std::size_t j = settled[from];
       const auto rest = std::stable_partition(open.begin(), open.end(), [&](std::size_t i) {
-        return std::min(std::abs(real_part(M[i].real, M[j].real)), std::abs(real_part((*B)[i].real, (*B)[j].real))) <= enough;
+        return std::min(std::abs(real_part(M[i].real, M[j].real)), std::abs(real_part((*B)[i].real, (*B)[j].real))) <=
+               enough;
       });
       for (auto i = rest; i != open.end(); ++i) {
         if (real_part(M[*i].real, M[j].real) * real_part((*B)[*i].real, (*B)[j].real) < 0.0) flip(&(*B)[*i]);
@@ -59,7 +62,8 @@ std::vector<std::size_t> canonical_order(const Screws& s) {
   const auto key = [&](std::size_t i) {
     const Eigen::Vector4d q = s.B[i].real.coeffs(), d = s.B[i].dual.coeffs();
     const double sign = q(3) < 0.0 ? -1.0 : 1.0;
-    return std::array<double, 7>{sign * q(0), sign * q(1), sign * q(2), sign * d(0), sign * d(1), sign * d(2), sign * d(3)};
+    return std::array<double, 7>{sign * q(0), sign * q(1), sign * q(2), sign * d(0),
+                                 sign * d(1), sign * d(2), sign * d(3)};
   };
   std::vector<std::array<double, 7>> keys(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) keys[i] = key(i);
@@ -73,7 +77,8 @@ void add_motion(const Screws& s, std::size_t i, std::size_t j, MotionSums* sums)
   const Eigen::Vector3d d = a.real.vec() - b.real.vec(), u = a.real.vec() + b.real.vec();
   const Eigen::Vector3d dd = a.dual.vec() - b.dual.vec(), du = a.dual.vec() + b.dual.vec();
   // K = [0, -d^T; d, [u]x], K' likewise:  S = [K 0; K' K].
-  const auto product = [](const Eigen::Vector3d& d1, const Eigen::Vector3d& u1, const Eigen::Vector3d& d2, const Eigen::Vector3d& u2) {
+  const auto product = [](const Eigen::Vector3d& d1, const Eigen::Vector3d& u1, const Eigen::Vector3d& d2,
+                          const Eigen::Vector3d& u2) {
     Eigen::Matrix4d k;  // K1^T K2
     k(0, 0) = d1.dot(d2);
     k.block<1, 3>(0, 1) = d1.cross(u2).transpose();
@@ -87,7 +92,8 @@ void add_motion(const Screws& s, std::size_t i, std::size_t j, MotionSums* sums)
   sums->normal.bottomLeftCorner<4, 4>() += pk.transpose();
   sums->normal.bottomRightCorner<4, 4>() += kk;
   sums->axes += a.real.vec() * a.real.vec().transpose();
-  const double angles = std::atan2(a.real.vec().norm(), std::abs(a.real.w())) - std::atan2(b.real.vec().norm(), std::abs(b.real.w()));
+  const double angles =
+      std::atan2(a.real.vec().norm(), std::abs(a.real.w())) - std::atan2(b.real.vec().norm(), std::abs(b.real.w()));
   sums->incongruence += 4.0 * angles * angles;
   ++sums->motions;
 }
@@ -141,7 +147,8 @@ Screws make_screws(const Frames& M, const Frames& B, const Rows& rows) {
   const Pivot pivot_M = find_pivot(M, rows), pivot_B = find_pivot(B, rows);
   Screws out;
   out.center_M = pivot_M.center, out.center_B = pivot_B.center;
-  // Rotations of 1 rad weigh as much as moves of this length. Boards that only turn about a point give no length of their own.
+  // Rotations of 1 rad weigh as much as moves of this length. Boards that only turn about a point give no length of
+  // their own.
   double distance = 0.0;
   for (const std::size_t i : rows) distance += (B[i].translation() - pivot_B.center).squaredNorm();
   distance = std::sqrt(distance / static_cast<double>(rows.size()));
@@ -163,7 +170,8 @@ Eigen::Matrix<double, 8, 8> motion_factor(const DualQuaternion& a, const DualQua
     return k;
   };
   Eigen::Matrix<double, 8, 8> S = Eigen::Matrix<double, 8, 8>::Zero();
-  S.topLeftCorner<4, 4>() = S.bottomRightCorner<4, 4>() = block(a.real.vec() - b.real.vec(), a.real.vec() + b.real.vec());
+  S.topLeftCorner<4, 4>() = S.bottomRightCorner<4, 4>() =
+      block(a.real.vec() - b.real.vec(), a.real.vec() + b.real.vec());
   S.bottomLeftCorner<4, 4>() = block(a.dual.vec() - b.dual.vec(), a.dual.vec() + b.dual.vec());
   return S;
 }
@@ -180,7 +188,8 @@ MotionSums sum_motions(const Screws& screws) {
   std::array<std::pair<double, std::size_t>, kCandidates> candidates;  // |cos(angle / 2)|, place in the order
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t k = 0; k < kCandidates; ++k) {
-      const std::size_t j = (i + 1 + k * (n / 2) / kCandidates) % n;  // half of them: the other half meets us from there
+      const std::size_t j =
+          (i + 1 + k * (n / 2) / kCandidates) % n;  // half of them: the other half meets us from there
       candidates[k] = {std::abs(real_part(screws.M[order[i]].real, screws.M[order[j]].real)), j};
     }
     std::nth_element(candidates.begin(), candidates.begin() + kPartners, candidates.end());
@@ -191,9 +200,11 @@ MotionSums sum_motions(const Screws& screws) {
 
 Vector8d unit_combination(const Vector8d& v7, const Vector8d& v8) {
   const auto u1 = v7.head<4>(), w1 = v7.tail<4>(), u2 = v8.head<4>(), w2 = v8.tail<4>();
-  // eq. (33): l1^2 u1.u1 + 2 l1 l2 u1.u2 + l2^2 u2.u2 = 1;  eq. (34): l1^2 u1.w1 + l1 l2 (u1.w2 + u2.w1) + l2^2 u2.w2 = 0.
+  // eq. (33): l1^2 u1.u1 + 2 l1 l2 u1.u2 + l2^2 u2.u2 = 1;  eq. (34): l1^2 u1.w1 + l1 l2 (u1.w2 + u2.w1) + l2^2 u2.w2 =
+  // 0.
   const double a = u1.dot(w1), b = u1.dot(w2) + u2.dot(w1), c = u2.dot(w2);
-  // The ratio l1 : l2 as (x, y), so that neither is divided by: a x^2 + b x y + c y^2 = 0. Noise can make the discriminant negative.
+  // The ratio l1 : l2 as (x, y), so that neither is divided by: a x^2 + b x y + c y^2 = 0. Noise can make the
+  // discriminant negative.
   const double root = std::sqrt(std::max(b * b - 4.0 * a * c, 0.0));
   const double q = -0.5 * (b + (b < 0.0 ? -root : root));
   const std::array<Eigen::Vector2d, 2> ratios{Eigen::Vector2d(q, a), Eigen::Vector2d(c, q)};
@@ -236,21 +247,26 @@ CameraSolution solve_camera(const Frames& M, const Frames& B, const Rows& rows) 
   return out;
 }
 
-Eigen::Isometry3d solve_camera_one_axis(const Frames& M, const Frames& B, const Rows& rows, const Eigen::Vector3d& axis, double height) {
+Eigen::Isometry3d solve_camera_one_axis(const Frames& M, const Frames& B, const Rows& rows, const Eigen::Vector3d& axis,
+                                        double height) {
   // The camera's view of the axis: the rotation vectors of its motions, with the sign of the hand's.
   const Screws screws = make_screws(M, B, rows);
   Eigen::Vector3d seen = Eigen::Vector3d::Zero();
   for (std::size_t i = 1; i < rows.size(); ++i) {
-    const Eigen::Quaterniond a = screws.M[i].real * screws.M[0].real.conjugate(), b = screws.B[i].real * screws.B[0].real.conjugate();
+    const Eigen::Quaterniond a = screws.M[i].real * screws.M[0].real.conjugate(),
+                             b = screws.B[i].real * screws.B[0].real.conjugate();
     seen += a.vec().dot(axis) * b.vec();
   }
-  const Eigen::Quaterniond tilt = Eigen::Quaterniond::FromTwoVectors(seen, axis);  // X's rotation but for a turn about the axis
-  // In the plane across it, (I - R_a) t + z tilt t_b - t_a = 0 with the turn z and the position t as complex numbers: linear in both.
+  const Eigen::Quaterniond tilt =
+      Eigen::Quaterniond::FromTwoVectors(seen, axis);  // X's rotation but for a turn about the axis
+  // In the plane across it, (I - R_a) t + z tilt t_b - t_a = 0 with the turn z and the position t as complex numbers:
+  // linear in both.
   const Eigen::Vector3d e1 = axis.unitOrthogonal(), e2 = axis.cross(e1);
   Eigen::MatrixXd A(2 * (rows.size() - 1), 4);
   Eigen::VectorXd rhs(A.rows());
   for (std::size_t i = 1; i < rows.size(); ++i) {
-    const Eigen::Isometry3d a = M[rows[i]] * M[rows[0]].inverse(Eigen::Isometry), b = B[rows[i]] * B[rows[0]].inverse(Eigen::Isometry);
+    const Eigen::Isometry3d a = M[rows[i]] * M[rows[0]].inverse(Eigen::Isometry),
+                            b = B[rows[i]] * B[rows[0]].inverse(Eigen::Isometry);
     const Eigen::Vector3d moved = tilt * b.translation();
     const Eigen::Vector2d tb(e1.dot(moved), e2.dot(moved)), ta(e1.dot(a.translation()), e2.dot(a.translation()));
     const double angle = std::atan2(e2.dot(a.linear() * e1), e1.dot(a.linear() * e1));

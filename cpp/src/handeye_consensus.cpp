@@ -17,11 +17,12 @@
 namespace truing::detail {
 namespace {
 
-constexpr double kAgreeing = 0.6;        // of the rows must close for a triple to count
-constexpr double kBeyond = 2.5;          // times their distance: rows that do not agree. Six normal errors get there once in a million
-constexpr std::size_t kFewest = 6;       // poses of which some may be left out: fewer agree by chance
-constexpr std::size_t kJudges = 200;     // rows that judge a triple
-constexpr double kTurn = 0.1;            // [rad] poses of a triple differ by more, where there are such
+constexpr double kAgreeing = 0.6;  // of the rows must close for a triple to count
+constexpr double kBeyond =
+    2.5;  // times their distance: rows that do not agree. Six normal errors get there once in a million
+constexpr std::size_t kFewest = 6;    // poses of which some may be left out: fewer agree by chance
+constexpr std::size_t kJudges = 200;  // rows that judge a triple
+constexpr double kTurn = 0.1;         // [rad] poses of a triple differ by more, where there are such
 constexpr double kPi = 3.14159265358979323846;
 
 /// Rows, each in every reading of its board, against one X and Y.
@@ -89,8 +90,9 @@ Rows canonical_order(const Frames& frames, const Rows& rows) {
   return order;
 }
 
-Agreement find_agreement(const Frames& M, const Frames& B, const Rows& rows, const std::vector<Eigen::Isometry3d>& symmetries,
-                         const CameraSolver& solve, const ConsensusOptions& options) {
+Agreement find_agreement(const Frames& M, const Frames& B, const Rows& rows,
+                         const std::vector<Eigen::Isometry3d>& symmetries, const CameraSolver& solve,
+                         const ConsensusOptions& options) {
   const Judge judge(M, B, symmetries, make_screws(M, B, rows).length);
   Agreement out;
   out.rows = rows;
@@ -128,12 +130,15 @@ Agreement find_agreement(const Frames& M, const Frames& B, const Rows& rows, con
     Rows triple;
     for (int attempt = 0; attempt < 20 && triple.size() < 3; ++attempt) {
       const std::size_t i = order[random.below(order.size())];
-      if (std::all_of(triple.begin(), triple.end(), [&](std::size_t j) { return j != i && angle_between(M[i], M[j]) > kTurn; })) triple.push_back(i);
+      if (std::all_of(triple.begin(), triple.end(),
+                      [&](std::size_t j) { return j != i && angle_between(M[i], M[j]) > kTurn; }))
+        triple.push_back(i);
     }
     if (triple.size() < 3) continue;
     for (int s1 = 0; s1 < readings; ++s1)
       for (int s2 = 0; s2 < readings; ++s2) {
-        read[triple[0]] = judge.board(triple[0], 0), read[triple[1]] = judge.board(triple[1], s1), read[triple[2]] = judge.board(triple[2], s2);
+        read[triple[0]] = judge.board(triple[0], 0), read[triple[1]] = judge.board(triple[1], s1),
+        read[triple[2]] = judge.board(triple[2], s2);
         const Eigen::Isometry3d X = solve(M, read, triple), Y = mean_board(M, read, triple, X);
         distances.clear();
         int ignored = 0;
@@ -157,15 +162,16 @@ Agreement find_agreement(const Frames& M, const Frames& B, const Rows& rows, con
   return out;
 }
 
-int nearest_symmetry(const Frames& M, const Frames& B, const std::vector<Eigen::Isometry3d>& symmetries, const Agreement& agreement, double length,
-                     std::size_t i) {
+int nearest_symmetry(const Frames& M, const Frames& B, const std::vector<Eigen::Isometry3d>& symmetries,
+                     const Agreement& agreement, double length, std::size_t i) {
   int symmetry = 0;
   Judge(M, B, symmetries, length).distance(agreement.X, agreement.Y, i, &symmetry);
   return symmetry;
 }
 
-std::string likely_cause(const Frames& A, const Frames& B, HandEyeSetup setup, std::size_t i, const Rows& agreeing, const Eigen::Isometry3d& X,
-                         const Eigen::Isometry3d& Y, double position_noise, double rotation_noise) {
+std::string likely_cause(const Frames& A, const Frames& B, HandEyeSetup setup, std::size_t i, const Rows& agreeing,
+                         const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y, double position_noise,
+                         double rotation_noise) {
   const double near = 6.0 * position_noise + 1e-6, aligned = 6.0 * rotation_noise + 1e-6;
   const auto same = [&](const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
     return (a.translation() - b.translation()).norm() < near && angle_between(a, b) < aligned;
@@ -175,7 +181,8 @@ std::string likely_cause(const Frames& A, const Frames& B, HandEyeSetup setup, s
   const Eigen::Isometry3d hand = setup == HandEyeSetup::eye_to_hand ? M : M.inverse(Eigen::Isometry);
   const Eigen::Isometry3d board = predicted_board(X, moving_frames({A[i]}, setup)[0], Y);
 
-  const Eigen::Isometry3d turn = B[i].inverse(Eigen::Isometry) * board;  // from the board as seen to the board as expected
+  const Eigen::Isometry3d turn =
+      B[i].inverse(Eigen::Isometry) * board;  // from the board as seen to the board as expected
   const Eigen::Vector3d v = vector_from_rotation(turn.linear());
   if (v.norm() > kPi - std::max(aligned, 0.1) && std::abs(v.z()) > 0.98 * v.norm())
     return "the board was seen turned by 180 deg about its normal";
@@ -184,7 +191,8 @@ std::string likely_cause(const Frames& A, const Frames& B, HandEyeSetup setup, s
   for (const std::size_t j : agreeing)
     if (same(hand, A[j]) && !same(A[i], A[j])) return "its board belongs to the hand of pose " + std::to_string(j);
   for (const std::size_t j : agreeing)
-    if (j != i && same(A[i], A[j])) return "its hand is that of pose " + std::to_string(j) + ": had the robot moved on?";
+    if (j != i && same(A[i], A[j]))
+      return "its hand is that of pose " + std::to_string(j) + ": had the robot moved on?";
 
   const Eigen::Vector3d off = A[i].translation() - hand.translation();
   const double turned = angle_between(A[i], hand);
@@ -202,8 +210,10 @@ std::string likely_cause(const Frames& A, const Frames& B, HandEyeSetup setup, s
   }
   const Eigen::Vector3d seen_off = B[i].translation() - board.translation();
   if (seen_off.norm() < near && turned > aligned && std::abs(v.z()) < 0.3 * v.norm())
-    return "the board was seen tilted the wrong way by " + degrees(v.norm()) + ": the other solution of a plane seen almost from the front";
-  if (off.norm() < near && turned > aligned) return "hand orientation is off by " + degrees(turned) + ", its position is right";
+    return "the board was seen tilted the wrong way by " + degrees(v.norm()) +
+           ": the other solution of a plane seen almost from the front";
+  if (off.norm() < near && turned > aligned)
+    return "hand orientation is off by " + degrees(turned) + ", its position is right";
   return "off by " + millimetres(seen_off.norm()) + " and " + degrees(v.norm());
 }
 

@@ -25,7 +25,8 @@ HandEyeErrors errors_of(const std::vector<HandEyeResidual>& residuals, const Row
     squares += p * p, turns += t * t, pixels += r.pixels * r.pixels;
   }
   const double n = static_cast<double>(rows.size());
-  out.position_rms = std::sqrt(squares / n), out.rotation_rms = std::sqrt(turns / n), out.pixel_rms = std::sqrt(pixels / n);
+  out.position_rms = std::sqrt(squares / n), out.rotation_rms = std::sqrt(turns / n),
+  out.pixel_rms = std::sqrt(pixels / n);
   out.position_mean = std::accumulate(position.begin(), position.end(), 0.0) / n;
   out.position_max = *std::max_element(position.begin(), position.end());
   out.position_p95 = quantile(&position, 0.95);

@@ -7,11 +7,11 @@
 #include <limits>
 #include <memory>
 
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
-#include <ceres/ceres.h>
-#include <ceres/rotation.h>
 
 #include "frame.hpp"
 
@@ -40,7 +40,8 @@ void project_point(const K* k, const T* p, T* pixel) {
 }
 
 /// Pixel and its derivative by the point in the camera frame.
-Eigen::Vector2d project_with_jacobian(const Intrinsics& k, const Eigen::Vector3d& point, Eigen::Matrix<double, 2, 3>* J) {
+Eigen::Vector2d project_with_jacobian(const Intrinsics& k, const Eigen::Vector3d& point,
+                                      Eigen::Matrix<double, 2, 3>* J) {
   using Jet = ceres::Jet<double, 3>;
   const std::array<Jet, 3> p{Jet(point.x(), 0), Jet(point.y(), 1), Jet(point.z(), 2)};
   std::array<Jet, 2> pixel;
@@ -62,7 +63,8 @@ void transform(const Eigen::Isometry3d& frame, const T* d, const T* p, T* out) {
 template <class T>
 void transform_back(const Eigen::Isometry3d& frame, const T* d, const T* p, T* out) {
   const T back[3] = {-d[3], -d[4], -d[5]};
-  const T arm[3] = {p[0] - frame.translation()(0) - d[0], p[1] - frame.translation()(1) - d[1], p[2] - frame.translation()(2) - d[2]};
+  const T arm[3] = {p[0] - frame.translation()(0) - d[0], p[1] - frame.translation()(1) - d[1],
+                    p[2] - frame.translation()(2) - d[2]};
   Eigen::Matrix<T, 3, 1> turned;
   ceres::AngleAxisRotatePoint(back, arm, turned.data());
   Eigen::Map<Eigen::Matrix<T, 3, 1>> result(out);
@@ -116,17 +118,23 @@ struct ImageProblem {
   ceres::Problem problem;
 };
 
-/// (J^T J)^-1 of the blocks given, all moves of robot poses marginalised: an arrow matrix, so that a sparse factor does it in linear time.
-Eigen::MatrixXd marginal_covariance(ceres::Problem* problem, const std::vector<double*>& moves, const std::vector<double*>& asked) {
+/// (J^T J)^-1 of the blocks given, all moves of robot poses marginalised: an arrow matrix, so that a sparse factor does
+/// it in linear time.
+Eigen::MatrixXd marginal_covariance(ceres::Problem* problem, const std::vector<double*>& moves,
+                                    const std::vector<double*>& asked) {
   ceres::Problem::EvaluateOptions options;
   options.parameter_blocks = moves;
   options.parameter_blocks.insert(options.parameter_blocks.end(), asked.begin(), asked.end());
   ceres::CRSMatrix crs;
   problem->Evaluate(options, nullptr, nullptr, nullptr, &crs);
-  const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> J(crs.num_rows, crs.num_cols, static_cast<Eigen::Index>(crs.values.size()),
-                                                                          crs.rows.data(), crs.cols.data(), crs.values.data());
+  const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> J(
+      crs.num_rows, crs.num_cols, static_cast<Eigen::Index>(crs.values.size()), crs.rows.data(), crs.cols.data(),
+      crs.values.data());
   const Eigen::SparseMatrix<double> columns(J);
-  const Eigen::VectorXd unit = (columns.cwiseProduct(columns).transpose() * Eigen::VectorXd::Ones(crs.num_rows)).cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::VectorXd unit = (columns.cwiseProduct(columns).transpose() * Eigen::VectorXd::Ones(crs.num_rows))
+                                   .cwiseSqrt()
+                                   .cwiseMax(1e-300)
+                                   .cwiseInverse();
   const Eigen::SparseMatrix<double> scaled = columns * unit.asDiagonal();
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(scaled.transpose() * scaled);
   const Eigen::Index count = crs.num_cols - 6 * static_cast<Eigen::Index>(moves.size());
@@ -147,7 +155,8 @@ struct PixelSums {
   Vector6d g = Vector6d::Zero();
 };
 
-PixelSums sum_pixels(const Camera& camera, const Eigen::Matrix3Xd& points, const Eigen::Matrix2Xd* pixels, const Eigen::Isometry3d& T_camera_board) {
+PixelSums sum_pixels(const Camera& camera, const Eigen::Matrix3Xd& points, const Eigen::Matrix2Xd* pixels,
+                     const Eigen::Isometry3d& T_camera_board) {
   const Intrinsics k = intrinsics_of(camera);
   PixelSums sums;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
@@ -164,12 +173,14 @@ PixelSums sum_pixels(const Camera& camera, const Eigen::Matrix3Xd& points, const
 
 Matrix6d inverse_of(const Matrix6d& H) {
   const Vector6d unit = H.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-  return unit.asDiagonal() * Matrix6d(unit.asDiagonal() * H * unit.asDiagonal()).ldlt().solve(Matrix6d::Identity()) * unit.asDiagonal();
+  return unit.asDiagonal() * Matrix6d(unit.asDiagonal() * H * unit.asDiagonal()).ldlt().solve(Matrix6d::Identity()) *
+         unit.asDiagonal();
 }
 
 }  // namespace
 
-Matrix6d board_covariance(const Camera& camera, const Eigen::Matrix3Xd& points, const Eigen::Isometry3d& T_camera_board) {
+Matrix6d board_covariance(const Camera& camera, const Eigen::Matrix3Xd& points,
+                          const Eigen::Isometry3d& T_camera_board) {
   return inverse_of(sum_pixels(camera, points, nullptr, T_camera_board).H);
 }
 
@@ -211,20 +222,21 @@ double pixel_rms(const Camera& camera, const BoardImage& image, const Eigen::Iso
   return std::sqrt(sum / static_cast<double>(2 * image.points.cols()));
 }
 
-ImageEstimate refine_images(const LoopProblem& problem, const std::vector<BoardImage>& images, const Rows& rows, const Camera& camera,
-                            const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y, const ImageSigmas& sigmas, bool refine_camera,
-                            int max_iterations) {
+ImageEstimate refine_images(const LoopProblem& problem, const std::vector<BoardImage>& images, const Rows& rows,
+                            const Camera& camera, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y,
+                            const ImageSigmas& sigmas, bool refine_camera, int max_iterations) {
   ImageProblem p;
   p.X = X, p.Y = Y, p.k = intrinsics_of(camera), p.dA.resize(rows.size());
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const std::size_t i = rows[r];
     for (Eigen::Index c = 0; c < images[i].points.cols(); ++c)
-      p.problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<PixelCost, 2, 9, 6, 6, 6>(new PixelCost{problem.setup, &p.X, &p.Y, &problem.A[i], images[i].points.col(c),
-                                                                                  images[i].pixels.col(c), 1.0 / sigmas.pixel}),
-          nullptr, p.k.data(), p.dX.data(), p.dY.data(), p.dA[r].data());
-    p.problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<HandCost, 6, 6>(new HandCost{1.0 / sigmas.hand_position, 1.0 / sigmas.hand_rotation}), nullptr, p.dA[r].data());
+      p.problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PixelCost, 2, 9, 6, 6, 6>(
+                                     new PixelCost{problem.setup, &p.X, &p.Y, &problem.A[i], images[i].points.col(c),
+                                                   images[i].pixels.col(c), 1.0 / sigmas.pixel}),
+                                 nullptr, p.k.data(), p.dX.data(), p.dY.data(), p.dA[r].data());
+    p.problem.AddResidualBlock(new ceres::AutoDiffCostFunction<HandCost, 6, 6>(
+                                   new HandCost{1.0 / sigmas.hand_position, 1.0 / sigmas.hand_rotation}),
+                               nullptr, p.dA[r].data());
   }
   if (!refine_camera) p.problem.SetParameterBlockConstant(p.k.data());
 
@@ -251,7 +263,8 @@ ImageEstimate refine_images(const LoopProblem& problem, const std::vector<BoardI
   p.dX.fill(0.0), p.dY.fill(0.0);
   out.camera = with_intrinsics(camera, p.k);
   out.A = problem.A;
-  for (std::size_t r = 0; r < rows.size(); ++r) out.A[rows[r]] = moved(problem.A[rows[r]], Eigen::Map<const Vector6d>(p.dA[r].data()));
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    out.A[rows[r]] = moved(problem.A[rows[r]], Eigen::Map<const Vector6d>(p.dA[r].data()));
   const Eigen::MatrixXd C = marginal_covariance(&p.problem, moves, asked);
   out.covariance = C.topLeftCorner<12, 12>();
   for (Eigen::Index i = 12; i < C.rows(); ++i) out.camera_sigma.push_back(std::sqrt(C(i, i)));

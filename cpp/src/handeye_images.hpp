@@ -25,12 +25,13 @@ BoardFit fit_board(const Camera& camera, const BoardImage& image, const Eigen::I
 double pixel_rms(const Camera& camera, const BoardImage& image, const Eigen::Isometry3d& T_camera_board);
 
 /// The same shape at a pose, of points that are yet to be seen.
-Matrix6d board_covariance(const Camera& camera, const Eigen::Matrix3Xd& points, const Eigen::Isometry3d& T_camera_board);
+Matrix6d board_covariance(const Camera& camera, const Eigen::Matrix3Xd& points,
+                          const Eigen::Isometry3d& T_camera_board);
 
 struct ImageSigmas {
-  double pixel = 1.0;          ///< [px]
-  double hand_position = 1e-3; ///< [m]
-  double hand_rotation = 1e-3; ///< [rad]
+  double pixel = 1.0;           ///< [px]
+  double hand_position = 1e-3;  ///< [m]
+  double hand_rotation = 1e-3;  ///< [rad]
 };
 
 struct ImageEstimate {
@@ -42,9 +43,10 @@ struct ImageEstimate {
   SolverSummary solver;
 };
 
-/// Minimises pixel errors over their sigma and moves of every robot pose over theirs, over X, Y, those moves, and the camera where asked.
-ImageEstimate refine_images(const LoopProblem& problem, const std::vector<BoardImage>& images, const Rows& rows, const Camera& camera,
-                            const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y, const ImageSigmas& sigmas, bool refine_camera,
-                            int max_iterations);
+/// Minimises pixel errors over their sigma and moves of every robot pose over theirs, over X, Y, those moves, and the
+/// camera where asked.
+ImageEstimate refine_images(const LoopProblem& problem, const std::vector<BoardImage>& images, const Rows& rows,
+                            const Camera& camera, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y,
+                            const ImageSigmas& sigmas, bool refine_camera, int max_iterations);
 
 }  // namespace truing::detail

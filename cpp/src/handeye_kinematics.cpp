@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
-/// Hand-eye as identification: the robot's tool is the camera, measured in the frame of the board, or the board, measured in that of the camera.
+/// Hand-eye as identification: the robot's tool is the camera, measured in the frame of the board, or the board,
+/// measured in that of the camera.
 
 #include <cmath>
 #include <numeric>
@@ -26,8 +27,8 @@ struct Table {
 
 Column column(const Eigen::MatrixXd& m, Eigen::Index k) { return {m.col(k).data(), 1}; }
 
-/// T_measurement_target of every pose. With the camera on the hand the target is a point where boards are, carried by the camera: errors of the
-/// camera's view are small there, not at the camera.
+/// T_measurement_target of every pose. With the camera on the hand the target is a point where boards are, carried by
+/// the camera: errors of the camera's view are small there, not at the camera.
 void fill(const Eigen::MatrixXd& reading, const HandEyePoses& poses, const Frames& T_measurement_target, Table* table) {
   const auto n = static_cast<Eigen::Index>(T_measurement_target.size());
   table->joints = reading;
@@ -89,11 +90,14 @@ Matrix6d inverted(const Eigen::Isometry3d& T) {
 
 }  // namespace
 
-HandEyeKinematics handeye_with_kinematics(const Robot& robot, const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>& reading,
-                                          const HandEyePoses& poses, const HandEyeOptions& options, const IdentifyOptions& fit) {
+HandEyeKinematics handeye_with_kinematics(
+    const Robot& robot, const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>& reading,
+    const HandEyePoses& poses, const HandEyeOptions& options, const IdentifyOptions& fit) {
   if (static_cast<std::size_t>(reading.rows()) != poses.T_camera_board.size())
-    throw std::invalid_argument("there are " + std::to_string(reading.rows()) + " rows of joints and " + std::to_string(poses.T_camera_board.size()) + " poses");
-  if (robot.targets.empty()) throw std::invalid_argument("the robot has no tool: give the flange, identity if it is the last link's frame");
+    throw std::invalid_argument("there are " + std::to_string(reading.rows()) + " rows of joints and " +
+                                std::to_string(poses.T_camera_board.size()) + " poses");
+  if (robot.targets.empty())
+    throw std::invalid_argument("the robot has no tool: give the flange, identity if it is the last link's frame");
   const bool in_hand = options.setup == HandEyeSetup::eye_in_hand;
   HandEyeKinematics out;
 
@@ -102,7 +106,8 @@ HandEyeKinematics handeye_with_kinematics(const Robot& robot, const Eigen::Matri
   start_options.reject = false;
   start_options.known_height.reset();
   const HandEyeResult start = handeye(poses, start_options);
-  if (start.status == HandEyeStatus::not_observable || start.status == HandEyeStatus::not_closing) throw std::invalid_argument(start.message);
+  if (start.status == HandEyeStatus::not_observable || start.status == HandEyeStatus::not_closing)
+    throw std::invalid_argument(start.message);
   out.working_point = start.working_point;
 
   Eigen::Isometry3d at_board = Eigen::Isometry3d::Identity();  // from the camera to where boards are
@@ -110,25 +115,31 @@ HandEyeKinematics handeye_with_kinematics(const Robot& robot, const Eigen::Matri
   Robot nominal = robot;
   const Eigen::Isometry3d T_last_flange = robot.targets[0].T_last_target;
   nominal.targets.resize(1);
-  nominal.targets[0].T_last_target = in_hand ? T_last_flange * start.camera.T * at_board : T_last_flange * start.board.T;
+  nominal.targets[0].T_last_target =
+      in_hand ? T_last_flange * start.camera.T * at_board : T_last_flange * start.board.T;
   nominal.T_measurement_base = (in_hand ? start.board.T : start.camera.T).inverse(Eigen::Isometry);
   nominal.anchor.reset();
 
   Frames measured;
-  for (const Eigen::Isometry3d& B : poses.T_camera_board) measured.push_back(in_hand ? B.inverse(Eigen::Isometry) * at_board : B);
+  for (const Eigen::Isometry3d& B : poses.T_camera_board)
+    measured.push_back(in_hand ? B.inverse(Eigen::Isometry) * at_board : B);
   Table table;
   fill(reading, poses, measured, &table);
   // Both kinds of error weigh by what they turn out to be: 1 rad counts as the ratio of the two.
   IdentifyOptions weighed = fit;
   out.identification = identify(nominal, table.measurements, weighed);
   weighed.rotation_length = out.identification.train.after.rms / out.identification.train.after.rotation_rms;
-  if (weighed.rotation_length > 0.0 && std::isfinite(weighed.rotation_length)) out.identification = identify(nominal, table.measurements, weighed);
+  if (weighed.rotation_length > 0.0 && std::isfinite(weighed.rotation_length))
+    out.identification = identify(nominal, table.measurements, weighed);
   const Identification& found = out.identification;
 
-  const Eigen::Isometry3d T_flange_target = T_last_flange.inverse(Eigen::Isometry) * found.robot.targets[0].T_last_target;
+  const Eigen::Isometry3d T_flange_target =
+      T_last_flange.inverse(Eigen::Isometry) * found.robot.targets[0].T_last_target;
   const Eigen::Isometry3d T_base_measurement = found.robot.T_measurement_base.inverse(Eigen::Isometry);
-  const Matrix6d at_flange = turned(T_last_flange.inverse(Eigen::Isometry)), from_base = inverted(found.robot.T_measurement_base);
-  UncertainFrame on_hand{T_flange_target * at_board.inverse(Eigen::Isometry), Matrix6d::Zero()}, in_base{T_base_measurement, Matrix6d::Zero()};
+  const Matrix6d at_flange = turned(T_last_flange.inverse(Eigen::Isometry)),
+                 from_base = inverted(found.robot.T_measurement_base);
+  UncertainFrame on_hand{T_flange_target * at_board.inverse(Eigen::Isometry), Matrix6d::Zero()},
+      in_base{T_base_measurement, Matrix6d::Zero()};
   const Matrix6d J = through(T_flange_target, at_board.inverse(Eigen::Isometry)) * at_flange;
   on_hand.covariance = J * frame_covariance(found, found.robot.targets[0].name) * J.transpose();
   in_base.covariance = from_base * frame_covariance(found, "base") * from_base.transpose();
@@ -142,8 +153,9 @@ HandEyeKinematics handeye_with_kinematics(const Robot& robot, const Eigen::Matri
     for (std::size_t i = 0; i < measured.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i);
       Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-      T.linear() = Eigen::Quaterniond(predicted.orientation(row, 0), predicted.orientation(row, 1), predicted.orientation(row, 2),
-                                      predicted.orientation(row, 3)).toRotationMatrix();
+      T.linear() = Eigen::Quaterniond(predicted.orientation(row, 0), predicted.orientation(row, 1),
+                                      predicted.orientation(row, 2), predicted.orientation(row, 3))
+                       .toRotationMatrix();
       T.translation() = predicted.position.row(row).transpose();
       if (in_hand) T = at_board * T.inverse(Eigen::Isometry);  // the board in the camera
       const Vector6d e = closure(T, poses.T_camera_board[i]);
@@ -158,7 +170,8 @@ HandEyeKinematics handeye_with_kinematics(const Robot& robot, const Eigen::Matri
   out.residuals = closures(found.robot);
   for (const std::size_t i : found.rejected_rows) out.residuals[i].rejected = true;
   out.train_before = errors_of(before, train, false), out.train_after = errors_of(out.residuals, train, false);
-  if (!test.empty()) out.test_before = errors_of(before, test, false), out.test_after = errors_of(out.residuals, test, false);
+  if (!test.empty())
+    out.test_before = errors_of(before, test, false), out.test_after = errors_of(out.residuals, test, false);
 
   out.robot = found.robot;
   out.robot.targets = robot.targets;

@@ -23,13 +23,14 @@ using namespace detail;
 
 namespace {
 
-constexpr double kOrbit = 1.0;       // [rad] how far a new view turns away from a measured one
-constexpr double kDistance = 0.25;   // share by which its distance changes
+constexpr double kOrbit = 1.0;      // [rad] how far a new view turns away from a measured one
+constexpr double kDistance = 0.25;  // share by which its distance changes
 
 /// Views of the board that the camera had.
 struct Seen {
-  double tilt = 0.0, aside = 0.0, nearest = 1e300, farthest = 0.0;  // [rad] of the board's normal, off the mean view; [m]
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();                   // unit vector
+  double tilt = 0.0, aside = 0.0, nearest = 1e300,
+         farthest = 0.0;                           // [rad] of the board's normal, off the mean view; [m]
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  // unit vector
 };
 
 double tilt_of(const Eigen::Isometry3d& B) {
@@ -43,14 +44,17 @@ Seen views(const Frames& B) {
   for (const Eigen::Isometry3d& b : B) {
     seen.tilt = std::max(seen.tilt, tilt_of(b));
     seen.aside = std::max(seen.aside, std::acos(std::min(1.0, seen.mean.dot(b.translation().normalized()))));
-    seen.nearest = std::min(seen.nearest, b.translation().norm()), seen.farthest = std::max(seen.farthest, b.translation().norm());
+    seen.nearest = std::min(seen.nearest, b.translation().norm()),
+    seen.farthest = std::max(seen.farthest, b.translation().norm());
   }
   return seen;
 }
 
 bool in_view(const HandEyePoses& poses, const Seen& seen, const Eigen::Isometry3d& B, double tilt) {
   const double distance = B.translation().norm();
-  if (tilt_of(B) > std::max(tilt, seen.tilt) || distance < (1.0 - kDistance) * seen.nearest || distance > (1.0 + kDistance) * seen.farthest) return false;
+  if (tilt_of(B) > std::max(tilt, seen.tilt) || distance < (1.0 - kDistance) * seen.nearest ||
+      distance > (1.0 + kDistance) * seen.farthest)
+    return false;
   if (!poses.camera || poses.images.empty()) return seen.mean.dot(B.translation().normalized()) >= std::cos(seen.aside);
   const Camera& camera = *poses.camera;
   const Eigen::Matrix3Xd& points = poses.images.front().points;
@@ -64,7 +68,8 @@ bool in_view(const HandEyePoses& poses, const Seen& seen, const Eigen::Isometry3
 }
 
 Eigen::Vector3d any_vector(Random* random, double length) {
-  return Eigen::Vector3d(random->normal(), random->normal(), random->normal()).normalized() * random->uniform(0.0, length);
+  return Eigen::Vector3d(random->normal(), random->normal(), random->normal()).normalized() *
+         random->uniform(0.0, length);
 }
 
 /// Covariance once a pose of these derivatives and this noise is measured too (Woodbury).
@@ -75,10 +80,12 @@ Matrix12d with_pose(const Matrix12d& C, const LoopRow& row) {
 
 }  // namespace
 
-std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeResult& result, const HandEyeOptions& options,
-                                       const HandEyePlanOptions& plan) {
-  if (result.status != HandEyeStatus::done) throw std::invalid_argument("a plan starts from a camera that was found: " + result.message);
-  if (plan.poses < 1 || plan.candidates < 1) throw std::invalid_argument("a plan needs one pose and one candidate or more");
+std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeResult& result,
+                                       const HandEyeOptions& options, const HandEyePlanOptions& plan) {
+  if (result.status != HandEyeStatus::done)
+    throw std::invalid_argument("a plan starts from a camera that was found: " + result.message);
+  if (plan.poses < 1 || plan.candidates < 1)
+    throw std::invalid_argument("a plan needs one pose and one candidate or more");
   HandEyePoses poses = given;
   apply_reading(options.reading, &poses.T_base_hand, &poses.T_camera_board);
   const Eigen::Isometry3d &X = result.camera.T, &Y = result.board.T;
@@ -87,7 +94,8 @@ std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeR
   LoopProblem problem;
   problem.setup = options.setup;
   LoopNoise noise;
-  noise.variance = {std::pow(result.noise.position, 2), std::pow(result.noise.hand_rotation, 2), std::pow(result.noise.camera_rotation, 2),
+  noise.variance = {std::pow(result.noise.position, 2), std::pow(result.noise.hand_rotation, 2),
+                    std::pow(result.noise.camera_rotation, 2),
                     poses.images.empty() ? 0.0 : std::pow(result.noise.pixel, 2)};
   const auto row_of = [&](const Eigen::Isometry3d& A, const Eigen::Isometry3d& B) {
     problem.A = {A}, problem.M = moving_frames(problem.A, options.setup), problem.B = {B};
@@ -103,7 +111,9 @@ std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeR
     N += row.J.transpose() * row.V.llt().solve(row.J);
   }
   const Eigen::Matrix<double, 12, 1> unit = N.diagonal().cwiseSqrt().cwiseInverse();
-  Matrix12d C = unit.asDiagonal() * Matrix12d(unit.asDiagonal() * N * unit.asDiagonal()).ldlt().solve(Matrix12d::Identity()) * unit.asDiagonal();
+  Matrix12d C = unit.asDiagonal() *
+                Matrix12d(unit.asDiagonal() * N * unit.asDiagonal()).ldlt().solve(Matrix12d::Identity()) *
+                unit.asDiagonal();
   const auto variance = [&](const Matrix12d& covariance) {
     return at_working_point({X, covariance.topLeftCorner<6, 6>()}, result.working_point).trace();
   };
@@ -121,9 +131,10 @@ std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeR
       next.T_camera_board.translation() = from.translation() + any_vector(&random, plan.reach);
       const Eigen::Isometry3d M = X * next.T_camera_board * Y.inverse(Eigen::Isometry);
       next.T_base_hand = options.setup == HandEyeSetup::eye_to_hand ? M : M.inverse(Eigen::Isometry);
-      const bool reached = std::any_of(poses.T_base_hand.begin(), poses.T_base_hand.end(), [&](const Eigen::Isometry3d& A) {
-        return (A.translation() - next.T_base_hand.translation()).norm() <= plan.reach;
-      });
+      const bool reached =
+          std::any_of(poses.T_base_hand.begin(), poses.T_base_hand.end(), [&](const Eigen::Isometry3d& A) {
+            return (A.translation() - next.T_base_hand.translation()).norm() <= plan.reach;
+          });
       if (!reached || !in_view(poses, seen, next.T_camera_board, plan.tilt)) continue;
       ++found;
       const Matrix12d covariance = with_pose(C, row_of(next.T_base_hand, next.T_camera_board));

@@ -18,11 +18,11 @@ namespace truing::detail {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kClearlyBetter = 0.3;     // of the closure as given
-constexpr double kAsGood = 1.5;            // times the best closure: the simpler reading is preferred
+constexpr double kClearlyBetter = 0.3;               // of the closure as given
+constexpr double kAsGood = 1.5;                      // times the best closure: the simpler reading is preferred
 constexpr double kShortest = 0.01, kLongest = 20.0;  // [m] of positions that make sense
-constexpr std::size_t kPoses = 30;         // that readings are judged by
-constexpr std::size_t kKept = 10;          // readings of the rotations that are tried with positions
+constexpr std::size_t kPoses = 30;                   // that readings are judged by
+constexpr std::size_t kKept = 10;                    // readings of the rotations that are tried with positions
 
 using Change = std::function<Eigen::Isometry3d(const Eigen::Isometry3d&)>;
 
@@ -38,7 +38,9 @@ struct Atom {
 
 // ---- Angles in twelve orders, and rotation vectors -----------------------------------------------------------------
 
-Eigen::Matrix3d about(int axis, double angle) { return Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(axis)).toRotationMatrix(); }
+Eigen::Matrix3d about(int axis, double angle) {
+  return Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(axis)).toRotationMatrix();
+}
 
 /// R = R_i(a_0) R_j(a_1) R_k(a_2)
 Eigen::Matrix3d compose(const std::array<int, 3>& order, const Eigen::Vector3d& a) {
@@ -101,9 +103,12 @@ void add_orders(bool hand, std::vector<Atom>* out) {
   const std::string side = hand ? "hand" : "board";
   const auto tait_bryan = [](const Order& o) { return o.axes[0] != o.axes[2]; };
   const auto even = [](const std::array<int, 3>& axes) { return (axes[1] - axes[0] + 3) % 3 == 1; };
-  const auto add = [&](const std::string& is, const std::string& as, const std::string& how, std::function<Eigen::Matrix3d(const Eigen::Matrix3d&)> f) {
+  const auto add = [&](const std::string& is, const std::string& as, const std::string& how,
+                       std::function<Eigen::Matrix3d(const Eigen::Matrix3d&)> f) {
     out->push_back({side + "-" + is + "-as-" + as + how,
-                    side + " angles are " + is + (how.empty() ? "" : ", the three numbers in the order of the rotations,") + " and were read as " + as,
+                    side + " angles are " + is +
+                        (how.empty() ? "" : ", the three numbers in the order of the rotations,") +
+                        " and were read as " + as,
                     Part::rotation, hand, [f](const Eigen::Isometry3d& T) { return with_rotation(T, f(T.linear())); }});
   };
   for (const Order& as : orders())
@@ -113,21 +118,29 @@ void add_orders(bool hand, std::vector<Atom>* out) {
         add(is.name, as.name, "", [as, is](const Eigen::Matrix3d& R) {
           return compose(is.axes, in_order(is.axes, named(as.axes, decompose(as.axes, R))));
         });
-      // Other names for the axes are another frame, which X and Y take up: even permutations, and all of those that begin and end with one axis.
+      // Other names for the axes are another frame, which X and Y take up: even permutations, and all of those that
+      // begin and end with one axis.
       if (tait_bryan(as) == tait_bryan(is) && (!tait_bryan(as) || even(as.axes) == even(is.axes))) continue;
-      add(is.name, as.name, "-in-order", [as, is](const Eigen::Matrix3d& R) { return compose(is.axes, decompose(as.axes, R)); });
+      add(is.name, as.name, "-in-order",
+          [as, is](const Eigen::Matrix3d& R) { return compose(is.axes, decompose(as.axes, R)); });
     }
   for (const Order& o : orders()) {
     if (!tait_bryan(o)) continue;
-    add("rotation-vector", o.name, "", [o](const Eigen::Matrix3d& R) { return rotation_from_vector(named(o.axes, decompose(o.axes, R))); });
-    add(o.name, "rotation-vector", "", [o](const Eigen::Matrix3d& R) { return compose(o.axes, in_order(o.axes, vector_from_rotation(R))); });
-    out->push_back({side + "-radians-as-degrees-" + o.name, side + " angles (" + o.name + ") are in radians and were read as degrees", Part::rotation, hand,
+    add("rotation-vector", o.name, "",
+        [o](const Eigen::Matrix3d& R) { return rotation_from_vector(named(o.axes, decompose(o.axes, R))); });
+    add(o.name, "rotation-vector", "",
+        [o](const Eigen::Matrix3d& R) { return compose(o.axes, in_order(o.axes, vector_from_rotation(R))); });
+    out->push_back({side + "-radians-as-degrees-" + o.name,
+                    side + " angles (" + o.name + ") are in radians and were read as degrees", Part::rotation, hand,
                     [o](const Eigen::Isometry3d& T) {
-                      return with_rotation(T, compose(o.axes, Eigen::Vector3d(180.0 / kPi * decompose(o.axes, T.linear()))));
+                      return with_rotation(
+                          T, compose(o.axes, Eigen::Vector3d(180.0 / kPi * decompose(o.axes, T.linear()))));
                     }});
   }
-  out->push_back({side + "-radians-as-degrees", side + " rotation vectors are in radians and were read as degrees", Part::rotation, hand,
-                  [](const Eigen::Isometry3d& T) { return with_rotation(T, rotation_from_vector(180.0 / kPi * vector_from_rotation(T.linear()))); }});
+  out->push_back({side + "-radians-as-degrees", side + " rotation vectors are in radians and were read as degrees",
+                  Part::rotation, hand, [](const Eigen::Isometry3d& T) {
+                    return with_rotation(T, rotation_from_vector(180.0 / kPi * vector_from_rotation(T.linear())));
+                  }});
 }
 
 // ---- The list ------------------------------------------------------------------------------------------------------
@@ -137,21 +150,32 @@ void add_side(bool hand, std::vector<Atom>* out) {
   const auto add = [&](const std::string& name, const std::string& text, Part part, Change change) {
     out->push_back({side + "-" + name, side + " " + text, part, hand, std::move(change)});
   };
-  add("inverted", hand ? "poses are inverted (base in hand), or the set-up is the other one (eye-in-hand, eye-to-hand)"
-                       : "poses are inverted (camera in board)",
+  add("inverted",
+      hand ? "poses are inverted (base in hand), or the set-up is the other one (eye-in-hand, eye-to-hand)"
+           : "poses are inverted (camera in board)",
       Part::inversion, [](const Eigen::Isometry3d& T) { return T.inverse(Eigen::Isometry); });
-  add("millimetres", "positions are in mm and were read as m", Part::position, [](Eigen::Isometry3d T) { T.translation() *= 1e-3; return T; });
-  add("metres", "positions are in m and were read as mm", Part::position, [](Eigen::Isometry3d T) { T.translation() *= 1e3; return T; });
+  add("millimetres", "positions are in mm and were read as m", Part::position, [](Eigen::Isometry3d T) {
+    T.translation() *= 1e-3;
+    return T;
+  });
+  add("metres", "positions are in m and were read as mm", Part::position, [](Eigen::Isometry3d T) {
+    T.translation() *= 1e3;
+    return T;
+  });
   for (int k = 0; k < 3; ++k) {
     const std::string axis(1, "xyz"[k]);
-    add(axis + "-negated", axis + " has the wrong sign", Part::position, [k](Eigen::Isometry3d T) { T.translation()(k) *= -1.0; return T; });
+    add(axis + "-negated", axis + " has the wrong sign", Part::position, [k](Eigen::Isometry3d T) {
+      T.translation()(k) *= -1.0;
+      return T;
+    });
   }
   for (const auto& [a, b] : {std::pair<int, int>{0, 1}, {0, 2}, {1, 2}}) {
     const std::string axes{"xyz"[a], "xyz"[b]};
-    add(axes + "-swapped", std::string(1, "xyz"[a]) + " and " + "xyz"[b] + " are swapped", Part::position, [a = a, b = b](Eigen::Isometry3d T) {
-      std::swap(T.translation()(a), T.translation()(b));
-      return T;
-    });
+    add(axes + "-swapped", std::string(1, "xyz"[a]) + " and " + "xyz"[b] + " are swapped", Part::position,
+        [a = a, b = b](Eigen::Isometry3d T) {
+          std::swap(T.translation()(a), T.translation()(b));
+          return T;
+        });
   }
   add("transposed", "rotations are transposed (positions are not)", Part::rotation,
       [](const Eigen::Isometry3d& T) { return with_rotation(T, T.linear().transpose()); });
@@ -164,7 +188,8 @@ void add_side(bool hand, std::vector<Atom>* out) {
   });
   add("xyzw", "quaternions are x y z w and were read as w x y z", Part::rotation, [](const Eigen::Isometry3d& T) {
     const Eigen::Quaterniond q(T.linear());
-    return with_rotation(T, Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()).toRotationMatrix());  // columns read as w x y z hold x y z w
+    return with_rotation(
+        T, Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()).toRotationMatrix());  // columns read as w x y z hold x y z w
   });
   add("wxyz", "quaternions are w x y z and were read as x y z w", Part::rotation, [](const Eigen::Isometry3d& T) {
     const Eigen::Quaterniond q(T.linear());
@@ -178,8 +203,10 @@ const std::vector<Atom>& atoms() {
     std::vector<Atom> out;
     add_side(true, &out);
     add_side(false, &out);
-    out.push_back({"board-one-later", "every board belongs to the hand pose of the next row", Part::rows, false, nullptr});
-    out.push_back({"board-one-earlier", "every board belongs to the hand pose of the row before", Part::rows, false, nullptr});
+    out.push_back(
+        {"board-one-later", "every board belongs to the hand pose of the next row", Part::rows, false, nullptr});
+    out.push_back(
+        {"board-one-earlier", "every board belongs to the hand pose of the row before", Part::rows, false, nullptr});
     return out;
   }();
   return list;
@@ -206,7 +233,8 @@ std::vector<std::string> parts_of(const std::string& name) {
 }
 
 /// Median closure after twice keeping the better half; [m], [rad] and the length that makes them one number.
-Reading close_up(const std::string& name, const Frames& hand, const Frames& board, HandEyeSetup setup, double* distance) {
+Reading close_up(const std::string& name, const Frames& hand, const Frames& board, HandEyeSetup setup,
+                 double* distance) {
   const Frames M = moving_frames(hand, setup);
   Rows rows(M.size());
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = i;
@@ -229,7 +257,8 @@ Reading close_up(const std::string& name, const Frames& hand, const Frames& boar
   return {name, explain_reading(name), position[middle], rotation[middle]};
 }
 
-/// Median difference of the angles by which hand and board turn between poses: zero in the right reading of the rotations, whatever the frames.
+/// Median difference of the angles by which hand and board turn between poses: zero in the right reading of the
+/// rotations, whatever the frames.
 double incongruence(const Frames& hand, const Frames& board) {
   std::vector<double> difference;
   const std::size_t n = hand.size();
@@ -240,7 +269,8 @@ double incongruence(const Frames& hand, const Frames& board) {
       };
       difference.push_back(std::abs(angle(hand[i], hand[i + step]) - angle(board[i], board[i + step])));
     }
-  std::nth_element(difference.begin(), difference.begin() + static_cast<std::ptrdiff_t>(difference.size() / 2), difference.end());
+  std::nth_element(difference.begin(), difference.begin() + static_cast<std::ptrdiff_t>(difference.size() / 2),
+                   difference.end());
   return difference[difference.size() / 2];
 }
 
@@ -252,9 +282,12 @@ bool plausible(const Frames& frames) {
   return typical > kShortest && typical < kLongest;
 }
 
-/// Most boards are before the camera, z looking out of it: of two inversions that close equally well, the one that has them there.
+/// Most boards are before the camera, z looking out of it: of two inversions that close equally well, the one that has
+/// them there.
 bool in_front(const Frames& board) {
-  return 2 * std::count_if(board.begin(), board.end(), [](const Eigen::Isometry3d& T) { return T.translation().z() > 0.0; }) > static_cast<std::ptrdiff_t>(board.size());
+  return 2 * std::count_if(board.begin(), board.end(),
+                           [](const Eigen::Isometry3d& T) { return T.translation().z() > 0.0; }) >
+         static_cast<std::ptrdiff_t>(board.size());
 }
 
 std::string joined(const std::string& a, const std::string& b) { return a.empty() ? b : b.empty() ? a : a + "+" + b; }
@@ -267,9 +300,11 @@ void apply_reading(const std::string& name, Frames* hand, Frames* board) {
     const Atom& atom = find_atom(part);
     if (atom.part == Part::rows) {  // the row without a partner is closed with itself a second time
       if (part == "board-one-later")
-        std::rotate(board->begin(), board->end() - 1, board->end()), board->front() = (*board)[1], hand->front() = (*hand)[1];
+        std::rotate(board->begin(), board->end() - 1, board->end()), board->front() = (*board)[1],
+                                                                     hand->front() = (*hand)[1];
       else
-        std::rotate(board->begin(), board->begin() + 1, board->end()), board->back() = (*board)[board->size() - 2], hand->back() = (*hand)[hand->size() - 2];
+        std::rotate(board->begin(), board->begin() + 1, board->end()), board->back() = (*board)[board->size() - 2],
+                                                                       hand->back() = (*hand)[hand->size() - 2];
       continue;
     }
     for (Eigen::Isometry3d& T : *(atom.hand ? hand : board)) T = atom.change(T);
@@ -282,11 +317,12 @@ std::string explain_reading(const std::string& name) {
   return text;
 }
 
-std::vector<Reading> find_readings(const Frames& T_base_hand, const Frames& T_camera_board, HandEyeSetup setup, const Rows& rows,
-                                   double position, double rotation) {
+std::vector<Reading> find_readings(const Frames& T_base_hand, const Frames& T_camera_board, HandEyeSetup setup,
+                                   const Rows& rows, double position, double rotation) {
   Frames hand, board;
   const std::size_t stride = std::max<std::size_t>(1, rows.size() / kPoses);
-  for (std::size_t r = 0; r < rows.size(); r += stride) hand.push_back(T_base_hand[rows[r]]), board.push_back(T_camera_board[rows[r]]);
+  for (std::size_t r = 0; r < rows.size(); r += stride)
+    hand.push_back(T_base_hand[rows[r]]), board.push_back(T_camera_board[rows[r]]);
 
   // Rotations first: how far a motion turns does not depend on frames or inversions.
   std::vector<std::pair<double, std::string>> turns;
@@ -305,7 +341,11 @@ std::vector<Reading> find_readings(const Frames& T_base_hand, const Frames& T_ca
   for (std::size_t k = 1; k < turns.size() && kept.size() <= kKept; ++k)
     if (turns[k].first < std::max(0.6 * given, given + 1e-9)) kept.push_back(turns[k].second);
 
-  struct Found { double distance; std::size_t changes; Reading reading; };  // changes: one more where lengths are not those of an arm in its cell
+  struct Found {
+    double distance;
+    std::size_t changes;
+    Reading reading;
+  };  // changes: one more where lengths are not those of an arm in its cell
   std::vector<Found> found;
   double length = 1.0;
   for (const std::string& turn : kept)
@@ -327,7 +367,8 @@ std::vector<Reading> find_readings(const Frames& T_base_hand, const Frames& T_ca
         apply_reading(name, &h, &b);
         double distance = 0.0;
         const Reading reading = close_up(name, h, b, setup, &distance);
-        found.push_back({distance, parts_of(name).size() + (plausible(h) && plausible(b) && in_front(b) ? 0 : 1), reading});
+        found.push_back(
+            {distance, parts_of(name).size() + (plausible(h) && plausible(b) && in_front(b) ? 0 : 1), reading});
       }
     }
   const double as_given = std::hypot(position / length, rotation);
@@ -335,12 +376,15 @@ std::vector<Reading> find_readings(const Frames& T_base_hand, const Frames& T_ca
   for (const Found& f : found)
     if (std::isfinite(f.distance) && f.distance < kClearlyBetter * as_given && f.distance < 0.1) better.push_back(f);
   if (better.empty()) return {};
-  const double best = std::min_element(better.begin(), better.end(), [](const Found& a, const Found& b) { return a.distance < b.distance; })->distance;
+  const double best = std::min_element(better.begin(), better.end(), [](const Found& a, const Found& b) {
+                        return a.distance < b.distance;
+                      })->distance;
   std::stable_sort(better.begin(), better.end(), [&](const Found& a, const Found& b) {
     const bool a_good = a.distance <= kAsGood * best, b_good = b.distance <= kAsGood * best;
     if (a_good != b_good) return a_good;
     if (!a_good) return a.distance < b.distance;
-    const bool a_hand = a.reading.name.rfind("hand", 0) == 0, b_hand = b.reading.name.rfind("hand", 0) == 0;  // a mirror may be on either side
+    const bool a_hand = a.reading.name.rfind("hand", 0) == 0,
+               b_hand = b.reading.name.rfind("hand", 0) == 0;  // a mirror may be on either side
     return a.changes != b.changes ? a.changes < b.changes : a_hand != b_hand ? a_hand : a.distance < b.distance;
   });
   std::vector<Reading> out;

@@ -16,12 +16,13 @@
 namespace truing::detail {
 namespace {
 
-constexpr double kStep = 1e-9;             // the estimate stands when a step is this small beside its standard errors …
-constexpr double kVarianceStep = 1e-2;     // … and variances change by no more than this share
-constexpr double kLargestChange = 2.0;     // of a variance's logarithm in one step
-constexpr double kPriorSpread = 3.0;       // [log of variance] of the weak prior that keeps what data cannot split near an even split
-constexpr double kLeastVariance = 1e-18;   // [m^2, rad^2, px^2] a nanometre, a nanoradian: data without noise stop there
-constexpr double kSingular = 1e-13;        // smallest eigenvalue of the unit-diagonal information
+constexpr double kStep = 1e-9;          // the estimate stands when a step is this small beside its standard errors …
+constexpr double kVarianceStep = 1e-2;  // … and variances change by no more than this share
+constexpr double kLargestChange = 2.0;  // of a variance's logarithm in one step
+constexpr double kPriorSpread =
+    3.0;  // [log of variance] of the weak prior that keeps what data cannot split near an even split
+constexpr double kLeastVariance = 1e-18;  // [m^2, rad^2, px^2] a nanometre, a nanoradian: data without noise stop there
+constexpr double kSingular = 1e-13;       // smallest eigenvalue of the unit-diagonal information
 
 using Shapes = std::array<Matrix6d, kVariances>;
 
@@ -38,10 +39,11 @@ Shapes shapes(const LoopProblem& problem, std::size_t i, const Eigen::Vector3d& 
   return out;
 }
 
-/// Closure and derivatives. With R = R_X^T: moving X by d moves the board by -R d, turning it by d about its own origin by R (v x d) and -R d,
-/// v from X's origin to the board in the parent; moving Y by d moves the board by R R_M d, turning it turns the board by R R_M d.
-void linearise(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y, Vector6d* e,
-               Eigen::Matrix<double, 6, 12>* J, Eigen::Vector3d* w) {
+/// Closure and derivatives. With R = R_X^T: moving X by d moves the board by -R d, turning it by d about its own origin
+/// by R (v x d) and -R d, v from X's origin to the board in the parent; moving Y by d moves the board by R R_M d,
+/// turning it turns the board by R R_M d.
+void linearise(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y,
+               Vector6d* e, Eigen::Matrix<double, 6, 12>* J, Eigen::Vector3d* w) {
   const Eigen::Isometry3d board = problem.M[i] * Y;  // in the camera's parent
   const Eigen::Matrix3d R = X.linear().transpose();
   Eigen::Isometry3d predicted;
@@ -61,23 +63,25 @@ void linearise(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3
 }
 
 Matrix6d weighted_sum(const Shapes& shape, const LoopNoise& noise) {
-  return noise.variance[0] * shape[0] + noise.variance[1] * shape[1] + noise.variance[2] * shape[2] + noise.variance[3] * shape[3];
+  return noise.variance[0] * shape[0] + noise.variance[1] * shape[1] + noise.variance[2] * shape[2] +
+         noise.variance[3] * shape[3];
 }
 
 /// Sums over poses for a step of X, Y and of the variances.
 struct LoopSums {
-  Matrix12d N = Matrix12d::Zero();                        // J^T W J, W = V^-1
+  Matrix12d N = Matrix12d::Zero();                                        // J^T W J, W = V^-1
   Eigen::Matrix<double, 12, 1> g = Eigen::Matrix<double, 12, 1>::Zero();  // J^T W e
   double chi2 = 0.0;
   // For variances: W V_k W between closures, between columns; traces.
-  std::array<double, 3> trace{};                          // tr W V_k
-  std::array<double, 3> square{};                         // e^T W V_k W e
+  std::array<double, 3> trace{};                                                             // tr W V_k
+  std::array<double, 3> square{};                                                            // e^T W V_k W e
   std::array<Matrix12d, 3> spread{Matrix12d::Zero(), Matrix12d::Zero(), Matrix12d::Zero()};  // J^T W V_k W J
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // tr W V_k W V_l; k, l < 3: the pixels' noise is known from within images
+  Eigen::Matrix3d information =
+      Eigen::Matrix3d::Zero();  // tr W V_k W V_l; k, l < 3: the pixels' noise is known from within images
 };
 
-LoopSums sum_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y, const LoopNoise& noise,
-                  bool variances) {
+LoopSums sum_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y,
+                  const LoopNoise& noise, bool variances) {
   LoopSums s;
   Vector6d e;
   Eigen::Matrix<double, 6, 12> J;
@@ -101,7 +105,8 @@ LoopSums sum_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Iso
     }
     for (int k = 0; k < 3; ++k)
       for (int l = 0; l <= k; ++l)
-        s.information(k, l) += WV[static_cast<std::size_t>(k)].cwiseProduct(WV[static_cast<std::size_t>(l)].transpose()).sum();
+        s.information(k, l) +=
+            WV[static_cast<std::size_t>(k)].cwiseProduct(WV[static_cast<std::size_t>(l)].transpose()).sum();
   }
   s.information = s.information.selfadjointView<Eigen::Lower>();
   if (problem.known) {
@@ -118,19 +123,21 @@ bool invert(const Matrix12d& N, Matrix12d* C) {
   const Eigen::Matrix<double, 12, 1> unit = N.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
   const Eigen::SelfAdjointEigenSolver<Matrix12d> eigen(unit.asDiagonal() * N * unit.asDiagonal());
   if (!(eigen.eigenvalues()(0) > kSingular * eigen.eigenvalues()(11))) return false;
-  *C = unit.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose() *
-       unit.asDiagonal();
+  *C = unit.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+       eigen.eigenvectors().transpose() * unit.asDiagonal();
   return true;
 }
 
-/// How far the variances are stepped: steps that turn back are halved, as scoring overshoots where a variance is next to nothing.
+/// How far the variances are stepped: steps that turn back are halved, as scoring overshoots where a variance is next
+/// to nothing.
 struct Stride {
   double factor = 1.0;
   Eigen::VectorXd last;
 };
 
-/// One scoring step of the logarithms of the variances; the largest change. Score of the restricted likelihood: (e^T P V_k P e - tr P V_k) / 2 with
-/// P = W - W J C J^T W, and P e = W e once the fit stands (Searle, Casella, McCulloch 1992, section 6.6).
+/// One scoring step of the logarithms of the variances; the largest change. Score of the restricted likelihood: (e^T P
+/// V_k P e - tr P V_k) / 2 with P = W - W J C J^T W, and P e = W e once the fit stands (Searle, Casella, McCulloch
+/// 1992, section 6.6).
 double step_variances(const LoopSums& s, const Matrix12d& C, std::size_t rows, Stride* stride, LoopNoise* noise) {
   std::vector<int> free;
   for (int k = 0; k < 3; ++k)
@@ -159,7 +166,9 @@ double step_variances(const LoopSums& s, const Matrix12d& C, std::size_t rows, S
     score(a) -= std::log(noise->variance[k] / even) / (kPriorSpread * kPriorSpread);
   }
   const Eigen::VectorXd full = F.ldlt().solve(score);
-  if (stride->last.size() == n) stride->factor = stride->last.dot(full) < -0.25 * stride->last.squaredNorm() ? 0.5 * stride->factor : std::min(1.0, 1.5 * stride->factor);
+  if (stride->last.size() == n)
+    stride->factor = stride->last.dot(full) < -0.25 * stride->last.squaredNorm() ? 0.5 * stride->factor
+                                                                                 : std::min(1.0, 1.5 * stride->factor);
   stride->last = full;
   const Eigen::VectorXd change = stride->factor * full;
   double largest = 0.0;
@@ -175,8 +184,8 @@ double step_variances(const LoopSums& s, const Matrix12d& C, std::size_t rows, S
 
 }  // namespace
 
-LoopEstimate refine_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y, LoopNoise noise,
-                         int max_iterations) {
+LoopEstimate refine_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Isometry3d& X,
+                         const Eigen::Isometry3d& Y, LoopNoise noise, int max_iterations) {
   LoopEstimate out;
   out.X = X, out.Y = Y, out.noise = noise;
   const bool estimate = noise.estimate[0] || noise.estimate[1] || noise.estimate[2];
@@ -200,7 +209,8 @@ LoopEstimate refine_loop(const LoopProblem& problem, const Rows& rows, const Eig
   return out;
 }
 
-LoopRow loop_row(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y, const LoopNoise& noise) {
+LoopRow loop_row(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y,
+                 const LoopNoise& noise) {
   LoopRow row;
   Eigen::Vector3d w;
   linearise(problem, i, X, Y, &row.e, &row.J, &w);
@@ -208,7 +218,8 @@ LoopRow loop_row(const LoopProblem& problem, std::size_t i, const Eigen::Isometr
   return row;
 }
 
-OneMore one_more_unknown(const LoopProblem& problem, const Rows& rows, const LoopEstimate& fit, const std::function<Vector6d(std::size_t)>& derivative) {
+OneMore one_more_unknown(const LoopProblem& problem, const Rows& rows, const LoopEstimate& fit,
+                         const std::function<Vector6d(std::size_t)>& derivative) {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(13, 13);
   Eigen::VectorXd g = Eigen::VectorXd::Zero(13);
   for (const std::size_t i : rows) {
@@ -223,7 +234,10 @@ OneMore one_more_unknown(const LoopProblem& problem, const Rows& rows, const Loo
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   if (!(eigen.eigenvalues()(0) > kSingular * eigen.eigenvalues()(12))) return {nan, nan};
   // The last row of the inverse.
-  const Eigen::VectorXd last = unit(12) * (unit.asDiagonal() * (eigen.eigenvectors() * (eigen.eigenvectors().row(12).transpose().array() / eigen.eigenvalues().array()).matrix()));
+  const Eigen::VectorXd last =
+      unit(12) *
+      (unit.asDiagonal() * (eigen.eigenvectors() *
+                            (eigen.eigenvectors().row(12).transpose().array() / eigen.eigenvalues().array()).matrix()));
   return {-last.dot(g), std::sqrt(last(12))};
 }
 

@@ -28,13 +28,17 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 std::string count_of(std::size_t n, const char* what) { return std::to_string(n) + " " + what + (n == 1 ? "" : "s"); }
 
-// --- which rows, which parameters ---------------------------------------------------------------------------------------
+// --- which rows, which parameters
+// ---------------------------------------------------------------------------------------
 
 /// 0 train, 1 test for every row: the data's own split, or a share of the pose groups drawn with the seed.
 std::vector<std::int8_t> split(const Measurements& data, const IdentifyOptions& options) {
   const std::vector<std::int32_t> group = pose_groups(data);
-  const std::size_t groups = group.empty() ? 0 : static_cast<std::size_t>(*std::max_element(group.begin(), group.end())) + 1;
-  if (groups < 2) throw std::invalid_argument("all " + count_of(data.rows, "row") + " are of one pose: nothing can be identified from them");
+  const std::size_t groups =
+      group.empty() ? 0 : static_cast<std::size_t>(*std::max_element(group.begin(), group.end())) + 1;
+  if (groups < 2)
+    throw std::invalid_argument("all " + count_of(data.rows, "row") +
+                                " are of one pose: nothing can be identified from them");
   if (!data.set.empty()) return data.set;
   std::vector<std::int32_t> order(groups);
   std::iota(order.begin(), order.end(), 0);
@@ -48,7 +52,8 @@ std::vector<std::int8_t> split(const Measurements& data, const IdentifyOptions& 
   return set;
 }
 
-/// Touching fixed points shows shapes, not sizes: with every length free the robot could shrink to nothing. The longest is held.
+/// Touching fixed points shows shapes, not sizes: with every length free the robot could shrink to nothing. The longest
+/// is held.
 int length_that_carries_scale(const Model& model, const Eigen::VectorXd& values, const std::vector<int>& free) {
   int longest = -1;
   for (std::size_t k = 0; k < model.parameters.size(); ++k) {
@@ -56,20 +61,22 @@ int length_that_carries_scale(const Model& model, const Eigen::VectorXd& values,
     const bool length = (info.role == Role::geometry || info.role == Role::target) && info.unit == "m";
     const double size = std::abs(values[static_cast<Eigen::Index>(k)]);
     if (!length || size < 1e-9) continue;
-    if (std::find(free.begin(), free.end(), static_cast<int>(k)) == free.end()) return -1;  // some length is held already
+    if (std::find(free.begin(), free.end(), static_cast<int>(k)) == free.end())
+      return -1;  // some length is held already
     if (info.role == Role::geometry && (longest < 0 || size > std::abs(values[longest]))) longest = static_cast<int>(k);
   }
   return longest;
 }
 
-// --- one fit ------------------------------------------------------------------------------------------------------------
+// --- one fit
+// ------------------------------------------------------------------------------------------------------------
 
 struct Fit {
   Eigen::VectorXd values;
   Weighing weighing;
   SolverSummary solver;
-  std::vector<int> fitted;              ///< parameters
-  std::vector<std::int32_t> rejected;   ///< rows
+  std::vector<int> fitted;             ///< parameters
+  std::vector<std::int32_t> rejected;  ///< rows
   double cost = 0.0;
 };
 
@@ -81,7 +88,8 @@ struct Job {
   std::vector<std::int32_t> rows;
 };
 
-SolverSummary solve(const Job& job, const Evaluator& evaluator, const Weighing& weighing, const Refit& refit, Eigen::VectorXd* values) {
+SolverSummary solve(const Job& job, const Evaluator& evaluator, const Weighing& weighing, const Refit& refit,
+                    Eigen::VectorXd* values) {
   return job.options.solver == Solver::ceres ? solve_with_ceres(evaluator, job.model, weighing, job.options, values)
                                              : levenberg_marquardt(evaluator, weighing, job.options, refit, values);
 }
@@ -93,7 +101,8 @@ int components_of(const Measurements& data, std::size_t row) {
 }
 
 /// The measurement frame refitted to the current predictions by SVD.
-Refit frame_by_registration(const Model& model, const Measurements& data, const Evaluator& evaluator, std::vector<std::int32_t> rows) {
+Refit frame_by_registration(const Model& model, const Measurements& data, const Evaluator& evaluator,
+                            std::vector<std::int32_t> rows) {
   return [&model, &data, &evaluator, rows](Eigen::VectorXd* values) {
     const auto n = static_cast<Eigen::Index>(rows.size());
     Eigen::Matrix3Xd from(3, n), to(3, n);
@@ -116,7 +125,8 @@ Refit frame_by_registration(const Model& model, const Measurements& data, const 
 std::vector<std::int32_t> gross_outliers(const Job& job, std::vector<double>* norms, double beyond) {
   std::vector<double> comparable;
   comparable.reserve(job.rows.size());
-  for (const std::int32_t row : job.rows) comparable.push_back((*norms)[row] / kChiMedian[components_of(job.data, row)]);
+  for (const std::int32_t row : job.rows)
+    comparable.push_back((*norms)[row] / kChiMedian[components_of(job.data, row)]);
   const double bound = beyond * median_of(comparable);
   std::vector<std::int32_t> out;
   for (std::size_t i = 0; i < job.rows.size(); ++i) {
@@ -136,10 +146,14 @@ double loss_medians(Loss loss) { return loss == Loss::tukey ? 6.0 : 1.5; }
 
 RowLoss row_loss(Loss loss) {
   switch (loss) {
-    case Loss::huber: return RowLoss::huber;
-    case Loss::cauchy: return RowLoss::cauchy;
-    case Loss::tukey: return RowLoss::tukey;
-    default: return RowLoss::none;
+    case Loss::huber:
+      return RowLoss::huber;
+    case Loss::cauchy:
+      return RowLoss::cauchy;
+    case Loss::tukey:
+      return RowLoss::tukey;
+    default:
+      return RowLoss::none;
   }
 }
 
@@ -149,9 +163,11 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
   out.values = start;
   out.fitted = fitted;
   out.weighing.rotation_scale = job.options.rotation_length;
-  const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, job.rows), fitted, job.options.threads);
-  const bool by_svd = job.options.frame_by == FrameBy::svd &&
-                      std::any_of(fitted.begin(), fitted.end(), [&](int k) { return job.model.parameters[k].role == Role::base; });
+  const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, job.rows), fitted,
+                            job.options.threads);
+  const bool by_svd = job.options.frame_by == FrameBy::svd && std::any_of(fitted.begin(), fitted.end(), [&](int k) {
+                        return job.model.parameters[k].role == Role::base;
+                      });
   const auto refit_on = [&](const Evaluator& of_rows, const std::vector<std::int32_t>& rows) {
     return by_svd ? frame_by_registration(job.model, job.data, of_rows, rows) : Refit();
   };
@@ -203,7 +219,8 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
 
 /// Splits the free parameters into those that the rows can see and combinations that they cannot.
 Selection select_observable(const Job& job, const std::vector<int>& free, const Eigen::VectorXd& values) {
-  const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, job.rows), free, job.options.threads);
+  const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, job.rows), free,
+                            job.options.threads);
   Weighing weighing;
   weighing.rotation_scale = job.options.rotation_length;
   NormalEquations normal;
@@ -213,12 +230,16 @@ Selection select_observable(const Job& job, const std::vector<int>& free, const 
   return observable(job.model, free, find_rank(normal.gram, priority, job.options.rank_tolerance));
 }
 
-// --- where to start -----------------------------------------------------------------------------------------------------
+// --- where to start
+// -----------------------------------------------------------------------------------------------------
 
 /// At most so many rows, evenly taken, are enough to start from.
 constexpr std::size_t kStartRows = 4096;
 
-struct Predicted { std::size_t row; Eigen::Isometry3d frame; };
+struct Predicted {
+  std::size_t row;
+  Eigen::Isometry3d frame;
+};
 
 /// What the robot predicts for a sample of those rows that satisfy `wanted`, in order of rows.
 template <typename Wanted>
@@ -241,7 +262,8 @@ std::vector<Predicted> predict_some(const Robot& robot, const Job& job, const Wa
   return out;
 }
 
-/// Base frame by registration of the nominal robot's predictions, and target orientations (where they are free) by the mean of what is left.
+/// Base frame by registration of the nominal robot's predictions, and target orientations (where they are free) by the
+/// mean of what is left.
 void register_frames(const Job& job, bool base_free, const std::vector<bool>& turn_free, Robot* robot) {
   const Measurements& data = job.data;
   const std::vector<Predicted> predicted =
@@ -262,12 +284,14 @@ void register_frames(const Job& job, bool base_free, const std::vector<bool>& tu
   std::vector<Eigen::Matrix3d> turn(robot->targets.size(), Eigen::Matrix3d::Zero());
   for (const Predicted& p : predicted) {
     if (!data.has_orientation(p.row)) continue;
-    const Eigen::Quaterniond want(data.orientation[0][p.row], data.orientation[1][p.row], data.orientation[2][p.row], data.orientation[3][p.row]);
+    const Eigen::Quaterniond want(data.orientation[0][p.row], data.orientation[1][p.row], data.orientation[2][p.row],
+                                  data.orientation[3][p.row]);
     const std::size_t target = data.target.empty() ? 0 : static_cast<std::size_t>(data.target[p.row]);
     turn[target] += (correction.linear() * p.frame.linear()).transpose() * want.normalized().toRotationMatrix();
   }
   for (std::size_t k = 0; k < turn.size(); ++k) {
-    if (turn_free[k] && !turn[k].isZero(0.0)) robot->targets[k].T_last_target.linear() = robot->targets[k].T_last_target.linear() * nearest_rotation(turn[k]);
+    if (turn_free[k] && !turn[k].isZero(0.0))
+      robot->targets[k].T_last_target.linear() = robot->targets[k].T_last_target.linear() * nearest_rotation(turn[k]);
   }
 }
 
@@ -275,7 +299,8 @@ void register_frames(const Job& job, bool base_free, const std::vector<bool>& tu
 void locate_anchor(const Job& job, Robot* robot) {
   Eigen::Matrix<double, 5, 5> gram = Eigen::Matrix<double, 5, 5>::Zero();
   Eigen::Matrix<double, 5, 1> right = Eigen::Matrix<double, 5, 1>::Zero();
-  for (const Predicted& predicted : predict_some(*robot, job, [&](std::size_t row) { return job.data.has_distance(row); })) {
+  for (const Predicted& predicted :
+       predict_some(*robot, job, [&](std::size_t row) { return job.data.has_distance(row); })) {
     const Eigen::Vector3d p = predicted.frame.translation();
     const double d = job.data.distance[predicted.row];
     Eigen::Matrix<double, 5, 1> column;
@@ -292,7 +317,8 @@ void locate_points(const Model& model, const Job& job, Eigen::VectorXd* values) 
   std::vector<Eigen::Vector3d> sum(model.point_names.size(), Eigen::Vector3d::Zero());
   std::vector<int> count(model.point_names.size(), 0);
   if (sum.empty()) return;
-  for (const Predicted& p : predict_some(model.robot, job, [&](std::size_t row) { return job.data.has_fixed_point(row); })) {
+  for (const Predicted& p :
+       predict_some(model.robot, job, [&](std::size_t row) { return job.data.has_fixed_point(row); })) {
     const auto point = static_cast<std::size_t>(job.data.fixed_point[p.row]);
     sum[point] += p.frame.translation();
     ++count[point];
@@ -312,22 +338,26 @@ struct Start {
 
 double reach_of(const Robot& robot) {
   double reach = 0.0;
-  for (const Joint& joint : robot.joints) reach += std::abs(joint.a) + std::abs(joint.d) + joint.T_parent_joint.translation().norm();
+  for (const Joint& joint : robot.joints)
+    reach += std::abs(joint.a) + std::abs(joint.d) + joint.T_parent_joint.translation().norm();
   return reach;
 }
 
 /// Nominal robot with base, targets, anchor and fixed points fitted, from one guess of the targets' places.
-Start fit_instrument(const Job& nominal_job, const std::vector<std::string>& unknown, const Robot& guess, bool base_free, bool distance) {
+Start fit_instrument(const Job& nominal_job, const std::vector<std::string>& unknown, const Robot& guess,
+                     bool base_free, bool distance) {
   Start out;
   out.robot = guess;
   std::vector<bool> turn_free(guess.targets.size(), true);
   for (const ParameterInfo& info : nominal_job.model.parameters) {
     const bool unknown_turn = std::find(unknown.begin(), unknown.end(), info.name) != unknown.end();
-    if (info.role == Role::target && info.rotation && !unknown_turn) turn_free[static_cast<std::size_t>(info.owner)] = false;
+    if (info.role == Role::target && info.rotation && !unknown_turn)
+      turn_free[static_cast<std::size_t>(info.owner)] = false;
   }
   register_frames(nominal_job, base_free, turn_free, &out.robot);
   if (distance) locate_anchor(nominal_job, &out.robot);
-  const Model model = make_model(out.robot, nominal_job.data, nominal_job.options.effects, nominal_job.options.own_effects);
+  const Model model =
+      make_model(out.robot, nominal_job.data, nominal_job.options.effects, nominal_job.options.own_effects);
   Eigen::VectorXd values = initial_values(model);
   IdentifyOptions options = nominal_job.options;
   options.solver = Solver::lm;
@@ -343,9 +373,11 @@ Start fit_instrument(const Job& nominal_job, const std::vector<std::string>& unk
   out.robot = robot_with(model, found.values);
   out.values = initial_values(make_model(out.robot, job.data, options.effects, options.own_effects));
   for (std::size_t k = 0; k < model.parameters.size(); ++k) {
-    if (model.parameters[k].role == Role::point) out.values[static_cast<Eigen::Index>(k)] = found.values[static_cast<Eigen::Index>(k)];
+    if (model.parameters[k].role == Role::point)
+      out.values[static_cast<Eigen::Index>(k)] = found.values[static_cast<Eigen::Index>(k)];
   }
-  const Evaluator evaluator(model, job.data, job.bases, make_segments(job.data, without(job.rows, found.rejected)), seen.fitted, options.threads);
+  const Evaluator evaluator(model, job.data, job.bases, make_segments(job.data, without(job.rows, found.rejected)),
+                            seen.fitted, options.threads);
   NormalEquations normal;
   evaluator.normal_equations(found.values, found.weighing, &normal);
   out.rms = normal.rms();
@@ -363,23 +395,27 @@ double spread_of(const Job& job) {
   return high[0] < low[0] ? 0.0 : (high - low).norm();
 }
 
-/// A target far from where the model has it can spoil the registration: then other places are tried, and the best one kept.
+/// A target far from where the model has it can spoil the registration: then other places are tried, and the best one
+/// kept.
 Start find_start(const Job& job, const std::vector<std::string>& unknown, const Content& content, bool base_free) {
   Start best = fit_instrument(job, unknown, job.model.robot, base_free, content.distance);
   const bool targets_free = std::any_of(unknown.begin(), unknown.end(), [&](const std::string& name) {
-    return job.model.parameters[job.model.parameter_index(name)].role == Role::target; });
+    return job.model.parameters[job.model.parameter_index(name)].role == Role::target;
+  });
   const bool doubtful = content.distance || (content.frame && best.rms > 0.02 * spread_of(job));
   if (!targets_free || !doubtful) return best;
   for (int k = 0; k < 6; ++k) {
     Robot guess = job.model.robot;
-    for (Target& target : guess.targets) target.T_last_target.translation()[k % 3] += (k < 3 ? 0.15 : -0.15) * reach_of(guess);
+    for (Target& target : guess.targets)
+      target.T_last_target.translation()[k % 3] += (k < 3 ? 0.15 : -0.15) * reach_of(guess);
     Start other = fit_instrument(job, unknown, guess, base_free, content.distance);
     if (other.rms < best.rms) best = std::move(other);
   }
   return best;
 }
 
-// --- what to say about it -----------------------------------------------------------------------------------------------
+// --- what to say about it
+// -----------------------------------------------------------------------------------------------
 
 /// Length of every row's error: position or distance [m], and rotation [rad] where orientations are measured.
 struct ErrorLengths {
@@ -393,7 +429,8 @@ ErrorLengths error_lengths(const Job& job, const Evaluator& evaluator, const Eig
   if (poses) out.rotation.assign(job.data.rows, std::numeric_limits<float>::quiet_NaN());
   evaluator.residuals(values, [&](std::size_t row, const double* r) {
     out.position[row] = std::sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
-    if (components_of(job.data, row) == 6) out.rotation[row] = static_cast<float>(std::sqrt(r[3] * r[3] + r[4] * r[4] + r[5] * r[5]));
+    if (components_of(job.data, row) == 6)
+      out.rotation[row] = static_cast<float>(std::sqrt(r[3] * r[3] + r[4] * r[4] + r[5] * r[5]));
   });
   return out;
 }
@@ -421,12 +458,13 @@ struct Uncertainty {
   double rotation_noise = kNaN;
 };
 
-/// Covariance with positions and rotations each at the noise they show: H^-1 (s_p^2 H_p + s_r^2 H_r) H^-1; for positions alone, s^2 H^-1.
-/// With a robust loss the weighted rows stand for the rows: good to a few per cent.
+/// Covariance with positions and rotations each at the noise they show: H^-1 (s_p^2 H_p + s_r^2 H_r) H^-1; for
+/// positions alone, s^2 H^-1. With a robust loss the weighted rows stand for the rows: good to a few per cent.
 Uncertainty uncertainty(const Job& job, const Fit& found, bool poses) {
   Uncertainty out;
   const std::vector<std::int32_t> rows = without(job.rows, found.rejected);
-  const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, rows), found.fitted, job.options.threads);
+  const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, rows), found.fitted,
+                            job.options.threads);
   NormalEquations all;
   evaluator.normal_equations(found.values, found.weighing, &all);
   const Eigen::MatrixXd inverse = inverse_of(all.gram);
@@ -448,7 +486,8 @@ Uncertainty uncertainty(const Job& job, const Fit& found, bool poses) {
     const Eigen::MatrixXd rotation_gram = all.gram - position.gram;
     const double p_position = (inverse * position.gram).trace();  // parameters that the positions pay for
     sigma2 = position.squares / std::max(1.0, position_components - p_position);
-    const double sigma2_rotation = (all.squares - position.squares) / std::max(1.0, rotation_components - (p - p_position));
+    const double sigma2_rotation =
+        (all.squares - position.squares) / std::max(1.0, rotation_components - (p - p_position));
     out.covariance = inverse * (sigma2 * position.gram + sigma2_rotation * rotation_gram) * inverse;
     out.rotation_noise = std::sqrt(sigma2_rotation) / found.weighing.rotation_scale;
   }
@@ -458,9 +497,11 @@ Uncertainty uncertainty(const Job& job, const Fit& found, bool poses) {
     double position = 0.0, rotation = 0.0;
     for (const std::int32_t row : rows) {
       position += errors.position[row] * errors.position[row];
-      if (poses && std::isfinite(errors.rotation[row])) rotation += static_cast<double>(errors.rotation[row]) * static_cast<double>(errors.rotation[row]);
+      if (poses && std::isfinite(errors.rotation[row]))
+        rotation += static_cast<double>(errors.rotation[row]) * static_cast<double>(errors.rotation[row]);
     }
-    const double freedom = (position_components + rotation_components) / std::max(1.0, position_components + rotation_components - p);
+    const double freedom =
+        (position_components + rotation_components) / std::max(1.0, position_components + rotation_components - p);
     out.noise = std::sqrt(position / position_components * freedom);
     if (poses) out.rotation_noise = std::sqrt(rotation / rotation_components * freedom);
   }
@@ -472,7 +513,8 @@ Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
   return turn.angle() * turn.axis();
 }
 
-/// d(rotation vector) / d(small rotation about the parent's axes): inverse left Jacobian of SO(3), Sola et al. 2018, eq. (146).
+/// d(rotation vector) / d(small rotation about the parent's axes): inverse left Jacobian of SO(3), Sola et al. 2018,
+/// eq. (146).
 Eigen::Matrix3d inverse_left_jacobian(const Eigen::Vector3d& v) {
   Eigen::Matrix3d cross;
   cross << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
@@ -489,7 +531,8 @@ int orientation_axis(const ParameterInfo& info) {
 }
 
 /// The covariance of rotation vectors from that of the small rotations which were fitted.
-void report_orientation_covariance(const Model& model, const std::vector<int>& fitted, const Eigen::VectorXd& values, Eigen::MatrixXd* covariance) {
+void report_orientation_covariance(const Model& model, const std::vector<int>& fitted, const Eigen::VectorXd& values,
+                                   Eigen::MatrixXd* covariance) {
   Eigen::MatrixXd T = Eigen::MatrixXd::Identity(covariance->rows(), covariance->cols());
   for (std::size_t i = 0; i < fitted.size(); ++i) {
     const ParameterInfo& row = model.parameters[fitted[i]];
@@ -501,52 +544,67 @@ void report_orientation_covariance(const Model& model, const std::vector<int>& f
     for (std::size_t k = 0; k < fitted.size(); ++k) {
       const ParameterInfo& column = model.parameters[fitted[k]];
       if (orientation_axis(column) < 0 || column.name.substr(0, column.name.rfind('.')) != frame) continue;
-      T(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = j(orientation_axis(row), orientation_axis(column));
+      T(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+          j(orientation_axis(row), orientation_axis(column));
     }
   }
   *covariance = T * *covariance * T.transpose();
 }
 
-/// Orientation parameters as the user reads them: the rotation vector from the nominal to the found orientation, about the parent's axes.
-void report_orientations(const Robot& nominal, const Robot& found, const Model& model, Eigen::VectorXd* nominal_values, Eigen::VectorXd* values) {
+/// Orientation parameters as the user reads them: the rotation vector from the nominal to the found orientation, about
+/// the parent's axes.
+void report_orientations(const Robot& nominal, const Robot& found, const Model& model, Eigen::VectorXd* nominal_values,
+                         Eigen::VectorXd* values) {
   for (std::size_t k = 0; k < model.parameters.size(); ++k) {
     const ParameterInfo& info = model.parameters[k];
     const int axis = orientation_axis(info);
     if (axis < 0) continue;
     const auto frame = [&](const Robot& robot) {
-      return info.role == Role::base ? robot.T_measurement_base : info.role == Role::target ? robot.targets[info.owner].T_last_target
-                                                                                             : robot.joints[info.owner].T_parent_joint;
+      return info.role == Role::base     ? robot.T_measurement_base
+             : info.role == Role::target ? robot.targets[info.owner].T_last_target
+                                         : robot.joints[info.owner].T_parent_joint;
     };
     (*nominal_values)[static_cast<Eigen::Index>(k)] = 0.0;
-    (*values)[static_cast<Eigen::Index>(k)] = rotation_vector(frame(found).linear() * frame(nominal).linear().transpose())[axis];
+    (*values)[static_cast<Eigen::Index>(k)] =
+        rotation_vector(frame(found).linear() * frame(nominal).linear().transpose())[axis];
   }
 }
 
 std::vector<std::string> make_warnings(const Identification& result, std::size_t train_components, double spread) {
   std::vector<std::string> warnings;
-  const auto text = [](double v) { char buffer[32]; std::snprintf(buffer, sizeof buffer, "%.3g", v); return std::string(buffer); };
+  const auto text = [](double v) {
+    char buffer[32];
+    std::snprintf(buffer, sizeof buffer, "%.3g", v);
+    return std::string(buffer);
+  };
   if (spread > 0.0 && result.train.after.median > 0.02 * spread) {
-    warnings.push_back("what is left, " + text(1e3 * result.train.after.median) + " mm in the median, is " + text(100.0 * result.train.after.median / spread) +
+    warnings.push_back("what is left, " + text(1e3 * result.train.after.median) + " mm in the median, is " +
+                       text(100.0 * result.train.after.median / spread) +
                        " % of the measured range: is a joint column wrong (unit, sign, order), or the robot file?");
   }
   if (train_components < 3 * static_cast<std::size_t>(result.rank)) {
-    warnings.push_back("only " + count_of(train_components, "measured value") + " for " + count_of(static_cast<std::size_t>(result.rank), "parameter") +
+    warnings.push_back("only " + count_of(train_components, "measured value") + " for " +
+                       count_of(static_cast<std::size_t>(result.rank), "parameter") +
                        ": measure more poses or free fewer parameters");
   }
   if (!result.test) {
     warnings.push_back("no rows are held out: nothing says how good the result is on other poses");
-  } else if (result.test->after.rms > 1.5 * result.train.after.rms && result.test->after.median > 1.3 * result.train.after.median) {
-    warnings.push_back("held-out error " + text(1e3 * result.test->after.rms) + " mm against " + text(1e3 * result.train.after.rms) +
+  } else if (result.test->after.rms > 1.5 * result.train.after.rms &&
+             result.test->after.median > 1.3 * result.train.after.median) {
+    warnings.push_back("held-out error " + text(1e3 * result.test->after.rms) + " mm against " +
+                       text(1e3 * result.train.after.rms) +
                        " mm in training: the data cannot support this many parameters");
   }
   std::string weak;
   for (const Parameter& parameter : result.parameters) {
     if (!parameter.frozen && (parameter.unit == "m" || parameter.unit == "rad") && parameter.sigma > 0.01) {
-      weak += (weak.empty() ? "" : ", ") + parameter.name + " (" + text(1e3 * parameter.sigma) + (parameter.unit == "m" ? " mm)" : " mrad)");
+      weak += (weak.empty() ? "" : ", ") + parameter.name + " (" + text(1e3 * parameter.sigma) +
+              (parameter.unit == "m" ? " mm)" : " mrad)");
     }
   }
   if (!weak.empty()) warnings.push_back("barely seen, standard error in brackets: " + weak);
-  if (!result.rejected_rows.empty()) warnings.push_back(count_of(result.rejected_rows.size(), "training row") + " left out as gross outliers");
+  if (!result.rejected_rows.empty())
+    warnings.push_back(count_of(result.rejected_rows.size(), "training row") + " left out as gross outliers");
   return warnings;
 }
 
@@ -595,12 +653,16 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   std::vector<int> free = select_free(nominal_model, content, options);
   if (free.empty()) throw std::invalid_argument("nothing is free: name parameters to fit, or hold fewer");
   for (const auto& [name, bound] : options.bounds) find_parameters(nominal_model, {name});
-  if (options.frame_by == FrameBy::svd && (content.distance || content.poses || !content.frame || !nominal_model.point_names.empty())) {
-    throw std::invalid_argument("frame_by = svd needs measured positions only, no orientations, distances or fixed points");
+  if (options.frame_by == FrameBy::svd &&
+      (content.distance || content.poses || !content.frame || !nominal_model.point_names.empty())) {
+    throw std::invalid_argument(
+        "frame_by = svd needs measured positions only, no orientations, distances or fixed points");
   }
   std::size_t train_components = 0;
   for (const Segment& segment : train_segments) {
-    train_components += segment.rows.size() * (segment.kind == kernel::Kind::distance ? 1u : segment.kind == kernel::Kind::pose ? 6u : 3u);
+    train_components += segment.rows.size() * (segment.kind == kernel::Kind::distance ? 1u
+                                               : segment.kind == kernel::Kind::pose   ? 6u
+                                                                                      : 3u);
   }
 
   // Base, targets, anchor and fixed points first: they are always unknown.
@@ -627,21 +689,26 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   }
   Selection selection = select_observable(job, free, start.values);
   if (train_components <= selection.fitted.size()) {
-    throw std::invalid_argument(count_of(train_components, "measured value") + " in " + count_of(train.size(), "training row") + " cannot determine " +
-                                count_of(selection.fitted.size(), "parameter") + ": measure more poses, or free fewer parameters");
+    throw std::invalid_argument(count_of(train_components, "measured value") + " in " +
+                                count_of(train.size(), "training row") + " cannot determine " +
+                                count_of(selection.fitted.size(), "parameter") +
+                                ": measure more poses, or free fewer parameters");
   }
   if (scale_carrier >= 0) {
     const std::string& name = model.parameters[scale_carrier].name;
-    selection.frozen.push_back({name, {{name, 1.0}}, "touching fixed points shows no scale: this length, held at nominal, carries it"});
+    selection.frozen.push_back(
+        {name, {{name, 1.0}}, "touching fixed points shows no scale: this length, held at nominal, carries it"});
   }
 
   // The fit; gravity torques are taken from the robot as found until they no longer change.
   Fit found = fit(job, selection.fitted, start.values);
-  const bool gravity = std::any_of(model.terms.begin(), model.terms.end(), [](const Term& t) { return t.needs_gravity; });
+  const bool gravity =
+      std::any_of(model.terms.begin(), model.terms.end(), [](const Term& t) { return t.needs_gravity; });
   for (int round = 0; gravity && round < 5; ++round) {
     const Robot robot = robot_with(model, found.values);
     const Model found_model = make_model(robot, data, options.effects, options.own_effects);
-    if (found_model.terms.size() != model.terms.size()) break;  // a length that was none: the law stays with the drawing's
+    if (found_model.terms.size() != model.terms.size())
+      break;  // a length that was none: the law stays with the drawing's
     bases = make_bases(found_model, data);
     const Eigen::VectorXd before = found.values;
     found = fit(job, selection.fitted, before);
@@ -738,7 +805,8 @@ Residuals residuals(const Robot& robot, const Measurements& data, const std::vec
   const Job job{model, data, bases, options, rows};
   locate_points(model, job, &values);
   for (const std::int32_t row : rows) {
-    if (data.has_distance(row) && !robot.anchor) throw std::invalid_argument("distances were measured, but the robot has no anchor: identify it first");
+    if (data.has_distance(row) && !robot.anchor)
+      throw std::invalid_argument("distances were measured, but the robot has no anchor: identify it first");
   }
   const Evaluator evaluator(model, data, bases, make_segments(data, rows), {}, threads);
   Residuals out;

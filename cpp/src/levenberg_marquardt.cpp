@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// The palletizer method's iteration: H = J^T J + mu I, g = J^T l, eta <- eta + H^-1 g; mu / 10 after a step that lowers the rms,
-// mu * 10 after one that does not (and that step is taken back). Columns are scaled to unit length first: metres and radians
-// must not meet unscaled in one mu I. With mu = 0 it is the least-squares iteration of the differential error model,
-// dxi = (Psi^T Psi)^-1 Psi^T dP.
+// The palletizer method's iteration: H = J^T J + mu I, g = J^T l, eta <- eta + H^-1 g; mu / 10 after a step that lowers
+// the rms, mu * 10 after one that does not (and that step is taken back). Columns are scaled to unit length first:
+// metres and radians must not meet unscaled in one mu I. With mu = 0 it is the least-squares iteration of the
+// differential error model, dxi = (Psi^T Psi)^-1 Psi^T dP.
 
 #include <algorithm>
 #include <cmath>
@@ -19,11 +19,12 @@ namespace {
 
 constexpr double kLeastDamping = 1e-15;
 constexpr double kMostDamping = 1e12;
-constexpr double kRounding = 1e-13;  // a smaller predicted fall of the cost, relative to it, is lost in the sum's rounding
+constexpr double kRounding =
+    1e-13;  // a smaller predicted fall of the cost, relative to it, is lost in the sum's rounding
 
 struct Step {
   Eigen::VectorXd delta;
-  double predicted_fall = 0.0;  ///< of the cost r^T r
+  double predicted_fall = 0.0;   ///< of the cost r^T r
   double scaled_gradient = 0.0;  ///< largest entry, columns of unit length
 };
 
@@ -49,8 +50,8 @@ Eigen::VectorXd moved(const Eigen::VectorXd& values, const std::vector<int>& fre
 
 }  // namespace
 
-SolverSummary levenberg_marquardt(const Evaluator& problem, const Weighing& weighing, const IdentifyOptions& options, const Refit& refit,
-                                  Eigen::VectorXd* values) {
+SolverSummary levenberg_marquardt(const Evaluator& problem, const Weighing& weighing, const IdentifyOptions& options,
+                                  const Refit& refit, Eigen::VectorXd* values) {
   SolverSummary summary;
   summary.name = "lm";
   NormalEquations now, next;
@@ -88,7 +89,8 @@ SolverSummary levenberg_marquardt(const Evaluator& problem, const Weighing& weig
       if (fall >= 0.0 && fall <= options.rms_fall) return stop("fall of the rms below its bound", true);
     } else {
       // The step was taken back; nothing is lost when it promised no more than the bound.
-      const double promised = now.rms() - std::sqrt(std::max(0.0, now.cost - step.predicted_fall) / static_cast<double>(now.components));
+      const double promised =
+          now.rms() - std::sqrt(std::max(0.0, now.cost - step.predicted_fall) / static_cast<double>(now.components));
       if (promised <= options.rms_fall) return stop("predicted fall of the rms below its bound", true);
       if (options.undamped || mu >= kMostDamping) return stop("no step lowers the rms", false);
       mu *= 10.0;

@@ -14,9 +14,10 @@
 
 namespace truing::detail {
 
-Linearisation linearise(const Robot& frames, const Measurements& data, const std::vector<std::int32_t>& rows, double rotation_length, int threads) {
-  constexpr double kPrior = 1e-2;          // [rad | m]
-  constexpr double kCauchyMedians = 1.5;   // scale of the loss
+Linearisation linearise(const Robot& frames, const Measurements& data, const std::vector<std::int32_t>& rows,
+                        double rotation_length, int threads) {
+  constexpr double kPrior = 1e-2;         // [rad | m]
+  constexpr double kCauchyMedians = 1.5;  // scale of the loss
   constexpr int kRounds = 12;
   const Model model = make_model(frames, data);
   const std::vector<std::vector<double>> bases = make_bases(model, data);
@@ -26,7 +27,8 @@ Linearisation linearise(const Robot& frames, const Measurements& data, const std
   const Eigen::VectorXd start = initial_values(model);
   Eigen::VectorXd values = start;
   const auto p = static_cast<Eigen::Index>(free.size());
-  // Base and targets are near where they belong already; without a prior, what the data cannot see of them would wander.
+  // Base and targets are near where they belong already; without a prior, what the data cannot see of them would
+  // wander.
   const Eigen::VectorXd precision = Eigen::VectorXd::Constant(p, 1.0 / (kPrior * kPrior));
   Weighing weighing;
   weighing.rotation_scale = rotation_length;
@@ -44,7 +46,8 @@ Linearisation linearise(const Robot& frames, const Measurements& data, const std
     const double sigma2 = std::pow(weighing.loss_scale / kCauchyMedians, 2.0) / 3.0;
     evaluator.normal_equations(values, weighing, &normal);
     Eigen::VectorXd away(p);
-    for (Eigen::Index k = 0; k < p; ++k) away[k] = values[free[static_cast<std::size_t>(k)]] - start[free[static_cast<std::size_t>(k)]];
+    for (Eigen::Index k = 0; k < p; ++k)
+      away[k] = values[free[static_cast<std::size_t>(k)]] - start[free[static_cast<std::size_t>(k)]];
     Eigen::MatrixXd d = normal.gram / sigma2;
     for (Eigen::Index k = 0; k < p; ++k) d(k, k) += precision[k] + 1e-11 * d(k, k) + 1e-30;
     const Eigen::VectorXd step = -d.ldlt().solve(normal.gradient / sigma2 + precision.cwiseProduct(away));

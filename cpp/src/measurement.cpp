@@ -31,8 +31,7 @@ void require_finite(const Column& column, const std::string& name, std::size_t r
 void require_positive(const Column& column, const std::string& name, std::size_t rows) {
   require_finite(column, name, rows);
   for (std::size_t row = 0; column && row < rows; ++row) {
-    if (!(column[row] > 0.0))
-      refuse_row(row, name + " is " + number(column[row]) + ", expected more than zero");
+    if (!(column[row] > 0.0)) refuse_row(row, name + " is " + number(column[row]) + ", expected more than zero");
   }
 }
 
@@ -44,12 +43,11 @@ void require_not_negative(const Column& column, const std::string& name, std::si
 }
 
 template <class Number>
-void require_integers(const std::vector<Number>& values, const std::string& name, std::size_t rows,
-                      std::int64_t lowest, std::int64_t end, const std::string& expected) {
+void require_integers(const std::vector<Number>& values, const std::string& name, std::size_t rows, std::int64_t lowest,
+                      std::int64_t end, const std::string& expected) {
   if (values.empty()) return;
   if (values.size() != rows) {
-    refuse(name + " has " + std::to_string(values.size()) + " entries, there are " + std::to_string(rows) +
-           " rows");
+    refuse(name + " has " + std::to_string(values.size()) + " entries, there are " + std::to_string(rows) + " rows");
   }
   for (std::size_t row = 0; row < rows; ++row) {
     const auto value = static_cast<std::int64_t>(values[row]);
@@ -109,8 +107,7 @@ void require_joints(const Measurements& data, const Robot& robot) {
     for (std::size_t row = 0; row < data.rows; ++row) {
       const double value = data.direction[k][row];
       if (value != -1.0 && value != 0.0 && value != 1.0) {
-        refuse_row(row,
-                   "approach direction of joint " + name + " is " + number(value) + ", expected -1, 0 or 1");
+        refuse_row(row, "approach direction of joint " + name + " is " + number(value) + ", expected -1, 0 or 1");
       }
     }
   }
@@ -118,8 +115,7 @@ void require_joints(const Measurements& data, const Robot& robot) {
 
 void require_some_measurement(const Measurements& data) {
   for (std::size_t row = 0; row < data.rows; ++row) {
-    if (data.has_position(row) || data.has_orientation(row) || data.has_distance(row) ||
-        data.has_fixed_point(row))
+    if (data.has_position(row) || data.has_orientation(row) || data.has_distance(row) || data.has_fixed_point(row))
       continue;
     refuse_row(row, "nothing is measured: expected a position, a pose, a distance or a fixed point");
   }
@@ -146,8 +142,7 @@ std::vector<std::int32_t> numbered_groups(std::size_t rows, Hash hash, Equal equ
   std::vector<std::int32_t> group(rows);
   for (std::size_t row = 0; row < rows; ++row) {
     std::size_t slot = hash(row) & (slots - 1);
-    while (group_in_slot[slot] >= 0 &&
-           !equal(row, first_row[static_cast<std::size_t>(group_in_slot[slot])])) {
+    while (group_in_slot[slot] >= 0 && !equal(row, first_row[static_cast<std::size_t>(group_in_slot[slot])])) {
       slot = (slot + 1) & (slots - 1);
     }
     if (group_in_slot[slot] < 0) {
@@ -170,10 +165,9 @@ void validate(const Measurements& data, const Robot& robot, bool joints_only) {
   for (std::size_t row = 0; data.distance && row < data.rows; ++row) {
     if (std::isinf(data.distance[row])) refuse_row(row, "distance is infinite");
   }
-  require_integers(
-      data.fixed_point, "fixed_point", data.rows, -1,
-      static_cast<std::int64_t>(data.fixed_point_names.size()),
-      "-1 (none) or an index into the " + std::to_string(data.fixed_point_names.size()) + " fixed points");
+  require_integers(data.fixed_point, "fixed_point", data.rows, -1,
+                   static_cast<std::int64_t>(data.fixed_point_names.size()),
+                   "-1 (none) or an index into the " + std::to_string(data.fixed_point_names.size()) + " fixed points");
   const std::size_t targets =
       robot.targets.empty() ? 1 : robot.targets.size();  // none given: the last frame is the tool
   require_integers(data.target, "target", data.rows, 0, static_cast<std::int64_t>(targets),
@@ -186,7 +180,8 @@ void validate(const Measurements& data, const Robot& robot, bool joints_only) {
   require_positive(data.position_sigma, "position_sigma", data.rows);
   require_positive(data.rotation_sigma, "rotation_sigma", data.rows);
   if (data.rotation_sigma && !data.position_sigma) {
-    throw std::invalid_argument("rotation_sigma needs position_sigma beside it: rows are weighed by both or by neither");
+    throw std::invalid_argument(
+        "rotation_sigma needs position_sigma beside it: rows are weighed by both or by neither");
   }
   require_not_negative(data.weight, "weight", data.rows);
   if (!joints_only) require_some_measurement(data);
@@ -195,14 +190,10 @@ void validate(const Measurements& data, const Robot& robot, bool joints_only) {
 std::vector<std::int32_t> pose_groups(const Measurements& data) {
   if (!data.pose.empty()) {
     if (data.pose.size() != data.rows)
-      refuse("pose has " + std::to_string(data.pose.size()) + " entries, there are " +
-             std::to_string(data.rows) + " rows");
-    const auto hash = [&data](std::size_t row) {
-      return mixed(0, static_cast<std::uint32_t>(data.pose[row]));
-    };
-    const auto equal = [&data](std::size_t row, std::size_t other) {
-      return data.pose[row] == data.pose[other];
-    };
+      refuse("pose has " + std::to_string(data.pose.size()) + " entries, there are " + std::to_string(data.rows) +
+             " rows");
+    const auto hash = [&data](std::size_t row) { return mixed(0, static_cast<std::uint32_t>(data.pose[row])); };
+    const auto equal = [&data](std::size_t row, std::size_t other) { return data.pose[row] == data.pose[other]; };
     return numbered_groups(data.rows, hash, equal);
   }
   const auto hash = [&data](std::size_t row) {

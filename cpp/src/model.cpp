@@ -97,7 +97,8 @@ class Builder {
   Model& model_;
 };
 
-/// Everything that the motion of `joint` moves: its own site, and those of the joints that it drives, however indirectly.
+/// Everything that the motion of `joint` moves: its own site, and those of the joints that it drives, however
+/// indirectly.
 void add_moved_sites(const Robot& robot, const std::vector<int>& own_site, std::size_t joint, double weight,
                      std::vector<SiteWeight>* moved) {
   moved->push_back({own_site[joint], weight});
@@ -114,7 +115,8 @@ int coordinate_of(Model* model, const std::string& site) {
     if (model->robot.joints[k].name == site) return static_cast<int>(k);
   }
   const int parameter = model->parameter_index(site);
-  const bool is_site = parameter >= 0 && model->parameters[parameter].role != Role::offset && model->parameters[parameter].role != Role::ratio &&
+  const bool is_site = parameter >= 0 && model->parameters[parameter].role != Role::offset &&
+                       model->parameters[parameter].role != Role::ratio &&
                        model->parameters[parameter].columns.size() == 1;
   if (!is_site) {
     throw std::invalid_argument("effect site '" + site + "' does not exist; a site is a joint, a link value such as '" +
@@ -131,7 +133,8 @@ void add_request(Model* model, const EffectRequest& request, const Measurements&
   const int request_index = static_cast<int>(model->requests.size()) - 1;
   for (Term& term : effect_terms({request}, model->robot, data, own)) {
     int parameter = model->parameter_index(term.parameter);
-    if (parameter >= 0 && model->parameters[parameter].owner != request_index) continue;  // the robot has this effect already
+    if (parameter >= 0 && model->parameters[parameter].owner != request_index)
+      continue;  // the robot has this effect already
     const int index = static_cast<int>(model->terms.size());
     const int at = coordinate_of(model, term.site);
     model->coordinates[at].terms.push_back(index);
@@ -201,7 +204,8 @@ Model make_model(const Robot& robot, const Measurements& data, const std::vector
   model.common_sites = static_cast<int>(model.sites.size());
   for (std::size_t k = 0; k < model.robot.targets.size(); ++k) {
     model.target_first.push_back(static_cast<int>(model.sites.size()));
-    build.add_frame(model.robot.targets[k].name, model.robot.targets[k].T_last_target, Role::target, static_cast<int>(k));
+    build.add_frame(model.robot.targets[k].name, model.robot.targets[k].T_last_target, Role::target,
+                    static_cast<int>(k));
   }
   model.target_first.push_back(static_cast<int>(model.sites.size()));
 
@@ -246,22 +250,34 @@ Eigen::VectorXd initial_values(const Model& model) {
     const ParameterInfo& info = model.parameters[i];
     const std::string name = suffix(info.name);
     const int coordinate = frame_coordinate(name);
-    const auto translation = [&](const Eigen::Isometry3d& T) { return coordinate < 3 ? T.translation()[coordinate] : 0.0; };
+    const auto translation = [&](const Eigen::Isometry3d& T) {
+      return coordinate < 3 ? T.translation()[coordinate] : 0.0;
+    };
     double& value = values[static_cast<Eigen::Index>(i)];
     switch (info.role) {
-      case Role::base: value = translation(robot.T_measurement_base); break;
-      case Role::target: value = translation(robot.targets[info.owner].T_last_target); break;
+      case Role::base:
+        value = translation(robot.T_measurement_base);
+        break;
+      case Role::target:
+        value = translation(robot.targets[info.owner].T_last_target);
+        break;
       case Role::geometry: {
         Joint joint = robot.joints[info.owner];
-        value = robot.convention == Convention::urdf ? translation(joint.T_parent_joint) : *geometry_value(&joint, name);
+        value =
+            robot.convention == Convention::urdf ? translation(joint.T_parent_joint) : *geometry_value(&joint, name);
         break;
       }
-      case Role::offset: value = robot.joints[info.owner].offset; break;
-      case Role::ratio: value = robot.joints[info.owner].ratio; break;
+      case Role::offset:
+        value = robot.joints[info.owner].offset;
+        break;
+      case Role::ratio:
+        value = robot.joints[info.owner].ratio;
+        break;
       case Role::anchor:
         if (robot.anchor) value = info.axis == 3 ? robot.anchor->zero : robot.anchor->point[info.axis];
         break;
-      case Role::point: break;
+      case Role::point:
+        break;
       case Role::effect:
         for (const AppliedEffect& applied : robot.effects) {
           const auto found = applied.parameters.find(info.name);
@@ -287,8 +303,12 @@ Robot robot_with(const Model& model, const Eigen::VectorXd& values) {
     const double value = values[static_cast<Eigen::Index>(i)];
     const std::string name = suffix(info.name);
     switch (info.role) {
-      case Role::base: base[frame_coordinate(name)] = value; break;
-      case Role::target: targets[info.owner][frame_coordinate(name)] = value; break;
+      case Role::base:
+        base[frame_coordinate(name)] = value;
+        break;
+      case Role::target:
+        targets[info.owner][frame_coordinate(name)] = value;
+        break;
       case Role::geometry:
         if (robot.convention == Convention::urdf) {
           origins[info.owner][frame_coordinate(name)] = value;
@@ -296,13 +316,18 @@ Robot robot_with(const Model& model, const Eigen::VectorXd& values) {
           *geometry_value(&robot.joints[info.owner], name) = value;
         }
         break;
-      case Role::offset: robot.joints[info.owner].offset = value; break;
-      case Role::ratio: robot.joints[info.owner].ratio = value; break;
+      case Role::offset:
+        robot.joints[info.owner].offset = value;
+        break;
+      case Role::ratio:
+        robot.joints[info.owner].ratio = value;
+        break;
       case Role::anchor:
         (info.axis == 3 ? anchor.zero : anchor.point[info.axis]) = value;
         if (value != 0.0) anchored = true;
         break;
-      case Role::point: break;
+      case Role::point:
+        break;
       case Role::effect: {
         AppliedEffect& applied = robot.effects[info.owner];
         applied.parameters[info.name] = value;
@@ -311,7 +336,8 @@ Robot robot_with(const Model& model, const Eigen::VectorXd& values) {
           applied.parameters.insert(term.constants.begin(), term.constants.end());
           const std::string& joint = term.joint;  // not its site, which may belong to a neighbour
           if (joint.empty()) continue;
-          if (std::find(applied.joints.begin(), applied.joints.end(), joint) == applied.joints.end()) applied.joints.push_back(joint);
+          if (std::find(applied.joints.begin(), applied.joints.end(), joint) == applied.joints.end())
+            applied.joints.push_back(joint);
         }
         break;
       }
@@ -321,9 +347,11 @@ Robot robot_with(const Model& model, const Eigen::VectorXd& values) {
                                      [](const AppliedEffect& e) { return e.parameters.empty(); }),
                       robot.effects.end());
   robot.T_measurement_base = frame_with(model.robot.T_measurement_base, base);
-  for (std::size_t k = 0; k < targets.size(); ++k) robot.targets[k].T_last_target = frame_with(model.robot.targets[k].T_last_target, targets[k]);
+  for (std::size_t k = 0; k < targets.size(); ++k)
+    robot.targets[k].T_last_target = frame_with(model.robot.targets[k].T_last_target, targets[k]);
   if (robot.convention == Convention::urdf) {
-    for (std::size_t k = 0; k < origins.size(); ++k) robot.joints[k].T_parent_joint = frame_with(model.robot.joints[k].T_parent_joint, origins[k]);
+    for (std::size_t k = 0; k < origins.size(); ++k)
+      robot.joints[k].T_parent_joint = frame_with(model.robot.joints[k].T_parent_joint, origins[k]);
   }
   if (anchored) robot.anchor = anchor;
   return robot;
@@ -334,7 +362,8 @@ std::vector<bool> near_parallel(const Robot& robot, double angle) {
   if (robot.convention == Convention::urdf) return found;  // origins have all six freedoms already
   const double bound = std::sin(angle);
   for (std::size_t k = 0; k < robot.joints.size(); ++k) {
-    // DH: alpha_k turns axis k into axis k+1; modified DH: axis k-1 into axis k. What lies beyond the ends is base or tool.
+    // DH: alpha_k turns axis k into axis k+1; modified DH: axis k-1 into axis k. What lies beyond the ends is base or
+    // tool.
     const bool inner = robot.convention == Convention::dh ? k + 1 < robot.joints.size() : k > 0;
     found[k] = inner && std::abs(std::sin(robot.joints[k].alpha)) < bound;
   }

@@ -21,8 +21,8 @@ inline bool is_rotation(Motion m) { return m == Motion::rotate_x || m == Motion:
 /// One elementary transform of the chain.
 struct Site {
   Motion motion = Motion::fixed;
-  int parameter = -1;                                     ///< whose value it holds; -1: zero
-  Eigen::Matrix3d fixed = Eigen::Matrix3d::Identity();    ///< Motion::fixed only
+  int parameter = -1;                                   ///< whose value it holds; -1: zero
+  Eigen::Matrix3d fixed = Eigen::Matrix3d::Identity();  ///< Motion::fixed only
 };
 
 using SiteWeight = std::pair<int, double>;
@@ -40,30 +40,30 @@ struct ParameterInfo {
   std::string name;
   std::string unit;
   Role role;
-  int owner = -1;                  ///< joint, target or fixed-point index; effect: its request
+  int owner = -1;                   ///< joint, target or fixed-point index; effect: its request
   std::vector<ColumnTerm> columns;  ///< its Jacobian column is their sum
-  int axis = -1;                   ///< anchor, point: coordinate 0..2; 3: the wire's zero
-  bool rotation = false;           ///< an angle of the target's own orientation: positions cannot see it
+  int axis = -1;                    ///< anchor, point: coordinate 0..2; 3: the wire's zero
+  bool rotation = false;            ///< an angle of the target's own orientation: positions cannot see it
 };
 
 /// The drive: motion of joint k = ratio * reading + offset + terms, moving its own site and those of passive joints.
 struct Coordinate {
-  int reading = -1;                ///< driven joint's reading; -1: passive joint, or a term's own site
-  int ratio = -1, offset = -1;     ///< parameters; -1: none
-  std::vector<int> terms;          ///< terms that add to it
-  std::vector<SiteWeight> sites;   ///< what it moves
+  int reading = -1;               ///< driven joint's reading; -1: passive joint, or a term's own site
+  int ratio = -1, offset = -1;    ///< parameters; -1: none
+  std::vector<int> terms;         ///< terms that add to it
+  std::vector<SiteWeight> sites;  ///< what it moves
 };
 
 struct Model {
-  Robot robot;                                  ///< what it was made from
-  std::vector<Site> sites;                      ///< base, joints, then each target's
-  int common_sites = 0;                         ///< base and joints
-  std::vector<int> target_first;                ///< first site of each target; one more at the end
+  Robot robot;                    ///< what it was made from
+  std::vector<Site> sites;        ///< base, joints, then each target's
+  int common_sites = 0;           ///< base and joints
+  std::vector<int> target_first;  ///< first site of each target; one more at the end
   std::vector<ParameterInfo> parameters;
-  std::vector<Coordinate> coordinates;          ///< joints in chain order, then sites that terms act on directly
+  std::vector<Coordinate> coordinates;  ///< joints in chain order, then sites that terms act on directly
   std::vector<Term> terms;
-  std::vector<int> term_parameter;              ///< which parameter each term belongs to: several terms may share one
-  std::vector<EffectRequest> requests;          ///< effects in the robot, then those asked for
+  std::vector<int> term_parameter;      ///< which parameter each term belongs to: several terms may share one
+  std::vector<EffectRequest> requests;  ///< effects in the robot, then those asked for
   std::vector<std::string> point_names;
 
   int parameter_index(const std::string& name) const;  ///< -1: none of that name
@@ -79,13 +79,15 @@ Eigen::VectorXd initial_values(const Model& model);
 /// The robot with these parameter values.
 Robot robot_with(const Model& model, const Eigen::VectorXd& values);
 
-/// Joints whose axis is within `angle` of parallel to the next axis in the chain, where d cannot stand for the missing freedom.
+/// Joints whose axis is within `angle` of parallel to the next axis in the chain, where d cannot stand for the missing
+/// freedom.
 std::vector<bool> near_parallel(const Robot& robot, double angle);
 
 /// True when `name` matches the glob (`*`, `?`).
 bool matches(const std::string& glob, const std::string& name);
 
-/// Indices of the parameters that any of the names or globs mean; throws std::invalid_argument naming one that means none.
+/// Indices of the parameters that any of the names or globs mean; throws std::invalid_argument naming one that means
+/// none.
 std::vector<int> find_parameters(const Model& model, const std::vector<std::string>& globs);
 
 }  // namespace truing::detail

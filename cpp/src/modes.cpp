@@ -28,19 +28,24 @@ constexpr double kTwoPi = 6.283185307179586;
 constexpr double kLowest = 0.3, kHighest = 12.0;  // frequencies that are looked for [Hz]
 constexpr int kInputs = 3 * ModalModel::kMost;    // a mode and an axis of the plan's acceleration each
 constexpr int kColumns = 6 + kInputs;
-constexpr int kEvery = 3;                         // of the rows, one is predicted from
-// A gain is the share of the tip's acceleration that a mode feels: of the order of one. Slow motion does not tell modes apart, and without this
-// prior their gains would be huge and cancel each other, at these frequencies only.
+constexpr int kEvery = 3;  // of the rows, one is predicted from
+// A gain is the share of the tip's acceleration that a mode feels: of the order of one. Slow motion does not tell modes
+// apart, and without this prior their gains would be huge and cancel each other, at these frequencies only.
 constexpr double kGain = 0.5, kPredictionNoise = 2e-3;  // standard deviations [-], [m]
 
-struct Mode { double frequency, damping; };
+struct Mode {
+  double frequency, damping;
+};
 
-bool follows(const std::vector<DeviationRow>& rows, std::size_t k, double period) { return std::abs(rows[k + 1].t - rows[k].t - period) < 0.1 * period; }
+bool follows(const std::vector<DeviationRow>& rows, std::size_t k, double period) {
+  return std::abs(rows[k + 1].t - rows[k].t - period) < 0.1 * period;
+}
 
-// ---- A start: eigensystem realisation ----------------------------------------------------------------------------------------
+// ---- A start: eigensystem realisation
+// ----------------------------------------------------------------------------------------
 
-/// Poles of the autocovariance of the acceleration: for a structure that is shaken at random it decays as the structure does (James, Carne and
-/// Lauffer 1993); its Hankel matrices have the poles as in Juang and Pappa 1985, eqs. (12)-(20).
+/// Poles of the autocovariance of the acceleration: for a structure that is shaken at random it decays as the structure
+/// does (James, Carne and Lauffer 1993); its Hankel matrices have the poles as in Juang and Pappa 1985, eqs. (12)-(20).
 std::vector<Mode> realise(const std::vector<DeviationRow>& rows, double period, int most) {
   const auto every = std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(0.02 / period)));
   const double step = static_cast<double>(every) * period;
@@ -48,7 +53,8 @@ std::vector<Mode> realise(const std::vector<DeviationRow>& rows, double period, 
   std::vector<Vector3d> y;  // acceleration, NaN across gaps
   for (std::size_t k = 0; k + 2 * every < rows.size(); k += every) {
     const bool whole = std::abs(rows[k + 2 * every].t - rows[k].t - 2.0 * step) < 0.1 * period;
-    y.push_back(whole ? Vector3d((rows[k + 2 * every].rate - rows[k].rate).head<3>() / (2.0 * step)) : Vector3d::Constant(std::nan("")));
+    y.push_back(whole ? Vector3d((rows[k + 2 * every].rate - rows[k].rate).head<3>() / (2.0 * step))
+                      : Vector3d::Constant(std::nan("")));
   }
   std::vector<Matrix3d> covariance(static_cast<std::size_t>(2 * blocks + 1), Matrix3d::Zero());
   for (std::size_t lag = 0; lag < covariance.size(); ++lag) {
@@ -67,28 +73,32 @@ std::vector<Mode> realise(const std::vector<DeviationRow>& rows, double period, 
   const Eigen::BDCSVD<MatrixXd> svd(H0, Eigen::ComputeThinU | Eigen::ComputeThinV);
   const int order = 2 * most + 4;
   const VectorXd root = svd.singularValues().head(order).cwiseSqrt().cwiseInverse();
-  const MatrixXd A = root.asDiagonal() * svd.matrixU().leftCols(order).transpose() * H1 * svd.matrixV().leftCols(order) * root.asDiagonal();
+  const MatrixXd A = root.asDiagonal() * svd.matrixU().leftCols(order).transpose() * H1 *
+                     svd.matrixV().leftCols(order) * root.asDiagonal();
   std::vector<Mode> out;
   const Eigen::VectorXcd poles = A.eigenvalues();
   for (Eigen::Index k = 0; k < poles.size(); ++k) {
     if (poles[k].imag() <= 0.0) continue;
     const std::complex<double> s = std::log(poles[k]) / step;
     const double frequency = std::abs(s) / kTwoPi, damping = -s.real() / std::abs(s);
-    if (frequency > kLowest && frequency < kHighest && damping < 0.3) out.push_back({frequency, std::clamp(damping, 0.005, 0.1)});
+    if (frequency > kLowest && frequency < kHighest && damping < 0.3)
+      out.push_back({frequency, std::clamp(damping, 0.005, 0.1)});
   }
   return out;
 }
 
-// ---- Errors of predictions -----------------------------------------------------------------------------------------------------
+// ---- Errors of predictions
+// -----------------------------------------------------------------------------------------------------
 
 struct Fit {
-  double cost = 0.0;      // mean square of position errors [m^2]
-  VectorXd residuals;     // position only
+  double cost = 0.0;   // mean square of position errors [m^2]
+  VectorXd residuals;  // position only
   std::array<Eigen::Matrix<double, 6, 3>, ModalModel::kMost> gain;
 };
 
-/// Runs the model's filter over the rows with these modes. A state is linear in what was observed and in the gains, so it is carried in columns:
-/// six for the observations without any gain, and one for a unit gain of every mode and axis; the best gains are then linear least squares.
+/// Runs the model's filter over the rows with these modes. A state is linear in what was observed and in the gains, so
+/// it is carried in columns: six for the observations without any gain, and one for a unit gain of every mode and axis;
+/// the best gains are then linear least squares.
 Fit evaluate(const std::vector<DeviationRow>& rows, const std::vector<Mode>& modes, const DeviationOptions& options) {
   const int count = static_cast<int>(modes.size()), inputs = 3 * count;
   ModalModel model;
@@ -124,17 +134,24 @@ Fit evaluate(const std::vector<DeviationRow>& rows, const std::vector<Mode>& mod
     }
     for (int first = 0; first < 2; ++first) {
       ModalVector gain;
-      filter.observe(first, first == 0 ? options.position_noise * options.position_noise : options.velocity_noise * options.velocity_noise, &gain);
+      filter.observe(first,
+                     first == 0 ? options.position_noise * options.position_noise
+                                : options.velocity_noise * options.velocity_noise,
+                     &gain);
       Eigen::Matrix<double, 1, kColumns> observed = Eigen::Matrix<double, 1, kColumns>::Zero();
       observed.head<6>() = (first == 0 ? rows[i].deviation : rows[i].rate).transpose();
       X += gain * (observed - sum_of<kColumns>(X, first));
     }
-    if (++since < 100 || i % kEvery != 0 || std::abs(rows[i + ahead].t - rows[i].t - static_cast<double>(ahead) * options.period) > 0.1 * options.period) continue;
+    if (++since < 100 || i % kEvery != 0 ||
+        std::abs(rows[i + ahead].t - rows[i].t - static_cast<double>(ahead) * options.period) > 0.1 * options.period)
+      continue;
 
     ModalState<kColumns> Y = X;
     for (std::size_t n = 0; n < ahead; ++n) step_state<kColumns>(steps, filter.parts, forces_of(rows[i + n]), &Y);
-    const double h = static_cast<double>(ahead) * options.period;  // the deviation and its rate are the observed ones, the model adds the rest
-    Eigen::Matrix<double, 1, kColumns> error = displacement_of<kColumns>(X) + h * speed_of<kColumns>(X) - displacement_of<kColumns>(Y);
+    const double h = static_cast<double>(ahead) *
+                     options.period;  // the deviation and its rate are the observed ones, the model adds the rest
+    Eigen::Matrix<double, 1, kColumns> error =
+        displacement_of<kColumns>(X) + h * speed_of<kColumns>(X) - displacement_of<kColumns>(Y);
     error.head<6>() += (rows[i + ahead].deviation - rows[i].deviation - h * rows[i].rate).transpose();
     errors.push_back(error);
     gram += error.tail<kInputs>().transpose() * error.tail<kInputs>();
@@ -149,19 +166,23 @@ Fit evaluate(const std::vector<DeviationRow>& rows, const std::vector<Mode>& mod
   }
   fit.residuals.resize(static_cast<Eigen::Index>(3 * errors.size()));
   for (std::size_t n = 0; n < errors.size(); ++n) {
-    fit.residuals.segment<3>(static_cast<Eigen::Index>(3 * n)) = (errors[n].head<6>() + errors[n].tail<kInputs>() * solution).head<3>().transpose();
+    fit.residuals.segment<3>(static_cast<Eigen::Index>(3 * n)) =
+        (errors[n].head<6>() + errors[n].tail<kInputs>() * solution).head<3>().transpose();
   }
   fit.cost = errors.empty() ? 0.0 : fit.residuals.squaredNorm() / static_cast<double>(errors.size());
-  for (std::size_t k = 0; k < static_cast<std::size_t>(ModalModel::kMost); ++k) fit.gain[k] = solution.middleRows<3>(static_cast<Eigen::Index>(3 * k)).transpose();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(ModalModel::kMost); ++k)
+    fit.gain[k] = solution.middleRows<3>(static_cast<Eigen::Index>(3 * k)).transpose();
   return fit;
 }
 
 Mode moved(const Mode& mode, double log_frequency, double log_damping) {
-  return {std::clamp(mode.frequency * std::exp(log_frequency), 0.5 * kLowest, 1.5 * kHighest), std::clamp(mode.damping * std::exp(log_damping), 1e-3, 0.5)};
+  return {std::clamp(mode.frequency * std::exp(log_frequency), 0.5 * kLowest, 1.5 * kHighest),
+          std::clamp(mode.damping * std::exp(log_damping), 1e-3, 0.5)};
 }
 
 /// Levenberg-Marquardt over logarithms of frequencies and dampings, differences for derivatives.
-Fit refine(const std::vector<DeviationRow>& rows, const DeviationOptions& options, int iterations, std::vector<Mode>* modes, MatrixXd* information) {
+Fit refine(const std::vector<DeviationRow>& rows, const DeviationOptions& options, int iterations,
+           std::vector<Mode>* modes, MatrixXd* information) {
   const auto n = static_cast<Eigen::Index>(2 * modes->size());
   Fit fit = evaluate(rows, *modes, options);
   double damping = 1e-3;
@@ -170,7 +191,8 @@ Fit refine(const std::vector<DeviationRow>& rows, const DeviationOptions& option
     for (Eigen::Index k = 0; k < n; ++k) {
       std::vector<Mode> other = *modes;
       const double h = k % 2 == 0 ? 1e-3 : 2e-2;
-      other[static_cast<std::size_t>(k / 2)] = moved(other[static_cast<std::size_t>(k / 2)], k % 2 == 0 ? h : 0.0, k % 2 == 0 ? 0.0 : h);
+      other[static_cast<std::size_t>(k / 2)] =
+          moved(other[static_cast<std::size_t>(k / 2)], k % 2 == 0 ? h : 0.0, k % 2 == 0 ? 0.0 : h);
       J.col(k) = (evaluate(rows, other, options).residuals - fit.residuals) / h;
     }
     const MatrixXd JtJ = J.transpose() * J;
@@ -182,9 +204,11 @@ Fit refine(const std::vector<DeviationRow>& rows, const DeviationOptions& option
       MatrixXd A = JtJ;
       A.diagonal() *= 1.0 + damping;
       VectorXd step = -A.ldlt().solve(g);
-      for (Eigen::Index k = 0; k < n; ++k) step[k] = std::clamp(step[k], k % 2 == 0 ? -0.1 : -0.7, k % 2 == 0 ? 0.1 : 0.7);
+      for (Eigen::Index k = 0; k < n; ++k)
+        step[k] = std::clamp(step[k], k % 2 == 0 ? -0.1 : -0.7, k % 2 == 0 ? 0.1 : 0.7);
       std::vector<Mode> other = *modes;
-      for (Eigen::Index k = 0; k < n; k += 2) other[static_cast<std::size_t>(k / 2)] = moved(other[static_cast<std::size_t>(k / 2)], step[k], step[k + 1]);
+      for (Eigen::Index k = 0; k < n; k += 2)
+        other[static_cast<std::size_t>(k / 2)] = moved(other[static_cast<std::size_t>(k / 2)], step[k], step[k + 1]);
       Fit next = evaluate(rows, other, options);
       if (next.cost < fit.cost) {
         fall = 1.0 - next.cost / fit.cost;
@@ -203,8 +227,10 @@ Fit refine(const std::vector<DeviationRow>& rows, const DeviationOptions& option
 
 }  // namespace
 
-ModesResult identify_modes(const std::vector<DeviationRow>& rows, const DeviationOptions& options, int most, double worth) {
-  if (rows.size() < 500) throw std::invalid_argument("identify_modes: " + std::to_string(rows.size()) + " rows, at least 500 are needed");
+ModesResult identify_modes(const std::vector<DeviationRow>& rows, const DeviationOptions& options, int most,
+                           double worth) {
+  if (rows.size() < 500)
+    throw std::invalid_argument("identify_modes: " + std::to_string(rows.size()) + " rows, at least 500 are needed");
   most = std::clamp(most, 0, ModalModel::kMost);
   ModesResult out;
   out.rows = static_cast<double>(rows.size());
@@ -217,7 +243,10 @@ ModesResult identify_modes(const std::vector<DeviationRow>& rows, const Deviatio
     std::size_t best = candidates.size();
     Fit best_fit;
     for (std::size_t k = 0; k < candidates.size(); ++k) {
-      if (std::any_of(modes.begin(), modes.end(), [&](const Mode& mode) { return std::abs(std::log(mode.frequency / candidates[k].frequency)) < 0.15; })) continue;
+      if (std::any_of(modes.begin(), modes.end(), [&](const Mode& mode) {
+            return std::abs(std::log(mode.frequency / candidates[k].frequency)) < 0.15;
+          }))
+        continue;
       std::vector<Mode> other = modes;
       other.push_back(candidates[k]);
       Fit next = evaluate(rows, other, options);
@@ -248,18 +277,24 @@ ModesResult identify_modes(const std::vector<DeviationRow>& rows, const Deviatio
   out.model.count = static_cast<int>(modes.size());
   std::vector<std::size_t> order(modes.size());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return modes[a].frequency < modes[b].frequency; });
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return modes[a].frequency < modes[b].frequency; });
   // Predictions overlap: neighbouring residuals say the same, `overlap` of them count as one.
   const double overlap = std::max(1.0, 2.0 * options.horizon / options.period / kEvery);
-  const double variance = fit.residuals.size() > 0 ? fit.residuals.squaredNorm() / static_cast<double>(fit.residuals.size()) * overlap : 0.0;
+  const double variance = fit.residuals.size() > 0
+                              ? fit.residuals.squaredNorm() / static_cast<double>(fit.residuals.size()) * overlap
+                              : 0.0;
   MatrixXd covariance = MatrixXd::Zero(information.rows(), information.cols());
-  if (!modes.empty()) covariance = variance * information.ldlt().solve(MatrixXd::Identity(information.rows(), information.cols()));
+  if (!modes.empty())
+    covariance = variance * information.ldlt().solve(MatrixXd::Identity(information.rows(), information.cols()));
   for (std::size_t k = 0; k < modes.size(); ++k) {
     const std::size_t m = order[k];
     out.model.frequency[k] = modes[m].frequency;
     out.model.damping[k] = modes[m].damping;
     out.model.gain[k] = fit.gain[m];
-    out.model.frequency_sigma[k] = modes[m].frequency * std::sqrt(std::max(0.0, covariance(static_cast<Eigen::Index>(2 * m), static_cast<Eigen::Index>(2 * m))));
+    out.model.frequency_sigma[k] =
+        modes[m].frequency *
+        std::sqrt(std::max(0.0, covariance(static_cast<Eigen::Index>(2 * m), static_cast<Eigen::Index>(2 * m))));
   }
   return out;
 }

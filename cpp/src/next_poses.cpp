@@ -18,7 +18,8 @@ namespace {
 
 constexpr int kTried = 300;  ///< poses to choose from
 
-/// Poses drawn within the joints' ranges (their limits, else what the data cover), both directions, light and full payload.
+/// Poses drawn within the joints' ranges (their limits, else what the data cover), both directions, light and full
+/// payload.
 struct Drawn {
   Measurements data;
   std::shared_ptr<std::vector<std::vector<double>>> columns;
@@ -57,7 +58,8 @@ Drawn draw(const Robot& robot, const Measurements& measured, std::uint64_t seed)
     }
     out.data.joints.push_back(add([&, from = low, to = high] { return random.uniform(from, to); }));
   }
-  for (std::size_t k = 0; k < measured.direction.size(); ++k) out.data.direction.push_back(add([&] { return random.next() & 1u ? 1.0 : -1.0; }));
+  for (std::size_t k = 0; k < measured.direction.size(); ++k)
+    out.data.direction.push_back(add([&] { return random.next() & 1u ? 1.0 : -1.0; }));
   if (measured.payload) {
     const auto [low, high] = range(measured.payload);
     out.data.payload = add([&, from = low, to = std::max(high, low + 1.0)] { return random.next() & 1u ? to : from; });
@@ -80,8 +82,8 @@ Drawn draw(const Robot& robot, const Measurements& measured, std::uint64_t seed)
 
 }  // namespace
 
-std::vector<NextPose> next_poses(const Robot& robot, const Measurements& measured, const Rivals& rivals, const DiagnoseOptions& options, int count,
-                                 double noise_sigma) {
+std::vector<NextPose> next_poses(const Robot& robot, const Measurements& measured, const Rivals& rivals,
+                                 const DiagnoseOptions& options, int count, double noise_sigma) {
   Drawn drawn = draw(robot, measured, options.seed + 23);
   Measurements& data = drawn.data;
   Robot plain = robot;
@@ -91,7 +93,9 @@ std::vector<NextPose> next_poses(const Robot& robot, const Measurements& measure
 
   std::vector<EffectRequest> requests = rivals.first.requests;
   for (const EffectRequest& request : rivals.other.requests) {
-    const bool there = std::any_of(requests.begin(), requests.end(), [&](const EffectRequest& r) { return r.effect == request.effect && r.joints == request.joints; });
+    const bool there = std::any_of(requests.begin(), requests.end(), [&](const EffectRequest& r) {
+      return r.effect == request.effect && r.joints == request.joints;
+    });
     if (!there) requests.push_back(request);
   }
   std::vector<int> free;
@@ -106,7 +110,9 @@ std::vector<NextPose> next_poses(const Robot& robot, const Measurements& measure
   // The first one's motion of the tip, and all that could take it up: base, tool and the rival.
   for (std::size_t k = 0; k < model.parameters.size(); ++k) {
     const ParameterInfo& info = model.parameters[k];
-    const auto is_of = [&](const Rivals::Side& side) { return std::find(side.parameters.begin(), side.parameters.end(), info.name) != side.parameters.end(); };
+    const auto is_of = [&](const Rivals::Side& side) {
+      return std::find(side.parameters.begin(), side.parameters.end(), info.name) != side.parameters.end();
+    };
     const bool frame = info.role == Role::base || (info.role == Role::target && info.owner == 0 && !info.rotation);
     if (frame || is_of(rivals.first) || is_of(rivals.other)) free.push_back(static_cast<int>(k));
   }
@@ -114,13 +120,15 @@ std::vector<NextPose> next_poses(const Robot& robot, const Measurements& measure
   for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = static_cast<std::int32_t>(k);
   const Evaluator evaluator(model, data, bases, make_segments(data, rows), free, 1);
   const Eigen::VectorXd values = initial_values(model);
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> j(3 * kTried, static_cast<Eigen::Index>(free.size()));
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> j(3 * kTried,
+                                                                           static_cast<Eigen::Index>(free.size()));
   Eigen::VectorXd r(3 * kTried);
   int row = 0;
   Weighing plain_weighing;
   plain_weighing.row_weights = false;
   for (int tile = 0; tile < evaluator.tile_count(); ++tile) {
-    evaluator.tile(tile, values, plain_weighing, r.data() + 3 * row, j.data() + static_cast<std::ptrdiff_t>(3 * row) * j.cols());
+    evaluator.tile(tile, values, plain_weighing, r.data() + 3 * row,
+                   j.data() + static_cast<std::ptrdiff_t>(3 * row) * j.cols());
     row += evaluator.tile_rows(tile);
   }
   Eigen::VectorXd signal = Eigen::VectorXd::Zero(j.rows());
@@ -128,12 +136,15 @@ std::vector<NextPose> next_poses(const Robot& robot, const Measurements& measure
   for (std::size_t k = 0; k < free.size(); ++k) {
     const std::string& name = model.parameters[static_cast<std::size_t>(free[k])].name;
     const auto mine = rivals.parameters.find(name);
-    if (mine != rivals.parameters.end() && std::isfinite(mine->second)) signal += mine->second * j.col(static_cast<Eigen::Index>(k));
-    else others.push_back(static_cast<int>(k));
+    if (mine != rivals.parameters.end() && std::isfinite(mine->second))
+      signal += mine->second * j.col(static_cast<Eigen::Index>(k));
+    else
+      others.push_back(static_cast<int>(k));
   }
   Eigen::MatrixXd x(j.rows(), static_cast<Eigen::Index>(others.size()));
   for (Eigen::Index k = 0; k < x.cols(); ++k) x.col(k) = j.col(others[static_cast<std::size_t>(k)]);
-  const Eigen::VectorXd size = (x.colwise().squaredNorm() / static_cast<double>(x.rows())).cwiseSqrt().cwiseMax(1e-30).transpose();
+  const Eigen::VectorXd size =
+      (x.colwise().squaredNorm() / static_cast<double>(x.rows())).cwiseSqrt().cwiseMax(1e-30).transpose();
   for (Eigen::Index k = 0; k < x.cols(); ++k) x.col(k) /= size[k];
 
   // Greedy: the pose where the rival, fitted to the first on what is chosen already, still differs most from it.
@@ -162,9 +173,11 @@ std::vector<NextPose> next_poses(const Robot& robot, const Measurements& measure
     right += x.middleRows(3 * best, 3).transpose() * signal.segment<3>(3 * best);
     NextPose pose;
     for (const Column& column : data.joints) pose.joints.push_back(column[static_cast<std::size_t>(best)]);
-    for (const Column& column : data.direction) pose.direction.push_back(column[static_cast<std::size_t>(best)] > 0.0 ? 1 : -1);
+    for (const Column& column : data.direction)
+      pose.direction.push_back(column[static_cast<std::size_t>(best)] > 0.0 ? 1 : -1);
     if (data.payload) pose.payload = data.payload[static_cast<std::size_t>(best)];
-    pose.why = rivals.name + " and " + rivals.other_name + " differ here by " + number(1e3 * most, 2) + " mm, " + number(most / std::max(noise_sigma, 1e-12), 2) + " times the noise";
+    pose.why = rivals.name + " and " + rivals.other_name + " differ here by " + number(1e3 * most, 2) + " mm, " +
+               number(most / std::max(noise_sigma, 1e-12), 2) + " times the noise";
     out.push_back(std::move(pose));
   }
   return out;

@@ -24,13 +24,15 @@ Eigen::VectorXd unit_scales(const Eigen::MatrixXd& gram) {
 Rank find_rank(const Eigen::MatrixXd& gram, const std::vector<int>& priority, double tolerance) {
   const Eigen::Index n = gram.rows();
   const Eigen::VectorXd scale = unit_scales(gram);
-  Eigen::MatrixXd rest = scale.asDiagonal() * gram * scale.asDiagonal();  // Schur complement after the columns kept so far
+  Eigen::MatrixXd rest =
+      scale.asDiagonal() * gram * scale.asDiagonal();  // Schur complement after the columns kept so far
   std::vector<bool> done(static_cast<std::size_t>(n), false);
   std::vector<int> classes(priority);
   std::sort(classes.begin(), classes.end());
   classes.erase(std::unique(classes.begin(), classes.end()), classes.end());
-  // In passes, the clearly visible first: a column kept while it is hardly visible would spoil the digits of those after it. Within a
-  // pass the order of the columns decides, never their rounding: of two equal columns it is always the first that stays.
+  // In passes, the clearly visible first: a column kept while it is hardly visible would spoil the digits of those
+  // after it. Within a pass the order of the columns decides, never their rounding: of two equal columns it is always
+  // the first that stays.
   for (const int wanted : classes) {
     for (const double share : {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, tolerance}) {
       const double bound = std::max(share, tolerance) * std::max(share, tolerance);
@@ -48,12 +50,15 @@ Rank find_rank(const Eigen::MatrixXd& gram, const std::vector<int>& priority, do
   const auto frozen = static_cast<Eigen::Index>(rank.frozen.size());
   Eigen::MatrixXd inner(kept, kept), cross(kept, frozen);
   for (Eigen::Index j = 0; j < kept; ++j) {
-    for (Eigen::Index i = 0; i < kept; ++i) inner(i, j) = scale[rank.kept[i]] * gram(rank.kept[i], rank.kept[j]) * scale[rank.kept[j]];
+    for (Eigen::Index i = 0; i < kept; ++i)
+      inner(i, j) = scale[rank.kept[i]] * gram(rank.kept[i], rank.kept[j]) * scale[rank.kept[j]];
   }
   for (Eigen::Index j = 0; j < frozen; ++j) {
-    for (Eigen::Index i = 0; i < kept; ++i) cross(i, j) = scale[rank.kept[i]] * gram(rank.kept[i], rank.frozen[j]) * scale[rank.frozen[j]];
+    for (Eigen::Index i = 0; i < kept; ++i)
+      cross(i, j) = scale[rank.kept[i]] * gram(rank.kept[i], rank.frozen[j]) * scale[rank.frozen[j]];
   }
-  rank.combination = kept > 0 && frozen > 0 ? Eigen::MatrixXd(inner.ldlt().solve(cross)) : Eigen::MatrixXd::Zero(kept, frozen);
+  rank.combination =
+      kept > 0 && frozen > 0 ? Eigen::MatrixXd(inner.ldlt().solve(cross)) : Eigen::MatrixXd::Zero(kept, frozen);
   for (Eigen::Index j = 0; j < frozen; ++j) {
     for (Eigen::Index i = 0; i < kept; ++i) {
       // A unit column explained to one part in a million has its weights no better than that.

@@ -13,12 +13,14 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kNone = std::numeric_limits<double>::infinity();
-constexpr int kMostPlaces = 160;     // rolls times places of the rails
-constexpr int kSearchSeeds = 24;   // of robots without closed form, for each target
-constexpr double kGapCost = 1e6;   // so that the fewest gaps come first
+constexpr int kMostPlaces = 160;  // rolls times places of the rails
+constexpr int kSearchSeeds = 24;  // of robots without closed form, for each target
+constexpr double kGapCost = 1e6;  // so that the fewest gaps come first
 
 /// Samples of what is free: `places` of them over a closed interval, its middle if there is one.
-double sample_of(double low, double high, int place, int places) { return places == 1 ? 0.5 * (low + high) : low + (high - low) * place / (places - 1); }
+double sample_of(double low, double high, int place, int places) {
+  return places == 1 ? 0.5 * (low + high) : low + (high - low) * place / (places - 1);
+}
 
 }  // namespace
 
@@ -29,8 +31,10 @@ struct Reach::Node {
   std::int32_t before = -1;  ///< node of the target before
 };
 
-/// All branches over rolls and rails. They are those of the closed form: near enough to the robot's own to choose among.
-void Reach::sample(const Goal& goal, const double* seed, const PathOptions& how, EffectScratch* scratch, std::vector<Node>* nodes) const {
+/// All branches over rolls and rails. They are those of the closed form: near enough to the robot's own to choose
+/// among.
+void Reach::sample(const Goal& goal, const double* seed, const PathOptions& how, EffectScratch* scratch,
+                   std::vector<Node>* nodes) const {
   nodes->clear();
   Search search{goal, seed, scratch};
   const auto keep = [&](const double* readings) {
@@ -53,11 +57,14 @@ void Reach::sample(const Goal& goal, const double* seed, const PathOptions& how,
   int roll_places = rolls ? how.rolls : 1, rail_places = how.rail_places;
   const auto all_places = [&] { return roll_places * static_cast<int>(std::pow(rail_places, closed.rails())); };
   while (all_places() > kMostPlaces && (rail_places > 2 || roll_places > 6)) {
-    if (roll_places > 6 && (roll_places > 2 * rail_places || rail_places <= 2)) roll_places = std::max(6, roll_places - 2);
-    else --rail_places;
+    if (roll_places > 6 && (roll_places > 2 * rail_places || rail_places <= 2))
+      roll_places = std::max(6, roll_places - 2);
+    else
+      --rail_places;
   }
   // All around the last sample is one before the first.
-  const double roll_low = goal.rolls ? goal.roll.lower : -kPi, roll_high = goal.rolls ? goal.roll.upper : kPi - 2.0 * kPi / roll_places;
+  const double roll_low = goal.rolls ? goal.roll.lower : -kPi,
+               roll_high = goal.rolls ? goal.roll.upper : kPi - 2.0 * kPi / roll_places;
   double low[3], high[3];
   int places = 1;
   for (int k = 0; k < closed.rails(); ++k) {
@@ -69,9 +76,12 @@ void Reach::sample(const Goal& goal, const double* seed, const PathOptions& how,
   }
   for (int place = 0; place < places; ++place) {
     double rails[3] = {0.0, 0.0, 0.0};
-    for (int k = 0, rest = place; k < closed.rails(); ++k, rest /= rail_places) rails[k] = sample_of(low[k], high[k], rest % rail_places, rail_places);
+    for (int k = 0, rest = place; k < closed.rails(); ++k, rest /= rail_places)
+      rails[k] = sample_of(low[k], high[k], rest % rail_places, rail_places);
     for (int roll = 0; roll < roll_places; ++roll) {
-      const Goal pose = !torch ? goal : pose_at_roll(goal, rolls ? sample_of(roll_low, roll_high, roll, roll_places) : goal.wanted_roll);
+      const Goal pose =
+          !torch ? goal
+                 : pose_at_roll(goal, rolls ? sample_of(roll_low, roll_high, roll, roll_places) : goal.wanted_roll);
       Candidate found[ClosedForm::kMost];
       const int count = candidates(&search, pose, rails, closed.exact() ? kLimitRounding : kNearLimit, found);
       for (int i = 0; i < count; ++i) {
@@ -94,9 +104,10 @@ double Reach::step_cost(const double* from, const double* to, const PathOptions&
   return sum;
 }
 
-/// Every target but the ends towards the middle of its neighbours, as far as its task leaves it free (Gauss-Seidel on the sum
-/// of the squared steps).
-void Reach::even_out(const std::vector<Goal>& goals, const PathOptions& how, EffectScratch* scratch, std::vector<Joints>* joints) const {
+/// Every target but the ends towards the middle of its neighbours, as far as its task leaves it free (Gauss-Seidel on
+/// the sum of the squared steps).
+void Reach::even_out(const std::vector<Goal>& goals, const PathOptions& how, EffectScratch* scratch,
+                     std::vector<Joints>* joints) const {
   const auto cost = [&](const Joints& a, const Joints& b, const Joints& c) {
     return step_cost(a.data(), b.data(), how, kNone) + step_cost(b.data(), c.data(), how, kNone);
   };
@@ -119,8 +130,8 @@ void Reach::even_out(const std::vector<Goal>& goals, const PathOptions& how, Eff
   }
 }
 
-Path Reach::path(const std::vector<Goal>& goals, const double* seed, const PathOptions& how, EffectScratch* scratch, bool by_way,
-                 const std::function<bool(std::size_t)>& progress) const {
+Path Reach::path(const std::vector<Goal>& goals, const double* seed, const PathOptions& how, EffectScratch* scratch,
+                 bool by_way, const std::function<bool(std::size_t)>& progress) const {
   // Samples lie apart: where something is free, a chain may step from one to the next, and smoothing makes up for it.
   const bool redundant = !goals.empty() && (goals[0].kind != TaskKind::pose || driven() > 6);
   const double slack = redundant ? 2.0 : 1.2;
@@ -162,7 +173,8 @@ Path Reach::path(const std::vector<Goal>& goals, const double* seed, const PathO
     before_layer[k] = last_at;
     cheapest_first.resize(layers[k].size());
     std::iota(cheapest_first.begin(), cheapest_first.end(), std::size_t{0});
-    std::sort(cheapest_first.begin(), cheapest_first.end(), [&](std::size_t a, std::size_t b) { return layers[k][a].cost < layers[k][b].cost; });
+    std::sort(cheapest_first.begin(), cheapest_first.end(),
+              [&](std::size_t a, std::size_t b) { return layers[k][a].cost < layers[k][b].cost; });
     last = &layers[k];
     last_at = k;
   }
@@ -187,7 +199,9 @@ Path Reach::path(const std::vector<Goal>& goals, const double* seed, const PathO
   if (redundant) even_out(goals, how, scratch, &joints);
 
   for (std::size_t k = 0; k < goals.size(); ++k) {
-    const Joints from = joints[k].size() > 0 ? joints[k] : k > 0 && joints[k - 1].size() > 0 ? joints[k - 1] : Joints(Eigen::Map<const Eigen::VectorXd>(seed, driven()));
+    const Joints from = joints[k].size() > 0                ? joints[k]
+                        : k > 0 && joints[k - 1].size() > 0 ? joints[k - 1]
+                                                            : Joints(Eigen::Map<const Eigen::VectorXd>(seed, driven()));
     Search search{goals[k], from.data(), scratch};
     if (joints[k].size() == 0 || !check(&search, from.data(), &out.solutions[k])) {
       out.solutions[k] = solve(&search);

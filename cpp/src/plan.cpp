@@ -37,7 +37,8 @@ std::vector<Range> joint_ranges(const Robot& robot, double min_step, double min_
     Range range{std::isfinite(joint.lower) ? joint.lower : -M_PI, std::isfinite(joint.upper) ? joint.upper : M_PI,
                 revolute ? min_step : min_step_prismatic};
     if (range.upper - range.lower <= 2.0 * range.step) {
-      throw std::invalid_argument(std::string(who) + ": the range of joint " + joint.name + " is too small for steps of more than " + std::to_string(range.step) +
+      throw std::invalid_argument(std::string(who) + ": the range of joint " + joint.name +
+                                  " is too small for steps of more than " + std::to_string(range.step) +
                                   (revolute ? " rad" : " m") + " between any two neighbours: lower min_step");
     }
     ranges.push_back(range);
@@ -67,7 +68,8 @@ bool passive_joints_within(const Robot& robot, const Model& model, const Pose& p
 
 }  // namespace
 
-bool draw_pose(const Robot& robot, const Model& model, const std::vector<Range>& ranges, const Pose* before, const Pose* after, Random* random, Pose* out) {
+bool draw_pose(const Robot& robot, const Model& model, const std::vector<Range>& ranges, const Pose* before,
+               const Pose* after, Random* random, Pose* out) {
   for (int attempt = 0; attempt < kDraws; ++attempt) {
     bool found = true;
     for (std::size_t k = 0; k < ranges.size() && found; ++k) {
@@ -75,7 +77,9 @@ bool draw_pose(const Robot& robot, const Model& model, const std::vector<Range>&
       found = false;
       for (int draw = 0; draw < kDraws && !found; ++draw) {
         (*out)[i] = random->uniform(ranges[k].lower, ranges[k].upper);
-        const auto far_from = [&](const Pose* other) { return !other || std::abs((*out)[i] - (*other)[i]) > ranges[k].step; };
+        const auto far_from = [&](const Pose* other) {
+          return !other || std::abs((*out)[i] - (*other)[i]) > ranges[k].step;
+        };
         found = far_from(before) && far_from(after);
       }
     }
@@ -89,7 +93,8 @@ namespace {
 /// Poses as measurements of the robot itself: only their Jacobian is wanted, at errors of zero.
 class Poses {
  public:
-  Poses(const Robot& robot, const std::vector<Pose>& poses, bool orientation) : columns_(static_cast<std::size_t>(poses.empty() ? 0 : poses[0].size())) {
+  Poses(const Robot& robot, const std::vector<Pose>& poses, bool orientation)
+      : columns_(static_cast<std::size_t>(poses.empty() ? 0 : poses[0].size())) {
     data.rows = poses.size();
     for (std::size_t k = 0; k < columns_.size(); ++k) {
       for (const Pose& pose : poses) columns_[k].push_back(pose[static_cast<Eigen::Index>(k)]);
@@ -125,7 +130,8 @@ Weighing weighing_of(const PlanOptions& options) {
 }
 
 /// Unit-weight Jacobian of every pose, shape (rows of a pose, parameters).
-std::vector<Eigen::MatrixXd> jacobians(const Model& model, const std::vector<int>& free, const std::vector<Pose>& poses, const PlanOptions& options) {
+std::vector<Eigen::MatrixXd> jacobians(const Model& model, const std::vector<int>& free, const std::vector<Pose>& poses,
+                                       const PlanOptions& options) {
   const Poses measured(model.robot, poses, options.orientation);
   const std::vector<std::vector<double>> bases = make_bases(model, measured.data);
   const Evaluator evaluator(model, measured.data, bases, make_segments(measured.data, measured.rows()), free, 1);
@@ -134,7 +140,8 @@ std::vector<Eigen::MatrixXd> jacobians(const Model& model, const std::vector<int
   for (int tile = 0; tile < evaluator.tile_count(); ++tile) {
     const int m = evaluator.tile_components(tile);
     Eigen::VectorXd r(evaluator.tile_rows(tile) * m);
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> j(r.size(), static_cast<Eigen::Index>(free.size()));
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> j(r.size(),
+                                                                             static_cast<Eigen::Index>(free.size()));
     evaluator.tile(tile, values, weighing_of(options), r.data(), j.data());
     for (int k = 0; k < evaluator.tile_rows(tile); ++k) out.push_back(j.middleRows(k * m, m));
   }
@@ -148,13 +155,18 @@ double index_of(const Eigen::MatrixXd& information, Observability kind) {
     if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
     return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
   }
-  const Eigen::VectorXd eigen = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(information, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::VectorXd eigen =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(information, Eigen::EigenvaluesOnly).eigenvalues();
   const double least = std::max(eigen.minCoeff(), 0.0), most = eigen.maxCoeff();
   switch (kind) {
-    case Observability::a_optimal: return least > 0.0 ? -eigen.cwiseInverse().sum() : -std::numeric_limits<double>::infinity();
-    case Observability::e_optimal: return std::sqrt(least);
-    case Observability::inverse_condition: return std::sqrt(least / most);
-    default: return least / std::sqrt(most);  // noise amplification
+    case Observability::a_optimal:
+      return least > 0.0 ? -eigen.cwiseInverse().sum() : -std::numeric_limits<double>::infinity();
+    case Observability::e_optimal:
+      return std::sqrt(least);
+    case Observability::inverse_condition:
+      return std::sqrt(least / most);
+    default:
+      return least / std::sqrt(most);  // noise amplification
   }
 }
 
@@ -168,7 +180,8 @@ bool PlanOptions::is_valid(std::string* error) const {
   };
   if (poses < 3) return fail("poses must be at least 3");
   if (!(min_step >= 0.0) || !(min_step_prismatic >= 0.0)) return fail("min_step must not be negative");
-  if (!(position_sigma > 0.0) || !(rotation_sigma > 0.0)) return fail("position_sigma and rotation_sigma must be positive");
+  if (!(position_sigma > 0.0) || !(rotation_sigma > 0.0))
+    return fail("position_sigma and rotation_sigma must be positive");
   if (sweeps < 0 || proposals < 1) return fail("sweeps must not be negative, proposals at least 1");
   return true;
 }
@@ -190,7 +203,8 @@ PlanResult plan(const Robot& robot, const PlanOptions& options) {
   const Model bare = make_model(robot, Measurements{});
   while (static_cast<int>(sample.size()) < kRankPoses) {
     Pose pose(n_joints);
-    if (!draw_pose(robot, bare, ranges, nullptr, nullptr, &random, &pose)) throw std::invalid_argument("plan: no pose is within the limits of the passive joints");
+    if (!draw_pose(robot, bare, ranges, nullptr, nullptr, &random, &pose))
+      throw std::invalid_argument("plan: no pose is within the limits of the passive joints");
     sample.push_back(pose);
   }
   const Poses measured(robot, sample, options.orientation);
@@ -204,12 +218,14 @@ PlanResult plan(const Robot& robot, const PlanOptions& options) {
   evaluator.normal_equations(initial_values(model), weighing_of(options), &normal);
   std::vector<int> priority;
   for (const int k : free) priority.push_back(priority_of(model.parameters[k].role));
-  const Selection selection = observable(model, free, find_rank(normal.gram, priority, identify_options.rank_tolerance));
+  const Selection selection =
+      observable(model, free, find_rank(normal.gram, priority, identify_options.rank_tolerance));
   const auto p = static_cast<Eigen::Index>(selection.fitted.size());
   const int rows_per_pose = options.orientation ? 6 : 3;
   if (options.poses * rows_per_pose <= p) {
-    throw std::invalid_argument("plan: " + std::to_string(options.poses) + " poses give " + std::to_string(options.poses * rows_per_pose) +
-                                " values for " + std::to_string(p) + " parameters: ask for more poses");
+    throw std::invalid_argument("plan: " + std::to_string(options.poses) + " poses give " +
+                                std::to_string(options.poses * rows_per_pose) + " values for " + std::to_string(p) +
+                                " parameters: ask for more poses");
   }
 
   // A random plan that keeps the rule between neighbours.
@@ -217,15 +233,19 @@ PlanResult plan(const Robot& robot, const PlanOptions& options) {
   for (int k = 0; k < options.poses; ++k) {
     Pose pose(n_joints);
     if (!draw_pose(robot, model, ranges, k ? &poses.back() : nullptr, nullptr, &random, &pose)) {
-      throw std::invalid_argument("plan: no pose is further than min_step from its neighbour in every joint: lower min_step");
+      throw std::invalid_argument(
+          "plan: no pose is further than min_step from its neighbour in every joint: lower min_step");
     }
     poses.push_back(pose);
   }
   std::vector<Eigen::MatrixXd> rows = jacobians(model, selection.fitted, poses, options);
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(p, p);
   for (const Eigen::MatrixXd& j : rows) information.noalias() += j.transpose() * j;
-  const Eigen::VectorXd unit = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();  // parameters in units of what one plan sees
-  const auto scaled = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd { return unit.asDiagonal() * m * unit.asDiagonal(); };
+  const Eigen::VectorXd unit =
+      information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();  // parameters in units of what one plan sees
+  const auto scaled = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
+    return unit.asDiagonal() * m * unit.asDiagonal();
+  };
 
   // Exchange (Fedorov 1972): each pose in turn gives way to the proposal that raises the index most.
   PlanResult result;
@@ -237,7 +257,9 @@ PlanResult plan(const Robot& robot, const PlanOptions& options) {
       std::vector<Pose> proposals;
       for (int c = 0; c < options.proposals; ++c) {
         Pose pose(n_joints);
-        if (draw_pose(robot, model, ranges, k ? &poses[k - 1] : nullptr, k + 1 < options.poses ? &poses[k + 1] : nullptr, &random, &pose)) proposals.push_back(pose);
+        if (draw_pose(robot, model, ranges, k ? &poses[k - 1] : nullptr,
+                      k + 1 < options.poses ? &poses[k + 1] : nullptr, &random, &pose))
+          proposals.push_back(pose);
       }
       if (proposals.empty()) continue;
       const std::vector<Eigen::MatrixXd> candidates = jacobians(model, selection.fitted, proposals, options);
@@ -267,7 +289,8 @@ PlanResult plan(const Robot& robot, const PlanOptions& options) {
   for (Eigen::Index k = 0; k < p; ++k) {
     const int parameter = selection.fitted[static_cast<std::size_t>(k)];
     const ParameterInfo& info = model.parameters[parameter];
-    result.parameters.push_back({info.name, values[parameter], values[parameter], std::sqrt(covariance(k, k)), info.unit, false});
+    result.parameters.push_back(
+        {info.name, values[parameter], values[parameter], std::sqrt(covariance(k, k)), info.unit, false});
   }
   result.frozen = selection.frozen;
   return result;

@@ -29,10 +29,11 @@ namespace {
 const char* const kColumns[4] = {"dir", "payload", "temp", "t"};
 /// A column of which less is left (of its square) cannot be seen.
 constexpr double kInvisible = 1e-9;
-/// Unit columns that add less than this to those before them are left out: of base, tool and geometry; of a rival, which would
-/// need to be absurdly large.
+/// Unit columns that add less than this to those before them are left out: of base, tool and geometry; of a rival,
+/// which would need to be absurdly large.
 constexpr double kSameColumn = 1e-8, kSameRival = 1e-4;
-/// Pairs to be told apart get poses until less than this is shared: the size needed is then three times what it takes to be seen.
+/// Pairs to be told apart get poses until less than this is shared: the size needed is then three times what it takes
+/// to be seen.
 constexpr double kGoal = 0.9;
 /// A pose that tells less than this share of an effect does not tell.
 constexpr double kTellsNothing = 1e-6;
@@ -50,14 +51,17 @@ struct Planned {
   double payload = 0.0, temperature = 0.0, time = 0.0;
 };
 
-struct Recorded { bool direction = false, payload = false, temperature = false, time = false; };
+struct Recorded {
+  bool direction = false, payload = false, temperature = false, time = false;
+};
 
 Recorded recorded(const DistinguishOptions& options) {
   Recorded out;
   bool* const flags[4] = {&out.direction, &out.payload, &out.temperature, &out.time};
   for (const std::string& name : options.columns) {
     const auto found = std::find(std::begin(kColumns), std::end(kColumns), name);
-    if (found == std::end(kColumns)) throw std::invalid_argument("distinguish: column '" + name + "' does not exist; there are dir, payload, temp, t");
+    if (found == std::end(kColumns))
+      throw std::invalid_argument("distinguish: column '" + name + "' does not exist; there are dir, payload, temp, t");
     *flags[found - std::begin(kColumns)] = true;
   }
   return out;
@@ -76,8 +80,10 @@ class Measured {
       for (const Planned& pose : poses) columns_.back().push_back(value(pose));
       return Column{columns_.back().data(), 1};
     };
-    for (std::size_t k = 0; k < driven; ++k) data.joints.push_back(add([k](const Planned& p) { return p.joints[static_cast<Index>(k)]; }));
-    for (std::size_t k = 0; k < driven; ++k) data.direction.push_back(add([k](const Planned& p) { return p.direction[k]; }));
+    for (std::size_t k = 0; k < driven; ++k)
+      data.joints.push_back(add([k](const Planned& p) { return p.joints[static_cast<Index>(k)]; }));
+    for (std::size_t k = 0; k < driven; ++k)
+      data.direction.push_back(add([k](const Planned& p) { return p.direction[k]; }));
     if (with.payload) data.payload = add([](const Planned& p) { return p.payload; });
     if (with.temperature) data.temperature = add([](const Planned& p) { return p.temperature; });
     if (with.time) data.time = add([](const Planned& p) { return p.time; });
@@ -85,7 +91,8 @@ class Measured {
     plain.effects.clear();
     predicted_ = predict(plain, data, {}, 1);
     for (std::size_t k = 0; k < 3; ++k) data.position[k] = {predicted_.position.data() + k, 3};
-    for (std::size_t k = 0; k < 4 && options.orientation; ++k) data.orientation[k] = {predicted_.orientation.data() + k, 4};
+    for (std::size_t k = 0; k < 4 && options.orientation; ++k)
+      data.orientation[k] = {predicted_.orientation.data() + k, 4};
   }
   Measured(const Measured&) = delete;
   Measured& operator=(const Measured&) = delete;
@@ -106,7 +113,8 @@ struct Group {
 
 bool is_named(const std::vector<EffectRequest>& requests, const Group& group) {
   return std::any_of(requests.begin(), requests.end(), [&](const EffectRequest& r) {
-    return r.effect == group.effect && (r.joints.empty() || std::find(r.joints.begin(), r.joints.end(), group.joint) != r.joints.end());
+    return r.effect == group.effect &&
+           (r.joints.empty() || std::find(r.joints.begin(), r.joints.end(), group.joint) != r.joints.end());
   });
 }
 
@@ -114,23 +122,29 @@ bool is_named(const std::vector<EffectRequest>& requests, const Group& group) {
 void check(const Robot& robot, const std::vector<EffectRequest>& separate, const Measurements& data) {
   for (const EffectRequest& request : separate) {
     const Effect& effect = find_effect(request.effect);
-    if (effect.name == "base_frame" || effect.name == "tool_frame") throw std::invalid_argument("distinguish: " + effect.name + " is fitted in any case, and what it explains is told from nothing");
+    if (effect.name == "base_frame" || effect.name == "tool_frame")
+      throw std::invalid_argument("distinguish: " + effect.name +
+                                  " is fitted in any case, and what it explains is told from nothing");
     if (effect.name == "transmission_error") effect.terms(robot, 0, data);  // throws: the name lacks the order
-    if (!effect.per_joint && !request.joints.empty()) throw std::invalid_argument("distinguish: effect '" + effect.name + "' belongs to the robot as a whole and takes no joints");
+    if (!effect.per_joint && !request.joints.empty())
+      throw std::invalid_argument("distinguish: effect '" + effect.name +
+                                  "' belongs to the robot as a whole and takes no joints");
     for (const std::string& joint : request.joints) {
       try {
         effect.terms(robot, robot.joint_index(joint), data);
       } catch (const Unsuited&) {
         throw;
       } catch (const std::invalid_argument&) {
-        robot.joint_index(joint);  // throws again if it is the joint that does not exist; a column that is missing is said in the result
+        robot.joint_index(joint);  // throws again if it is the joint that does not exist; a column that is missing is
+                                   // said in the result
       }
     }
   }
 }
 
 /// Every effect at every joint that these inputs can show, and why not the others.
-std::vector<Group> find_groups(const Robot& robot, const Measurements& data, const std::vector<EffectRequest>& separate, std::vector<NotTestable>* not_testable) {
+std::vector<Group> find_groups(const Robot& robot, const Measurements& data, const std::vector<EffectRequest>& separate,
+                               std::vector<NotTestable>* not_testable) {
   std::vector<Group> groups;
   const Model plain = make_model(robot, data);
   const std::vector<bool> parallel = near_parallel(robot, IdentifyOptions().hayati_angle);
@@ -155,7 +169,8 @@ std::vector<Group> find_groups(const Robot& robot, const Measurements& data, con
       if (weights_missing) group.requests.push_back({"gravity_moment", joints});
       if (!weights_missing || data.payload) group.requests.push_back({effect.name, joints});
       for (const Term& term : effect_terms(group.requests, robot, data)) {
-        if (std::find(group.parameters.begin(), group.parameters.end(), term.parameter) == group.parameters.end()) group.parameters.push_back(term.parameter);
+        if (std::find(group.parameters.begin(), group.parameters.end(), term.parameter) == group.parameters.end())
+          group.parameters.push_back(term.parameter);
       }
     }
     if (!group.parameters.empty()) groups.push_back(std::move(group));
@@ -163,13 +178,16 @@ std::vector<Group> find_groups(const Robot& robot, const Measurements& data, con
 
   std::vector<const Effect*> effects;
   for (const Effect& effect : catalogue()) {
-    const bool named = std::any_of(separate.begin(), separate.end(), [&](const EffectRequest& r) { return r.effect == effect.name; });
-    const bool special = effect.name == "base_frame" || effect.name == "tool_frame" || effect.name == "gravity_moment" || effect.name == "transmission_error";
+    const bool named =
+        std::any_of(separate.begin(), separate.end(), [&](const EffectRequest& r) { return r.effect == effect.name; });
+    const bool special = effect.name == "base_frame" || effect.name == "tool_frame" ||
+                         effect.name == "gravity_moment" || effect.name == "transmission_error";
     if (named || !special) effects.push_back(&effect);
   }
   for (const EffectRequest& request : separate) {  // transmission_error@96
     const Effect& effect = find_effect(request.effect);
-    if (std::none_of(effects.begin(), effects.end(), [&](const Effect* e) { return e->name == effect.name; })) effects.push_back(&effect);
+    if (std::none_of(effects.begin(), effects.end(), [&](const Effect* e) { return e->name == effect.name; }))
+      effects.push_back(&effect);
   }
   for (const Effect* effect : effects) {
     if (!effect->per_joint) {
@@ -215,7 +233,8 @@ struct Columns {
 };
 
 /// `carrying` (null: none) becomes the robot with the effects at zero: it remembers mean temperatures and knots.
-Columns make_columns(const Robot& robot, const std::vector<Planned>& poses, const std::vector<EffectRequest>& requests, const DistinguishOptions& options, Robot* carrying) {
+Columns make_columns(const Robot& robot, const std::vector<Planned>& poses, const std::vector<EffectRequest>& requests,
+                     const DistinguishOptions& options, Robot* carrying) {
   const Measured measured(robot, poses, options);
   const Model model = make_model(robot, measured.data, requests);
   const std::vector<bool> parallel = near_parallel(robot, IdentifyOptions().hayati_angle);
@@ -225,7 +244,8 @@ Columns make_columns(const Robot& robot, const std::vector<Planned>& poses, cons
   for (std::size_t k = 0; k < model.parameters.size(); ++k) {
     const ParameterInfo& info = model.parameters[k];
     const auto owner = static_cast<std::size_t>(std::max(info.owner, 0));
-    const bool beta = info.role == Role::geometry && info.name.size() > 5 && info.name.compare(info.name.size() - 5, 5, ".beta") == 0;
+    const bool beta =
+        info.role == Role::geometry && info.name.size() > 5 && info.name.compare(info.name.size() - 5, 5, ".beta") == 0;
     if (info.role == Role::anchor || info.role == Role::point) continue;
     if (info.role == Role::target && (info.owner != 0 || (info.rotation && !options.orientation))) continue;
     if (beta && !parallel[owner] && robot.joints[owner].beta == 0.0) continue;
@@ -300,8 +320,8 @@ struct Seen {
 struct View {
   Columns columns;
   std::vector<Index> base, tool, geometry;
-  MatrixXd frames, all;        ///< bases of what base and tool span, and of that with all geometry
-  std::vector<Seen> seen;      ///< parallel to the groups
+  MatrixXd frames, all;    ///< bases of what base and tool span, and of that with all geometry
+  std::vector<Seen> seen;  ///< parallel to the groups
   double values = 0.0;
 
   double r2(std::size_t a, std::size_t b) const {
@@ -309,15 +329,19 @@ struct View {
     return all_of_it > 0.0 ? std::min(1.0, (seen[b].basis.transpose() * seen[a].left).squaredNorm() / all_of_it) : 0.0;
   }
   /// What is left of a parameter's square beyond base, tool and the rival.
-  double visible_beside(std::size_t rival, Index column) const { return beyond(seen[rival].basis, beyond(frames, columns.x.col(column))).squaredNorm(); }
+  double visible_beside(std::size_t rival, Index column) const {
+    return beyond(seen[rival].basis, beyond(frames, columns.x.col(column))).squaredNorm();
+  }
 };
 
-View look(const Robot& robot, const std::vector<Planned>& poses, const std::vector<Group>& groups, const DistinguishOptions& options, Robot* carrying) {
+View look(const Robot& robot, const std::vector<Planned>& poses, const std::vector<Group>& groups,
+          const DistinguishOptions& options, Robot* carrying) {
   std::vector<EffectRequest> requests;
   std::set<std::pair<std::string, std::string>> asked;
   for (const Group& group : groups) {
     for (const EffectRequest& request : group.requests) {
-      if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second) requests.push_back(request);
+      if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second)
+        requests.push_back(request);
     }
   }
   View out;
@@ -340,7 +364,8 @@ View look(const Robot& robot, const std::vector<Planned>& poses, const std::vect
     }
     seen.left = beyond(out.frames, unit_columns(chosen(x, seen.columns)));
     for (Index k = 0; k < seen.left.cols(); ++k) {
-      if (seen.left.col(k).squaredNorm() < kInvisible) seen.left.col(k).setZero();  // rounding explains nothing, and is explained by anything
+      if (seen.left.col(k).squaredNorm() < kInvisible)
+        seen.left.col(k).setZero();  // rounding explains nothing, and is explained by anything
     }
     seen.basis = orthonormal(seen.left, kSameRival);
     out.seen.push_back(std::move(seen));
@@ -351,29 +376,34 @@ View look(const Robot& robot, const std::vector<Planned>& poses, const std::vect
 /// Standard errors that diagnose would ask of an effect with so many parameters, out of so many effects.
 double standard_errors(const View& view, std::size_t group, std::size_t groups) {
   const auto parameters = static_cast<std::size_t>(std::max<Index>(1, view.seen[group].basis.cols()));
-  return std::sqrt(2.0 * detection_nats(SearchOptions().threshold, std::log(static_cast<double>(groups)), parameters, view.values));
+  return std::sqrt(
+      2.0 * detection_nats(SearchOptions().threshold, std::log(static_cast<double>(groups)), parameters, view.values));
 }
 
 /// Rms motion of the tip by a parameter of one.
 double at_tip(const View& view, Index column, double position_sigma) {
   double sum = 0.0;
   const Index poses = view.columns.x.rows() / view.columns.per_pose;
-  for (Index k = 0; k < poses; ++k) sum += view.columns.x.col(column).segment<3>(k * view.columns.per_pose).squaredNorm();
+  for (Index k = 0; k < poses; ++k)
+    sum += view.columns.x.col(column).segment<3>(k * view.columns.per_pose).squaredNorm();
   return position_sigma * std::sqrt(sum / static_cast<double>(std::max<Index>(1, poses)));
 }
 
-EffectSize smallest(const View& view, const Group& group, std::size_t g, std::size_t groups, const DistinguishOptions& options) {
+EffectSize smallest(const View& view, const Group& group, std::size_t g, std::size_t groups,
+                    const DistinguishOptions& options) {
   EffectSize best;
   double least = std::numeric_limits<double>::infinity();
   bool best_with_geometry = false;
   const double errors = standard_errors(view, g, groups);
   for (const Index k : view.seen[g].columns) {
     const auto column = view.columns.x.col(k);
-    const double visible = beyond(view.frames, column).squaredNorm(), beside_geometry = beyond(view.all, column).squaredNorm();
+    const double visible = beyond(view.frames, column).squaredNorm(),
+                 beside_geometry = beyond(view.all, column).squaredNorm();
     if (!(visible > kInvisible * column.squaredNorm())) continue;
     const bool with_geometry = beside_geometry > kInvisible * column.squaredNorm();
     const double tip = at_tip(view, k, options.position_sigma);
-    const double size = errors / std::sqrt(visible), larger = with_geometry ? errors / std::sqrt(beside_geometry) : kNaN;
+    const double size = errors / std::sqrt(visible),
+                 larger = with_geometry ? errors / std::sqrt(beside_geometry) : kNaN;
     const double judged = (with_geometry ? larger : size) * tip;
     if (with_geometry < best_with_geometry || (with_geometry == best_with_geometry && judged >= least)) continue;
     least = judged;
@@ -388,7 +418,10 @@ std::string why_invisible(const View& view, const Seen& seen) {
   const MatrixXd x = unit_columns(chosen(view.columns.x, seen.columns));
   if (x.squaredNorm() == 0.0) return "moves nothing in this plan";
   const auto taken_up_by = [&](const std::vector<Index>& frame) {
-    return beyond(orthonormal(unit_columns(chosen(view.columns.x, frame)), kSameColumn), x).colwise().squaredNorm().maxCoeff() < kInvisible;
+    return beyond(orthonormal(unit_columns(chosen(view.columns.x, frame)), kSameColumn), x)
+               .colwise()
+               .squaredNorm()
+               .maxCoeff() < kInvisible;
   };
   if (taken_up_by(view.base)) return "the same as the base frame";
   if (taken_up_by(view.tool)) return "the same as the tool";
@@ -398,18 +431,24 @@ std::string why_invisible(const View& view, const Seen& seen) {
 std::string separated_by(const Group& a, const Group& b, const DistinguishOptions& options) {
   const Recorded with = recorded(options);
   const auto one_is = [&](const char* x) { return a.effect == x || b.effect == x; };
-  const auto pair_is = [&](const char* x, const char* y) { return (a.effect == x && b.effect == y) || (a.effect == y && b.effect == x); };
+  const auto pair_is = [&](const char* x, const char* y) {
+    return (a.effect == x && b.effect == y) || (a.effect == y && b.effect == x);
+  };
   const bool thermal = one_is("thermal") || one_is("thermal_zero");
   if (one_is("backlash") && !with.direction) return "approach the same poses from both sides (column dir)";
-  if (pair_is("joint_offset", "link_geometry") && a.joint == b.joint) return "no measurement; a joint's zero is part of its link's geometry";
-  if (pair_is("joint_compliance", "stiffness_zones") && a.joint == b.joint) return "no measurement; a spring with three zones can be a plain one";
+  if (pair_is("joint_offset", "link_geometry") && a.joint == b.joint)
+    return "no measurement; a joint's zero is part of its link's geometry";
+  if (pair_is("joint_compliance", "stiffness_zones") && a.joint == b.joint)
+    return "no measurement; a spring with three zones can be a plain one";
   if (one_is("scale")) return "measure a scale bar of known length";
   if (thermal && one_is("drift")) return "measure during warm-up and cool-down, or touch a fixed nest again and again";
   if (thermal) return "measure at more temperatures, and further apart";
   if (one_is("drift")) return "measure fixed points again and again";
   if (pair_is("joint_compliance", "link_compliance")) return "put a target on the elbow, or measure orientations";
-  if (one_is("joint_compliance") || one_is("link_compliance") || one_is("stiffness_zones") || one_is("gravity_backlash")) {
-    return with.payload ? "repeat the same poses with another payload" : "repeat the same poses with another payload (column payload)";
+  if (one_is("joint_compliance") || one_is("link_compliance") || one_is("stiffness_zones") ||
+      one_is("gravity_backlash")) {
+    return with.payload ? "repeat the same poses with another payload"
+                        : "repeat the same poses with another payload (column payload)";
   }
   if (one_is("gear_ratio") || one_is("harmonic")) return "use the joint's full range, both turns";
   if (one_is("axis_wobble") && !options.orientation) return "measure orientations as well";
@@ -417,7 +456,8 @@ std::string separated_by(const Group& a, const Group& b, const DistinguishOption
 }
 
 /// The two, the one that is explained better first.
-EffectPair make_pair(const View& view, const std::vector<Group>& groups, std::size_t a, std::size_t b, const DistinguishOptions& options) {
+EffectPair make_pair(const View& view, const std::vector<Group>& groups, std::size_t a, std::size_t b,
+                     const DistinguishOptions& options) {
   if (view.r2(b, a) > view.r2(a, b) + 1e-9) std::swap(a, b);
   EffectPair pair;
   pair.effect = groups[a].effect;
@@ -430,7 +470,9 @@ EffectPair make_pair(const View& view, const std::vector<Group>& groups, std::si
   pair.unit = size.unit;
   const Index column = view.columns.at(size.parameter);
   const double visible = column < 0 ? 0.0 : view.visible_beside(b, column);
-  pair.size = column >= 0 && visible > kInvisible * view.columns.x.col(column).squaredNorm() ? size.standard_errors / std::sqrt(visible) : kNaN;
+  pair.size = column >= 0 && visible > kInvisible * view.columns.x.col(column).squaredNorm()
+                  ? size.standard_errors / std::sqrt(visible)
+                  : kNaN;
   pair.separated_by = separated_by(groups[a], groups[b], options);
   return pair;
 }
@@ -438,13 +480,15 @@ EffectPair make_pair(const View& view, const std::vector<Group>& groups, std::si
 /// Draws the inputs of poses.
 class InputDraw {
  public:
-  InputDraw(const DistinguishOptions& options, std::size_t driven) : options_(options), with_(recorded(options)), driven_(driven), random_(options.seed + 0x51ed2701u) {}
+  InputDraw(const DistinguishOptions& options, std::size_t driven)
+      : options_(options), with_(recorded(options)), driven_(driven), random_(options.seed + 0x51ed2701u) {}
 
   /// Of the plan's own poses: warm-up and cool-down, half a sine, so that temperature is no function of time alone.
   Planned planned(const Pose& joints, std::size_t k, std::size_t count) {
     Planned out = drawn(joints, k);
     const double part = count > 1 ? static_cast<double>(k) / static_cast<double>(count - 1) : 0.5;
-    out.temperature = options_.temperature_low + (options_.temperature_high - options_.temperature_low) * std::sin(M_PI * part);
+    out.temperature =
+        options_.temperature_low + (options_.temperature_high - options_.temperature_low) * std::sin(M_PI * part);
     return out;
   }
 
@@ -472,9 +516,10 @@ class InputDraw {
 
 using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
-/// The pose, of some hundred, where rivals that are fitted to each other on what is planned already still differ most (greedy T-optimal
-/// design, Atkinson and Fedorov 1975), summed over the pairs that are still alike. False: none tells.
-bool next_pose(const View& view, const std::vector<Planned>& proposals, const Robot& carrying, const Pairs& alike, const DistinguishOptions& options, Planned* out) {
+/// The pose, of some hundred, where rivals that are fitted to each other on what is planned already still differ most
+/// (greedy T-optimal design, Atkinson and Fedorov 1975), summed over the pairs that are still alike. False: none tells.
+bool next_pose(const View& view, const std::vector<Planned>& proposals, const Robot& carrying, const Pairs& alike,
+               const DistinguishOptions& options, Planned* out) {
   const Columns there = make_columns(carrying, proposals, {}, options, nullptr);
   const Index m = there.per_pose, count = static_cast<Index>(proposals.size());
   Eigen::VectorXd told = Eigen::VectorXd::Zero(count);
@@ -490,11 +535,13 @@ bool next_pose(const View& view, const std::vector<Planned>& proposals, const Ro
     std::vector<Index> rivals = frames;
     rivals.insert(rivals.end(), view.seen[b].columns.begin(), view.seen[b].columns.end());
     MatrixXd x = chosen(view.columns.x, rivals), x_there = chosen(there.x, same_there(rivals));
-    MatrixXd y = chosen(view.columns.x, view.seen[a].columns), y_there = chosen(there.x, same_there(view.seen[a].columns));
+    MatrixXd y = chosen(view.columns.x, view.seen[a].columns),
+             y_there = chosen(there.x, same_there(view.seen[a].columns));
     // Unit rms over plan and proposals together, so that what the plan does not move at all counts as well.
     const auto scale = [&](MatrixXd* here, MatrixXd* other) {
       for (Index k = 0; k < here->cols(); ++k) {
-        const double rms = std::sqrt(here->col(k).squaredNorm() / planned + other->col(k).squaredNorm() / static_cast<double>(count));
+        const double rms =
+            std::sqrt(here->col(k).squaredNorm() / planned + other->col(k).squaredNorm() / static_cast<double>(count));
         if (!(rms > 0.0)) continue;
         here->col(k) /= rms;
         other->col(k) /= rms;
@@ -508,7 +555,8 @@ bool next_pose(const View& view, const std::vector<Planned>& proposals, const Ro
     both << x, little * x_there;
     wanted << y, little * y_there;
     const MatrixXd left = y_there - x_there * Eigen::ColPivHouseholderQR<MatrixXd>(both).solve(wanted);
-    for (Index k = 0; k < count; ++k) told[k] += left.middleRows(k * m, m).squaredNorm() / static_cast<double>(std::max<Index>(1, y.cols()));
+    for (Index k = 0; k < count; ++k)
+      told[k] += left.middleRows(k * m, m).squaredNorm() / static_cast<double>(std::max<Index>(1, y.cols()));
   }
   Index best = -1;
   if (count == 0 || !(told.maxCoeff(&best) > kTellsNothing)) return false;
@@ -525,9 +573,11 @@ bool DistinguishOptions::is_valid(std::string* error) const {
     return false;
   };
   if (!(payload > 0.0) || !std::isfinite(payload)) return fail("payload must be positive");
-  if (!(temperature_high > temperature_low) || !std::isfinite(temperature_high - temperature_low)) return fail("temperature_high must be above temperature_low");
+  if (!(temperature_high > temperature_low) || !std::isfinite(temperature_high - temperature_low))
+    return fail("temperature_high must be above temperature_low");
   if (!(seconds_per_pose > 0.0) || !std::isfinite(seconds_per_pose)) return fail("seconds_per_pose must be positive");
-  if (!(position_sigma > 0.0) || !(rotation_sigma > 0.0)) return fail("position_sigma and rotation_sigma must be positive");
+  if (!(position_sigma > 0.0) || !(rotation_sigma > 0.0))
+    return fail("position_sigma and rotation_sigma must be positive");
   if (!(alike > 0.0 && alike < 1.0)) return fail("alike must lie between 0 and 1");
   if (add < 0 || proposals < 1) return fail("add must not be negative, proposals at least 1");
   if (!(min_step >= 0.0) || !(min_step_prismatic >= 0.0)) return fail("min_step must not be negative");
@@ -544,14 +594,17 @@ Distinction distinguish(const Robot& given, const Eigen::MatrixXd& joints, const
   const Recorded with = recorded(options);
   const std::size_t driven = robot.driven_count();
   if (joints.cols() != static_cast<Index>(driven)) {
-    throw std::invalid_argument("distinguish: poses have " + std::to_string(joints.cols()) + " joints, and the robot " + std::to_string(driven) + " driven ones");
+    throw std::invalid_argument("distinguish: poses have " + std::to_string(joints.cols()) + " joints, and the robot " +
+                                std::to_string(driven) + " driven ones");
   }
   if (joints.rows() < 3) throw std::invalid_argument("distinguish: a plan has at least 3 poses");
   if (!joints.allFinite()) throw std::invalid_argument("distinguish: joints must be finite");
 
   InputDraw inputs(options, driven);
   std::vector<Planned> poses;
-  for (Index k = 0; k < joints.rows(); ++k) poses.push_back(inputs.planned(joints.row(k).transpose(), static_cast<std::size_t>(k), static_cast<std::size_t>(joints.rows())));
+  for (Index k = 0; k < joints.rows(); ++k)
+    poses.push_back(inputs.planned(joints.row(k).transpose(), static_cast<std::size_t>(k),
+                                   static_cast<std::size_t>(joints.rows())));
 
   Distinction result;
   std::vector<Group> groups;
@@ -597,7 +650,8 @@ Distinction distinguish(const Robot& given, const Eigen::MatrixXd& joints, const
         if (k % 2 == 0) {  // a pose of the plan again, with other inputs
           pose = first[inputs.random().below(first.size())].joints;
           bool far = true;
-          for (Index j = 0; j < pose.size(); ++j) far = far && std::abs(pose[j] - last[j]) > ranges[static_cast<std::size_t>(j)].step;
+          for (Index j = 0; j < pose.size(); ++j)
+            far = far && std::abs(pose[j] - last[j]) > ranges[static_cast<std::size_t>(j)].step;
           if (!far) continue;
         } else if (!draw_pose(robot, bare, ranges, &last, nullptr, &inputs.random(), &pose)) {
           continue;
@@ -622,21 +676,27 @@ Distinction distinguish(const Robot& given, const Eigen::MatrixXd& joints, const
     for (std::size_t k = 0; k < pairs.size(); ++k) {
       EffectPair& pair = result.separated[k];
       const bool as_before = groups[pairs[k].first].effect == pair.effect && groups[pairs[k].first].joint == pair.joint;
-      const std::size_t a = as_before ? pairs[k].first : pairs[k].second, b = as_before ? pairs[k].second : pairs[k].first;
+      const std::size_t a = as_before ? pairs[k].first : pairs[k].second,
+                        b = as_before ? pairs[k].second : pairs[k].first;
       pair.r2_after = view.r2(a, b);
       const Index column = view.columns.at(pair.parameter);
       const double left = column < 0 ? 0.0 : view.visible_beside(b, column);
-      if (left > kInvisible * view.columns.x.col(std::max<Index>(0, column)).squaredNorm()) pair.size_after = standard_errors(view, a, groups.size()) / std::sqrt(left);
+      if (left > kInvisible * view.columns.x.col(std::max<Index>(0, column)).squaredNorm())
+        pair.size_after = standard_errors(view, a, groups.size()) / std::sqrt(left);
     }
   }
-  std::stable_sort(result.separated.begin(), result.separated.end(), [](const EffectPair& a, const EffectPair& b) { return a.r2 > b.r2; });
+  std::stable_sort(result.separated.begin(), result.separated.end(),
+                   [](const EffectPair& a, const EffectPair& b) { return a.r2 > b.r2; });
 
   // What the whole plan sees.
   std::vector<std::size_t> shown;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     if (!options.separate.empty() && !all && !named(g)) continue;
     if (!visible(g)) {
-      result.not_testable.push_back({groups[g].effect, groups[g].joint.empty() ? std::vector<std::string>{} : std::vector<std::string>{groups[g].joint}, why_invisible(view, view.seen[g])});
+      result.not_testable.push_back(
+          {groups[g].effect,
+           groups[g].joint.empty() ? std::vector<std::string>{} : std::vector<std::string>{groups[g].joint},
+           why_invisible(view, view.seen[g])});
       continue;
     }
     shown.push_back(g);
@@ -644,10 +704,14 @@ Distinction distinguish(const Robot& given, const Eigen::MatrixXd& joints, const
   }
   if (!options.separate.empty() && !all) {  // nobody asked for the others
     const auto other = [&](const NotTestable& n) { return names.count(n.effect) == 0; };
-    result.not_testable.erase(std::remove_if(result.not_testable.begin(), result.not_testable.end(), other), result.not_testable.end());
+    result.not_testable.erase(std::remove_if(result.not_testable.begin(), result.not_testable.end(), other),
+                              result.not_testable.end());
   }
   if (!with.direction && (all || names.count("backlash") > 0)) {
-    result.not_testable.push_back({"backlash", {}, "no column dir: every pose is approached from the same side, and play is the same as a joint's zero"});
+    result.not_testable.push_back(
+        {"backlash",
+         {},
+         "no column dir: every pose is approached from the same side, and play is the same as a joint's zero"});
   }
   const auto count = static_cast<Index>(shown.size());
   result.r2.resize(count, count);
@@ -660,11 +724,13 @@ Distinction distinguish(const Robot& given, const Eigen::MatrixXd& joints, const
   for (Index i = 0; i < count; ++i) {
     for (Index j = i + 1; j < count; ++j) {
       if (std::max(result.r2(i, j), result.r2(j, i)) > options.alike) {
-        result.alike.push_back(make_pair(view, groups, shown[static_cast<std::size_t>(i)], shown[static_cast<std::size_t>(j)], options));
+        result.alike.push_back(
+            make_pair(view, groups, shown[static_cast<std::size_t>(i)], shown[static_cast<std::size_t>(j)], options));
       }
     }
   }
-  std::stable_sort(result.alike.begin(), result.alike.end(), [](const EffectPair& a, const EffectPair& b) { return a.r2 > b.r2 + 1e-9; });
+  std::stable_sort(result.alike.begin(), result.alike.end(),
+                   [](const EffectPair& a, const EffectPair& b) { return a.r2 > b.r2 + 1e-9; });
 
   const auto n = static_cast<Index>(poses.size());
   result.joints.resize(n, static_cast<Index>(driven));
@@ -675,7 +741,8 @@ Distinction distinguish(const Robot& given, const Eigen::MatrixXd& joints, const
   for (Index k = 0; k < n; ++k) {
     const Planned& pose = poses[static_cast<std::size_t>(k)];
     result.joints.row(k) = pose.joints.transpose();
-    for (Index j = 0; j < result.direction.cols(); ++j) result.direction(k, j) = pose.direction[static_cast<std::size_t>(j)];
+    for (Index j = 0; j < result.direction.cols(); ++j)
+      result.direction(k, j) = pose.direction[static_cast<std::size_t>(j)];
     if (with.payload) result.payload[k] = pose.payload;
     if (with.temperature) result.temperature[k] = pose.temperature;
     if (with.time) result.time[k] = pose.time;

@@ -18,10 +18,10 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMark = 0.1;           // beliefs are kept at least so often, and forward kinematics is taken in [s]
-constexpr double kSwayTime = 20.0;      // over which the size of the sway is averaged [s]
-constexpr double kScaleTime = 2.0;      // over which motion goes one way [s]
-constexpr double kClockFrom = 1.0;      // after the start, the clock is estimated [s]
+constexpr double kMark = 0.1;              // beliefs are kept at least so often, and forward kinematics is taken in [s]
+constexpr double kSwayTime = 20.0;         // over which the size of the sway is averaged [s]
+constexpr double kScaleTime = 2.0;         // over which motion goes one way [s]
+constexpr double kClockFrom = 1.0;         // after the start, the clock is estimated [s]
 constexpr double kLargestFlangeGap = 0.1;  // between the two readings that one is interpolated from [s]
 
 std::int64_t power_of_two(double at_least) {
@@ -49,12 +49,13 @@ void inject(const Eigen::Matrix<double, kStates, 1>& delta, Nominal* x) {
   x->slow_theta += delta.segment<3>(kSlowTheta);
 }
 
-/// Kalman update with innovation r = measured minus predicted; false and no change if its normalised square is above `gate`. Solà eqs. (274)-(276).
-/// PHt: P H'. S: H P H' + R. Before `clock_from` the clock is considered and not estimated (Schmidt 1966): how much lateness matters goes with
-/// the speed, and until that is known the product of the two would settle on a wrong pair.
+/// Kalman update with innovation r = measured minus predicted; false and no change if its normalised square is above
+/// `gate`. Solà eqs. (274)-(276). PHt: P H'. S: H P H' + R. Before `clock_from` the clock is considered and not
+/// estimated (Schmidt 1966): how much lateness matters goes with the speed, and until that is known the product of the
+/// two would settle on a wrong pair.
 template <int N>
-bool fuse(const Eigen::Matrix<double, kStates, N>& PHt, const Eigen::Matrix<double, N, N>& S, const Eigen::Matrix<double, N, 1>& r, double gate,
-          Belief* belief, double* nis) {
+bool fuse(const Eigen::Matrix<double, kStates, N>& PHt, const Eigen::Matrix<double, N, N>& S,
+          const Eigen::Matrix<double, N, 1>& r, double gate, Belief* belief, double* nis) {
   const Eigen::LLT<Eigen::Matrix<double, N, N>> factor(S);
   const Eigen::Matrix<double, N, 1> weighted = factor.solve(r);
   *nis = r.dot(weighted);
@@ -94,11 +95,16 @@ PoseFilter::PoseFilter(const TrackSetup& setup, const FilterOptions& options) : 
   changed_ = kInfinity;
 }
 
-// ---- Samples come in ---------------------------------------------------------------------------------------------------
+// ---- Samples come in
+// ---------------------------------------------------------------------------------------------------
 
 Outcome PoseFilter::push_imu(const ImuSample& sample) {
-  const auto count = [&](Outcome outcome) { ++counters_.imu[static_cast<std::size_t>(outcome)]; return outcome; };
-  if (!std::isfinite(sample.t) || !sample.gyro.allFinite() || !sample.accel.allFinite()) return count(Outcome::not_finite);
+  const auto count = [&](Outcome outcome) {
+    ++counters_.imu[static_cast<std::size_t>(outcome)];
+    return outcome;
+  };
+  if (!std::isfinite(sample.t) || !sample.gyro.allFinite() || !sample.accel.allFinite())
+    return count(Outcome::not_finite);
   Outcome outcome = Outcome::accepted;
   double extra_gyro = 0.0, extra_accel = 0.0;
   if (imu_count_ > 0) {
@@ -119,7 +125,8 @@ Outcome PoseFilter::push_imu(const ImuSample& sample) {
     } else {
       extra_gyro = last.extra_gyro;
       extra_accel = last.extra_accel;
-      const bool saturated = sample.gyro.cwiseAbs().maxCoeff() >= options_.gyro_range || sample.accel.cwiseAbs().maxCoeff() >= options_.accel_range;
+      const bool saturated = sample.gyro.cwiseAbs().maxCoeff() >= options_.gyro_range ||
+                             sample.accel.cwiseAbs().maxCoeff() >= options_.accel_range;
       if (dt > options_.largest_gap) outcome = Outcome::accepted_gap;
       if (saturated) outcome = Outcome::accepted_saturated;
       if (outcome != Outcome::accepted) {  // what was hidden is taken to be constant over the gap
@@ -128,7 +135,8 @@ Outcome PoseFilter::push_imu(const ImuSample& sample) {
       }
     }
   }
-  if (imu_count_ - (initialised_ ? imu_before(base_.t) : std::max<std::int64_t>(0, imu_count_ - 8)) >= imu_mask_ - 1) update();
+  if (imu_count_ - (initialised_ ? imu_before(base_.t) : std::max<std::int64_t>(0, imu_count_ - 8)) >= imu_mask_ - 1)
+    update();
   ImuRow& row = imu(imu_count_++);
   row.t = sample.t;
   row.gyro = sample.gyro;
@@ -139,14 +147,19 @@ Outcome PoseFilter::push_imu(const ImuSample& sample) {
 }
 
 Outcome PoseFilter::push_pose(const PoseSample& sample) {
-  const auto count = [&](Outcome outcome) { ++counters_.pose[static_cast<std::size_t>(outcome)]; return outcome; };
-  if (!std::isfinite(sample.t) || !sample.position.allFinite() || !sample.orientation.coeffs().allFinite()) return count(Outcome::not_finite);
+  const auto count = [&](Outcome outcome) {
+    ++counters_.pose[static_cast<std::size_t>(outcome)];
+    return outcome;
+  };
+  if (!std::isfinite(sample.t) || !sample.position.allFinite() || !sample.orientation.coeffs().allFinite())
+    return count(Outcome::not_finite);
   Quaterniond orientation = sample.orientation;
   if (sample.has_orientation()) {
     if (std::abs(orientation.norm() - 1.0) > 1e-3) return count(Outcome::not_unit);
     orientation.normalize();
   }
-  if (sample.position == last_pushed_.position && sample.orientation.coeffs() == last_pushed_.orientation.coeffs() && sample.t != last_pushed_.t) {
+  if (sample.position == last_pushed_.position && sample.orientation.coeffs() == last_pushed_.orientation.coeffs() &&
+      sample.t != last_pushed_.t) {
     if (++frozen_ >= options_.frozen_after) return count(Outcome::frozen);
   } else {
     frozen_ = 0;
@@ -167,7 +180,10 @@ Outcome PoseFilter::push_pose(const PoseSample& sample) {
 }
 
 Outcome PoseFilter::push_flange(double t, const Isometry3d& T_base_flange) {
-  const auto count = [&](Outcome outcome) { ++counters_.joints[static_cast<std::size_t>(outcome)]; return outcome; };
+  const auto count = [&](Outcome outcome) {
+    ++counters_.joints[static_cast<std::size_t>(outcome)];
+    return outcome;
+  };
   if (!std::isfinite(t) || !T_base_flange.matrix().allFinite()) return count(Outcome::not_finite);
   if (imu_count_ > 0 && t > newest_imu() + options_.future_limit) return count(Outcome::future);
   if (imu_count_ > 0 && t < newest_imu() - options_.window) return count(Outcome::too_late);
@@ -182,13 +198,17 @@ Outcome PoseFilter::push_flange(double t, const Isometry3d& T_base_flange) {
   // Marks between the neighbours of the new reading see another interpolation now.
   const double from = k > 0 ? flange(k - 1).t : t, to = k + 1 < flange_count_ ? flange(k + 1).t : t;
   for (int e = first_event_after(from - 1e-12); e < event_count() && event(e).t <= to; ++e) {
-    if (event(e).kind == Kind::mark) { set_dirty(e); break; }
+    if (event(e).kind == Kind::mark) {
+      set_dirty(e);
+      break;
+    }
   }
   return count(Outcome::accepted);
 }
 
-/// The clock offset with which a stamp is placed. It must not depend on when the sample arrives: the stamps of a second are placed with the
-/// estimate from well before that second, when nothing can change it any more. What the estimate has moved since is in the measurement function.
+/// The clock offset with which a stamp is placed. It must not depend on when the sample arrives: the stamps of a second
+/// are placed with the estimate from well before that second, when nothing can change it any more. What the estimate
+/// has moved since is in the measurement function.
 double PoseFilter::place_of(double stamp) {
   const auto second = static_cast<std::int64_t>(std::floor(stamp - setup_.clock_offset));
   const auto slot = static_cast<std::size_t>(((second % kPlaces) + kPlaces) % kPlaces);
@@ -196,7 +216,10 @@ double PoseFilter::place_of(double stamp) {
 }
 
 int PoseFilter::first_event_after(double t) const {
-  return static_cast<int>(std::upper_bound(order_.begin(), order_.end(), t, [&](double x, int slot) { return x < events_[static_cast<std::size_t>(slot)].t; }) - order_.begin());
+  return static_cast<int>(
+      std::upper_bound(order_.begin(), order_.end(), t,
+                       [&](double x, int slot) { return x < events_[static_cast<std::size_t>(slot)].t; }) -
+      order_.begin());
 }
 
 Outcome PoseFilter::insert(const Event& event) {
@@ -234,7 +257,8 @@ Outcome PoseFilter::insert(const Event& event) {
 
 void PoseFilter::set_dirty(int k) { dirty_ = std::min(dirty_, k); }
 
-// ---- The window is worked off --------------------------------------------------------------------------------------------
+// ---- The window is worked off
+// --------------------------------------------------------------------------------------------
 
 /// Last inertial sample at or before t; -1: none.
 std::int64_t PoseFilter::imu_before(double t) const {
@@ -262,8 +286,9 @@ void PoseFilter::imu_between(std::int64_t k, double t, Vector3d* gyro, Vector3d*
   *accel = a.accel + fraction * (b.accel - a.accel);
 }
 
-/// From t0 to t1, both between inertial samples k and k + 1, which are taken to be joined by straight lines. Midpoint rule for the
-/// orientation (Solà eq. (223)), Simpson-like weights for what acceleration in the base frame does to position.
+/// From t0 to t1, both between inertial samples k and k + 1, which are taken to be joined by straight lines. Midpoint
+/// rule for the orientation (Solà eq. (223)), Simpson-like weights for what acceleration in the base frame does to
+/// position.
 void PoseFilter::integrate(Nominal* x, std::int64_t k, double t0, double t1) const {
   Vector3d gyro0, gyro1, accel0, accel1;
   imu_between(k, t0, &gyro0, &accel0);
@@ -275,7 +300,8 @@ void PoseFilter::integrate(Nominal* x, std::int64_t k, double t0, double t1) con
   }
   const double dt = t1 - t0;
   const Quaterniond q1 = x->q * exp_rotation((0.5 * (gyro0 + gyro1) - x->gyro_bias) * dt);
-  const Vector3d a0 = x->q * (accel0 - x->accel_bias) + setup_.gravity, a1 = q1 * (accel1 - x->accel_bias) + setup_.gravity;
+  const Vector3d a0 = x->q * (accel0 - x->accel_bias) + setup_.gravity,
+                 a1 = q1 * (accel1 - x->accel_bias) + setup_.gravity;
   x->p += dt * x->v + dt * dt / 6.0 * (2.0 * a0 + a1);
   x->v += dt / 2.0 * (a0 + a1);
   x->q = q1;
@@ -315,8 +341,9 @@ double PoseFilter::extra(double t, bool gyro) const {
   return at_a + (t - a.t) / (b.t - a.t) * ((gyro ? b.extra_gyro : b.extra_accel) - at_a);
 }
 
-/// P <- F P F' + Q over the segment from `from` to `to_x` at t. With global orientation errors (Solà section 7.2, eqs. (309)-(315), integrated
-/// instead of taken per sample) F holds the first and second integral of specific force in the base frame, which the nominal states give.
+/// P <- F P F' + Q over the segment from `from` to `to_x` at t. With global orientation errors (Solà section 7.2, eqs.
+/// (309)-(315), integrated instead of taken per sample) F holds the first and second integral of specific force in the
+/// base frame, which the nominal states give.
 void PoseFilter::transition(const Belief& from, const Nominal& to_x, double t, Covariance* P) const {
   const double dt = t - from.t;
   const Vector3d dv = to_x.v - from.x.v - dt * setup_.gravity;
@@ -329,14 +356,19 @@ void PoseFilter::transition(const Belief& from, const Nominal& to_x, double t, C
 
   Covariance& M = *P;
   // Rows first, M = F P. The columns of what stays the same are then final, and mirrored.
-  M.middleRows<3>(kP) += dt * M.middleRows<3>(kV) + p_theta * M.middleRows<3>(kTheta) + p_gyro * M.middleRows<3>(kGyroBias) + p_accel * M.middleRows<3>(kAccelBias);
-  M.middleRows<3>(kV) += v_theta * M.middleRows<3>(kTheta) + v_gyro * M.middleRows<3>(kGyroBias) + v_accel * M.middleRows<3>(kAccelBias);
+  M.middleRows<3>(kP) += dt * M.middleRows<3>(kV) + p_theta * M.middleRows<3>(kTheta) +
+                         p_gyro * M.middleRows<3>(kGyroBias) + p_accel * M.middleRows<3>(kAccelBias);
+  M.middleRows<3>(kV) +=
+      v_theta * M.middleRows<3>(kTheta) + v_gyro * M.middleRows<3>(kGyroBias) + v_accel * M.middleRows<3>(kAccelBias);
   M.middleRows<3>(kTheta) += theta_bias * M.middleRows<3>(kGyroBias);
   // Then the columns of position, velocity and orientation, P = M F'.
   auto top = M.topRows<9>();
-  top.middleCols<3>(kP) += dt * top.middleCols<3>(kV) + top.middleCols<3>(kTheta) * p_theta.transpose() + top.middleCols<3>(kGyroBias) * p_gyro.transpose() +
+  top.middleCols<3>(kP) += dt * top.middleCols<3>(kV) + top.middleCols<3>(kTheta) * p_theta.transpose() +
+                           top.middleCols<3>(kGyroBias) * p_gyro.transpose() +
                            top.middleCols<3>(kAccelBias) * p_accel.transpose();
-  top.middleCols<3>(kV) += top.middleCols<3>(kTheta) * v_theta.transpose() + top.middleCols<3>(kGyroBias) * v_gyro.transpose() + top.middleCols<3>(kAccelBias) * v_accel.transpose();
+  top.middleCols<3>(kV) += top.middleCols<3>(kTheta) * v_theta.transpose() +
+                           top.middleCols<3>(kGyroBias) * v_gyro.transpose() +
+                           top.middleCols<3>(kAccelBias) * v_accel.transpose();
   top.middleCols<3>(kTheta) += top.middleCols<3>(kGyroBias) * theta_bias.transpose();
   M.bottomLeftCorner<kStates - 9, 9>() = M.topRightCorner<9, kStates - 9>().transpose();
   M.row(kClock) += dt * M.row(kDrift);
@@ -344,7 +376,8 @@ void PoseFilter::transition(const Belief& from, const Nominal& to_x, double t, C
 
   const FilterOptions& o = options_;
   // Scale errors: of what moved, alike over `kScaleTime`.
-  const double turn = 4.0 * (to_x.q * from.x.q.conjugate()).vec().squaredNorm(), speed_up = (to_x.v - from.x.v).squaredNorm();
+  const double turn = 4.0 * (to_x.q * from.x.q.conjugate()).vec().squaredNorm(),
+               speed_up = (to_x.v - from.x.v).squaredNorm();
   const double scale = o.imu_scale * o.imu_scale * kScaleTime / dt;
   const double accel = o.accel_noise * o.accel_noise * dt + scale * speed_up + extra(t, false) - extra(from.t, false);
   const double gyro = o.gyro_noise * o.gyro_noise * dt + scale * turn + extra(t, true) - extra(from.t, true);
@@ -376,7 +409,8 @@ Motion PoseFilter::motion_of(const Nominal& x, std::int64_t k, double t) const {
   return out;
 }
 
-/// The receiver where it was `late` before the place of the sample, late = clock offset now minus that of the placing; to second order.
+/// The receiver where it was `late` before the place of the sample, late = clock offset now minus that of the placing;
+/// to second order.
 void PoseFilter::measure_pose(Event* event, Belief* belief) const {
   const Motion motion = motion_of(belief->x, imu_before(belief->t), belief->t);
   const double late = belief->x.clock - event->place;
@@ -384,7 +418,8 @@ void PoseFilter::measure_pose(Event* event, Belief* belief) const {
   const Vector3d velocity = belief->x.v + motion.rate.cross(lever);
   const Vector3d acceleration = motion.acceleration + motion.rate.cross(motion.rate.cross(lever));
   const Vector3d predicted = belief->x.p + lever - late * velocity + 0.5 * late * late * acceleration;
-  const Quaterniond predicted_q = exp_rotation(-late * motion.rate) * belief->x.q * Quaterniond(T_imu_receiver_.linear());
+  const Quaterniond predicted_q =
+      exp_rotation(-late * motion.rate) * belief->x.q * Quaterniond(T_imu_receiver_.linear());
 
   // H = [I, -late I, -[lever]x, 0, 0, -velocity + late acceleration; 0, 0, I, 0, 0, -rate], as P H' and H P H' + R.
   const Matrix3d lever_x = skew(lever);
@@ -392,7 +427,8 @@ void PoseFilter::measure_pose(Event* event, Belief* belief) const {
   clock_column << -velocity + late * acceleration, -motion.rate;
   const auto times_H = [&](const auto& M) {  // M H' for any M with kStates columns
     Eigen::Matrix<double, std::decay_t<decltype(M)>::RowsAtCompileTime, 6> out;
-    out.template leftCols<3>() = M.template middleCols<3>(kP) - late * M.template middleCols<3>(kV) + M.template middleCols<3>(kTheta) * lever_x;
+    out.template leftCols<3>() =
+        M.template middleCols<3>(kP) - late * M.template middleCols<3>(kV) + M.template middleCols<3>(kTheta) * lever_x;
     out.template rightCols<3>() = M.template middleCols<3>(kTheta);
     out += M.col(kClock) * clock_column.transpose();
     return out;
@@ -402,7 +438,8 @@ void PoseFilter::measure_pose(Event* event, Belief* belief) const {
   Matrix6d S = times_H(HP);
   Vector6d r = Vector6d::Zero();
   r.head<3>() = event->T_base_receiver.translation() - predicted;
-  if (event->has_orientation) r.tail<3>() = log_rotation(Quaterniond(event->T_base_receiver.linear()) * predicted_q.conjugate());
+  if (event->has_orientation)
+    r.tail<3>() = log_rotation(Quaterniond(event->T_base_receiver.linear()) * predicted_q.conjugate());
   S.diagonal().head<3>().array() += options_.position_sigma * options_.position_sigma;
   S.diagonal().tail<3>().array() += options_.rotation_sigma * options_.rotation_sigma;
 
@@ -411,12 +448,14 @@ void PoseFilter::measure_pose(Event* event, Belief* belief) const {
   grade.dimensions = event->has_orientation ? 6 : 3;
   grade.innovation = r;
   grade.S = S;
-  grade.R << Vector3d::Constant(options_.position_sigma * options_.position_sigma), Vector3d::Constant(options_.rotation_sigma * options_.rotation_sigma);
+  grade.R << Vector3d::Constant(options_.position_sigma * options_.position_sigma),
+      Vector3d::Constant(options_.rotation_sigma * options_.rotation_sigma);
   grade.T_base_receiver = event->T_base_receiver;
   grade.reacquired = false;
   const auto apply = [&](double gate) {
-    return event->has_orientation ? fuse<6>(PHt, S, r, gate, belief, &grade.nis)
-                                  : fuse<3>(PHt.leftCols<3>(), S.topLeftCorner<3, 3>(), r.head<3>(), gate, belief, &grade.nis);
+    return event->has_orientation
+               ? fuse<6>(PHt, S, r, gate, belief, &grade.nis)
+               : fuse<3>(PHt.leftCols<3>(), S.topLeftCorner<3, 3>(), r.head<3>(), gate, belief, &grade.nis);
   };
   grade.accepted = apply(options_.gate);
   if (!grade.accepted && belief->rejected + 1 >= options_.reacquire_after) {
@@ -457,7 +496,8 @@ bool PoseFilter::flange_at(double t, Isometry3d* T_base_flange) const {
   return true;
 }
 
-/// Forward kinematics: flange = fk * Exp(slow) * sway. Sway is no white noise: samples within its correlation time count as one.
+/// Forward kinematics: flange = fk * Exp(slow) * sway. Sway is no white noise: samples within its correlation time
+/// count as one.
 void PoseFilter::measure_flange(double t, Belief* belief) const {
   Isometry3d fk;
   if (!flange_at(t, &fk)) return;
@@ -467,7 +507,8 @@ void PoseFilter::measure_flange(double t, Belief* belief) const {
   const Matrix3d lever_x = skew(lever), fk_t = fk.linear().transpose();
   const auto times_H = [&](const auto& M) {
     Eigen::Matrix<double, std::decay_t<decltype(M)>::RowsAtCompileTime, 6> out;
-    out.template leftCols<3>() = M.template middleCols<3>(kP) + M.template middleCols<3>(kTheta) * lever_x - M.template middleCols<3>(kSlowP) * fk_t;
+    out.template leftCols<3>() = M.template middleCols<3>(kP) + M.template middleCols<3>(kTheta) * lever_x -
+                                 M.template middleCols<3>(kSlowP) * fk_t;
     out.template rightCols<3>() = M.template middleCols<3>(kTheta) - M.template middleCols<3>(kSlowTheta) * fk_t;
     return out;
   };
@@ -476,7 +517,8 @@ void PoseFilter::measure_flange(double t, Belief* belief) const {
   Matrix6d S = times_H(HP);
   Vector6d r;
   r.head<3>() = fk.translation() + fk.linear() * belief->x.slow_p - belief->x.p - lever;
-  r.tail<3>() = log_rotation(fk_q * exp_rotation(belief->x.slow_theta) * (belief->x.q * Quaterniond(T_imu_flange_.linear())).conjugate());
+  r.tail<3>() = log_rotation(fk_q * exp_rotation(belief->x.slow_theta) *
+                             (belief->x.q * Quaterniond(T_imu_flange_.linear())).conjugate());
   if (t - belief->last_pose < kCoastingAge) {
     Vector6d sway;
     sway << fk_t * r.head<3>(), fk_t * r.tail<3>();
@@ -511,12 +553,15 @@ void PoseFilter::start_from(const Event& first) {
   base_ = Belief();
   base_.t = first.t;
   base_.clock_from = first.t + kClockFrom;
-  base_.sway << Vector3d::Constant(options_.sway_position * options_.sway_position), Vector3d::Constant(options_.sway_rotation * options_.sway_rotation);
+  base_.sway << Vector3d::Constant(options_.sway_position * options_.sway_position),
+      Vector3d::Constant(options_.sway_rotation * options_.sway_rotation);
   base_.x.p = T_base_imu.translation();
   base_.x.q = Quaterniond(T_base_imu.linear());
   base_.x.clock = setup_.clock_offset;
   const FilterOptions& o = options_;
-  const auto set = [&](int place, int n, double sigma) { base_.P.diagonal().segment(place, n).setConstant(sigma * sigma); };
+  const auto set = [&](int place, int n, double sigma) {
+    base_.P.diagonal().segment(place, n).setConstant(sigma * sigma);
+  };
   set(kP, 3, 100.0 * o.position_sigma);
   set(kV, 3, 1.0);
   set(kTheta, 3, 100.0 * o.rotation_sigma);
@@ -530,8 +575,10 @@ void PoseFilter::start_from(const Event& first) {
   std::size_t kept = 0;
   for (int slot : order_) {
     const Event& e = events_[static_cast<std::size_t>(slot)];
-    if (e.kind == Kind::mark || e.t < first.t) free_.push_back(slot);
-    else order_[kept++] = slot;
+    if (e.kind == Kind::mark || e.t < first.t)
+      free_.push_back(slot);
+    else
+      order_[kept++] = slot;
   }
   order_.resize(kept);
   next_mark_ = std::ceil(first.t / kMark) * kMark;
@@ -546,7 +593,9 @@ void PoseFilter::update() {
   if (!initialised_) {
     const double oldest = imu(std::max<std::int64_t>(0, imu_count_ - imu_mask_ - 1)).t;
     int first = 0;
-    while (first < event_count() && !(event(first).kind == Kind::pose && event(first).has_orientation && event(first).t >= oldest)) ++first;
+    while (first < event_count() &&
+           !(event(first).kind == Kind::pose && event(first).has_orientation && event(first).t >= oldest))
+      ++first;
     if (first == event_count() || event(first).t > newest_imu()) return;
     const Event copy = event(first);
     start_from(copy);
@@ -559,8 +608,10 @@ void PoseFilter::update() {
     for (; dirty_ < event_count() && event(dirty_).t <= newest_imu(); ++dirty_) {
       Event& e = event(dirty_);
       propagate(&belief, e.t);
-      if (e.kind == Kind::pose) measure_pose(&e, &belief);
-      else measure_flange(e.t, &belief);
+      if (e.kind == Kind::pose)
+        measure_pose(&e, &belief);
+      else
+        measure_flange(e.t, &belief);
       e.after = belief;
     }
   }
@@ -601,7 +652,8 @@ void PoseFilter::trim() {
     const double clock = k == 0 ? base_.x.clock : event(k - 1).after.x.clock;
     // Seconds that end in between: the stamps of a later second will be placed with the estimate of this moment.
     const auto ahead = static_cast<std::int64_t>(std::ceil(options_.window)) + 2;
-    for (auto second = static_cast<std::int64_t>(std::floor(before)) + 1; second <= static_cast<std::int64_t>(std::floor(e.t)); ++second) {
+    for (auto second = static_cast<std::int64_t>(std::floor(before)) + 1;
+         second <= static_cast<std::int64_t>(std::floor(e.t)); ++second) {
       const auto slot = static_cast<std::size_t>((((second + ahead) % kPlaces) + kPlaces) % kPlaces);
       place_[slot] = clock;
       place_second_[slot] = second + ahead;
@@ -619,7 +671,8 @@ void PoseFilter::trim() {
   dirty_ -= settled;
 }
 
-// ---- What is known -----------------------------------------------------------------------------------------------------
+// ---- What is known
+// -----------------------------------------------------------------------------------------------------
 
 Motion PoseFilter::motion_at(double t) const {
   const int k = std::min(first_event_after(t), dirty_) - 1;

@@ -4,10 +4,11 @@
 
 // Error-state Kalman filter on SE(3) over a window in which measurements may arrive in any order.
 //
-// The body is the inertial sensor; time is its clock. Nominal state: position and velocity of the sensor in the base frame, orientation,
-// gyro and accelerometer bias, offset and drift of the tracker's clock, and the slow deviation of forward kinematics (flange = fk * Exp(s)).
-// Orientation errors are global, R_true = Exp(dtheta) R (Solà 2017, section 7): with them the transition over a whole segment between two
-// measurements depends on the inertial data through their first and second integral only, so covariances need no step per sample.
+// The body is the inertial sensor; time is its clock. Nominal state: position and velocity of the sensor in the base
+// frame, orientation, gyro and accelerometer bias, offset and drift of the tracker's clock, and the slow deviation of
+// forward kinematics (flange = fk * Exp(s)). Orientation errors are global, R_true = Exp(dtheta) R (Solà 2017, section
+// 7): with them the transition over a whole segment between two measurements depends on the inertial data through their
+// first and second integral only, so covariances need no step per sample.
 
 #include <array>
 #include <cstdint>
@@ -22,7 +23,18 @@
 namespace truing::detail {
 
 /// Places of the error state.
-enum State : int { kP = 0, kV = 3, kTheta = 6, kGyroBias = 9, kAccelBias = 12, kClock = 15, kDrift = 16, kSlowP = 17, kSlowTheta = 20, kStates = 23 };
+enum State : int {
+  kP = 0,
+  kV = 3,
+  kTheta = 6,
+  kGyroBias = 9,
+  kAccelBias = 12,
+  kClock = 15,
+  kDrift = 16,
+  kSlowP = 17,
+  kSlowTheta = 20,
+  kStates = 23
+};
 constexpr double kCoastingAge = 0.2;  ///< without tracker samples for so long, the filter coasts [s]
 using Covariance = Eigen::Matrix<double, kStates, kStates>;
 
@@ -30,27 +42,29 @@ struct Nominal {
   Eigen::Vector3d p = Eigen::Vector3d::Zero(), v = Eigen::Vector3d::Zero();  ///< sensor in the base frame [m], [m/s]
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();                     ///< base from sensor
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
-  double clock = 0.0, drift = 0.0;                                           ///< t_imu = t_tracker - clock
-  Eigen::Vector3d slow_p = Eigen::Vector3d::Zero(), slow_theta = Eigen::Vector3d::Zero();  ///< in the flange of forward kinematics
+  double clock = 0.0, drift = 0.0;  ///< t_imu = t_tracker - clock
+  Eigen::Vector3d slow_p = Eigen::Vector3d::Zero(),
+                  slow_theta = Eigen::Vector3d::Zero();  ///< in the flange of forward kinematics
 };
 
 struct Belief {
   double t = 0.0;
   Nominal x;
   Covariance P = Covariance::Zero();
-  double last_pose = -1e300;  ///< time of the last accepted tracker sample
-  int rejected = 0;           ///< tracker samples rejected in a row
-  double clock_from = 0.0;    ///< before, the clock is considered and not estimated
-  Vector6d sway = Vector6d::Zero();  ///< variance of the deviation from forward kinematics and slow deviation, in the flange [m^2], [rad^2]
+  double last_pose = -1e300;         ///< time of the last accepted tracker sample
+  int rejected = 0;                  ///< tracker samples rejected in a row
+  double clock_from = 0.0;           ///< before, the clock is considered and not estimated
+  Vector6d sway = Vector6d::Zero();  ///< variance of the deviation from forward kinematics and slow deviation, in the
+                                     ///< flange [m^2], [rad^2]
 };
 
 /// What a tracker sample came to when it was last processed.
 struct PoseGrade {
-  double t = 0.0;        ///< where it was placed [s]
-  double nis = 0.0;      ///< normalised innovation squared
-  int dimensions = 0;    ///< 6, or 3 without orientation
+  double t = 0.0;      ///< where it was placed [s]
+  double nis = 0.0;    ///< normalised innovation squared
+  int dimensions = 0;  ///< 6, or 3 without orientation
   bool accepted = false;
-  bool reacquired = false;  ///< accepted only after the covariance had been widened
+  bool reacquired = false;                 ///< accepted only after the covariance had been widened
   Vector6d innovation = Vector6d::Zero();  ///< measured minus predicted, base frame [m], [rad]
   Matrix6d S = Matrix6d::Identity();       ///< its covariance
   Vector6d R = Vector6d::Ones();           ///< variance of the tracker's noise in it
@@ -84,7 +98,8 @@ class PoseFilter {
   Motion motion_at(double t) const;
   /// With covariance, from the last event before.
   Belief belief_at(double t) const;
-  /// Mean variance of a component of position and of velocity at the last event before t, and how long ago the last tracker sample was then.
+  /// Mean variance of a component of position and of velocity at the last event before t, and how long ago the last
+  /// tracker sample was then.
   void sigmas_at(double t, double* position_variance, double* velocity_variance, double* pose_age) const;
   /// Variance of the sway about the slow deviation, per component in the flange of forward kinematics.
   Vector6d sway_variance() const { return (dirty_ == 0 ? base_ : event(dirty_ - 1).after).sway; }
@@ -107,13 +122,16 @@ class PoseFilter {
     Eigen::Vector3d p, v;                        ///< nominal state here, as of the last update
     Eigen::Quaterniond q;
   };
-  struct FlangeRow { double t = 0.0; Eigen::Isometry3d T_base_flange; };
+  struct FlangeRow {
+    double t = 0.0;
+    Eigen::Isometry3d T_base_flange;
+  };
   enum class Kind { mark, pose };
   struct Event {
     double t = 0.0;
     Kind kind = Kind::mark;
-    double stamp = 0.0, place = 0.0;      // t = stamp - place
-    Eigen::Isometry3d T_base_receiver;    // measured
+    double stamp = 0.0, place = 0.0;    // t = stamp - place
+    Eigen::Isometry3d T_base_receiver;  // measured
     bool has_orientation = false;
     PoseGrade grade;
     Belief after;
@@ -155,7 +173,7 @@ class PoseFilter {
   std::int64_t flange_mask_ = 0, flange_count_ = 0;
   std::vector<Event> events_;
   std::vector<int> order_, free_;
-  int dirty_ = 0;             // first event whose belief is not right
+  int dirty_ = 0;  // first event whose belief is not right
   double next_mark_ = 0.0;
   Belief base_;
   bool initialised_ = false, base_is_first_pose_ = false;
@@ -163,7 +181,7 @@ class PoseFilter {
   PoseSample last_pushed_;
   int frozen_ = 0;
   static constexpr int kPlaces = 8;
-  std::array<double, kPlaces> place_{};            // clock offset with which stamps of second k are placed, k modulo kPlaces
+  std::array<double, kPlaces> place_{};  // clock offset with which stamps of second k are placed, k modulo kPlaces
   std::array<std::int64_t, kPlaces> place_second_{};
   std::int64_t placed_until_ = 0;
   std::vector<PoseGrade> grades_;

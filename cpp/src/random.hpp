@@ -19,7 +19,9 @@ class Random {
     return z ^ (z >> 31);
   }
 
-  double uniform(double low, double high) { return low + (high - low) * (static_cast<double>(next() >> 11) * 0x1.0p-53); }
+  double uniform(double low, double high) {
+    return low + (high - low) * (static_cast<double>(next() >> 11) * 0x1.0p-53);
+  }
 
   /// Standard normal (Box and Muller 1958).
   double normal() {

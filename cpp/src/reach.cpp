@@ -56,7 +56,8 @@ const InverseOptions& valid(const InverseOptions& options) {
   return options;
 }
 
-/// Steps of the additive recurrence x_k = frac(1/2 + k a), a_j = g^-(j+1), g^(n+1) = g + 1: the generalised golden ratio (Roberts 2018).
+/// Steps of the additive recurrence x_k = frac(1/2 + k a), a_j = g^-(j+1), g^(n+1) = g + 1: the generalised golden
+/// ratio (Roberts 2018).
 void golden_steps(int n, double* step) {
   double g = 2.0;
   for (int i = 0; i < 60; ++i) g = std::pow(1.0 + g, 1.0 / (n + 1));
@@ -66,7 +67,8 @@ void golden_steps(int n, double* step) {
 
 }  // namespace
 
-Reach::Reach(const Robot& robot, const InverseOptions& o, const Conditions& c, std::size_t target, const std::vector<Effect>& own)
+Reach::Reach(const Robot& robot, const InverseOptions& o, const Conditions& c, std::size_t target,
+             const std::vector<Effect>& own)
     : options(valid(o)),
       conditions(c),
       arm(robot, c, target, own),
@@ -102,7 +104,8 @@ bool Reach::check(Search* search, const double* readings, Solution* solution) co
     solution->contact_distance = pair.distance + options.scene.clearance;
     if (pair.distance < 0.0) {
       solution->reason = Reason::interference;
-      if (search->interfering.joints.size() == 0 || solution->contact_distance > search->interfering.contact_distance) search->interfering = *solution;
+      if (search->interfering.joints.size() == 0 || solution->contact_distance > search->interfering.contact_distance)
+        search->interfering = *solution;
       return false;
     }
   }
@@ -119,7 +122,8 @@ double Reach::distance2(const double* a, const double* b) const {
   return sum;
 }
 
-// ---- Descents --------------------------------------------------------------------------------------------------------
+// ---- Descents
+// --------------------------------------------------------------------------------------------------------
 
 Descent Reach::descent_from(Search* search, const double* from, const DescentOptions& how) const {
   Descent descent;
@@ -129,7 +133,8 @@ Descent Reach::descent_from(Search* search, const double* from, const DescentOpt
   return descent;
 }
 
-/// Seed k of those that restarts begin from: evenly over the joints' ranges, of unlimited ones over a turn or the arm's reach.
+/// Seed k of those that restarts begin from: evenly over the joints' ranges, of unlimited ones over a turn or the arm's
+/// reach.
 void Reach::restart_seed(int k, const double* around, double* seed) const {
   for (int j = 0; j < driven(); ++j) {
     const double half = kPi * scales.joint[j];
@@ -168,10 +173,11 @@ bool Reach::descend_from_many(Search* search, int restarts, Solution* solution) 
   return false;
 }
 
-// ---- Closed form -----------------------------------------------------------------------------------------------------
+// ---- Closed form
+// -----------------------------------------------------------------------------------------------------
 
-/// What the closed form knows of a pose with the rails there, nearest to the seed first; `slack`: how far beyond limits they
-/// may lie.
+/// What the closed form knows of a pose with the rails there, nearest to the seed first; `slack`: how far beyond limits
+/// they may lie.
 int Reach::candidates(Search* search, const Goal& pose, const double* rails, double slack, Candidate* found) const {
   Configuration all[ClosedForm::kMost];
   double from[kMaxDrivenJoints];
@@ -197,21 +203,23 @@ int Reach::candidates(Search* search, const Goal& pose, const double* rails, dou
   return kept;
 }
 
-/// Above det J in Cramer's rule for Newton's step of one joint: det [J, the error in place of that joint's column]. Zero where the
-/// other joints alone take the error away.
+/// Above det J in Cramer's rule for Newton's step of one joint: det [J, the error in place of that joint's column].
+/// Zero where the other joints alone take the error away.
 double Reach::newton_numerator(const Goal& pose, const double* readings, int joint, EffectScratch* scratch) const {
   Columns columns;
   const Tip tip = arm.tip(readings, scratch, &columns);
   columns.linear[joint] = pose.position - tip.position;
   columns.angular[joint] = rotation_between(tip.rotation, pose.rotation);
   Eigen::Matrix<double, 6, 6> J;
-  for (int j = 0; j < 6; ++j) J.col(j) << columns.linear[closed.rails() + j] / scales.length, columns.angular[closed.rails() + j];
+  for (int j = 0; j < 6; ++j)
+    J.col(j) << columns.linear[closed.rails() + j] / scales.length, columns.angular[closed.rails() + j];
   return J.determinant();
 }
 
-/// Round a circle of seeds Newton's step of the joint that goes round passes through zero near every configuration that the robot
-/// has there: seeds are moved to these zeros, and those beside a place that is missing stay.
-void Reach::choose_on_circles(const Goal& pose, const double* from, Configuration* all, int count, EffectScratch* scratch, bool* worth) const {
+/// Round a circle of seeds Newton's step of the joint that goes round passes through zero near every configuration that
+/// the robot has there: seeds are moved to these zeros, and those beside a place that is missing stay.
+void Reach::choose_on_circles(const Goal& pose, const double* from, Configuration* all, int count,
+                              EffectScratch* scratch, bool* worth) const {
   int at[ClosedForm::kCircles][ClosedForm::kMostPlaces];
   double value[ClosedForm::kMost];
   Configuration moved[ClosedForm::kMost];
@@ -238,7 +246,8 @@ void Reach::choose_on_circles(const Goal& pose, const double* from, Configuratio
     } else if ((value[k] < 0.0) != (value[next] < 0.0)) {
       worth[k] = true;
       const double share = value[k] / (value[k] - value[next]);
-      for (int i = 0; i < 6; ++i) moved[k].angle[i] += share * std::remainder(all[next].angle[i] - all[k].angle[i], 2.0 * kPi);
+      for (int i = 0; i < 6; ++i)
+        moved[k].angle[i] += share * std::remainder(all[next].angle[i] - all[k].angle[i], 2.0 * kPi);
     } else {
       // It may touch zero between places: where its size is least, and small.
       const bool least = std::abs(value[k]) < std::abs(value[before]) && std::abs(value[k]) <= std::abs(value[next]);
@@ -251,7 +260,8 @@ void Reach::choose_on_circles(const Goal& pose, const double* from, Configuratio
   }
 }
 
-/// A candidate carried over to the robot as it is, rails and limits aside; then the turns nearest to the seed within limits.
+/// A candidate carried over to the robot as it is, rails and limits aside; then the turns nearest to the seed within
+/// limits.
 bool Reach::polish(Search* search, const Candidate& candidate, Solution* solution) const {
   solution->branch = candidate.branch;
   constexpr double kGood = 1e-10;  // of what closed forms give away from singularities
@@ -289,10 +299,11 @@ bool Reach::finish(Search* search, Descent descent, Solution* solution) const {
   return check(search, readings, solution);
 }
 
-/// A descent that ended at a singularity, e != 0 there, may have its answer beside it. Lyapunov-Schmidt: with J v = 0 and u J = 0 all
-/// but u e can be taken away by the other motions, and u e(q + s v) = c + b s + a s^2 has its zeros where the answers are; or there are none.
+/// A descent that ended at a singularity, e != 0 there, may have its answer beside it. Lyapunov-Schmidt: with J v = 0
+/// and u J = 0 all but u e can be taken away by the other motions, and u e(q + s v) = c + b s + a s^2 has its zeros
+/// where the answers are; or there are none.
 void Reach::leave_singularity(Search* search, const double* seed, const DescentOptions& how, Descent* descent) const {
-  constexpr double kNear = 1e-3;  // of the cost
+  constexpr double kNear = 1e-3;                   // of the cost
   constexpr double kProbe = 0.1, kFurthest = 1.5;  // [rad]
   if (descent->cost > kNear) return;
   double still[kMaxDrivenJoints];
@@ -304,7 +315,8 @@ void Reach::leave_singularity(Search* search, const double* seed, const DescentO
     double readings[kMaxDrivenJoints];
     beside(s, readings);
     const Tip tip = arm.tip(readings, search->scratch);
-    return u.head<3>().dot(search->goal.position - tip.position) / scales.length + u.tail<3>().dot(rotation_between(tip.rotation, search->goal.rotation));
+    return u.head<3>().dot(search->goal.position - tip.position) / scales.length +
+           u.tail<3>().dot(rotation_between(tip.rotation, search->goal.rotation));
   };
   const double c = left(0.0), plus = left(kProbe), minus = left(-kProbe);
   const double a = 0.5 * (plus + minus - 2.0 * c) / (kProbe * kProbe), b = 0.5 * (plus - minus) / kProbe;
@@ -312,7 +324,8 @@ void Reach::leave_singularity(Search* search, const double* seed, const DescentO
   if (!(discriminant > 0.0)) return;
   // The zero on the side that the seed came from first: the other one is its twin's.
   double side = 0.0;
-  for (int j = 0; j < driven(); ++j) side += (seed[j] - descent->readings[j]) * still[j] / (scales.joint[j] * scales.joint[j]);
+  for (int j = 0; j < driven(); ++j)
+    side += (seed[j] - descent->readings[j]) * still[j] / (scales.joint[j] * scales.joint[j]);
   const double half = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
   const double zero[2] = {half / a, c / half};
   const int first = side * zero[0] > side * zero[1] ? 0 : 1;
@@ -340,10 +353,12 @@ bool Reach::solve_by_branches(Search* search, Solution* solution) const {
 
 Goal pose_at_roll(const Goal& goal, double roll) {
   const auto nearest_to_zero = [](const Window& window) { return std::clamp(0.0, window.lower, window.upper); };
-  const Vector3d leant = std::tan(nearest_to_zero(goal.lead)) * goal.travel + std::tan(nearest_to_zero(goal.work)) * goal.across + goal.axis;
+  const Vector3d leant = std::tan(nearest_to_zero(goal.lead)) * goal.travel +
+                         std::tan(nearest_to_zero(goal.work)) * goal.across + goal.axis;
   Goal pose = goal;
   pose.kind = TaskKind::pose;
-  pose.rotation = goal.rotation * Eigen::Quaterniond::FromTwoVectors(goal.axis, leant) * Eigen::AngleAxisd(roll, goal.axis);
+  pose.rotation =
+      goal.rotation * Eigen::Quaterniond::FromTwoVectors(goal.axis, leant) * Eigen::AngleAxisd(roll, goal.axis);
   return pose;
 }
 
@@ -364,15 +379,20 @@ bool Reach::solve_by_rolls(Search* search, Solution* solution) const {
   return false;
 }
 
-// ---- One answer ------------------------------------------------------------------------------------------------------
+// ---- One answer
+// ------------------------------------------------------------------------------------------------------
 
 bool Reach::solve_once(Search* search, Solution* solution) const {
   const Goal& goal = search->goal;
-  if (options.choose != Choose::nearest && (solve_for_best(search, solution) || solve_for_best_of_many(search, solution))) return true;
+  if (options.choose != Choose::nearest &&
+      (solve_for_best(search, solution) || solve_for_best_of_many(search, solution)))
+    return true;
   if (goal.kind == TaskKind::pose && closed && solve_by_branches(search, solution)) return true;
   // Without rails an exact closed form has said all there is to say, but for configurations at the rim of what exists.
-  const bool said_all = goal.kind == TaskKind::pose && closed.exact() && closed && closed.rails() == 0 && limits.passive.empty();
-  if (descend_from_many(search, said_all ? std::min(options.max_restarts, 8) : options.max_restarts, solution)) return true;
+  const bool said_all =
+      goal.kind == TaskKind::pose && closed.exact() && closed && closed.rails() == 0 && limits.passive.empty();
+  if (descend_from_many(search, said_all ? std::min(options.max_restarts, 8) : options.max_restarts, solution))
+    return true;
   return goal.kind == TaskKind::torch && closed && solve_by_rolls(search, solution);
 }
 
@@ -409,7 +429,8 @@ bool Reach::solve_at_preferred_roll(Search* search, Solution* solution) const {
   return true;
 }
 
-/// The goal moved along its direction of retreat, by the least that frees it: doubled steps until it is free, then halved ones.
+/// The goal moved along its direction of retreat, by the least that frees it: doubled steps until it is free, then
+/// halved ones.
 bool Reach::retreat(Search* search, Solution* solution) const {
   const Goal& goal = search->goal;
   if (!(goal.longest_retreat > 0.0) || search->interfering.joints.size() == 0) return false;
@@ -473,7 +494,8 @@ void Reach::branches(Search* search, Branches* found) const {
     for (int k = 0; k < found->count; ++k) {
       if ((found->solution[static_cast<std::size_t>(k)].joints - solution.joints).cwiseAbs().maxCoeff() < kSame) return;
     }
-    if (found->count < static_cast<int>(found->solution.size())) found->solution[static_cast<std::size_t>(found->count++)] = solution;
+    if (found->count < static_cast<int>(found->solution.size()))
+      found->solution[static_cast<std::size_t>(found->count++)] = solution;
   };
   if (closed) {
     Candidate all[ClosedForm::kMost];

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The machinery of InverseSolver: candidates from the closed form, descents, the check of what comes out, why it failed.
+// The machinery of InverseSolver: candidates from the closed form, descents, the check of what comes out, why it
+// failed.
 
 #include <algorithm>
 #include <cmath>
@@ -20,8 +21,10 @@
 
 namespace truing::detail {
 
-constexpr double kLimitRounding = 1e-9;  ///< a reading so far beyond its limit is rounding, and set to the limit [rad | m]
-constexpr double kNearLimit = 0.02;      ///< a seed so far beyond may lead to joints within: the robot is not quite the closed form's
+constexpr double kLimitRounding =
+    1e-9;  ///< a reading so far beyond its limit is rounding, and set to the limit [rad | m]
+constexpr double kNearLimit =
+    0.02;  ///< a seed so far beyond may lead to joints within: the robot is not quite the closed form's
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxDrivenJoints, kMaxDrivenJoints>;
@@ -59,7 +62,7 @@ struct Search {
   const Goal& goal;
   const double* seed;
   EffectScratch* scratch;
-  bool by_way = false;   ///< approach directions are those of the way from the seed
+  bool by_way = false;  ///< approach directions are those of the way from the seed
   int iterations = 0;
   Descent nearest{};       ///< of all descents within limits the one that came nearest
   Solution interfering{};  ///< of what would be there but for an interference the least deep; joints empty: none
@@ -75,7 +78,8 @@ struct Box {
 
 class Reach {
  public:
-  Reach(const Robot& robot, const InverseOptions& options, const Conditions& conditions, std::size_t target, const std::vector<Effect>& own);
+  Reach(const Robot& robot, const InverseOptions& options, const Conditions& conditions, std::size_t target,
+        const std::vector<Effect>& own);
 
   const InverseOptions options;
   const Conditions conditions;
@@ -95,10 +99,10 @@ class Reach {
   /// All answers that the closed form knows of, or many descents find.
   void branches(Search* search, Branches* found) const;
   /// Joints along a chain of goals; `scratch` as for one solve; `by_way`: approach directions are those of the path.
-  Path path(const std::vector<Goal>& goals, const double* seed, const PathOptions& how, EffectScratch* scratch, bool by_way,
-            const std::function<bool(std::size_t)>& progress) const;
-  /// Where effects ask for the direction that a joint came from and nobody said: the way from the seed. An answer changes the
-  /// ways, and the ways the answer, by no more than the play: a few rounds settle it.
+  Path path(const std::vector<Goal>& goals, const double* seed, const PathOptions& how, EffectScratch* scratch,
+            bool by_way, const std::function<bool(std::size_t)>& progress) const;
+  /// Where effects ask for the direction that a joint came from and nobody said: the way from the seed. An answer
+  /// changes the ways, and the ways the answer, by no more than the play: a few rounds settle it.
   void settle_directions(Search* search, Solution* solution) const;
 
   /// The independent check: forward once more, task, limits, interference. Fills errors and roll; true: reached.
@@ -115,7 +119,8 @@ class Reach {
   void restart_seed(int k, const double* around, double* seed) const;
   int candidates(Search* search, const Goal& pose, const double* rails, double slack, Candidate* found) const;
   double newton_numerator(const Goal& pose, const double* readings, int joint, EffectScratch* scratch) const;
-  void choose_on_circles(const Goal& pose, const double* rails, Configuration* all, int count, EffectScratch* scratch, bool* worth) const;
+  void choose_on_circles(const Goal& pose, const double* rails, Configuration* all, int count, EffectScratch* scratch,
+                         bool* worth) const;
   bool polish(Search* search, const Candidate& candidate, Solution* solution) const;
   bool finish(Search* search, Descent descent, Solution* solution) const;
   void leave_singularity(Search* search, const double* seed, const DescentOptions& how, Descent* descent) const;
@@ -137,10 +142,12 @@ class Reach {
 
   // path.cpp
   struct Node;
-  void sample(const Goal& goal, const double* seed, const PathOptions& how, EffectScratch* scratch, std::vector<Node>* nodes) const;
+  void sample(const Goal& goal, const double* seed, const PathOptions& how, EffectScratch* scratch,
+              std::vector<Node>* nodes) const;
   double step_cost(const double* from, const double* to, const PathOptions& how, double slack) const;
   double turn_of(int joint) const;
-  void even_out(const std::vector<Goal>& goals, const PathOptions& how, EffectScratch* scratch, std::vector<Joints>* joints) const;
+  void even_out(const std::vector<Goal>& goals, const PathOptions& how, EffectScratch* scratch,
+                std::vector<Joints>* joints) const;
 
   // why_not.cpp
   void explain(Search* search, Solution* solution) const;

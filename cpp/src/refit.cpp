@@ -22,9 +22,12 @@ std::vector<double> held_out_lengths(const Design& design, const Evidence::State
   std::vector<double> out;
   std::int32_t last = -1;
   for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
-    if (design.fold[static_cast<std::size_t>(i)] < design.folds || kind_of(design.component[static_cast<std::size_t>(i)]) == 1) continue;
+    if (design.fold[static_cast<std::size_t>(i)] < design.folds ||
+        kind_of(design.component[static_cast<std::size_t>(i)]) == 1)
+      continue;
     double e = design.y[i];
-    for (std::size_t c = 0; c < state.columns.size(); ++c) e -= design.x(i, state.columns[c]) * state.solution[static_cast<Eigen::Index>(c)];
+    for (std::size_t c = 0; c < state.columns.size(); ++c)
+      e -= design.x(i, state.columns[c]) * state.solution[static_cast<Eigen::Index>(c)];
     const std::int32_t row = design.row[static_cast<std::size_t>(i)];
     if (row != last) out.push_back(0.0);
     last = row;
@@ -37,7 +40,8 @@ std::vector<double> held_out_lengths(const Design& design, const Evidence::State
 Share percentile_interval(std::vector<double> values, double center) {
   Share out{center, center, center};
   if (values.size() < 5) return out;
-  // Folds are few and whole: their spread is a little less than that of poses (measured by the examination, docs/exam.md).
+  // Folds are few and whole: their spread is a little less than that of poses (measured by the examination,
+  // docs/exam.md).
   constexpr double kWider = 1.25;
   const double median = quantile(&values, 0.5);
   out.low = center + kWider * (quantile(&values, 0.05) - median);
@@ -49,11 +53,14 @@ Share percentile_interval(std::vector<double> values, double center) {
 static double solution_of(const Work& work, const Evidence::State& state, const std::string& name) {
   const int column = work.design.column(name);
   const auto at = std::find(state.columns.begin(), state.columns.end(), column) - state.columns.begin();
-  return column >= 0 && at < static_cast<std::ptrdiff_t>(state.columns.size()) ? state.solution[static_cast<Eigen::Index>(at)] : 0.0;
+  return column >= 0 && at < static_cast<std::ptrdiff_t>(state.columns.size())
+             ? state.solution[static_cast<Eigen::Index>(at)]
+             : 0.0;
 }
 
 /// The chosen groups fitted without linearisation on the training rows.
-static Refit refit_with(const Work& work, const Robot& robot, const Evidence::State& state, const std::vector<int>& groups, bool hold_moments) {
+static Refit refit_with(const Work& work, const Robot& robot, const Evidence::State& state,
+                        const std::vector<int>& groups, bool hold_moments) {
   Refit out;
   Robot start = robot;
   IdentifyOptions options;
@@ -68,27 +75,33 @@ static Refit refit_with(const Work& work, const Robot& robot, const Evidence::St
   for (const int g : groups) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     options.free.insert(options.free.end(), e.model_free.begin(), e.model_free.end());
-    const bool many = std::any_of(e.requests.begin(), e.requests.end(), [](const EffectRequest& request) { return request.effect == "gravity_moment"; });
+    const bool many = std::any_of(e.requests.begin(), e.requests.end(),
+                                  [](const EffectRequest& request) { return request.effect == "gravity_moment"; });
     if (many && hold_moments) {
-      // First moments of unknown weights are many and hardly told apart: they stay as the search found them, under its prior.
+      // First moments of unknown weights are many and hardly told apart: they stay as the search found them, under its
+      // prior.
       for (const EffectRequest& request : e.requests) {
         AppliedEffect applied{request.effect, request.joints, {}};
         for (const std::string& name : e.parameters) {
-          if (name.compare(0, request.effect.size() + 1, request.effect + ".") == 0) applied.parameters[name] = solution_of(work, state, name);
+          if (name.compare(0, request.effect.size() + 1, request.effect + ".") == 0)
+            applied.parameters[name] = solution_of(work, state, name);
         }
         start.effects.push_back(std::move(applied));
       }
       continue;
     }
     for (const EffectRequest& request : e.requests) {
-      if (request.effect == "gear_ratio" || request.effect == "joint_offset" || request.effect == "link_geometry") continue;
-      if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second) options.effects.push_back(request);
+      if (request.effect == "gear_ratio" || request.effect == "joint_offset" || request.effect == "link_geometry")
+        continue;
+      if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second)
+        options.effects.push_back(request);
     }
     if (e.kind == Kind::law || e.kind == Kind::free || e.kind == Kind::drift) {
       const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(g)].columns;
       Eigen::VectorXd coefficients(static_cast<Eigen::Index>(columns.size()));
       for (Eigen::Index k = 0; k < coefficients.size(); ++k) {
-        const auto at = std::find(state.columns.begin(), state.columns.end(), columns[static_cast<std::size_t>(k)]) - state.columns.begin();
+        const auto at = std::find(state.columns.begin(), state.columns.end(), columns[static_cast<std::size_t>(k)]) -
+                        state.columns.begin();
         coefficients[k] = state.solution[static_cast<Eigen::Index>(at)];
       }
       options.own_effects.push_back(free_effect(e, coefficients, work.inputs));
@@ -98,9 +111,13 @@ static Refit refit_with(const Work& work, const Robot& robot, const Evidence::St
   // One request an effect, with all of its joints.
   std::vector<EffectRequest> merged;
   for (const EffectRequest& request : options.effects) {
-    auto same = std::find_if(merged.begin(), merged.end(), [&](const EffectRequest& other) { return other.effect == request.effect && !other.joints.empty(); });
-    if (same != merged.end() && !request.joints.empty()) same->joints.insert(same->joints.end(), request.joints.begin(), request.joints.end());
-    else merged.push_back(request);
+    auto same = std::find_if(merged.begin(), merged.end(), [&](const EffectRequest& other) {
+      return other.effect == request.effect && !other.joints.empty();
+    });
+    if (same != merged.end() && !request.joints.empty())
+      same->joints.insert(same->joints.end(), request.joints.begin(), request.joints.end());
+    else
+      merged.push_back(request);
   }
   options.effects = merged;
   out.own = options.own_effects;
@@ -113,7 +130,8 @@ static Refit refit_with(const Work& work, const Robot& robot, const Evidence::St
 Refit refit(const Work& work, const Robot& robot, const Evidence::State& state, const std::vector<int>& groups) {
   Refit out = refit_with(work, robot, state, groups, true);
   // Moments that lean on geometry which the fit holds elsewhere do not fit there: then they are fitted with it.
-  if (out.found.train.after.median > work.frames.train.after.median) out = refit_with(work, robot, state, groups, false);
+  if (out.found.train.after.median > work.frames.train.after.median)
+    out = refit_with(work, robot, state, groups, false);
   return out;
 }
 
@@ -147,8 +165,10 @@ Repeats noise_of_repeats(const Measurements& data) {
     key.push_back(data.payload ? data.payload[row] : 0.0);
     key.push_back(data.target.empty() ? 0.0 : data.target[row]);
     key.push_back(data.has_distance(row) ? 1.0 : 3.0);
-    if (data.has_distance(row)) same[std::move(key)].insert({data.distance[row]});
-    else same[std::move(key)].insert({data.position[0][row], data.position[1][row], data.position[2][row]});
+    if (data.has_distance(row))
+      same[std::move(key)].insert({data.distance[row]});
+    else
+      same[std::move(key)].insert({data.position[0][row], data.position[1][row], data.position[2][row]});
   }
   Repeats out;
   double sum = 0.0;
@@ -166,11 +186,13 @@ Repeats noise_of_repeats(const Measurements& data) {
   return out;
 }
 
-/// By how many standard errors held-out errors exceed the noise that repeats show, and the 5 % that fitting a few frames may add.
-/// Of medians: a few rows far out are no lack of fit.
-double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set, const Repeats& repeats) {
+/// By how many standard errors held-out errors exceed the noise that repeats show, and the 5 % that fitting a few
+/// frames may add. Of medians: a few rows far out are no lack of fit.
+double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set,
+                   const Repeats& repeats) {
   constexpr double kFitted = 0.05;
-  constexpr double kSpread[2] = {0.562, 1.166};  // sqrt(n) standard errors of the logarithm of a median length: 3 components, 1
+  constexpr double kSpread[2] = {
+      0.562, 1.166};  // sqrt(n) standard errors of the logarithm of a median length: 3 components, 1
   std::vector<double> sigmas;
   bool distances = false;
   for (std::size_t row = 0; row < lengths.size(); ++row) {
@@ -184,8 +206,10 @@ double lack_of_fit(const Measurements& data, const std::vector<double>& lengths,
   return (std::log(std::max(median_of(sigmas), 1e-300) / repeats.sigma) - kFitted) / error;
 }
 
-std::vector<std::int32_t> thinned_rows(const Measurements& data, const std::vector<std::int32_t>& cluster, std::size_t most) {
-  const std::size_t clusters = cluster.empty() ? 0 : static_cast<std::size_t>(*std::max_element(cluster.begin(), cluster.end())) + 1;
+std::vector<std::int32_t> thinned_rows(const Measurements& data, const std::vector<std::int32_t>& cluster,
+                                       std::size_t most) {
+  const std::size_t clusters =
+      cluster.empty() ? 0 : static_cast<std::size_t>(*std::max_element(cluster.begin(), cluster.end())) + 1;
   std::vector<std::int32_t> rows;
   for (std::size_t row = 0; row < data.rows; ++row) {
     if (data.weight && data.weight[row] == 0.0) continue;
@@ -242,7 +266,8 @@ Measurements subset_of(const Measurements& data, const std::vector<std::int32_t>
 }
 
 /// Own effects may look values up by row: of the whole data, not of the subset.
-std::vector<Effect> mapped(const std::vector<Effect>& own, const Measurements& whole, const std::vector<std::int32_t>& rows) {
+std::vector<Effect> mapped(const std::vector<Effect>& own, const Measurements& whole,
+                           const std::vector<std::int32_t>& rows) {
   std::vector<Effect> out = own;
   for (Effect& effect : out) {
     effect.terms = [terms = effect.terms, &whole, &rows](const Robot& robot, std::size_t joint, const Measurements&) {

@@ -16,10 +16,11 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
 
 Eigen::Isometry3d register_points(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
   const Eigen::Vector3d from_mean = from.rowwise().mean(), to_mean = to.rowwise().mean();
-  const Eigen::Matrix3d covariance = (to.colwise() - to_mean) * (from.colwise() - from_mean).transpose();  // eq. (38), but for 1/n
+  const Eigen::Matrix3d covariance =
+      (to.colwise() - to_mean) * (from.colwise() - from_mean).transpose();  // eq. (38), but for 1/n
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = nearest_rotation(covariance);                    // eq. (40)
-  T.translation() = to_mean - T.linear() * from_mean;           // eq. (41)
+  T.linear() = nearest_rotation(covariance);           // eq. (40)
+  T.translation() = to_mean - T.linear() * from_mean;  // eq. (41)
   return T;
 }
 

@@ -6,7 +6,8 @@
 
 namespace truing::detail {
 
-/// The rigid frame T that makes T * from nearest to `to` in least squares: Umeyama 1991, eqs. (38)-(42), without scale. shape=(3, n)
+/// The rigid frame T that makes T * from nearest to `to` in least squares: Umeyama 1991, eqs. (38)-(42), without scale.
+/// shape=(3, n)
 Eigen::Isometry3d register_points(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to);
 
 /// The rotation nearest to a 3x3 matrix in the Frobenius norm: U diag(1, 1, det(U V^T)) V^T.

@@ -44,8 +44,8 @@ Isometry3d mdh_frame(double theta, double d, double a, double alpha, double beta
 }
 
 Isometry3d urdf_frame(const Joint& joint, double motion) {
-  return joint.T_parent_joint * (joint.type == JointType::revolute ? rotation_about(joint.axis, motion)
-                                                                   : shift_along(joint.axis, motion));
+  return joint.T_parent_joint *
+         (joint.type == JointType::revolute ? rotation_about(joint.axis, motion) : shift_along(joint.axis, motion));
 }
 
 // From the frame before a joint to the frame after its link.
@@ -84,8 +84,7 @@ void require_no_circle(const Robot& robot, std::size_t index, std::size_t depth)
   throw std::invalid_argument("joint '" + robot.joints[index].name + "': driven_by goes round in a circle");
 }
 
-double motion_of(const Robot& robot, std::size_t index, const Eigen::VectorXd& all_readings,
-                 std::size_t depth) {
+double motion_of(const Robot& robot, std::size_t index, const Eigen::VectorXd& all_readings, std::size_t depth) {
   require_no_circle(robot, index, depth);
   const Joint& joint = robot.joints[index];
   if (!joint.passive()) return joint.ratio * all_readings[static_cast<Eigen::Index>(index)] + joint.offset;
@@ -111,8 +110,7 @@ Eigen::RowVectorXd coupling_row(const Robot& robot, std::size_t index, std::size
 }
 
 void require_finite(const std::string& where, const char* name, double value) {
-  if (!std::isfinite(value))
-    refuse(where, std::string(name) + " is " + number(value) + ", expected a finite number");
+  if (!std::isfinite(value)) refuse(where, std::string(name) + " is " + number(value) + ", expected a finite number");
 }
 
 void require_frame(const std::string& where, const char* name, const Isometry3d& T) {
@@ -121,8 +119,8 @@ void require_frame(const std::string& where, const char* name, const Isometry3d&
   const bool is_rotation = (R.transpose() * R).isIdentity(1e-6) && R.determinant() > 0.0;
   const bool is_rigid = (T.matrix().row(3) - Eigen::RowVector4d::Unit(3)).isZero(1e-12);
   if (!is_rotation || !is_rigid) {
-    refuse(where, std::string(name) +
-                      " is not a rigid transform: its rotation part must be orthonormal and right-handed");
+    refuse(where,
+           std::string(name) + " is not a rigid transform: its rotation part must be orthonormal and right-handed");
   }
 }
 
@@ -139,8 +137,7 @@ void validate_joint(const Joint& joint, Convention convention) {
     require_frame(where, "T_parent_joint", joint.T_parent_joint);
     const double length = joint.axis.norm();
     if (!(std::abs(length - 1.0) <= 1e-9)) {
-      refuse(where,
-             "axis has length " + number(length, 12) + ", expected a unit vector: divide it by its length");
+      refuse(where, "axis has length " + number(length, 12) + ", expected a unit vector: divide it by its length");
     }
   }
   for (const auto& [driver, weight] : joint.driven_by) {
@@ -164,8 +161,7 @@ void validate_names(const Robot& robot) {
   const auto take = [&taken](const std::string& kind, std::size_t number_from_1, const std::string& name) {
     if (name.empty()) refuse(kind + " " + std::to_string(number_from_1), "has no name");
     if (name == "base" || name == "anchor") {
-      refuse(kind + " '" + name + "'",
-             "this name is kept for parameters such as base.x and anchor.zero: rename it");
+      refuse(kind + " '" + name + "'", "this name is kept for parameters such as base.x and anchor.zero: rename it");
     }
     if (!taken.insert(name).second) refuse(kind + " '" + name + "'", "this name is used twice: rename one");
   };
@@ -174,15 +170,13 @@ void validate_names(const Robot& robot) {
 }
 
 // Depth first along `driven_by`; `path` is how we came here, `done` the joints known to be sound.
-void validate_drivers(const Robot& robot, std::size_t index, std::vector<std::string> path,
-                      std::vector<bool>& done) {
+void validate_drivers(const Robot& robot, std::size_t index, std::vector<std::string> path, std::vector<bool>& done) {
   const Joint& joint = robot.joints[index];
   const std::string where = "joint '" + joint.name + "'";
   for (const std::string& earlier : path) {
     if (earlier == joint.name) {
       path.push_back(joint.name);
-      refuse(where,
-             "driven_by goes round in a circle (" + listed(path) + "); one of them must have a reading");
+      refuse(where, "driven_by goes round in a circle (" + listed(path) + "); one of them must have a reading");
     }
   }
   if (done[index]) return;
@@ -194,8 +188,7 @@ void validate_drivers(const Robot& robot, std::size_t index, std::vector<std::st
       known = true;
       validate_drivers(robot, i, path, done);
     }
-    if (!known)
-      refuse(where, "driven_by names '" + driver.first + "', but the joints are " + joint_names(robot));
+    if (!known) refuse(where, "driven_by names '" + driver.first + "', but the joints are " + joint_names(robot));
   }
   done[index] = true;
 }
@@ -229,8 +222,7 @@ std::size_t Robot::joint_index(const std::string& joint_name) const {
   for (std::size_t i = 0; i < joints.size(); ++i) {
     if (joints[i].name == joint_name) return i;
   }
-  throw std::invalid_argument("joint '" + joint_name + "' does not exist; the joints are " +
-                              joint_names(*this));
+  throw std::invalid_argument("joint '" + joint_name + "' does not exist; the joints are " + joint_names(*this));
 }
 
 void validate(const Robot& robot) {
@@ -308,8 +300,8 @@ std::vector<Eigen::Isometry3d> forward_kinematics(const Robot& robot, const Eige
   frames.reserve(robot.joints.size() + 1);
   Isometry3d T_measurement_link = robot.T_measurement_base;
   for (std::size_t i = 0; i < robot.joints.size(); ++i) {
-    T_measurement_link = T_measurement_link *
-                         joint_frame(robot.convention, robot.joints[i], motion[static_cast<Eigen::Index>(i)]);
+    T_measurement_link =
+        T_measurement_link * joint_frame(robot.convention, robot.joints[i], motion[static_cast<Eigen::Index>(i)]);
     frames.push_back(T_measurement_link);
   }
   frames.push_back(T_measurement_link * T_last_target);

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Rotation vectors and quaternions (Hamilton, w x y z). Equation numbers: Solà, "Quaternion kinematics for the error-state Kalman
-// filter", 2017 (arXiv 1711.02508).
+// Rotation vectors and quaternions (Hamilton, w x y z). Equation numbers: Solà, "Quaternion kinematics for the
+// error-state Kalman filter", 2017 (arXiv 1711.02508).
 
 #include <cmath>
 

@@ -89,7 +89,9 @@ void find_duplicates(const Measurements& data, std::vector<SanityFinding>* findi
   if (twice.empty()) return;
   SanityFinding finding;
   finding.kind = "duplicates";
-  finding.text = std::to_string(twice.size()) + " rows repeat another row to the last digit, joints and measurement: they are copies, not repeats, and make noise look smaller than it is. Remove them.";
+  finding.text = std::to_string(twice.size()) +
+                 " rows repeat another row to the last digit, joints and measurement: they are copies, not repeats, "
+                 "and make noise look smaller than it is. Remove them.";
   if (twice.size() <= 50) finding.rows = twice;
   findings->push_back(finding);
 }
@@ -116,20 +118,24 @@ void choose_record(const Robot& robot, const DiagnoseOptions& options, Checked* 
   std::vector<std::vector<double>> other = second_record(out->data, out->data.joints.size(), robot);
   if (other.empty()) return;
   const Measurements alternative = with_joints(out->data, std::move(other));
-  const double first = median_error(robot, out->data, options, true), second = median_error(robot, alternative, options, true);
+  const double first = median_error(robot, out->data, options, true),
+               second = median_error(robot, alternative, options, true);
   SanityFinding finding;
   finding.kind = "joint_record";
   const double ratio = first / std::max(second, 1e-12);
   if (ratio > 1.1) {
-    finding.text = "the second record of the joints (qr) explains the measurements better than the first (q): median " + in_millimetres(second) + " against " + in_millimetres(first) +
+    finding.text = "the second record of the joints (qr) explains the measurements better than the first (q): median " +
+                   in_millimetres(second) + " against " + in_millimetres(first) +
                    " after geometry. The diagnosis goes on with qr.";
     out->data = alternative;
     out->joint_record = "qr";
   } else if (ratio < 1.0 / 1.1) {
-    finding.text = "the two records of the joints differ, and the first (q) explains the measurements better: median " + in_millimetres(first) + " against " + in_millimetres(second) +
+    finding.text = "the two records of the joints differ, and the first (q) explains the measurements better: median " +
+                   in_millimetres(first) + " against " + in_millimetres(second) +
                    " after geometry. The diagnosis goes on with q; was the other read before the arm had settled?";
   } else {
-    finding.text = "the two records of the joints (q, qr) explain the measurements equally well; the diagnosis goes on with q.";
+    finding.text =
+        "the two records of the joints (q, qr) explain the measurements equally well; the diagnosis goes on with q.";
   }
   out->findings.push_back(finding);
 }
@@ -147,7 +153,8 @@ void try_orders(const Robot& robot, const DiagnoseOptions& options, double sprea
     if (error >= best) return;
     best = error;
     finding.kind = kind;
-    finding.text = text + " explains the measurements far better: median " + in_millimetres(error) + " against " + in_millimetres(as_is) + " with base and tool fitted. Correct the columns and run again.";
+    finding.text = text + " explains the measurements far better: median " + in_millimetres(error) + " against " +
+                   in_millimetres(as_is) + " with base and tool fitted. Correct the columns and run again.";
   };
   for (std::size_t k = 0; k < n; ++k) {
     std::vector<std::vector<double>> changed = columns;
@@ -156,7 +163,8 @@ void try_orders(const Robot& robot, const DiagnoseOptions& options, double sprea
     for (std::size_t m = k + 1; m < n; ++m) {
       changed = columns;
       std::swap(changed[k], changed[m]);
-      attempt(changed, "joint_order", "swapping joint columns " + std::to_string(k + 1) + " and " + std::to_string(m + 1));
+      attempt(changed, "joint_order",
+              "swapping joint columns " + std::to_string(k + 1) + " and " + std::to_string(m + 1));
     }
   }
   for (const double factor : {57.29577951308232, 0.017453292519943295}) {
@@ -164,12 +172,15 @@ void try_orders(const Robot& robot, const DiagnoseOptions& options, double sprea
     for (std::vector<double>& column : changed) {
       for (double& q : column) q *= factor;
     }
-    attempt(changed, "joint_unit", std::string("reading the joints in ") + (factor > 1.0 ? "rad instead of deg" : "deg instead of rad"));
+    attempt(changed, "joint_unit",
+            std::string("reading the joints in ") + (factor > 1.0 ? "rad instead of deg" : "deg instead of rad"));
   }
   if (finding.text.empty()) {
     finding.kind = "joint_order";
-    finding.text = "with base and tool fitted the median error is " + in_millimetres(as_is) + ", " + number(100.0 * as_is / spread, 2) +
-                   " % of the measured range, and no swap, sign or unit of a joint column explains it: is it the right robot file?";
+    finding.text = "with base and tool fitted the median error is " + in_millimetres(as_is) + ", " +
+                   number(100.0 * as_is / spread, 2) +
+                   " % of the measured range, and no swap, sign or unit of a joint column explains it: is it the right "
+                   "robot file?";
   }
   out->findings.push_back(finding);
 }
@@ -189,7 +200,8 @@ void infer_directions(const Robot& robot, Checked* out) {
     if (group[row] != current) {
       for (std::size_t k = 0; k < driven; ++k) {
         const double step = now[k] - last[k];
-        if (std::isfinite(step) && std::abs(step) > 1e-4) direction[k] = step > 0.0 ? 1.0 : -1.0;  // a joint that rests keeps its side
+        if (std::isfinite(step) && std::abs(step) > 1e-4)
+          direction[k] = step > 0.0 ? 1.0 : -1.0;  // a joint that rests keeps its side
       }
       last = now;
       current = group[row];
@@ -203,7 +215,10 @@ void infer_directions(const Robot& robot, Checked* out) {
   changed.owner = owned;
   out->data = std::move(changed);
   out->inferred_direction = true;
-  out->findings.push_back({"direction", "no columns dir1 …: the approach directions were inferred from the order of the rows, as if the poses had been driven to one after the other.", {}});
+  out->findings.push_back({"direction",
+                           "no columns dir1 …: the approach directions were inferred from the order of the rows, as if "
+                           "the poses had been driven to one after the other.",
+                           {}});
 }
 
 }  // namespace
@@ -212,8 +227,11 @@ Checked check(const Robot& robot, const Measurements& data, const DiagnoseOption
   Checked out;
   out.data = data;
   const std::vector<std::int32_t> group = pose_groups(data);
-  const std::size_t poses = group.empty() ? 0 : static_cast<std::size_t>(*std::max_element(group.begin(), group.end())) + 1;
-  if (poses < 12) throw std::invalid_argument(std::to_string(poses) + " poses are too few to diagnose anything: measure at least 12, better 100");
+  const std::size_t poses =
+      group.empty() ? 0 : static_cast<std::size_t>(*std::max_element(group.begin(), group.end())) + 1;
+  if (poses < 12)
+    throw std::invalid_argument(std::to_string(poses) +
+                                " poses are too few to diagnose anything: measure at least 12, better 100");
   find_duplicates(data, &out.findings);
   // A long path of the measured points tells how large an error is large.
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e300), high = -low;

@@ -18,8 +18,9 @@ struct Checked {
   bool inferred_direction = false;
 };
 
-/// Before any statistics: duplicate rows, joints that stand still, which record of the joints fits, order and signs of the joints,
-/// approach directions from the order of the poses where none are given. Throws std::invalid_argument on what cannot be used.
+/// Before any statistics: duplicate rows, joints that stand still, which record of the joints fits, order and signs of
+/// the joints, approach directions from the order of the poses where none are given. Throws std::invalid_argument on
+/// what cannot be used.
 Checked check(const Robot& robot, const Measurements& data, const DiagnoseOptions& options);
 
 }  // namespace truing::detail

@@ -40,30 +40,40 @@ std::vector<int> select_free(const Model& model, const Content& content, const I
     const ParameterInfo& info = model.parameters[k];
     const bool by_default = options.free.empty();
     switch (info.role) {
-      case Role::base: wanted[k] = wanted[k] || content.frame; break;
-      case Role::anchor: wanted[k] = wanted[k] || content.distance; break;
-      case Role::point: wanted[k] = content.point[info.owner]; break;
+      case Role::base:
+        wanted[k] = wanted[k] || content.frame;
+        break;
+      case Role::anchor:
+        wanted[k] = wanted[k] || content.distance;
+        break;
+      case Role::point:
+        wanted[k] = content.point[info.owner];
+        break;
       case Role::target:
         if (by_default) wanted[k] = info.rotation ? content.target_rotation[info.owner] : content.target[info.owner];
         break;
       case Role::geometry:
-        if (by_default) wanted[k] = !suffix_is(info, "beta") || parallel[info.owner] || model.robot.joints[info.owner].beta != 0.0;
+        if (by_default)
+          wanted[k] = !suffix_is(info, "beta") || parallel[info.owner] || model.robot.joints[info.owner].beta != 0.0;
         break;
-      default: break;
+      default:
+        break;
     }
   }
   // Effects asked for: their own terms, or the model parameters that they stand for.
   for (const EffectRequest& request : options.effects) {
     const auto on_joint = [&](int joint) {
       const Joint& j = model.robot.joints[joint];
-      return request.joints.empty() ? !j.passive() || request.effect == "link_geometry"
-                                    : std::find(request.joints.begin(), request.joints.end(), j.name) != request.joints.end();
+      return request.joints.empty()
+                 ? !j.passive() || request.effect == "link_geometry"
+                 : std::find(request.joints.begin(), request.joints.end(), j.name) != request.joints.end();
     };
     for (std::size_t k = 0; k < model.parameters.size(); ++k) {
       const ParameterInfo& info = model.parameters[k];
       if (request.effect == "gear_ratio" && info.role == Role::ratio && on_joint(info.owner)) wanted[k] = true;
       if (request.effect == "joint_offset" && info.role == Role::offset && on_joint(info.owner)) wanted[k] = true;
-      if (request.effect == "link_geometry" && info.role == Role::geometry && on_joint(info.owner)) wanted[k] = !suffix_is(info, "beta") || parallel[info.owner];
+      if (request.effect == "link_geometry" && info.role == Role::geometry && on_joint(info.owner))
+        wanted[k] = !suffix_is(info, "beta") || parallel[info.owner];
       if (request.effect == "base_frame" && info.role == Role::base) wanted[k] = content.frame;
       if (request.effect == "tool_frame" && info.role == Role::target) {
         wanted[k] = info.rotation ? content.target_rotation[info.owner] : content.target[info.owner];
@@ -71,7 +81,8 @@ std::vector<int> select_free(const Model& model, const Content& content, const I
       if (info.role == Role::effect) {
         const EffectRequest& from = model.requests[info.owner];
         const std::string& joint = model.terms[info.columns[0].term].joint;
-        const bool named = request.joints.empty() || std::find(request.joints.begin(), request.joints.end(), joint) != request.joints.end();
+        const bool named = request.joints.empty() ||
+                           std::find(request.joints.begin(), request.joints.end(), joint) != request.joints.end();
         if (from.effect == request.effect && named) wanted[k] = true;
       }
     }
@@ -91,11 +102,15 @@ int priority_of(Role role) {
     case Role::base:
     case Role::anchor:
     case Role::point:
-    case Role::target: return 0;
-    case Role::geometry: return 1;
+    case Role::target:
+      return 0;
+    case Role::geometry:
+      return 1;
     case Role::offset:
-    case Role::ratio: return 2;
-    case Role::effect: return 3;
+    case Role::ratio:
+      return 2;
+    case Role::effect:
+      return 3;
   }
   return 3;
 }
@@ -111,8 +126,9 @@ Selection observable(const Model& model, const std::vector<int>& free, const Ran
       const double weight = rank.combination(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
       if (weight != 0.0) frozen.combination[model.parameters[free[rank.kept[i]]].name] = -weight;
     }
-    frozen.why = frozen.combination.size() == 1 ? "no measurement depends on it"
-                                                : "moving these together changes no measurement; " + frozen.parameter + " is held at nominal";
+    frozen.why = frozen.combination.size() == 1
+                     ? "no measurement depends on it"
+                     : "moving these together changes no measurement; " + frozen.parameter + " is held at nominal";
     out.frozen.push_back(frozen);
   }
   return out;

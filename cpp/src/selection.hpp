@@ -23,12 +23,15 @@ struct Content {
 
 Content content_of(const Model& model, const std::vector<Segment>& segments);
 
-inline bool belongs_to_instrument(Role role) { return role == Role::base || role == Role::anchor || role == Role::point; }
+inline bool belongs_to_instrument(Role role) {
+  return role == Role::base || role == Role::anchor || role == Role::point;
+}
 
 /// Indices of the parameters to fit, before anything is known about what can be seen.
 std::vector<int> select_free(const Model& model, const Content& content, const IdentifyOptions& options);
 
-/// What is unknown anyway is kept first, then geometry, zeros and ratios, effects: of two that cannot be told apart the plainer stays.
+/// What is unknown anyway is kept first, then geometry, zeros and ratios, effects: of two that cannot be told apart the
+/// plainer stays.
 int priority_of(Role role);
 
 struct Selection {

@@ -17,11 +17,11 @@ namespace truing::detail {
 using Refit = std::function<void(Eigen::VectorXd* values)>;
 
 /// Levenberg-Marquardt on streamed normal equations (levenberg_marquardt.cpp).
-SolverSummary levenberg_marquardt(const Evaluator& problem, const Weighing& weighing, const IdentifyOptions& options, const Refit& refit,
-                                  Eigen::VectorXd* values);
+SolverSummary levenberg_marquardt(const Evaluator& problem, const Weighing& weighing, const IdentifyOptions& options,
+                                  const Refit& refit, Eigen::VectorXd* values);
 
 /// Ceres on the same tiles (ceres_solver.cpp); honours options.bounds.
-SolverSummary solve_with_ceres(const Evaluator& problem, const Model& model, const Weighing& weighing, const IdentifyOptions& options,
-                               Eigen::VectorXd* values);
+SolverSummary solve_with_ceres(const Evaluator& problem, const Model& model, const Weighing& weighing,
+                               const IdentifyOptions& options, Eigen::VectorXd* values);
 
 }  // namespace truing::detail

@@ -46,8 +46,11 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
     const Explanation& e = named[static_cast<std::size_t>(gain.group)];
     const ColumnGroup& group = groups[static_cast<std::size_t>(gain.group)];
     if (gain.group == g || group.corrects_law_at >= 0 || group.columns.empty() || e.kind == Kind::free) continue;
-    if (same_name(e, named[static_cast<std::size_t>(g)]) || contains(e, named[static_cast<std::size_t>(g)]) || e.kind == Kind::drift) continue;
-    if (std::find(less.choice.groups.begin(), less.choice.groups.end(), gain.group) != less.choice.groups.end()) continue;
+    if (same_name(e, named[static_cast<std::size_t>(g)]) || contains(e, named[static_cast<std::size_t>(g)]) ||
+        e.kind == Kind::drift)
+      continue;
+    if (std::find(less.choice.groups.begin(), less.choice.groups.end(), gain.group) != less.choice.groups.end())
+      continue;
     Rival rival;
     rival.group = gain.group;
     rival.loss = state.score - less.score - gain.score;
@@ -57,10 +60,12 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
       rival.r2 = evidence.explained(less, groups[static_cast<std::size_t>(g)].columns, theta, group.columns);
       // Or the other way round: a plainer one that this one contains, and that closes nearly as much.
       if (group.columns.size() == 1 && gain.squares > 0.8 * gained) {
-        rival.r2 = std::max(rival.r2, evidence.explained(less, group.columns, Eigen::VectorXd::Ones(1), groups[static_cast<std::size_t>(g)].columns));
+        rival.r2 = std::max(rival.r2, evidence.explained(less, group.columns, Eigen::VectorXd::Ones(1),
+                                                         groups[static_cast<std::size_t>(g)].columns));
       }
     }
-    // What can make the same motion is named with it, even where the last per cents speak for one of them: no law is that exact.
+    // What can make the same motion is named with it, even where the last per cents speak for one of them: no law is
+    // that exact.
     const bool comparable = any_geometry ? mine == "scale" || mine == "thermal" : gain.rank <= 8;
     rival.in_class = rival.loss < kClassNats || (rival.r2 > kClassR2 && comparable);
     const double weight = group.shadow ? 0.0 : std::exp(-kTempered * std::max(0.0, rival.loss));
@@ -69,7 +74,8 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
     if (rival.in_class || weight > 1e-3) out.rivals.push_back(rival);
   }
   out.raw = of_class / all;
-  std::sort(out.rivals.begin(), out.rivals.end(), [](const Rival& a, const Rival& b) { return a.in_class != b.in_class ? a.in_class : a.loss < b.loss; });
+  std::sort(out.rivals.begin(), out.rivals.end(),
+            [](const Rival& a, const Rival& b) { return a.in_class != b.in_class ? a.in_class : a.loss < b.loss; });
   return out;
 }
 
@@ -135,7 +141,8 @@ Resampled resample(const Work& work, const Decision& decision) {
   return out;
 }
 
-/// How often the resampled selections hold the group or one of its class; one more success and one more trial stand for the data's own.
+/// How often the resampled selections hold the group or one of its class; one more success and one more trial stand for
+/// the data's own.
 double came_back(const Work& work, const Resampled& resampled, const Sureness& sure, int group) {
   const auto& named = work.design.candidates.named;
   double back = 1.0, draws = 1.0;
@@ -143,7 +150,8 @@ double came_back(const Work& work, const Resampled& resampled, const Sureness& s
     const bool found = std::any_of(chosen.begin(), chosen.end(), [&](int g) {
       const Explanation &other = named[static_cast<std::size_t>(g)], &mine = named[static_cast<std::size_t>(group)];
       if (same_name(other, mine) || contains(other, mine)) return true;
-      return std::any_of(sure.rivals.begin(), sure.rivals.end(), [&](const Rival& r) { return r.in_class && r.group == g; });
+      return std::any_of(sure.rivals.begin(), sure.rivals.end(),
+                         [&](const Rival& r) { return r.in_class && r.group == g; });
     });
     back += found ? 1.0 : 0.0;
     draws += 1.0;
@@ -151,13 +159,15 @@ double came_back(const Work& work, const Resampled& resampled, const Sureness& s
   return back / draws;
 }
 
-/// Stated confidence from what it rests on: the posterior of the class, how often resampled poses bring it back, and what is lost
-/// without it. Mapped so that it says how often such names were right on development sets of the examination (docs/exam.md).
+/// Stated confidence from what it rests on: the posterior of the class, how often resampled poses bring it back, and
+/// what is lost without it. Mapped so that it says how often such names were right on development sets of the
+/// examination (docs/exam.md).
 double calibrated(double posterior, double came_back, double removal_loss) {
   const double score = 0.45 * posterior + 0.35 * came_back + 0.2 * std::min(removal_loss, 40.0) / 40.0;
   constexpr double kMap[6][2] = {{0.0, 0.05}, {0.5, 0.3}, {0.7, 0.64}, {0.9, 0.74}, {0.975, 0.8}, {0.998, 0.95}};
   for (int k = 1; k < 6; ++k) {
-    if (score <= kMap[k][0]) return kMap[k - 1][1] + (score - kMap[k - 1][0]) / (kMap[k][0] - kMap[k - 1][0]) * (kMap[k][1] - kMap[k - 1][1]);
+    if (score <= kMap[k][0])
+      return kMap[k - 1][1] + (score - kMap[k - 1][0]) / (kMap[k][0] - kMap[k - 1][0]) * (kMap[k][1] - kMap[k - 1][1]);
   }
   return kMap[5][1];
 }

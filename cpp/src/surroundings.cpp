@@ -29,8 +29,8 @@ double depth_in_box(const Vector3d& point, const Vector3d& half) { return (half 
 }  // namespace
 
 double segment_distance(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
-  // The square of the distance is convex in both parameters: its minimum is where the lines come nearest, if that is within
-  // both segments, or on one of the four edges.
+  // The square of the distance is convex in both parameters: its minimum is where the lines come nearest, if that is
+  // within both segments, or on one of the four edges.
   const Vector3d u = b - a, v = d - c, w = a - c;
   const double uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v);
   const double determinant = uu * vv - uv * uv;
@@ -40,13 +40,16 @@ double segment_distance(const Vector3d& a, const Vector3d& b, const Vector3d& c,
     if (s >= 0.0 && s <= 1.0 && t >= 0.0 && t <= 1.0) return (w + s * u - t * v).norm();
   }
   double least = std::numeric_limits<double>::infinity();
-  for (const Vector3d& end : {a, b}) least = std::min(least, (end - (c + nearest_on_segment(c, v, end) * v)).squaredNorm());
-  for (const Vector3d& end : {c, d}) least = std::min(least, (end - (a + nearest_on_segment(a, u, end) * u)).squaredNorm());
+  for (const Vector3d& end : {a, b})
+    least = std::min(least, (end - (c + nearest_on_segment(c, v, end) * v)).squaredNorm());
+  for (const Vector3d& end : {c, d})
+    least = std::min(least, (end - (a + nearest_on_segment(a, u, end) * u)).squaredNorm());
   return std::sqrt(least);
 }
 
 double segment_box_distance(const Vector3d& a, const Vector3d& b, const Vector3d& half) {
-  // f(t) = sum of max(|x_i(t)| - half_i, 0)^2 is convex, and a parabola between the places where x(t) passes a face's plane.
+  // f(t) = sum of max(|x_i(t)| - half_i, 0)^2 is convex, and a parabola between the places where x(t) passes a face's
+  // plane.
   const Vector3d way = b - a;
   double place[8] = {0.0};  // rising
   int places = 1;
@@ -96,12 +99,15 @@ Surroundings::Surroundings(const Scene& scene, const Arm& arm) : clearance_(scen
   const std::size_t joints = arm.robot().joints.size();
   if (joints + 1 > kMostFrames) throw std::invalid_argument("too many joints for a scene");
   for (const LinkCapsule& capsule : scene.capsules) {
-    const int frame = capsule.link == "base" ? -1 : capsule.link == "tool" ? static_cast<int>(joints) : static_cast<int>(arm.robot().joint_index(capsule.link));
+    const int frame = capsule.link == "base"   ? -1
+                      : capsule.link == "tool" ? static_cast<int>(joints)
+                                               : static_cast<int>(arm.robot().joint_index(capsule.link));
     capsules_.push_back({frame, capsule.from, capsule.to, capsule.radius});
   }
   for (const Obstacle& obstacle : scene.obstacles) {
     const Isometry3d& T = obstacle.T_measurement_shape;
-    solids_.push_back({obstacle.shape, T.inverse(), T.translation(), T * Vector3d(0.0, 0.0, obstacle.shape == Shape::capsule ? obstacle.size.z() : 0.0),
+    solids_.push_back({obstacle.shape, T.inverse(), T.translation(),
+                       T * Vector3d(0.0, 0.0, obstacle.shape == Shape::capsule ? obstacle.size.z() : 0.0),
                        0.5 * obstacle.size, obstacle.shape == Shape::box ? 0.0 : obstacle.radius});
   }
   std::set<std::pair<std::string, std::string>> ignored;
@@ -141,8 +147,9 @@ NearestPair Surroundings::nearest(const Arm& arm, const double* readings) const 
       distance += segment_distance(a, b, end(other, other.from), end(other, other.to)) - other.radius;
     } else {
       const Solid& solid = solids_[static_cast<std::size_t>(second) - capsules_.size()];
-      distance += solid.shape == Shape::box ? segment_box_distance(solid.T_shape_measurement * a, solid.T_shape_measurement * b, solid.half)
-                                            : segment_distance(a, b, solid.from, solid.to) - solid.radius;
+      distance += solid.shape == Shape::box
+                      ? segment_box_distance(solid.T_shape_measurement * a, solid.T_shape_measurement * b, solid.half)
+                      : segment_distance(a, b, solid.from, solid.to) - solid.radius;
     }
     if (distance < found.distance) found = {first, second, distance};
   }
@@ -161,21 +168,25 @@ void validate(const Scene& scene, const Robot& robot) {
   };
   const auto require_length = [](const std::string& where, const char* what, double value, bool zero_too) {
     if (std::isfinite(value) && (value > 0.0 || (zero_too && value == 0.0))) return;
-    throw std::invalid_argument(where + ": " + what + " is " + detail::number(value) + " m, expected " + (zero_too ? "zero or more" : "more than zero"));
+    throw std::invalid_argument(where + ": " + what + " is " + detail::number(value) + " m, expected " +
+                                (zero_too ? "zero or more" : "more than zero"));
   };
-  if (!(std::isfinite(scene.clearance) && scene.clearance >= 0.0)) throw std::invalid_argument("clearance is not zero or more");
+  if (!(std::isfinite(scene.clearance) && scene.clearance >= 0.0))
+    throw std::invalid_argument("clearance is not zero or more");
   for (const LinkCapsule& capsule : scene.capsules) {
     take("link capsule", capsule.name);
     const std::string where = "link capsule '" + capsule.name + "'";
     if (capsule.link != "base" && capsule.link != "tool") (void)robot.joint_index(capsule.link);
-    if (!capsule.from.allFinite() || !capsule.to.allFinite()) throw std::invalid_argument(where + ": an end is not finite");
+    if (!capsule.from.allFinite() || !capsule.to.allFinite())
+      throw std::invalid_argument(where + ": an end is not finite");
     require_length(where, "radius", capsule.radius, true);
   }
   for (const Obstacle& obstacle : scene.obstacles) {
     take("obstacle", obstacle.name);
     const std::string where = "obstacle '" + obstacle.name + "'";
     const Eigen::Matrix3d R = obstacle.T_measurement_shape.linear();
-    if (!obstacle.T_measurement_shape.matrix().allFinite() || (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-6) {
+    if (!obstacle.T_measurement_shape.matrix().allFinite() ||
+        (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-6) {
       throw std::invalid_argument(where + ": its frame is not rigid");
     }
     if (obstacle.shape != Shape::box) require_length(where, "radius", obstacle.radius, false);
@@ -194,7 +205,8 @@ Contact nearest_contact(const Scene& scene, const Robot& robot, const Eigen::Vec
   bare.effects.clear();
   const detail::Arm arm(bare, {}, target, {});
   if (readings.size() != arm.driven()) {
-    throw std::invalid_argument("got " + std::to_string(readings.size()) + " joint readings, the robot has " + std::to_string(arm.driven()) + " driven joints");
+    throw std::invalid_argument("got " + std::to_string(readings.size()) + " joint readings, the robot has " +
+                                std::to_string(arm.driven()) + " driven joints");
   }
   const detail::Surroundings surroundings(scene, arm);
   const detail::NearestPair pair = surroundings.nearest(arm, readings.data());

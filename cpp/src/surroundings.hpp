@@ -16,9 +16,11 @@
 namespace truing::detail {
 
 /// Distance of two segments; zero where they cross.
-double segment_distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c, const Eigen::Vector3d& d);
+double segment_distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                        const Eigen::Vector3d& d);
 
-/// Distance of a segment from a box of half lengths `half` about the origin; inside, how deep its deepest point is, negative.
+/// Distance of a segment from a box of half lengths `half` about the origin; inside, how deep its deepest point is,
+/// negative.
 double segment_box_distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& half);
 
 /// Indices into the scene; second: capsule, or capsule count + obstacle; -1: no pair to look at.

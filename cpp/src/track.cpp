@@ -42,8 +42,9 @@ Matrix6d moved(const detail::Covariance& P, const Vector3d& lever) {
 }  // namespace
 
 const char* name(Outcome outcome) {
-  static const char* const names[] = {"accepted", "accepted_gap", "accepted_saturated", "accepted_restart", "duplicate", "backwards",
-                                      "future",   "too_late",     "not_finite",         "not_unit",         "frozen"};
+  static const char* const names[] = {
+      "accepted", "accepted_gap", "accepted_saturated", "accepted_restart", "duplicate", "backwards",
+      "future",   "too_late",     "not_finite",         "not_unit",         "frozen"};
   return names[static_cast<std::size_t>(outcome)];
 }
 bool accepted(Outcome outcome) { return outcome <= Outcome::accepted_restart; }
@@ -61,29 +62,43 @@ const char* name(Predictor predictor) {
 }
 
 bool FilterOptions::is_valid(std::string* error) const {
-  const auto no = [&](const char* why) { if (error) *error = why; return false; };
+  const auto no = [&](const char* why) {
+    if (error) *error = why;
+    return false;
+  };
   if (!(window > 0.0 && window <= 5.0)) return no("window must be above 0 and at most 5 s");
   if (!(future_limit >= 0.0 && future_limit <= 5.0)) return no("future_limit must be from 0 to 5 s");
-  if (!(highest_imu_rate >= 10.0 && highest_imu_rate <= 1e5 && highest_pose_rate >= 1.0 && highest_pose_rate <= 1e4)) return no("rates out of range");
-  if (!(gyro_noise > 0.0 && accel_noise > 0.0 && position_sigma > 0.0 && rotation_sigma > 0.0)) return no("noises must be above 0");
-  if (!(reacquire_after >= 2 && frozen_after >= 1)) return no("reacquire_after must be at least 2, frozen_after at least 1");
+  if (!(highest_imu_rate >= 10.0 && highest_imu_rate <= 1e5 && highest_pose_rate >= 1.0 && highest_pose_rate <= 1e4))
+    return no("rates out of range");
+  if (!(gyro_noise > 0.0 && accel_noise > 0.0 && position_sigma > 0.0 && rotation_sigma > 0.0))
+    return no("noises must be above 0");
+  if (!(reacquire_after >= 2 && frozen_after >= 1))
+    return no("reacquire_after must be at least 2, frozen_after at least 1");
   if (!(gate > 6.0)) return no("gate must be above 6, the mean of the innovation squared");
-  if (!(largest_gap > 0.0 && restart_gap > largest_gap)) return no("gaps must be above 0, restart_gap above largest_gap");
+  if (!(largest_gap > 0.0 && restart_gap > largest_gap))
+    return no("gaps must be above 0, restart_gap above largest_gap");
   return true;
 }
 
 bool DeviationOptions::is_valid(std::string* error) const {
-  const auto no = [&](const char* why) { if (error) *error = why; return false; };
+  const auto no = [&](const char* why) {
+    if (error) *error = why;
+    return false;
+  };
   if (!(period >= 1e-3 && period <= 0.1)) return no("period must be from 1 to 100 ms");
   if (!(horizon >= period && horizon <= 1.0)) return no("horizon must be from one period to 1 s");
-  if (!(position_noise > 0.0 && velocity_noise > 0.0 && mode_noise > 0.0 && slow_noise > 0.0)) return no("noises must be above 0");
+  if (!(position_noise > 0.0 && velocity_noise > 0.0 && mode_noise > 0.0 && slow_noise > 0.0))
+    return no("noises must be above 0");
   if (!(static_time > 0.0 && grade_time > 0.0)) return no("times must be above 0");
   if (!(frequency_range >= 0.0 && frequency_range < 0.9)) return no("frequency_range must be from 0 to below 0.9");
   return true;
 }
 
 bool WatchOptions::is_valid(std::string* error) const {
-  const auto no = [&](const char* why) { if (error) *error = why; return false; };
+  const auto no = [&](const char* why) {
+    if (error) *error = why;
+    return false;
+  };
   if (!(threshold > 20.0)) return no("watch.threshold must be above 20, or it is always exceeded");
   if (!(forget > 0.0 && compare > 0.0)) return no("watch.forget and watch.compare must be above 0 s");
   return true;
@@ -91,21 +106,33 @@ bool WatchOptions::is_valid(std::string* error) const {
 
 bool TrackOptions::is_valid(std::string* error) const {
   if (!filter.is_valid(error) || !deviation.is_valid(error) || !watch.is_valid(error)) return false;
-  const auto no = [&](const char* why) { if (error) *error = why; return false; };
-  if (deviation.settle_time + deviation.period > filter.window) return no("settle_time must be shorter than the filter's window");
+  const auto no = [&](const char* why) {
+    if (error) *error = why;
+    return false;
+  };
+  if (deviation.settle_time + deviation.period > filter.window)
+    return no("settle_time must be shorter than the filter's window");
   if (modes.count < 0 || modes.count > ModalModel::kMost) return no("too many modes");
   for (std::size_t k = 0; k < static_cast<std::size_t>(modes.count); ++k) {
-    if (!(modes.frequency[k] > 0.0 && modes.frequency[k] * deviation.period < 0.25)) return no("a mode's frequency must be above 0 and below a quarter of the step rate");
+    if (!(modes.frequency[k] > 0.0 && modes.frequency[k] * deviation.period < 0.25))
+      return no("a mode's frequency must be above 0 and below a quarter of the step rate");
     if (!(modes.damping[k] >= 0.0 && modes.damping[k] < 1.0)) return no("a mode's damping must be from 0 to below 1");
   }
   const CorrectionLimits& l = limits;
-  if (!(l.position > 0.0 && l.rotation > 0.0 && l.position_rate > 0.0 && l.rotation_rate > 0.0 && l.position_jerk > 0.0 && l.rotation_jerk > 0.0)) return no("limits must be above 0");
+  if (!(l.position > 0.0 && l.rotation > 0.0 && l.position_rate > 0.0 && l.rotation_rate > 0.0 &&
+        l.position_jerk > 0.0 && l.rotation_jerk > 0.0))
+    return no("limits must be above 0");
   return true;
 }
 
 struct Tracker::Inside {
   Inside(const TrackSetup& setup_in, const TrackOptions& options_in)
-      : setup(setup_in), options(options_in), filter(setup, options.filter), deviation(setup, options.deviation, options.modes), watch(setup, options.watch), limiter(options.limits) {
+      : setup(setup_in),
+        options(options_in),
+        filter(setup, options.filter),
+        deviation(setup, options.deviation, options.modes),
+        watch(setup, options.watch),
+        limiter(options.limits) {
     innovations.resize(1024);
     T_imu_tool = setup.T_flange_imu.inverse() * setup.T_flange_tool;
     T_tool_flange = setup.T_flange_tool.inverse();
@@ -125,7 +152,9 @@ struct Tracker::Inside {
       Isometry3d T_base_flange;
       const bool has_flange = filter.flange_at(grade.t, &T_base_flange);
       watch.push(grade, has_flange ? &T_base_flange : nullptr);
-      if (innovation_count < static_cast<int>(innovations.size())) innovations[static_cast<std::size_t>(innovation_count++)] = {grade.t, grade.nis, grade.dimensions, grade.accepted};
+      if (innovation_count < static_cast<int>(innovations.size()))
+        innovations[static_cast<std::size_t>(innovation_count++)] = {grade.t, grade.nis, grade.dimensions,
+                                                                     grade.accepted};
     }
   }
 
@@ -190,16 +219,22 @@ PosePrediction Tracker::predict(double t) {
     belief = in.filter.belief_at(std::min(t, newest));
     const double age = newest - belief.last_pose;
     const Vector6d sway = in.filter.sway_variance().cwiseSqrt();
-    const double position = std::sqrt(belief.P.diagonal().segment<3>(detail::kP).maxCoeff()), rotation = std::sqrt(belief.P.diagonal().segment<3>(detail::kTheta).maxCoeff());
-    if (age < detail::kCoastingAge) out.status = Status::valid;
-    else if (position < std::max(in.options.coast_position, sway.head<3>().maxCoeff()) && rotation < std::max(in.options.coast_rotation, sway.tail<3>().maxCoeff())) out.status = Status::coasting;
-    else out.status = joints_alive ? Status::hold : Status::lost;
+    const double position = std::sqrt(belief.P.diagonal().segment<3>(detail::kP).maxCoeff()),
+                 rotation = std::sqrt(belief.P.diagonal().segment<3>(detail::kTheta).maxCoeff());
+    if (age < detail::kCoastingAge)
+      out.status = Status::valid;
+    else if (position < std::max(in.options.coast_position, sway.head<3>().maxCoeff()) &&
+             rotation < std::max(in.options.coast_rotation, sway.tail<3>().maxCoeff()))
+      out.status = Status::coasting;
+    else
+      out.status = joints_alive ? Status::hold : Status::lost;
   } else {
     out.status = joints_alive ? Status::hold : Status::lost;
   }
 
   PlanPoint reference;
-  const double out_of_plan = 1.0;  // forward kinematics as the plan: continued at constant velocity for so long at most [s]
+  const double out_of_plan =
+      1.0;  // forward kinematics as the plan: continued at constant velocity for so long at most [s]
   const bool has_reference = in.deviation.reference_at(t, &reference, out_of_plan);
   const bool estimate = out.status == Status::valid || out.status == Status::coasting;
   const double h = std::max(0.0, t - newest);
@@ -221,7 +256,8 @@ PosePrediction Tracker::predict(double t) {
       T_base_imu.translation() = motion.x.p + h * motion.x.v + 0.5 * h * h * motion.acceleration;
       T_base_imu.linear() = (detail::exp_rotation(h * motion.rate) * motion.x.q).toRotationMatrix();
     }
-    // What predictions were found to be wrong by, at the graded horizon; it grows with the horizon's square where acceleration is unknown.
+    // What predictions were found to be wrong by, at the graded horizon; it grows with the horizon's square where
+    // acceleration is unknown.
     const double ratio = h / in.options.deviation.horizon;
     const Vector6d growth = in.deviation.grade(out.predictor) * (ratio * ratio);
     out.covariance = moved(belief.P, T_base_imu.linear() * in.T_imu_tool.translation());
@@ -232,10 +268,13 @@ PosePrediction Tracker::predict(double t) {
     out.predictor = Predictor::slow;
     T_base_imu = detail::deviated(reference.T, in.deviation.slow());
     const FilterOptions& f = in.options.filter;
-    const double away = in.filter.initialised() ? std::max(0.0, t - belief.last_pose) : 0.0, wander = imu_alive ? std::min(away, 1e4) : 0.0;
-    const double slow_p = in.deviation.ready() ? 0.0 : f.slow_position * f.slow_position, slow_r = in.deviation.ready() ? 0.0 : f.slow_rotation * f.slow_rotation;
+    const double away = in.filter.initialised() ? std::max(0.0, t - belief.last_pose) : 0.0,
+                 wander = imu_alive ? std::min(away, 1e4) : 0.0;
+    const double slow_p = in.deviation.ready() ? 0.0 : f.slow_position * f.slow_position,
+                 slow_r = in.deviation.ready() ? 0.0 : f.slow_rotation * f.slow_rotation;
     Vector6d sway;
-    sway << Vector3d::Constant(f.sway_position * f.sway_position), Vector3d::Constant(f.sway_rotation * f.sway_rotation);
+    sway << Vector3d::Constant(f.sway_position * f.sway_position),
+        Vector3d::Constant(f.sway_rotation * f.sway_rotation);
     if (in.filter.initialised()) sway = in.filter.sway_variance();
     const Matrix3d R = T_base_imu.linear() * in.setup.T_flange_imu.linear().transpose();
     out.covariance.topLeftCorner<3, 3>() = R * sway.head<3>().asDiagonal() * R.transpose();
@@ -260,14 +299,16 @@ Compensation Tracker::compensate(double t) {
     out.T_base_tool_planned = plan.T * in.T_imu_tool;
     if (out.predicted.status != Status::lost) {
       out.wanted.head<3>() = out.T_base_tool_planned.translation() - out.predicted.T_base_tool.translation();
-      out.wanted.tail<3>() = detail::log_rotation(Quaterniond(out.T_base_tool_planned.linear() * out.predicted.T_base_tool.linear().transpose()));
+      out.wanted.tail<3>() = detail::log_rotation(
+          Quaterniond(out.T_base_tool_planned.linear() * out.predicted.T_base_tool.linear().transpose()));
     }
   }
   out.correction = in.limiter.follow(t, out.wanted);
   out.limited = (out.correction - out.wanted).cwiseAbs().maxCoeff() > 1e-3;
   Isometry3d corrected = Isometry3d::Identity();
   corrected.translation() = out.T_base_tool_planned.translation() + out.correction.head<3>();
-  corrected.linear() = detail::exp_rotation(out.correction.tail<3>()).toRotationMatrix() * out.T_base_tool_planned.linear();
+  corrected.linear() =
+      detail::exp_rotation(out.correction.tail<3>()).toRotationMatrix() * out.T_base_tool_planned.linear();
   out.T_base_flange = corrected * in.T_tool_flange;
   return out;
 }

@@ -32,24 +32,28 @@ using Matrix12d = Eigen::Matrix<double, 12, 12>;
 using Vector12d = Eigen::Matrix<double, 12, 1>;
 using Matrix6x12 = Eigen::Matrix<double, 6, 12>;
 
-constexpr double kFreedom = 5.0;      // degrees of freedom of the t distribution that errors have
+constexpr double kFreedom = 5.0;  // degrees of freedom of the t distribution that errors have
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
-constexpr double kLeastTurn = 0.1;    // [rad] pivot poses that turn less do not show the tool point
-constexpr double kExact = 1e-9;       // [m], [rad] errors below this are rounding
+constexpr double kLeastTurn = 0.1;  // [rad] pivot poses that turn less do not show the tool point
+constexpr double kExact = 1e-9;     // [m], [rad] errors below this are rounding
 
-// ---- Standstills -----------------------------------------------------------------------------------------------------------------
+// ---- Standstills
+// --------------------------------------------------------------------------------------------------------------------
 
 template <typename Sample>
 void check_times(const std::vector<Sample>& rows, const char* what) {
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (!std::isfinite(rows[k].t)) throw std::invalid_argument(std::string(what) + " has a time that is not finite in row " + std::to_string(k));
+    if (!std::isfinite(rows[k].t))
+      throw std::invalid_argument(std::string(what) + " has a time that is not finite in row " + std::to_string(k));
     if (k > 0 && !(rows[k].t > rows[k - 1].t))
-      throw std::invalid_argument(std::string(what) + " goes back in time at row " + std::to_string(k) + ": " + number(rows[k].t, 9) + " s after " + number(rows[k - 1].t, 9) + " s");
+      throw std::invalid_argument(std::string(what) + " goes back in time at row " + std::to_string(k) + ": " +
+                                  number(rows[k].t, 9) + " s after " + number(rows[k - 1].t, 9) + " s");
   }
 }
 
 bool moved(const Isometry3d& a, const Isometry3d& b, const RestOptions& options) {
-  return (a.translation() - b.translation()).norm() > options.position || log_rotation(Quaterniond(a.linear().transpose() * b.linear())).norm() > options.rotation;
+  return (a.translation() - b.translation()).norm() > options.position ||
+         log_rotation(Quaterniond(a.linear().transpose() * b.linear())).norm() > options.rotation;
 }
 
 /// Mean position and rotation of the tracker's samples with stamps from `start` to `end`.
@@ -70,12 +74,16 @@ void average_tracker(const std::vector<PoseSample>& tracker, double start, doubl
   rest->scatter = std::sqrt(std::max(0.0, (squares / n - (sum / n).cwiseAbs2()).mean()));
 }
 
-// ---- Frames ------------------------------------------------------------------------------------------------------------------------
+// ---- Frames
+// --------------------------------------------------------------------------------------------------------------------
 
 /// What `handeye` says of hand, camera and board, said of flange, tracker and receiver.
 std::string in_our_words(std::string text) {
-  const std::pair<const char*, const char*> words[] = {{"camera", "tracker"}, {"board", "receiver"}, {"hand", "flange"}};
-  const auto letter = [&](std::size_t at) { return at < text.size() && (std::isalpha(static_cast<unsigned char>(text[at])) || text[at] == '-'); };
+  const std::pair<const char*, const char*> words[] = {
+      {"camera", "tracker"}, {"board", "receiver"}, {"hand", "flange"}};
+  const auto letter = [&](std::size_t at) {
+    return at < text.size() && (std::isalpha(static_cast<unsigned char>(text[at])) || text[at] == '-');
+  };
   for (const auto& [theirs, ours] : words) {
     const std::string from = theirs, to = ours;
     for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + 1)) {
@@ -85,11 +93,14 @@ std::string in_our_words(std::string text) {
   return text;
 }
 
-/// Measured minus predicted receiver: position and rotation vector in the tracker frame, T_tracker_base T_base_flange T_flange_receiver.
-Vector6d frame_error(const Isometry3d& W, const Isometry3d& F, const Isometry3d& R, const Isometry3d& measured, Matrix6x12* J) {
+/// Measured minus predicted receiver: position and rotation vector in the tracker frame, T_tracker_base T_base_flange
+/// T_flange_receiver.
+Vector6d frame_error(const Isometry3d& W, const Isometry3d& F, const Isometry3d& R, const Isometry3d& measured,
+                     Matrix6x12* J) {
   const Isometry3d FR = F * R, predicted = W * FR;
   Vector6d e;
-  e << measured.translation() - predicted.translation(), log_rotation(Quaterniond(measured.linear() * predicted.linear().transpose()));
+  e << measured.translation() - predicted.translation(),
+      log_rotation(Quaterniond(measured.linear() * predicted.linear().transpose()));
   const Matrix3d R_tracker_flange = W.linear() * F.linear();
   J->setZero();
   J->block<3, 3>(0, 0).setIdentity();
@@ -112,10 +123,14 @@ void refine_frames(const std::vector<Isometry3d>& F, const std::vector<Isometry3
   Isometry3d &W = out->T_tracker_base.T, &R = out->T_flange_receiver.T;
   std::vector<Vector6d> e(F.size());
   std::vector<Matrix6x12> J(F.size());
-  const auto look = [&]() { for (std::size_t i = 0; i < F.size(); ++i) e[i] = frame_error(W, F[i], R, T[i], &J[i]); };
+  const auto look = [&]() {
+    for (std::size_t i = 0; i < F.size(); ++i) e[i] = frame_error(W, F[i], R, T[i], &J[i]);
+  };
   const auto scale = [&]() {
     double p = 0.0, r = 0.0;
-    for (std::size_t i = 0; i < F.size(); ++i) p += out->errors[i].weight * e[i].head<3>().squaredNorm(), r += out->errors[i].weight * e[i].tail<3>().squaredNorm();
+    for (std::size_t i = 0; i < F.size(); ++i)
+      p += out->errors[i].weight * e[i].head<3>().squaredNorm(),
+          r += out->errors[i].weight * e[i].tail<3>().squaredNorm();
     out->position_sigma = std::max(kExact, std::sqrt(p / (3.0 * n * freedom)));
     out->rotation_sigma = std::max(kExact, std::sqrt(r / (3.0 * n * freedom)));
   };
@@ -125,7 +140,8 @@ void refine_frames(const std::vector<Isometry3d>& F, const std::vector<Isometry3
   out->status = CalibrationStatus::not_converged;
   for (out->iterations = 1; out->iterations <= 200; ++out->iterations) {
     Vector6d weight;
-    weight << Vector3d::Constant(std::pow(out->position_sigma, -2)), Vector3d::Constant(std::pow(out->rotation_sigma, -2));
+    weight << Vector3d::Constant(std::pow(out->position_sigma, -2)),
+        Vector3d::Constant(std::pow(out->rotation_sigma, -2));
     information.setZero();
     Vector12d right = Vector12d::Zero();
     for (std::size_t i = 0; i < F.size(); ++i) {
@@ -141,14 +157,17 @@ void refine_frames(const std::vector<Isometry3d>& F, const std::vector<Isometry3
     look();
     const double before = out->position_sigma;
     scale();
-    if (step.norm() < 1e-11 || (step.dot(information * step) < 1e-12 && std::abs(out->position_sigma / before - 1.0) < 1e-8)) {
+    if (step.norm() < 1e-11 ||
+        (step.dot(information * step) < 1e-12 && std::abs(out->position_sigma / before - 1.0) < 1e-8)) {
       out->status = CalibrationStatus::done;
       break;
     }
   }
-  // Covariance of an M-estimate (Huber 1981, eq. (6.5) of chapter 7): psi = w e, its variance over the square of its mean slope.
+  // Covariance of an M-estimate (Huber 1981, eq. (6.5) of chapter 7): psi = w e, its variance over the square of its
+  // mean slope.
   Vector6d weight;
-  weight << Vector3d::Constant(std::pow(out->position_sigma, -2)), Vector3d::Constant(std::pow(out->rotation_sigma, -2));
+  weight << Vector3d::Constant(std::pow(out->position_sigma, -2)),
+      Vector3d::Constant(std::pow(out->rotation_sigma, -2));
   double psi = 0.0, slope = 0.0;
   information.setZero();
   for (std::size_t i = 0; i < F.size(); ++i) {
@@ -170,7 +189,8 @@ const char* name(CalibrationStatus status) {
   return names[static_cast<std::size_t>(status)];
 }
 
-std::vector<RestPose> find_rests(const std::vector<FrameSample>& flange, const std::vector<PoseSample>& tracker, const RestOptions& options) {
+std::vector<RestPose> find_rests(const std::vector<FrameSample>& flange, const std::vector<PoseSample>& tracker,
+                                 const RestOptions& options) {
   check_times(flange, "the record of the joints");
   check_times(tracker, "the record of the tracker");
   std::vector<RestPose> out;
@@ -192,7 +212,8 @@ std::vector<RestPose> find_rests(const std::vector<FrameSample>& flange, const s
   return out;
 }
 
-FramesResult calibrate_frames(const std::vector<Isometry3d>& T_base_flange, const std::vector<Isometry3d>& T_tracker_receiver) {
+FramesResult calibrate_frames(const std::vector<Isometry3d>& T_base_flange,
+                              const std::vector<Isometry3d>& T_tracker_receiver) {
   HandEyePoses poses;
   poses.T_base_hand = T_base_flange;
   poses.T_camera_board = T_tracker_receiver;
@@ -201,30 +222,41 @@ FramesResult calibrate_frames(const std::vector<Isometry3d>& T_base_flange, cons
   const HandEyeResult start = handeye(poses, options);
   FramesResult out;
   for (const std::string& warning : start.warnings) {
-    if (warning.find(" lie behind ") == std::string::npos) out.warnings.push_back(in_our_words(warning));  // a camera's trouble: trackers have no lens
+    if (warning.find(" lie behind ") == std::string::npos)
+      out.warnings.push_back(in_our_words(warning));  // a camera's trouble: trackers have no lens
   }
   out.message = in_our_words(start.message);
   if (start.status == HandEyeStatus::not_observable || start.status == HandEyeStatus::not_closing) {
-    out.status = start.status == HandEyeStatus::not_observable ? CalibrationStatus::not_observable : CalibrationStatus::not_consistent;
-    for (const Reading& reading : start.readings) out.warnings.push_back("the frames agree if " + in_our_words(reading.explanation));
+    out.status = start.status == HandEyeStatus::not_observable ? CalibrationStatus::not_observable
+                                                               : CalibrationStatus::not_consistent;
+    for (const Reading& reading : start.readings)
+      out.warnings.push_back("the frames agree if " + in_our_words(reading.explanation));
     return out;
   }
   out.T_tracker_base.T = start.camera.T.inverse();
   out.T_flange_receiver.T = start.board.T;
   out.errors.resize(T_base_flange.size());
   refine_frames(T_base_flange, T_tracker_receiver, &out);
-  if (out.status == CalibrationStatus::not_converged) out.message = "The refinement did not come to an end: look for test positions that are far off.";
-  else out.message = "Tracker frame and receiver are known from " + std::to_string(T_base_flange.size()) + " positions; usual error " + number(1e3 * out.position_sigma, 3) + " mm, " + number(out.rotation_sigma / kDegree, 3) + " deg.";
+  if (out.status == CalibrationStatus::not_converged)
+    out.message = "The refinement did not come to an end: look for test positions that are far off.";
+  else
+    out.message = "Tracker frame and receiver are known from " + std::to_string(T_base_flange.size()) +
+                  " positions; usual error " + number(1e3 * out.position_sigma, 3) + " mm, " +
+                  number(out.rotation_sigma / kDegree, 3) + " deg.";
   return out;
 }
 
-// ---- Tool --------------------------------------------------------------------------------------------------------------------------
+// ---- Tool
+// --------------------------------------------------------------------------------------------------------------------
 
 ToolResult calibrate_tool(const ToolPoses& poses) {
   const std::size_t n = poses.pivot.size();
-  if (n < 3) throw std::invalid_argument("the tool point needs three pivot poses or more, found " + std::to_string(n) + ": put the tip on one point in at least three orientations");
+  if (n < 3)
+    throw std::invalid_argument("the tool point needs three pivot poses or more, found " + std::to_string(n) +
+                                ": put the tip on one point in at least three orientations");
   if (poses.orientation.size() != poses.prescribed.size())
-    throw std::invalid_argument("there are " + std::to_string(poses.orientation.size()) + " orientation poses and " + std::to_string(poses.prescribed.size()) + " prescribed orientations");
+    throw std::invalid_argument("there are " + std::to_string(poses.orientation.size()) + " orientation poses and " +
+                                std::to_string(poses.prescribed.size()) + " prescribed orientations");
   ToolResult out;
   // R_i t + p_i = c: linear in tool point t and fixed point c.
   Eigen::MatrixXd A(3 * n, 6);
@@ -232,7 +264,8 @@ ToolResult calibrate_tool(const ToolPoses& poses) {
   Matrix3d mean = Matrix3d::Zero();
   for (std::size_t i = 0; i < n; ++i) {
     const auto row = static_cast<Eigen::Index>(3 * i);
-    if (!poses.pivot[i].matrix().allFinite()) throw std::invalid_argument("pivot pose " + std::to_string(i) + " is not finite");
+    if (!poses.pivot[i].matrix().allFinite())
+      throw std::invalid_argument("pivot pose " + std::to_string(i) + " is not finite");
     A.block<3, 3>(row, 0) = poses.pivot[i].linear();
     A.block<3, 3>(row, 3) = -Matrix3d::Identity();
     b.segment<3>(row) = -poses.pivot[i].translation();
@@ -243,7 +276,9 @@ ToolResult calibrate_tool(const ToolPoses& poses) {
   if (spread.eigenvalues()[0] < kLeastTurn * kLeastTurn) {
     out.status = CalibrationStatus::not_observable;
     const Vector3d axis = spread.eigenvectors().col(0);
-    out.message = "The tool point is not observable along flange (" + number(axis.x(), 2) + ", " + number(axis.y(), 2) + ", " + number(axis.z(), 2) + "): tilt the tool by 30 deg or more about two axes while its tip stays on the point.";
+    out.message = "The tool point is not observable along flange (" + number(axis.x(), 2) + ", " + number(axis.y(), 2) +
+                  ", " + number(axis.z(), 2) +
+                  "): tilt the tool by 30 deg or more about two axes while its tip stays on the point.";
     return out;
   }
   const Eigen::Matrix<double, 6, 6> normal = A.transpose() * A;
@@ -252,7 +287,8 @@ ToolResult calibrate_tool(const ToolPoses& poses) {
   out.T_flange_tool.T.translation() = x.head<3>();
   out.point = x.tail<3>();
   const double variance = e.squaredNorm() / std::max(1.0, 3.0 * static_cast<double>(n) - 6.0);
-  out.T_flange_tool.covariance.topLeftCorner<3, 3>() = variance * Eigen::Matrix<double, 6, 6>(normal.inverse()).topLeftCorner<3, 3>();
+  out.T_flange_tool.covariance.topLeftCorner<3, 3>() =
+      variance * Eigen::Matrix<double, 6, 6>(normal.inverse()).topLeftCorner<3, 3>();
   for (std::size_t i = 0; i < n; ++i) out.pivot_error.push_back(e.segment<3>(static_cast<Eigen::Index>(3 * i)).norm());
 
   const std::size_t m = poses.orientation.size();
@@ -263,20 +299,27 @@ ToolResult calibrate_tool(const ToolPoses& poses) {
     out.T_flange_tool.T.linear() = R;
     double squares = 0.0;
     for (std::size_t i = 0; i < m; ++i) {
-      const double angle = log_rotation(Quaterniond(R.transpose() * poses.orientation[i].linear().transpose() * poses.prescribed[i])).norm();
+      const double angle =
+          log_rotation(Quaterniond(R.transpose() * poses.orientation[i].linear().transpose() * poses.prescribed[i]))
+              .norm();
       out.orientation_error.push_back(angle);
       squares += angle * angle;
     }
     // A single pose shows no scatter: then the covariance of the orientation is not known, and left zero.
-    if (m > 1) out.T_flange_tool.covariance.bottomRightCorner<3, 3>() = squares / (3.0 * static_cast<double>(m - 1)) / static_cast<double>(m) * Matrix3d::Identity();
+    if (m > 1)
+      out.T_flange_tool.covariance.bottomRightCorner<3, 3>() =
+          squares / (3.0 * static_cast<double>(m - 1)) / static_cast<double>(m) * Matrix3d::Identity();
   }
-  out.message = "The tool point is known from " + std::to_string(n) + " poses; scatter " + number(1e3 * std::sqrt(variance), 3) + " mm.";
+  out.message = "The tool point is known from " + std::to_string(n) + " poses; scatter " +
+                number(1e3 * std::sqrt(variance), 3) + " mm.";
   return out;
 }
 
-// ---- All together ------------------------------------------------------------------------------------------------------------------
+// ---- All together
+// --------------------------------------------------------------------------------------------------------------------
 
-TrackSetup assemble_setup(const FramesResult& frames, const ToolResult& tool, const InertialResult& inertial, std::vector<std::string>* notes) {
+TrackSetup assemble_setup(const FramesResult& frames, const ToolResult& tool, const InertialResult& inertial,
+                          std::vector<std::string>* notes) {
   TrackSetup out;
   out.T_tracker_base = frames.T_tracker_base.T;
   out.T_flange_receiver = frames.T_flange_receiver.T;
@@ -287,8 +330,12 @@ TrackSetup assemble_setup(const FramesResult& frames, const ToolResult& tool, co
   out.clock_offset_sigma = inertial.clock_offset_sigma;
   if (notes) {
     const double tilt = std::acos(std::clamp(-out.gravity.z() / out.gravity.norm(), -1.0, 1.0));
-    if (tilt > kDegree) notes->push_back("gravity is " + number(tilt / kDegree, 3) + " deg from the base's -z: the base is not level, or its z does not point up; gravity as measured is used");
-    if (inertial.tracker_up != "+z") notes->push_back("the tracker's axis " + inertial.tracker_up + " points up, not +z");
+    if (tilt > kDegree)
+      notes->push_back(
+          "gravity is " + number(tilt / kDegree, 3) +
+          " deg from the base's -z: the base is not level, or its z does not point up; gravity as measured is used");
+    if (inertial.tracker_up != "+z")
+      notes->push_back("the tracker's axis " + inertial.tracker_up + " points up, not +z");
   }
   return out;
 }

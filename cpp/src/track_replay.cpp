@@ -33,7 +33,8 @@ constexpr std::size_t kFewestRows = 500;  // that identify_modes takes
 template <class Sample>
 void require_sorted(const std::vector<Sample>& samples, const char* name) {
   const auto earlier = [](const Sample& a, const Sample& b) { return a.arrival < b.arrival; };
-  if (!std::is_sorted(samples.begin(), samples.end(), earlier)) throw std::invalid_argument(std::string("replay: ") + name + " is not sorted by arrival");
+  if (!std::is_sorted(samples.begin(), samples.end(), earlier))
+    throw std::invalid_argument(std::string("replay: ") + name + " is not sorted by arrival");
 }
 
 Isometry3d frame_of(const PoseSample& sample) {
@@ -79,12 +80,19 @@ Matrix6d carried(const Matrix6d& P, const Vector3d& lever) {
 class Replay {
  public:
   Replay(const RecordedStreams& streams, const TrackSetup& setup, const ReplayOptions& options)
-      : streams_(streams), setup_(setup), options_(options), tracker_(setup, options.track), next_grade_(options.horizons.size(), 0), poses_(0.0), flanges_(kEncoderStep) {
+      : streams_(streams),
+        setup_(setup),
+        options_(options),
+        tracker_(setup, options.track),
+        next_grade_(options.horizons.size(), 0),
+        poses_(0.0),
+        flanges_(kEncoderStep) {
     T_tool_receiver_ = setup.T_flange_tool.inverse() * setup.T_flange_receiver;
     T_base_tracker_ = setup.T_tracker_base.inverse();
     by_stamp_.resize(streams.tracker.size());
     for (std::size_t k = 0; k < by_stamp_.size(); ++k) by_stamp_[k] = k;
-    std::stable_sort(by_stamp_.begin(), by_stamp_.end(), [&](std::size_t a, std::size_t b) { return streams.tracker[a].t < streams.tracker[b].t; });
+    std::stable_sort(by_stamp_.begin(), by_stamp_.end(),
+                     [&](std::size_t a, std::size_t b) { return streams.tracker[a].t < streams.tracker[b].t; });
     for (const FrameSample& sample : streams.plan) {
       CompensationRow row;
       row.t = sample.t - setup.controller_clock_offset + setup.actuator_lag;
@@ -92,11 +100,13 @@ class Replay {
     }
     by_time_.resize(result_.rows.size());
     for (std::size_t k = 0; k < by_time_.size(); ++k) by_time_[k] = k;
-    std::stable_sort(by_time_.begin(), by_time_.end(), [&](std::size_t a, std::size_t b) { return result_.rows[a].t < result_.rows[b].t; });
+    std::stable_sort(by_time_.begin(), by_time_.end(),
+                     [&](std::size_t a, std::size_t b) { return result_.rows[a].t < result_.rows[b].t; });
   }
 
   ReplayResult run(const std::function<bool(double)>& progress) {
-    const std::size_t all = streams_.imu.size() + streams_.tracker.size() + streams_.flange.size() + streams_.plan.size();
+    const std::size_t all =
+        streams_.imu.size() + streams_.tracker.size() + streams_.flange.size() + streams_.plan.size();
     const std::size_t step = std::max<std::size_t>(1, all / 100);
     for (std::size_t done = 0; push_next(); ++done) {
       if (now_ > kNever) make_what_is_due();
@@ -105,17 +115,21 @@ class Replay {
         break;
       }
     }
-    std::stable_sort(result_.graded.begin(), result_.graded.end(), [](const GradedPrediction& a, const GradedPrediction& b) { return a.t < b.t; });
+    std::stable_sort(result_.graded.begin(), result_.graded.end(),
+                     [](const GradedPrediction& a, const GradedPrediction& b) { return a.t < b.t; });
     result_.counters = tracker_.counters();
     result_.clock = tracker_.clock();
     return std::move(result_);
   }
 
  private:
-  /// The sample that arrives next, of any stream; the plan first, then joints and tracker, where several arrive at once.
+  /// The sample that arrives next, of any stream; the plan first, then joints and tracker, where several arrive at
+  /// once.
   bool push_next() {
-    const double plan = plan_ < streams_.plan.size() ? streams_.plan[plan_].arrival : kNotYet, flange = flange_ < streams_.flange.size() ? streams_.flange[flange_].arrival : kNotYet;
-    const double pose = pose_ < streams_.tracker.size() ? streams_.tracker[pose_].arrival : kNotYet, imu = imu_ < streams_.imu.size() ? streams_.imu[imu_].arrival : kNotYet;
+    const double plan = plan_ < streams_.plan.size() ? streams_.plan[plan_].arrival : kNotYet,
+                 flange = flange_ < streams_.flange.size() ? streams_.flange[flange_].arrival : kNotYet;
+    const double pose = pose_ < streams_.tracker.size() ? streams_.tracker[pose_].arrival : kNotYet,
+                 imu = imu_ < streams_.imu.size() ? streams_.imu[imu_].arrival : kNotYet;
     const double first = std::min({plan, flange, pose, imu});
     if (first == kNotYet) return false;
     if (plan == first) {
@@ -156,7 +170,8 @@ class Replay {
     }
   }
 
-  /// Tracker samples that will have been taken a horizon from now: their stamps are known here, what they say is not looked at until the prediction is made.
+  /// Tracker samples that will have been taken a horizon from now: their stamps are known here, what they say is not
+  /// looked at until the prediction is made.
   void grade_due(std::size_t which) {
     const double horizon = options_.horizons[which];
     for (std::size_t& next = next_grade_[which]; next < by_stamp_.size(); ++next) {
@@ -171,27 +186,33 @@ class Replay {
   GradedPrediction graded(const PoseSample& later, double t, double horizon) {
     GradedPrediction out;
     const PosePrediction predicted = tracker_.predict(t);
-    out.t = t, out.made = predicted.made, out.horizon = horizon, out.status = predicted.status, out.predictor = predicted.predictor;
-    const Isometry3d T_base_receiver = predicted.T_base_tool * T_tool_receiver_, measured = T_base_tracker_ * frame_of(later);
+    out.t = t, out.made = predicted.made, out.horizon = horizon, out.status = predicted.status,
+    out.predictor = predicted.predictor;
+    const Isometry3d T_base_receiver = predicted.T_base_tool * T_tool_receiver_,
+                     measured = T_base_tracker_ * frame_of(later);
     out.baselines = baselines(later.t, t, measured.translation());
     if (predicted.status == Status::lost) return out;
     out.dimensions = later.has_orientation() ? 6 : 3;
     out.position = measured.translation() - T_base_receiver.translation();
-    if (out.dimensions == 6) out.rotation = log_rotation(Quaterniond(measured.linear() * T_base_receiver.linear().transpose()));
+    if (out.dimensions == 6)
+      out.rotation = log_rotation(Quaterniond(measured.linear() * T_base_receiver.linear().transpose()));
     Matrix6d S = carried(predicted.covariance, T_base_receiver.translation() - predicted.T_base_tool.translation());
     S.diagonal().head<3>().array() += options_.track.filter.position_sigma * options_.track.filter.position_sigma;
     S.diagonal().tail<3>().array() += options_.track.filter.rotation_sigma * options_.track.filter.rotation_sigma;
     out.position_sigma = S.diagonal().head<3>().cwiseSqrt();
     Vector6d e;
     e << out.position, out.rotation;
-    out.squares = out.dimensions == 6 ? e.dot(S.ldlt().solve(e)) : e.head<3>().dot(S.topLeftCorner<3, 3>().ldlt().solve(e.head<3>()));
+    out.squares = out.dimensions == 6 ? e.dot(S.ldlt().solve(e))
+                                      : e.head<3>().dot(S.topLeftCorner<3, 3>().ldlt().solve(e.head<3>()));
     return out;
   }
 
   std::array<double, kBaselines> baselines(double stamp, double t, const Vector3d& measured) const {
     std::array<double, kBaselines> out;
     out.fill(kNotYet);
-    const auto set = [&](Baseline which, const Vector3d& receiver) { out[static_cast<std::size_t>(which)] = (measured - receiver).norm(); };
+    const auto set = [&](Baseline which, const Vector3d& receiver) {
+      out[static_cast<std::size_t>(which)] = (measured - receiver).norm();
+    };
     const Vector3d lever = setup_.T_flange_receiver.translation();
     if (poses_.any()) set(Baseline::hold, poses_.held().translation());
     if (poses_.two()) set(Baseline::velocity, poses_.at(stamp).translation());
@@ -210,10 +231,13 @@ class Replay {
     result_.timeline.push_back(row);
     offset_ = row.clock.offset;
     next_timeline_ = now_ + kTimelineStep;
-    if (tracker_.shift().count > result_.shifts.size()) result_.shifts.push_back(tracker_.shift());
-    else if (!result_.shifts.empty()) result_.shifts.back() = tracker_.shift();  // its cause becomes clearer
+    if (tracker_.shift().count > result_.shifts.size())
+      result_.shifts.push_back(tracker_.shift());
+    else if (!result_.shifts.empty())
+      result_.shifts.back() = tracker_.shift();  // its cause becomes clearer
     Innovation innovations[64];
-    for (int n; (n = tracker_.take_innovations(innovations, 64)) > 0;) result_.innovations.insert(result_.innovations.end(), innovations, innovations + n);
+    for (int n; (n = tracker_.take_innovations(innovations, 64)) > 0;)
+      result_.innovations.insert(result_.innovations.end(), innovations, innovations + n);
     DeviationRow rows[64];
     for (int n; (n = tracker_.take_rows(rows, 64)) > 0;) {
       if (learning()) rows_.insert(rows_.end(), rows, rows + n);
@@ -227,7 +251,8 @@ class Replay {
   void learn() {
     learnt_ = true;
     const double settled = start_ + std::min(3.0, 0.2 * options_.learn_modes);
-    rows_.erase(rows_.begin(), std::find_if(rows_.begin(), rows_.end(), [&](const DeviationRow& row) { return row.t >= settled; }));
+    rows_.erase(rows_.begin(),
+                std::find_if(rows_.begin(), rows_.end(), [&](const DeviationRow& row) { return row.t >= settled; }));
     if (rows_.size() < kFewestRows) return;
     result_.modes = identify_modes(rows_, options_.track.deviation);
     rows_.clear();
@@ -259,7 +284,10 @@ const char* name(Baseline baseline) {
 
 bool ReplayOptions::is_valid(std::string* error) const {
   if (!track.is_valid(error)) return false;
-  const auto no = [&](const char* why) { if (error) *error = why; return false; };
+  const auto no = [&](const char* why) {
+    if (error) *error = why;
+    return false;
+  };
   for (const double horizon : horizons) {
     if (!(horizon >= 0.0 && horizon <= 1.0)) return no("horizons must be from 0 to 1 s");
   }
@@ -267,7 +295,8 @@ bool ReplayOptions::is_valid(std::string* error) const {
   return true;
 }
 
-ReplayResult replay(const RecordedStreams& streams, const TrackSetup& setup, const ReplayOptions& options, const std::function<bool(double)>& progress) {
+ReplayResult replay(const RecordedStreams& streams, const TrackSetup& setup, const ReplayOptions& options,
+                    const std::function<bool(double)>& progress) {
   std::string error;
   if (!options.is_valid(&error)) throw std::invalid_argument("ReplayOptions: " + error);
   require_sorted(streams.imu, "imu");

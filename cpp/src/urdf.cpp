@@ -77,8 +77,7 @@ std::string link_names(const urdf::ModelInterface& model) {
   return listed(names);
 }
 
-urdf::LinkConstSharedPtr link_named(const urdf::ModelInterface& model, const std::string& name,
-                                    const char* role) {
+urdf::LinkConstSharedPtr link_named(const urdf::ModelInterface& model, const std::string& name, const char* role) {
   const urdf::LinkConstSharedPtr link = model.getLink(name);
   if (!link) {
     throw std::invalid_argument(std::string(role) + " link '" + name + "' does not exist; the links are " +
@@ -104,8 +103,8 @@ urdf::LinkConstSharedPtr only_leaf(const urdf::ModelInterface& model, const urdf
 }
 
 // The joints between two links, base first.
-std::vector<urdf::JointConstSharedPtr> joints_between(const urdf::ModelInterface& model,
-                                                      const urdf::Link& base, const urdf::Link& tip) {
+std::vector<urdf::JointConstSharedPtr> joints_between(const urdf::ModelInterface& model, const urdf::Link& base,
+                                                      const urdf::Link& tip) {
   std::vector<urdf::JointConstSharedPtr> path;
   const urdf::Link* link = &tip;
   while (link->name != base.name) {
@@ -137,8 +136,8 @@ void add_load(const urdf::ModelInterface& model, const urdf::Link& link, const I
   }
   for (const urdf::JointSharedPtr& joint : link.child_joints) {
     if (joint->type != urdf::Joint::FIXED) continue;
-    add_load(model, *model.getLink(joint->child_link_name),
-             T * frame_of(joint->parent_to_joint_origin_transform), load);
+    add_load(model, *model.getLink(joint->child_link_name), T * frame_of(joint->parent_to_joint_origin_transform),
+             load);
   }
 }
 
@@ -211,8 +210,7 @@ void require_drivers_in_chain(const Robot& robot) {
 
 Chain read_chain(const std::string& urdf_text, const std::string& base_link, const std::string& tip_link) {
   const urdf::ModelInterfaceSharedPtr model = parse(urdf_text);
-  const urdf::LinkConstSharedPtr base =
-      base_link.empty() ? model->getRoot() : link_named(*model, base_link, "base");
+  const urdf::LinkConstSharedPtr base = base_link.empty() ? model->getRoot() : link_named(*model, base_link, "base");
   const urdf::LinkConstSharedPtr tip =
       tip_link.empty() ? only_leaf(*model, *base) : link_named(*model, tip_link, "tip");
 
@@ -240,8 +238,8 @@ Chain read_chain(const std::string& urdf_text, const std::string& base_link, con
     T_link_parent = Isometry3d::Identity();
   }
   if (chain.robot.joints.empty()) {
-    throw std::invalid_argument("nothing moves between base link '" + base->name + "' and tip link '" +
-                                tip->name + "'");
+    throw std::invalid_argument("nothing moves between base link '" + base->name + "' and tip link '" + tip->name +
+                                "'");
   }
   chain.robot.targets = {{"tool", T_link_parent}};
   require_drivers_in_chain(chain.robot);
@@ -284,8 +282,7 @@ void write_origin(tinyxml2::XMLElement* joint, const Isometry3d& T) {
   origin->SetAttribute("rpy", triple(rpy_from_rotation(T.linear())).c_str());
 }
 
-void write_tool(tinyxml2::XMLElement* robot, const std::string& parent_link,
-                const Isometry3d& T_last_target) {
+void write_tool(tinyxml2::XMLElement* robot, const std::string& parent_link, const Isometry3d& T_last_target) {
   tinyxml2::XMLElement* joint = named_element(robot, "joint", tool_joint);
   if (joint == nullptr) {
     if (named_element(robot, "link", tool_link) != nullptr) {
@@ -311,8 +308,8 @@ void require_same_chain(const Robot& nominal, const Robot& calibrated) {
   for (const Joint& joint : nominal.joints) expected.push_back(joint.name);
   for (const Joint& joint : calibrated.joints) found.push_back(joint.name);
   if (expected != found) {
-    throw std::invalid_argument("the URDF's chain has the joints " + listed(expected) +
-                                "; the calibrated robot has " + listed(found));
+    throw std::invalid_argument("the URDF's chain has the joints " + listed(expected) + "; the calibrated robot has " +
+                                listed(found));
   }
   for (std::size_t i = 0; i < nominal.joints.size(); ++i) {
     if (nominal.joints[i].type == calibrated.joints[i].type) continue;
@@ -330,8 +327,7 @@ std::vector<std::string> not_in_urdf(const Robot& nominal, const Robot& calibrat
                       " (the joint moves by ratio * reading)");
     }
     if (joint.driven_by != nominal.joints[i].driven_by) {
-      notes.push_back("coupling of " + joint.name +
-                      ": the calibrated robot's driven_by is not the mimic of this file");
+      notes.push_back("coupling of " + joint.name + ": the calibrated robot's driven_by is not the mimic of this file");
     }
   }
   if (!is_same(calibrated.T_measurement_base, Isometry3d::Identity())) {
@@ -339,8 +335,7 @@ std::vector<std::string> not_in_urdf(const Robot& nominal, const Robot& calibrat
     notes.push_back("base in the measurement frame: xyz " + triple(T.translation()) + " m, rpy " +
                     triple(rpy_from_rotation(T.linear())) + " rad");
   }
-  for (std::size_t k = 1; k < calibrated.targets.size(); ++k)
-    notes.push_back("target " + calibrated.targets[k].name);
+  for (std::size_t k = 1; k < calibrated.targets.size(); ++k) notes.push_back("target " + calibrated.targets[k].name);
   for (const AppliedEffect& applied : calibrated.effects) {
     std::string note = "effect " + applied.effect + ":";
     for (const auto& [name, value] : applied.parameters) note += " " + name + " = " + number(value, 9);
@@ -352,8 +347,7 @@ std::vector<std::string> not_in_urdf(const Robot& nominal, const Robot& calibrat
 
 // XML forbids '--' in a comment, and '-' at its end: ours end in a new line.
 std::string comment_text(std::string text) {
-  for (std::size_t at = text.find("--"); at != std::string::npos; at = text.find("--"))
-    text.insert(at + 1, " ");
+  for (std::size_t at = text.find("--"); at != std::string::npos; at = text.find("--")) text.insert(at + 1, " ");
   return text;
 }
 
@@ -369,13 +363,12 @@ void write_comment(tinyxml2::XMLDocument& document, const std::string& text) {
 
 }  // namespace
 
-Robot robot_from_urdf(const std::string& urdf_text, const std::string& base_link,
-                      const std::string& tip_link) {
+Robot robot_from_urdf(const std::string& urdf_text, const std::string& base_link, const std::string& tip_link) {
   return read_chain(urdf_text, base_link, tip_link).robot;
 }
 
-std::string urdf_with_calibration(const std::string& urdf_text, const Robot& calibrated,
-                                  const std::string& base_link, const std::string& tip_link) {
+std::string urdf_with_calibration(const std::string& urdf_text, const Robot& calibrated, const std::string& base_link,
+                                  const std::string& tip_link) {
   const Chain chain = read_chain(urdf_text, base_link, tip_link);
   const Robot& nominal = chain.robot;
   validate(calibrated);
@@ -395,15 +388,12 @@ std::string urdf_with_calibration(const std::string& urdf_text, const Robot& cal
     throw std::invalid_argument("the calibrated robot has " + std::to_string(calibrated.driven_count()) +
                                 " driven joints, the URDF's chain " + std::to_string(nominal.driven_count()));
   }
-  const Eigen::VectorXd shift =
-      detail::joint_motions(calibrated, zero) - detail::joint_motions(nominal, zero);
+  const Eigen::VectorXd shift = detail::joint_motions(calibrated, zero) - detail::joint_motions(nominal, zero);
   for (std::size_t i = 0; i < nominal.joints.size(); ++i) {
     const Joint& joint = calibrated.joints[i];
     tinyxml2::XMLElement* element = named_element(robot, "joint", joint.name);
-    if (element == nullptr)
-      throw std::invalid_argument("joint '" + joint.name + "' is not a child of <robot>");
-    const Isometry3d T_link_joint =
-        joint.T_parent_joint * motion_frame(joint, shift[static_cast<Eigen::Index>(i)]);
+    if (element == nullptr) throw std::invalid_argument("joint '" + joint.name + "' is not a child of <robot>");
+    const Isometry3d T_link_joint = joint.T_parent_joint * motion_frame(joint, shift[static_cast<Eigen::Index>(i)]);
     // What did not move keeps its text.
     if (!is_same(T_link_joint, nominal.joints[i].T_parent_joint)) {
       write_origin(element, chain.T_link_parent[i].inverse() * T_link_joint);
@@ -420,8 +410,7 @@ std::string urdf_with_calibration(const std::string& urdf_text, const Robot& cal
       calibrated.targets.empty() ? Isometry3d::Identity() : calibrated.targets.front().T_last_target;
   if (!is_same(T_last_tool, nominal.targets.front().T_last_target)) {
     write_tool(robot, chain.last_link, T_last_tool);
-    comment +=
-        std::string("  The measured tool is the link ") + tool_link + ", fixed to " + chain.last_link + ".\n";
+    comment += std::string("  The measured tool is the link ") + tool_link + ", fixed to " + chain.last_link + ".\n";
   }
   const std::vector<std::string> notes = not_in_urdf(nominal, calibrated);
   if (!notes.empty()) comment += "  Found as well, but URDF cannot hold it:\n";

@@ -47,14 +47,16 @@ static std::vector<Block> blocks_of(const Design& design) {
   for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const int kind = kind_of(design.component[at]);
-    if (out.empty() || design.row[at] != last || out.back().kind != kind) out.push_back({i, 0, kind, design.fold[at] < design.folds});
+    if (out.empty() || design.row[at] != last || out.back().kind != kind)
+      out.push_back({i, 0, kind, design.fold[at] < design.folds});
     ++out.back().count;
     last = design.row[at];
   }
   return out;
 }
 
-/// Noise of one value, by kind, from the median length of what a row leaves; 0: no row has this kind. `used`: effective parameters.
+/// Noise of one value, by kind, from the median length of what a row leaves; 0: no row has this kind. `used`: effective
+/// parameters.
 static std::array<double, 3> sigma_of(const std::vector<Block>& blocks, const Eigen::VectorXd& residual, double used) {
   std::vector<double> lengths[3];
   double training = 0.0;
@@ -66,14 +68,15 @@ static std::array<double, 3> sigma_of(const std::vector<Block>& blocks, const Ei
   const double inflate = std::sqrt(training / std::max(1.0, training - used));
   std::array<double, 3> sigma{};
   for (std::size_t kind = 0; kind < 3; ++kind) {
-    if (!lengths[kind].empty()) sigma[kind] = std::max(median_of(lengths[kind]) / kChiMedian[kind == 2 ? 1 : 3] * inflate, 1e-12);
+    if (!lengths[kind].empty())
+      sigma[kind] = std::max(median_of(lengths[kind]) / kChiMedian[kind == 2 ? 1 : 3] * inflate, 1e-12);
   }
   return sigma;
 }
 
-/// Unit-weight rows: each kind of value by its own noise, what stands far out by less (Huber 1964; the power makes gross
-/// outliers count for nothing). The noise is what the flexible model leaves: everything at once under a ridge prior, so
-/// that an effect is not taken for noise.
+/// Unit-weight rows: each kind of value by its own noise, what stands far out by less (Huber 1964; the power makes
+/// gross outliers count for nothing). The noise is what the flexible model leaves: everything at once under a ridge
+/// prior, so that an effect is not taken for noise.
 void weigh(Work* work) {
   Design& design = work->design;
   const Eigen::Index n = design.x.rows();
@@ -91,7 +94,8 @@ void weigh(Work* work) {
   for (const int k : flexible) in[static_cast<std::size_t>(k)] = true;
   for (std::size_t g = 0; g < design.candidates.groups.size(); ++g) {
     const Explanation& e = design.candidates.named[g];
-    const bool coarse_drift = e.kind == Kind::drift && e.effect == "drift" && e.site != "base.xyz" && e.knots[0].size() <= 12;
+    const bool coarse_drift =
+        e.kind == Kind::drift && e.effect == "drift" && e.site != "base.xyz" && e.knots[0].size() <= 12;
     if (e.kind == Kind::drift && !coarse_drift) continue;
     for (const int k : design.candidates.groups[g].columns) {
       if (!in[static_cast<std::size_t>(k)]) flexible.push_back(k);
@@ -114,12 +118,14 @@ void weigh(Work* work) {
     for (std::size_t b = 0; b < blocks.size(); ++b) {
       const auto [first, count, kind, training] = blocks[b];
       const double noise = sigma[static_cast<std::size_t>(kind)];
-      distance2[b] = own.segment(first, count).cwiseProduct(residual.segment(first, count)).squaredNorm() / (noise * noise);
+      distance2[b] =
+          own.segment(first, count).cwiseProduct(residual.segment(first, count)).squaredNorm() / (noise * noise);
       const double bound = count == 1 ? 9.0 : 14.2;  // one in 370 of normal noise
       far += distance2[b] > bound ? 1 : 0;
       very_far += distance2[b] > 3.0 * bound ? 1 : 0;
     }
-    const bool tails = round > 0 && (very_far > 0 || static_cast<double>(far) > 4.0 + 0.01 * static_cast<double>(blocks.size()));
+    const bool tails =
+        round > 0 && (very_far > 0 || static_cast<double>(far) > 4.0 + 0.01 * static_cast<double>(blocks.size()));
     for (std::size_t b = 0; b < blocks.size(); ++b) {
       const auto [first, count, kind, training] = blocks[b];
       const double bound = count == 1 ? 5.0 : 9.0;
@@ -144,7 +150,8 @@ void weigh(Work* work) {
     Eigen::MatrixXd d = xx;
     for (Eigen::Index c = 0; c < p; ++c) {
       const bool flat = c < static_cast<Eigen::Index>(design.nuisance.size());
-      d(c, c) += flat ? 1e-9 * xx(c, c) + 1e-30 : std::pow(0.05 * design.prior[flexible[static_cast<std::size_t>(c)]], -2.0);
+      d(c, c) +=
+          flat ? 1e-9 * xx(c, c) + 1e-30 : std::pow(0.05 * design.prior[flexible[static_cast<std::size_t>(c)]], -2.0);
     }
     const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(d));
     const Eigen::VectorXd solution = factor.solve(xy);
@@ -161,7 +168,8 @@ void weigh(Work* work) {
 
   // Rows of one pose that err together count for less than their number.
   double together = 0.0, pairs = 0.0, alone = 0.0, values = 0.0;
-  std::map<std::pair<std::int32_t, int>, std::array<double, 3>> sums;  // by pose and component: sum, sum of squares, count
+  std::map<std::pair<std::int32_t, int>, std::array<double, 3>>
+      sums;  // by pose and component: sum, sum of squares, count
   for (Eigen::Index i = 0; i < n; ++i) {
     if (design.fold[static_cast<std::size_t>(i)] >= design.folds) continue;
     const double e = design.weight[i] * residual[i];
@@ -189,7 +197,8 @@ void make_grams(Work* work) {
   const int folds = design.folds + design.test_folds;
   std::vector<Gram> grams(static_cast<std::size_t>(folds));
   const auto some = [&](int first) {
-    for (int f = first; f < folds; f += 2) grams[static_cast<std::size_t>(f)].add(design.gram_of_fold(f), 1.0 / work->deff);
+    for (int f = first; f < folds; f += 2)
+      grams[static_cast<std::size_t>(f)].add(design.gram_of_fold(f), 1.0 / work->deff);
   };
   if (work->options.threads == 1) {
     some(0);

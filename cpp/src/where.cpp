@@ -21,15 +21,18 @@ constexpr int kResamples = 24;
 constexpr std::size_t kMostValues = 6000;
 
 /// Gram of the nuisance columns and some free functions, fold by fold.
-std::vector<Gram> fold_grams(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at, double deff) {
+std::vector<Gram> fold_grams(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at,
+                             double deff) {
   const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size()), p = nuisance + more.cols();
   std::vector<GramSum> sums(static_cast<std::size_t>(design.folds), GramSum(p));
   for (std::size_t n = 0; n < at.size(); ++n) {
     const Eigen::Index i = at[n];
     GramSum& sum = sums[static_cast<std::size_t>(design.fold[static_cast<std::size_t>(i)])];
     double* out = sum.row();
-    for (Eigen::Index k = 0; k < nuisance; ++k) out[k * GramSum::stride()] = design.weight[i] * design.x(i, design.nuisance[static_cast<std::size_t>(k)]);
-    for (Eigen::Index k = 0; k < more.cols(); ++k) out[(nuisance + k) * GramSum::stride()] = design.weight[i] * more(static_cast<Eigen::Index>(n), k);
+    for (Eigen::Index k = 0; k < nuisance; ++k)
+      out[k * GramSum::stride()] = design.weight[i] * design.x(i, design.nuisance[static_cast<std::size_t>(k)]);
+    for (Eigen::Index k = 0; k < more.cols(); ++k)
+      out[(nuisance + k) * GramSum::stride()] = design.weight[i] * more(static_cast<Eigen::Index>(n), k);
     out[p * GramSum::stride()] = design.weight[i] * design.y[i];
     sum.push();
   }
@@ -41,11 +44,13 @@ std::vector<Gram> fold_grams(const Design& design, const Design::Rows& more, con
   return out;
 }
 
-/// Sum of squares that the nuisance alone leaves, less what is left with the free functions, and what those cost in noise.
+/// Sum of squares that the nuisance alone leaves, less what is left with the free functions, and what those cost in
+/// noise.
 double explained(const Gram& gram, Eigen::Index nuisance, double* closable) {
   Eigen::MatrixXd d = gram.xx;
   const Eigen::Index p = d.rows();
-  const Eigen::MatrixXd base = d.topLeftCorner(nuisance, nuisance) + (1e-10 * d.diagonal().head(nuisance)).asDiagonal().toDenseMatrix();
+  const Eigen::MatrixXd base =
+      d.topLeftCorner(nuisance, nuisance) + (1e-10 * d.diagonal().head(nuisance)).asDiagonal().toDenseMatrix();
   const double before = gram.yy - gram.xy.head(nuisance).dot(base.ldlt().solve(gram.xy.head(nuisance)));
   for (Eigen::Index k = 0; k < p; ++k) d(k, k) += 1e-10 * gram.xx(k, k) + (k < nuisance ? 0.0 : 1.0 / (1e-3 * 1e-3));
   const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(d));
@@ -57,7 +62,8 @@ double explained(const Gram& gram, Eigen::Index nuisance, double* closable) {
   return std::max(0.0, before - after - used * noise);
 }
 
-Share share_of(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at, double deff, double closable, std::uint64_t seed) {
+Share share_of(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at, double deff,
+               double closable, std::uint64_t seed) {
   const std::vector<Gram> folds = fold_grams(design, more, at, deff);
   const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size());
   Gram all;
@@ -84,14 +90,17 @@ Share share_of(const Design& design, const Design::Rows& more, const std::vector
 
 }  // namespace
 
-void share_out(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot, double deff, std::uint64_t seed, Diagnosis* out) {
+void share_out(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+               std::uint64_t seed, Diagnosis* out) {
   std::vector<Eigen::Index> at;
   int folds = design.folds;
   std::size_t training = 0;
   for (const std::int32_t fold : design.fold) training += fold < design.folds ? 1 : 0;
-  while (folds > 2 && training * static_cast<std::size_t>(folds) / static_cast<std::size_t>(design.folds) > kMostValues) --folds;
+  while (folds > 2 && training * static_cast<std::size_t>(folds) / static_cast<std::size_t>(design.folds) > kMostValues)
+    --folds;
   for (std::size_t i = 0; i < design.fold.size(); ++i) {
-    if (design.fold[i] < folds && design.weight[static_cast<Eigen::Index>(i)] > 0.0) at.push_back(static_cast<Eigen::Index>(i));
+    if (design.fold[i] < folds && design.weight[static_cast<Eigen::Index>(i)] > 0.0)
+      at.push_back(static_cast<Eigen::Index>(i));
   }
   std::vector<std::int32_t> rows;
   for (const Eigen::Index i : at) rows.push_back(design.row[static_cast<std::size_t>(i)]);
@@ -105,7 +114,10 @@ void share_out(const Design& design, const std::vector<InputColumn>& inputs, con
       Design::Rows part(static_cast<Eigen::Index>(at.size()), static_cast<Eigen::Index>(sites.size() * knots.size()));
       std::vector<double> hats(knots.size());
       for (std::size_t n = 0; n < at.size(); ++n) {
-        hats_at(knots, inputs[static_cast<std::size_t>(input)].values[static_cast<std::size_t>(design.row[static_cast<std::size_t>(at[n])])], hats.data());
+        hats_at(knots,
+                inputs[static_cast<std::size_t>(input)]
+                    .values[static_cast<std::size_t>(design.row[static_cast<std::size_t>(at[n])])],
+                hats.data());
         Eigen::Index c = 0;
         for (const int site : sites) {
           for (const double hat : hats) part(static_cast<Eigen::Index>(n), c++) = hat * design.x(at[n], site);
@@ -124,11 +136,13 @@ void share_out(const Design& design, const std::vector<InputColumn>& inputs, con
   };
   std::vector<int> moving;
   for (std::size_t k = 0; k < inputs.size(); ++k) {
-    if (!inputs[k].constant && inputs[k].name.rfind("torque", 0) != 0 && moving.size() < 20) moving.push_back(static_cast<int>(k));
+    if (!inputs[k].constant && inputs[k].name.rfind("torque", 0) != 0 && moving.size() < 20)
+      moving.push_back(static_cast<int>(k));
   }
   // What is closable at all: every joint by its own motion and direction, and by torque, together.
   std::vector<int> every_site;
-  for (const std::vector<int>& columns : design.joint_column) every_site.insert(every_site.end(), columns.begin(), columns.end());
+  for (const std::vector<int>& columns : design.joint_column)
+    every_site.insert(every_site.end(), columns.begin(), columns.end());
   double closable = 0.0;
   {
     const Design::Rows all = some(every_site, moving, 3);
@@ -137,7 +151,8 @@ void share_out(const Design& design, const std::vector<InputColumn>& inputs, con
     explained(gram, static_cast<Eigen::Index>(design.nuisance.size()), &closable);
   }
   for (std::size_t joint = 0; joint < robot.joints.size(); ++joint) {
-    out->where_joints.push_back({robot.joints[joint].name, share_of(design, some(design.joint_column[joint], moving, 5), at, deff, closable, seed + joint)});
+    out->where_joints.push_back({robot.joints[joint].name, share_of(design, some(design.joint_column[joint], moving, 5),
+                                                                    at, deff, closable, seed + joint)});
   }
   for (const int input : moving) {
     Gram gram;
@@ -146,8 +161,10 @@ void share_out(const Design& design, const std::vector<InputColumn>& inputs, con
     const double share = explained(gram, static_cast<Eigen::Index>(design.nuisance.size()), &own) / closable;
     out->where_inputs.push_back({inputs[static_cast<std::size_t>(input)].name, std::min(1.0, share)});
   }
-  std::stable_sort(out->where_joints.begin(), out->where_joints.end(), [](const WhereJoint& a, const WhereJoint& b) { return a.share.value > b.share.value; });
-  std::stable_sort(out->where_inputs.begin(), out->where_inputs.end(), [](const WhereInput& a, const WhereInput& b) { return a.share > b.share; });
+  std::stable_sort(out->where_joints.begin(), out->where_joints.end(),
+                   [](const WhereJoint& a, const WhereJoint& b) { return a.share.value > b.share.value; });
+  std::stable_sort(out->where_inputs.begin(), out->where_inputs.end(),
+                   [](const WhereInput& a, const WhereInput& b) { return a.share > b.share; });
 }
 
 void map_workspace(const Robot& robot, const Measurements& data, const Residuals& residuals, Diagnosis* out) {
@@ -156,7 +173,8 @@ void map_workspace(const Robot& robot, const Measurements& data, const Residuals
   for (std::size_t row = 0; row < data.rows; ++row) {
     const Eigen::Vector3d e = residuals.position.row(static_cast<Eigen::Index>(row)).transpose();
     if (!e.allFinite() || !data.has_position(row)) continue;
-    places.push_back(base_from_measurement * Eigen::Vector3d(data.position[0][row], data.position[1][row], data.position[2][row]));
+    places.push_back(base_from_measurement *
+                     Eigen::Vector3d(data.position[0][row], data.position[1][row], data.position[2][row]));
     errors.push_back(base_from_measurement.linear() * e);
   }
   if (places.size() < 3) return;
@@ -180,7 +198,8 @@ void map_workspace(const Robot& robot, const Measurements& data, const Residuals
   std::map<std::array<int, 3>, Cell> cells;
   for (std::size_t k = 0; k < places.size(); ++k) {
     std::array<int, 3> key{};
-    for (int axis = 0; axis < 3; ++axis) key[static_cast<std::size_t>(axis)] = static_cast<int>((places[k][axis] - low[axis]) / side);
+    for (int axis = 0; axis < 3; ++axis)
+      key[static_cast<std::size_t>(axis)] = static_cast<int>((places[k][axis] - low[axis]) / side);
     Cell& cell = cells[key];
     cell.place += places[k];
     cell.squares += errors[k].squaredNorm();
@@ -188,12 +207,14 @@ void map_workspace(const Robot& robot, const Measurements& data, const Residuals
   }
   for (const auto& [key, cell] : cells) {
     const Eigen::Vector3d center = cell.place / static_cast<double>(cell.n);
-    out->workspace.push_back({{center.x(), center.y(), center.z()}, std::sqrt(cell.squares / static_cast<double>(cell.n)), cell.n});
+    out->workspace.push_back(
+        {{center.x(), center.y(), center.z()}, std::sqrt(cell.squares / static_cast<double>(cell.n)), cell.n});
   }
 }
 
-double neighbour_share(const Measurements& data, const std::vector<std::int8_t>& set, const Residuals& residuals, double* p95) {
-  constexpr std::size_t kMost = 1500;      // poses of each part that are compared
+double neighbour_share(const Measurements& data, const std::vector<std::int8_t>& set, const Residuals& residuals,
+                       double* p95) {
+  constexpr std::size_t kMost = 1500;  // poses of each part that are compared
   constexpr std::size_t kNeighbours = 4;
   const std::size_t joints = data.joints.size();
   std::vector<std::size_t> train, test;
@@ -235,7 +256,8 @@ double neighbour_share(const Measurements& data, const std::vector<std::int8_t>&
     if (near.size() < kNeighbours) continue;
     std::nth_element(near.begin(), near.begin() + kNeighbours - 1, near.end());
     Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
-    for (std::size_t k = 0; k < kNeighbours; ++k) mean += residuals.position.row(static_cast<Eigen::Index>(near[k].second)) / kNeighbours;
+    for (std::size_t k = 0; k < kNeighbours; ++k)
+      mean += residuals.position.row(static_cast<Eigen::Index>(near[k].second)) / kNeighbours;
     const Eigen::RowVector3d e = residuals.position.row(static_cast<Eigen::Index>(row));
     before += e.squaredNorm();
     // A mean of neighbours is itself noisy: half of it is the better guess when they agree only in part.

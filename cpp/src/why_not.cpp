@@ -62,7 +62,8 @@ TipJacobian scaled_jacobian(const Reach& reach, const double* readings, int fixe
 template <typename Vector>
 void to_readings(const Vector& v, const Scales& scales, int fixed, double* still) {
   std::fill(still, still + fixed, 0.0);
-  for (Eigen::Index j = 0; j < v.size(); ++j) still[fixed + j] = v[j] / v.cwiseAbs().maxCoeff() * scales.joint[fixed + j];
+  for (Eigen::Index j = 0; j < v.size(); ++j)
+    still[fixed + j] = v[j] / v.cwiseAbs().maxCoeff() * scales.joint[fixed + j];
 }
 
 }  // namespace
@@ -89,7 +90,8 @@ Vector3d Reach::singular_direction(const double* readings, EffectScratch* scratc
   return linear.norm() > 0.5 ? Vector3d(linear.normalized()) : Vector3d::Zero();
 }
 
-/// Readings of a joint after which everything is where it was: a whole turn of a joint that turns nothing else. 0: none.
+/// Readings of a joint after which everything is where it was: a whole turn of a joint that turns nothing else. 0:
+/// none.
 double Reach::turn_of(int joint) const {
   int moved = 0;
   for (Eigen::Index k = 0; k < arm.motion_weights().rows(); ++k) moved += arm.motion_weights()(k, joint) != 0.0;
@@ -142,7 +144,8 @@ void Reach::explain(Search* search, Solution* solution) const {
     joint = at;
   }
 
-  // The nearest alternative: the orientation first, then as near as can be; unless the orientation itself is the trouble.
+  // The nearest alternative: the orientation first, then as near as can be; unless the orientation itself is the
+  // trouble.
   DescentOptions stiff;
   stiff.max_iterations = 4 * options.max_iterations;
   stiff.rotation_weight = 100.0;
@@ -154,7 +157,8 @@ void Reach::explain(Search* search, Solution* solution) const {
     if (other.cost < (1.0 - 1e-6) * nearest.cost) nearest = other;
   }
   check(search, nearest.readings, solution);
-  if (solution->rotation_error > 1e-4 && solution->rotation_error * scales.length > solution->position_error) check(search, best, solution);
+  if (solution->rotation_error > 1e-4 && solution->rotation_error * scales.length > solution->position_error)
+    check(search, best, solution);
   const Tip tip = arm.tip(solution->joints.data(), search->scratch);
   const bool turned_away = solution->position_error <= options.position_tolerance;
   solution->miss = turned_away ? solution->rotation_error : solution->position_error;

@@ -63,8 +63,7 @@ int main() {
     for (std::size_t k = 0; k < joints; ++k) reading[row * joints + k] = angle(random);
     const Eigen::Map<const Eigen::VectorXd> q(&reading[row * joints], joints);
     const Eigen::Vector3d tip = truing::forward_kinematics(real, q).back().translation();
-    for (int axis = 0; axis < 3; ++axis)
-      position[row * 3 + static_cast<std::size_t>(axis)] = tip[axis] + noise(random);
+    for (int axis = 0; axis < 3; ++axis) position[row * 3 + static_cast<std::size_t>(axis)] = tip[axis] + noise(random);
   }
   truing::Measurements data;  // owns nothing: pointer and stride per column
   data.rows = rows;
@@ -77,8 +76,7 @@ int main() {
               found.solver.iterations, found.solver.stopped_because.c_str());
   std::printf("held out: %.4f mm before, %.4f mm after (mean of %zu rows)\n", 1e3 * found.test->before.mean,
               1e3 * found.test->after.mean, found.test->after.n);
-  std::printf("%d of %d parameters found; the changes of more than five standard errors:\n", found.rank,
-              found.columns);
+  std::printf("%d of %d parameters found; the changes of more than five standard errors:\n", found.rank, found.columns);
   for (const truing::Parameter& p : found.parameters) {
     if (p.frozen || p.name.rfind("base.", 0) == 0 || std::abs(p.value - p.nominal) < 5.0 * p.sigma) continue;
     std::printf("  %-10s %+.6f +- %.6f %s\n", p.name.c_str(), p.value - p.nominal, p.sigma, p.unit.c_str());

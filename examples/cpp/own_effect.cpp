@@ -86,7 +86,7 @@ int main() {
   const truing::Identification found = truing::identify(nominal, data, options);
 
   const double value = found.robot.effects.at(0).parameters.at("belt_stretch.J2");
-  std::printf("belt_stretch.J2 = %.4g rad/kg, hidden were %.4g; held-out error %.3g mm after %.3g mm\n",
-              value, stretch, 1e3 * found.test->after.mean, 1e3 * found.test->before.mean);
+  std::printf("belt_stretch.J2 = %.4g rad/kg, hidden were %.4g; held-out error %.3g mm after %.3g mm\n", value, stretch,
+              1e3 * found.test->after.mean, 1e3 * found.test->before.mean);
   return std::abs(value - stretch) < 1e-3 * stretch ? 0 : 1;
 }

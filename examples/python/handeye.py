@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where is the camera? It stands in the cell, the robot shows it a board, and three of the boards were read wrongly.
+"""Where is the camera? It stands in the cell, the robot shows it a board, and three of the boards were read
+wrongly.
 
-Then two ways to get it wrong, and what is said of them: poses that are inverted, and a robot that turns about one axis only.
+Then two ways to get it wrong, and what is said of them: poses that are inverted, and a robot that turns about
+one axis only.
 """
 
 import numpy as np
@@ -23,7 +25,10 @@ def main() -> None:
 
     # Which poses would help most?
     for pose in truing.handeye_plan(poses, found, setup="eye-to-hand", count=3):
-        print(f"with the hand at {np.round(pose.T_base_hand[:3, 3], 2)} m as well: {1e3 * pose.working_point_sigma:.2f} mm at the working point")
+        print(
+            f"with the hand at {np.round(pose.T_base_hand[:3, 3], 2)} m as well:"
+            f" {1e3 * pose.working_point_sigma:.2f} mm at the working point"
+        )
 
     inverted = truing.HandEyePoses(np.linalg.inv(scene.T_base_hand), scene.T_camera_board)
     print(truing.handeye(inverted, setup="eye-to-hand", raise_if_undecided=False).message)

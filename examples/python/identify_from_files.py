@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """From two files, a robot and its measurements, to a calibrated robot file.
 
-The measurements are simulated here, so that the example runs by itself; with your own, only `calibrate` counts.
+The measurements are simulated here, so that the example runs by itself; with your own, only `calibrate`
+counts.
 """
 
 import tempfile
@@ -36,11 +37,19 @@ def main() -> None:
 
     assert found.test is not None  # rows are held out unless test_share=0 is asked for
     before, after = found.test.before, found.test.after
-    print(f"held-out error, mean: {1e3 * before.mean:.3f} mm before, {1e3 * after.mean:.3f} mm after ({after.n} rows)")
-    print(f"{found.rank} of {found.columns} parameters found, {len(found.rejected_rows)} gross outliers left out, "
-          f"noise {1e3 * found.noise_sigma:.3f} mm per axis")  # fmt: skip
+    print(
+        f"held-out error, mean: {1e3 * before.mean:.3f} mm before, {1e3 * after.mean:.3f} mm after ({after.n}"
+        " rows)"
+    )
+    print(
+        f"{found.rank} of {found.columns} parameters found, {len(found.rejected_rows)} gross outliers left"
+        f" out, noise {1e3 * found.noise_sigma:.3f} mm per axis"
+    )
     for parameter in [p for p in found.parameters if not p.frozen and not p.name.startswith("base.")][:5]:
-        print(f"  {parameter.name:10} {parameter.value - parameter.nominal:+.6f} ± {parameter.sigma:.6f} {parameter.unit}")
+        print(
+            f"  {parameter.name:10} {parameter.value - parameter.nominal:+.6f} ± {parameter.sigma:.6f}"
+            f" {parameter.unit}"
+        )
     print("the calibrated robot begins:", written.splitlines()[0])
 
 

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An effect of one's own: the pedestal grows as the cell warms up.
 
-Nothing in the catalogue says so. What acts where is all that has to be said: the site is the length `shoulder_pan.d`, the basis the
+Nothing in the catalogue says so. What acts where is all that has to be said: the site is the length
+`shoulder_pan.d`, the basis the
 temperature above 20 °C. The Jacobian follows by itself.
 """
 
@@ -15,7 +16,9 @@ GROWTH = 25e-6  # [m/K] of the true robot: about a metre of aluminium
 
 
 def measured_while_warming_up(robot: truing.Robot) -> truing.Measurements:
-    """A robot whose pedestal, upright in the measurement frame, grows: its target is measured that much higher."""
+    """A robot whose pedestal, upright in the measurement frame, grows: its target is measured that much
+    higher.
+    """
     data = truing.simulate(robot, poses=200, columns=["temp"], seed=2).data
     assert data.positions is not None and data.temperature is not None
     positions = np.array(data.positions)
@@ -32,9 +35,15 @@ def main() -> None:
     found = truing.identify(robot, data, effects=growth)
 
     assert without.test is not None and found.test is not None
-    print(f"held-out error, mean: {1e3 * without.test.after.mean:.3f} mm without the effect, {1e3 * found.test.after.mean:.3f} mm with it")
+    print(
+        f"held-out error, mean: {1e3 * without.test.after.mean:.3f} mm without the effect,"
+        f" {1e3 * found.test.after.mean:.3f} mm with it"
+    )
     parameter = next(p for p in found.parameters if p.name == "growth.shoulder_pan.d")
-    print(f"{parameter.name} = {1e6 * parameter.value:.2f} ± {1e6 * parameter.sigma:.2f} µm/K, hidden were {1e6 * GROWTH:.2f}")
+    print(
+        f"{parameter.name} = {1e6 * parameter.value:.2f} ± {1e6 * parameter.sigma:.2f} µm/K, hidden were"
+        f" {1e6 * GROWTH:.2f}"
+    )
 
     # The calibrated robot carries the effect's name and value; what it means has to be given again.
     predicted = truing.predict(found.robot, data, effects=growth)

@@ -31,11 +31,15 @@ def main() -> None:
     assert found.test is not None
     for name, errors in (("before", found.test.before), ("after", found.test.after)):
         print(f"held out, {name:6}: {1e3 * errors.rms:.3f} mm, {1e3 * errors.rotation_rms:.3f} mrad (rms)")
-    # Every origin has six values, and an axis shows only where it is: what lies along or about it is frozen, by name.
+    # Every origin has six values, and an axis shows only where it is: what lies along or about it is frozen,
+    # by name.
     print(f"{found.rank} of {found.columns} parameters found")
 
     calibrated = truing.urdf_with_calibration(ARM, found.robot, "base", "flange")
-    print("the elbow's origin is now", next(line.strip() for line in calibrated.split('name="elbow"')[1].splitlines() if "<origin" in line))
+    print(
+        "the elbow's origin is now",
+        next(line.strip() for line in calibrated.split('name="elbow"')[1].splitlines() if "<origin" in line),
+    )
 
 
 if __name__ == "__main__":

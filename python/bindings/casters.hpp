@@ -86,8 +86,7 @@ template <>
 struct Words<Loss> {
   static constexpr const char* what = "loss";
   static constexpr std::array<const char*, 5> list{"reject", "none", "huber", "cauchy", "tukey"};
-  static constexpr auto type =
-      py::detail::const_name("typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey']");
+  static constexpr auto type = py::detail::const_name("typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey']");
 };
 
 template <>
@@ -186,8 +185,8 @@ Enum enum_from_word(const std::string& text) {
     if (text == Words<Enum>::list[i]) return static_cast<Enum>(i);
     choices += std::string(i == 0 ? "'" : ", '") + Words<Enum>::list[i] + "'";
   }
-  throw std::invalid_argument(std::string("unknown ") + Words<Enum>::what + " '" + text +
-                              "'; choose one of " + choices);
+  throw std::invalid_argument(std::string("unknown ") + Words<Enum>::what + " '" + text + "'; choose one of " +
+                              choices);
 }
 
 // ---- Arrays
@@ -199,9 +198,7 @@ inline py::array_t<double> read_only(py::array_t<double> array) {
   return array;
 }
 
-inline py::array_t<double> array_from(const Eigen::Vector3d& v) {
-  return read_only(py::array_t<double>(3, v.data()));
-}
+inline py::array_t<double> array_from(const Eigen::Vector3d& v) { return read_only(py::array_t<double>(3, v.data())); }
 
 /// Copies a frame, row by row, to 16 doubles.
 inline void write_frame(const Eigen::Isometry3d& frame, double* out) {
@@ -217,10 +214,13 @@ std::vector<Eigen::Isometry3d> frames_from(const FrameArray& given, const std::s
 py::array_t<double> array_from(const std::vector<Eigen::Isometry3d>& frames);
 
 /// Samples from columns: t shape (n,), the others (n, 3) or (n, 4); without arrivals, arrived at once.
-std::vector<ImuSample> imu_samples(const ArrayLike& t, const ArrayLike& gyro, const ArrayLike& accel, const std::optional<ArrayLike>& arrival);
-std::vector<PoseSample> pose_samples(const ArrayLike& t, const ArrayLike& position, const std::optional<ArrayLike>& orientation,
+std::vector<ImuSample> imu_samples(const ArrayLike& t, const ArrayLike& gyro, const ArrayLike& accel,
+                                   const std::optional<ArrayLike>& arrival);
+std::vector<PoseSample> pose_samples(const ArrayLike& t, const ArrayLike& position,
+                                     const std::optional<ArrayLike>& orientation,
                                      const std::optional<ArrayLike>& arrival);
-std::vector<FrameSample> frame_samples(const ArrayLike& t, const FrameArray& T, const std::optional<ArrayLike>& arrival, const char* name);
+std::vector<FrameSample> frame_samples(const ArrayLike& t, const FrameArray& T, const std::optional<ArrayLike>& arrival,
+                                       const char* name);
 
 // ---- Sequences and value semantics
 // ---------------------------------------------------------------------------------
@@ -280,8 +280,7 @@ void define_value(Class& cls, const std::vector<const char*>& fields) {
       },
       "A copy with the given attributes changed (the constructor's keywords; an unknown one raises "
       "TypeError).");
-  cls.def(
-      "copy", [](const T& self) { return T(self); }, "An independent copy.");
+  cls.def("copy", [](const T& self) { return T(self); }, "An independent copy.");
   cls.def("__reduce__", [fields](const py::object& self) -> TupleOf<py::object> {
     const py::object partial = py::module_::import("functools").attr("partial");
     py::tuple reduced = py::make_tuple(partial(py::type::of(self), **keywords_of(self, fields)), py::tuple());
@@ -346,14 +345,13 @@ struct handle_type_name<truing::python::Labels> {
 
 template <>
 struct handle_type_name<truing::python::FrameArray> {
-  static constexpr auto name =
-      const_name("typing.Annotated[numpy.typing.ArrayLike, numpy.float64, \"[n, 4, 4]\"]");
+  static constexpr auto name = const_name("typing.Annotated[numpy.typing.ArrayLike, numpy.float64, \"[n, 4, 4]\"]");
 };
 
 template <class Key, class Value>
 struct handle_type_name<truing::python::Mapping<Key, Value>> {
-  static constexpr auto name = const_name("types.MappingProxyType[") + make_caster<Key>::name +
-                               const_name(", ") + make_caster<Value>::name + const_name("]");
+  static constexpr auto name = const_name("types.MappingProxyType[") + make_caster<Key>::name + const_name(", ") +
+                               make_caster<Value>::name + const_name("]");
 };
 
 template <class Enum>
@@ -365,9 +363,7 @@ struct word_caster {
     value = truing::python::enum_from_word<Enum>(source.cast<std::string>());
     return true;
   }
-  static handle cast(Enum source, return_value_policy, handle) {
-    return str(truing::python::word(source)).release();
-  }
+  static handle cast(Enum source, return_value_policy, handle) { return str(truing::python::word(source)).release(); }
 };
 
 template <>
@@ -420,9 +416,8 @@ struct type_caster<truing::Window> {
 
 template <>
 struct type_caster<Eigen::Isometry3d> {
-  PYBIND11_TYPE_CASTER(Eigen::Isometry3d,
-                       io_name("typing.Annotated[numpy.typing.ArrayLike, numpy.float64, \"[4, 4]\"]",
-                               "typing.Annotated[numpy.typing.NDArray[numpy.float64], \"[4, 4]\"]"));
+  PYBIND11_TYPE_CASTER(Eigen::Isometry3d, io_name("typing.Annotated[numpy.typing.ArrayLike, numpy.float64, \"[4, 4]\"]",
+                                                  "typing.Annotated[numpy.typing.NDArray[numpy.float64], \"[4, 4]\"]"));
 
   bool load(handle source, bool) {
     const auto matrix = array_t<double, array::c_style | array::forcecast>::ensure(source);

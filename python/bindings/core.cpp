@@ -8,8 +8,7 @@ namespace py = pybind11;
 PYBIND11_MODULE(_core, m) {
   m.doc() = "The C++ core of truing. Use it through `import truing`.";
   // A function, so that the committed stubs do not hold the version a second time.
-  m.def(
-      "version", [] { return truing::version; }, "Version of the C++ core: 'major.minor.patch'.");
+  m.def("version", [] { return truing::version; }, "Version of the C++ core: 'major.minor.patch'.");
 
   // The library reports bad input as std::invalid_argument; the exception that teaches is written in Python.
   py::register_local_exception_translator([](std::exception_ptr pointer) {

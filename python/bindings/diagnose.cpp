@@ -45,8 +45,8 @@ py::array_t<double> array_from(const std::vector<double>& values) {
 }
 
 std::string summary(const Diagnosis& d) {
-  std::string out = d.sentence + "\nheld-out rms " + millimetres(d.gap.rms) + " -> " +
-                    millimetres(d.after.rms) + ", noise " + millimetres(d.noise_floor) + "\n";
+  std::string out = d.sentence + "\nheld-out rms " + millimetres(d.gap.rms) + " -> " + millimetres(d.after.rms) +
+                    ", noise " + millimetres(d.noise_floor) + "\n";
   for (const FoundEffect& e : d.effects) {
     out += at_joints(e.effect, e.joints) + ": probability " + text(e.probability);
     for (const Alternative& a : e.confounded_with) out += ", or " + at_joints(a.effect, a.joints);
@@ -62,35 +62,33 @@ std::string summary(const Diagnosis& d) {
 
 /// Properties of strings that are copied out as tuples.
 template <class T>
-void define_names(py::class_<T>& cls, const char* name, std::vector<std::string> T::*member,
-                  const char* doc) {
-  cls.def_property_readonly(
-      name, [member](const T& self) { return tuple_of(self.*member); }, doc);
+void define_names(py::class_<T>& cls, const char* name, std::vector<std::string> T::* member, const char* doc) {
+  cls.def_property_readonly(name, [member](const T& self) { return tuple_of(self.*member); }, doc);
 }
 
 void bind_options(py::module_& m) {
   const DiagnoseOptions usual;
   py::class_<DiagnoseOptions> cls(m, "DiagnoseOptions", "How `diagnose` works; see the attributes.");
-  cls.def(py::init([](std::vector<std::string> leave_out, double false_alarm, int max_effects,
-                      double test_share, std::size_t search_poses, int resamples, double rotation_length,
-                      std::uint64_t seed, int threads) {
-            DiagnoseOptions o;
-            o.leave_out = std::move(leave_out);
-            o.false_alarm = false_alarm;
-            o.max_effects = max_effects;
-            o.test_share = test_share;
-            o.search_poses = search_poses;
-            o.resamples = resamples;
-            o.rotation_length = rotation_length;
-            o.seed = seed;
-            o.threads = threads;
-            return o;
-          }),
-          py::kw_only(), py::arg("leave_out") = usual.leave_out, py::arg("false_alarm") = usual.false_alarm,
-          py::arg("max_effects") = usual.max_effects, py::arg("test_share") = usual.test_share,
-          py::arg("search_poses") = usual.search_poses, py::arg("resamples") = usual.resamples,
-          py::arg("rotation_length") = usual.rotation_length, py::arg("seed") = usual.seed,
-          py::arg("threads") = usual.threads);
+  cls.def(
+      py::init([](std::vector<std::string> leave_out, double false_alarm, int max_effects, double test_share,
+                  std::size_t search_poses, int resamples, double rotation_length, std::uint64_t seed, int threads) {
+        DiagnoseOptions o;
+        o.leave_out = std::move(leave_out);
+        o.false_alarm = false_alarm;
+        o.max_effects = max_effects;
+        o.test_share = test_share;
+        o.search_poses = search_poses;
+        o.resamples = resamples;
+        o.rotation_length = rotation_length;
+        o.seed = seed;
+        o.threads = threads;
+        return o;
+      }),
+      py::kw_only(), py::arg("leave_out") = usual.leave_out, py::arg("false_alarm") = usual.false_alarm,
+      py::arg("max_effects") = usual.max_effects, py::arg("test_share") = usual.test_share,
+      py::arg("search_poses") = usual.search_poses, py::arg("resamples") = usual.resamples,
+      py::arg("rotation_length") = usual.rotation_length, py::arg("seed") = usual.seed,
+      py::arg("threads") = usual.threads);
   cls.def_property(
       "leave_out", [](const DiagnoseOptions& o) { return tuple_of(o.leave_out); },
       [](DiagnoseOptions& o, std::vector<std::string> v) { o.leave_out = std::move(v); },
@@ -111,8 +109,7 @@ void bind_options(py::module_& m) {
   cls.def_readwrite("threads", &DiagnoseOptions::threads, "0: as many as the machine has.");
   cls.def("__repr__", [](const DiagnoseOptions& o) {
     return "DiagnoseOptions(false_alarm=" + text(o.false_alarm) +
-           (o.leave_out.empty() ? "" : ", without " + joined(o.leave_out)) +
-           ", seed=" + std::to_string(o.seed) + ")";
+           (o.leave_out.empty() ? "" : ", without " + joined(o.leave_out)) + ", seed=" + std::to_string(o.seed) + ")";
   });
   define_value(cls, {"leave_out", "false_alarm", "max_effects", "test_share", "search_poses", "resamples",
                      "rotation_length", "seed", "threads"});
@@ -133,11 +130,10 @@ void bind_findings(py::module_& m) {
   alternative.def("__repr__",
                   [](const Alternative& a) { return "Alternative(" + at_joints(a.effect, a.joints) + ")"; });
 
-  py::class_<Curve> curve(
-      m, "Curve", "A fitted law, or a free function, drawn against its input: value at the site [rad | m].");
+  py::class_<Curve> curve(m, "Curve",
+                          "A fitted law, or a free function, drawn against its input: value at the site [rad | m].");
   curve.def_readonly("site", &Curve::site, "What moves: a joint's name, 'base.x' ...");
-  curve.def_readonly("input", &Curve::input,
-                     "'q4', 'torque2', 'temp', 'time', 'dir3', 'payload', a covariate.");
+  curve.def_readonly("input", &Curve::input, "'q4', 'torque2', 'temp', 'time', 'dir3', 'payload', a covariate.");
   curve.def_readonly(
       "second_input", &Curve::second_input,
       "Of a function of two inputs: the other one, which is between `second_low` and `second_high`; or ''.");
@@ -146,8 +142,7 @@ void bind_findings(py::module_& m) {
   curve.def_readonly("input_unit", &Curve::input_unit, "Of the input.");
   curve.def_readonly("unit", &Curve::unit, "Of the value and its standard error: rad or m.");
   curve.def_property_readonly(
-      "points", [](const Curve& c) { return block_of(c.points); },
-      "shape=(n, 3): input, value, standard error.");
+      "points", [](const Curve& c) { return block_of(c.points); }, "shape=(n, 3): input, value, standard error.");
   curve.def_property_readonly(
       "samples", [](const Curve& c) { return block_of(c.samples); },
       "shape=(n, 2): input and value, what single poses say; at most 600.");
@@ -162,20 +157,16 @@ void bind_findings(py::module_& m) {
   found.def_readonly("probability", &FoundEffect::probability,
                      "Of the class: this effect or one of `confounded_with`.");
   found.def_property_readonly(
-      "parameters", [](const FoundEffect& e) { return tuple_of(e.parameters); },
-      "Values and standard errors.");
+      "parameters", [](const FoundEffect& e) { return tuple_of(e.parameters); }, "Values and standard errors.");
   found.def_readonly("held_out_before", &FoundEffect::held_out_before,
                      "Held-out errors without this effect, all others in [m].");
-  found.def_readonly("held_out_after", &FoundEffect::held_out_after,
-                     "Held-out errors with all named effects [m].");
+  found.def_readonly("held_out_after", &FoundEffect::held_out_after, "Held-out errors with all named effects [m].");
   found.def_readonly("shrink", &FoundEffect::shrink, "Of the held-out rms: 1 - after / before.");
-  found.def_readonly(
-      "share", &FoundEffect::share,
-      "Of the gap's mean square; those of all effects and unknowns add up to what was closed.");
+  found.def_readonly("share", &FoundEffect::share,
+                     "Of the gap's mean square; those of all effects and unknowns add up to what was closed.");
   found.def_readonly("share_alone", &FoundEffect::share_alone,
                      "Of the gap's mean square, what it closes when it is the only one.");
-  found.def_readonly("share_last", &FoundEffect::share_last,
-                     "What it closes when all others are in already.");
+  found.def_readonly("share_last", &FoundEffect::share_last, "What it closes when all others are in already.");
   found.def_property_readonly(
       "confounded_with", [](const FoundEffect& e) { return tuple_of(e.confounded_with); },
       "Effects that would explain these data as well.");
@@ -234,8 +225,8 @@ void bind_limits(py::module_& m) {
     return "Detectable(" + d.parameter + " >= " + text(d.size) + " " + d.unit + ")";
   });
 
-  py::class_<Candidate> candidate(
-      m, "Candidate", "One candidate before any choice: what methods without a search would go by.");
+  py::class_<Candidate> candidate(m, "Candidate",
+                                  "One candidate before any choice: what methods without a search would go by.");
   candidate.def_readonly("effect", &Candidate::effect, "Its name.");
   define_names(candidate, "joints", &Candidate::joints, "Where.");
   candidate.def_readonly("columns", &Candidate::columns, "Parameters that the data can see.");
@@ -251,16 +242,14 @@ void bind_limits(py::module_& m) {
   });
 
   py::class_<SanityFinding> sanity(m, "SanityFinding", "What looks wrong with the data themselves.");
-  sanity.def_readonly(
-      "kind", &SanityFinding::kind,
-      "joint_record, joint_order, joint_sign, joint_unit, duplicates, direction, lag, moved_target, "
-      "constant or outliers.");
+  sanity.def_readonly("kind", &SanityFinding::kind,
+                      "joint_record, joint_order, joint_sign, joint_unit, duplicates, direction, lag, moved_target, "
+                      "constant or outliers.");
   sanity.def_readonly("text", &SanityFinding::text, "A sentence with what to do.");
   sanity.def_property_readonly(
       "rows", [](const SanityFinding& s) { return tuple_of(s.rows); },
       "Rows (counted from 0) that it is about, if few.");
-  sanity.def("__repr__",
-             [](const SanityFinding& s) { return "SanityFinding(" + s.kind + ": " + s.text + ")"; });
+  sanity.def("__repr__", [](const SanityFinding& s) { return "SanityFinding(" + s.kind + ": " + s.text + ")"; });
 
   py::class_<NextPose> next(m, "NextPose", "A pose worth measuring next.");
   next.def_property_readonly(
@@ -278,14 +267,12 @@ void bind_where(py::module_& m) {
   joint.def_readonly("joint", &WhereJoint::joint, "Its name.");
   joint.def_readonly("share", &WhereJoint::share,
                      "Of the closable gap, what a free function of the inputs at this joint explains.");
-  joint.def("__repr__",
-            [](const WhereJoint& w) { return "WhereJoint('" + w.joint + "', " + repr(w.share) + ")"; });
+  joint.def("__repr__", [](const WhereJoint& w) { return "WhereJoint('" + w.joint + "', " + repr(w.share) + ")"; });
 
   py::class_<WhereInput> input(m, "WhereInput", "How much of the gap goes with an input.");
   input.def_readonly("input", &WhereInput::input, "Its name.");
   input.def_readonly("share", &WhereInput::share, "Of the closable gap.");
-  input.def("__repr__",
-            [](const WhereInput& w) { return "WhereInput('" + w.input + "', " + percent(w.share) + ")"; });
+  input.def("__repr__", [](const WhereInput& w) { return "WhereInput('" + w.input + "', " + percent(w.share) + ")"; });
 
   py::class_<WorkspaceCell> cell(m, "WorkspaceCell", "The error in one part of the workspace.");
   cell.def_property_readonly(
@@ -300,13 +287,11 @@ void bind_where(py::module_& m) {
 
 void bind_diagnosis(py::module_& m) {
   py::class_<Diagnosis> cls(m, "Diagnosis", "What `diagnose` found.");
-  cls.def_readonly(
-      "verdict", &Diagnosis::verdict,
-      "'none' (no gap beyond noise), 'effects' (named, and nothing is left), 'unknown' (a gap that no "
-      "effect of the catalogue explains) or 'effects+unknown' (named, and something is left).");
+  cls.def_readonly("verdict", &Diagnosis::verdict,
+                   "'none' (no gap beyond noise), 'effects' (named, and nothing is left), 'unknown' (a gap that no "
+                   "effect of the catalogue explains) or 'effects+unknown' (named, and something is left).");
   cls.def_readonly("sentence", &Diagnosis::sentence, "The verdict in words.");
-  cls.def_readonly("gap", &Diagnosis::gap,
-                   "Held-out errors with base, targets (and anchor) fitted only [m].");
+  cls.def_readonly("gap", &Diagnosis::gap, "Held-out errors with base, targets (and anchor) fitted only [m].");
   cls.def_readonly("noise_floor", &Diagnosis::noise_floor, "[m] rms length of a row's error that is noise.");
   cls.def_readonly("noise_from_repeats", &Diagnosis::noise_from_repeats,
                    "The noise is that of repeated poses, not of what a flexible fit leaves.");
@@ -314,9 +299,8 @@ void bind_diagnosis(py::module_& m) {
   cls.def_readonly("closable", &Diagnosis::closable,
                    "Share of the gap's mean square above the noise floor that the named effects close.");
   cls.def_readonly("p_gap", &Diagnosis::p_gap, "Chance of a gain as large under noise alone.");
-  cls.def_readonly(
-      "after", &Diagnosis::after,
-      "Held-out errors with all named effects, corrections of their laws and drifts included [m].");
+  cls.def_readonly("after", &Diagnosis::after,
+                   "Held-out errors with all named effects, corrections of their laws and drifts included [m].");
   cls.def_readonly("after_unknown", &Diagnosis::after_unknown,
                    "Held-out errors with the unknown functions as well [m].");
   cls.def_readonly("remaining_structure_p", &Diagnosis::remaining_structure_p,
@@ -325,27 +309,22 @@ void bind_diagnosis(py::module_& m) {
       "effects", [](const Diagnosis& d) { return tuple_of(d.effects); },
       "By how much of the gap each explains, most first.");
   cls.def_property_readonly(
-      "unknown", [](const Diagnosis& d) { return tuple_of(d.unknown); },
-      "What no effect of the catalogue is.");
+      "unknown", [](const Diagnosis& d) { return tuple_of(d.unknown); }, "What no effect of the catalogue is.");
   cls.def_property_readonly(
-      "not_testable", [](const Diagnosis& d) { return tuple_of(d.not_testable); },
-      "What these data could not show.");
+      "not_testable", [](const Diagnosis& d) { return tuple_of(d.not_testable); }, "What these data could not show.");
   cls.def_property_readonly(
       "detectable", [](const Diagnosis& d) { return tuple_of(d.detectable); },
       "The smallest effects that would have been found; of each, its easiest joint first.");
   cls.def_property_readonly(
-      "candidates", [](const Diagnosis& d) { return tuple_of(d.candidates); },
-      "Every candidate, before any choice.");
+      "candidates", [](const Diagnosis& d) { return tuple_of(d.candidates); }, "Every candidate, before any choice.");
   cls.def_property_readonly(
-      "sanity", [](const Diagnosis& d) { return tuple_of(d.sanity); },
-      "What looks wrong with the data themselves.");
+      "sanity", [](const Diagnosis& d) { return tuple_of(d.sanity); }, "What looks wrong with the data themselves.");
   cls.def_property_readonly(
       "where_joints", [](const Diagnosis& d) { return tuple_of(d.where_joints); }, "The gap by joint.");
   cls.def_property_readonly(
       "where_inputs", [](const Diagnosis& d) { return tuple_of(d.where_inputs); }, "The gap by input.");
   cls.def_property_readonly(
-      "workspace", [](const Diagnosis& d) { return tuple_of(d.workspace); },
-      "The gap by part of the workspace.");
+      "workspace", [](const Diagnosis& d) { return tuple_of(d.workspace); }, "The gap by part of the workspace.");
   cls.def_readonly("direction", &Diagnosis::direction,
                    "shape=(3, 3): principal axes of the residual in the base frame, as columns.");
   cls.def_readonly("direction_rms", &Diagnosis::direction_rms, "shape=(3,) [m]: along them.");
@@ -353,9 +332,7 @@ void bind_diagnosis(py::module_& m) {
       "next_poses", [](const Diagnosis& d) { return tuple_of(d.next_poses); }, "Poses worth measuring next.");
   cls.def_property_readonly(
       "set",
-      [](const Diagnosis& d) {
-        return py::array_t<std::int8_t>(static_cast<py::ssize_t>(d.set.size()), d.set.data());
-      },
+      [](const Diagnosis& d) { return py::array_t<std::int8_t>(static_cast<py::ssize_t>(d.set.size()), d.set.data()); },
       "shape=(n,): 0 train, 1 test, for every row.");
   cls.def_property_readonly(
       "error_before", [](const Diagnosis& d) { return array_from(d.error_before); },
@@ -387,17 +364,14 @@ void bind_diagnosis(py::module_& m) {
                    "[m] 95th percentile of the errors of a nearest-neighbour predictor; NaN: too few rows.");
   cls.def_readonly("neighbour_share", &Diagnosis::neighbour_share,
                    "Of the remaining mean square, what a nearest-neighbour predictor still explains.");
-  cls.def_readonly(
-      "robot_before", &Diagnosis::robot_before,
-      "Nominal robot with base and targets fitted. Part of this result: copy() it before changing it.");
-  cls.def_readonly(
-      "robot", &Diagnosis::robot,
-      "Robot with the effects that were named; free functions are left out. Part of this result.");
+  cls.def_readonly("robot_before", &Diagnosis::robot_before,
+                   "Nominal robot with base and targets fitted. Part of this result: copy() it before changing it.");
+  cls.def_readonly("robot", &Diagnosis::robot,
+                   "Robot with the effects that were named; free functions are left out. Part of this result.");
   cls.def_readonly("joint_record", &Diagnosis::joint_record,
                    "'q' or 'qr': the record that explains the measurements better.");
   cls.def_property_readonly(
-      "warnings", [](const Diagnosis& d) { return tuple_of(d.warnings); },
-      "What to know before trusting it.");
+      "warnings", [](const Diagnosis& d) { return tuple_of(d.warnings); }, "What to know before trusting it.");
   cls.def_readonly("seed", &Diagnosis::seed, "Of the split and of every simulation.");
   cls.def("summary", &summary, "A few lines for people.");
   cls.def("__repr__", [](const Diagnosis& d) {

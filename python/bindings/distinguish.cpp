@@ -55,9 +55,21 @@ void bind_options(py::module_& m) {
                       double temperature_low, double temperature_high, double seconds_per_pose, bool orientation,
                       double position_sigma, double rotation_sigma, double alike, int add, int proposals,
                       double min_step, double min_step_prismatic, std::uint64_t seed) {
-            return O{std::move(columns), std::move(separate), payload,        temperature_low, temperature_high,
-                     seconds_per_pose,   orientation,         position_sigma, rotation_sigma,  alike,
-                     add,                proposals,           min_step,       min_step_prismatic, seed};
+            return O{std::move(columns),
+                     std::move(separate),
+                     payload,
+                     temperature_low,
+                     temperature_high,
+                     seconds_per_pose,
+                     orientation,
+                     position_sigma,
+                     rotation_sigma,
+                     alike,
+                     add,
+                     proposals,
+                     min_step,
+                     min_step_prismatic,
+                     seed};
           }),
           py::kw_only(), py::arg("columns") = usual.columns, py::arg("separate") = usual.separate,
           py::arg("payload") = usual.payload, py::arg("temperature_low") = usual.temperature_low,
@@ -80,17 +92,16 @@ void bind_options(py::module_& m) {
   cls.def_readwrite("orientation", &O::orientation, "Full poses are measured, not only positions.");
   cls.def_readwrite("position_sigma", &O::position_sigma, "[m] of one component.");
   cls.def_readwrite("rotation_sigma", &O::rotation_sigma, "[rad]");
-  cls.def_readwrite("alike", &O::alike,
-                    "An effect of which another explains a larger share is not told from it.");
+  cls.def_readwrite("alike", &O::alike, "An effect of which another explains a larger share is not told from it.");
   cls.def_readwrite("add", &O::add, "At most so many poses are added.");
   cls.def_readwrite("proposals", &O::proposals, "Poses that each of them is chosen from.");
   cls.def_readwrite("min_step", &O::min_step, "[rad] every revolute joint moves by more to an added pose.");
   cls.def_readwrite("min_step_prismatic", &O::min_step_prismatic, "[m] the same for prismatic joints.");
   cls.def_readwrite("seed", &O::seed, "Of directions, payloads and proposals.");
   cls.def("__repr__", [](const O& o) { return "DistinguishOptions(columns: " + joined(o.columns) + ")"; });
-  define_value(cls, {"columns", "separate", "payload", "temperature_low", "temperature_high", "seconds_per_pose",
-                     "orientation", "position_sigma", "rotation_sigma", "alike", "add", "proposals", "min_step",
-                     "min_step_prismatic", "seed"});
+  define_value(
+      cls, {"columns", "separate", "payload", "temperature_low", "temperature_high", "seconds_per_pose", "orientation",
+            "position_sigma", "rotation_sigma", "alike", "add", "proposals", "min_step", "min_step_prismatic", "seed"});
 }
 
 }  // namespace
@@ -127,8 +138,7 @@ void bind_distinguish(py::module_& m) {
       "payload", [](const Distinction& d) { return column(d.payload); }, "shape=(poses,) [kg]");
   result.def_property_readonly(
       "temperature", [](const Distinction& d) { return column(d.temperature); }, "shape=(poses,) [deg C]");
-  result.def_property_readonly(
-      "time", [](const Distinction& d) { return column(d.time); }, "shape=(poses,) [s]");
+  result.def_property_readonly("time", [](const Distinction& d) { return column(d.time); }, "shape=(poses,) [s]");
   result.def("__repr__", [](const Distinction& d) {
     return "Distinction(" + std::to_string(d.effects.size()) + " effects, " + std::to_string(d.alike.size()) +
            " pairs alike, " + std::to_string(d.added) + " poses added)";
@@ -136,8 +146,7 @@ void bind_distinguish(py::module_& m) {
 
   m.def(
       "distinguish",
-      [](const Robot& given_robot,
-         const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>& joints,
+      [](const Robot& given_robot, const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>& joints,
          const std::optional<DistinguishOptions>& given) {
         const DistinguishOptions options = given.value_or(DistinguishOptions{});
         const Robot robot = given_robot;

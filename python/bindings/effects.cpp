@@ -7,25 +7,23 @@ namespace truing::python {
 std::vector<Effect> effects_from(const std::vector<OwnEffect>& own) {
   std::vector<Effect> effects;
   for (const OwnEffect& effect : own) {
-    effects.push_back({effect.name, effect.summary,
-                       [effect](const Robot& robot, std::size_t joint, const Measurements& data) {
-                         std::vector<Term> terms;
-                         for (const OwnEffect::Part& part : effect.parts) {
-                           if (part.joint != robot.joints.at(joint).name) continue;
-                           if (part.rows != data.rows)
-                             throw std::invalid_argument("effect '" + effect.name + "' was evaluated for " +
-                                                         std::to_string(part.rows) + " rows, the data has " +
-                                                         std::to_string(data.rows));
-                           // The numbers are already there: no Python runs, and no GIL is needed, in the loop
-                           // over the rows.
-                           terms.push_back({part.parameter, part.unit, part.site,
-                                            [values = part.values, owner = part.owner](const Inputs& in) {
-                                              return values[in.row];
-                                            },
-                                            false});
-                         }
-                         return terms;
-                       }});
+    effects.push_back(
+        {effect.name, effect.summary, [effect](const Robot& robot, std::size_t joint, const Measurements& data) {
+           std::vector<Term> terms;
+           for (const OwnEffect::Part& part : effect.parts) {
+             if (part.joint != robot.joints.at(joint).name) continue;
+             if (part.rows != data.rows)
+               throw std::invalid_argument("effect '" + effect.name + "' was evaluated for " +
+                                           std::to_string(part.rows) + " rows, the data has " +
+                                           std::to_string(data.rows));
+             // The numbers are already there: no Python runs, and no GIL is needed, in the loop
+             // over the rows.
+             terms.push_back({part.parameter, part.unit, part.site,
+                              [values = part.values, owner = part.owner](const Inputs& in) { return values[in.row]; },
+                              false});
+           }
+           return terms;
+         }});
   }
   return effects;
 }
@@ -55,9 +53,8 @@ Eigen::VectorXd reading_weights(const Robot& robot, std::size_t joint) {
 void check_joint_count(const Robot& robot, const Measurements& data) {
   validate(robot);
   if (data.joints.size() != robot.driven_count())
-    throw std::invalid_argument("joints has " + std::to_string(data.joints.size()) +
-                                " columns, the robot has " + std::to_string(robot.driven_count()) +
-                                " driven joints");
+    throw std::invalid_argument("joints has " + std::to_string(data.joints.size()) + " columns, the robot has " +
+                                std::to_string(robot.driven_count()) + " driven joints");
 }
 
 Eigen::VectorXd joint_motion(const Robot& robot, const Measurements& data, const std::string& name) {
@@ -66,8 +63,7 @@ Eigen::VectorXd joint_motion(const Robot& robot, const Measurements& data, const
   Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows));
   for (std::size_t j = 0; j < data.joints.size(); ++j)
     if (const double weight = weights[static_cast<Eigen::Index>(j)]; weight != 0.0)
-      for (std::size_t i = 0; i < data.rows; ++i)
-        out[static_cast<Eigen::Index>(i)] += weight * data.joints[j][i];
+      for (std::size_t i = 0; i < data.rows; ++i) out[static_cast<Eigen::Index>(i)] += weight * data.joints[j][i];
   return out;
 }
 
@@ -83,28 +79,24 @@ RowMajor gravity_torque_rows(const Robot& robot, const Measurements& data) {
 }  // namespace
 
 void bind_effects(py::module_& m) {
-  py::class_<EffectRequest> request(
-      m, "EffectRequest", R"(An effect asked for: its name, and joints (none: every driven joint).)");
+  py::class_<EffectRequest> request(m, "EffectRequest",
+                                    R"(An effect asked for: its name, and joints (none: every driven joint).)");
   request.def(py::init([](std::string effect, std::vector<std::string> joints) {
                 return EffectRequest{std::move(effect), std::move(joints)};
               }),
               py::arg("effect"), py::arg("joints") = std::vector<std::string>{});
   request.def_readonly("effect", &EffectRequest::effect, "Name, as in `catalogue()`.");
   request.def_property_readonly(
-      "joints", [](const EffectRequest& r) { return tuple_of(r.joints); },
-      "Names of joints; none: every driven one.");
+      "joints", [](const EffectRequest& r) { return tuple_of(r.joints); }, "Names of joints; none: every driven one.");
   request.def("__repr__", [](const EffectRequest& r) {
-    return "EffectRequest('" + r.effect + "'" + (r.joints.empty() ? "" : ", joints: " + joined(r.joints)) +
-           ")";
+    return "EffectRequest('" + r.effect + "'" + (r.joints.empty() ? "" : ", joints: " + joined(r.joints)) + ")";
   });
   define_value(request, {"effect", "joints"});
 
-  py::class_<OwnEffect> own(
-      m, "OwnEffect",
-      "The values of a user's effect for the rows of some data; `truing.Effect` makes these.");
-  own.def(py::init([](std::string name, std::string summary) {
-            return OwnEffect{std::move(name), std::move(summary), {}};
-          }),
+  py::class_<OwnEffect> own(m, "OwnEffect",
+                            "The values of a user's effect for the rows of some data; `truing.Effect` makes these.");
+  own.def(py::init(
+              [](std::string name, std::string summary) { return OwnEffect{std::move(name), std::move(summary), {}}; }),
           py::arg("name"), py::arg("summary") = "");
   own.def_readonly("name", &OwnEffect::name, "Name of the effect.");
   own.def(
@@ -114,11 +106,9 @@ void bind_effects(py::module_& m) {
         const py::array array = float_array(values, parameter);
         if (array.ndim() != 1) throw std::invalid_argument(parameter + ": values must have shape (n,)");
         self.parts.push_back({std::move(joint), std::move(parameter), std::move(unit), std::move(site),
-                              column_of(array), static_cast<std::size_t>(array.shape(0)),
-                              keep_alive({array})});
+                              column_of(array), static_cast<std::size_t>(array.shape(0)), keep_alive({array})});
       },
-      py::kw_only(), py::arg("joint"), py::arg("parameter"), py::arg("unit"), py::arg("site"),
-      py::arg("values"),
+      py::kw_only(), py::arg("joint"), py::arg("parameter"), py::arg("unit"), py::arg("site"), py::arg("values"),
       "Adds a term: parameter * values[row] on `site`, listed under `joint`. values: shape=(n,); not copied "
       "when float64. Raises InputError.");
   own.def("__repr__", [](const OwnEffect& e) {

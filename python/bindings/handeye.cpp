@@ -24,9 +24,7 @@ std::string milliradians(double radians) {
   return buffer;
 }
 
-std::optional<double> known(double value) {
-  return std::isnan(value) ? std::nullopt : std::optional<double>(value);
-}
+std::optional<double> known(double value) { return std::isnan(value) ? std::nullopt : std::optional<double>(value); }
 
 /// Rows of N numbers as columns of an Eigen matrix.
 template <int N>
@@ -36,8 +34,8 @@ Eigen::Matrix<double, N, Eigen::Dynamic> columns_from(const ArrayLike& given, co
     PyErr_Clear();
     throw std::invalid_argument(name + " must have shape (m, " + std::to_string(N) + ")");
   }
-  const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, N, Eigen::RowMajor>> rows(
-      array.data(), array.shape(0), N);
+  const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, N, Eigen::RowMajor>> rows(array.data(), array.shape(0),
+                                                                                         N);
   return rows.transpose();
 }
 
@@ -98,8 +96,8 @@ void bind_camera(py::module_& m) {
       "distortion", [](const Camera& c) { return py::typing::Tuple<double, py::ellipsis>(py::cast(c.distortion)); },
       [](Camera& c, const std::array<double, 5>& v) { c.distortion = v; }, "k1 k2 p1 p2 k3");
   cls.def("__repr__", [](const Camera& c) {
-    return "Camera(" + std::to_string(c.width) + " x " + std::to_string(c.height) + ", fx " + text(c.fx) +
-           ", fy " + text(c.fy) + ", centre " + text(c.cx) + " " + text(c.cy) + ")";
+    return "Camera(" + std::to_string(c.width) + " x " + std::to_string(c.height) + ", fx " + text(c.fx) + ", fy " +
+           text(c.fy) + ", centre " + text(c.cx) + " " + text(c.cy) + ")";
   });
   define_value(cls, {"width", "height", "fx", "fy", "cx", "cy", "distortion"});
 }
@@ -135,14 +133,13 @@ Raises InputError that names the pose: values that are not finite, rotations tha
                 BoardImage image{columns_from<3>(points, which + ": points"),
                                  columns_from<2>(pixels, which + ": pixels")};
                 if (image.points.cols() != image.pixels.cols())
-                  throw std::invalid_argument(which + ": " + std::to_string(image.points.cols()) +
-                                              " points, but " + std::to_string(image.pixels.cols()) + " pixels");
+                  throw std::invalid_argument(which + ": " + std::to_string(image.points.cols()) + " points, but " +
+                                              std::to_string(image.pixels.cols()) + " pixels");
                 p.images.push_back(std::move(image));
               }
               if (p.images.size() != p.T_base_hand.size())
                 throw std::invalid_argument("images has " + std::to_string(p.images.size()) +
-                                            " entries, T_base_hand has " +
-                                            std::to_string(p.T_base_hand.size()));
+                                            " entries, T_base_hand has " + std::to_string(p.T_base_hand.size()));
               if (!camera) throw std::invalid_argument("images need a camera: its focal lengths and centre");
             }
             p.camera = camera;
@@ -166,12 +163,10 @@ Raises InputError that names the pose: values that are not finite, rotations tha
         py::tuple out(p.images.size());
         for (std::size_t i = 0; i < p.images.size(); ++i)
           out[i] = py::make_tuple(array_from_columns(p.images[i].points), array_from_columns(p.images[i].pixels));
-        return py::reinterpret_steal<TupleOf<std::pair<py::array_t<double>, py::array_t<double>>>>(
-            out.release());
+        return py::reinterpret_steal<TupleOf<std::pair<py::array_t<double>, py::array_t<double>>>>(out.release());
       },
       "Of each pose, points shape=(m, 3) [m] and pixels shape=(m, 2) [px]; None without images.");
-  cls.def_property_readonly(
-      "camera", [](const HandEyePoses& p) { return p.camera; }, "None without images.");
+  cls.def_property_readonly("camera", [](const HandEyePoses& p) { return p.camera; }, "None without images.");
   cls.def_property_readonly(
       "set",
       [](const HandEyePoses& p) -> std::optional<py::array_t<std::int8_t>> {
@@ -194,46 +189,45 @@ void bind_options(py::module_& m) {
   const HandEyeOptions usual;
   py::class_<HandEyeOptions> cls(m, "HandEyeOptions",
                                  "How `handeye` works; see the attributes. Noise that is None is estimated.");
-  cls.def(
-      py::init([](HandEyeSetup setup, HandEyeMethod method, std::optional<double> hand_position_sigma,
-                  std::optional<double> hand_rotation_sigma, std::optional<double> camera_position_sigma,
-                  std::optional<double> camera_rotation_sigma, std::optional<double> pixel_sigma,
-                  bool refine_camera, std::optional<Eigen::Vector3d> working_point,
-                  std::optional<double> known_height, double known_height_sigma, bool reject,
-                  double reject_beyond, bool recognise, std::string reading, int max_iterations) {
-        HandEyeOptions o;
-        o.setup = setup;
-        o.method = method;
-        o.hand_position_sigma = hand_position_sigma.value_or(kEstimate);
-        o.hand_rotation_sigma = hand_rotation_sigma.value_or(kEstimate);
-        o.camera_position_sigma = camera_position_sigma.value_or(kEstimate);
-        o.camera_rotation_sigma = camera_rotation_sigma.value_or(kEstimate);
-        o.pixel_sigma = pixel_sigma.value_or(kEstimate);
-        o.refine_camera = refine_camera;
-        o.working_point = working_point;
-        o.known_height = known_height;
-        o.known_height_sigma = known_height_sigma;
-        o.reject = reject;
-        o.reject_beyond = reject_beyond;
-        o.recognise = recognise;
-        o.reading = std::move(reading);
-        o.max_iterations = max_iterations;
-        return o;
-      }),
-      py::kw_only(), py::arg("setup") = usual.setup, py::arg("method") = usual.method,
-      py::arg("hand_position_sigma") = py::none(), py::arg("hand_rotation_sigma") = py::none(),
-      py::arg("camera_position_sigma") = py::none(), py::arg("camera_rotation_sigma") = py::none(),
-      py::arg("pixel_sigma") = py::none(), py::arg("refine_camera") = usual.refine_camera,
-      py::arg("working_point") = py::none(), py::arg("known_height") = py::none(),
-      py::arg("known_height_sigma") = usual.known_height_sigma, py::arg("reject") = usual.reject,
-      py::arg("reject_beyond") = usual.reject_beyond, py::arg("recognise") = usual.recognise,
-      py::arg("reading") = usual.reading, py::arg("max_iterations") = usual.max_iterations);
+  cls.def(py::init([](HandEyeSetup setup, HandEyeMethod method, std::optional<double> hand_position_sigma,
+                      std::optional<double> hand_rotation_sigma, std::optional<double> camera_position_sigma,
+                      std::optional<double> camera_rotation_sigma, std::optional<double> pixel_sigma,
+                      bool refine_camera, std::optional<Eigen::Vector3d> working_point,
+                      std::optional<double> known_height, double known_height_sigma, bool reject, double reject_beyond,
+                      bool recognise, std::string reading, int max_iterations) {
+            HandEyeOptions o;
+            o.setup = setup;
+            o.method = method;
+            o.hand_position_sigma = hand_position_sigma.value_or(kEstimate);
+            o.hand_rotation_sigma = hand_rotation_sigma.value_or(kEstimate);
+            o.camera_position_sigma = camera_position_sigma.value_or(kEstimate);
+            o.camera_rotation_sigma = camera_rotation_sigma.value_or(kEstimate);
+            o.pixel_sigma = pixel_sigma.value_or(kEstimate);
+            o.refine_camera = refine_camera;
+            o.working_point = working_point;
+            o.known_height = known_height;
+            o.known_height_sigma = known_height_sigma;
+            o.reject = reject;
+            o.reject_beyond = reject_beyond;
+            o.recognise = recognise;
+            o.reading = std::move(reading);
+            o.max_iterations = max_iterations;
+            return o;
+          }),
+          py::kw_only(), py::arg("setup") = usual.setup, py::arg("method") = usual.method,
+          py::arg("hand_position_sigma") = py::none(), py::arg("hand_rotation_sigma") = py::none(),
+          py::arg("camera_position_sigma") = py::none(), py::arg("camera_rotation_sigma") = py::none(),
+          py::arg("pixel_sigma") = py::none(), py::arg("refine_camera") = usual.refine_camera,
+          py::arg("working_point") = py::none(), py::arg("known_height") = py::none(),
+          py::arg("known_height_sigma") = usual.known_height_sigma, py::arg("reject") = usual.reject,
+          py::arg("reject_beyond") = usual.reject_beyond, py::arg("recognise") = usual.recognise,
+          py::arg("reading") = usual.reading, py::arg("max_iterations") = usual.max_iterations);
   cls.def_readwrite("setup", &HandEyeOptions::setup,
                     "'eye-in-hand' (camera on the hand, board in the cell) or 'eye-to-hand' (camera in the "
                     "cell, board on the hand).");
   cls.def_readwrite("method", &HandEyeOptions::method,
                     "'refined' (maximum likelihood) or 'closed-form' (dual quaternions and one SVD alone).");
-  const auto sigma = [&cls](const char* name, double HandEyeOptions::*member, const char* doc) {
+  const auto sigma = [&cls](const char* name, double HandEyeOptions::* member, const char* doc) {
     cls.def_property(
         name, [member](const HandEyeOptions& o) { return known(o.*member); },
         [member](HandEyeOptions& o, std::optional<double> v) { o.*member = v.value_or(kEstimate); }, doc);
@@ -269,8 +263,7 @@ void bind_options(py::module_& m) {
   });
   define_value(cls, {"setup", "method", "hand_position_sigma", "hand_rotation_sigma", "camera_position_sigma",
                      "camera_rotation_sigma", "pixel_sigma", "refine_camera", "working_point", "known_height",
-                     "known_height_sigma", "reject", "reject_beyond", "recognise", "reading",
-                     "max_iterations"});
+                     "known_height_sigma", "reject", "reject_beyond", "recognise", "reading", "max_iterations"});
 }
 
 // ---- Results
@@ -293,8 +286,8 @@ void bind_parts(py::module_& m) {
     return "UncertainFrame(at " + text(p.x()) + " " + text(p.y()) + " " + text(p.z()) + " m)";
   });
 
-  py::class_<HandEyeResidual> residual(
-      m, "HandEyeResidual", "How far a pose is from closing the loop: seen minus predicted board pose.");
+  py::class_<HandEyeResidual> residual(m, "HandEyeResidual",
+                                       "How far a pose is from closing the loop: seen minus predicted board pose.");
   residual.def_readonly("position", &HandEyeResidual::position, "[m] length.");
   residual.def_readonly("rotation", &HandEyeResidual::rotation, "[rad] angle.");
   residual.def_readonly("position_left_out", &HandEyeResidual::position_left_out,
@@ -333,8 +326,7 @@ void bind_parts(py::module_& m) {
   unobservable.def_readonly("rotation", &Unobservable::rotation, "About the direction, not along it.");
   unobservable.def_readonly("sigma", &Unobservable::sigma, "[m] or [rad]; infinite: not at all.");
   unobservable.def_readonly("advice", &Unobservable::advice, "What to do.");
-  unobservable.def("__repr__",
-                   [](const Unobservable& u) { return "Unobservable(" + u.what + ": " + u.advice + ")"; });
+  unobservable.def("__repr__", [](const Unobservable& u) { return "Unobservable(" + u.what + ": " + u.advice + ")"; });
 
   py::class_<Reading> reading(m, "Reading",
                               "Another reading of the numbers: what it would mean, and how well the loop "
@@ -343,8 +335,7 @@ void bind_parts(py::module_& m) {
   reading.def_readonly("explanation", &Reading::explanation, "In words.");
   reading.def_readonly("position_rms", &Reading::position_rms, "[m] median closure.");
   reading.def_readonly("rotation_rms", &Reading::rotation_rms, "[rad]");
-  reading.def("__repr__",
-              [](const Reading& r) { return "Reading('" + r.name + "': " + r.explanation + ")"; });
+  reading.def("__repr__", [](const Reading& r) { return "Reading('" + r.name + "': " + r.explanation + ")"; });
 
   py::class_<HandEyeNoise> noise(m, "HandEyeNoise",
                                  "Standard deviations of one component, as told or as found. Position noise of hand "
@@ -369,22 +360,21 @@ void bind_parts(py::module_& m) {
   closed.def_readonly("singular_values", &ClosedForm::singular_values,
                       "shape=(8,), descending; of exact data the last two are 0.");
   closed.def_readonly("length_scale", &ClosedForm::length_scale, "[m] the unit of length in the equations.");
-  closed.def_readonly("residual", &ClosedForm::residual,
-                      "Of the unit dual quaternion in the equations, per motion.");
+  closed.def_readonly("residual", &ClosedForm::residual, "Of the unit dual quaternion in the equations, per motion.");
   closed.def_readonly("axes_spread", &ClosedForm::axes_spread,
                       "Second over first principal rotation of the motions: 0 one axis, 1 two alike.");
   closed.def_readonly("rotation", &ClosedForm::rotation, "[rad] rms angle of the motions.");
   closed.def_readonly("motions", &ClosedForm::motions, "How many were used.");
-  closed.def("__repr__",
-             [](const ClosedForm& c) { return "ClosedForm(" + std::to_string(c.motions) + " motions)"; });
+  closed.def("__repr__", [](const ClosedForm& c) { return "ClosedForm(" + std::to_string(c.motions) + " motions)"; });
 
   py::class_<NextHandPose> next(m, "NextHandPose", "A robot pose that would help.");
   next.def_readonly("T_base_hand", &NextHandPose::T_base_hand, "shape=(4, 4)");
   next.def_readonly("T_camera_board", &NextHandPose::T_camera_board,
                     "shape=(4, 4): what the camera is expected to see.");
-  next.def_readonly("working_point_sigma", &NextHandPose::working_point_sigma,
-                    "[m] standard error of the working point per axis (rms over three), with this pose and those before "
-                    "it measured.");
+  next.def_readonly(
+      "working_point_sigma", &NextHandPose::working_point_sigma,
+      "[m] standard error of the working point per axis (rms over three), with this pose and those before "
+      "it measured.");
   next.def("__repr__", [](const NextHandPose& p) {
     return "NextHandPose(working point to " + millimetres(p.working_point_sigma) + ")";
   });
@@ -392,8 +382,7 @@ void bind_parts(py::module_& m) {
   py::class_<ClockOffset> clock(m, "ClockOffset", "Two records of the same motion by two clocks.");
   clock.def_readonly("offset", &ClockOffset::offset, "[s] t_hand = t_camera + offset");
   clock.def_readonly("sigma", &ClockOffset::sigma, "[s]");
-  clock.def_readonly("correlation", &ClockOffset::correlation,
-                     "Of the two angular speeds at that offset.");
+  clock.def_readonly("correlation", &ClockOffset::correlation, "Of the two angular speeds at that offset.");
   clock.def_readonly("found", &ClockOffset::found, "False: `message` says why.");
   clock.def_readonly("message", &ClockOffset::message, "Why not, or how sure.");
   clock.def_property_readonly(
@@ -416,8 +405,8 @@ std::string position_text(const Eigen::Isometry3d& frame) {
 }
 
 std::string closure_text(const char* name, const HandEyeErrors& e) {
-  return std::string(name) + ": rms " + millimetres(e.position_rms) + ", " + milliradians(e.rotation_rms) +
-         " (worst " + millimetres(e.position_max) + ", n = " + std::to_string(e.n) + ")\n";
+  return std::string(name) + ": rms " + millimetres(e.position_rms) + ", " + milliradians(e.rotation_rms) + " (worst " +
+         millimetres(e.position_max) + ", n = " + std::to_string(e.n) + ")\n";
 }
 
 std::string summary(const HandEyeResult& r) {
@@ -436,8 +425,8 @@ std::string summary(const HandEyeResult& r) {
     out += "rejected pose " + std::to_string(i) + ": " + r.residuals.at(i).cause + "\n";
   for (const Unobservable& u : r.unobservable) out += u.what + ": " + u.advice + "\n";
   for (const Reading& reading : r.readings)
-    out += "the loop closes (" + millimetres(reading.position_rms) + ") if " + reading.explanation +
-           ": reading '" + reading.name + "'\n";
+    out += "the loop closes (" + millimetres(reading.position_rms) + ") if " + reading.explanation + ": reading '" +
+           reading.name + "'\n";
   return out;
 }
 
@@ -457,8 +446,7 @@ void bind_result(py::module_& m) {
   cls.def_readonly("working_point_covariance", &HandEyeResult::working_point_covariance,
                    "shape=(3, 3) [m^2] of that point in the frame that carries the camera.");
   cls.def_readonly("noise", &HandEyeResult::noise, "Given or found.");
-  cls.def_property_readonly(
-      "residuals", [](const HandEyeResult& r) { return tuple_of(r.residuals); }, "One per pose.");
+  cls.def_property_readonly("residuals", [](const HandEyeResult& r) { return tuple_of(r.residuals); }, "One per pose.");
   cls.def_readonly("train", &HandEyeResult::train, "Poses fitted, without rejected ones.");
   cls.def_readonly("left_out", &HandEyeResult::left_out, "The same, each predicted without itself.");
   cls.def_property_readonly(
@@ -467,8 +455,7 @@ void bind_result(py::module_& m) {
       "rejected", [](const HandEyeResult& r) { return tuple_of(r.rejected); },
       "Poses (counted from 0) that do not fit the others.");
   cls.def_property_readonly(
-      "unobservable", [](const HandEyeResult& r) { return tuple_of(r.unobservable); },
-      "What the motions cannot show.");
+      "unobservable", [](const HandEyeResult& r) { return tuple_of(r.unobservable); }, "What the motions cannot show.");
   cls.def_readonly("singular_values", &HandEyeResult::singular_values,
                    "shape=(8,), of the motions' equations, descending.");
   cls.def_readonly("singular_gap", &HandEyeResult::singular_gap,
@@ -499,11 +486,13 @@ void bind_result(py::module_& m) {
   });
 
   py::class_<HandEyeKinematics> both(m, "HandEyeKinematics", "What `handeye_with_kinematics` found.");
-  both.def_readonly("identification", &HandEyeKinematics::identification,
-                    "Of the robot whose tool is the camera (eye in hand) or the board, measured in the frame of the other.");
-  both.def_readonly("robot", &HandEyeKinematics::robot,
-                    "Calibrated, its tool the flange as given, its base the origin. Part of this result: copy() it before "
-                    "changing it.");
+  both.def_readonly(
+      "identification", &HandEyeKinematics::identification,
+      "Of the robot whose tool is the camera (eye in hand) or the board, measured in the frame of the other.");
+  both.def_readonly(
+      "robot", &HandEyeKinematics::robot,
+      "Calibrated, its tool the flange as given, its base the origin. Part of this result: copy() it before "
+      "changing it.");
   both.def_readonly("camera", &HandEyeKinematics::camera, "As in HandEyeResult, of the calibrated robot.");
   both.def_readonly("board", &HandEyeKinematics::board, "As in HandEyeResult, of the calibrated robot.");
   both.def_readonly("working_point", &HandEyeKinematics::working_point, "shape=(3,) [m] in the camera frame.");
@@ -570,8 +559,8 @@ Raises InputError on data that cannot be used.)");
       "All readings of the numbers that `handeye` tries, in the order tried; their closures are not set.");
   m.def(
       "handeye_plan",
-      [](const HandEyePoses& poses, const HandEyeResult& result, const std::optional<HandEyeOptions>& given,
-         int count, int candidates, double tilt, double reach, std::uint64_t seed) {
+      [](const HandEyePoses& poses, const HandEyeResult& result, const std::optional<HandEyeOptions>& given, int count,
+         int candidates, double tilt, double reach, std::uint64_t seed) {
         const HandEyeOptions options = given.value_or(HandEyeOptions{});
         HandEyePlanOptions plan;
         plan.poses = count;

@@ -19,8 +19,7 @@ std::string formatted(const char* format, Arguments... arguments) {
 std::string repr(const Parameter& p) {
   const std::string unit = p.unit.empty() || p.unit == "-" ? "" : " " + p.unit;
   return "Parameter('" + p.name + "', " + text(p.value) +
-         (p.frozen ? unit + ", frozen" : formatted(" +- %.2g", p.sigma) + unit) + ", nominal " +
-         text(p.nominal) + ")";
+         (p.frozen ? unit + ", frozen" : formatted(" +- %.2g", p.sigma) + unit) + ", nominal " + text(p.nominal) + ")";
 }
 
 std::string repr(const ErrorStatistics& e) {
@@ -29,19 +28,18 @@ std::string repr(const ErrorStatistics& e) {
 }
 
 std::string summary(const Identification& r) {
-  std::string out = formatted("%s: %s after %d iterations (%s)\n%d of %d parameters fitted, noise %.4g mm\n",
-                              r.solver.name.c_str(), r.solver.converged ? "converged" : "did not converge",
-                              r.solver.iterations, r.solver.stopped_because.c_str(), r.rank, r.columns,
-                              1e3 * r.noise_sigma);
+  std::string out =
+      formatted("%s: %s after %d iterations (%s)\n%d of %d parameters fitted, noise %.4g mm\n", r.solver.name.c_str(),
+                r.solver.converged ? "converged" : "did not converge", r.solver.iterations,
+                r.solver.stopped_because.c_str(), r.rank, r.columns, 1e3 * r.noise_sigma);
   const auto line = [&out](const char* name, const BeforeAfter& e) {
     out += formatted("%-5s  rms %.4g -> %.4g mm, p95 %.4g -> %.4g mm, max %.4g -> %.4g mm, n = %zu\n", name,
-                     1e3 * e.before.rms, 1e3 * e.after.rms, 1e3 * e.before.p95, 1e3 * e.after.p95,
-                     1e3 * e.before.max, 1e3 * e.after.max, e.after.n);
+                     1e3 * e.before.rms, 1e3 * e.after.rms, 1e3 * e.before.p95, 1e3 * e.after.p95, 1e3 * e.before.max,
+                     1e3 * e.after.max, e.after.n);
   };
   line("train", r.train);
   if (r.test) line("test", *r.test);
-  if (!r.rejected_rows.empty())
-    out += std::to_string(r.rejected_rows.size()) + " rows rejected as gross outliers\n";
+  if (!r.rejected_rows.empty()) out += std::to_string(r.rejected_rows.size()) + " rows rejected as gross outliers\n";
   for (const Frozen& f : r.frozen) out += "frozen: " + f.parameter + " (" + f.why + ")\n";
   for (const std::string& w : r.warnings) out += "warning: " + w + "\n";
   return out;
@@ -50,44 +48,42 @@ std::string summary(const Identification& r) {
 void bind_options(py::module_& m) {
   const IdentifyOptions usual;
   py::class_<IdentifyOptions> cls(m, "IdentifyOptions", "How `identify` works; see the attributes.");
-  cls.def(
-      py::init([](std::vector<std::string> free, std::vector<std::string> hold,
-                  std::vector<EffectRequest> effects, Solver solver, Loss loss,
-                  FrameBy frame_by, double rotation_length, double test_share, std::uint64_t seed,
-                  int max_iterations, double initial_damping, double rms_fall, double gradient, bool undamped,
-                  double rank_tolerance, double hayati_angle, double reject_beyond,
-                  std::map<std::string, std::pair<double, double>> bounds, int threads) {
-        IdentifyOptions o;
-        o.free = std::move(free);
-        o.hold = std::move(hold);
-        o.effects = std::move(effects);
-        o.solver = solver;
-        o.loss = loss;
-        o.frame_by = frame_by;
-        o.rotation_length = rotation_length;
-        o.test_share = test_share;
-        o.seed = seed;
-        o.max_iterations = max_iterations;
-        o.initial_damping = initial_damping;
-        o.rms_fall = rms_fall;
-        o.gradient = gradient;
-        o.undamped = undamped;
-        o.rank_tolerance = rank_tolerance;
-        o.hayati_angle = hayati_angle;
-        o.reject_beyond = reject_beyond;
-        o.bounds = std::move(bounds);
-        o.threads = threads;
-        return o;
-      }),
-      py::kw_only(), py::arg("free") = usual.free, py::arg("hold") = usual.hold,
-      py::arg("effects") = usual.effects, py::arg("solver") = usual.solver, py::arg("loss") = usual.loss, py::arg("frame_by") = usual.frame_by,
-      py::arg("rotation_length") = usual.rotation_length, py::arg("test_share") = usual.test_share,
-      py::arg("seed") = usual.seed, py::arg("max_iterations") = usual.max_iterations,
-      py::arg("initial_damping") = usual.initial_damping, py::arg("rms_fall") = usual.rms_fall,
-      py::arg("gradient") = usual.gradient, py::arg("undamped") = usual.undamped,
-      py::arg("rank_tolerance") = usual.rank_tolerance, py::arg("hayati_angle") = usual.hayati_angle,
-      py::arg("reject_beyond") = usual.reject_beyond, py::arg("bounds") = usual.bounds,
-      py::arg("threads") = usual.threads);
+  cls.def(py::init([](std::vector<std::string> free, std::vector<std::string> hold, std::vector<EffectRequest> effects,
+                      Solver solver, Loss loss, FrameBy frame_by, double rotation_length, double test_share,
+                      std::uint64_t seed, int max_iterations, double initial_damping, double rms_fall, double gradient,
+                      bool undamped, double rank_tolerance, double hayati_angle, double reject_beyond,
+                      std::map<std::string, std::pair<double, double>> bounds, int threads) {
+            IdentifyOptions o;
+            o.free = std::move(free);
+            o.hold = std::move(hold);
+            o.effects = std::move(effects);
+            o.solver = solver;
+            o.loss = loss;
+            o.frame_by = frame_by;
+            o.rotation_length = rotation_length;
+            o.test_share = test_share;
+            o.seed = seed;
+            o.max_iterations = max_iterations;
+            o.initial_damping = initial_damping;
+            o.rms_fall = rms_fall;
+            o.gradient = gradient;
+            o.undamped = undamped;
+            o.rank_tolerance = rank_tolerance;
+            o.hayati_angle = hayati_angle;
+            o.reject_beyond = reject_beyond;
+            o.bounds = std::move(bounds);
+            o.threads = threads;
+            return o;
+          }),
+          py::kw_only(), py::arg("free") = usual.free, py::arg("hold") = usual.hold, py::arg("effects") = usual.effects,
+          py::arg("solver") = usual.solver, py::arg("loss") = usual.loss, py::arg("frame_by") = usual.frame_by,
+          py::arg("rotation_length") = usual.rotation_length, py::arg("test_share") = usual.test_share,
+          py::arg("seed") = usual.seed, py::arg("max_iterations") = usual.max_iterations,
+          py::arg("initial_damping") = usual.initial_damping, py::arg("rms_fall") = usual.rms_fall,
+          py::arg("gradient") = usual.gradient, py::arg("undamped") = usual.undamped,
+          py::arg("rank_tolerance") = usual.rank_tolerance, py::arg("hayati_angle") = usual.hayati_angle,
+          py::arg("reject_beyond") = usual.reject_beyond, py::arg("bounds") = usual.bounds,
+          py::arg("threads") = usual.threads);
   cls.def_property(
       "free", [](const IdentifyOptions& o) { return tuple_of(o.free); },
       [](IdentifyOptions& o, std::vector<std::string> v) { o.free = std::move(v); },
@@ -98,13 +94,10 @@ void bind_options(py::module_& m) {
       "Names and globs that stay at nominal whatever else is asked for.");
   cls.def_property(
       "effects", [](const IdentifyOptions& o) { return tuple_of(o.effects); },
-      [](IdentifyOptions& o, std::vector<EffectRequest> v) { o.effects = std::move(v); },
-      "Effects to fit as well.");
-  cls.def_readwrite("solver", &IdentifyOptions::solver,
-                    "'lm' (Levenberg-Marquardt) or 'ceres' (takes bounds).");
-  cls.def_readwrite(
-      "loss", &IdentifyOptions::loss,
-      "'reject' (gross outliers are found, listed and left out), 'none', 'huber', 'cauchy' or 'tukey'.");
+      [](IdentifyOptions& o, std::vector<EffectRequest> v) { o.effects = std::move(v); }, "Effects to fit as well.");
+  cls.def_readwrite("solver", &IdentifyOptions::solver, "'lm' (Levenberg-Marquardt) or 'ceres' (takes bounds).");
+  cls.def_readwrite("loss", &IdentifyOptions::loss,
+                    "'reject' (gross outliers are found, listed and left out), 'none', 'huber', 'cauchy' or 'tukey'.");
   cls.def_readwrite("frame_by", &IdentifyOptions::frame_by,
                     "The measurement frame: 'parameters' (six more), or 'svd' (registered after every step; "
                     "positions only).");
@@ -115,8 +108,7 @@ void bind_options(py::module_& m) {
   cls.def_readwrite("seed", &IdentifyOptions::seed, "Of the split.");
   cls.def_readwrite("max_iterations", &IdentifyOptions::max_iterations, "The fit stops here at the latest.");
   cls.def_readwrite("initial_damping", &IdentifyOptions::initial_damping, "mu, on columns of unit norm.");
-  cls.def_readwrite("rms_fall", &IdentifyOptions::rms_fall,
-                    "[m] stop when a step lowers the rms by no more.");
+  cls.def_readwrite("rms_fall", &IdentifyOptions::rms_fall, "[m] stop when a step lowers the rms by no more.");
   cls.def_readwrite("gradient", &IdentifyOptions::gradient,
                     "Stop when the gradient of unit columns, relative to the residual's norm, is no more.");
   cls.def_readwrite("undamped", &IdentifyOptions::undamped, "mu = 0: plain least-squares iteration.");
@@ -133,12 +125,12 @@ void bind_options(py::module_& m) {
   cls.def_readwrite("threads", &IdentifyOptions::threads, "0: as many as the machine has.");
   cls.def("__repr__", [](const IdentifyOptions& o) {
     return std::string("IdentifyOptions(solver='") + word(o.solver) + "', loss='" + word(o.loss) +
-           "', free: " + (o.free.empty() ? "default" : joined(o.free)) + ", " +
-           std::to_string(o.effects.size()) + " effects)";
+           "', free: " + (o.free.empty() ? "default" : joined(o.free)) + ", " + std::to_string(o.effects.size()) +
+           " effects)";
   });
   define_value(cls, {"free", "hold", "effects", "solver", "loss", "frame_by", "rotation_length", "test_share", "seed",
-                     "max_iterations", "initial_damping", "rms_fall", "gradient", "undamped",
-                     "rank_tolerance", "hayati_angle", "reject_beyond", "bounds", "threads"});
+                     "max_iterations", "initial_damping", "rms_fall", "gradient", "undamped", "rank_tolerance",
+                     "hayati_angle", "reject_beyond", "bounds", "threads"});
 }
 
 void bind_results(py::module_& m) {
@@ -175,8 +167,7 @@ void bind_results(py::module_& m) {
   errors.def("__repr__", [](const ErrorStatistics& e) { return repr(e); });
 
   py::class_<BeforeAfter> both(m, "BeforeAfter", "Errors before and after calibration.");
-  both.def_readonly("before", &BeforeAfter::before,
-                    "Nominal robot with base, targets (anchor, fixed points) fitted.");
+  both.def_readonly("before", &BeforeAfter::before, "Nominal robot with base, targets (anchor, fixed points) fitted.");
   both.def_readonly("after", &BeforeAfter::after, "Calibrated robot.");
   both.def("__repr__", [](const BeforeAfter& b) {
     return "BeforeAfter(before=" + repr(b.before) + ", after=" + repr(b.after) + ")";
@@ -237,8 +228,7 @@ void bind_results(py::module_& m) {
       },
       "shape=(n,): 0 train, 1 test, for every row.");
   cls.def_property_readonly(
-      "warnings", [](const Identification& r) { return tuple_of(r.warnings); },
-      "What to know before trusting it.");
+      "warnings", [](const Identification& r) { return tuple_of(r.warnings); }, "What to know before trusting it.");
   cls.def_readonly("solver", &Identification::solver, "How the solver ended.");
   cls.def_readonly("noise_sigma", &Identification::noise_sigma,
                    "[m] of one position component (or distance), from the training residuals.");
@@ -249,27 +239,24 @@ void bind_results(py::module_& m) {
   cls.def("summary", &summary, "A few lines for people.");
   cls.def("__repr__", [](const Identification& r) {
     return formatted("Identification(%s, %d of %d parameters, train rms %.4g -> %.4g mm)",
-                     r.solver.converged ? "converged" : "not converged", r.rank, r.columns,
-                     1e3 * r.train.before.rms, 1e3 * r.train.after.rms);
+                     r.solver.converged ? "converged" : "not converged", r.rank, r.columns, 1e3 * r.train.before.rms,
+                     1e3 * r.train.after.rms);
   });
 
   py::class_<Prediction> prediction(m, "Prediction", "What the robot predicts for the rows of some data.");
-  prediction.def_readonly("position", &Prediction::position,
-                          "shape=(n, 3) [m]: target in the measurement frame.");
+  prediction.def_readonly("position", &Prediction::position, "shape=(n, 3) [m]: target in the measurement frame.");
   prediction.def_readonly("orientation", &Prediction::orientation, "shape=(n, 4): w x y z, w >= 0.");
   prediction.def_readonly("distance", &Prediction::distance, "shape=(n,) [m]; empty without an anchor.");
-  prediction.def("__repr__", [](const Prediction& p) {
-    return "Prediction(" + std::to_string(p.position.rows()) + " rows)";
-  });
+  prediction.def("__repr__",
+                 [](const Prediction& p) { return "Prediction(" + std::to_string(p.position.rows()) + " rows)"; });
 
   py::class_<Residuals> residual(m, "Residuals", "Predicted minus measured; NaN where not measured.");
   residual.def_readonly("position", &Residuals::position, "shape=(n, 3) [m]");
   residual.def_readonly("rotation", &Residuals::rotation,
                         "shape=(n, 3) [rad]: twice the vector part of the error quaternion.");
   residual.def_readonly("distance", &Residuals::distance, "shape=(n,) [m]");
-  residual.def("__repr__", [](const Residuals& r) {
-    return "Residuals(" + std::to_string(r.position.rows()) + " rows)";
-  });
+  residual.def("__repr__",
+               [](const Residuals& r) { return "Residuals(" + std::to_string(r.position.rows()) + " rows)"; });
 }
 
 }  // namespace
@@ -320,25 +307,22 @@ Rows of a fixed point are compared with the mean of that point's predictions.)")
 void bind_plan(py::module_& m) {
   const PlanOptions usual;
   py::class_<PlanOptions> cls(m, "PlanOptions", "How `plan` works; see the attributes.");
-  cls.def(
-      py::init([](int poses, double min_step, double min_step_prismatic, Observability index,
-                  bool orientation, double position_sigma, double rotation_sigma, int sweeps, int proposals,
-                  std::uint64_t seed, std::vector<std::string> free, std::vector<EffectRequest> effects) {
-        return PlanOptions{poses,       min_step,       min_step_prismatic, index,
-                           orientation, position_sigma, rotation_sigma,     sweeps,
-                           proposals,   seed,           std::move(free),    std::move(effects)};
-      }),
-      py::kw_only(), py::arg("poses") = usual.poses, py::arg("min_step") = usual.min_step,
-      py::arg("min_step_prismatic") = usual.min_step_prismatic, py::arg("index") = usual.index,
-      py::arg("orientation") = usual.orientation, py::arg("position_sigma") = usual.position_sigma,
-      py::arg("rotation_sigma") = usual.rotation_sigma, py::arg("sweeps") = usual.sweeps,
-      py::arg("proposals") = usual.proposals, py::arg("seed") = usual.seed, py::arg("free") = usual.free,
-      py::arg("effects") = usual.effects);
+  cls.def(py::init([](int poses, double min_step, double min_step_prismatic, Observability index, bool orientation,
+                      double position_sigma, double rotation_sigma, int sweeps, int proposals, std::uint64_t seed,
+                      std::vector<std::string> free, std::vector<EffectRequest> effects) {
+            return PlanOptions{poses,       min_step,       min_step_prismatic, index,
+                               orientation, position_sigma, rotation_sigma,     sweeps,
+                               proposals,   seed,           std::move(free),    std::move(effects)};
+          }),
+          py::kw_only(), py::arg("poses") = usual.poses, py::arg("min_step") = usual.min_step,
+          py::arg("min_step_prismatic") = usual.min_step_prismatic, py::arg("index") = usual.index,
+          py::arg("orientation") = usual.orientation, py::arg("position_sigma") = usual.position_sigma,
+          py::arg("rotation_sigma") = usual.rotation_sigma, py::arg("sweeps") = usual.sweeps,
+          py::arg("proposals") = usual.proposals, py::arg("seed") = usual.seed, py::arg("free") = usual.free,
+          py::arg("effects") = usual.effects);
   cls.def_readwrite("poses", &PlanOptions::poses, "Number of poses.");
-  cls.def_readwrite("min_step", &PlanOptions::min_step,
-                    "[rad] every revolute joint moves by more between neighbours.");
-  cls.def_readwrite("min_step_prismatic", &PlanOptions::min_step_prismatic,
-                    "[m] the same for prismatic joints.");
+  cls.def_readwrite("min_step", &PlanOptions::min_step, "[rad] every revolute joint moves by more between neighbours.");
+  cls.def_readwrite("min_step_prismatic", &PlanOptions::min_step_prismatic, "[m] the same for prismatic joints.");
   cls.def_readwrite("index", &PlanOptions::index, R"(What the plan makes large.
 
 'd_optimal' (determinant; O1 of Borm and Menq 1989), 'a_optimal' (minus the sum of variances), 'e_optimal' (smallest
@@ -370,8 +354,7 @@ singular value; O3 of Nahvi et al. 1994), 'inverse_condition' (O2 of Driels and 
       "parameters", [](const PlanResult& r) { return tuple_of(r.parameters); },
       "sigma: the standard error that this plan promises.");
   result.def_property_readonly(
-      "frozen", [](const PlanResult& r) { return tuple_of(r.frozen); },
-      "What no plan of this kind could see.");
+      "frozen", [](const PlanResult& r) { return tuple_of(r.frozen); }, "What no plan of this kind could see.");
   result.def_readonly("index_start", &PlanResult::index_start,
                       "Index of the random plan that the exchange began with.");
   result.def_readonly("index_end", &PlanResult::index_end, "Index of this plan.");

@@ -15,13 +15,9 @@ namespace {
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Callback = std::optional<py::typing::Callable<py::object(std::size_t)>>;
 
-std::optional<double> known(double value) {
-  return std::isnan(value) ? std::nullopt : std::optional<double>(value);
-}
+std::optional<double> known(double value) { return std::isnan(value) ? std::nullopt : std::optional<double>(value); }
 
-double or_nan(const std::optional<double>& value) {
-  return value.value_or(std::numeric_limits<double>::quiet_NaN());
-}
+double or_nan(const std::optional<double>& value) { return value.value_or(std::numeric_limits<double>::quiet_NaN()); }
 
 // ---- Joints, tasks and conditions out of Python
 
@@ -78,8 +74,8 @@ std::vector<Conditions> conditions_from(const GivenConditions& given) {
   return std::get<std::vector<Conditions>>(*given);
 }
 
-/// Runs `work(progress)` without the interpreter lock. Now and then it is taken for `callback` (done) and for Ctrl-C; what they
-/// raise stops the work and is raised here.
+/// Runs `work(progress)` without the interpreter lock. Now and then it is taken for `callback` (done) and for Ctrl-C;
+/// what they raise stops the work and is raised here.
 template <class Work>
 auto with_progress(const Callback& callback, const Work& work) {
   std::exception_ptr raised;
@@ -127,8 +123,7 @@ py::array_t<double> array_of(const Joints& joints) {
 template <class Value, class Item, class Get>
 py::array_t<Value> column(const std::vector<Item>& items, const Get& get) {
   py::array_t<Value> out(static_cast<py::ssize_t>(items.size()));
-  for (std::size_t k = 0; k < items.size(); ++k)
-    out.mutable_data()[k] = static_cast<Value>(get(items[k]));
+  for (std::size_t k = 0; k < items.size(); ++k) out.mutable_data()[k] = static_cast<Value>(get(items[k]));
   return out;
 }
 
@@ -138,8 +133,7 @@ py::array_t<double> block(const std::vector<Item>& items, py::ssize_t width, con
   py::array_t<double> out({static_cast<py::ssize_t>(items.size()), width});
   for (std::size_t k = 0; k < items.size(); ++k) {
     const auto values = get(items[k]);
-    for (py::ssize_t j = 0; j < width; ++j)
-      out.mutable_data()[static_cast<py::ssize_t>(k) * width + j] = values[j];
+    for (py::ssize_t j = 0; j < width; ++j) out.mutable_data()[static_cast<py::ssize_t>(k) * width + j] = values[j];
   }
   return out;
 }
@@ -169,8 +163,7 @@ void bind_solution(py::module_& m) {
 `contact` is in the way; 'out_of_reach': it stays away by `miss` along `direction`, limits aside; 'limit': that of `joint` is in
 the way, by `excess`; 'singular': the tip cannot move along `direction`.)");
   cls.def_property_readonly("reached", &Solution::reached, "Whether the task is met.");
-  cls.def_readonly("position_error", &Solution::position_error,
-                   "[m] of the task, from a second forward computation.");
+  cls.def_readonly("position_error", &Solution::position_error, "[m] of the task, from a second forward computation.");
   cls.def_readonly("rotation_error", &Solution::rotation_error,
                    "[rad] of the task: what of the orientation is asked for.");
   cls.def_readonly("roll", &Solution::roll, "[rad] torch: the turn about the axis from the wanted frame.");
@@ -187,8 +180,7 @@ the way, by `excess`; 'singular': the tip cannot move along `direction`.)");
   cls.def_property_readonly(
       "contact",
       [](const Solution& s) {
-        return s.contact[0] < 0 ? std::optional<std::pair<int, int>>()
-                                : std::make_pair(s.contact[0], s.contact[1]);
+        return s.contact[0] < 0 ? std::optional<std::pair<int, int>>() : std::make_pair(s.contact[0], s.contact[1]);
       },
       "With a scene the nearest pair: index of a capsule; of another one, or number of capsules + index of an "
       "obstacle.");
@@ -216,7 +208,7 @@ the way, by `excess`; 'singular': the tip cannot move along `direction`.)");
         return tuple_of(reasons);
       },
       "Of each, as `Solution.reason`.");
-  const auto number = [&all](const char* name, double Solution::*member, const char* doc) {
+  const auto number = [&all](const char* name, double Solution::* member, const char* doc) {
     all.def_property_readonly(
         name,
         [member](const Solutions& s) {
@@ -231,7 +223,7 @@ the way, by `excess`; 'singular': the tip cannot move along `direction`.)");
   number("excess", &Solution::excess, "shape=(n,) [rad | m]");
   number("contact_distance", &Solution::contact_distance, "shape=(n,) [m]");
   number("retreat", &Solution::retreat, "shape=(n,) [m]");
-  const auto whole = [&all](const char* name, int Solution::*member, const char* doc) {
+  const auto whole = [&all](const char* name, int Solution::* member, const char* doc) {
     all.def_property_readonly(
         name,
         [member](const Solutions& s) {
@@ -247,8 +239,7 @@ the way, by `excess`; 'singular': the tip cannot move along `direction`.)");
       [](const Solutions& s) { return block(s.items, 3, [](const Solution& i) { return i.direction.data(); }); },
       "shape=(n, 3)");
   all.def("__len__", [](const Solutions& s) { return s.items.size(); });
-  all.def(
-      "__getitem__", [](const Solutions& s, py::ssize_t k) { return at(s.items, k); }, py::arg("k"));
+  all.def("__getitem__", [](const Solutions& s, py::ssize_t k) { return at(s.items, k); }, py::arg("k"));
   all.def(
       "__iter__", [](const Solutions& s) { return py::make_iterator(s.items.begin(), s.items.end()); },
       py::keep_alive<0, 1>());
@@ -309,17 +300,13 @@ frees it, and by no more than longest_retreat [m]; 0: not at all.)");
           py::arg("longest_retreat") = usual.longest_retreat);
   cls.def_readonly("T_measurement_target", &Task::T_measurement_target, "shape=(4, 4) [m]");
   cls.def_readonly("kind", &Task::kind, "'pose', 'torch' or 'point'.");
-  cls.def_property_readonly(
-      "axis", [](const Task& t) { return array_from(t.axis); }, "shape=(3,)");
-  cls.def_property_readonly(
-      "travel", [](const Task& t) { return array_from(t.travel); }, "shape=(3,)");
+  cls.def_property_readonly("axis", [](const Task& t) { return array_from(t.axis); }, "shape=(3,)");
+  cls.def_property_readonly("travel", [](const Task& t) { return array_from(t.travel); }, "shape=(3,)");
   cls.def_readonly("roll", &Task::roll, "(lower, upper) [rad]");
-  cls.def_property_readonly(
-      "preferred_roll", [](const Task& t) { return known(t.preferred_roll); }, "[rad] or None.");
+  cls.def_property_readonly("preferred_roll", [](const Task& t) { return known(t.preferred_roll); }, "[rad] or None.");
   cls.def_readonly("lead", &Task::lead, "(lower, upper) [rad]");
   cls.def_readonly("work", &Task::work, "(lower, upper) [rad]");
-  cls.def_property_readonly(
-      "retreat", [](const Task& t) { return array_from(t.retreat); }, "shape=(3,)");
+  cls.def_property_readonly("retreat", [](const Task& t) { return array_from(t.retreat); }, "shape=(3,)");
   cls.def_readonly("longest_retreat", &Task::longest_retreat, "[m]");
   cls.def("__repr__", [](const Task& t) {
     const Eigen::Vector3d p = t.T_measurement_target.translation();
@@ -335,24 +322,22 @@ frees it, and by no more than longest_retreat [m]; 0: not at all.)");
 direction: approach direction of every driven joint, -1, 0 or 1; empty: the way from the seed to the answer.
 payload: [kg] at the tool. temperature: [deg C]. time: [s]. joint_speed: of every driven joint [rad/s | m/s].
 covariates: what else the effects look at, by column name.)");
-  conditions.def(py::init([](std::vector<int> direction, double payload, const std::optional<double>& temperature,
-                             const std::optional<double>& time, std::vector<double> joint_speed,
-                             std::map<std::string, double> covariates) {
-                   return Conditions{std::move(direction),   payload,
-                                     or_nan(temperature),    or_nan(time),
-                                     std::move(joint_speed), std::move(covariates)};
-                 }),
-                 py::kw_only(), py::arg("direction") = std::vector<int>{}, py::arg("payload") = 0.0,
-                 py::arg("temperature") = py::none(), py::arg("time") = py::none(),
-                 py::arg("joint_speed") = std::vector<double>{},
-                 py::arg("covariates") = std::map<std::string, double>{});
+  conditions.def(
+      py::init([](std::vector<int> direction, double payload, const std::optional<double>& temperature,
+                  const std::optional<double>& time, std::vector<double> joint_speed,
+                  std::map<std::string, double> covariates) {
+        return Conditions{std::move(direction), payload, or_nan(temperature), or_nan(time), std::move(joint_speed),
+                          std::move(covariates)};
+      }),
+      py::kw_only(), py::arg("direction") = std::vector<int>{}, py::arg("payload") = 0.0,
+      py::arg("temperature") = py::none(), py::arg("time") = py::none(), py::arg("joint_speed") = std::vector<double>{},
+      py::arg("covariates") = std::map<std::string, double>{});
   conditions.def_property_readonly(
       "direction", [](const Conditions& c) { return tuple_of(c.direction); }, "-1, 0 or 1 each.");
   conditions.def_readonly("payload", &Conditions::payload, "[kg]");
   conditions.def_property_readonly(
       "temperature", [](const Conditions& c) { return known(c.temperature); }, "[deg C] or None.");
-  conditions.def_property_readonly(
-      "time", [](const Conditions& c) { return known(c.time); }, "[s] or None.");
+  conditions.def_property_readonly("time", [](const Conditions& c) { return known(c.time); }, "[s] or None.");
   conditions.def_property_readonly(
       "joint_speed", [](const Conditions& c) { return tuple_of(c.joint_speed); }, "[rad/s | m/s]");
   conditions.def_property_readonly(
@@ -373,17 +358,14 @@ shape: 'sphere' (radius about the frame's origin), 'capsule' (radius about the s
 (`size` along the frame's axes, its centre at the origin).
 T_measurement_shape: shape=(4, 4) [m]. size: shape=(3,) [m] whole lengths. radius: [m].)");
   obstacle.def(py::init([](std::string name, Shape shape, const Eigen::Isometry3d& T, const Eigen::Vector3d& size,
-                           double radius) {
-                 return Obstacle{std::move(name), shape, T, size, radius};
-               }),
+                           double radius) { return Obstacle{std::move(name), shape, T, size, radius}; }),
                py::arg("name"), py::kw_only(), py::arg("shape") = usual.shape,
                py::arg("T_measurement_shape") = usual.T_measurement_shape, py::arg("size") = array_from(usual.size),
                py::arg("radius") = usual.radius);
   obstacle.def_readonly("name", &Obstacle::name, "As answers call it.");
   obstacle.def_readonly("shape", &Obstacle::shape, "'sphere', 'capsule' or 'box'.");
   obstacle.def_readonly("T_measurement_shape", &Obstacle::T_measurement_shape, "shape=(4, 4) [m]");
-  obstacle.def_property_readonly(
-      "size", [](const Obstacle& o) { return array_from(o.size); }, "shape=(3,) [m]");
+  obstacle.def_property_readonly("size", [](const Obstacle& o) { return array_from(o.size); }, "shape=(3,) [m]");
   obstacle.def_readonly("radius", &Obstacle::radius, "[m]");
   obstacle.def("__repr__",
                [](const Obstacle& o) { return "Obstacle('" + o.name + "', " + std::string(word(o.shape)) + ")"; });
@@ -394,19 +376,14 @@ T_measurement_shape: shape=(4, 4) [m]. size: shape=(3,) [m] whole lengths. radiu
 link: the joint whose link carries it, in the frame after it; 'base': the base frame; 'tool': the target's frame.
 start, end: shape=(3,) [m]. radius: [m].)");
   capsule.def(py::init([](std::string name, std::string link, const Eigen::Vector3d& start, const Eigen::Vector3d& end,
-                          double radius) {
-                return LinkCapsule{std::move(name), std::move(link), start, end, radius};
-              }),
+                          double radius) { return LinkCapsule{std::move(name), std::move(link), start, end, radius}; }),
               py::arg("name"), py::kw_only(), py::arg("link"), py::arg("start"), py::arg("end"), py::arg("radius"));
   capsule.def_readonly("name", &LinkCapsule::name, "As answers call it.");
   capsule.def_readonly("link", &LinkCapsule::link, "Name of a joint, 'base' or 'tool'.");
-  capsule.def_property_readonly(
-      "start", [](const LinkCapsule& c) { return array_from(c.from); }, "shape=(3,) [m]");
-  capsule.def_property_readonly(
-      "end", [](const LinkCapsule& c) { return array_from(c.to); }, "shape=(3,) [m]");
+  capsule.def_property_readonly("start", [](const LinkCapsule& c) { return array_from(c.from); }, "shape=(3,) [m]");
+  capsule.def_property_readonly("end", [](const LinkCapsule& c) { return array_from(c.to); }, "shape=(3,) [m]");
   capsule.def_readonly("radius", &LinkCapsule::radius, "[m]");
-  capsule.def("__repr__",
-              [](const LinkCapsule& c) { return "LinkCapsule('" + c.name + "' on '" + c.link + "')"; });
+  capsule.def("__repr__", [](const LinkCapsule& c) { return "LinkCapsule('" + c.name + "' on '" + c.link + "')"; });
   define_value(capsule, {"name", "link", "start", "end", "radius"});
 
   py::class_<Scene> scene(m, "Scene", R"(What the robot must not touch, and what of it must not.
@@ -421,13 +398,11 @@ what stands still.)");
             py::kw_only(), py::arg("obstacles") = std::vector<Obstacle>{},
             py::arg("capsules") = std::vector<LinkCapsule>{}, py::arg("clearance") = 0.0,
             py::arg("ignored") = NamePairs{});
-  scene.def_property_readonly(
-      "obstacles", [](const Scene& s) { return tuple_of(s.obstacles); }, "What stands still.");
+  scene.def_property_readonly("obstacles", [](const Scene& s) { return tuple_of(s.obstacles); }, "What stands still.");
   scene.def_property_readonly(
       "capsules", [](const Scene& s) { return tuple_of(s.capsules); }, "What of the robot must not touch.");
   scene.def_readonly("clearance", &Scene::clearance, "[m]");
-  scene.def_property_readonly(
-      "ignored", [](const Scene& s) { return tuple_of(s.ignored); }, "Pairs of names.");
+  scene.def_property_readonly("ignored", [](const Scene& s) { return tuple_of(s.ignored); }, "Pairs of names.");
   scene.def("__repr__", [](const Scene& s) {
     return "Scene(" + std::to_string(s.obstacles.size()) + " obstacles, " + std::to_string(s.capsules.size()) +
            " capsules)";
@@ -443,9 +418,9 @@ what stands still.)");
     return "Contact('" + c.first + "', '" + c.second + "', " + text(1e3 * c.distance) + " mm)";
   });
 
-  m.def("validate_scene", py::overload_cast<const Scene&, const Robot&>(&validate), py::arg("scene"),
-        py::arg("robot"),
-        "Raises InputError on unknown links, empty or equal names, sizes that are not positive, frames that are not rigid.");
+  m.def("validate_scene", py::overload_cast<const Scene&, const Robot&>(&validate), py::arg("scene"), py::arg("robot"),
+        "Raises InputError on unknown links, empty or equal names, sizes that are not positive, frames that are not "
+        "rigid.");
   m.def("nearest_contact", &nearest_contact, py::arg("scene"), py::arg("robot"), py::arg("joints"),
         py::arg("target") = 0,
         R"(The nearest pair at these readings, effects left out; without names when there is none to look at.
@@ -460,9 +435,8 @@ void bind_options(py::module_& m) {
   py::class_<InverseOptions> cls(m, "InverseOptions", "How `InverseSolver` works; see the attributes.");
   cls.def(py::init([](double position_tolerance, double rotation_tolerance, Choose choose, int max_iterations,
                       int max_restarts, double wrist_tolerance, double parallel_tolerance, Scene scene) {
-            return InverseOptions{position_tolerance, rotation_tolerance, choose,
-                                  max_iterations,     max_restarts,       wrist_tolerance,
-                                  parallel_tolerance, std::move(scene)};
+            return InverseOptions{position_tolerance, rotation_tolerance, choose,          max_iterations, max_restarts,
+                                  wrist_tolerance,    parallel_tolerance, std::move(scene)};
           }),
           py::kw_only(), py::arg("position_tolerance") = usual.position_tolerance,
           py::arg("rotation_tolerance") = usual.rotation_tolerance, py::arg("choose") = usual.choose,
@@ -486,8 +460,7 @@ least way of the prismatic joints from the seed, then nearest.)");
   cls.def_property(
       "scene", [](const InverseOptions& o) { return Scene(o.scene); },
       [](InverseOptions& o, const Scene& scene) { o.scene = scene; }, "What the robot must not touch.");
-  cls.def("__repr__",
-          [](const InverseOptions& o) { return std::string("InverseOptions('") + word(o.choose) + "')"; });
+  cls.def("__repr__", [](const InverseOptions& o) { return std::string("InverseOptions('") + word(o.choose) + "')"; });
   define_value(cls, {"position_tolerance", "rotation_tolerance", "choose", "max_iterations", "max_restarts",
                      "wrist_tolerance", "parallel_tolerance", "scene"});
 
@@ -512,11 +485,9 @@ least way of the prismatic joints from the seed, then nearest.)");
 
   const CompensateOptions none;
   py::class_<CompensateOptions> compensate(m, "CompensateOptions", "How `Compensator` works; see the attributes.");
-  compensate.def(py::init([](const InverseOptions& inverse, bool in_base) {
-                   return CompensateOptions{inverse, in_base};
-                 }),
-                 py::kw_only(), py::arg_v("inverse", none.inverse, "InverseOptions()"),
-                 py::arg("in_base") = none.in_base);
+  compensate.def(
+      py::init([](const InverseOptions& inverse, bool in_base) { return CompensateOptions{inverse, in_base}; }),
+      py::kw_only(), py::arg_v("inverse", none.inverse, "InverseOptions()"), py::arg("in_base") = none.in_base);
   compensate.def_readwrite("inverse", &CompensateOptions::inverse, "Of both solvers.");
   compensate.def_readwrite("in_base", &CompensateOptions::in_base,
                            "Wanted poses and commands are in each robot's own base frame, as programs have them; "
@@ -549,8 +520,7 @@ void bind_path(py::module_& m) {
   path.def_readonly("longest_turn", &FoundPath::longest_turn,
                     "[rad] the longest step of a turning joint that is no gap.");
   path.def_readonly("longest_slide", &FoundPath::longest_slide, "[m] of a sliding joint.");
-  path.def_property_readonly(
-      "continuous", [](const FoundPath& p) { return p.gaps.empty(); }, "No gaps.");
+  path.def_property_readonly("continuous", [](const FoundPath& p) { return p.gaps.empty(); }, "No gaps.");
   path.def("__repr__", [](const FoundPath& p) {
     return "JointPath(" + std::to_string(p.solutions.items.size()) + " targets, " + std::to_string(p.gaps.size()) +
            " gaps)";
@@ -558,7 +528,8 @@ void bind_path(py::module_& m) {
 }
 
 void bind_solver(py::module_& m) {
-  py::class_<InverseSolver> cls(m, "InverseSolver", R"(A robot made ready for inverse kinematics, nominal or calibrated, effects included.
+  py::class_<InverseSolver> cls(m, "InverseSolver",
+                                R"(A robot made ready for inverse kinematics, nominal or calibrated, effects included.
 
 Built once it does not change, and any number of threads may use it. Where a seed is asked for, None is the middle of every
 joint's range.
@@ -571,8 +542,7 @@ conditions: those of every solve that names no others; they also say which input
           }),
           py::arg("robot"), py::arg("options") = py::none(), py::arg("conditions") = py::none(), py::kw_only(),
           py::arg("target") = 0);
-  cls.def_property_readonly(
-      "robot", [](const InverseSolver& s) { return Robot(s.robot()); }, "A copy of the robot.");
+  cls.def_property_readonly("robot", [](const InverseSolver& s) { return Robot(s.robot()); }, "A copy of the robot.");
   cls.def_property_readonly(
       "options", [](const InverseSolver& s) { return InverseOptions(s.options()); }, "A copy of the options.");
   cls.def_property_readonly("driven_count", &InverseSolver::driven_count, "Number of joints that have a reading.");
@@ -660,12 +630,11 @@ It stays on its branch; where it cannot, the reason says why, and nothing else i
         Path path = with_progress(callback, [&](const auto& progress) {
           return s.path(tasks, from, options, conditions ? &*conditions : nullptr, progress);
         });
-        return FoundPath{{std::move(path.solutions), s.driven_count()},
-                         std::move(path.gaps), path.longest_turn, path.longest_slide};
+        return FoundPath{
+            {std::move(path.solutions), s.driven_count()}, std::move(path.gaps), path.longest_turn, path.longest_slide};
       },
       py::arg("targets"), py::arg("seed") = py::none(), py::arg("options") = py::none(),
-      py::arg("conditions") = py::none(), py::kw_only(), py::arg("like") = py::none(),
-      py::arg("progress") = py::none(),
+      py::arg("conditions") = py::none(), py::kw_only(), py::arg("like") = py::none(), py::arg("progress") = py::none(),
       R"(A path through the targets in steps as short as can be; where none keeps within the bounds, the gap is told.
 
 targets, like, progress: as in `solve_batch`. seed: where the robot comes from. Raises InputError.)");
@@ -685,9 +654,10 @@ void bind_compensate(py::module_& m) {
                    "Of the calibrated robot: joints to command, and whether the target is reached with them.");
   cls.def_readonly("T_command", &Compensated::T_command,
                    "shape=(4, 4) [m]: pose to command; the nominal robot takes these joints for it.");
-  cls.def_readonly("other_configuration", &Compensated::other_configuration,
-                   "The joints are more than half a radian from those that the nominal robot would take: a controller that is "
-                   "given T_command may choose others.");
+  cls.def_readonly(
+      "other_configuration", &Compensated::other_configuration,
+      "The joints are more than half a radian from those that the nominal robot would take: a controller that is "
+      "given T_command may choose others.");
   cls.def_property_readonly(
       "position_before", [](const Compensated& c) { return known(c.position_before); },
       "[m] how far off the real robot would be if the wanted pose were commanded; None: the nominal robot "
@@ -742,14 +712,15 @@ void bind_compensate(py::module_& m) {
       [](const Compensations& c) { return block(c.items, 6, [](const Compensated& i) { return i.sigma.data(); }); },
       "shape=(n, 6) [m], [rad]; NaN: no uncertainty was given.");
   all.def("__len__", [](const Compensations& c) { return c.items.size(); });
-  all.def(
-      "__getitem__", [](const Compensations& c, py::ssize_t k) { return at(c.items, k); }, py::arg("k"));
+  all.def("__getitem__", [](const Compensations& c, py::ssize_t k) { return at(c.items, k); }, py::arg("k"));
   all.def(
       "__iter__", [](const Compensations& c) { return py::make_iterator(c.items.begin(), c.items.end()); },
       py::keep_alive<0, 1>());
   all.def("__repr__", [](const Compensations& c) { return "Compensations(" + std::to_string(c.items.size()) + ")"; });
 
-  py::class_<Compensator> maker(m, "Compensator", R"(Says what to command so that the real robot, which `calibrated` describes, goes where it is wanted.
+  py::class_<Compensator> maker(
+      m, "Compensator",
+      R"(Says what to command so that the real robot, which `calibrated` describes, goes where it is wanted.
 
 Built once from both robots, then any number of threads may use it. conditions, target: as of `InverseSolver`.
 Raises InputError when the robots have different joints, or as InverseSolver does.)");
@@ -817,24 +788,29 @@ seed: where the robot comes from; None: it stands there already. Raises InputErr
         const std::vector<Conditions> conditions = conditions_from(given);
         require_one_or_each(seeds.size(), tasks.size(), "seeds");
         if (!conditions.empty()) require_one_or_each(conditions.size(), tasks.size(), "conditions");
-        return Compensations{
-            with_progress(callback, [&](const auto& progress) { return c.pose_batch(tasks, seeds, conditions, threads, progress); }),
-            c.nominal().driven_count()};
+        return Compensations{with_progress(callback,
+                                           [&](const auto& progress) {
+                                             return c.pose_batch(tasks, seeds, conditions, threads, progress);
+                                           }),
+                             c.nominal().driven_count()};
       },
       py::arg("targets"), py::arg("seeds") = py::none(), py::arg("conditions") = py::none(), py::kw_only(),
       py::arg("like") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
       "One result per target; arguments as of `InverseSolver.solve_batch`. Raises InputError.");
   maker.def(
       "joints_batch",
-      [](const Compensator& c, const ArrayLike& given_program, const GivenConditions& given, int threads, const Callback& callback) {
+      [](const Compensator& c, const ArrayLike& given_program, const GivenConditions& given, int threads,
+         const Callback& callback) {
         const std::vector<Joints> program = joint_rows(given_program, c.nominal().driven_count(), "program");
         const std::vector<Conditions> conditions = conditions_from(given);
         if (!conditions.empty()) require_one_or_each(conditions.size(), program.size(), "conditions");
         return Compensations{
-            with_progress(callback, [&](const auto& progress) { return c.joints_batch(program, conditions, threads, progress); }),
+            with_progress(callback,
+                          [&](const auto& progress) { return c.joints_batch(program, conditions, threads, progress); }),
             c.nominal().driven_count()};
       },
-      py::arg("program"), py::arg("conditions") = py::none(), py::kw_only(), py::arg("threads") = 0, py::arg("progress") = py::none(),
+      py::arg("program"), py::arg("conditions") = py::none(), py::kw_only(), py::arg("threads") = 0,
+      py::arg("progress") = py::none(),
       R"(One result per row of a program of joint positions, shape=(n, driven joints) [rad | m].
 
 The robot comes from the row before; to the first it does not move. Raises InputError.)");

@@ -15,8 +15,7 @@ py::array float_array(py::handle object, const std::string& name) {
     given = given.attr("astype")("f8").attr("filled")(std::numeric_limits<double>::quiet_NaN());
   auto array = py::array::ensure(given);
   if (!array)
-    throw std::invalid_argument(name +
-                                " cannot be made an array of numbers; are its rows of different lengths?");
+    throw std::invalid_argument(name + " cannot be made an array of numbers; are its rows of different lengths?");
   const char kind = array.dtype().kind();
   if (kind != 'f' && kind != 'i' && kind != 'u')
     throw std::invalid_argument(name + " holds " + py::str(array.dtype()).cast<std::string>() +
@@ -50,12 +49,10 @@ class Reader {
   std::vector<py::object> kept;
 
   /// shape=(n, width), or a list or tuple of `width` columns. width 0: any.
-  std::vector<Column> block(const py::object& given, const std::string& name, std::size_t width,
-                            bool first = false) {
+  std::vector<Column> block(const py::object& given, const std::string& name, std::size_t width, bool first = false) {
     std::vector<Column> columns;
     if (is_list_of_columns(given)) {
-      check_width(py::len(given), width, name,
-                  "; a list of arrays holds columns: for rows use np.array(...)");
+      check_width(py::len(given), width, name, "; a list of arrays holds columns: for rows use np.array(...)");
       for (const py::handle item : given) {
         const py::array array = float_array(item, name);
         if (array.ndim() != 1)
@@ -99,8 +96,8 @@ class Reader {
     kept.push_back(array);
     if (or_number && array.ndim() == 0) return column_of(array);
     if (array.ndim() != 1)
-      throw std::invalid_argument(name + " must have shape (n,)" + (or_number ? " or be one number" : "") +
-                                  "; found " + shape_text(array));
+      throw std::invalid_argument(name + " must have shape (n,)" + (or_number ? " or be one number" : "") + "; found " +
+                                  shape_text(array));
     check_rows(array, name);
     return column_of(array);
   }
@@ -124,8 +121,7 @@ class Reader {
       throw std::invalid_argument(name + " has " + std::to_string(array.shape(0)) + " rows, joints has " +
                                   std::to_string(rows));
   }
-  static void check_width(std::size_t found, std::size_t expected, const std::string& name,
-                          const std::string& hint) {
+  static void check_width(std::size_t found, std::size_t expected, const std::string& name, const std::string& hint) {
     if (expected != 0 && found != expected)
       throw std::invalid_argument(name + " has " + std::to_string(found) + " columns, expected " +
                                   std::to_string(expected) + hint);
@@ -146,8 +142,7 @@ bool is_missing(py::handle item) {
 }
 
 std::int32_t number_of(py::handle item, std::size_t row, const LabelRule& rule,
-                       std::unordered_map<std::string, std::int32_t>& index,
-                       std::vector<std::string>& names) {
+                       std::unordered_map<std::string, std::int32_t>& index, std::vector<std::string>& names) {
   if (rule.none && is_missing(item)) return -1;
   if (!PyUnicode_Check(item.ptr()))
     throw std::invalid_argument(std::string(rule.column) + ": row " + std::to_string(row) + " holds " +
@@ -155,8 +150,8 @@ std::int32_t number_of(py::handle item, std::size_t row, const LabelRule& rule,
   const auto name = item.cast<std::string>();
   if (const auto found = index.find(name); found != index.end()) return found->second;
   if (!rule.grow)
-    throw std::invalid_argument(std::string(rule.column) + ": row " + std::to_string(row) + " holds '" +
-                                name + "', expected one of: " + joined(names));
+    throw std::invalid_argument(std::string(rule.column) + ": row " + std::to_string(row) + " holds '" + name +
+                                "', expected one of: " + joined(names));
   names.push_back(name);
   return index[name] = static_cast<std::int32_t>(names.size()) - 1;
 }
@@ -165,23 +160,20 @@ std::int32_t number_of(py::handle item, std::size_t row, const LabelRule& rule,
 std::vector<std::int32_t> read_labels(const Labels& given, std::size_t rows, const LabelRule& rule,
                                       std::vector<std::string>& names) {
   py::object items = given;
-  const bool words = (py::isinstance<py::list>(given) || py::isinstance<py::tuple>(given)) &&
-                     py::len(given) > 0 &&
+  const bool words = (py::isinstance<py::list>(given) || py::isinstance<py::tuple>(given)) && py::len(given) > 0 &&
                      (py::isinstance<py::str>(given[py::int_(0)]) || given[py::int_(0)].is_none());
   std::vector<std::int32_t> out;
   if (!words) {
     const auto array = py::array::ensure(given);
     if (!array || array.ndim() != 1)
-      throw std::invalid_argument(std::string(rule.column) +
-                                  " must have shape (n,): one name or number for each row");
+      throw std::invalid_argument(std::string(rule.column) + " must have shape (n,): one name or number for each row");
     const char kind = array.dtype().kind();
     if (kind == 'i' || kind == 'u') {
       const auto numbers = array.cast<py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>>();
       out.reserve(static_cast<std::size_t>(numbers.size()));
       for (py::ssize_t i = 0; i < numbers.size(); ++i) {
         const std::int64_t number = numbers.data()[i];
-        if (number < std::numeric_limits<std::int32_t>::min() ||
-            number > std::numeric_limits<std::int32_t>::max())
+        if (number < std::numeric_limits<std::int32_t>::min() || number > std::numeric_limits<std::int32_t>::max())
           throw std::invalid_argument(std::string(rule.column) + ": row " + std::to_string(i) + " holds " +
                                       std::to_string(number) + ", beyond 32 bits");
         out.push_back(static_cast<std::int32_t>(number));
@@ -197,13 +189,13 @@ std::vector<std::int32_t> read_labels(const Labels& given, std::size_t rows, con
     for (const py::handle item : items) out.push_back(number_of(item, out.size(), rule, index, names));
   }
   if (out.size() != rows)
-    throw std::invalid_argument(std::string(rule.column) + " has " + std::to_string(out.size()) +
-                                " rows, joints has " + std::to_string(rows));
+    throw std::invalid_argument(std::string(rule.column) + " has " + std::to_string(out.size()) + " rows, joints has " +
+                                std::to_string(rows));
   return out;
 }
 
-void check_range(const std::vector<std::int32_t>& numbers, const char* column, std::int32_t lowest,
-                 std::size_t count, const char* hint) {
+void check_range(const std::vector<std::int32_t>& numbers, const char* column, std::int32_t lowest, std::size_t count,
+                 const char* hint) {
   for (std::size_t row = 0; row < numbers.size(); ++row)
     if (numbers[row] < lowest || numbers[row] >= static_cast<std::int32_t>(count))
       throw std::invalid_argument(std::string(column) + ": row " + std::to_string(row) + " holds " +
@@ -212,9 +204,8 @@ void check_range(const std::vector<std::int32_t>& numbers, const char* column, s
 
 Measurements make(const ArrayLike& joints, const std::optional<ArrayLike>& positions,
                   const std::optional<ArrayLike>& orientations, const std::optional<ArrayLike>& distances,
-                  const std::optional<Labels>& fixed_points,
-                  const std::vector<std::string>& fixed_point_names, const std::optional<Labels>& targets,
-                  std::optional<std::vector<std::string>> target_names,
+                  const std::optional<Labels>& fixed_points, const std::vector<std::string>& fixed_point_names,
+                  const std::optional<Labels>& targets, std::optional<std::vector<std::string>> target_names,
                   const std::optional<ArrayLike>& directions, const std::optional<ArrayLike>& joint_speeds,
                   const std::optional<ArrayLike>& payload, const std::optional<ArrayLike>& temperature,
                   const std::optional<ArrayLike>& time, const std::optional<Labels>& pose,
@@ -241,8 +232,8 @@ Measurements make(const ArrayLike& joints, const std::optional<ArrayLike>& posit
 
   if (fixed_points) {
     data.fixed_point_names = fixed_point_names;
-    data.fixed_point = read_labels(*fixed_points, data.rows,
-                                   {"fixed_points", fixed_point_names.empty(), true}, data.fixed_point_names);
+    data.fixed_point = read_labels(*fixed_points, data.rows, {"fixed_points", fixed_point_names.empty(), true},
+                                   data.fixed_point_names);
     check_range(data.fixed_point, "fixed_points", -1, data.fixed_point_names.size(),
                 "expected -1 (none) or an index into fixed_point_names");
   }
@@ -283,11 +274,11 @@ py::typing::Optional<T> optional_of(py::object object) {
 /// The column itself, read-only; it keeps `self` alive.
 py::array_t<double> view_of(const Column& column, const py::object& self) {
   const auto rows = static_cast<py::ssize_t>(self.cast<const Measurements&>().rows);
-  return read_only(py::array_t<double>({rows}, {column.stride * static_cast<py::ssize_t>(sizeof(double))},
-                                       column.data, self));
+  return read_only(
+      py::array_t<double>({rows}, {column.stride * static_cast<py::ssize_t>(sizeof(double))}, column.data, self));
 }
 
-auto column_getter(Column Measurements::*member) {
+auto column_getter(Column Measurements::* member) {
   return [member](const py::object& self) -> Block {
     const Column& column = self.cast<const Measurements&>().*member;
     return column ? optional_of<py::array_t<double>>(view_of(column, self))
@@ -305,14 +296,14 @@ py::object block_of(const Measurements& data, const Columns& columns) {
 }
 
 template <class Member>
-auto block_getter(Member Measurements::*member) {
+auto block_getter(Member Measurements::* member) {
   return [member](const Measurements& data) -> Block {
     return optional_of<py::array_t<double>>(block_of(data, data.*member));
   };
 }
 
 template <class Number>
-auto number_getter(std::vector<Number> Measurements::*member) {
+auto number_getter(std::vector<Number> Measurements::* member) {
   return [member](const py::object& self) -> py::typing::Optional<py::array_t<Number>> {
     const std::vector<Number>& numbers = self.cast<const Measurements&>().*member;
     if (numbers.empty()) return optional_of<py::array_t<Number>>(py::none());
@@ -323,8 +314,8 @@ auto number_getter(std::vector<Number> Measurements::*member) {
 }
 
 std::string repr(const Measurements& data) {
-  std::string out = "Measurements(" + std::to_string(data.rows) + " rows, " +
-                    std::to_string(data.joints.size()) + " joints";
+  std::string out =
+      "Measurements(" + std::to_string(data.rows) + " rows, " + std::to_string(data.joints.size()) + " joints";
   const auto count = [&](const char* what, auto has) {
     std::size_t n = 0;
     for (std::size_t row = 0; row < data.rows; ++row) n += has(row) ? 1U : 0U;
@@ -340,8 +331,8 @@ std::string repr(const Measurements& data) {
 }  // namespace
 
 void bind_measurements(py::module_& m) {
-  py::class_<Measurements> cls(
-      m, "Measurements", R"(One row per measurement: n rows of joint readings, and what was measured there.
+  py::class_<Measurements> cls(m, "Measurements",
+                               R"(One row per measurement: n rows of joint readings, and what was measured there.
 
 joints: shape=(n, driven joints) [rad | m], chain order.
 positions: shape=(n, 3) [m] of the target in the measurement frame; NaN rows: not measured.
@@ -360,22 +351,20 @@ Arrays of float64 are not copied, whatever their strides: do not change them whi
 of arrays holds columns (from Arrow or pandas); a list of lists of numbers holds rows.
 Raises InputError naming the column when shapes or types do not fit; `validate_measurements` checks the values.)");
   cls.def(py::init(&make), py::arg("joints"), py::kw_only(), py::arg("positions") = py::none(),
-          py::arg("orientations") = py::none(), py::arg("distances") = py::none(),
-          py::arg("fixed_points") = py::none(), py::arg("fixed_point_names") = std::vector<std::string>{},
-          py::arg("targets") = py::none(), py::arg("target_names") = py::none(),
-          py::arg("directions") = py::none(), py::arg("joint_speeds") = py::none(),
-          py::arg("payload") = py::none(), py::arg("temperature") = py::none(), py::arg("time") = py::none(),
-          py::arg("pose") = py::none(), py::arg("set") = py::none(), py::arg("position_sigma") = py::none(),
-          py::arg("rotation_sigma") = py::none(), py::arg("weight") = py::none(),
-          py::arg("covariates") = std::map<std::string, ArrayLike>{}, py::arg("robot") = py::none());
+          py::arg("orientations") = py::none(), py::arg("distances") = py::none(), py::arg("fixed_points") = py::none(),
+          py::arg("fixed_point_names") = std::vector<std::string>{}, py::arg("targets") = py::none(),
+          py::arg("target_names") = py::none(), py::arg("directions") = py::none(),
+          py::arg("joint_speeds") = py::none(), py::arg("payload") = py::none(), py::arg("temperature") = py::none(),
+          py::arg("time") = py::none(), py::arg("pose") = py::none(), py::arg("set") = py::none(),
+          py::arg("position_sigma") = py::none(), py::arg("rotation_sigma") = py::none(),
+          py::arg("weight") = py::none(), py::arg("covariates") = std::map<std::string, ArrayLike>{},
+          py::arg("robot") = py::none());
   cls.def_readonly("rows", &Measurements::rows, "Number of rows n.");
   cls.def("__len__", [](const Measurements& data) { return data.rows; });
   cls.def_property_readonly(
-      "joints",
-      [](const Measurements& data) { return block_of(data, data.joints).cast<py::array_t<double>>(); },
+      "joints", [](const Measurements& data) { return block_of(data, data.joints).cast<py::array_t<double>>(); },
       "shape=(n, driven joints) [rad | m], a copy.");
-  cls.def_property_readonly("positions", block_getter(&Measurements::position),
-                            "shape=(n, 3) [m], a copy, or None.");
+  cls.def_property_readonly("positions", block_getter(&Measurements::position), "shape=(n, 3) [m], a copy, or None.");
   cls.def_property_readonly("orientations", block_getter(&Measurements::orientation),
                             "shape=(n, 4) w x y z, a copy, or None.");
   cls.def_property_readonly("distances", column_getter(&Measurements::distance), "shape=(n,) [m], or None.");
@@ -391,15 +380,11 @@ Raises InputError naming the column when shapes or types do not fit; `validate_m
   cls.def_property_readonly("joint_speeds", block_getter(&Measurements::joint_speed),
                             "shape=(n, driven joints) [rad/s | m/s], a copy, or None.");
   cls.def_property_readonly("payload", column_getter(&Measurements::payload), "shape=(n,) [kg], or None.");
-  cls.def_property_readonly("temperature", column_getter(&Measurements::temperature),
-                            "shape=(n,) [deg C], or None.");
+  cls.def_property_readonly("temperature", column_getter(&Measurements::temperature), "shape=(n,) [deg C], or None.");
   cls.def_property_readonly("time", column_getter(&Measurements::time), "shape=(n,) [s], or None.");
-  cls.def_property_readonly("pose", number_getter(&Measurements::pose),
-                            "shape=(n,): number of the pose, or None.");
-  cls.def_property_readonly("set", number_getter(&Measurements::set),
-                            "shape=(n,): 0 train, 1 test; or None.");
-  cls.def_property_readonly("position_sigma", column_getter(&Measurements::position_sigma),
-                            "shape=(n,) [m], or None.");
+  cls.def_property_readonly("pose", number_getter(&Measurements::pose), "shape=(n,): number of the pose, or None.");
+  cls.def_property_readonly("set", number_getter(&Measurements::set), "shape=(n,): 0 train, 1 test; or None.");
+  cls.def_property_readonly("position_sigma", column_getter(&Measurements::position_sigma), "shape=(n,) [m], or None.");
   cls.def_property_readonly("rotation_sigma", column_getter(&Measurements::rotation_sigma),
                             "shape=(n,) [rad], or None.");
   cls.def_property_readonly("weight", column_getter(&Measurements::weight), "shape=(n,), or None.");
@@ -409,20 +394,17 @@ Raises InputError naming the column when shapes or types do not fit; `validate_m
         py::dict columns;
         for (const auto& [name, column] : self.cast<const Measurements&>().covariates)
           columns[py::str(name)] = view_of(column, self);
-        return py::reinterpret_steal<Mapping<std::string, py::array_t<double>>>(
-            mapping_proxy(columns).release());
+        return py::reinterpret_steal<Mapping<std::string, py::array_t<double>>>(mapping_proxy(columns).release());
       },
       "More columns by name, each of shape (n,).");
   cls.def("__repr__", [](const Measurements& data) { return repr(data); });
-  define_value(cls, {"joints", "positions", "orientations", "distances", "fixed_points", "fixed_point_names",
-                     "targets", "directions", "joint_speeds", "payload", "temperature", "time", "pose", "set",
-                     "position_sigma", "rotation_sigma", "weight", "covariates"});
+  define_value(cls, {"joints", "positions", "orientations", "distances", "fixed_points", "fixed_point_names", "targets",
+                     "directions", "joint_speeds", "payload", "temperature", "time", "pose", "set", "position_sigma",
+                     "rotation_sigma", "weight", "covariates"});
 
-  m.def(
-      "validate_measurements", py::overload_cast<const Measurements&, const Robot&, bool>(&validate),
-      py::arg("data"), py::arg("robot"), py::arg("joints_only") = false,
-      py::call_guard<py::gil_scoped_release>(),
-      R"(Raises InputError naming the row (counted from 0) and what is wrong with the measurements for this robot.
+  m.def("validate_measurements", py::overload_cast<const Measurements&, const Robot&, bool>(&validate), py::arg("data"),
+        py::arg("robot"), py::arg("joints_only") = false, py::call_guard<py::gil_scoped_release>(),
+        R"(Raises InputError naming the row (counted from 0) and what is wrong with the measurements for this robot.
 
 Checked are: counts that do not fit the robot, joints or inputs that are not finite, a row without any measurement (unless
 `joints_only`), half a position, a quaternion that is not of unit length, directions, sigmas.)");

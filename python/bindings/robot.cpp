@@ -28,8 +28,7 @@ Eigen::Isometry3d frame_from(const py::array_t<double, py::array::c_style | py::
       1e-12;  // [-] below this the matrix is taken as it is, so that frames survive a round trip
   if (matrix.ndim() != 2 || matrix.shape(0) != 4 || matrix.shape(1) != 4) {
     std::string shape;
-    for (py::ssize_t i = 0; i < matrix.ndim(); ++i)
-      shape += (i == 0 ? "" : ", ") + std::to_string(matrix.shape(i));
+    for (py::ssize_t i = 0; i < matrix.ndim(); ++i) shape += (i == 0 ? "" : ", ") + std::to_string(matrix.shape(i));
     throw std::invalid_argument("a frame is a 4x4 matrix; found an array of shape (" + shape + ")");
   }
   const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> given(matrix.data());
@@ -130,15 +129,15 @@ std::string repr(const Robot& r) {
 
 void bind_joint(py::module_& m) {
   const Joint usual;
-  py::class_<Joint> cls(
-      m, "Joint", R"(One joint and the link that belongs to it. Lengths in m, angles in rad, masses in kg.
+  py::class_<Joint> cls(m, "Joint",
+                        R"(One joint and the link that belongs to it. Lengths in m, angles in rad, masses in kg.
 
 A driven joint moves by `ratio * reading + offset`. A passive joint has no reading: it moves by the weighted sum of the
 corrected motions of the joints in `driven_by`, a mapping or pairs of name and weight (a palletizer's J4: {"J2": -1, "J3": -1}).)");
-  cls.def(py::init([](std::string name, JointType type, double theta, double d, double a, double alpha,
-                      double beta, const Eigen::Isometry3d& T_parent_joint, const Eigen::Vector3d& axis,
-                      double ratio, double offset, const Drives& driven_by, double lower, double upper,
-                      std::optional<double> mass, const Eigen::Vector3d& center_of_mass) {
+  cls.def(py::init([](std::string name, JointType type, double theta, double d, double a, double alpha, double beta,
+                      const Eigen::Isometry3d& T_parent_joint, const Eigen::Vector3d& axis, double ratio, double offset,
+                      const Drives& driven_by, double lower, double upper, std::optional<double> mass,
+                      const Eigen::Vector3d& center_of_mass) {
             return Joint{std::move(name),
                          type,
                          theta,
@@ -157,11 +156,10 @@ corrected motions of the joints in `driven_by`, a mapping or pairs of name and w
                          center_of_mass};
           }),
           py::arg("name"), py::kw_only(), py::arg("type") = usual.type, py::arg("theta") = usual.theta,
-          py::arg("d") = usual.d, py::arg("a") = usual.a, py::arg("alpha") = usual.alpha,
-          py::arg("beta") = usual.beta, py::arg("T_parent_joint") = usual.T_parent_joint,
-          py::arg("axis") = array_from(usual.axis), py::arg("ratio") = usual.ratio,
-          py::arg("offset") = usual.offset, py::arg("driven_by") = Drivers{}, py::arg("lower") = usual.lower,
-          py::arg("upper") = usual.upper, py::arg("mass") = usual.mass,
+          py::arg("d") = usual.d, py::arg("a") = usual.a, py::arg("alpha") = usual.alpha, py::arg("beta") = usual.beta,
+          py::arg("T_parent_joint") = usual.T_parent_joint, py::arg("axis") = array_from(usual.axis),
+          py::arg("ratio") = usual.ratio, py::arg("offset") = usual.offset, py::arg("driven_by") = Drivers{},
+          py::arg("lower") = usual.lower, py::arg("upper") = usual.upper, py::arg("mass") = usual.mass,
           py::arg("center_of_mass") = array_from(usual.center_of_mass));
   cls.def_readwrite("name", &Joint::name, "Name, unique within the robot.");
   cls.def_readwrite("type", &Joint::type, "'revolute' or 'prismatic'.");
@@ -169,14 +167,12 @@ corrected motions of the joints in `driven_by`, a mapping or pairs of name and w
   cls.def_readwrite("d", &Joint::d, "[m] the motion of a prismatic joint adds to it.");
   cls.def_readwrite("a", &Joint::a, "[m] link length.");
   cls.def_readwrite("alpha", &Joint::alpha, "[rad] link twist.");
-  cls.def_readwrite("beta", &Joint::beta,
-                    "[rad] Hayati's twist about y, for near-parallel neighbouring axes.");
+  cls.def_readwrite("beta", &Joint::beta, "[rad] Hayati's twist about y, for near-parallel neighbouring axes.");
   cls.def_readwrite("T_parent_joint", &Joint::T_parent_joint,
                     "shape=(4, 4) [m]: joint in its parent; convention 'urdf' only. Setting it to what is "
                     "not rigid raises InputError.");
   cls.def_property(
-      "axis", [](const Joint& j) { return array_from(j.axis); },
-      [](Joint& j, const Eigen::Vector3d& v) { j.axis = v; },
+      "axis", [](const Joint& j) { return array_from(j.axis); }, [](Joint& j, const Eigen::Vector3d& v) { j.axis = v; },
       "shape=(3,) unit vector; convention 'urdf' only.");
   cls.def_readwrite("ratio", &Joint::ratio, "[-] gear-ratio correction.");
   cls.def_readwrite("offset", &Joint::offset, "[rad | m] joint zero.");
@@ -189,12 +185,11 @@ corrected motions of the joints in `driven_by`, a mapping or pairs of name and w
   cls.def_readwrite("mass", &Joint::mass, "[kg] of the link that this joint moves; None: not known.");
   cls.def_property(
       "center_of_mass", [](const Joint& j) { return array_from(j.center_of_mass); },
-      [](Joint& j, const Eigen::Vector3d& v) { j.center_of_mass = v; },
-      "shape=(3,) [m] in the frame after the link.");
+      [](Joint& j, const Eigen::Vector3d& v) { j.center_of_mass = v; }, "shape=(3,) [m] in the frame after the link.");
   cls.def_property_readonly("passive", &Joint::passive, "Whether other joints drive it.");
   cls.def("__repr__", [](const Joint& j) { return repr(j); });
-  define_value(cls, {"name", "type", "theta", "d", "a", "alpha", "beta", "T_parent_joint", "axis", "ratio",
-                     "offset", "driven_by", "lower", "upper", "mass", "center_of_mass"});
+  define_value(cls, {"name", "type", "theta", "d", "a", "alpha", "beta", "T_parent_joint", "axis", "ratio", "offset",
+                     "driven_by", "lower", "upper", "mass", "center_of_mass"});
 }
 
 void bind_parts(py::module_& m) {
@@ -216,9 +211,7 @@ void bind_parts(py::module_& m) {
   py::class_<Anchor> anchor(m, "Anchor", R"(The far end of a draw-wire or ballbar: reading = distance + zero.
 
 It does not change: set `robot.anchor = robot.anchor.replace(zero=0.01)`.)");
-  anchor.def(py::init([](const Eigen::Vector3d& point, double zero) {
-               return Anchor{point, zero};
-             }),
+  anchor.def(py::init([](const Eigen::Vector3d& point, double zero) { return Anchor{point, zero}; }),
              py::arg("point") = array_from(Anchor{}.point), py::arg("zero") = Anchor{}.zero);
   anchor.def_property_readonly(
       "point", [](const Anchor& a) { return array_from(a.point); }, "shape=(3,) [m] in the measurement frame.");
@@ -233,11 +226,11 @@ It does not change: set `robot.anchor = robot.anchor.replace(zero=0.01)`.)");
                                     R"(An effect with its fitted parameters, as `identify` found them.
 
 It does not change; make another one.)");
-  applied.def(py::init([](std::string effect, std::vector<std::string> joints,
-                          std::map<std::string, double> parameters) {
-                return AppliedEffect{std::move(effect), std::move(joints), std::move(parameters)};
-              }),
-              py::arg("effect"), py::arg("joints"), py::arg("parameters"));
+  applied.def(
+      py::init([](std::string effect, std::vector<std::string> joints, std::map<std::string, double> parameters) {
+        return AppliedEffect{std::move(effect), std::move(joints), std::move(parameters)};
+      }),
+      py::arg("effect"), py::arg("joints"), py::arg("parameters"));
   applied.def_readonly("effect", &AppliedEffect::effect, "Name, as in `catalogue()`.");
   applied.def_property_readonly(
       "joints", [](const AppliedEffect& e) { return tuple_of(e.joints); }, "Names of the joints it acts on.");
@@ -267,18 +260,16 @@ void bind_robot(py::module_& m) {
   bind_parts(m);
 
   const Robot usual;
-  py::class_<Robot> cls(
-      m, "Robot", R"(A robot model, nominal or calibrated. `truing.validate` says whether it can be used.
+  py::class_<Robot> cls(m, "Robot",
+                        R"(A robot model, nominal or calibrated. `truing.validate` says whether it can be used.
 
 `robot.joints[1].a = 0.3` and `robot.joint("J2").a = 0.3` change the robot. The number of joints and targets is fixed:
 `robot.replace(joints=...)` makes another robot.)");
-  cls.def(py::init([](std::string name, std::vector<Joint> joints, std::vector<Target> targets,
-                      Convention convention, const Eigen::Vector3d& gravity,
-                      const Eigen::Isometry3d& T_measurement_base, std::vector<AppliedEffect> effects,
-                      std::optional<Anchor> anchor) {
-            return Robot{
-                std::move(name),    convention,         gravity, T_measurement_base, std::move(joints),
-                std::move(targets), std::move(effects), anchor};
+  cls.def(py::init([](std::string name, std::vector<Joint> joints, std::vector<Target> targets, Convention convention,
+                      const Eigen::Vector3d& gravity, const Eigen::Isometry3d& T_measurement_base,
+                      std::vector<AppliedEffect> effects, std::optional<Anchor> anchor) {
+            return Robot{std::move(name),    convention,         gravity, T_measurement_base, std::move(joints),
+                         std::move(targets), std::move(effects), anchor};
           }),
           py::arg("name"), py::kw_only(), py::arg("joints"),
           py::arg_v("targets", std::vector<Target>{Target{"tool"}}, "[Target('tool')]"),
@@ -300,8 +291,7 @@ motion about or along `axis`.)");
       "joints", [](const py::object& self) { return tuple_of_references(self.cast<Robot&>().joints, self); },
       "The joints in chain order; what is set on them changes the robot.");
   cls.def_property_readonly(
-      "targets",
-      [](const py::object& self) { return tuple_of_references(self.cast<Robot&>().targets, self); },
+      "targets", [](const py::object& self) { return tuple_of_references(self.cast<Robot&>().targets, self); },
       "The targets, the tool first; what is set on them changes the robot.");
   cls.def_property(
       "effects", [](const Robot& r) { return tuple_of(r.effects); },
@@ -323,8 +313,7 @@ motion about or along `axis`.)");
       "The joint of that name; what is set on it changes the robot. Raises InputError that lists the joints "
       "there are.");
   cls.def("__repr__", [](const Robot& r) { return repr(r); });
-  define_value(
-      cls, {"name", "joints", "targets", "convention", "gravity", "T_measurement_base", "effects", "anchor"});
+  define_value(cls, {"name", "joints", "targets", "convention", "gravity", "T_measurement_base", "effects", "anchor"});
 
   m.def("validate_robot", py::overload_cast<const Robot&>(&validate), py::arg("robot"),
         R"(Raises InputError when the robot cannot be used.
@@ -340,13 +329,11 @@ Returns shape=(joints + 1, 4, 4) [m]: the frame after every joint, then the targ
         R"(Rotation of roll, pitch and yaw as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll).
 
 rpy: shape=(3,) [rad]. Returns shape=(3, 3).)");
-  m.def(
-      "rpy_from_rotation", &rpy_from_rotation, py::arg("rotation"),
-      R"(Roll, pitch and yaw of a rotation: shape=(3, 3) to shape=(3,) [rad]. At pitch = +-pi/2 roll is 0.)");
+  m.def("rpy_from_rotation", &rpy_from_rotation, py::arg("rotation"),
+        R"(Roll, pitch and yaw of a rotation: shape=(3, 3) to shape=(3,) [rad]. At pitch = +-pi/2 roll is 0.)");
   m.def("frame_from_xyz_rpy", &frame_from_xyz_rpy, py::arg("xyz"), py::arg("rpy"),
         "Frame, shape=(4, 4), of a position, shape=(3,) [m], and roll, pitch, yaw, shape=(3,) [rad].");
-  m.def("robot_from_urdf", &robot_from_urdf, py::arg("urdf_text"), py::arg("base_link") = "",
-        py::arg("tip_link") = "",
+  m.def("robot_from_urdf", &robot_from_urdf, py::arg("urdf_text"), py::arg("base_link") = "", py::arg("tip_link") = "",
         R"(The chain from `base_link` to `tip_link` of a URDF text, as a robot of convention 'urdf'.
 
 Fixed joints are folded into the next moving joint, the last ones into the tool; link masses are merged the same way;

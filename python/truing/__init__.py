@@ -154,11 +154,32 @@ from truing.files import (
     save_measurements,
     save_robot,
 )
-from truing.files.stream_file import ImuData, JointData, PoseData, SetupData, ToolPoses, TrackerData, load_imu, load_joints, load_plan, load_setup, load_tool_poses, load_tracker, save_setup
+from truing.files.stream_file import (
+    ImuData,
+    JointData,
+    PoseData,
+    SetupData,
+    ToolPoses,
+    TrackerData,
+    load_imu,
+    load_joints,
+    load_plan,
+    load_setup,
+    load_tool_poses,
+    load_tracker,
+    save_setup,
+)
 from truing.hand_eye import handeye, handeye_clock, handeye_options, handeye_plan, handeye_with_kinematics
 from truing.inverse_kinematics import compensate, inverse, inverse_path
 from truing.simulation import simulate
-from truing.track import TrackCalibration, actuator_lag, check_streams, recorded_streams, simulate_streams, track_calibrate
+from truing.track import (
+    TrackCalibration,
+    actuator_lag,
+    check_streams,
+    recorded_streams,
+    simulate_streams,
+    track_calibrate,
+)
 
 __version__ = version()
 validate = validate_robot

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The six verbs: identify, diagnose, predict, residuals, plan, distinguish. Each hands its keywords to the C++ core."""
+"""The six verbs: identify, diagnose, predict, residuals, plan, distinguish. Each hands its keywords to the
+C++ core.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truing import _core
-from truing._core import Diagnosis, Distinction, Identification, Measurements, PlanResult, Prediction, Residuals, Robot
+from truing._core import (
+    Diagnosis,
+    Distinction,
+    Identification,
+    Measurements,
+    PlanResult,
+    Prediction,
+    Residuals,
+    Robot,
+)
 from truing.effects import Effect, Effects, evaluated, split_effects
 from truing.errors import InputError, NotConvergedError
 
@@ -47,25 +58,30 @@ def identify(
 ) -> Identification:
     """Find the robot's parameters from measurements.
 
-    Base, targets (anchor, fixed points) are found first; what the data cannot see is frozen at nominal and named in the
+    Base, targets (anchor, fixed points) are found first; what the data cannot see is frozen at nominal and
+    named in the
     result; then the fit runs on the training rows.
 
     robot: nominal. data: measurements, see `Measurements`.
     free: names and globs, "J2.*,*.ratio" or a list; empty: every geometric value, base and targets.
     hold: names and globs that stay at nominal whatever else is asked for, "base.*" for a frame that is known.
-    effects: effects to fit as well: "backlash,harmonic:J2+J3", or a list of such words, `EffectRequest` and `Effect`.
+    effects: effects to fit as well: "backlash,harmonic:J2+J3", or a list of such words, `EffectRequest` and
+    `Effect`.
     solver: "lm" (Levenberg-Marquardt) or "ceres" (takes bounds).
     loss: "reject" finds gross outliers, lists them and fits without; or "none", "huber", "cauchy", "tukey".
-    frame_by: the measurement frame as six "parameters", or registered after every step ("svd"; positions only).
+    frame_by: the measurement frame as six "parameters", or registered after every step ("svd"; positions
+    only).
     rotation_length: [m] a rotation error of 1 rad counts as this length, where rows give no sigma.
     test_share: of the pose groups, held out when the data has no `set`. seed: of that split.
-    max_iterations, initial_damping, rms_fall [m], gradient, undamped: of the iteration, see `IdentifyOptions`.
+    max_iterations, initial_damping, rms_fall [m], gradient, undamped: of the iteration, see
+    `IdentifyOptions`.
     rank_tolerance: a unit column that the others explain but for this share is not observable.
     hayati_angle: [rad] neighbouring axes nearer to parallel get beta.
     reject_beyond: loss "reject": rows whose residual is longer than this many medians.
     bounds: {parameter: (lowest, highest)}, solver "ceres" only. threads: 0: as many as the machine has.
 
-    Raises InputError on data or options that cannot be used, and NotConvergedError (it carries the result), unless
+    Raises InputError on data or options that cannot be used, and NotConvergedError (it carries the result),
+    unless
     `raise_if_not_converged` is False.
     """
     asked, own = split_effects(effects)
@@ -113,20 +129,26 @@ def diagnose(
 ) -> Diagnosis:
     """Find where the gap between robot and model lies, which effect causes it, and how far it shrinks.
 
-    Base and targets are fitted first. Then every effect of the catalogue at every joint, the geometry, and free functions of the
-    recorded inputs compete; what is named is fitted without linearisation and judged on rows that were held out. What cannot be
-    told apart is listed together, what could not be tested is listed with the reason, and what no effect explains is called
+    Base and targets are fitted first. Then every effect of the catalogue at every joint, the geometry, and
+    free functions of the
+    recorded inputs compete; what is named is fitted without linearisation and judged on rows that were held
+    out. What cannot be
+    told apart is listed together, what could not be tested is listed with the reason, and what no effect
+    explains is called
     unknown.
 
     robot: nominal, or calibrated. data: measurements, see `Measurements`.
     effects: definitions of own effects that take part beside the catalogue's.
     leave_out: effects that are not to be considered, "drift,scale" or a list.
-    false_alarm: chance that a robot without any gap is said to have one. max_effects: at most so many are named.
+    false_alarm: chance that a robot without any gap is said to have one. max_effects: at most so many are
+    named.
     test_share: of the pose groups, held out when the data has no `set`.
     search_poses: of more pose groups, so many are searched; errors are those of all rows.
-    resamples: draws of folds of pose groups for the intervals, with what was chosen fitted again; at most 10 more repeat the selection.
+    resamples: draws of folds of pose groups for the intervals, with what was chosen fitted again; at most 10
+    more repeat the selection.
     rotation_length: [m] a rotation error of 1 rad counts as this length in reported errors.
-    seed: of the split and of every simulation; the same seed gives the same result. threads: 0: as many as the machine has.
+    seed: of the split and of every simulation; the same seed gives the same result. threads: 0: as many as
+    the machine has.
 
     Raises InputError on data or options that cannot be used.
     """
@@ -144,7 +166,9 @@ def diagnose(
     return _core.diagnose(robot, data, options, evaluated(_own(effects), robot, data))
 
 
-def predict(robot: Robot, data: Measurements, *, effects: Effect | Iterable[Effect] = (), threads: int = 0) -> Prediction:
+def predict(
+    robot: Robot, data: Measurements, *, effects: Effect | Iterable[Effect] = (), threads: int = 0
+) -> Prediction:
     """What the robot, with its fitted effects, predicts for the rows of `data`.
 
     effects: definitions of one's own effects that the robot carries; those of the catalogue are known.
@@ -153,7 +177,9 @@ def predict(robot: Robot, data: Measurements, *, effects: Effect | Iterable[Effe
     return _core.predict(robot, data, evaluated(_own(effects), robot, data), threads)
 
 
-def residuals(robot: Robot, data: Measurements, *, effects: Effect | Iterable[Effect] = (), threads: int = 0) -> Residuals:
+def residuals(
+    robot: Robot, data: Measurements, *, effects: Effect | Iterable[Effect] = (), threads: int = 0
+) -> Residuals:
     """Predicted minus measured, NaN where not measured.
 
     Rows of a fixed point are compared with the mean of that point's predictions. effects: as in `predict`.
@@ -168,7 +194,9 @@ def plan(
     poses: int = 50,
     min_step: float = 0.2617993877991494,
     min_step_prismatic: float = 0.0,
-    index: Literal["d_optimal", "a_optimal", "e_optimal", "inverse_condition", "noise_amplification"] = "d_optimal",
+    index: Literal[
+        "d_optimal", "a_optimal", "e_optimal", "inverse_condition", "noise_amplification"
+    ] = "d_optimal",
     orientation: bool = False,
     position_sigma: float = 3e-5,
     rotation_sigma: float = 1e-4,
@@ -181,7 +209,8 @@ def plan(
     """Measurement poses by exchange on an observability index.
 
     poses: how many. min_step: [rad], min_step_prismatic: [m]: joints move by more between neighbours.
-    index: what the plan makes large, see `PlanOptions`. orientation: full poses are measured, not only positions.
+    index: what the plan makes large, see `PlanOptions`. orientation: full poses are measured, not only
+    positions.
     position_sigma: [m], rotation_sigma: [rad] of one component, for the standard errors promised.
     sweeps, proposals, seed: of the exchange. free, effects: as in `identify`; effects of the catalogue only.
 
@@ -189,8 +218,10 @@ def plan(
     """
     asked, own = split_effects(effects)
     if own:
-        raise InputError(f"plan cannot use own effects ({', '.join(effect.name for effect in own)}): their basis is known only "
-                         "for rows that were recorded; plan with effects of the catalogue")  # fmt: skip
+        raise InputError(
+            f"plan cannot use own effects ({', '.join(effect.name for effect in own)}): their basis is known"
+            " only for rows that were recorded; plan with effects of the catalogue"
+        )
     options = _core.PlanOptions(
         poses=poses,
         min_step=min_step,
@@ -228,25 +259,33 @@ def distinguish(
     min_step_prismatic: float = _USUAL_DISTINCTION.min_step_prismatic,
     seed: int = _USUAL_DISTINCTION.seed,
 ) -> Distinction:
-    """Before any data: which effects a plan can tell apart, how small it would still see them, and the poses to add.
+    """Before any data: which effects a plan can tell apart, how small it would still see them, and the poses
+    to add.
 
         planned = truing.plan(robot, poses=60)
-        seen = truing.distinguish(robot, planned.joints, columns="dir,payload", separate="backlash,joint_offset")
+        seen = truing.distinguish(robot, planned.joints, columns="dir,payload",
+        separate="backlash,joint_offset")
 
     robot: nominal. joints: shape=(poses, driven joints) [rad | m], as of `plan`.
     columns: what will be recorded and varied, of "dir" (approached from both sides), "payload", "temp", "t".
-    separate: effects to be told apart, "backlash,joint_offset:J2" or a list; a single one from everything else. Poses are added if it takes
+    separate: effects to be told apart, "backlash,joint_offset:J2" or a list; a single one from everything
+    else. Poses are added if it takes
     any, `add` at most, each chosen from `proposals`. Empty: the whole catalogue is looked at.
-    payload: [kg] a pose is measured with this or with nothing. temperature_low, temperature_high: [deg C] the plan warms up, and cools down.
-    seconds_per_pose: [s]. orientation, position_sigma, rotation_sigma, min_step, min_step_prismatic: as in `plan`.
-    alike: an effect of which another explains a larger share is not told from it. seed: of directions, payloads and proposals.
+    payload: [kg] a pose is measured with this or with nothing. temperature_low, temperature_high: [deg C] the
+    plan warms up, and cools down.
+    seconds_per_pose: [s]. orientation, position_sigma, rotation_sigma, min_step, min_step_prismatic: as in
+    `plan`.
+    alike: an effect of which another explains a larger share is not told from it. seed: of directions,
+    payloads and proposals.
 
     Raises InputError: unknown effects, joints or columns.
     """
     asked, own = split_effects(separate)
     if own:
-        raise InputError(f"distinguish cannot use own effects ({', '.join(effect.name for effect in own)}): their basis is known only "
-                         "for rows that were recorded; name effects of the catalogue")  # fmt: skip
+        raise InputError(
+            f"distinguish cannot use own effects ({', '.join(effect.name for effect in own)}): their basis is"
+            " known only for rows that were recorded; name effects of the catalogue"
+        )
     options = _core.DistinguishOptions(
         columns=_names(columns),
         separate=[item for item in asked if not isinstance(item, Effect)],
@@ -280,6 +319,8 @@ def _own(effects: Effect | Iterable[Effect]) -> list[Effect]:
     own = [effects] if isinstance(effects, Effect) else list(effects)
     for effect in own:
         if not isinstance(effect, Effect):
-            raise InputError(f"effects holds {effect!r}: only definitions of own effects are needed here; effects of the catalogue "
-                             "are known")  # fmt: skip
+            raise InputError(
+                f"effects holds {effect!r}: only definitions of own effects are needed here; effects of the"
+                " catalogue are known"
+            )
     return own

@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calibration boards: what they are called, where their points are, and how they are found in images (by OpenCV, which is imported only then).
+"""Calibration boards: what they are called, where their points are, and how they are found in images (by
+OpenCV, which is imported only then).
 
     board = truing.parse_board("chessboard:9x6:25mm")
     views = truing.find_board(["0.png", "1.png", ...], board)
 
-A board's frame has its origin at the first point, x along a row, y along a column and z into the board, away from the camera. Pixels count from the
+A board's frame has its origin at the first point, x along a row, y along a column and z into the board, away
+from the camera. Pixels count from the
 centre of the top left pixel.
 """
 
@@ -29,8 +31,10 @@ Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
 Kind = Literal["chessboard", "charuco", "circles", "acircles"]
 
-_EXPECTED = ("chessboard:9x6:25mm (inner corners, square), charuco:5x7:40mm:30mm (squares, square, marker), circles:10x10:25.4mm (dots, distance) "
-             "or acircles:4x11:20mm (dots in a row, rows, distance of rows)")  # fmt: skip
+_EXPECTED = (
+    "chessboard:9x6:25mm (inner corners, square), charuco:5x7:40mm:30mm (squares, square, marker),"
+    " circles:10x10:25.4mm (dots, distance) or acircles:4x11:20mm (dots in a row, rows, distance of rows)"
+)
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _FEWEST_VIEWS = 3
 _FEWEST_POINTS = 6  # of a ChArUco board: fewer do not fix its pose well
@@ -53,8 +57,10 @@ _OTHER_DICTIONARIES = ("ARUCO_ORIGINAL", "APRILTAG_36h11", "APRILTAG_25h9", "APR
 class Board:
     """A flat calibration board. Lengths in m.
 
-    chessboard: `columns` x `rows` inner corners, `size` of a square. charuco: `columns` x `rows` squares, `size` of a square, `marker` of a marker.
-    circles: `columns` x `rows` dots, `size` from dot to dot. acircles: `columns` dots in a row, `rows` rows (an odd number), each shifted by half; `size` from row to
+    chessboard: `columns` x `rows` inner corners, `size` of a square. charuco: `columns` x `rows` squares,
+    `size` of a square, `marker` of a marker.
+    circles: `columns` x `rows` dots, `size` from dot to dot. acircles: `columns` dots in a row, `rows` rows
+    (an odd number), each shifted by half; `size` from row to
     row (half the distance of dots in a row).
     """
 
@@ -64,7 +70,9 @@ class Board:
     size: float
     marker: float = 0.0
     dictionary: str = ""  # of a charuco board; empty: found from the images
-    legacy: bool | None = None  # of a charuco board: pattern of OpenCV before 4.6; None: found from the images
+    legacy: bool | None = (
+        None  # of a charuco board: pattern of OpenCV before 4.6; None: found from the images
+    )
 
     def __str__(self) -> str:
         text = f"{self.kind}:{self.columns}x{self.rows}:{_length(self.size)}"
@@ -76,7 +84,13 @@ class Board:
     def points(self) -> Floats:
         """All points, row by row, shape=(n, 3) [m] in the board's frame."""
         if self.kind == "acircles":
-            return np.array([[(2 * j + i % 2) * self.size, i * self.size, 0.0] for i in range(self.rows) for j in range(self.columns)])
+            return np.array(
+                [
+                    [(2 * j + i % 2) * self.size, i * self.size, 0.0]
+                    for i in range(self.rows)
+                    for j in range(self.columns)
+                ]
+            )
         less = 1 if self.kind == "charuco" else 0
         first = 1 if self.kind == "charuco" else 0  # a ChArUco board counts from its outer edge
         x, y = np.meshgrid(np.arange(self.columns - less) + first, np.arange(self.rows - less) + first)
@@ -120,7 +134,8 @@ class BoardViews:
 
 
 def parse_board(text: str) -> Board:
-    """A board by its name: chessboard:9x6:25mm (inner corners), charuco:5x7:40mm:30mm[:DICTIONARY] (squares), circles:10x10:25.4mm, acircles:4x11:20mm.
+    """A board by its name: chessboard:9x6:25mm (inner corners), charuco:5x7:40mm:30mm[:DICTIONARY] (squares),
+    circles:10x10:25.4mm, acircles:4x11:20mm.
 
     Raises InputError that says what was expected.
     """
@@ -140,7 +155,10 @@ def parse_board(text: str) -> Board:
     columns, rows = int(counts[1]), int(counts[2])
     least = 2 if kind == "circles" else 3 if kind != "acircles" else 2
     if min(columns, rows) < least or columns * rows > 20_000:
-        raise refuse(f"a board of {columns} x {rows} {'squares' if kind == 'charuco' else 'points'} {'is too small' if min(columns, rows) < least else 'is too large'}")
+        raise refuse(
+            f"a board of {columns} x {rows} {'squares' if kind == 'charuco' else 'points'}"
+            f" {'is too small' if min(columns, rows) < least else 'is too large'}"
+        )
     sizes = []
     for part in parts[1 : 1 + lengths]:
         match = re.fullmatch(r"([0-9]+\.?[0-9]*|\.[0-9]+)\s*([a-z]*)", part)
@@ -159,7 +177,10 @@ def parse_board(text: str) -> Board:
     if rest:
         raise refuse(f"{':'.join(rest)!r} is too much")
     if kind == "acircles" and rows % 2 == 0:
-        raise refuse(f"of a shifted grid with {rows} rows, an even number, OpenCV finds no order; use an odd number of rows")
+        raise refuse(
+            f"of a shifted grid with {rows} rows, an even number, OpenCV finds no order; use an odd number of"
+            " rows"
+        )
     if kind == "charuco" and sizes[1] >= sizes[0]:
         raise refuse("the marker is not smaller than its square")
     return Board(kind, columns, rows, sizes[0], sizes[1] if kind == "charuco" else 0.0, dictionary)  # type: ignore[arg-type]
@@ -178,16 +199,32 @@ def plausible_camera(camera: Camera) -> tuple[str, str] | None:
     for name in ("fx", "fy"):
         value = getattr(camera, name)
         if not (value > 0 and camera.width / 100 < value < camera.width * _LARGEST_RATIO):
-            return name, f"found {value:g}, expected a focal length in pixels, of about the image's width ({camera.width})"
+            return (
+                name,
+                (
+                    f"found {value:g}, expected a focal length in pixels, of about the image's width"
+                    f" ({camera.width})"
+                ),
+            )
     if not 0.5 < camera.fx / camera.fy < 2:
-        return "fy", f"found {camera.fy:g} beside fx {camera.fx:g}, expected nearly equal focal lengths in pixels"
+        return (
+            "fy",
+            f"found {camera.fy:g} beside fx {camera.fx:g}, expected nearly equal focal lengths in pixels",
+        )
     for name, size, what in (("cx", camera.width, "width"), ("cy", camera.height, "height")):
         if not 0 < getattr(camera, name) < size:
-            return name, f"found {getattr(camera, name):g}, outside the image's {what} of {size} pixels: are these the values of images of another size?"
+            return (
+                name,
+                (
+                    f"found {getattr(camera, name):g}, outside the image's {what} of {size} pixels: are these"
+                    " the values of images of another size?"
+                ),
+            )
     return None
 
 
-# ---- Finding ---------------------------------------------------------------------------------------------------------
+# ---- Finding
+# ---------------------------------------------------------------------------------------------------------
 
 
 def _opencv() -> Any:
@@ -196,7 +233,10 @@ def _opencv() -> Any:
     except ImportError as error:
         missing = error.name == "cv2"
         why = "which is not installed" if missing else f"which cannot be imported ({error})"
-        raise InputError(f'finding a board in images needs OpenCV, {why}: pip install "truing[images]" (or opencv-python-headless)') from None
+        raise InputError(
+            f'finding a board in images needs OpenCV, {why}: pip install "truing[images]" (or'
+            " opencv-python-headless)"
+        ) from None
     return cv2
 
 
@@ -211,15 +251,24 @@ def find_board(
 ) -> BoardViews:
     """Find a board in images: its points to a fraction of a pixel, and its pose in each.
 
-    images: files, or arrays of grey values (or BGR), shape=(height, width). camera: its values; None: they are found from these images.
-    names: what messages call the images. where: what messages call the camera's file. progress: called with images done, and images in all.
+    images: files, or arrays of grey values (or BGR), shape=(height, width). camera: its values; None: they
+    are found from these images.
+    names: what messages call the images. where: what messages call the camera's file. progress: called with
+    images done, and images in all.
 
-    Images without the board are listed in the result. Raises InputError when fewer than three show it (and says which board they do show),
+    Images without the board are listed in the result. Raises InputError when fewer than three show it (and
+    says which board they do show),
     when images differ in size, when the camera is not theirs, or OpenCV is not there.
     """
     cv = _opencv()
     board = parse_board(board) if isinstance(board, str) else board
-    called = [str(name) for name in names] if names is not None else [str(image) if isinstance(image, (str, Path)) else f"image {k}" for k, image in enumerate(images)]
+    called = (
+        [str(name) for name in names]
+        if names is not None
+        else [
+            str(image) if isinstance(image, (str, Path)) else f"image {k}" for k, image in enumerate(images)
+        ]
+    )
     total = len(images)
     size: tuple[int, int] | None = None
     finder: _Finder | None = None if board.kind == "charuco" else _Finder(cv, board)
@@ -234,7 +283,10 @@ def find_board(
             size = shape
             _check_size(camera, size, called[number], where)
         elif size != shape:
-            raise InputError(f"{called[number]}: has {shape[0]} x {shape[1]} pixels, but {called[0]} has {size[0]} x {size[1]}: expected images of one camera, all of one size")
+            raise InputError(
+                f"{called[number]}: has {shape[0]} x {shape[1]} pixels, but {called[0]} has {size[0]} x"
+                f" {size[1]}: expected images of one camera, all of one size"
+            )
         if finder is None:
             finder = _charuco_finder(cv, board, grey)
             if finder is None:
@@ -260,7 +312,10 @@ def find_board(
     points, pixels = [seen[number][0] for number in found], [seen[number][1] for number in found]
     larger = _larger_board(cv, [images[number] for number in found[:2]], board)
     if larger is not None:
-        raise InputError(f"the board in the images is larger than {board}: {larger} is found as well, and of {board} nobody knows which part; say --board {larger}")
+        raise InputError(
+            f"the board in the images is larger than {board}: {larger} is found as well, and of {board}"
+            f" nobody knows which part; say --board {larger}"
+        )
     return _with_poses(cv, board, images, called, found, missing, points, pixels, size, camera, where)
 
 
@@ -278,7 +333,10 @@ def _grey(cv: Any, image: Path | str | Image, name: str) -> Image:
         if grey.ndim == 3:
             grey = cv.cvtColor(grey, cv.COLOR_BGR2GRAY)
         if grey.dtype != np.uint8 or grey.ndim != 2:
-            raise InputError(f"{name}: found an array of {grey.dtype}, shape {grey.shape}, expected grey values of 8 bits, shape (height, width)")
+            raise InputError(
+                f"{name}: found an array of {grey.dtype}, shape {grey.shape}, expected grey values of 8 bits,"
+                " shape (height, width)"
+            )
     if min(grey.shape) < 32:
         raise InputError(f"{name}: has {grey.shape[1]} x {grey.shape[0]} pixels only")
     return np.ascontiguousarray(grey)
@@ -289,13 +347,21 @@ def _check_size(camera: Camera | None, size: tuple[int, int], name: str, where: 
         return
     whose = where or "the camera"
     ratio = size[0] / camera.width
-    hint = f" If the images were only scaled: fx, fy, cx and cy are those of {whose} times {ratio:.6g}." if abs(size[1] / camera.height - ratio) < 1e-3 else ""
-    raise InputError(f"{name}: has {size[0]} x {size[1]} pixels, but the values of {whose} are for {camera.width} x {camera.height}.{hint} "
-                     "Leave the camera out, and its values are found from the images")  # fmt: skip
+    hint = (
+        f" If the images were only scaled: fx, fy, cx and cy are those of {whose} times {ratio:.6g}."
+        if abs(size[1] / camera.height - ratio) < 1e-3
+        else ""
+    )
+    raise InputError(
+        f"{name}: has {size[0]} x {size[1]} pixels, but the values of {whose} are for {camera.width} x"
+        f" {camera.height}.{hint} Leave the camera out, and its values are found from the images"
+    )
 
 
 class _Finder:
-    """Finds one board, image by image: its points, shape=(m, 3) [m], and where they are seen, shape=(m, 2) [px]."""
+    """Finds one board, image by image: its points, shape=(m, 3) [m], and where they are seen, shape=(m, 2)
+    [px].
+    """
 
     def __init__(self, cv: Any, board: Board, *, quick: bool = False) -> None:
         self.cv = cv
@@ -324,17 +390,35 @@ class _Finder:
                 return self._in_order(grey, np.asarray(corners, dtype=np.float64).reshape(-1, 2))
         if self._quick:
             return None
-        found, corners = cv.findChessboardCorners(grey, shape, flags=cv.CALIB_CB_ADAPTIVE_THRESH | cv.CALIB_CB_NORMALIZE_IMAGE | cv.CALIB_CB_FAST_CHECK)
+        found, corners = cv.findChessboardCorners(
+            grey,
+            shape,
+            flags=cv.CALIB_CB_ADAPTIVE_THRESH | cv.CALIB_CB_NORMALIZE_IMAGE | cv.CALIB_CB_FAST_CHECK,
+        )
         if not found:
             return None
         corners = np.asarray(corners, dtype=np.float32).reshape(-1, 1, 2)
-        step = float(np.median(np.linalg.norm(np.diff(corners.reshape(self.board.rows, self.board.columns, 2), axis=1), axis=2)))
+        step = float(
+            np.median(
+                np.linalg.norm(
+                    np.diff(corners.reshape(self.board.rows, self.board.columns, 2), axis=1), axis=2
+                )
+            )
+        )
         half = max(2, min(11, int(step / 3)))
-        corners = cv.cornerSubPix(grey, corners, (half, half), (-1, -1), (cv.TERM_CRITERIA_EPS | cv.TERM_CRITERIA_MAX_ITER, 50, 1e-3))
+        corners = cv.cornerSubPix(
+            grey,
+            corners,
+            (half, half),
+            (-1, -1),
+            (cv.TERM_CRITERIA_EPS | cv.TERM_CRITERIA_MAX_ITER, 50, 1e-3),
+        )
         return self._in_order(grey, np.asarray(corners, dtype=np.float64).reshape(-1, 2))
 
     def _in_order(self, grey: Image, pixels: Floats) -> Floats:
-        """The corners so that the frame is right-handed and the first square is dark: what is left to choose, the board's symmetries are."""
+        """The corners so that the frame is right-handed and the first square is dark: what is left to choose,
+        the board's symmetries are.
+        """
         grid = _right_handed(pixels.reshape(self.board.rows, self.board.columns, 2))
         if not _first_square_is_dark(grey, grid):
             if (self.board.columns + self.board.rows) % 2:
@@ -348,13 +432,23 @@ class _Finder:
     def _circles(self, grey: Image) -> Floats | None:
         cv, shape = self.cv, (self.board.columns, self.board.rows)
         flags = cv.CALIB_CB_SYMMETRIC_GRID if self.board.kind == "circles" else cv.CALIB_CB_ASYMMETRIC_GRID
-        tries = [(image, effort, extra) for image in (grey, 255 - grey) for effort, extra in ((0, 0), (1, 0), (1, cv.CALIB_CB_CLUSTERING))]
+        tries = [
+            (image, effort, extra)
+            for image in (grey, 255 - grey)
+            for effort, extra in ((0, 0), (1, 0), (1, cv.CALIB_CB_CLUSTERING))
+        ]
         for image, effort, extra in tries[: 1 if self._quick else None]:
-            found, centres = cv.findCirclesGrid(image, shape, flags=flags | extra, blobDetector=self._blobs(grey, effort))
+            found, centres = cv.findCirclesGrid(
+                image, shape, flags=flags | extra, blobDetector=self._blobs(grey, effort)
+            )
             if found:
                 pixels = _dot_centres(cv, image, np.asarray(centres, dtype=np.float64).reshape(-1, 2))
                 grid = pixels.reshape(self.board.rows, self.board.columns, 2)
-                return _right_handed(grid).reshape(-1, 2) if self.board.kind == "circles" else self._asymmetric(grid)
+                return (
+                    _right_handed(grid).reshape(-1, 2)
+                    if self.board.kind == "circles"
+                    else self._asymmetric(grid)
+                )
         return None
 
     def _asymmetric(self, grid: Floats) -> Floats | None:
@@ -394,7 +488,11 @@ class _Finder:
         if flat[1] < 0.1 * flat[0]:  # corners in one line fix no pose
             return None
         # Corners that no plane shows so are misplaced; where the counts are others than was said, most are.
-        square = self.board.size * float(np.linalg.norm(np.ptp(pixels, axis=0))) / float(np.linalg.norm(np.ptp(points, axis=0)))
+        square = (
+            self.board.size
+            * float(np.linalg.norm(np.ptp(pixels, axis=0)))
+            / float(np.linalg.norm(np.ptp(points, axis=0)))
+        )
         H, inside = self.cv.findHomography(points[:, :2], pixels, self.cv.RANSAC, 0.25 * square)
         if H is None:
             return None
@@ -404,22 +502,37 @@ class _Finder:
 
 def _charuco_detector(cv: Any, board: Board) -> Any:
     if not hasattr(cv, "aruco") or not hasattr(cv.aruco, "CharucoDetector"):
-        raise InputError(f"a ChArUco board needs OpenCV 4.8 or newer with its ArUco module, found {cv.__version__}: pip install opencv-python-headless")
+        raise InputError(
+            f"a ChArUco board needs OpenCV 4.8 or newer with its ArUco module, found {cv.__version__}: pip"
+            " install opencv-python-headless"
+        )
     dictionary = cv.aruco.getPredefinedDictionary(getattr(cv.aruco, f"DICT_{board.dictionary}"))
     pattern = cv.aruco.CharucoBoard((board.columns, board.rows), board.size, board.marker, dictionary)
     if hasattr(pattern, "setLegacyPattern"):
         pattern.setLegacyPattern(bool(board.legacy))
     parameters = cv.aruco.DetectorParameters()
-    parameters.cornerRefinementMethod = cv.aruco.CORNER_REFINE_NONE  # that of the chessboard corners is another, and always done
+    parameters.cornerRefinementMethod = (
+        cv.aruco.CORNER_REFINE_NONE
+    )  # that of the chessboard corners is another, and always done
     # The usual ones are quick and miss markers that are small in the image.
-    parameters.adaptiveThreshWinSizeMax, parameters.adaptiveThreshWinSizeStep, parameters.minMarkerPerimeterRate = 43, 4, 0.01
+    (
+        parameters.adaptiveThreshWinSizeMax,
+        parameters.adaptiveThreshWinSizeStep,
+        parameters.minMarkerPerimeterRate,
+    ) = (
+        43,
+        4,
+        0.01,
+    )
     corners = cv.aruco.CharucoParameters()
     corners.minMarkers = 1  # of the two beside a corner: a plane tells below where a corner was misplaced
     return cv.aruco.CharucoDetector(pattern, corners, parameters)
 
 
 def _charuco_finder(cv: Any, board: Board, grey: Image) -> _Finder | None:
-    """The dictionary and pattern (OpenCV changed it in 4.6 for boards with an even number of rows) that explain most of an image; None: no such board there."""
+    """The dictionary and pattern (OpenCV changed it in 4.6 for boards with an even number of rows) that
+    explain most of an image; None: no such board there.
+    """
     dictionary = board.dictionary or _dictionary(cv, grey, board.columns * board.rows // 2)
     patterns = [board.legacy] if board.legacy is not None else [False] if board.rows % 2 else [False, True]
     best: tuple[int, _Finder | None] = (_FEWEST_POINTS - 1, None)
@@ -432,12 +545,16 @@ def _charuco_finder(cv: Any, board: Board, grey: Image) -> _Finder | None:
 
 
 def _dictionary(cv: Any, grey: Image, markers: int) -> str:
-    """The dictionary that most markers in an image are of, in the smallest size that has so many markers; empty: there are none."""
+    """The dictionary that most markers in an image are of, in the smallest size that has so many markers;
+    empty: there are none.
+    """
     most, best = 1, ""
     for name in [f"{family}_{_FAMILY_SIZES[-1]}" for family in _FAMILIES] + list(_OTHER_DICTIONARIES):
         if not hasattr(cv.aruco, f"DICT_{name}"):
             continue
-        _, identities, _ = cv.aruco.ArucoDetector(cv.aruco.getPredefinedDictionary(getattr(cv.aruco, f"DICT_{name}"))).detectMarkers(grey)
+        _, identities, _ = cv.aruco.ArucoDetector(
+            cv.aruco.getPredefinedDictionary(getattr(cv.aruco, f"DICT_{name}"))
+        ).detectMarkers(grey)
         count = 0 if identities is None else len(np.unique(identities))
         if count > most:
             most, best = count, name
@@ -490,7 +607,9 @@ def _dot_centres(cv: Any, grey: Image, centres: Floats) -> Floats:
         if own[0].any() or own[-1].any() or own[:, 0].any() or own[:, -1].any():  # runs into something
             continue
         own = cv.dilate(own, np.ones((5, 5), np.uint8))
-        level = np.median(window[(own == 0) & (inside == 0)]) if ((own == 0) & (inside == 0)).any() else bright
+        level = (
+            np.median(window[(own == 0) & (inside == 0)]) if ((own == 0) & (inside == 0)).any() else bright
+        )
         weight = np.clip(level - window, 0.0, None) * own
         weight[weight < 0.05 * (level - dark)] = 0.0  # noise of the paper
         total = weight.sum()
@@ -500,21 +619,49 @@ def _dot_centres(cv: Any, grey: Image, centres: Floats) -> Floats:
     return out
 
 
-# ---- Another board than was said -------------------------------------------------------------------------------------
+# ---- Another board than was said
+# -------------------------------------------------------------------------------------
 
 
 def _neighbours(board: Board) -> list[Board]:
-    """What the board may be instead: squares counted for corners, a row too few, rows and columns exchanged, another kind."""
+    """What the board may be instead: squares counted for corners, a row too few, rows and columns exchanged,
+    another kind.
+    """
     c, r = board.columns, board.rows
-    pairs = [(c - 1, r - 1), (c + 1, r + 1), (r, c), (c - 1, r), (c, r - 1), (c + 1, r), (c, r + 1), (r - 1, c - 1), (r + 1, c + 1)]
+    pairs = [
+        (c - 1, r - 1),
+        (c + 1, r + 1),
+        (r, c),
+        (c - 1, r),
+        (c, r - 1),
+        (c + 1, r),
+        (c, r + 1),
+        (r - 1, c - 1),
+        (r + 1, c + 1),
+    ]
     odd = board.kind == "acircles"
-    out = [replace(board, columns=x, rows=y, legacy=None, dictionary="") for x, y in dict.fromkeys(pairs) if min(x, y) >= 3 and (x, y) != (c, r) and not (odd and y % 2 == 0)]
+    out = [
+        replace(board, columns=x, rows=y, legacy=None, dictionary="")
+        for x, y in dict.fromkeys(pairs)
+        if min(x, y) >= 3 and (x, y) != (c, r) and not (odd and y % 2 == 0)
+    ]
     if board.kind == "charuco":
-        out = [replace(board, legacy=None, dictionary=""), *out, Board("chessboard", max(2, c - 1), max(2, r - 1), board.size)]
+        out = [
+            replace(board, legacy=None, dictionary=""),
+            *out,
+            Board("chessboard", max(2, c - 1), max(2, r - 1), board.size),
+        ]
     elif board.kind == "chessboard":
-        out += [Board("charuco", c + 1, r + 1, board.size, 0.75 * board.size), Board("charuco", c, r, board.size, 0.75 * board.size), Board("circles", c, r, board.size)]
+        out += [
+            Board("charuco", c + 1, r + 1, board.size, 0.75 * board.size),
+            Board("charuco", c, r, board.size, 0.75 * board.size),
+            Board("circles", c, r, board.size),
+        ]
     elif board.kind == "circles":
-        out += [Board("chessboard", c, r, board.size), *([Board("acircles", c, r, board.size)] if r % 2 else [])]
+        out += [
+            Board("chessboard", c, r, board.size),
+            *([Board("acircles", c, r, board.size)] if r % 2 else []),
+        ]
     else:
         out += [Board("circles", c, r, board.size)]
     return out
@@ -532,11 +679,26 @@ def _hits(cv: Any, images: Sequence[Image], board: Board) -> tuple[int, float]:
     return count, points
 
 
-def _refuse_too_few(cv: Any, images: Sequence[Path | str | Image], called: Sequence[str], board: Board, found: Sequence[int], missing: Sequence[int]) -> None:
+def _refuse_too_few(
+    cv: Any,
+    images: Sequence[Path | str | Image],
+    called: Sequence[str],
+    board: Board,
+    found: Sequence[int],
+    missing: Sequence[int],
+) -> None:
     """Raises InputError: which images do not show the board, and which board they seem to show."""
-    which = ", ".join(called[number] for number in missing[:8]) + (f" … ({len(missing)} in all)" if len(missing) > 8 else "")
-    head = f"the board {board} was found in {len(found)} of {len(images)} images, expected at least {_FEWEST_VIEWS}"
-    tried = [_grey(cv, images[number], called[number]) for number in missing[:: max(1, len(missing) // _TRIED)][:_TRIED]]
+    which = ", ".join(called[number] for number in missing[:8]) + (
+        f" … ({len(missing)} in all)" if len(missing) > 8 else ""
+    )
+    head = (
+        f"the board {board} was found in {len(found)} of {len(images)} images, expected at least"
+        f" {_FEWEST_VIEWS}"
+    )
+    tried = [
+        _grey(cv, images[number], called[number])
+        for number in missing[:: max(1, len(missing) // _TRIED)][:_TRIED]
+    ]
     best, most = None, (0, -math.inf)
     # Of a grid of dots, and of numbered corners, a smaller one is found as well: most points win.
     markers = "" if not hasattr(cv, "aruco") else _dictionary(cv, tried[0], 0) if tried else ""
@@ -546,7 +708,14 @@ def _refuse_too_few(cv: Any, images: Sequence[Path | str | Image], called: Seque
                 continue
             family = markers.rpartition("_")[0]
             count = other.columns * other.rows // 2
-            other = replace(other, dictionary=f"{family}_{next((s for s in _FAMILY_SIZES if s >= count), _FAMILY_SIZES[-1])}" if family in _FAMILIES else markers)
+            other = replace(
+                other,
+                dictionary=(
+                    f"{family}_{next((s for s in _FAMILY_SIZES if s >= count), _FAMILY_SIZES[-1])}"
+                    if family in _FAMILIES
+                    else markers
+                ),
+            )
         this = _hits(cv, tried, other)
         if this > most:
             best, most = other, this
@@ -555,39 +724,67 @@ def _refuse_too_few(cv: Any, images: Sequence[Path | str | Image], called: Seque
     hits = most[0]
     if best is not None and hits >= 0.5 * len(tried):
         counting = ""
-        if board.kind == best.kind == "chessboard" and (best.columns - board.columns, best.rows - board.rows) in ((-1, -1), (1, 1)):
-            counting = ": count inner corners, where four squares meet, not squares" if best.columns < board.columns else ": these are one more each way than was said"
+        if board.kind == best.kind == "chessboard" and (
+            best.columns - board.columns,
+            best.rows - board.rows,
+        ) in ((-1, -1), (1, 1)):
+            counting = (
+                ": count inner corners, where four squares meet, not squares"
+                if best.columns < board.columns
+                else ": these are one more each way than was said"
+            )
         named = f"{best.kind}:{best.columns}x{best.rows}"
         best = replace(best, dictionary="", legacy=None)
         say = f"--board {best}" if best.kind == board.kind else f"--board {named}:… with its size"
-        raise InputError(f"{head}; but {named} is in {hits} of the {len(tried)} that were looked at again{counting}. Say {say}")
-    margin = {"chessboard": "its white margin", "charuco": "its markers", "circles": "all of its dots", "acircles": "all of its dots"}[board.kind]
-    raise InputError(f"{head}; not found in {which}. Boards of neighbouring counts are not there either: does every image show the whole board, sharp and evenly lit, with {margin}? "
-                     f"Expected {_EXPECTED}")  # fmt: skip
+        raise InputError(
+            f"{head}; but {named} is in {hits} of the {len(tried)} that were looked at again{counting}. Say"
+            f" {say}"
+        )
+    margin = {
+        "chessboard": "its white margin",
+        "charuco": "its markers",
+        "circles": "all of its dots",
+        "acircles": "all of its dots",
+    }[board.kind]
+    raise InputError(
+        f"{head}; not found in {which}. Boards of neighbouring counts are not there either: does every image"
+        f" show the whole board, sharp and evenly lit, with {margin}? Expected {_EXPECTED}"
+    )
 
 
 def _larger_board(cv: Any, images: Sequence[Path | str | Image], board: Board) -> Board | None:
-    """A board of more dots that contains the one that was named; of chessboards and ChArUco boards no part is taken for the whole."""
+    """A board of more dots that contains the one that was named; of chessboards and ChArUco boards no part is
+    taken for the whole.
+    """
     if board.kind not in ("circles", "acircles"):
         return None
     greys = [_grey(cv, image, "") for image in images]
     steps = ((1, 1), (1, 0), (0, 1))
     for wide, high in steps:
-        other = replace(board, columns=board.columns + wide, rows=board.rows + high * (2 if board.kind == "acircles" else 1))
+        other = replace(
+            board,
+            columns=board.columns + wide,
+            rows=board.rows + high * (2 if board.kind == "acircles" else 1),
+        )
         if _hits(cv, greys, other)[0] == len(greys):
             return other
     return None
 
 
-# ---- Poses and intrinsics --------------------------------------------------------------------------------------------
+# ---- Poses and intrinsics
+# --------------------------------------------------------------------------------------------
 
 
 def _matrix(camera: Camera) -> tuple[Floats, Floats]:
-    return np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]]), np.asarray(camera.distortion, dtype=np.float64)
+    return np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]]), np.asarray(
+        camera.distortion, dtype=np.float64
+    )
 
 
 def _pose(cv: Any, points: Floats, pixels: Floats, camera: Camera) -> tuple[Floats, float]:
-    """Pose of a flat board from one image, and its rms [px]. Two poses look nearly alike from afar: the one that fits better is taken."""
+    """Pose of a flat board from one image, and its rms [px]. Two poses look nearly alike from afar: the one
+    that fits better is taken.
+    """
     matrix, distortion = _matrix(camera)
     # The flat-board solver wants the plane through the origin, and is at its best in the middle.
     middle = points.mean(axis=0)
@@ -595,7 +792,14 @@ def _pose(cv: Any, points: Floats, pixels: Floats, camera: Camera) -> tuple[Floa
     best, frame = math.inf, np.eye(4)
     count, turns, shifts, _ = cv.solvePnPGeneric(flat, seen, matrix, distortion, flags=cv.SOLVEPNP_IPPE)
     for turn, shift in zip(turns[:count], shifts[:count], strict=True):
-        refined, moved = cv.solvePnPRefineLM(flat, seen, matrix, distortion, np.array(turn, dtype=np.float64), np.array(shift, dtype=np.float64))
+        refined, moved = cv.solvePnPRefineLM(
+            flat,
+            seen,
+            matrix,
+            distortion,
+            np.array(turn, dtype=np.float64),
+            np.array(shift, dtype=np.float64),
+        )
         predicted, _ = cv.projectPoints(flat, refined, moved, matrix, distortion)
         rms = float(np.sqrt(np.mean(np.sum((np.asarray(predicted).reshape(-1, 2) - pixels) ** 2, axis=1))))
         rotation, _ = cv.Rodrigues(refined)
@@ -611,23 +815,52 @@ def _orthonormal(rotation: Floats) -> Floats:
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
 
 
-def _calibrate(cv: Any, points: Sequence[Floats], pixels: Sequence[Floats], size: tuple[int, int]) -> tuple[Camera, float, float]:
-    """Intrinsics from views of a board, their rms [px], and the standard error of the focal length over the focal length."""
+def _calibrate(
+    cv: Any, points: Sequence[Floats], pixels: Sequence[Floats], size: tuple[int, int]
+) -> tuple[Camera, float, float]:
+    """Intrinsics from views of a board, their rms [px], and the standard error of the focal length over the
+    focal length.
+    """
     chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), _CALIBRATION_VIEWS)).astype(np.intp))
     objects = [np.ascontiguousarray(points[k], dtype=np.float32).reshape(-1, 1, 3) for k in chosen]
     seen = [np.ascontiguousarray(pixels[k], dtype=np.float32).reshape(-1, 1, 2) for k in chosen]
     flags = cv.CALIB_FIX_K3 if len(chosen) < 10 else 0  # it bends what few images do not hold
-    rms, matrix, distortion, turns, _, sigma, _, _ = cv.calibrateCameraExtended(objects, seen, size, None, None, flags=flags)
+    rms, matrix, distortion, turns, _, sigma, _, _ = cv.calibrateCameraExtended(
+        objects, seen, size, None, None, flags=flags
+    )
     coefficients = np.zeros(5)
     coefficients[: min(5, np.size(distortion))] = np.asarray(distortion).ravel()[:5]
-    camera = Camera(width=size[0], height=size[1], fx=float(matrix[0, 0]), fy=float(matrix[1, 1]), cx=float(matrix[0, 2]), cy=float(matrix[1, 2]), distortion=coefficients.tolist())
+    camera = Camera(
+        width=size[0],
+        height=size[1],
+        fx=float(matrix[0, 0]),
+        fy=float(matrix[1, 1]),
+        cx=float(matrix[0, 2]),
+        cy=float(matrix[1, 2]),
+        distortion=coefficients.tolist(),
+    )
     # Boards seen from the front look the same to every focal length, whatever its standard error says.
     tilt = max(math.acos(min(1.0, abs(float(np.asarray(cv.Rodrigues(turn)[0])[2, 2])))) for turn in turns)
-    return camera, float(rms), float(np.asarray(sigma).ravel()[0]) / float(matrix[0, 0]) if tilt > _LEAST_TILT else math.inf
+    return (
+        camera,
+        float(rms),
+        float(np.asarray(sigma).ravel()[0]) / float(matrix[0, 0]) if tilt > _LEAST_TILT else math.inf,
+    )
 
 
-def _with_poses(cv: Any, board: Board, images: Sequence[Path | str | Image], called: Sequence[str], found: Sequence[int], missing: Sequence[int], points: Sequence[Floats],
-                pixels: Sequence[Floats], size: tuple[int, int], camera: Camera | None, where: str) -> BoardViews:  # fmt: skip
+def _with_poses(
+    cv: Any,
+    board: Board,
+    images: Sequence[Path | str | Image],
+    called: Sequence[str],
+    found: Sequence[int],
+    missing: Sequence[int],
+    points: Sequence[Floats],
+    pixels: Sequence[Floats],
+    size: tuple[int, int],
+    camera: Camera | None,
+    where: str,
+) -> BoardViews:
     given = camera is not None
     calibration_rms = math.nan
     limit = max(_BAD_PIXELS, _BAD_SHARE * size[0])
@@ -635,11 +868,19 @@ def _with_poses(cv: Any, board: Board, images: Sequence[Path | str | Image], cal
         try:
             camera, calibration_rms, focal = _calibrate(cv, points, pixels, size)
         except cv.error as error:
-            raise InputError(f"the camera's values cannot be found from these images ({str(error).strip().splitlines()[-1][:120]}): give --camera, or images with the board tilted by 20 to 40 "
-                             "degrees about different axes") from None  # fmt: skip
+            raise InputError(
+                "the camera's values cannot be found from these images"
+                f" ({str(error).strip().splitlines()[-1][:120]}): give --camera, or images with the board"
+                " tilted by 20 to 40 degrees about different axes"
+            ) from None
         if not math.isfinite(calibration_rms) or plausible_camera(camera) is not None or not focal < 0.1:
-            raise InputError(f"the camera's values cannot be found from these images: the focal length came out as {camera.fx:.4g} px" + (f" ± {focal * camera.fx:.2g}" if math.isfinite(focal) else ", but no board is tilted") + ". "
-                             "Tilt the board against the camera by 20 to 40 degrees about different axes, or give --camera")  # fmt: skip
+            raise InputError(
+                "the camera's values cannot be found from these images: the focal length came out as"
+                f" {camera.fx:.4g} px"
+                + (f" ± {focal * camera.fx:.2g}" if math.isfinite(focal) else ", but no board is tilted")
+                + ". "
+                "Tilt the board against the camera by 20 to 40 degrees about different axes, or give --camera"
+            )
         if calibration_rms > limit:
             raise InputError(_bad_fit(cv, images, called, found, board, calibration_rms))
     frames, rms = [], []
@@ -657,24 +898,55 @@ def _with_poses(cv: Any, board: Board, images: Sequence[Path | str | Image], cal
         if own > limit:
             raise InputError(_bad_fit(cv, images, called, found, board, own))
         if usual > 3 * own:
-            text = (f"{where or 'the camera'} does not fit the images: the board's points are off by {usual:.2g} px (median rms), and by {own:.2g} px with values found from these "
-                    "images; leave the camera out, or have it refined")  # fmt: skip
+            text = (
+                f"{where or 'the camera'} does not fit the images: the board's points are off by {usual:.2g}"
+                f" px (median rms), and by {own:.2g} px with values found from these images; leave the camera"
+                " out, or have it refined"
+            )
             if usual > limit:
                 raise InputError(text)
             warnings.warn(InputWarning(text), stacklevel=3)
     good = np.isfinite(errors)
     if good.sum() < _FEWEST_VIEWS:
-        raise InputError(f"the board {board} was found in {len(found)} images, but its pose could be found in {int(good.sum())} only")
+        raise InputError(
+            f"the board {board} was found in {len(found)} images, but its pose could be found in"
+            f" {int(good.sum())} only"
+        )
     keep = np.flatnonzero(good).tolist()
-    return BoardViews(board, tuple(found[k] for k in keep), tuple(sorted([*missing, *(found[k] for k in np.flatnonzero(~good).tolist())])), tuple(points[k] for k in keep),
-                      tuple(pixels[k] for k in keep), np.array([frames[k] for k in keep]), errors[keep], camera, not given, calibration_rms)  # fmt: skip
+    return BoardViews(
+        board,
+        tuple(found[k] for k in keep),
+        tuple(sorted([*missing, *(found[k] for k in np.flatnonzero(~good).tolist())])),
+        tuple(points[k] for k in keep),
+        tuple(pixels[k] for k in keep),
+        np.array([frames[k] for k in keep]),
+        errors[keep],
+        camera,
+        not given,
+        calibration_rms,
+    )
 
 
-def _bad_fit(cv: Any, images: Sequence[Path | str | Image], called: Sequence[str], found: Sequence[int], board: Board, rms: float) -> str:
+def _bad_fit(
+    cv: Any,
+    images: Sequence[Path | str | Image],
+    called: Sequence[str],
+    found: Sequence[int],
+    board: Board,
+    rms: float,
+) -> str:
     """The points are not where a board of this kind has them: says so, and which one they do fit."""
-    tried = [_grey(cv, images[number], called[number]) for number in found[:: max(1, len(found) // _TRIED)][:_TRIED]]
+    tried = [
+        _grey(cv, images[number], called[number])
+        for number in found[:: max(1, len(found) // _TRIED)][:_TRIED]
+    ]
     for other in _neighbours(board):
         if _hits(cv, tried, other)[0] == len(tried):
-            return (f"the points found are not those of {board}: no camera sees them so, {rms:.3g} px rms are left; {other.kind}:{other.columns}x{other.rows} is in the images as well: "
-                    "is it this one?")  # fmt: skip
-    return f"the points found are not those of a flat board {board}: no camera sees them so, {rms:.3g} px rms are left. Is the board flat, and are its counts right?"
+            return (
+                f"the points found are not those of {board}: no camera sees them so, {rms:.3g} px rms are"
+                f" left; {other.kind}:{other.columns}x{other.rows} is in the images as well: is it this one?"
+            )
+    return (
+        f"the points found are not those of a flat board {board}: no camera sees them so, {rms:.3g} px rms"
+        " are left. Is the board flat, and are its counts right?"
+    )

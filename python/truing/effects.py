@@ -5,7 +5,8 @@
     eccentric = truing.Effect("eccentric", site="J2", basis=lambda d: np.cos(d.joint("J2")))
     found = truing.identify(robot, data, effects=["backlash", eccentric])
 
-The basis is evaluated once, for all rows together, before the fit starts; the Jacobian follows from it by itself.
+The basis is evaluated once, for all rows together, before the fit starts; the Jacobian follows from it by
+itself.
 """
 
 from __future__ import annotations
@@ -86,7 +87,9 @@ class Inputs:
         """Any other column of the data (a covariate)."""
         columns = self._data.covariates
         if name not in columns:
-            raise InputError(f"the data has no column {name!r}; its covariates are: {', '.join(columns) or 'none'}")
+            raise InputError(
+                f"the data has no column {name!r}; its covariates are: {', '.join(columns) or 'none'}"
+            )
         return columns[name]
 
     def _driven_number(self, name: str) -> int:
@@ -97,7 +100,10 @@ class Inputs:
 
     def _present(self, values: Floats | None, column: str, keyword: str) -> Floats:
         if values is None:
-            raise InputError(f"the data has no column {column} (Measurements(..., {keyword}=...)), and the basis asks for it")
+            raise InputError(
+                f"the data has no column {column} (Measurements(..., {keyword}=...)), and the basis asks"
+                " for it"
+            )
         return values
 
 
@@ -111,7 +117,8 @@ class Effect:
     """An effect of one's own: parameter * basis(inputs) is added to the value of a site.
 
     name: names the parameter, `name.site`.
-    site: a joint ("J2": whatever moves with it), a link value ("J2.a"), a coordinate of base or target ("base.z",
+    site: a joint ("J2": whatever moves with it), a link value ("J2.a"), a coordinate of base or target
+    ("base.z",
         "tool.x"), or "*" for every driven joint.
     basis: takes `Inputs` (with "*" also the joint's name) and returns an array of shape=(n,), or a mapping
         {suffix: array} for several parameters, `name.site.suffix`.
@@ -128,16 +135,22 @@ class Effect:
         if not self.name or any(character in self.name for character in ".:,+* "):
             raise InputError(f"an effect's name is one word without . : , + *; found {self.name!r}")
         if self.name in (known := [name for name, _ in catalogue()]):
-            raise InputError(f"effect name {self.name!r} is taken by the catalogue ({', '.join(known)}); choose another")
+            raise InputError(
+                f"effect name {self.name!r} is taken by the catalogue ({', '.join(known)}); choose another"
+            )
         if not callable(self.basis):
-            raise InputError(f"effect {self.name!r}: basis must be a function of the inputs, found {self.basis!r}")
+            raise InputError(
+                f"effect {self.name!r}: basis must be a function of the inputs, found {self.basis!r}"
+            )
 
     def request(self, robot: Robot) -> EffectRequest:
         """The request that asks `identify` for this effect."""
         return EffectRequest(self.name, [joint for joint, _ in self._places(robot)])
 
     def evaluate(self, robot: Robot, data: Measurements) -> OwnEffect:
-        """The basis values for the rows of `data`. Raises InputError when the basis returns what cannot be used."""
+        """The basis values for the rows of `data`. Raises InputError when the basis returns what cannot be
+        used.
+        """
         validate_robot(robot)
         inputs = Inputs(robot, data)
         evaluated = OwnEffect(self.name, self.summary)
@@ -145,10 +158,18 @@ class Effect:
             values = self.basis(inputs, joint) if self.site == EVERY_JOINT else self.basis(inputs)  # type: ignore[call-arg]
             parts = values if isinstance(values, Mapping) else {"": values}
             if not parts:
-                raise InputError(f"effect {self.name!r}: the basis returned an empty mapping, expected {{suffix: array}}")
+                raise InputError(
+                    f"effect {self.name!r}: the basis returned an empty mapping, expected {{suffix: array}}"
+                )
             for suffix, part in parts.items():
                 parameter = ".".join([self.name, site] + ([suffix] if suffix else []))
-                evaluated.add(joint=joint, parameter=parameter, unit=self.unit, site=site, values=_checked(parameter, part, len(inputs)))
+                evaluated.add(
+                    joint=joint,
+                    parameter=parameter,
+                    unit=self.unit,
+                    site=site,
+                    values=_checked(parameter, part, len(inputs)),
+                )
         return evaluated
 
     def _places(self, robot: Robot) -> list[tuple[str, str]]:
@@ -163,21 +184,31 @@ class Effect:
         frames = ["base"] + [target.name for target in robot.targets]
         if owner in frames:
             return [(driven[0], self.site)]  # belongs to no joint, and is to be counted once
-        raise InputError(f"effect {self.name!r}: site {self.site!r} does not exist; a site is a joint ({', '.join(joints)}), "
-                         f"a link value such as '{joints[0]}.a', a coordinate such as 'base.z', or '*'")  # fmt: skip
+        raise InputError(
+            f"effect {self.name!r}: site {self.site!r} does not exist; a site is a joint"
+            f" ({', '.join(joints)}), a link value such as '{joints[0]}.a', a coordinate such as 'base.z',"
+            " or '*'"
+        )
 
 
 def _checked(parameter: str, given: ArrayLike, rows: int) -> Floats:
     try:
         values = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"effect parameter {parameter!r}: the basis must return numbers, one per row: {error}") from None
+        raise InputError(
+            f"effect parameter {parameter!r}: the basis must return numbers, one per row: {error}"
+        ) from None
     if values.shape != (rows,):
-        raise InputError(f"effect parameter {parameter!r}: the basis returned shape {values.shape}, expected ({rows},), one value per row"
-                         + ("; for a constant use np.full(len(d), ...)" if values.ndim == 0 else ""))  # fmt: skip
+        raise InputError(
+            f"effect parameter {parameter!r}: the basis returned shape {values.shape}, expected ({rows},),"
+            " one value per row" + ("; for a constant use np.full(len(d), ...)" if values.ndim == 0 else "")
+        )
     if not np.isfinite(values).all():
         row = int(np.flatnonzero(~np.isfinite(values))[0])
-        raise InputError(f"effect parameter {parameter!r}: the basis returned {values[row]} at row {row}, expected finite values")
+        raise InputError(
+            f"effect parameter {parameter!r}: the basis returned {values[row]} at row {row}, expected finite"
+            " values"
+        )
     # A copy: the basis may have handed out an array that it goes on to change.
     return np.array(values)
 
@@ -193,7 +224,7 @@ def parse_effects(text: str) -> list[EffectRequest]:
         name, colon, joints = (piece.strip() for piece in part.partition(":"))
         names = [joint.strip() for joint in joints.split("+")] if colon else []
         if not name or not all(names):
-            raise InputError(f"cannot read the effects {text!r}; expected e.g. \"backlash,harmonic:J2+J3\"")
+            raise InputError(f'cannot read the effects {text!r}; expected e.g. "backlash,harmonic:J2+J3"')
         requests.append(EffectRequest(name, names))
     return requests
 

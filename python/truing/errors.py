@@ -25,14 +25,20 @@ class NotConvergedError(RuntimeError):
         self.result = result
         solver = result.solver
         super().__init__(
-            f"the fit ({solver.name}) did not converge in {solver.iterations} iterations: {solver.stopped_because}. "
-            "The exception's `result` has what it came to; raise_if_not_converged=False returns it instead."
+            f"the fit ({solver.name}) did not converge in {solver.iterations} iterations:"
+            f" {solver.stopped_because}. The exception's `result` has what it came to;"
+            " raise_if_not_converged=False returns it instead."
         )
 
 
 class UndecidedError(RuntimeError):
-    """Data do not say where the camera is: `result.status` is "not observable", "not closing" or "not converged", and the message says why."""
+    """Data do not say where the camera is: `result.status` is "not observable", "not closing" or "not
+    converged", and the message says why.
+    """
 
     def __init__(self, result: HandEyeResult) -> None:
         self.result = result
-        super().__init__(f"{result.status}: {result.message} (The exception's `result` has the details; raise_if_undecided=False returns it instead.)")
+        super().__init__(
+            f"{result.status}: {result.message} (The exception's `result` has the details;"
+            " raise_if_undecided=False returns it instead.)"
+        )

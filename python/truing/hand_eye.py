@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where the camera is: handeye, and what belongs to it. Each function hands its keywords to the C++ core.
 
-    data = truing.load_handeye("poses.csv", board="chessboard:9x6:25mm")
-    found = truing.handeye(data, setup="eye-to-hand")
-    print(found.summary())
-    found.camera.T, found.camera.sigma  # in the robot base
+data = truing.load_handeye("poses.csv", board="chessboard:9x6:25mm")
+found = truing.handeye(data, setup="eye-to-hand")
+print(found.summary())
+found.camera.T, found.camera.sigma  # in the robot base
 """
 
 from __future__ import annotations
@@ -17,7 +17,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truing import _core
-from truing._core import ClockOffset, HandEyeKinematics, HandEyeOptions, HandEyePoses, HandEyeResult, NextHandPose, Robot
+from truing._core import (
+    ClockOffset,
+    HandEyeKinematics,
+    HandEyeOptions,
+    HandEyePoses,
+    HandEyeResult,
+    NextHandPose,
+    Robot,
+)
 from truing.effects import Effect, Effects, split_effects
 from truing.errors import InputError, UndecidedError
 from truing.files import HandEyeData
@@ -52,23 +60,33 @@ def handeye(
 ) -> HandEyeResult:
     """Find where the camera is, from poses of the hand and of a board that the camera sees.
 
-    Dual quaternions of the motions and one SVD start it; poses that do not fit the others are found and left out; then maximum likelihood with
+    Dual quaternions of the motions and one SVD start it; poses that do not fit the others are found and left
+    out; then maximum likelihood with
     the noise of robot and camera. What the motions cannot show is refused, with what to do.
 
     poses: `HandEyePoses`, or what `load_handeye` read.
-    setup: "eye-in-hand" (camera on the hand, board in the cell) or "eye-to-hand" (camera in the cell, board on the hand).
+    setup: "eye-in-hand" (camera on the hand, board in the cell) or "eye-to-hand" (camera in the cell, board
+    on the hand).
     method: "refined", or "closed-form" for the SVD alone.
-    hand_m, hand_rad: [m], [rad] standard deviation of one component of the robot's reported poses; None: found from the data.
-    camera_m, camera_rad: [m], [rad] of the board's poses, without images. pixel: [px] with images. None: found from the data.
-    refine_camera: with images, find focal lengths, centre and distortion as well; None: unless a camera was given.
-    working_point: shape=(3,) [m] in the camera frame, where accuracy is asked for; None: the mean of the board's positions.
-    known_height: [m] where all rotation axes are parallel: the camera's coordinate along that axis, in the frame that carries the camera;
+    hand_m, hand_rad: [m], [rad] standard deviation of one component of the robot's reported poses; None:
+    found from the data.
+    camera_m, camera_rad: [m], [rad] of the board's poses, without images. pixel: [px] with images. None:
+    found from the data.
+    refine_camera: with images, find focal lengths, centre and distortion as well; None: unless a camera was
+    given.
+    working_point: shape=(3,) [m] in the camera frame, where accuracy is asked for; None: the mean of the
+    board's positions.
+    known_height: [m] where all rotation axes are parallel: the camera's coordinate along that axis, in the
+    frame that carries the camera;
     known_height_sigma: [m].
-    reject: leave poses out that do not fit the others, those whose standardised residual (rms of six) exceeds reject_beyond.
-    recognise: where the loop does not close, try other readings of the numbers (inverted, scalar last, mm …), and name the one that closes.
+    reject: leave poses out that do not fit the others, those whose standardised residual (rms of six) exceeds
+    reject_beyond.
+    recognise: where the loop does not close, try other readings of the numbers (inverted, scalar last, mm …),
+    and name the one that closes.
     reading: use the poses in such a reading, a name of `handeye_readings`.
 
-    Raises InputError on data or options that cannot be used, and UndecidedError (it carries the result) where `status` is not "done", unless
+    Raises InputError on data or options that cannot be used, and UndecidedError (it carries the result) where
+    `status` is not "done", unless
     `raise_if_undecided` is False.
     """
     options = handeye_options(
@@ -119,7 +137,10 @@ def handeye_options(
     """The options of `handeye` by the keywords it takes, for functions that take `HandEyeOptions`."""
     point = None if working_point is None else np.asarray(working_point, dtype=np.float64)
     if point is not None and point.shape != (3,):
-        raise InputError(f"working_point: found shape {point.shape}, expected three numbers [m]: a point in the camera frame")
+        raise InputError(
+            f"working_point: found shape {point.shape}, expected three numbers [m]: a point in the camera"
+            " frame"
+        )
     if refine_camera is None:
         refine_camera = isinstance(poses, HandEyeData) and not poses.camera_given
     return HandEyeOptions(
@@ -156,9 +177,11 @@ def handeye_plan(
 ) -> tuple[NextHandPose, ...]:
     """Robot poses, one after the other, that shrink the covariance of the working point most.
 
-    poses, result: what was measured, and what `handeye` made of it. options: those of `handeye`; None: the usual ones with `setup`.
+    poses, result: what was measured, and what `handeye` made of it. options: those of `handeye`; None: the
+    usual ones with `setup`.
     count: how many. candidates: tried for each. seed: of them.
-    tilt: [rad] the board is seen at no more than this from its normal, beyond what was seen. reach: [m] hands stay this close to a measured one.
+    tilt: [rad] the board is seen at no more than this from its normal, beyond what was seen. reach: [m] hands
+    stay this close to a measured one.
     None: the usual ones, see `HandEyePlanOptions` in handeye.hpp.
 
     Raises InputError.
@@ -166,7 +189,14 @@ def handeye_plan(
     if options is None:
         options = handeye_options(poses, setup=setup)
     usual = {"candidates": candidates, "tilt": tilt, "reach": reach}
-    return _core.handeye_plan(_poses(poses), result, options, count=count, seed=seed, **{name: value for name, value in usual.items() if value is not None})
+    return _core.handeye_plan(
+        _poses(poses),
+        result,
+        options,
+        count=count,
+        seed=seed,
+        **{name: value for name, value in usual.items() if value is not None},
+    )
 
 
 def handeye_clock(
@@ -178,15 +208,20 @@ def handeye_clock(
     setup: Setup = "eye-in-hand",
     search: float = 10.0,
 ) -> ClockOffset:
-    """The offset between the clocks of robot and camera, from the motion that both saw: t_hand = t_camera + offset.
+    """The offset between the clocks of robot and camera, from the motion that both saw: t_hand = t_camera +
+    offset.
 
-    hand_time, camera_time: shape=(n,), shape=(m,) [s], increasing. T_base_hand: shape=(n, 4, 4); T_camera_board: shape=(m, 4, 4).
-    search: [s] offsets up to this are tried. The result's `T_base_hand` are hand poses at the times of its camera `rows`.
+    hand_time, camera_time: shape=(n,), shape=(m,) [s], increasing. T_base_hand: shape=(n, 4, 4);
+    T_camera_board: shape=(m, 4, 4).
+    search: [s] offsets up to this are tried. The result's `T_base_hand` are hand poses at the times of its
+    camera `rows`.
 
     Raises InputError.
     """
     times = [np.asarray(time, dtype=np.float64) for time in (hand_time, camera_time)]
-    return _core.handeye_clock(times[0].tolist(), T_base_hand, times[1].tolist(), T_camera_board, setup, search)
+    return _core.handeye_clock(
+        times[0].tolist(), T_base_hand, times[1].tolist(), T_camera_board, setup, search
+    )
 
 
 def handeye_with_kinematics(
@@ -204,10 +239,12 @@ def handeye_with_kinematics(
     seed: int = _USUAL_FIT.seed,
     threads: int = 0,
 ) -> HandEyeKinematics:
-    """Find camera, board mount and the robot's own parameters in one problem: an arm that is off its model puts its error into the camera else.
+    """Find camera, board mount and the robot's own parameters in one problem: an arm that is off its model
+    puts its error into the camera else.
 
     robot: nominal. joints: shape=(n, driven joints) [rad | m], one row per pose, `HandEyeData.joints`.
-    poses, options, setup: as in `handeye`. free, hold, effects, loss, test_share, seed, threads: as in `identify`; effects of the catalogue only.
+    poses, options, setup: as in `handeye`. free, hold, effects, loss, test_share, seed, threads: as in
+    `identify`; effects of the catalogue only.
 
     Raises InputError on data or options that cannot be used.
     """
@@ -215,7 +252,10 @@ def handeye_with_kinematics(
         options = handeye_options(poses, setup=setup)
     asked, own = split_effects(effects)
     if own:
-        raise InputError(f"handeye_with_kinematics cannot use own effects ({', '.join(effect.name for effect in own)}); name effects of the catalogue")
+        raise InputError(
+            f"handeye_with_kinematics cannot use own effects ({', '.join(effect.name for effect in own)});"
+            " name effects of the catalogue"
+        )
     fit = _core.IdentifyOptions(
         free=[*_names(free), "base.*", "tool.*"] if free else [],  # these two are camera and board
         hold=_names(hold),

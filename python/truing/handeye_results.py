@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""What ``truing handeye`` found, as it is written: ``result.json``, ``residuals.csv``, ``camera.yaml``, ``next_poses.csv``, ``robot.yaml``, the report."""
+"""What ``truing handeye`` found, as it is written: ``result.json``, ``residuals.csv``, ``camera.yaml``,
+``next_poses.csv``, ``robot.yaml``, the report.
+"""
 
 from __future__ import annotations
 
@@ -29,13 +31,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Scene:
-    """What the report draws, beside what result.json holds. Frames in the robot base, one per pose; NaN where there is none."""
+    """What the report draws, beside what result.json holds. Frames in the robot base, one per pose; NaN where
+    there is none.
+    """
 
     T_base_hand: Floats  # shape=(n, 4, 4) as found
     T_base_camera: Floats  # shape=(n, 4, 4)
     T_base_board_seen: Floats  # shape=(n, 4, 4)
     T_base_board: Floats  # shape=(n, 4, 4) predicted
-    predicted_m: Floats  # shape=(n,) [m] length below which 95 % of position residuals lie by the noise; NaN: not known
+    # shape=(n,) [m] length below which 95 % of position residuals lie by the noise; NaN: not known
+    predicted_m: Floats
     predicted_rad: Floats  # shape=(n,) [rad]
     board_m: tuple[float, float, float, float]  # left, top, right, bottom of the board in its frame [m]
     pixel_errors: Floats  # shape=(k, 2) [px] seen minus predicted, robot poses as found
@@ -55,7 +60,8 @@ class Solved:
     seed: int = 0
 
 
-# ---- result.json -----------------------------------------------------------------------------------------------------
+# ---- result.json
+# -----------------------------------------------------------------------------------------------------
 
 
 def frame_dict(T: Floats) -> dict[str, float]:
@@ -63,17 +69,30 @@ def frame_dict(T: Floats) -> dict[str, float]:
     from truing.files.handeye_file import quaternions_from_rotations
 
     q = quaternions_from_rotations(np.asarray(T)[None, :3, :3])[0]
-    return {**{f"{axis}_m": float(T[k, 3]) for k, axis in enumerate(AXES)}, **dict(zip(("qw", "qx", "qy", "qz"), map(float, q), strict=True))}
+    return {
+        **{f"{axis}_m": float(T[k, 3]) for k, axis in enumerate(AXES)},
+        **dict(zip(("qw", "qx", "qy", "qz"), map(float, q), strict=True)),
+    }
 
 
 def _uncertain(frame: truing.UncertainFrame, parent: str) -> dict[str, Any]:
-    return {"in": parent, **frame_dict(frame.T), "sigma": dict(zip(CHANGES, map(float, frame.sigma), strict=True))}
+    return {
+        "in": parent,
+        **frame_dict(frame.T),
+        "sigma": dict(zip(CHANGES, map(float, frame.sigma), strict=True)),
+    }
 
 
 def _errors(e: truing.HandEyeErrors | None) -> dict[str, Any] | None:
     if e is None:
         return None
-    found: dict[str, Any] = {"rms_m": e.position_rms, "mean_m": e.position_mean, "p95_m": e.position_p95, "max_m": e.position_max, "rotation_rms_rad": e.rotation_rms}
+    found: dict[str, Any] = {
+        "rms_m": e.position_rms,
+        "mean_m": e.position_mean,
+        "p95_m": e.position_p95,
+        "max_m": e.position_max,
+        "rotation_rms_rad": e.rotation_rms,
+    }
     if math.isfinite(e.pixel_rms):
         found["rms_px"] = e.pixel_rms
     return {**found, "n": e.n}
@@ -81,8 +100,12 @@ def _errors(e: truing.HandEyeErrors | None) -> dict[str, Any] | None:
 
 def camera_model_dict(camera: truing.Camera, sigma: Sequence[float] = ()) -> dict[str, Any]:
     """A camera's values as camera.yaml has them, with their standard errors where known."""
-    found: dict[str, Any] = {"width": camera.width, "height": camera.height, **{name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")},
-                             "distortion": {"model": "plumb_bob", "coefficients": list(camera.distortion)}}  # fmt: skip
+    found: dict[str, Any] = {
+        "width": camera.width,
+        "height": camera.height,
+        **{name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")},
+        "distortion": {"model": "plumb_bob", "coefficients": list(camera.distortion)},
+    }
     if len(sigma):
         found["sigma"] = dict(zip(INTRINSICS, map(float, sigma), strict=False))
     return found
@@ -102,7 +125,11 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
         "message": r.message,
         "poses": data.count,
     }
-    camera, board = (r.camera, r.board) if solved.kinematics is None else (solved.kinematics.camera, solved.kinematics.board)
+    camera, board = (
+        (r.camera, r.board)
+        if solved.kinematics is None
+        else (solved.kinematics.camera, solved.kinematics.board)
+    )
     if r.status == "done":
         found["camera"] = _uncertain(camera, parents[0])
         found["board"] = _uncertain(board, parents[1])
@@ -111,21 +138,45 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
     k = solved.kinematics
     residuals = list(r.residuals if k is None else k.residuals)
     found["residuals"] = [_residual(solved, row, residual) for row, residual in enumerate(residuals)]
-    found["rejected_poses"] = [{"pose": int(data.rows[row]), **_image(data, row), "cause": residual.cause} for row, residual in enumerate(residuals) if residual.rejected]
+    found["rejected_poses"] = [
+        {"pose": int(data.rows[row]), **_image(data, row), "cause": residual.cause}
+        for row, residual in enumerate(residuals)
+        if residual.rejected
+    ]
     found["observability"] = {
         "singular_values": r.singular_values,
         "gap": r.singular_gap,
         "axes_spread": r.axes_spread,
-        "unobservable": [{"what": u.what, "direction": u.direction, "rotation": u.rotation, "sigma": u.sigma, "advice": u.advice} for u in r.unobservable],
+        "unobservable": [
+            {
+                "what": u.what,
+                "direction": u.direction,
+                "rotation": u.rotation,
+                "sigma": u.sigma,
+                "advice": u.advice,
+            }
+            for u in r.unobservable
+        ],
     }
     found["convention"] = _convention(solved)
     if k is not None:  # what belongs to the robot as it was is left out
-        n = {"position_m": k.identification.noise_sigma, "hand_rad": k.identification.rotation_noise_sigma, "camera_rad": None, "pixel": None, "estimated": True}
+        n = {
+            "position_m": k.identification.noise_sigma,
+            "hand_rad": k.identification.rotation_noise_sigma,
+            "camera_rad": None,
+            "pixel": None,
+            "estimated": True,
+        }
         found["noise"] = n
         found["errors"] = _known({"train": k.train_after, "test": k.test_after})
     elif residuals:
-        found["noise"] = {"position_m": r.noise.position, "hand_rad": r.noise.hand_rotation, "camera_rad": r.noise.camera_rotation, "pixel": r.noise.pixel,
-                          "estimated": r.noise.estimated or not _noise_is_given(options)}  # fmt: skip
+        found["noise"] = {
+            "position_m": r.noise.position,
+            "hand_rad": r.noise.hand_rotation,
+            "camera_rad": r.noise.camera_rotation,
+            "pixel": r.noise.pixel,
+            "estimated": r.noise.estimated or not _noise_is_given(options),
+        }
         found["errors"] = _known({"train": r.train, "left_out": r.left_out, "test": r.test})
     if r.status == "done" and k is None:
         found["board_scale"] = {"value": r.board_scale, "sigma": r.board_scale_sigma}
@@ -133,20 +184,35 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
         found["board_turned"] = {"poses": [int(data.rows[k]) for k, turn in enumerate(r.symmetry) if turn]}
     if data.views is not None:
         found["images"] = _images(solved)
-    found["next_poses"] = [{**frame_dict(p.T_base_hand), "working_point_sigma_m": p.working_point_sigma} for p in solved.next_poses]
+    found["next_poses"] = [
+        {**frame_dict(p.T_base_hand), "working_point_sigma_m": p.working_point_sigma}
+        for p in solved.next_poses
+    ]
     if solved.clock is not None:
         found["clock"] = _clock(solved.clock)
     if solved.kinematics is not None:
         found["kinematics"] = _kinematics(solved.kinematics)
     if r.solver.name:
-        found["solver"] = {"name": r.solver.name, "iterations": r.solver.iterations, "converged": r.solver.converged, "stopped_because": r.solver.stopped_because}
+        found["solver"] = {
+            "name": r.solver.name,
+            "iterations": r.solver.iterations,
+            "converged": r.solver.converged,
+            "stopped_because": r.solver.stopped_because,
+        }
     found["seed"] = solved.seed
     found["warnings"] = [*warnings, *(r.warnings if k is None else k.identification.warnings)]
     return found
 
 
 def _clock(c: truing.ClockOffset) -> dict[str, Any]:
-    return {"offset_s": c.offset, "sigma_s": c.sigma, "correlation": c.correlation, "found": c.found, "message": c.message, "rows": len(c.rows)}
+    return {
+        "offset_s": c.offset,
+        "sigma_s": c.sigma,
+        "correlation": c.correlation,
+        "found": c.found,
+        "message": c.message,
+        "rows": len(c.rows),
+    }
 
 
 def _known(errors: Mapping[str, truing.HandEyeErrors | None]) -> dict[str, Any]:
@@ -154,13 +220,25 @@ def _known(errors: Mapping[str, truing.HandEyeErrors | None]) -> dict[str, Any]:
 
 
 def _noise_is_given(options: truing.HandEyeOptions) -> bool:
-    given = (options.hand_position_sigma, options.hand_rotation_sigma, options.camera_position_sigma, options.camera_rotation_sigma, options.pixel_sigma)
+    given = (
+        options.hand_position_sigma,
+        options.hand_rotation_sigma,
+        options.camera_position_sigma,
+        options.camera_rotation_sigma,
+        options.pixel_sigma,
+    )
     return any(sigma is not None for sigma in given)
 
 
 def _working_point(solved: Solved) -> dict[str, Any]:
-    told: truing.HandEyeResult | truing.HandEyeKinematics = solved.result if solved.kinematics is None else solved.kinematics
-    point, covariance, camera = np.asarray(told.working_point), np.asarray(told.working_point_covariance), told.camera
+    told: truing.HandEyeResult | truing.HandEyeKinematics = (
+        solved.result if solved.kinematics is None else solved.kinematics
+    )
+    point, covariance, camera = (
+        np.asarray(told.working_point),
+        np.asarray(told.working_point_covariance),
+        told.camera,
+    )
     values, axes = np.linalg.eigh(covariance)
     values, axes = np.sqrt(np.maximum(values[::-1], 0)), axes[:, ::-1]
     return {
@@ -185,8 +263,15 @@ def _residual(solved: Solved, k: int, r: truing.HandEyeResidual) -> dict[str, An
     data = solved.data
     test = data.poses.set is not None and data.poses.set[k] == 1
     alone = solved.kinematics is None  # with the robot found as well nothing was left out
-    found: dict[str, Any] = {"pose": int(data.rows[k]), **_image(data, k), "set": "test" if test else "train", "position_m": r.position, "rotation_rad": r.rotation,
-                             "position_left_out_m": r.position_left_out if alone else None, "rotation_left_out_rad": r.rotation_left_out if alone else None}  # fmt: skip
+    found: dict[str, Any] = {
+        "pose": int(data.rows[k]),
+        **_image(data, k),
+        "set": "test" if test else "train",
+        "position_m": r.position,
+        "rotation_rad": r.rotation,
+        "position_left_out_m": r.position_left_out if alone else None,
+        "rotation_left_out_rad": r.rotation_left_out if alone else None,
+    }
     if data.images:
         found |= {"pixels": r.pixels, "pixels_corrected": r.pixels_corrected}
     return {**found, "distance": r.distance if alone else None, "rejected": r.rejected, "cause": r.cause}
@@ -194,12 +279,24 @@ def _residual(solved: Solved, k: int, r: truing.HandEyeResidual) -> dict[str, An
 
 def _convention(solved: Solved) -> dict[str, Any]:
     used = solved.options.reading
-    explanation = next((reading.explanation for reading in truing.handeye_readings() if reading.name == used), "") if used else "as the file says"
+    explanation = (
+        next((reading.explanation for reading in truing.handeye_readings() if reading.name == used), "")
+        if used
+        else "as the file says"
+    )
     return {
         "reading": used,
         "explanation": explanation,
         "orientation": solved.data.convention,
-        "other_readings": [{"reading": o.name, "explanation": o.explanation, "rms_m": o.position_rms, "rotation_rms_rad": o.rotation_rms} for o in solved.result.readings],
+        "other_readings": [
+            {
+                "reading": o.name,
+                "explanation": o.explanation,
+                "rms_m": o.position_rms,
+                "rotation_rms_rad": o.rotation_rms,
+            }
+            for o in solved.result.readings
+        ],
     }
 
 
@@ -235,8 +332,20 @@ def _kinematics(k: truing.HandEyeKinematics) -> dict[str, Any]:
     return {
         "robot": k.robot.name,
         "errors": errors,
-        "parameters": [{"name": p.name, "nominal": p.nominal, "value": p.value, "sigma": p.sigma, "unit": p.unit, "frozen": p.frozen} for p in i.parameters],
-        "frozen": [{"parameter": f.parameter, "combination": dict(f.combination), "why": f.why} for f in i.frozen],
+        "parameters": [
+            {
+                "name": p.name,
+                "nominal": p.nominal,
+                "value": p.value,
+                "sigma": p.sigma,
+                "unit": p.unit,
+                "frozen": p.frozen,
+            }
+            for p in i.parameters
+        ],
+        "frozen": [
+            {"parameter": f.parameter, "combination": dict(f.combination), "why": f.why} for f in i.frozen
+        ],
         "rejected_poses": list(i.rejected_rows),
         "rank": i.rank,
         "columns": i.columns,
@@ -245,7 +354,8 @@ def _kinematics(k: truing.HandEyeKinematics) -> dict[str, Any]:
     }
 
 
-# ---- What is drawn ---------------------------------------------------------------------------------------------------
+# ---- What is drawn
+# ---------------------------------------------------------------------------------------------------
 
 
 def scene_of(solved: Solved) -> Scene | None:
@@ -261,7 +371,9 @@ def scene_of(solved: Solved) -> Scene | None:
     for k, turn in enumerate(r.symmetry):
         if turn:
             B[k] = B[k] @ np.asarray(data.poses.board_symmetries[turn - 1])
-    X, Y = (np.asarray(frame.T) for frame in ((r.camera, r.board) if both is None else (both.camera, both.board)))
+    X, Y = (
+        np.asarray(frame.T) for frame in ((r.camera, r.board) if both is None else (both.camera, both.board))
+    )
     ones = np.ones((data.count, 1, 1))
     eye_in_hand = solved.options.setup == "eye-in-hand"
     camera, predicted = (A @ X, ones * Y) if eye_in_hand else (ones * X, A @ Y)
@@ -271,28 +383,44 @@ def scene_of(solved: Solved) -> Scene | None:
     n = r.noise
     lever = np.linalg.norm((np.linalg.inv(A) @ predicted)[:, :3, 3], axis=1)
     # Two of a position's three components turn with the hand's noise; as if all three had their mean.
-    spread_m, spread_rad = np.sqrt(n.position**2 + (2.0 / 3.0) * (n.hand_rotation * lever) ** 2), np.full(data.count, n.hand_rotation)
+    spread_m, spread_rad = (
+        np.sqrt(n.position**2 + (2.0 / 3.0) * (n.hand_rotation * lever) ** 2),
+        np.full(data.count, n.hand_rotation),
+    )
     if math.isfinite(n.camera_rotation):
         spread_rad = np.hypot(spread_rad, n.camera_rotation)
     if data.poses.images is not None and data.poses.camera is not None and math.isfinite(n.pixel):
         pixel_m, pixel_rad = _by_pixels(data.poses.images, B, data.poses.camera, n.pixel)
         spread_m, spread_rad = np.hypot(spread_m, pixel_m), np.hypot(spread_rad, pixel_rad)
     if both is not None:
-        spread_m, spread_rad = np.full(data.count, both.identification.noise_sigma), np.full(data.count, both.identification.rotation_noise_sigma)
+        spread_m, spread_rad = (
+            np.full(data.count, both.identification.noise_sigma),
+            np.full(data.count, both.identification.rotation_noise_sigma),
+        )
     board = _board_extent(data)
     errors, places = _pixel_errors(solved, A, X, Y)
     return Scene(A, camera, seen, predicted, CHI3_95 * spread_m, CHI3_95 * spread_rad, board, errors, places)
 
 
-def _by_pixels(images: Sequence[tuple[Floats, Floats]], T_camera_board: Floats, camera: truing.Camera, pixel: float) -> tuple[Floats, Floats]:
-    """Rms standard error of a component of the board's position [m] and rotation [rad] that pixels of this noise give, one per image."""
+def _by_pixels(
+    images: Sequence[tuple[Floats, Floats]], T_camera_board: Floats, camera: truing.Camera, pixel: float
+) -> tuple[Floats, Floats]:
+    """Rms standard error of a component of the board's position [m] and rotation [rad] that pixels of this
+    noise give, one per image.
+    """
     position, rotation = np.full(len(images), np.nan), np.full(len(images), np.nan)
     for k, (points, _) in enumerate(images):
         T = T_camera_board[k]
         arm = np.asarray(points) @ T[:3, :3].T
         x, y, z = (arm + T[:3, 3]).T
         zero = np.zeros_like(x)
-        by_point = np.stack([np.stack([camera.fx / z, zero, -camera.fx * x / z**2], axis=1), np.stack([zero, camera.fy / z, -camera.fy * y / z**2], axis=1)], axis=1)
+        by_point = np.stack(
+            [
+                np.stack([camera.fx / z, zero, -camera.fx * x / z**2], axis=1),
+                np.stack([zero, camera.fy / z, -camera.fy * y / z**2], axis=1),
+            ],
+            axis=1,
+        )
         a, b, c = arm.T
         by_turn = by_point @ np.moveaxis(np.array([[zero, c, -b], [-c, zero, a], [b, -a, zero]]), 2, 0)
         J = np.concatenate([by_point, by_turn], axis=2).reshape(-1, 6)
@@ -336,7 +464,8 @@ def _pixel_errors(solved: Solved, A: Floats, X: Floats, Y: Floats) -> tuple[Floa
     return every[::step], where[::step]
 
 
-# ---- Files -----------------------------------------------------------------------------------------------------------
+# ---- Files
+# -----------------------------------------------------------------------------------------------------------
 
 
 def residual_columns(solved: Solved) -> dict[str, Any]:
@@ -349,7 +478,11 @@ def residual_columns(solved: Solved) -> dict[str, Any]:
         columns["image"] = list(data.images)
     names = {"position_m": "position", "rotation_rad": "rotation"}
     if solved.kinematics is None:
-        names |= {"position_left_out_m": "position_left_out", "rotation_left_out_rad": "rotation_left_out", "distance": "distance"}
+        names |= {
+            "position_left_out_m": "position_left_out",
+            "rotation_left_out_rad": "rotation_left_out",
+            "distance": "distance",
+        }
     if data.images:
         names |= {"rms_px": "pixels", "rms_corrected_px": "pixels_corrected"}
     for name, attribute in names.items():
@@ -360,15 +493,27 @@ def residual_columns(solved: Solved) -> dict[str, Any]:
 
 
 def next_pose_columns(poses: Sequence[truing.NextHandPose]) -> dict[str, Any]:
-    """Columns of ``next_poses.csv``: hand poses to drive to, as in poses.csv, and what each leaves at the working point."""
+    """Columns of ``next_poses.csv``: hand poses to drive to, as in poses.csv, and what each leaves at the
+    working point.
+    """
     frames = [frame_dict(pose.T_base_hand) for pose in poses]
     columns = {f"hand_{name}": np.array([frame[name] for frame in frames]) for name in frames[0]}
     columns["working_point_sigma_m"] = np.array([pose.working_point_sigma for pose in poses])
     return columns
 
 
-def write_handeye(folder: Path, solved: Solved, *, warnings: Iterable[str] = (), nominal_file: Path | None = None, base_link: str = "", tip_link: str = "") -> dict[str, Any]:
-    """Writes everything that ``truing handeye`` found into `folder`, and returns what result.json holds. `nominal_file`: of the robot, with kinematics."""
+def write_handeye(
+    folder: Path,
+    solved: Solved,
+    *,
+    warnings: Iterable[str] = (),
+    nominal_file: Path | None = None,
+    base_link: str = "",
+    tip_link: str = "",
+) -> dict[str, Any]:
+    """Writes everything that ``truing handeye`` found into `folder`, and returns what result.json holds.
+    `nominal_file`: of the robot, with kinematics.
+    """
     from truing.handeye_report import handeye_report
 
     data, r = solved.data, solved.result
@@ -376,11 +521,24 @@ def write_handeye(folder: Path, solved: Solved, *, warnings: Iterable[str] = (),
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
     if r.residuals:
         write_table(folder / "residuals.csv", residual_columns(solved))
-    if data.views is not None and r.status == "done" and (r.camera_model is not None or data.views.calibrated):
+    if (
+        data.views is not None
+        and r.status == "done"
+        and (r.camera_model is not None or data.views.calibrated)
+    ):
         camera, sigma = _camera_model(solved)
         noise = found["noise"]["pixel"]
-        save_camera(folder / "camera.yaml", camera, sigma=dict(zip(INTRINSICS, sigma, strict=False)) if len(sigma) else None,
-                    calibration={"source": data.path.name, "board": str(data.views.board), "images": len(data.views.found), **({} if noise is None else {"noise_px": float(noise)})})  # fmt: skip
+        save_camera(
+            folder / "camera.yaml",
+            camera,
+            sigma=dict(zip(INTRINSICS, sigma, strict=False)) if len(sigma) else None,
+            calibration={
+                "source": data.path.name,
+                "board": str(data.views.board),
+                "images": len(data.views.found),
+                **({} if noise is None else {"noise_px": float(noise)}),
+            },
+        )
     if solved.next_poses:
         write_table(folder / "next_poses.csv", next_pose_columns(solved.next_poses))
     if solved.kinematics is not None and nominal_file is not None:
@@ -389,35 +547,56 @@ def write_handeye(folder: Path, solved: Solved, *, warnings: Iterable[str] = (),
     return found
 
 
-def write_without_clock(folder: Path, clock: truing.ClockOffset, keywords: Mapping[str, Any], *, warnings: Iterable[str] = ()) -> dict[str, Any]:
-    """Writes that the clocks of robot and camera could not be compared, so that no two poses belong together; returns what result.json holds."""
+def write_without_clock(
+    folder: Path, clock: truing.ClockOffset, keywords: Mapping[str, Any], *, warnings: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Writes that the clocks of robot and camera could not be compared, so that no two poses belong together;
+    returns what result.json holds.
+    """
     from truing.handeye_report import handeye_report
 
-    found: dict[str, Any] = without_nan({
-        "format": HANDEYE_FORMAT,
-        "version": truing.__version__,
-        "setup": keywords["setup"],
-        "method": keywords["method"],
-        "status": "clock not found",
-        "message": clock.message,
-        "poses": 0,
-        "residuals": [],
-        "rejected_poses": [],
-        "observability": {"singular_values": [], "gap": None, "axes_spread": None, "unobservable": []},
-        "convention": {"reading": "", "explanation": "as the file says", "orientation": "", "other_readings": []},
-        "next_poses": [],
-        "clock": _clock(clock),
-        "warnings": list(warnings),
-    })  # fmt: skip
+    found: dict[str, Any] = without_nan(
+        {
+            "format": HANDEYE_FORMAT,
+            "version": truing.__version__,
+            "setup": keywords["setup"],
+            "method": keywords["method"],
+            "status": "clock not found",
+            "message": clock.message,
+            "poses": 0,
+            "residuals": [],
+            "rejected_poses": [],
+            "observability": {"singular_values": [], "gap": None, "axes_spread": None, "unobservable": []},
+            "convention": {
+                "reading": "",
+                "explanation": "as the file says",
+                "orientation": "",
+                "other_readings": [],
+            },
+            "next_poses": [],
+            "clock": _clock(clock),
+            "warnings": list(warnings),
+        }
+    )
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
     (folder / "report.html").write_text(handeye_report(found, None), encoding="utf-8")
     return found
 
 
-def _write_robot(folder: Path, solved: Solved, found: Mapping[str, Any], nominal_file: Path, base_link: str, tip_link: str) -> None:
+def _write_robot(
+    folder: Path, solved: Solved, found: Mapping[str, Any], nominal_file: Path, base_link: str, tip_link: str
+) -> None:
     from truing.results import write_robot
 
     assert solved.kinematics is not None
     errors = found["kinematics"]["errors"]
     rms = errors.get("test", errors["train"])["after"]["rms_m"]
-    write_robot(folder, solved.kinematics.robot, solved.data.path.name, {"rms_m": rms}, nominal_file, base_link, tip_link)
+    write_robot(
+        folder,
+        solved.kinematics.robot,
+        solved.data.path.name,
+        {"rms_m": rms},
+        nominal_file,
+        base_link,
+        tip_link,
+    )

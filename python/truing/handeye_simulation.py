@@ -8,14 +8,20 @@
 
 In every scene and pose, with the true frames,
 
-    eye-to-hand:  T_base_hand @ T_hand_board = T_base_camera @ T_camera_board     parent of the camera: base; of the board: hand
-    eye-in-hand:  T_base_hand @ T_hand_camera @ T_camera_board = T_base_board     parent of the camera: hand; of the board: base
+    eye-to-hand:  T_base_hand @ T_hand_board = T_base_camera @ T_camera_board     parent of the camera: base;
+    of the board: hand
+    eye-in-hand:  T_base_hand @ T_hand_camera @ T_camera_board = T_base_board     parent of the camera: hand;
+    of the board: base
 
-Noise acts on a frame by a rotation vector about the frame's own axes, in its origin, and by a translation, each component independent
-and normal: `R_true = R_reported @ exp(w)`, `t_true = t_reported + n` for the hand; `R_seen = R_true @ exp(w)`, `t_seen = t_true + n` for the board in
-the camera. So a rotation error of the hand moves a board that is mounted a lever away; a rotation error of the seen board does not move its origin.
+Noise acts on a frame by a rotation vector about the frame's own axes, in its origin, and by a translation,
+each component independent
+and normal: `R_true = R_reported @ exp(w)`, `t_true = t_reported + n` for the hand; `R_seen = R_true @
+exp(w)`, `t_seen = t_true + n` for the board in
+the camera. So a rotation error of the hand moves a board that is mounted a lever away; a rotation error of
+the seen board does not move its origin.
 
-Nothing here knows a solver. `MISTAKES` and `DEGENERATE` are what users hand in: data that are wrong, and data that cannot tell.
+Nothing here knows a solver. `MISTAKES` and `DEGENERATE` are what users hand in: data that are wrong, and data
+that cannot tell.
 """
 
 from __future__ import annotations
@@ -39,7 +45,9 @@ _BATCH = 64  # candidates drawn at a time: a longer scene of the same seed begin
 
 @dataclass(frozen=True)
 class Board:
-    """A flat pattern. Its frame: origin in the first point, x along a row, y along a column, z away from who looks at it."""
+    """A flat pattern. Its frame: origin in the first point, x along a row, y along a column, z away from who
+    looks at it.
+    """
 
     columns: int = 9
     rows: int = 6
@@ -59,7 +67,9 @@ class Board:
 
 @dataclass(frozen=True)
 class PinholeCamera:
-    """Intrinsics in pixels, with the five coefficients k1 k2 p1 p2 k3 of plumb_bob; the centre of the first pixel is (0, 0)."""
+    """Intrinsics in pixels, with the five coefficients k1 k2 p1 p2 k3 of plumb_bob; the centre of the first
+    pixel is (0, 0).
+    """
 
     width: int = 1280
     height: int = 960
@@ -91,12 +101,20 @@ class PinholeCamera:
         x, y = ideal[..., 0], ideal[..., 1]
         r2 = x * x + y * y
         radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        return np.stack([x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y], axis=-1)
+        return np.stack(
+            [
+                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+            ],
+            axis=-1,
+        )
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things are, and how far the poses spread. Positions are drawn evenly in a box before the camera, tilts evenly in a cone."""
+    """Where things are, and how far the poses spread. Positions are drawn evenly in a box before the camera,
+    tilts evenly in a cone.
+    """
 
     distance: float  # from the camera to the middle of the box [m]
     box: tuple[float, float, float]  # half sides along the camera's x, y, z [m]
@@ -106,14 +124,35 @@ class Layout:
     reach: float  # from the robot base to the middle of the box [m]
 
     def __post_init__(self) -> None:
-        if not (self.distance > self.box[2] >= 0 and min(self.box) >= 0 and 0 <= self.tilt < math.pi / 2 and 0 <= self.roll <= math.pi):
+        if not (
+            self.distance > self.box[2] >= 0
+            and min(self.box) >= 0
+            and 0 <= self.tilt < math.pi / 2
+            and 0 <= self.roll <= math.pi
+        ):
             raise InputError(f"a layout with the board behind or beside the camera: {self}")
 
 
-LAYOUTS: Mapping[Setup, Layout] = MappingProxyType({
-    "eye-to-hand": Layout(distance=0.9, box=(0.38, 0.285, 0.32), tilt=math.radians(50), roll=math.radians(75), lever=0.16, reach=0.9),
-    "eye-in-hand": Layout(distance=0.5, box=(0.16, 0.12, 0.12), tilt=math.radians(40), roll=math.radians(75), lever=0.10, reach=0.7),
-})  # fmt: skip
+LAYOUTS: Mapping[Setup, Layout] = MappingProxyType(
+    {
+        "eye-to-hand": Layout(
+            distance=0.9,
+            box=(0.38, 0.285, 0.32),
+            tilt=math.radians(50),
+            roll=math.radians(75),
+            lever=0.16,
+            reach=0.9,
+        ),
+        "eye-in-hand": Layout(
+            distance=0.5,
+            box=(0.16, 0.12, 0.12),
+            tilt=math.radians(40),
+            roll=math.radians(75),
+            lever=0.10,
+            reach=0.7,
+        ),
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -135,7 +174,10 @@ class HandEyeScene:
     pixel: float
     camera: PinholeCamera
     board: Board
-    pixels: Floats | None  # shape=(n, points of the board, 2): what the camera sees instead of T_camera_board, with noise of its own
+    pixels: (
+        Floats | None
+        # shape=(n, points of the board, 2): what the camera sees instead of T_camera_board, with noise of its own
+    )
     seed: int
 
     @property
@@ -146,10 +188,14 @@ class HandEyeScene:
         """The scene with these poses, in this order."""
         chosen = np.asarray(rows, dtype=np.intp)
         return replace(
-            self, T_base_hand=self.T_base_hand[chosen], T_camera_board=self.T_camera_board[chosen], true_T_base_hand=self.true_T_base_hand[chosen],
-            true_T_camera_board=self.true_T_camera_board[chosen], pixels=None if self.pixels is None else self.pixels[chosen],
+            self,
+            T_base_hand=self.T_base_hand[chosen],
+            T_camera_board=self.T_camera_board[chosen],
+            true_T_base_hand=self.true_T_base_hand[chosen],
+            true_T_camera_board=self.true_T_camera_board[chosen],
+            pixels=None if self.pixels is None else self.pixels[chosen],
             outlier_rows=tuple(new for new, old in enumerate(chosen.tolist()) if old in self.outlier_rows),
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)
@@ -190,12 +236,15 @@ def simulate_handeye(
     Args:
         hand_m: Noise of the reported hand, per axis [m]; hand_rad: about each axis [rad].
         camera_m: Noise of the seen board, per axis [m]; camera_rad: about each axis [rad].
-        board: Make images too: the points of this board in pixels, with noise `pixel` per axis. Their noise has nothing to do with that of
+        board: Make images too: the points of this board in pixels, with noise `pixel` per axis. Their noise
+        has nothing to do with that of
             T_camera_board; a calibration uses one or the other.
-        outliers: This share of the boards, rounded, is seen off by `outlier_m` [m] in a random direction, turned by `outlier_rad` [rad] about a random axis
+        outliers: This share of the boards, rounded, is seen off by `outlier_m` [m] in a random direction,
+        turned by `outlier_rad` [rad] about a random axis
             of its own; their pixels too.
         layout: Where things are; by default LAYOUTS[setup].
-        camera_looks_down: Eye-to-hand: the optical axis is the base's -z. Eye-in-hand: it is parallel to the hand's z.
+        camera_looks_down: Eye-to-hand: the optical axis is the base's -z. Eye-in-hand: it is parallel to the
+        hand's z.
         seed: The same seed gives the same scene, and a longer one begins with the shorter one.
     """
     if setup not in SETUPS:
@@ -219,7 +268,9 @@ def simulate_handeye(
     seen[rows, :3, 3] += outlier_m * directions
     seen[rows, :3, :3] = seen[rows, :3, :3] @ rotation(outlier_rad * axes)
 
-    draws = np.random.default_rng([seed, 4]).normal(size=(poses, 4, 3))  # pose by pose, so that longer scenes begin with shorter ones
+    draws = np.random.default_rng([seed, 4]).normal(
+        size=(poses, 4, 3)
+    )  # pose by pose, so that longer scenes begin with shorter ones
     reported = hand.copy()
     reported[:, :3, :3] = hand[:, :3, :3] @ rotation(-hand_rad * draws[:, 0])
     reported[:, :3, 3] = hand[:, :3, 3] - hand_m * draws[:, 1]
@@ -230,8 +281,25 @@ def simulate_handeye(
     if board is not None:
         exact = lens.project(_apply(seen, board.points))
         pixels = exact + pixel * np.random.default_rng([seed, 5]).normal(size=exact.shape)
-    return HandEyeScene(setup, reported, noisy, T_parent_camera, T_parent_board, hand, seen, tuple(int(row) for row in rows), hand_m, hand_rad, camera_m,
-                        camera_rad, pixel if board else 0.0, lens, pattern, pixels, seed)  # fmt: skip
+    return HandEyeScene(
+        setup,
+        reported,
+        noisy,
+        T_parent_camera,
+        T_parent_board,
+        hand,
+        seen,
+        tuple(int(row) for row in rows),
+        hand_m,
+        hand_rad,
+        camera_m,
+        camera_rad,
+        pixel if board else 0.0,
+        lens,
+        pattern,
+        pixels,
+        seed,
+    )
 
 
 def simulate_streams(
@@ -248,9 +316,11 @@ def simulate_streams(
     layout: Layout | None = None,
     seed: int = 0,
 ) -> HandEyeStreams:
-    """The arm in smooth motion, both records over the same span of true time. A camera stamp t is true time t - clock_offset [s].
+    """The arm in smooth motion, both records over the same span of true time. A camera stamp t is true time t
+    - clock_offset [s].
 
-    Rates in Hz. The board moves in the camera by a sum of three sines a coordinate, 0.1 to 0.6 Hz, within the layout's bounds.
+    Rates in Hz. The board moves in the camera by a sum of three sines a coordinate, 0.1 to 0.6 Hz, within the
+    layout's bounds.
     """
     if setup not in SETUPS:
         raise InputError(f"setup: found {setup!r}, expected one of {', '.join(SETUPS)}")
@@ -267,7 +337,9 @@ def simulate_streams(
         swing = (np.sin(2 * math.pi * times[:, None, None] * frequency + phase) * size).sum(axis=1)
         tilt, roll = np.zeros((len(times), 3)), np.zeros((len(times), 3))
         tilt[:, :2], roll[:, 2] = swing[:, 3:5], swing[:, 5]
-        return _centred(rotation(tilt) @ rotation(roll), swing[:, :3] + np.array([0.0, 0.0, layout.distance]), pattern)
+        return _centred(
+            rotation(tilt) @ rotation(roll), swing[:, :3] + np.array([0.0, 0.0, layout.distance]), pattern
+        )
 
     true_hand = np.arange(round(seconds * hand_rate)) / hand_rate
     # not in step with the robot's samples
@@ -278,26 +350,47 @@ def simulate_streams(
     seen = boards(true_camera)
     seen[:, :3, :3] = seen[:, :3, :3] @ rotation(camera_rad * rng.normal(size=(len(seen), 3)))
     seen[:, :3, 3] += camera_m * rng.normal(size=(len(seen), 3))
-    return HandEyeStreams(setup, true_hand, hand, true_camera + clock_offset, seen, clock_offset, T_parent_camera, T_parent_board, seed)
+    return HandEyeStreams(
+        setup,
+        true_hand,
+        hand,
+        true_camera + clock_offset,
+        seen,
+        clock_offset,
+        T_parent_camera,
+        T_parent_board,
+        seed,
+    )
 
 
-# ---- Data that cannot tell -------------------------------------------------------------------------------------------
+# ---- Data that cannot tell
+# -------------------------------------------------------------------------------------------
 
 
 def one_rotation_axis(setup: Setup = "eye-to-hand", poses: int = 30, **options: Any) -> HandEyeScene:
-    """A SCARA: the hand turns about the vertical only. The camera's (the board's) place along that axis cannot be seen."""
+    """A SCARA: the hand turns about the vertical only. The camera's (the board's) place along that axis
+    cannot be seen.
+    """
     layout = replace(options.pop("layout", LAYOUTS[setup]), tilt=0.0)
     return simulate_handeye(setup, poses, layout=layout, camera_looks_down=True, **options)
 
 
 def pure_translation(setup: Setup = "eye-to-hand", poses: int = 30, **options: Any) -> HandEyeScene:
     """The hand never turns: the camera's orientation can be found, its place cannot."""
-    return simulate_handeye(setup, poses, layout=replace(options.pop("layout", LAYOUTS[setup]), tilt=0.0, roll=0.0), **options)
+    return simulate_handeye(
+        setup, poses, layout=replace(options.pop("layout", LAYOUTS[setup]), tilt=0.0, roll=0.0), **options
+    )
 
 
-def tiny_rotations(setup: Setup = "eye-to-hand", poses: int = 30, *, angle: float = math.radians(0.5), **options: Any) -> HandEyeScene:
-    """The hand turns by no more than `angle` [rad] about any axis: what is found of the camera's place drowns in noise."""
-    return simulate_handeye(setup, poses, layout=replace(options.pop("layout", LAYOUTS[setup]), tilt=angle, roll=angle), **options)
+def tiny_rotations(
+    setup: Setup = "eye-to-hand", poses: int = 30, *, angle: float = math.radians(0.5), **options: Any
+) -> HandEyeScene:
+    """The hand turns by no more than `angle` [rad] about any axis: what is found of the camera's place drowns
+    in noise.
+    """
+    return simulate_handeye(
+        setup, poses, layout=replace(options.pop("layout", LAYOUTS[setup]), tilt=angle, roll=angle), **options
+    )
 
 
 def equal_poses(setup: Setup = "eye-to-hand", poses: int = 5, **options: Any) -> HandEyeScene:
@@ -310,7 +403,8 @@ def two_poses(setup: Setup = "eye-to-hand", poses: int = 2, **options: Any) -> H
     return simulate_handeye(setup, poses, **options)
 
 
-# ---- Data that are wrong ---------------------------------------------------------------------------------------------
+# ---- Data that are wrong
+# ---------------------------------------------------------------------------------------------
 
 
 def inverted_hand(scene: HandEyeScene) -> HandEyeScene:
@@ -325,7 +419,10 @@ def inverted_board(scene: HandEyeScene) -> HandEyeScene:
 
 def scalar_last(scene: HandEyeScene) -> HandEyeScene:
     """The hand's quaternions were written x y z w and read as w x y z."""
-    return _rotated(scene, rotation_of_quaternion(np.roll(quaternion_of_rotation(scene.T_base_hand[:, :3, :3]), -1, axis=1)))
+    return _rotated(
+        scene,
+        rotation_of_quaternion(np.roll(quaternion_of_rotation(scene.T_base_hand[:, :3, :3]), -1, axis=1)),
+    )
 
 
 def millimetres(scene: HandEyeScene) -> HandEyeScene:
@@ -336,7 +433,9 @@ def millimetres(scene: HandEyeScene) -> HandEyeScene:
 
 
 def left_handed(scene: HandEyeScene) -> HandEyeScene:
-    """The hand's poses come from a world with y the other way: every matrix is a proper frame still, but of a mirrored robot."""
+    """The hand's poses come from a world with y the other way: every matrix is a proper frame still, but of a
+    mirrored robot.
+    """
     mirror = np.diag([1.0, -1.0, 1.0, 1.0])
     return replace(scene, T_base_hand=mirror @ scene.T_base_hand @ mirror)
 
@@ -344,7 +443,11 @@ def left_handed(scene: HandEyeScene) -> HandEyeScene:
 def euler_order(scene: HandEyeScene) -> HandEyeScene:
     """The hand's angles are of Rz(c) Ry(b) Rx(a) and were read as Rx(a) Ry(b) Rz(c)."""
     R = scene.T_base_hand[:, :3, :3]
-    a, b, c = np.arctan2(R[:, 2, 1], R[:, 2, 2]), np.arcsin(np.clip(-R[:, 2, 0], -1, 1)), np.arctan2(R[:, 1, 0], R[:, 0, 0])
+    a, b, c = (
+        np.arctan2(R[:, 2, 1], R[:, 2, 2]),
+        np.arcsin(np.clip(-R[:, 2, 0], -1, 1)),
+        np.arctan2(R[:, 1, 0], R[:, 0, 0]),
+    )
     x, y, z = (rotation(angle[:, None] * axis) for angle, axis in zip((a, b, c), np.eye(3), strict=True))
     return _rotated(scene, x @ y @ z)
 
@@ -355,8 +458,14 @@ def degrees_as_radians(scene: HandEyeScene) -> HandEyeScene:
 
 
 def flipped_boards(scene: HandEyeScene, share: float = 0.3) -> HandEyeScene:
-    """In so many images (rounded) the board was found turned by 180 degrees: its last point taken for the first. These rows are the outliers."""
-    rows = np.sort(np.random.default_rng([scene.seed, 7]).choice(scene.poses, size=round(share * scene.poses), replace=False))
+    """In so many images (rounded) the board was found turned by 180 degrees: its last point taken for the
+    first. These rows are the outliers.
+    """
+    rows = np.sort(
+        np.random.default_rng([scene.seed, 7]).choice(
+            scene.poses, size=round(share * scene.poses), replace=False
+        )
+    )
     turn = np.diag([-1.0, -1.0, 1.0, 1.0])
     turn[:3, 3] = 2 * scene.board.centre
     seen = scene.T_camera_board.copy()
@@ -381,7 +490,12 @@ def one_behind(scene: HandEyeScene) -> HandEyeScene:
     shifted = np.roll(np.arange(scene.poses), -1)[:-1]
     kept = np.arange(scene.poses - 1)
     later, earlier = scene.select(shifted), scene.select(kept)
-    return replace(earlier, T_camera_board=later.T_camera_board, true_T_camera_board=later.true_T_camera_board, pixels=later.pixels)
+    return replace(
+        earlier,
+        T_camera_board=later.T_camera_board,
+        true_T_camera_board=later.true_T_camera_board,
+        pixels=later.pixels,
+    )
 
 
 def shuffled(scene: HandEyeScene, seed: int = 1) -> HandEyeScene:
@@ -398,37 +512,70 @@ def scaled(scene: HandEyeScene, factor: float = 1000.0) -> HandEyeScene:
         return out
 
     return replace(
-        scene, T_base_hand=scale(scene.T_base_hand), T_camera_board=scale(scene.T_camera_board), T_parent_camera=scale(scene.T_parent_camera),
-        T_parent_board=scale(scene.T_parent_board), true_T_base_hand=scale(scene.true_T_base_hand), true_T_camera_board=scale(scene.true_T_camera_board),
-        hand_m=factor * scene.hand_m, camera_m=factor * scene.camera_m, board=replace(scene.board, spacing=factor * scene.board.spacing),
-    )  # fmt: skip
+        scene,
+        T_base_hand=scale(scene.T_base_hand),
+        T_camera_board=scale(scene.T_camera_board),
+        T_parent_camera=scale(scene.T_parent_camera),
+        T_parent_board=scale(scene.T_parent_board),
+        true_T_base_hand=scale(scene.true_T_base_hand),
+        true_T_camera_board=scale(scene.true_T_camera_board),
+        hand_m=factor * scene.hand_m,
+        camera_m=factor * scene.camera_m,
+        board=replace(scene.board, spacing=factor * scene.board.spacing),
+    )
 
 
-DEGENERATE: Mapping[str, Callable[..., HandEyeScene]] = MappingProxyType({
-    "one rotation axis": one_rotation_axis, "pure translation": pure_translation, "tiny rotations": tiny_rotations, "equal poses": equal_poses,
-    "two poses": two_poses,
-})  # fmt: skip
-MISTAKES: Mapping[str, Callable[[HandEyeScene], HandEyeScene]] = MappingProxyType({
-    "inverted hand": inverted_hand, "inverted board": inverted_board, "quaternion x y z w": scalar_last, "mm for m": millimetres,
-    "left-handed": left_handed, "Euler order": euler_order, "degrees for radians": degrees_as_radians, "flipped boards": flipped_boards,
-    "typing error": typing_error, "one behind": one_behind,
-})  # fmt: skip
+DEGENERATE: Mapping[str, Callable[..., HandEyeScene]] = MappingProxyType(
+    {
+        "one rotation axis": one_rotation_axis,
+        "pure translation": pure_translation,
+        "tiny rotations": tiny_rotations,
+        "equal poses": equal_poses,
+        "two poses": two_poses,
+    }
+)
+MISTAKES: Mapping[str, Callable[[HandEyeScene], HandEyeScene]] = MappingProxyType(
+    {
+        "inverted hand": inverted_hand,
+        "inverted board": inverted_board,
+        "quaternion x y z w": scalar_last,
+        "mm for m": millimetres,
+        "left-handed": left_handed,
+        "Euler order": euler_order,
+        "degrees for radians": degrees_as_radians,
+        "flipped boards": flipped_boards,
+        "typing error": typing_error,
+        "one behind": one_behind,
+    }
+)
 
 
-# ---- Images ----------------------------------------------------------------------------------------------------------
+# ---- Images
+# ----------------------------------------------------------------------------------------------------------
 
 
 def render_board(
-    camera: PinholeCamera, board: Board, T_camera_board: Floats, *, blur: float = 0.6, noise: float = 2.0, samples: int = 4, seed: int = 0
+    camera: PinholeCamera,
+    board: Board,
+    T_camera_board: Floats,
+    *,
+    blur: float = 0.6,
+    noise: float = 2.0,
+    samples: int = 4,
+    seed: int = 0,
 ) -> NDArray[np.uint8]:
     """A grey image of the board through the lens, shape=(height, width).
 
-    Every pixel is the mean of samples x samples rays, each followed through the distortion to the board's plane, so corners and circles are
-    where `camera.project` says. `blur` is the lens's standard deviation [px], `noise` the sensor's [grey levels of 255].
+    Every pixel is the mean of samples x samples rays, each followed through the distortion to the board's
+    plane, so corners and circles are
+    where `camera.project` says. `blur` is the lens's standard deviation [px], `noise` the sensor's [grey
+    levels of 255].
     """
     outline = _outline(board)
     across = np.linspace(0, 1, 50)[:, None]
-    edges = np.concatenate([(1 - across) * a + across * b for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True)])
+    edges = np.concatenate(
+        [(1 - across) * a + across * b for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True)]
+    )
     in_camera = _apply(T_camera_board[None], edges)[0]
     if in_camera[:, 2].min() <= 0:
         raise InputError("a board behind the camera cannot be drawn")
@@ -436,15 +583,26 @@ def render_board(
     pixels = camera.project(in_camera)
     margin = 3 + 4 * blur
     left, top = np.maximum(np.floor(pixels.min(axis=0) - margin), 0).astype(int)
-    right, bottom = np.minimum(np.ceil(pixels.max(axis=0) + margin) + 1, [camera.width, camera.height]).astype(int)
+    right, bottom = np.minimum(
+        np.ceil(pixels.max(axis=0) + margin) + 1, [camera.width, camera.height]
+    ).astype(int)
     if right > left and bottom > top:
-        part = _rays_to_grey(camera, board, T_camera_board, np.arange(left, right), np.arange(top, bottom), samples)
+        part = _rays_to_grey(
+            camera, board, T_camera_board, np.arange(left, right), np.arange(top, bottom), samples
+        )
         image[top:bottom, left:right] = _blurred(part, blur) if blur > 0 else part
     image += noise * np.random.default_rng([seed, 9]).normal(size=image.shape)
     return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
 
 
-def _rays_to_grey(camera: PinholeCamera, board: Board, T_camera_board: Floats, columns: NDArray[np.intp], rows: NDArray[np.intp], samples: int) -> Floats:
+def _rays_to_grey(
+    camera: PinholeCamera,
+    board: Board,
+    T_camera_board: Floats,
+    columns: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    samples: int,
+) -> Floats:
     u, v = np.meshgrid(columns, rows)
     rays = camera.rays(np.stack([u, v], axis=-1).astype(float))
     along_v, along_u = np.gradient(rays, axis=(0, 1))  # within a pixel the lens is linear
@@ -465,15 +623,27 @@ def _blurred(image: Floats, deviation: float) -> Floats:
     for axis in (0, 1):
         padded = np.pad(image, [(reach, reach) if a == axis else (0, 0) for a in (0, 1)], mode="edge")
         size = image.shape[axis]
-        image = np.sum([weight * np.take(padded, range(k, k + size), axis=axis) for k, weight in enumerate(kernel)], axis=0)
+        image = np.sum(
+            [weight * np.take(padded, range(k, k + size), axis=axis) for k, weight in enumerate(kernel)],
+            axis=0,
+        )
     return image
 
 
 def _outline(board: Board, around: float = 2.0) -> Floats:
-    """Corners of the sheet with so many squares around the points: 1 to the end of a chessboard, 2 to that of its paper."""
+    """Corners of the sheet with so many squares around the points: 1 to the end of a chessboard, 2 to that of
+    its paper.
+    """
     edge = around * board.spacing
     right, bottom = 2 * board.centre[:2]
-    return np.array([[-edge, -edge, 0], [right + edge, -edge, 0], [right + edge, bottom + edge, 0], [-edge, bottom + edge, 0]])
+    return np.array(
+        [
+            [-edge, -edge, 0],
+            [right + edge, -edge, 0],
+            [right + edge, bottom + edge, 0],
+            [-edge, bottom + edge, 0],
+        ]
+    )
 
 
 def _grey(board: Board, at: Floats) -> Floats:
@@ -484,11 +654,18 @@ def _grey(board: Board, at: Floats) -> Floats:
         black = inside & ((np.floor(x) + np.floor(y)) % 2 == 0)
     else:
         column, row = np.rint(x), np.rint(y)
-        black = (column >= 0) & (column < board.columns) & (row >= 0) & (row < board.rows) & ((x - column) ** 2 + (y - row) ** 2 < 0.28**2)
+        black = (
+            (column >= 0)
+            & (column < board.columns)
+            & (row >= 0)
+            & (row < board.rows)
+            & ((x - column) ** 2 + (y - row) ** 2 < 0.28**2)
+        )
     return np.where(black, 30.0, grey)
 
 
-# ---- Rotations and frames --------------------------------------------------------------------------------------------
+# ---- Rotations and frames
+# --------------------------------------------------------------------------------------------
 
 
 def rotation(vectors: Floats) -> Floats:
@@ -498,7 +675,9 @@ def rotation(vectors: Floats) -> Floats:
     x, y, z = np.moveaxis(vectors, -1, 0)
     zero = np.zeros_like(x)
     K = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
-    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (K @ K))
+    return np.asarray(
+        np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (K @ K)
+    )
 
 
 def rotation_vector(R: Floats) -> Floats:
@@ -515,7 +694,12 @@ def quaternion_of_rotation(R: Floats) -> Floats:
     xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
     wx, wy, wz = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
     xy, xz, yz = R[..., 1, 0] + R[..., 0, 1], R[..., 0, 2] + R[..., 2, 0], R[..., 2, 1] + R[..., 1, 2]
-    rows = [[1 + xx + yy + zz, wx, wy, wz], [wx, 1 + xx - yy - zz, xy, xz], [wy, xy, 1 - xx + yy - zz, yz], [wz, xz, yz, 1 - xx - yy + zz]]
+    rows = [
+        [1 + xx + yy + zz, wx, wy, wz],
+        [wx, 1 + xx - yy - zz, xy, xz],
+        [wy, xy, 1 - xx + yy - zz, yz],
+        [wz, xz, yz, 1 - xx - yy + zz],
+    ]
     outer = np.stack([np.stack(row, -1) for row in rows], -2)
     best = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
     q = np.take_along_axis(outer, best[..., None, None], axis=-2)[..., 0, :]
@@ -526,9 +710,14 @@ def quaternion_of_rotation(R: Floats) -> Floats:
 def rotation_of_quaternion(q: Floats) -> Floats:
     """Rotation matrices of unit quaternions w x y z, shape=(..., 4)."""
     w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
-    return np.stack([np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
-                     np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
-                     np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1)], -2)  # fmt: skip
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
+        ],
+        -2,
+    )
 
 
 def _frames(R: Floats, t: Floats) -> Floats:
@@ -557,7 +746,9 @@ def _centred(R: Floats, centres: Floats, board: Board) -> Floats:
     return _frames(R, centres - R @ board.centre)
 
 
-def _mounts(setup: Setup, layout: Layout, board: Board, camera_looks_down: bool, seed: int) -> tuple[Floats, Floats]:
+def _mounts(
+    setup: Setup, layout: Layout, board: Board, camera_looks_down: bool, seed: int
+) -> tuple[Floats, Floats]:
     """True T_parent_camera and T_parent_board."""
     rng = np.random.default_rng([seed, 1])
     middle = layout.reach * _directions(rng, 1)[0]
@@ -583,21 +774,29 @@ def _visible_boards(count: int, layout: Layout, camera: PinholeCamera, board: Bo
     kept: list[Floats] = []
     found = 0
     for _ in range(100 + 20 * count // _BATCH):
-        centres = rng.uniform(-1, 1, (_BATCH, 3)) * np.array(layout.box) + np.array([0.0, 0.0, layout.distance])
+        centres = rng.uniform(-1, 1, (_BATCH, 3)) * np.array(layout.box) + np.array(
+            [0.0, 0.0, layout.distance]
+        )
         around = rng.uniform(-math.pi, math.pi, _BATCH)
         away = layout.tilt * np.sqrt(rng.uniform(0, 1, _BATCH))
         roll = rng.uniform(-layout.roll, layout.roll, _BATCH)
         zero = np.zeros(_BATCH)
-        R = rotation(np.column_stack([away * np.cos(around), away * np.sin(around), zero])) @ rotation(np.column_stack([zero, zero, roll]))
+        R = rotation(np.column_stack([away * np.cos(around), away * np.sin(around), zero])) @ rotation(
+            np.column_stack([zero, zero, roll])
+        )
         frames = _centred(R, centres, board)
         points = _apply(frames, corners)
         pixels = camera.project(points)
-        frames = frames[((pixels > low) & (pixels < high)).all(axis=(1, 2)) & (points[..., 2] > 0).all(axis=1)]
+        frames = frames[
+            ((pixels > low) & (pixels < high)).all(axis=(1, 2)) & (points[..., 2] > 0).all(axis=1)
+        ]
         kept.append(frames)
         found += len(frames)
         if found >= count:
             return np.concatenate(kept)[:count]
-    raise InputError("this camera hardly ever sees the whole board in this layout: a smaller board, or one farther away")
+    raise InputError(
+        "this camera hardly ever sees the whole board in this layout: a smaller board, or one farther away"
+    )
 
 
 def _hand_of(setup: Setup, T_parent_camera: Floats, T_parent_board: Floats, T_camera_board: Floats) -> Floats:

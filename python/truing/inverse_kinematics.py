@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics and compensation: inverse, inverse_path, compensate. Each function hands its keywords to the C++ core.
+"""Inverse kinematics and compensation: inverse, inverse_path, compensate. Each function hands its keywords to
+the C++ core.
 
-    found = truing.inverse(robot, poses, kind="torch")  # poses: shape=(n, 4, 4), or what load_targets read
-    found.joints, found.reached, found.position_error
+found = truing.inverse(robot, poses, kind="torch")  # poses: shape=(n, 4, 4), or what load_targets read
+found.joints, found.reached, found.position_error
 
-    made = truing.compensate(nominal, calibrated, poses)
-    made.solutions.joints, made.T_command
+made = truing.compensate(nominal, calibrated, poses)
+made.solutions.joints, made.T_command
 """
 
 from __future__ import annotations
@@ -18,7 +19,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truing import _core
-from truing._core import Compensations, Compensator, Conditions, InverseSolver, JointPath, Robot, Scene, Solutions, Task
+from truing._core import (
+    Compensations,
+    Compensator,
+    Conditions,
+    InverseSolver,
+    JointPath,
+    Robot,
+    Scene,
+    Solutions,
+    Task,
+)
 from truing.errors import InputError
 from truing.files import TargetData, Uncertainty
 
@@ -48,25 +59,46 @@ def inverse(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Solutions:
-    """Joint readings that bring the robot's tool to each target, effects included. What cannot be reached is told in the result.
+    """Joint readings that bring the robot's tool to each target, effects included. What cannot be reached is
+    told in the result.
 
-    robot: nominal or calibrated. targets: shape=(n, 4, 4) [m] poses in the measurement frame, a sequence of `Task`, or what `load_targets` read.
-    kind: of poses given as an array: "pose", "torch" (roll about the tool's z is free) or "point" (position alone).
-    seeds: shape=(driven joints,) or (n, driven joints) [rad | m], where the robot comes from; None: those of the file, or the middle of the joints' ranges.
-    choose: which of several answers: "nearest" to the seed, "limits_margin", "manipulability" or "rail_travel".
-    scene: what the robot must not touch. conditions: payload, approach direction …, one or one per target; None: those of the file.
+    robot: nominal or calibrated. targets: shape=(n, 4, 4) [m] poses in the measurement frame, a sequence of
+    `Task`, or what `load_targets` read.
+    kind: of poses given as an array: "pose", "torch" (roll about the tool's z is free) or "point" (position
+    alone).
+    seeds: shape=(driven joints,) or (n, driven joints) [rad | m], where the robot comes from; None: those of
+    the file, or the middle of the joints' ranges.
+    choose: which of several answers: "nearest" to the seed, "limits_margin", "manipulability" or
+    "rail_travel".
+    scene: what the robot must not touch. conditions: payload, approach direction …, one or one per target;
+    None: those of the file.
     target: which of the robot's targets is brought there, its index.
-    position_tolerance: [m], rotation_tolerance: [rad] an answer misses the task by no more. max_restarts: descents before a target is given up.
-    threads: 0: as many as the machine has; the answers are the same for any number. progress: called with targets done, now and then.
+    position_tolerance: [m], rotation_tolerance: [rad] an answer misses the task by no more. max_restarts:
+    descents before a target is given up.
+    threads: 0: as many as the machine has; the answers are the same for any number. progress: called with
+    targets done, now and then.
 
-    For many calls with one robot make an `InverseSolver` once. Raises InputError on robots, targets or options that cannot be used.
+    For many calls with one robot make an `InverseSolver` once. Raises InputError on robots, targets or
+    options that cannot be used.
     """
     tasks = _tasks(targets)
     given = _conditions(targets, conditions)
-    options = _core.InverseOptions(position_tolerance=position_tolerance, rotation_tolerance=rotation_tolerance, choose=choose, max_restarts=max_restarts,
-                                   scene=scene or Scene())  # fmt: skip
+    options = _core.InverseOptions(
+        position_tolerance=position_tolerance,
+        rotation_tolerance=rotation_tolerance,
+        choose=choose,
+        max_restarts=max_restarts,
+        scene=scene or Scene(),
+    )
     solver = InverseSolver(robot, options, _first(given), target=target)
-    return solver.solve_batch(tasks, _seeds(targets, seeds), given, like=Task(np.eye(4), kind=kind), threads=threads, progress=progress)
+    return solver.solve_batch(
+        tasks,
+        _seeds(targets, seeds),
+        given,
+        like=Task(np.eye(4), kind=kind),
+        threads=threads,
+        progress=progress,
+    )
 
 
 def inverse_path(
@@ -85,19 +117,30 @@ def inverse_path(
     smoothing: int = _USUAL_PATH.smoothing,
     progress: Progress | None = None,
 ) -> JointPath:
-    """Joints along a chain of targets, in steps as short as can be; where none keeps within the bounds, the gap is told.
+    """Joints along a chain of targets, in steps as short as can be; where none keeps within the bounds, the
+    gap is told.
 
-    robot, targets, kind, scene, target, progress: as in `inverse`. seed: shape=(driven joints,) [rad | m], where the robot comes from.
+    robot, targets, kind, scene, target, progress: as in `inverse`. seed: shape=(driven joints,) [rad | m],
+    where the robot comes from.
     conditions: of the whole path; None: those of the file, whose rows must agree.
     longest_turn: [rad], longest_slide: [m] of a joint between neighbouring targets; more is a gap.
-    rolls: samples of a torch's free roll. rail_places: of each rail. smoothing: rounds that even the path out.
+    rolls: samples of a torch's free roll. rail_places: of each rail. smoothing: rounds that even the path
+    out.
 
     Raises InputError as `inverse` does.
     """
     tasks = _tasks(targets)
-    given = targets.path_conditions() if conditions is None and isinstance(targets, TargetData) else conditions
+    given = (
+        targets.path_conditions() if conditions is None and isinstance(targets, TargetData) else conditions
+    )
     solver = InverseSolver(robot, _core.InverseOptions(scene=scene or Scene()), given, target=target)
-    options = _core.PathOptions(longest_turn=longest_turn, longest_slide=longest_slide, rolls=rolls, rail_places=rail_places, smoothing=smoothing)
+    options = _core.PathOptions(
+        longest_turn=longest_turn,
+        longest_slide=longest_slide,
+        rolls=rolls,
+        rail_places=rail_places,
+        smoothing=smoothing,
+    )
     seeds = _seeds(targets, seed)
     first = None if seeds is None else seeds if seeds.ndim == 1 else seeds[0]
     return solver.path(tasks, first, options, given, like=Task(np.eye(4), kind=kind), progress=progress)
@@ -120,24 +163,37 @@ def compensate(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Compensations:
-    """What to command to a controller that believes in the nominal robot, so that the calibrated one goes where it is wanted.
+    """What to command to a controller that believes in the nominal robot, so that the calibrated one goes
+    where it is wanted.
 
-    nominal: what the controller believes. calibrated: what `identify` found. targets: as in `inverse`; or, with `program`, joint positions, shape=(n, driven joints)
+    nominal: what the controller believes. calibrated: what `identify` found. targets: as in `inverse`; or,
+    with `program`, joint positions, shape=(n, driven joints)
     [rad | m]: the nominal robot's pose there is what is wanted. A file with joints and no poses is a program.
-    kind, seeds, choose, scene, conditions, target, threads, progress: as in `inverse`. The seed decides the configuration.
-    in_base: poses and commands are in each robot's own base frame, as programs have them; else in the measurement frame.
+    kind, seeds, choose, scene, conditions, target, threads, progress: as in `inverse`. The seed decides the
+    configuration.
+    in_base: poses and commands are in each robot's own base frame, as programs have them; else in the
+    measurement frame.
     uncertainty: what `load_uncertainty` read, for the standard error of where the tool will be.
 
     Raises InputError as `inverse` does, and when the robots have different joints.
     """
     given = _conditions(targets, conditions)
-    options = _core.CompensateOptions(inverse=_core.InverseOptions(choose=choose, scene=scene or Scene()), in_base=in_base)
+    options = _core.CompensateOptions(
+        inverse=_core.InverseOptions(choose=choose, scene=scene or Scene()), in_base=in_base
+    )
     maker = Compensator(nominal, calibrated, options, _first(given), target=target)
     if uncertainty is not None:
         maker.set_uncertainty(uncertainty.names, uncertainty.values, uncertainty.covariance)
     if program or isinstance(targets, TargetData) and targets.is_program:
         return maker.joints_batch(_program(targets), given, threads=threads, progress=progress)
-    return maker.pose_batch(_tasks(targets), _seeds(targets, seeds), given, like=Task(np.eye(4), kind=kind), threads=threads, progress=progress)
+    return maker.pose_batch(
+        _tasks(targets),
+        _seeds(targets, seeds),
+        given,
+        like=Task(np.eye(4), kind=kind),
+        threads=threads,
+        progress=progress,
+    )
 
 
 def _tasks(targets: Targets) -> list[Task] | NDArray[np.float64]:

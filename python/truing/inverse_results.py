@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""What ``truing ik`` and ``truing compensate`` found, as it is written: ``result.json``, ``joints.csv``, ``poses.csv``, the report."""
+"""What ``truing ik`` and ``truing compensate`` found, as it is written: ``result.json``, ``joints.csv``,
+``poses.csv``, the report.
+"""
 
 from __future__ import annotations
 
@@ -52,20 +54,25 @@ class CompensatedProgram:
 
 @dataclass(frozen=True)
 class Drawing:
-    """What the reports draw, beside what result.json holds. In the measurement frame, or in the robot's base frame where the targets are."""
+    """What the reports draw, beside what result.json holds. In the measurement frame, or in the robot's base
+    frame where the targets are.
+    """
 
     wanted: Floats  # shape=(n, 3) [m] wanted places of the targets
     reasons: tuple[str, ...]  # n of them
     texts: tuple[str, ...]  # n of them: in words
     robots: tuple[Floats, ...]  # shape=(joints + 2, 3) [m]: base, every joint's frame, target
     joints: Floats  # shape=(n, driven joints) [rad | m]; NaN where there are none to command
-    obstacles: tuple[tuple[str, Floats], ...] = ()  # name, and a line along its outline, shape=(k, 3) [m]; gaps are NaN
+    obstacles: tuple[
+        tuple[str, Floats], ...
+    ] = ()  # name, and a line along its outline, shape=(k, 3) [m]; gaps are NaN
     correction: Floats | None = None  # shape=(n, 3) [m] of compensated commands
     before: Floats | None = None  # shape=(n,) [m]
     sigma: Floats | None = None  # shape=(n, 6) [m], [rad]
 
 
-# ---- What both write -------------------------------------------------------------------------------------------------
+# ---- What both write
+# -------------------------------------------------------------------------------------------------
 
 
 def is_commanded(solution: truing.Solution) -> bool:
@@ -91,7 +98,9 @@ def solution_columns(solver: truing.InverseSolver, solutions: Sequence[truing.So
 
 def _commanded_joints(solver: truing.InverseSolver, solutions: Sequence[truing.Solution]) -> Floats:
     nothing = np.full(solver.driven_count, np.nan)
-    return np.array([np.asarray(s.joints) if is_commanded(s) else nothing for s in solutions]).reshape(-1, solver.driven_count)
+    return np.array([np.asarray(s.joints) if is_commanded(s) else nothing for s in solutions]).reshape(
+        -1, solver.driven_count
+    )
 
 
 def _failure(solver: truing.InverseSolver, target: int, s: truing.Solution) -> dict[str, Any]:
@@ -100,19 +109,35 @@ def _failure(solver: truing.InverseSolver, target: int, s: truing.Solution) -> d
     if s.reason == "retreated":
         return {**found, "retreat_m": s.retreat}
     if s.reason == "interference":
-        return {**found, "pair": contact_names(solver, s), "own_parts": is_with_itself(solver, s), "distance_m": s.contact_distance}
+        return {
+            **found,
+            "pair": contact_names(solver, s),
+            "own_parts": is_with_itself(solver, s),
+            "distance_m": s.contact_distance,
+        }
     unit = "rad" if s.position_error <= solver.options.position_tolerance else "m"
     found |= {f"miss_{unit}": s.miss, "direction": s.direction}
     if s.joint >= 0:
         joint = limited_joint(solver.robot, s.joint)
         found |= {"joint": joint.name, f"excess_{'rad' if joint.type == 'revolute' else 'm'}": s.excess}
-    return {**found, "nearest": {"joints": s.joints, "position_error_m": s.position_error, "rotation_error_rad": s.rotation_error}}
+    return {
+        **found,
+        "nearest": {
+            "joints": s.joints,
+            "position_error_m": s.position_error,
+            "rotation_error_rad": s.rotation_error,
+        },
+    }
 
 
 def limited_joint(robot: truing.Robot, index: int) -> truing.Joint:
     """As `Solution.joint` counts: driven joints, then passive ones that have limits."""
     driven = [robot.joints[k] for k in robot.driven_joints()]
-    passive = [joint for joint in robot.joints if joint.passive and (np.isfinite(joint.lower) or np.isfinite(joint.upper))]
+    passive = [
+        joint
+        for joint in robot.joints
+        if joint.passive and (np.isfinite(joint.lower) or np.isfinite(joint.upper))
+    ]
     return [*driven, *passive][index]
 
 
@@ -137,7 +162,14 @@ def _ranges(robot: truing.Robot, joints: Floats) -> list[dict[str, Any]]:
     for k, index in enumerate(robot.driven_joints()):
         joint = robot.joints[index]
         used = [float(rows[:, k].min()), float(rows[:, k].max())] if len(rows) else None
-        found.append({"joint": joint.name, "unit": "rad" if joint.type == "revolute" else "m", "limits": [joint.lower, joint.upper], "used": used})
+        found.append(
+            {
+                "joint": joint.name,
+                "unit": "rad" if joint.type == "revolute" else "m",
+                "limits": [joint.lower, joint.upper],
+                "used": used,
+            }
+        )
     return found
 
 
@@ -147,7 +179,10 @@ def _counts(solutions: Iterable[truing.Solution]) -> dict[str, int]:
 
 def _worst(solutions: Iterable[truing.Solution]) -> dict[str, Any]:
     met = [s for s in solutions if s.reached]
-    return {"position_m": max((s.position_error for s in met), default=None), "rotation_rad": max((s.rotation_error for s in met), default=None)}
+    return {
+        "position_m": max((s.position_error for s in met), default=None),
+        "rotation_rad": max((s.rotation_error for s in met), default=None),
+    }
 
 
 def _skeletons(robot: truing.Robot, joints: Floats) -> tuple[Floats, ...]:
@@ -157,7 +192,9 @@ def _skeletons(robot: truing.Robot, joints: Floats) -> tuple[Floats, ...]:
         return ()
     pick = rows[np.unique(np.linspace(0, rows.size - 1, min(_ROBOTS_DRAWN, rows.size)).astype(np.intp))]
     base = np.asarray(robot.T_measurement_base)[None, :3, 3]
-    return tuple(np.concatenate([base, truing.forward_kinematics(robot, joints[row])[:, :3, 3]]) for row in pick)
+    return tuple(
+        np.concatenate([base, truing.forward_kinematics(robot, joints[row])[:, :3, 3]]) for row in pick
+    )
 
 
 def _outlines(scene: truing.Scene) -> tuple[tuple[str, Floats], ...]:
@@ -168,19 +205,33 @@ def _outlines(scene: truing.Scene) -> tuple[tuple[str, Floats], ...]:
     found = []
     for o in scene.obstacles:
         if o.shape == "box":
-            corners = 0.5 * np.asarray(o.size) * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+            corners = (
+                0.5
+                * np.asarray(o.size)
+                * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+            )
             pieces = [corners[[a, b]] for a in range(8) for b in range(a) if (a ^ b) in (1, 2, 4)]
         else:
             end = np.array([0.0, 0.0, o.size[2] if o.shape == "capsule" else 0.0])
-            pieces = [o.radius * circle, o.radius * circle + end, o.radius * circle[:, [0, 2, 1]], o.radius * circle[:, [2, 0, 1]] + end]
-            pieces += [np.array([side, side + end]) for side in o.radius * circle[::8]] if o.shape == "capsule" else []
+            pieces = [
+                o.radius * circle,
+                o.radius * circle + end,
+                o.radius * circle[:, [0, 2, 1]],
+                o.radius * circle[:, [2, 0, 1]] + end,
+            ]
+            pieces += (
+                [np.array([side, side + end]) for side in o.radius * circle[::8]]
+                if o.shape == "capsule"
+                else []
+            )
         line = np.concatenate([part for piece in pieces for part in (piece, gap)])
         T = np.asarray(o.T_measurement_shape)
         found.append((o.name, line @ T[:3, :3].T + T[:3, 3]))
     return tuple(found)
 
 
-# ---- truing ik -------------------------------------------------------------------------------------------------------
+# ---- truing ik
+# -------------------------------------------------------------------------------------------------------
 
 
 def first_of_each(solved: Solved) -> list[truing.Solution]:
@@ -201,7 +252,10 @@ def inverse_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
         "closed_form": solver.closed_form,
         "tasks": dict(Counter(task.kind for task in solved.data.tasks)),
         "choose": solver.options.choose,
-        "tolerance": {"position_m": solver.options.position_tolerance, "rotation_rad": solver.options.rotation_tolerance},
+        "tolerance": {
+            "position_m": solver.options.position_tolerance,
+            "rotation_rad": solver.options.rotation_tolerance,
+        },
         "targets": solved.data.count,
         "reached": len(reached),
         "reasons": _counts(solutions),
@@ -210,10 +264,17 @@ def inverse_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
         "failures": [_failure(solver, k, s) for k, s in enumerate(solutions) if not s.reached],
     }
     if solved.all_branches:
-        found["branches"] = {"rows": len(solved.solutions), "per_target": dict(Counter(int(n) for n in Counter(solved.target.tolist()).values()))}
+        found["branches"] = {
+            "rows": len(solved.solutions),
+            "per_target": dict(Counter(int(n) for n in Counter(solved.target.tolist()).values())),
+        }
     if not_empty(solver.options.scene):
         scene = solver.options.scene
-        found["scene"] = {"capsules": len(scene.capsules), "obstacles": len(scene.obstacles), "clearance_m": scene.clearance}
+        found["scene"] = {
+            "capsules": len(scene.capsules),
+            "obstacles": len(scene.obstacles),
+            "clearance_m": scene.clearance,
+        }
     if solved.path is not None and solved.steps is not None:
         found["path"] = _path(solved.path, solved.steps, solver.robot)
     found["warnings"] = list(warnings)
@@ -230,19 +291,30 @@ def _path(path: truing.JointPath, steps: truing.PathOptions, robot: truing.Robot
     for gap in path.gaps:
         joint = joints[gap.joint] if gap.joint >= 0 else None
         size = {} if joint is None else {f"step_{'rad' if joint.type == 'revolute' else 'm'}": gap.step}
-        gaps.append({"from": gap.start, "to": gap.start + 1, "joint": None if joint is None else joint.name, **size})
-    return {"continuous": path.continuous, "longest_turn_rad": path.longest_turn, "longest_slide_m": path.longest_slide,
-            "bounds": {"turn_rad": steps.longest_turn, "slide_m": steps.longest_slide}, "gaps": gaps}  # fmt: skip
+        gaps.append(
+            {"from": gap.start, "to": gap.start + 1, "joint": None if joint is None else joint.name, **size}
+        )
+    return {
+        "continuous": path.continuous,
+        "longest_turn_rad": path.longest_turn,
+        "longest_slide_m": path.longest_slide,
+        "bounds": {"turn_rad": steps.longest_turn, "slide_m": steps.longest_slide},
+        "gaps": gaps,
+    }
 
 
 def inverse_columns(solved: Solved) -> dict[str, Any]:
-    """Columns of ``joints.csv`` of ``truing ik``: one row per target in order; with all branches one per answer, and which target it is for."""
+    """Columns of ``joints.csv`` of ``truing ik``: one row per target in order; with all branches one per
+    answer, and which target it is for.
+    """
     columns = solution_columns(solved.solver, solved.solutions)
     if solved.all_branches:
         columns = {"target": solved.target.astype(np.int64), **columns}
     if any(task.kind == "torch" for task in solved.data.tasks):
         kinds = [solved.data.tasks[int(k)].kind for k in solved.target]
-        columns["roll_rad"] = np.array([s.roll if kind == "torch" else np.nan for s, kind in zip(solved.solutions, kinds, strict=True)])
+        columns["roll_rad"] = np.array(
+            [s.roll if kind == "torch" else np.nan for s, kind in zip(solved.solutions, kinds, strict=True)]
+        )
     if any(task.longest_retreat > 0 for task in solved.data.tasks):
         columns["retreat_m"] = np.array([s.retreat for s in solved.solutions])
     return columns
@@ -269,10 +341,13 @@ def write_inverse(folder: Path, solved: Solved, *, warnings: Iterable[str] = ())
     return found
 
 
-# ---- truing compensate -----------------------------------------------------------------------------------------------
+# ---- truing compensate
+# -----------------------------------------------------------------------------------------------
 
 
-def compensation_dict(made: CompensatedProgram, wanted: Floats, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
+def compensation_dict(
+    made: CompensatedProgram, wanted: Floats, *, warnings: Iterable[str] = ()
+) -> dict[str, Any]:
     """What ``result.json`` of ``truing compensate`` holds. `wanted`: shape=(n, 4, 4) [m]."""
     solver, solutions = made.compensator.calibrated, list(made.results.solutions)
     met = np.array([s.reached for s in solutions])
@@ -293,19 +368,28 @@ def compensation_dict(made: CompensatedProgram, wanted: Floats, *, warnings: Ite
         "before": statistics(np.where(met, before, np.nan)),
         "after": statistics(np.where(met, after, np.nan)),
         "correction": statistics(np.where(met, moved, np.nan)),
-        "other_configuration": [k for k, other in enumerate(made.results.other_configuration) if other and met[k]],
+        "other_configuration": [
+            k for k, other in enumerate(made.results.other_configuration) if other and met[k]
+        ],
         "joints": _ranges(solver.robot, _commanded_joints(solver, solutions)),
         "failures": [_failure(solver, k, s) for k, s in enumerate(solutions) if not s.reached],
     }
     if made.uncertain and met.any():
         rms = np.sqrt(np.mean(sigma[met] ** 2, axis=0))
-        found["standard_error"] = {"rms": dict(zip(MOTIONS, rms, strict=True)), "position_m": statistics(np.sqrt(np.sum(np.where(met[:, None], sigma, np.nan)[:, :3] ** 2, axis=1)))}
+        found["standard_error"] = {
+            "rms": dict(zip(MOTIONS, rms, strict=True)),
+            "position_m": statistics(
+                np.sqrt(np.sum(np.where(met[:, None], sigma, np.nan)[:, :3] ** 2, axis=1))
+            ),
+        }
     found["warnings"] = list(warnings)
     return found
 
 
 def wanted_frames(made: CompensatedProgram) -> Floats:
-    """shape=(n, 4, 4) [m]: of a program of joints the nominal robot's poses, in the frame that commands are in."""
+    """shape=(n, 4, 4) [m]: of a program of joints the nominal robot's poses, in the frame that commands are
+    in.
+    """
     if not made.data.is_program:
         return np.array([np.asarray(task.T_measurement_target) for task in made.data.tasks])
     nominal = made.compensator.nominal
@@ -316,13 +400,17 @@ def wanted_frames(made: CompensatedProgram) -> Floats:
 
 
 def compensation_columns(made: CompensatedProgram) -> dict[str, Any]:
-    """Columns of ``joints.csv`` of ``truing compensate``: those of ``truing ik``, the error without compensation, and standard errors if they are known."""
+    """Columns of ``joints.csv`` of ``truing compensate``: those of ``truing ik``, the error without
+    compensation, and standard errors if they are known.
+    """
     columns = solution_columns(made.compensator.calibrated, list(made.results.solutions))
     columns["position_before_m"] = np.asarray(made.results.position_before)
     columns["rotation_before_rad"] = np.asarray(made.results.rotation_before)
     columns["other_configuration"] = np.asarray(made.results.other_configuration).astype(np.int8)
     if made.uncertain:
-        columns.update({f"sigma_{name}": np.asarray(made.results.sigma)[:, k] for k, name in enumerate(MOTIONS)})
+        columns.update(
+            {f"sigma_{name}": np.asarray(made.results.sigma)[:, k] for k, name in enumerate(MOTIONS)}
+        )
     return columns
 
 
@@ -333,14 +421,22 @@ def pose_columns(made: CompensatedProgram) -> dict[str, Any]:
     solutions = list(made.results.solutions)
     good = np.array([is_commanded(s) for s in solutions])
     frames = np.asarray(made.results.T_command)
-    values = np.where(good[:, None], np.column_stack([frames[:, :3, 3], quaternions_from_rotations(frames[:, :3, :3])]), np.nan)
-    columns: dict[str, Any] = {name: values[:, k] for k, name in enumerate(("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"))}
+    values = np.where(
+        good[:, None],
+        np.column_stack([frames[:, :3, 3], quaternions_from_rotations(frames[:, :3, :3])]),
+        np.nan,
+    )
+    columns: dict[str, Any] = {
+        name: values[:, k] for k, name in enumerate(("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"))
+    }
     columns["other_configuration"] = np.asarray(made.results.other_configuration).astype(np.int8)
     columns["status"] = [status_text(made.compensator.calibrated, s) for s in solutions]
     return columns
 
 
-def write_compensation(folder: Path, made: CompensatedProgram, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
+def write_compensation(
+    folder: Path, made: CompensatedProgram, *, warnings: Iterable[str] = ()
+) -> dict[str, Any]:
     """Writes everything that ``truing compensate`` found into `folder`, and returns what result.json holds."""
     from truing.inverse_report import compensation_report
 
@@ -351,8 +447,14 @@ def write_compensation(folder: Path, made: CompensatedProgram, *, warnings: Iter
     met = ~np.isnan(joints[:, 0])
     robots, obstacles = _skeletons(solver.robot, joints), _outlines(solver.options.scene)
     if made.in_base:  # all is drawn where the targets are
-        R, p = np.asarray(solver.robot.T_measurement_base)[:3, :3], np.asarray(solver.robot.T_measurement_base)[:3, 3]
-        robots, obstacles = tuple((points - p) @ R for points in robots), tuple((name, (points - p) @ R) for name, points in obstacles)
+        R, p = (
+            np.asarray(solver.robot.T_measurement_base)[:3, :3],
+            np.asarray(solver.robot.T_measurement_base)[:3, 3],
+        )
+        robots, obstacles = (
+            tuple((points - p) @ R for points in robots),
+            tuple((name, (points - p) @ R) for name, points in obstacles),
+        )
     drawing = Drawing(
         wanted=wanted[:, :3, 3],
         reasons=tuple(s.reason for s in solutions),
@@ -360,7 +462,9 @@ def write_compensation(folder: Path, made: CompensatedProgram, *, warnings: Iter
         robots=robots,
         joints=joints,
         obstacles=obstacles,
-        correction=np.where(met[:, None], np.asarray(made.results.T_command)[:, :3, 3] - wanted[:, :3, 3], np.nan),
+        correction=np.where(
+            met[:, None], np.asarray(made.results.T_command)[:, :3, 3] - wanted[:, :3, 3], np.nan
+        ),
         before=np.where(met, np.asarray(made.results.position_before), np.nan),
         sigma=np.where(met[:, None], np.asarray(made.results.sigma), np.nan) if made.uncertain else None,
     )

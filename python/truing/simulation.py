@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Simulated measurements: a hidden true robot, and what an instrument would read from it.
 
-The truth is a copy of the nominal robot with errors drawn on its parameters; where its target is, `truing.predict` says. So
-these data test estimation and bookkeeping, not the model itself: what no model here knows is not in them either.
+The truth is a copy of the nominal robot with errors drawn on its parameters; where its target is,
+`truing.predict` says. So
+these data test estimation and bookkeeping, not the model itself: what no model here knows is not in them
+either.
 """
 
 from __future__ import annotations
@@ -53,7 +55,9 @@ class Truth:
     """The robot behind simulated measurements."""
 
     robot: truing.Robot
-    parameters: Mapping[str, tuple[float, float, str]]  # name: (nominal, true, unit) of every value that differs
+    parameters: Mapping[
+        str, tuple[float, float, str]
+    ]  # name: (nominal, true, unit) of every value that differs
     effects: Sequence[TrueEffect] = ()
 
 
@@ -79,9 +83,14 @@ class Simulation:
         return {
             "format": FORMAT,
             "robot": yaml.safe_load(robot_to_yaml(self.truth.robot)),
-            "parameters": {name: {"nominal": nominal, "true": true, "unit": unit}
-                           for name, (nominal, true, unit) in self.truth.parameters.items()},
-            "effects": [{"effect": e.effect, "joint": e.joint, "parameter": e.parameter, "value": e.value} for e in self.truth.effects],
+            "parameters": {
+                name: {"nominal": nominal, "true": true, "unit": unit}
+                for name, (nominal, true, unit) in self.truth.parameters.items()
+            },
+            "effects": [
+                {"effect": e.effect, "joint": e.joint, "parameter": e.parameter, "value": e.value}
+                for e in self.truth.effects
+            ],
             "noise_m": self.noise,
             "rotation_noise_rad": self.rotation_noise,
             "outlier_rows": list(self.outlier_rows),
@@ -89,7 +98,7 @@ class Simulation:
             "columns": list(self.columns),
             "rows": self.data.rows,
             "seed": self.seed,
-        }  # fmt: skip
+        }
 
 
 def simulate(
@@ -111,18 +120,38 @@ def simulate(
     base_unknown: bool = False,
     seed: int = 0,
 ) -> Simulation:
-    """Hides errors in a copy of `robot` and measures it: `true_robot`, then `measure`; see these for the arguments.
+    """Hides errors in a copy of `robot` and measures it: `true_robot`, then `measure`; see these for the
+    arguments.
 
-        simulated = truing.simulate(robot, poses=100, effects={"backlash.J2": 2e-4}, seed=1)
-        found = truing.identify(robot, simulated.data, effects="backlash:J2")
-        simulated.truth.parameters  # what should have been found
+    simulated = truing.simulate(robot, poses=100, effects={"backlash.J2": 2e-4}, seed=1)
+    found = truing.identify(robot, simulated.data, effects="backlash:J2")
+    simulated.truth.parameters  # what should have been found
     """
-    truth = true_robot(robot, lengths=lengths, angles=angles, ratios=ratios, only=only, effects=effects, base_unknown=base_unknown, seed=seed)
+    truth = true_robot(
+        robot,
+        lengths=lengths,
+        angles=angles,
+        ratios=ratios,
+        only=only,
+        effects=effects,
+        base_unknown=base_unknown,
+        seed=seed,
+    )
     wanted = list(columns)
     if any(effect.effect == "backlash" for effect in truth.effects):
         wanted.append("dir")  # without approach directions there is no backlash
-    return measure(truth, joints=joints, poses=poses, noise=noise, orientation=orientation, rotation_noise=rotation_noise,
-                   outlier_share=outlier_share, outlier_length=outlier_length, columns=wanted, seed=seed)  # fmt: skip
+    return measure(
+        truth,
+        joints=joints,
+        poses=poses,
+        noise=noise,
+        orientation=orientation,
+        rotation_noise=rotation_noise,
+        outlier_share=outlier_share,
+        outlier_length=outlier_length,
+        columns=wanted,
+        seed=seed,
+    )
 
 
 def true_robot(
@@ -143,9 +172,11 @@ def true_robot(
         angles: Of joint zeros and link twists [rad].
         ratios: Of gear ratios [-].
         only: Names and globs of the values that get errors ("J2.*", "*.offset"); empty: all.
-        effects: Effects that the true robot has as well, by parameter and in SI: {"backlash.J2": 2e-4, "harmonic.J3.cos1": 1e-4,
+        effects: Effects that the true robot has as well, by parameter and in SI: {"backlash.J2": 2e-4,
+        "harmonic.J3.cos1": 1e-4,
             "gear_ratio.J1": 1e-4}.
-        base_unknown: Put the robot somewhere else in the measurement frame: within 2 m, turned about z, tilted by up to 2 degrees.
+        base_unknown: Put the robot somewhere else in the measurement frame: within 2 m, turned about z,
+        tilted by up to 2 degrees.
         seed: The same seed gives the same robot, whatever is measured on it.
     """
     robot = nominal.copy()
@@ -155,7 +186,9 @@ def true_robot(
     sigma = {"m": lengths, "rad": angles, "-": ratios}
     met: set[str] = set()
     for owner, attribute, name, unit in _values(robot):
-        error = float(rng.normal()) * sigma[unit]  # drawn for every value, so that `only` does not change the others
+        error = (
+            float(rng.normal()) * sigma[unit]
+        )  # drawn for every value, so that `only` does not change the others
         matching = {pattern for pattern in chosen if fnmatch.fnmatchcase(name, pattern)}
         met |= matching
         if error and (matching or not chosen):
@@ -184,13 +217,17 @@ def true_robot(
                     changed[f"{name}.{axis}"] = (0.0, float(draws[3 + k]), "rad")
     for pattern in chosen:
         if pattern not in met and not pattern.startswith("base."):
-            raise InputError(f"{pattern!r} means no value of robot {robot.name!r} that an error can be put on")
+            raise InputError(
+                f"{pattern!r} means no value of robot {robot.name!r} that an error can be put on"
+            )
     hidden = tuple(_true_effect(robot, name, value) for name, value in (effects or {}).items())
     _add_effects(robot, hidden, changed)
     if base_unknown:
         place = np.eye(4)
         place[:3, 3] = rng.uniform(-2, 2, 3)
-        place[:3, :3] = truing.rotation_from_rpy(rng.uniform([-0.035, -0.035, -math.pi], [0.035, 0.035, math.pi]))
+        place[:3, :3] = truing.rotation_from_rpy(
+            rng.uniform([-0.035, -0.035, -math.pi], [0.035, 0.035, math.pi])
+        )
         robot.T_measurement_base = place
     return Truth(robot, changed, hidden)
 
@@ -215,7 +252,8 @@ def measure(
         noise: Standard deviation of each measured coordinate [m].
         orientation: Measure orientations too, with `rotation_noise` [rad] about each axis.
         outlier_share: This share of the rows is off by `outlier_length` [m] in a random direction.
-        columns: More recorded inputs, of "dir" (approach directions), "payload", "temp", "t"; they are there for effects to act on.
+        columns: More recorded inputs, of "dir" (approach directions), "payload", "temp", "t"; they are there
+        for effects to act on.
     """
     robot = truth.robot
     wanted = tuple(dict.fromkeys(columns))
@@ -244,8 +282,16 @@ def measure(
     away = rng.normal(size=(rows.size, 3))
     positions[rows] += outlier_length * away / np.linalg.norm(away, axis=1, keepdims=True)
     data = truing.Measurements(joints, positions=positions, orientations=orientations, **inputs)
-    return Simulation(truth, data, noise, rotation_noise if orientation else 0.0, tuple(int(row) for row in rows),
-                      outlier_length if rows.size else 0.0, seed, wanted)  # fmt: skip
+    return Simulation(
+        truth,
+        data,
+        noise,
+        rotation_noise if orientation else 0.0,
+        tuple(int(row) for row in rows),
+        outlier_length if rows.size else 0.0,
+        seed,
+        wanted,
+    )
 
 
 def random_joints(robot: truing.Robot, count: int, seed: int = 0) -> Floats:
@@ -258,9 +304,15 @@ def random_joints(robot: truing.Robot, count: int, seed: int = 0) -> Floats:
         joint = robot.joints[index]
         lower, upper = joint.lower, joint.upper
         if joint.type == "revolute":
-            lower, upper = max(lower, -math.pi) if math.isinf(lower) else lower, min(upper, math.pi) if math.isinf(upper) else upper
+            lower, upper = (
+                max(lower, -math.pi) if math.isinf(lower) else lower,
+                min(upper, math.pi) if math.isinf(upper) else upper,
+            )
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            raise InputError(f"joint {joint.name} is prismatic and has no limits: give it `limits` in the robot file to draw poses from")
+            raise InputError(
+                f"joint {joint.name} is prismatic and has no limits: give it `limits` in the robot file to"
+                " draw poses from"
+            )
         bounds.append((lower, upper))
     low, high = np.array(bounds).T
     return np.random.default_rng([seed, 2]).uniform(low, high, (count, len(bounds)))
@@ -272,7 +324,10 @@ def _true_effect(robot: truing.Robot, name: str, value: float) -> TrueEffect:
     effect, rest = (found[1], found[2] or "") if found else (name, "")
     known = [word for word, _ in truing.catalogue() if word not in _NOT_EFFECTS]
     if effect.partition("@")[0] not in known:
-        raise InputError(f"effect {effect!r} cannot be simulated; there are {', '.join(known)} (link geometry, base and tool come from options of their own)")
+        raise InputError(
+            f"effect {effect!r} cannot be simulated; there are {', '.join(known)} (link geometry, base and"
+            " tool come from options of their own)"
+        )
     if effect in _WHOLE_ROBOT:
         return TrueEffect(effect, "", name, value)
     joint, _, part = rest.partition(".")
@@ -282,7 +337,9 @@ def _true_effect(robot: truing.Robot, name: str, value: float) -> TrueEffect:
         if part:
             raise InputError(f"{effect} has one parameter only, found {name!r}")
         return TrueEffect(effect, joint, f"{joint}.{attribute}", value)
-    return TrueEffect(effect, joint, f"{effect}.{joint}" + (f".{part}" if part else _MAIN_PART.get(effect, "")), value)
+    return TrueEffect(
+        effect, joint, f"{effect}.{joint}" + (f".{part}" if part else _MAIN_PART.get(effect, "")), value
+    )
 
 
 def _values(robot: truing.Robot) -> Iterator[tuple[Any, str, str, str]]:
@@ -316,7 +373,9 @@ def _frames(robot: truing.Robot) -> Iterator[tuple[str, Any, Any]]:
         yield target.name, target.T_last_target, setter(target, "T_last_target")
 
 
-def _add_effects(robot: truing.Robot, effects: Sequence[TrueEffect], changed: dict[str, tuple[float, float, str]]) -> None:
+def _add_effects(
+    robot: truing.Robot, effects: Sequence[TrueEffect], changed: dict[str, tuple[float, float, str]]
+) -> None:
     applied: dict[tuple[str, str], dict[str, float]] = {}
     for effect in effects:
         attribute = _MODEL_EFFECTS.get(effect.effect)
@@ -324,12 +383,20 @@ def _add_effects(robot: truing.Robot, effects: Sequence[TrueEffect], changed: di
             joint = robot.joint(effect.joint)
             before = float(getattr(joint, attribute))
             setattr(joint, attribute, before + effect.value)
-            first, _, unit = changed.get(effect.parameter, (before, before, "-" if attribute == "ratio" else "rad"))
+            first, _, unit = changed.get(
+                effect.parameter, (before, before, "-" if attribute == "ratio" else "rad")
+            )
             changed[effect.parameter] = (first, before + effect.value, unit)
         else:
             applied.setdefault((effect.effect, effect.joint), {})[effect.parameter] = effect.value
     if applied:
-        robot.effects = [*robot.effects, *(truing.AppliedEffect(name, [joint] if joint else [], values) for (name, joint), values in applied.items())]
+        robot.effects = [
+            *robot.effects,
+            *(
+                truing.AppliedEffect(name, [joint] if joint else [], values)
+                for (name, joint), values in applied.items()
+            ),
+        ]
 
 
 def _inputs(robot: truing.Robot, n: int, columns: Sequence[str], seed: int) -> dict[str, Any]:
@@ -338,8 +405,12 @@ def _inputs(robot: truing.Robot, n: int, columns: Sequence[str], seed: int) -> d
     payload = rng.choice([0.0, 0.5, 1.0], size=n) * LARGEST_PAYLOAD
     time = SECONDS_PER_POSE * np.arange(n)
     temperature = 20.0 + 12.0 * (1.0 - np.exp(-time / max(time[-1] / 3.0, 1.0))) + rng.normal(0.0, 0.1, n)
-    every: dict[str, tuple[str, Any]] = {"dir": ("directions", direction), "payload": ("payload", payload),
-                                         "temp": ("temperature", temperature), "t": ("time", time)}  # fmt: skip
+    every: dict[str, tuple[str, Any]] = {
+        "dir": ("directions", direction),
+        "payload": ("payload", payload),
+        "temp": ("temperature", temperature),
+        "t": ("time", time),
+    }
     return dict(every[name] for name in columns)
 
 

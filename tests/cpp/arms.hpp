@@ -40,8 +40,9 @@ inline Robot ur10() {
   Robot robot;
   robot.name = "ur10";
   robot.convention = Convention::mdh;
-  robot.joints = {joint("J1", 0, 0.1273, 0, 0),        joint("J2", 0, 0, 0, M_PI / 2),       joint("J3", 0, 0, -0.612, 0),
-                  joint("J4", 0, 0.163941, -0.5723, 0), joint("J5", 0, 0.1157, 0, M_PI / 2), joint("J6", 0, 0.0922, 0, -M_PI / 2)};
+  robot.joints = {joint("J1", 0, 0.1273, 0, 0),        joint("J2", 0, 0, 0, M_PI / 2),
+                  joint("J3", 0, 0, -0.612, 0),        joint("J4", 0, 0.163941, -0.5723, 0),
+                  joint("J5", 0, 0.1157, 0, M_PI / 2), joint("J6", 0, 0.0922, 0, -M_PI / 2)};
   const double masses[6] = {7.778, 12.93, 3.87, 1.96, 1.96, 0.202};
   for (int k = 0; k < 6; ++k) {
     robot.joints[k].mass = masses[k];
@@ -55,8 +56,8 @@ inline Robot ur10() {
 inline Robot palletizer() {
   Robot robot;
   robot.name = "palletizer";
-  robot.joints = {joint("J1", 0, 0.7425, 0.26, -M_PI / 2), joint("J2", -M_PI / 2, 0, 1.3, 0), joint("J3", M_PI / 2, 0, 1.6, 0),
-                  joint("J4", 0, 0.05, 0.22, M_PI / 2), joint("J5", 0, 0.2, 0, 0)};
+  robot.joints = {joint("J1", 0, 0.7425, 0.26, -M_PI / 2), joint("J2", -M_PI / 2, 0, 1.3, 0),
+                  joint("J3", M_PI / 2, 0, 1.6, 0), joint("J4", 0, 0.05, 0.22, M_PI / 2), joint("J5", 0, 0.2, 0, 0)};
   robot.joints[3].driven_by = {{"J2", -1.0}, {"J3", -1.0}};
   for (Joint& j : robot.joints) {
     j.lower = -1.2;
@@ -72,7 +73,8 @@ inline Robot palletizer() {
 inline Robot rail_arm() {
   Robot robot;
   robot.name = "rail";
-  robot.joints = {joint("rail", 0, 0, 0.1, M_PI / 2), joint("J1", 0.3, 0.4, 0.05, -M_PI / 2), joint("J2", 0, 0, 0.5, 0.02), joint("J3", 0, 0.1, 0.4, 1.0)};
+  robot.joints = {joint("rail", 0, 0, 0.1, M_PI / 2), joint("J1", 0.3, 0.4, 0.05, -M_PI / 2),
+                  joint("J2", 0, 0, 0.5, 0.02), joint("J3", 0, 0.1, 0.4, 1.0)};
   robot.joints[0].type = JointType::prismatic;
   robot.joints[0].lower = -1.0;
   robot.joints[0].upper = 1.0;
@@ -147,8 +149,9 @@ inline void measure(Table* table, const Robot& truth, What what, double sigma, u
   std::vector<std::vector<double>> q(4, std::vector<double>(table->data.rows));
   for (Eigen::Index i = 0; i < rows; ++i) {
     const Eigen::Vector3d v(sigma * normal(random), sigma * normal(random), sigma * normal(random));
-    const Eigen::Quaterniond noisy = Eigen::Quaterniond(1.0, v.x(), v.y(), v.z()).normalized() *
-                                     Eigen::Quaterniond(p.orientation(i, 0), p.orientation(i, 1), p.orientation(i, 2), p.orientation(i, 3));
+    const Eigen::Quaterniond noisy =
+        Eigen::Quaterniond(1.0, v.x(), v.y(), v.z()).normalized() *
+        Eigen::Quaterniond(p.orientation(i, 0), p.orientation(i, 1), p.orientation(i, 2), p.orientation(i, 3));
     const double wxyz[4] = {noisy.w(), noisy.x(), noisy.y(), noisy.z()};
     for (int k = 0; k < 4; ++k) q[k][i] = wxyz[k];
   }
@@ -161,8 +164,10 @@ inline Robot perturbed(Robot robot, double length, double angle, unsigned seed) 
   std::normal_distribution<double> normal(0.0, 1.0);
   for (Joint& j : robot.joints) {
     if (robot.convention == Convention::urdf) {
-      j.T_parent_joint = j.T_parent_joint * truing::frame_from_xyz_rpy(length * Eigen::Vector3d(normal(random), normal(random), normal(random)),
-                                                                        angle * Eigen::Vector3d(normal(random), normal(random), normal(random)));
+      j.T_parent_joint =
+          j.T_parent_joint *
+          truing::frame_from_xyz_rpy(length * Eigen::Vector3d(normal(random), normal(random), normal(random)),
+                                     angle * Eigen::Vector3d(normal(random), normal(random), normal(random)));
       continue;
     }
     j.theta += angle * normal(random);
@@ -170,7 +175,8 @@ inline Robot perturbed(Robot robot, double length, double angle, unsigned seed) 
     j.a += length * normal(random);
     j.alpha += angle * normal(random);
   }
-  for (truing::Target& t : robot.targets) t.T_last_target.translation() += length * Eigen::Vector3d(normal(random), normal(random), normal(random));
+  for (truing::Target& t : robot.targets)
+    t.T_last_target.translation() += length * Eigen::Vector3d(normal(random), normal(random), normal(random));
   return robot;
 }
 

@@ -27,8 +27,9 @@ constexpr double kDegree = M_PI / 180;
 inline Robot wrist_arm() {
   Robot robot;
   robot.name = "wrist";
-  robot.joints = {joint("J1", 0, 0.495, 0.175, -M_PI / 2), joint("J2", -M_PI / 2, 0, 0.9, 0), joint("J3", 0, 0, 0.175, -M_PI / 2),
-                  joint("J4", 0, 0.96, 0, M_PI / 2),       joint("J5", 0, 0, 0, -M_PI / 2),   joint("J6", 0, 0.135, 0, 0)};
+  robot.joints = {joint("J1", 0, 0.495, 0.175, -M_PI / 2), joint("J2", -M_PI / 2, 0, 0.9, 0),
+                  joint("J3", 0, 0, 0.175, -M_PI / 2),     joint("J4", 0, 0.96, 0, M_PI / 2),
+                  joint("J5", 0, 0, 0, -M_PI / 2),         joint("J6", 0, 0.135, 0, 0)};
   const double limits[6][2] = {{-180, 180}, {-90, 150}, {-180, 75}, {-400, 400}, {-125, 120}, {-400, 400}};
   for (int k = 0; k < 6; ++k) {
     robot.joints[k].lower = limits[k][0] * kDegree;
@@ -53,7 +54,8 @@ inline Robot ur() {
 inline Robot gantry() {
   Robot robot = wrist_arm();
   robot.name = "gantry";
-  std::vector<Joint> rails = {joint("X", 0, 0, 0, -M_PI / 2), joint("Y", M_PI / 2, 0, 0, M_PI / 2), joint("Z", 0, 0, 0, 0)};
+  std::vector<Joint> rails = {joint("X", 0, 0, 0, -M_PI / 2), joint("Y", M_PI / 2, 0, 0, M_PI / 2),
+                              joint("Z", 0, 0, 0, 0)};
   const double lengths[3] = {10, 4, 2};
   for (int k = 0; k < 3; ++k) {
     rails[k].type = JointType::prismatic;
@@ -74,7 +76,8 @@ inline Robot as_urdf(const Robot& robot) {
   Isometry3d before = robot.T_measurement_base;
   for (std::size_t k = 0; k < robot.joints.size(); ++k) {
     // Where the joint turns: z of the frame before its link (DH) or after it (modified DH).
-    const Isometry3d here = robot.convention == Convention::dh ? (k ? frames[k - 1] : robot.T_measurement_base) : frames[k];
+    const Isometry3d here =
+        robot.convention == Convention::dh ? (k ? frames[k - 1] : robot.T_measurement_base) : frames[k];
     out.joints[k].T_parent_joint = before.inverse() * here;
     out.joints[k].axis = Vector3d::UnitZ();
     before = here;
@@ -85,7 +88,9 @@ inline Robot as_urdf(const Robot& robot) {
 
 struct Sampler {
   explicit Sampler(const Robot& r, unsigned seed) : robot(r), random(seed) {}
-  double uniform(double low, double high) { return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1.0p-53); }
+  double uniform(double low, double high) {
+    return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1.0p-53);
+  }
   Joints joints() {
     Joints q(static_cast<Eigen::Index>(robot.driven_count()));
     Eigen::Index k = 0;
@@ -110,7 +115,9 @@ inline Task task_at(const Isometry3d& T, TaskKind kind = TaskKind::pose) {
 inline Isometry3d reached(const Robot& robot, const Joints& q) { return truing::forward_kinematics(robot, q).back(); }
 
 inline double angle_between(const Vector3d& a, const Vector3d& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
-inline double turn_between(const Matrix3d& a, const Matrix3d& b) { return Eigen::Quaterniond(a).angularDistance(Eigen::Quaterniond(b)); }
+inline double turn_between(const Matrix3d& a, const Matrix3d& b) {
+  return Eigen::Quaterniond(a).angularDistance(Eigen::Quaterniond(b));
+}
 
 inline bool within_limits(const Robot& robot, const Joints& q) {
   Eigen::Index k = 0;
@@ -122,12 +129,15 @@ inline bool within_limits(const Robot& robot, const Joints& q) {
 }
 
 /// What the solver claims, looked at by forward_kinematics.
-inline bool holds(const Robot& robot, const Task& task, const Solution& solution, double position = 1e-6, double rotation = 1e-6) {
+inline bool holds(const Robot& robot, const Task& task, const Solution& solution, double position = 1e-6,
+                  double rotation = 1e-6) {
   const Isometry3d T = reached(robot, solution.joints);
   const Isometry3d& wanted = task.T_measurement_target;
-  if (!within_limits(robot, solution.joints) || (T.translation() - wanted.translation()).norm() > position) return false;
+  if (!within_limits(robot, solution.joints) || (T.translation() - wanted.translation()).norm() > position)
+    return false;
   if (task.kind == TaskKind::pose) return turn_between(T.linear(), wanted.linear()) <= rotation;
-  if (task.kind == TaskKind::torch && task.lead.lower == 0.0 && task.lead.upper == 0.0 && task.work.lower == 0.0 && task.work.upper == 0.0) {
+  if (task.kind == TaskKind::torch && task.lead.lower == 0.0 && task.lead.upper == 0.0 && task.work.lower == 0.0 &&
+      task.work.upper == 0.0) {
     return angle_between(T.linear() * task.axis, wanted.linear() * task.axis) <= rotation;
   }
   return true;

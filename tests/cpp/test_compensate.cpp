@@ -36,7 +36,9 @@ TEST_CASE("the real robot goes where it is wanted when the command is given to a
       REQUIRE(controlled.reached());
       const Isometry3d T = truing::forward_kinematics(real, controlled.joints).back();
       CHECK((T.translation() - task.T_measurement_target.translation()).norm() < 1e-7);
-      CHECK((truing::forward_kinematics(real, out.solution.joints).back().translation() - task.T_measurement_target.translation()).norm() < 1e-9);
+      CHECK((truing::forward_kinematics(real, out.solution.joints).back().translation() -
+             task.T_measurement_target.translation())
+                .norm() < 1e-9);
       CHECK(out.position_before > 1e-5);
     }
     CHECK(reached_count > 90);
@@ -94,10 +96,13 @@ TEST_CASE("joint programs keep their configuration, and base frames are each rob
     const Compensated out = compensator.joints(program, program);
     if (!out.solution.reached()) continue;
     const Isometry3d wanted = truing::forward_kinematics(nominal, program).back();
-    const Isometry3d T = real.T_measurement_base.inverse() * truing::forward_kinematics(real, out.solution.joints).back();
+    const Isometry3d T =
+        real.T_measurement_base.inverse() * truing::forward_kinematics(real, out.solution.joints).back();
     CHECK((T.translation() - wanted.translation()).norm() < 1e-9);
-    CHECK((out.T_command.translation() - truing::forward_kinematics(nominal, out.solution.joints).back().translation()).norm() < 1e-12);
-    if (std::abs(program[4]) > 0.3 && std::abs(program[2] + 1.39) > 0.2) CHECK((out.solution.joints - program).cwiseAbs().maxCoeff() < 0.1);
+    CHECK((out.T_command.translation() - truing::forward_kinematics(nominal, out.solution.joints).back().translation())
+              .norm() < 1e-12);
+    if (std::abs(program[4]) > 0.3 && std::abs(program[2] + 1.39) > 0.2)
+      CHECK((out.solution.joints - program).cwiseAbs().maxCoeff() < 0.1);
   }
 }
 
@@ -135,7 +140,8 @@ TEST_CASE("the standard error of a reached pose is what parameters drawn from th
     for (const truing::Parameter& parameter : found.parameters) {
       if (!parameter.frozen) values[model.parameter_index(parameter.name)] += change[at++];
     }
-    const Isometry3d moved = truing::forward_kinematics(truing::detail::robot_with(model, values), out.solution.joints).back();
+    const Isometry3d moved =
+        truing::forward_kinematics(truing::detail::robot_with(model, values), out.solution.joints).back();
     const Matrix3d turn = moved.linear() * T.linear().transpose();
     Eigen::Matrix<double, 6, 1> off;
     off << moved.translation() - T.translation(), turn(2, 1), turn(0, 2), turn(1, 0);
@@ -153,9 +159,11 @@ TEST_CASE("robots and parameters that do not fit are one clear error; a batch is
   Compensator compensator(nominal, real);
   truing::Parameter unknown;
   unknown.name = "J9.a";
-  CHECK_THROWS_WITH_AS(compensator.set_uncertainty({unknown}, Eigen::MatrixXd::Identity(1, 1)), doctest::Contains("J9.a"), std::invalid_argument);
+  CHECK_THROWS_WITH_AS(compensator.set_uncertainty({unknown}, Eigen::MatrixXd::Identity(1, 1)),
+                       doctest::Contains("J9.a"), std::invalid_argument);
   unknown.name = "J2.a";
-  CHECK_THROWS_WITH_AS(compensator.set_uncertainty({unknown}, Eigen::MatrixXd::Identity(2, 2)), doctest::Contains("2 x 2"), std::invalid_argument);
+  CHECK_THROWS_WITH_AS(compensator.set_uncertainty({unknown}, Eigen::MatrixXd::Identity(2, 2)),
+                       doctest::Contains("2 x 2"), std::invalid_argument);
   Sampler sampler(nominal, 72);
   std::vector<Task> tasks;
   for (int k = 0; k < 200; ++k) tasks.push_back(task_at(truing::forward_kinematics(nominal, sampler.joints()).back()));

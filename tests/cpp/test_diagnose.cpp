@@ -14,10 +14,10 @@
 #include "arms.hpp"
 
 using namespace arms;
-using truing::Diagnosis;
-using truing::DiagnoseOptions;
-using truing::Verdict;
 using truing::diagnose;
+using truing::DiagnoseOptions;
+using truing::Diagnosis;
+using truing::Verdict;
 
 namespace {
 
@@ -39,7 +39,9 @@ void add_directions(Table* table, unsigned seed) {
   }
 }
 
-truing::AppliedEffect backlash(const std::string& joint, double size) { return {"backlash", {joint}, {{"backlash." + joint, size}}}; }
+truing::AppliedEffect backlash(const std::string& joint, double size) {
+  return {"backlash", {joint}, {{"backlash." + joint, size}}};
+}
 
 /// Random poses with random approach directions of `truth`, somewhere in the measurement frame, measured.
 std::unique_ptr<Table> measured(Robot truth, std::size_t rows, unsigned seed, What what = What::position) {
@@ -51,7 +53,8 @@ std::unique_ptr<Table> measured(Robot truth, std::size_t rows, unsigned seed, Wh
 }
 
 /// The same where joint `k` is not where it was read: by `f` of row and reading.
-std::unique_ptr<Table> measured_displaced(Robot truth, std::size_t rows, unsigned seed, std::size_t k, const std::function<double(std::size_t, double)>& f) {
+std::unique_ptr<Table> measured_displaced(Robot truth, std::size_t rows, unsigned seed, std::size_t k,
+                                          const std::function<double(std::size_t, double)>& f) {
   truth.T_measurement_base = somewhere();
   auto table = random_joints(truth, rows, seed);
   add_directions(table.get(), seed + 1);
@@ -66,7 +69,8 @@ std::unique_ptr<Table> measured_displaced(Robot truth, std::size_t rows, unsigne
 
 const truing::FoundEffect* found(const Diagnosis& d, const std::string& effect, const std::string& joint) {
   for (const truing::FoundEffect& e : d.effects) {
-    if (e.effect == effect && (joint.empty() || std::find(e.joints.begin(), e.joints.end(), joint) != e.joints.end())) return &e;
+    if (e.effect == effect && (joint.empty() || std::find(e.joints.begin(), e.joints.end(), joint) != e.joints.end()))
+      return &e;
   }
   return nullptr;
 }
@@ -154,7 +158,8 @@ TEST_CASE("diagnose names a backlash, its joint, its size, and by how much the e
   for (const truing::Alternative& other : effect.confounded_with) {  // nothing but what no column was recorded for
     CHECK(other.probability == 0.0);
     CHECK(other.separated_by.find("record") == 0);
-    CHECK(std::any_of(d.not_testable.begin(), d.not_testable.end(), [&](const truing::NotTestable& n) { return n.effect == other.effect; }));
+    CHECK(std::any_of(d.not_testable.begin(), d.not_testable.end(),
+                      [&](const truing::NotTestable& n) { return n.effect == other.effect; }));
   }
   const truing::Parameter* size = parameter(effect, "backlash.J3");
   REQUIRE(size);
@@ -194,7 +199,8 @@ TEST_CASE("diagnose tells two effects apart on top of wrong geometry") {
   CHECK(found(d, "link_geometry", ""));
   CHECK(d.effects.size() <= 3);
   CHECK(d.unknown.empty());
-  const truing::Parameter *size = parameter(*first, "backlash.J2"), *softness = parameter(*second, "joint_compliance.J3");
+  const truing::Parameter *size = parameter(*first, "backlash.J2"),
+                          *softness = parameter(*second, "joint_compliance.J3");
   REQUIRE(size);
   REQUIRE(softness);
   CHECK(std::abs(size->value - 8e-4) < 4.0 * size->sigma);
@@ -209,8 +215,10 @@ TEST_CASE("diagnose tells two effects apart on top of wrong geometry") {
 TEST_CASE("diagnose lists what the data cannot tell apart, and how to tell") {
   for (const bool lost_motion : {false, true}) {
     Robot truth = light_arm();
-    if (lost_motion) truth.effects = {backlash("J3", 1e-3)};
-    else truth.joints[2].offset += 5e-4;
+    if (lost_motion)
+      truth.effects = {backlash("J3", 1e-3)};
+    else
+      truth.joints[2].offset += 5e-4;
     truth.T_measurement_base = somewhere();
     auto table = random_joints(truth, 150, 400);
     for (int k = 0; k < 6; ++k) table->data.direction.push_back(table->add(std::vector<double>(150, 1.0)));
@@ -222,12 +230,16 @@ TEST_CASE("diagnose lists what the data cannot tell apart, and how to tell") {
     CHECK(d.effects[0].effect == "joint_offset");
     CHECK(d.effects[0].joints == std::vector<std::string>{"J3"});
     const auto& others = d.effects[0].confounded_with;
-    const auto other = std::find_if(others.begin(), others.end(), [](const truing::Alternative& a) { return a.effect == "backlash" && a.joints == std::vector<std::string>{"J3"}; });
+    const auto other = std::find_if(others.begin(), others.end(), [](const truing::Alternative& a) {
+      return a.effect == "backlash" && a.joints == std::vector<std::string>{"J3"};
+    });
     REQUIRE(other != others.end());
     CHECK(other->separated_by.find("both sides") != std::string::npos);
     CHECK(other->probability <= d.effects[0].probability);
     CHECK(d.sentence.find("cannot tell") != std::string::npos);
-    CHECK(std::any_of(d.not_testable.begin(), d.not_testable.end(), [](const truing::NotTestable& n) { return n.effect == "backlash" && n.why.find("same side") != std::string::npos; }));
+    CHECK(std::any_of(d.not_testable.begin(), d.not_testable.end(), [](const truing::NotTestable& n) {
+      return n.effect == "backlash" && n.why.find("same side") != std::string::npos;
+    }));
     // What to measure next: among others, from the side that was never driven from.
     REQUIRE(!d.next_poses.empty());
     bool other_side = false;
@@ -254,7 +266,8 @@ TEST_CASE("diagnose does not call absent what the data could not show") {
   CHECK(why("thermal_zero").find("temp_C") != std::string::npos);
   CHECK(why("drift").find("t_s") != std::string::npos);
   CHECK(why("backlash").empty());
-  CHECK(std::none_of(d.candidates.begin(), d.candidates.end(), [](const truing::Candidate& c) { return c.effect == "thermal"; }));
+  CHECK(std::none_of(d.candidates.begin(), d.candidates.end(),
+                     [](const truing::Candidate& c) { return c.effect == "thermal"; }));
 }
 
 TEST_CASE("diagnose says that a joint which never moves cannot be judged") {
@@ -267,7 +280,9 @@ TEST_CASE("diagnose says that a joint which never moves cannot be judged") {
   measure(table.get(), truth, What::position, kNoise, 442);
   const Diagnosis d = diagnose(light_arm(), table->data);
   INFO(names(d));
-  const auto still = std::find_if(d.not_testable.begin(), d.not_testable.end(), [](const truing::NotTestable& n) { return n.joints == std::vector<std::string>{"J5"}; });
+  const auto still = std::find_if(d.not_testable.begin(), d.not_testable.end(), [](const truing::NotTestable& n) {
+    return n.joints == std::vector<std::string>{"J5"};
+  });
   REQUIRE(still != d.not_testable.end());
   CHECK(still->why == "J5 does not move");
   REQUIRE(d.effects.size() == 1);
@@ -276,7 +291,8 @@ TEST_CASE("diagnose says that a joint which never moves cannot be judged") {
 }
 
 TEST_CASE("diagnose calls what no effect explains unknown, with its joint, input and shape") {
-  const auto table = measured_displaced(light_arm(), 200, 500, 3, [](std::size_t, double q) { return q > 0.4 ? 1.5e-3 : -1.5e-3; });
+  const auto table =
+      measured_displaced(light_arm(), 200, 500, 3, [](std::size_t, double q) { return q > 0.4 ? 1.5e-3 : -1.5e-3; });
   const Diagnosis d = diagnose(light_arm(), table->data);
   INFO(names(d));
   CHECK((d.verdict == Verdict::unknown || d.verdict == Verdict::effects_and_unknown));
@@ -302,7 +318,8 @@ TEST_CASE("diagnose finds a displacement by a column of one's own, unknown or wi
   std::vector<double> humidity(160);
   std::mt19937_64 random(510);
   for (double& h : humidity) h = static_cast<double>(random() >> 11) * 0x1.0p-53;
-  auto table = measured_displaced(light_arm(), 160, 511, 1, [&](std::size_t row, double) { return 1e-3 * humidity[row]; });
+  auto table =
+      measured_displaced(light_arm(), 160, 511, 1, [&](std::size_t row, double) { return 1e-3 * humidity[row]; });
   table->data.covariates["humidity"] = table->add(humidity);
 
   const Diagnosis without = diagnose(light_arm(), table->data);
@@ -345,7 +362,8 @@ TEST_CASE("diagnose leaves out what it is told to leave out") {
   const Diagnosis d = diagnose(light_arm(), table->data, options);
   INFO(names(d));
   CHECK(!found(d, "backlash", ""));
-  CHECK(std::none_of(d.candidates.begin(), d.candidates.end(), [](const truing::Candidate& c) { return c.effect == "backlash"; }));
+  CHECK(std::none_of(d.candidates.begin(), d.candidates.end(),
+                     [](const truing::Candidate& c) { return c.effect == "backlash"; }));
   REQUIRE(!d.unknown.empty());  // it is there all the same
   CHECK(d.unknown[0].joint == "J3");
   CHECK(d.unknown[0].inputs == std::vector<std::string>{"dir3"});
@@ -381,10 +399,12 @@ TEST_CASE("diagnose gives the same bits on one and on two threads") {
     for (std::size_t m = 0; m < a.parameters.size(); ++m) CHECK(a.parameters[m].value == b.parameters[m].value);
   }
   REQUIRE(one.candidates.size() == two.candidates.size());
-  for (std::size_t k = 0; k < one.candidates.size(); ++k) CHECK(one.candidates[k].evidence == two.candidates[k].evidence);
+  for (std::size_t k = 0; k < one.candidates.size(); ++k)
+    CHECK(one.candidates[k].evidence == two.candidates[k].evidence);
   REQUIRE(one.detectable.size() == two.detectable.size());
   for (std::size_t k = 0; k < one.detectable.size(); ++k) CHECK(one.detectable[k].size == two.detectable[k].size);
-  for (std::size_t k = 0; k < one.where_joints.size(); ++k) CHECK(one.where_joints[k].share.value == two.where_joints[k].share.value);
+  for (std::size_t k = 0; k < one.where_joints.size(); ++k)
+    CHECK(one.where_joints[k].share.value == two.where_joints[k].share.value);
 }
 
 TEST_CASE("diagnose does not depend on where the instrument stands") {
@@ -395,7 +415,8 @@ TEST_CASE("diagnose does not depend on where the instrument stands") {
   const Eigen::Isometry3d elsewhere = truing::frame_from_xyz_rpy({-3.0, 1.5, 0.8}, {0.7, -0.4, 1.9});
   std::array<std::vector<double>, 3> moved;
   for (std::size_t row = 0; row < table->data.rows; ++row) {
-    const Eigen::Vector3d p = elsewhere * Eigen::Vector3d(table->data.position[0][row], table->data.position[1][row], table->data.position[2][row]);
+    const Eigen::Vector3d p = elsewhere * Eigen::Vector3d(table->data.position[0][row], table->data.position[1][row],
+                                                          table->data.position[2][row]);
     for (int k = 0; k < 3; ++k) moved[static_cast<std::size_t>(k)].push_back(p[k]);
   }
   for (std::size_t k = 0; k < 3; ++k) table->data.position[k] = table->add(moved[k]);
@@ -463,20 +484,24 @@ TEST_CASE("diagnose names the option that makes no sense") {
   CHECK(DiagnoseOptions().is_valid(nullptr));
   DiagnoseOptions misspelt;
   misspelt.leave_out = {"backlsh"};
-  CHECK_THROWS_WITH_AS(diagnose(light_arm(), table->data, misspelt), doctest::Contains("backlsh"), std::invalid_argument);
+  CHECK_THROWS_WITH_AS(diagnose(light_arm(), table->data, misspelt), doctest::Contains("backlsh"),
+                       std::invalid_argument);
 }
 
 TEST_CASE("diagnose refuses a handful of poses") {
   const auto table = measured(light_arm(), 8, 710);
-  CHECK_THROWS_WITH_AS(diagnose(light_arm(), table->data), doctest::Contains("8 poses are too few"), std::invalid_argument);
+  CHECK_THROWS_WITH_AS(diagnose(light_arm(), table->data), doctest::Contains("8 poses are too few"),
+                       std::invalid_argument);
   auto repeated = measured(light_arm(), 60, 711);  // many rows, few poses
   for (int row = 0; row < 60; ++row) repeated->data.pose.push_back(row / 6);
-  CHECK_THROWS_WITH_AS(diagnose(light_arm(), repeated->data), doctest::Contains("10 poses are too few"), std::invalid_argument);
+  CHECK_THROWS_WITH_AS(diagnose(light_arm(), repeated->data), doctest::Contains("10 poses are too few"),
+                       std::invalid_argument);
 }
 
 TEST_CASE("diagnose finds unequal bars of a palletizer's parallelograms") {
   const std::map<std::string, double> between = {{"linkage.J4.cos", 1.5e-3}, {"linkage.J4.sin", -8e-4}};
-  const std::map<std::string, double> fixed_to_base_and_wrist = {{"linkage.J4.sin_first", 1.5e-3}, {"linkage.J4.cos_sum", -1.5e-3}};
+  const std::map<std::string, double> fixed_to_base_and_wrist = {{"linkage.J4.sin_first", 1.5e-3},
+                                                                 {"linkage.J4.cos_sum", -1.5e-3}};
   for (const auto& bars : {between, fixed_to_base_and_wrist}) {
     Robot truth = palletizer();
     truth.effects = {{"linkage", {"J4"}, bars}};
@@ -604,7 +629,8 @@ TEST_CASE("diagnose goes on with the record of the joints that fits better") {
   REQUIRE(finding(d, "joint_record"));
   CHECK(d.joint_record == "qr");
   CHECK(d.gap.rms < 3.0 * kNoise);
-  for (std::size_t k = 0; k < 6; ++k) std::swap(table->data.joints[k], table->data.covariates["qr" + std::to_string(k + 1) + "_rad"]);
+  for (std::size_t k = 0; k < 6; ++k)
+    std::swap(table->data.joints[k], table->data.covariates["qr" + std::to_string(k + 1) + "_rad"]);
   const Diagnosis e = diagnose(light_arm(), table->data);
   REQUIRE(finding(e, "joint_record"));
   CHECK(e.joint_record == "q");
@@ -633,7 +659,8 @@ TEST_CASE("diagnose infers approach directions from the order of the poses, and 
   auto table = random_joints(truth, 120, 930);
   for (std::size_t k = 0; k < 6; ++k) {
     std::vector<double> dir(120, 0.0);
-    for (std::size_t row = 1; row < 120; ++row) dir[row] = table->data.joints[k][row] > table->data.joints[k][row - 1] ? 1.0 : -1.0;
+    for (std::size_t row = 1; row < 120; ++row)
+      dir[row] = table->data.joints[k][row] > table->data.joints[k][row - 1] ? 1.0 : -1.0;
     table->data.direction.push_back(table->add(dir));
   }
   measure(table.get(), truth, What::position, kNoise, 931);
@@ -728,7 +755,8 @@ TEST_CASE("diagnose is not misled by gross outliers or a wandering frame") {
   std::normal_distribution<double> normal(0.0, 1.0);
   for (std::size_t k = 0; k < 3; ++k) {
     std::vector<double> values(120);
-    for (std::size_t row = 0; row < 120; ++row) values[row] = table->data.position[k][row] + (row % 40 == 7 ? 5e-3 * normal(random) : 0.0);
+    for (std::size_t row = 0; row < 120; ++row)
+      values[row] = table->data.position[k][row] + (row % 40 == 7 ? 5e-3 * normal(random) : 0.0);
     table->data.position[k] = table->add(values);
   }
   const Diagnosis outliers = diagnose(light_arm(), table->data);
@@ -742,7 +770,8 @@ TEST_CASE("diagnose is not misled by gross outliers or a wandering frame") {
   for (std::size_t k = 0; k < 3; ++k) {  // a random walk of the frame
     std::vector<double> values(150);
     double at = 0.0;
-    for (std::size_t row = 0; row < 150; ++row) values[row] = table->data.position[k][row] + (at += 2e-5 * normal(random));
+    for (std::size_t row = 0; row < 150; ++row)
+      values[row] = table->data.position[k][row] + (at += 2e-5 * normal(random));
     table->data.position[k] = table->add(values);
   }
   const Diagnosis wandering = diagnose(light_arm(), table->data);
@@ -763,5 +792,6 @@ TEST_CASE("diagnose searches a part of many poses and judges all of them") {
   CHECK(names(d) == "backlash J3; ");
   CHECK(d.error_after.size() == 300);
   CHECK(d.gap.n == 60);
-  CHECK(std::any_of(d.warnings.begin(), d.warnings.end(), [](const std::string& w) { return w.find("120 of 300") != std::string::npos; }));
+  CHECK(std::any_of(d.warnings.begin(), d.warnings.end(),
+                    [](const std::string& w) { return w.find("120 of 300") != std::string::npos; }));
 }

@@ -68,8 +68,8 @@ double potential_energy(const Robot& robot, const VectorXd& q, double payload) {
 
 Measurements no_columns() { return Measurements(); }
 
-std::string complaint(const std::vector<truing::EffectRequest>& requests, const Robot& robot,
-                      const Measurements& data, const std::vector<truing::Effect>& own = {}) {
+std::string complaint(const std::vector<truing::EffectRequest>& requests, const Robot& robot, const Measurements& data,
+                      const std::vector<truing::Effect>& own = {}) {
   try {
     truing::effect_terms(requests, robot, data, own);
   } catch (const std::invalid_argument& error) {
@@ -93,8 +93,7 @@ TEST_CASE("gravity torque is minus the derivative of potential energy, passive j
         Robot more = robot, less = robot;
         more.joints[i].offset += h;
         less.joints[i].offset -= h;
-        const double slope =
-            (potential_energy(more, q, payload) - potential_energy(less, q, payload)) / (2.0 * h);
+        const double slope = (potential_energy(more, q, payload) - potential_energy(less, q, payload)) / (2.0 * h);
         CHECK(torque[static_cast<Eigen::Index>(i)] == doctest::Approx(-slope).epsilon(1e-7));
       }
     }
@@ -129,12 +128,13 @@ TEST_CASE("every effect of the catalogue is found by its name") {
     CHECK(&truing::find_effect(effect.name) == &effect);
     CHECK(!effect.summary.empty());
   }
-  CHECK_THROWS_WITH_AS(truing::find_effect("backlsh"),
-                       "effect 'backlsh' does not exist; there are gear_ratio, joint_offset, link_geometry, "
-                       "base_frame, tool_frame, joint_compliance, stiffness_zones, gravity_moment, link_compliance, "
-                       "harmonic, transmission_error, backlash, gravity_backlash, windup, thermal, thermal_zero, drift, "
-                       "joint_coupling, linkage, axis_wobble, scale, time_offset",
-                       std::invalid_argument);
+  CHECK_THROWS_WITH_AS(
+      truing::find_effect("backlsh"),
+      "effect 'backlsh' does not exist; there are gear_ratio, joint_offset, link_geometry, "
+      "base_frame, tool_frame, joint_compliance, stiffness_zones, gravity_moment, link_compliance, "
+      "harmonic, transmission_error, backlash, gravity_backlash, windup, thermal, thermal_zero, drift, "
+      "joint_coupling, linkage, axis_wobble, scale, time_offset",
+      std::invalid_argument);
 }
 
 TEST_CASE("one's own effect stands beside the catalogue, under another name") {
@@ -153,14 +153,12 @@ TEST_CASE("one's own effect stands beside the catalogue, under another name") {
   REQUIRE(terms.size() == 1);
   CHECK(terms[0].parameter == "creep.J2");
   creep.name = "backlash";
-  CHECK(complaint({{"backlash", {"J2"}}}, robot, no_columns(), {creep}).find("exists twice") !=
-        std::string::npos);
+  CHECK(complaint({{"backlash", {"J2"}}}, robot, no_columns(), {creep}).find("exists twice") != std::string::npos);
 }
 
 TEST_CASE("the effects that are model parameters have no terms, but look whether the joint suits") {
   const Robot robot = loaded_arm(Convention::dh);
-  CHECK(truing::effect_terms({{"gear_ratio", {}}, {"joint_offset", {}}, {"link_geometry", {}}}, robot,
-                             no_columns())
+  CHECK(truing::effect_terms({{"gear_ratio", {}}, {"joint_offset", {}}, {"link_geometry", {}}}, robot, no_columns())
             .empty());
   CHECK(complaint({{"gear_ratio", {"J4"}}}, robot, no_columns()) ==
         "gear_ratio at J4 needs a joint with a reading; J4 is passive, driven by J2, J3");
@@ -221,8 +219,7 @@ TEST_CASE("joint compliance is a spring under gravity torque, and says when no m
   in.gravity_torque = (VectorXd(5) << 1, 2, 3, 4, 5).finished();
   CHECK(terms[3].basis(in) == 5.0);
   for (Joint& joint : robot.joints) joint.mass.reset();
-  CHECK(complaint({{"joint_compliance", {"J2"}}}, robot, no_columns()).find("payload_kg") !=
-        std::string::npos);
+  CHECK(complaint({{"joint_compliance", {"J2"}}}, robot, no_columns()).find("payload_kg") != std::string::npos);
   const double payload = 10.0;
   Measurements data;
   data.payload.data = &payload;

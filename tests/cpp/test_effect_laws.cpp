@@ -18,18 +18,22 @@ using truing::EffectRequest;
 
 namespace {
 
-const std::set<std::string> kModelParameters = {"gear_ratio", "joint_offset", "link_geometry", "base_frame", "tool_frame"};
+const std::set<std::string> kModelParameters = {"gear_ratio", "joint_offset", "link_geometry", "base_frame",
+                                                "tool_frame"};
 
 /// Names to ask for: those of the catalogue, with an order where there must be one.
 std::vector<std::string> names_to_ask() {
   std::vector<std::string> names;
-  for (const truing::Effect& effect : truing::catalogue()) names.push_back(effect.name == "transmission_error" ? "transmission_error@24" : effect.name);
+  for (const truing::Effect& effect : truing::catalogue())
+    names.push_back(effect.name == "transmission_error" ? "transmission_error@24" : effect.name);
   return names;
 }
 
 std::vector<std::string> names_with_terms() {
   std::vector<std::string> names = names_to_ask();
-  names.erase(std::remove_if(names.begin(), names.end(), [](const std::string& name) { return kModelParameters.count(name) > 0; }), names.end());
+  names.erase(std::remove_if(names.begin(), names.end(),
+                             [](const std::string& name) { return kModelParameters.count(name) > 0; }),
+              names.end());
   return names;
 }
 
@@ -97,7 +101,8 @@ void for_every_effect_and_robot(const Law& law) {
 }
 
 /// How much the parameter must be to move its site by about `size` [rad | m].
-double value_that_moves(const detail::Model& model, const std::vector<std::vector<double>>& bases, const std::string& parameter, double size) {
+double value_that_moves(const detail::Model& model, const std::vector<std::vector<double>>& bases,
+                        const std::string& parameter, double size) {
   double most = 0.0;
   for (const detail::ColumnTerm& column : model.parameters[model.parameter_index(parameter)].columns) {
     for (const double v : bases[column.term]) most = std::max(most, std::abs(v));
@@ -114,11 +119,13 @@ std::vector<int> effect_parameters(const detail::Model& model) {
 }
 
 /// The robot with these effects, every parameter such that it moves its sites by about `size`, signs alternating.
-Robot with_effects(const Robot& robot, const Measurements& data, const std::vector<EffectRequest>& requests, double size) {
+Robot with_effects(const Robot& robot, const Measurements& data, const std::vector<EffectRequest>& requests,
+                   double size) {
   const detail::Model model = detail::make_model(robot, data, requests);
   const auto bases = detail::make_bases(model, data);
   Eigen::VectorXd values = detail::initial_values(model);
-  for (const int k : effect_parameters(model)) values[k] = (k % 2 ? 1.0 : -1.0) * value_that_moves(model, bases, model.parameters[k].name, size);
+  for (const int k : effect_parameters(model))
+    values[k] = (k % 2 ? 1.0 : -1.0) * value_that_moves(model, bases, model.parameters[k].name, size);
   return detail::robot_with(model, values);
 }
 
@@ -178,7 +185,8 @@ TEST_CASE("law: the Jacobian agrees with central differences") {
         evaluator.tile(tile, moved, weighing, minus.data(), nullptr);
         const Eigen::VectorXd difference = (plus - minus) / 2e-5;  // per unit of what the site moves
         INFO(info.name);
-        CHECK((difference - j.col(k) * (step / 1e-5)).cwiseAbs().maxCoeff() < 5e-9 * std::max(1.0, difference.cwiseAbs().maxCoeff()));
+        CHECK((difference - j.col(k) * (step / 1e-5)).cwiseAbs().maxCoeff() <
+              5e-9 * std::max(1.0, difference.cwiseAbs().maxCoeff()));
       }
     }
   });
@@ -189,7 +197,8 @@ TEST_CASE("law: a parameter of zero changes nothing") {
     Robot zero = with_effects(robot, table->data, {{name, {}}}, 1e-3);
     REQUIRE(zero.effects.size() == 1);
     const std::vector<truing::Term> terms = truing::effect_terms({{name, {}}}, robot, table->data);
-    bool at_joints = true;  // elsewhere a number that was folded away before is now computed in the kernel, and may round the other way
+    bool at_joints = true;  // elsewhere a number that was folded away before is now computed in the kernel, and may
+                            // round the other way
     for (const truing::Term& term : terms) {
       zero.effects[0].parameters[term.parameter] = 0.0;
       at_joints = at_joints && !contains(term.site, ".");
@@ -217,19 +226,25 @@ TEST_CASE("law: two effects together are their sum, to second order") {
       CAPTURE(one);
       CAPTURE(other);
       if (!applies(one, robot, table->data) || !applies(other, robot, table->data)) continue;
-      Robot a = with_effects(robot, table->data, {{one, {}}}, size), b = with_effects(robot, table->data, {{other, {}}}, size), both = a;
+      Robot a = with_effects(robot, table->data, {{one, {}}}, size),
+            b = with_effects(robot, table->data, {{other, {}}}, size), both = a;
       both.effects.push_back(b.effects[0]);
-      const auto moved = [&](const Robot& r) -> Eigen::MatrixXd { return truing::predict(r, table->data).position - none.position; };
+      const auto moved = [&](const Robot& r) -> Eigen::MatrixXd {
+        return truing::predict(r, table->data).position - none.position;
+      };
       const Eigen::MatrixXd da = moved(a), db = moved(b), dboth = moved(both);
       CHECK(da.cwiseAbs().maxCoeff() > 0.0);
       // Up to 60 terms of 1e-4 at arms of a few metres.
-      CHECK((dboth - da - db).cwiseAbs().maxCoeff() < 10.0 * (da.cwiseAbs().maxCoeff() * db.cwiseAbs().maxCoeff() + size * size));
+      CHECK((dboth - da - db).cwiseAbs().maxCoeff() <
+            10.0 * (da.cwiseAbs().maxCoeff() * db.cwiseAbs().maxCoeff() + size * size));
       CHECK((dboth - da - db).cwiseAbs().maxCoeff() < 0.05 * (da.cwiseAbs().maxCoeff() + db.cwiseAbs().maxCoeff()));
     }
   }
 }
 
-TEST_CASE("law: identified from what it makes, an effect predicts just that, from the robot alone, also on a part of the rows") {
+TEST_CASE(
+    "law: identified from what it makes, an effect predicts just that, from the robot alone, also on a part of the "
+    "rows") {
   for (const std::string& name : names_with_terms()) {
     for (const Robot& robot : robots()) {
       CAPTURE(name);
@@ -267,7 +282,8 @@ TEST_CASE("law: identified from what it makes, an effect predicts just that, fro
       part.position = {};
       part.orientation = {};
       const truing::Prediction last = truing::predict(found.robot, part);
-      CHECK((last.position - whole.position.bottomRows(static_cast<Eigen::Index>(part.rows))).cwiseAbs().maxCoeff() < 1e-14);
+      CHECK((last.position - whole.position.bottomRows(static_cast<Eigen::Index>(part.rows))).cwiseAbs().maxCoeff() <
+            1e-14);
     }
   }
 }
@@ -318,7 +334,8 @@ TEST_CASE("law: joints are named only where they mean something, and those that 
   CHECK(terms[0].site == "J4");
   CHECK(contains(complaint({"link_compliance", {"J5"}}, robot, table->data), "is the last"));
   std::set<std::string> joints;
-  for (const truing::Term& term : truing::effect_terms({{"link_compliance", {}}}, robot, table->data)) joints.insert(term.joint);
+  for (const truing::Term& term : truing::effect_terms({{"link_compliance", {}}}, robot, table->data))
+    joints.insert(term.joint);
   CHECK(joints == std::set<std::string>{"J1", "J2", "J3"});
   const Robot rail = rail_arm();
   for (const char* name : {"harmonic", "axis_wobble", "transmission_error@24"}) {
@@ -327,7 +344,8 @@ TEST_CASE("law: joints are named only where they mean something, and those that 
   }
 }
 
-TEST_CASE("law: bars of a palletizer's parallelograms turn by the difference of its drivers, by the first and by their sum") {
+TEST_CASE(
+    "law: bars of a palletizer's parallelograms turn by the difference of its drivers, by the first and by their sum") {
   const Robot robot = palletizer();
   const auto table = full_table(robot, 5, 46);
   truing::Inputs in;
@@ -382,8 +400,13 @@ TEST_CASE("three zones of equal compliance are one spring") {
   Robot one = ur10(), three = one;
   const auto table = random_joints(one, 200, 65);
   one.effects = {{"joint_compliance", {"J2"}, {{"joint_compliance.J2", 2e-6}}}};
-  three.effects = {{"stiffness_zones", {"J2"}, {{"stiffness_zones.J2.c1", 2e-6}, {"stiffness_zones.J2.c2", 2e-6}, {"stiffness_zones.J2.c3", 2e-6}}}};
-  CHECK((truing::predict(one, table->data).position - truing::predict(three, table->data).position).cwiseAbs().maxCoeff() < 1e-14);
+  three.effects = {
+      {"stiffness_zones",
+       {"J2"},
+       {{"stiffness_zones.J2.c1", 2e-6}, {"stiffness_zones.J2.c2", 2e-6}, {"stiffness_zones.J2.c3", 2e-6}}}};
+  CHECK((truing::predict(one, table->data).position - truing::predict(three, table->data).position)
+            .cwiseAbs()
+            .maxCoeff() < 1e-14);
 }
 
 TEST_CASE("a scale stretches every target about the base, wherever the base stands") {
@@ -422,10 +445,12 @@ TEST_CASE("a link bends as a finely cut beam does, under what hangs beyond its e
   const std::vector<double> first = {0.0, 0.4, -0.9, 1.2}, second = {M_PI / 2, -0.3, 2.0, 0.7};
   table.data.joints = {table.add(first), table.add(second)};
   table.data.payload = table.add(std::vector<double>(4, load));
-  const Eigen::MatrixXd by_law = displacement(robot, table.data, {"link_compliance", {"J1"}, {{"link_compliance.J1.rz", compliance}}});
+  const Eigen::MatrixXd by_law =
+      displacement(robot, table.data, {"link_compliance", {"J1"}, {{"link_compliance.J1.rz", compliance}}});
   for (std::size_t row = 0; row < 4; ++row) {
     const double q1 = first[row], q12 = first[row] + second[row];
-    const Eigen::Vector2d tip = 2.0 * Eigen::Vector2d(std::cos(q1), std::sin(q1)) + 0.5 * Eigen::Vector2d(std::cos(q12), std::sin(q12));
+    const Eigen::Vector2d tip =
+        2.0 * Eigen::Vector2d(std::cos(q1), std::sin(q1)) + 0.5 * Eigen::Vector2d(std::cos(q12), std::sin(q12));
     constexpr int kPieces = 2000;
     Eigen::Vector2d moved(0.0, 0.0);
     for (int k = 0; k < kPieces; ++k) {  // each piece turns all that is beyond it
@@ -448,21 +473,25 @@ TEST_CASE("a link bends about both of its ends, in every convention") {
       CAPTURE(name);
       if (complaint({"link_compliance", {name}}, robot, table->data) != "") continue;  // has no length
       std::set<std::string> parameters;
-      for (const truing::Term& term : truing::effect_terms({{"link_compliance", {name}}}, robot, table->data)) parameters.insert(term.parameter);
+      for (const truing::Term& term : truing::effect_terms({{"link_compliance", {name}}}, robot, table->data))
+        parameters.insert(term.parameter);
       REQUIRE(parameters.size() == 2);
       for (const std::string& parameter : parameters) {
         CAPTURE(parameter);
         const double compliance = 1e-9;
-        const Eigen::MatrixXd by_law = displacement(robot, table->data, {"link_compliance", {name}, {{parameter, compliance}}});
+        const Eigen::MatrixXd by_law =
+            displacement(robot, table->data, {"link_compliance", {name}, {{parameter, compliance}}});
         for (std::size_t row = 0; row < 6; ++row) {
           Eigen::VectorXd reading(static_cast<Eigen::Index>(robot.driven_count()));
-          for (Eigen::Index k = 0; k < reading.size(); ++k) reading[k] = table->data.joints[static_cast<std::size_t>(k)][row];
+          for (Eigen::Index k = 0; k < reading.size(); ++k)
+            reading[k] = table->data.joints[static_cast<std::size_t>(k)][row];
           const std::vector<Eigen::Isometry3d> frames = truing::forward_kinematics(robot, reading, 0);
           const Joint &at = robot.joints[link], &next = robot.joints[link + 1];
           Eigen::Isometry3d end = frames[link];
           Eigen::Vector3d start = (link == 0 ? robot.T_measurement_base : frames[link - 1]).translation();
           if (robot.convention == Convention::mdh) {
-            end = end * Eigen::AngleAxisd(next.alpha, Eigen::Vector3d::UnitX()) * Eigen::Translation3d(next.a, 0.0, 0.0);
+            end =
+                end * Eigen::AngleAxisd(next.alpha, Eigen::Vector3d::UnitX()) * Eigen::Translation3d(next.a, 0.0, 0.0);
             start = frames[link] * Eigen::Vector3d(0.0, 0.0, -at.d);
           } else if (robot.convention == Convention::urdf) {
             end = end * Eigen::Translation3d(next.T_parent_joint.translation());
@@ -471,11 +500,14 @@ TEST_CASE("a link bends about both of its ends, in every convention") {
           const Eigen::Vector3d across = end.linear().col(parameter.back() - 'x'), tip = frames.back().translation();
           const auto moment = [&](const Eigen::Vector3d& place) {
             Eigen::Vector3d sum = table->data.payload[row] * (tip - place).cross(g);
-            for (std::size_t k = link + 1; k < robot.joints.size(); ++k) sum += *robot.joints[k].mass * (frames[k] * robot.joints[k].center_of_mass - place).cross(g);
+            for (std::size_t k = link + 1; k < robot.joints.size(); ++k)
+              sum += *robot.joints[k].mass * (frames[k] * robot.joints[k].center_of_mass - place).cross(g);
             return across.dot(sum);
           };
           const double of_start = moment(start), of_end = moment(end.translation());
-          const Eigen::Vector3d moved = compliance / 6.0 * ((2.0 * of_start + of_end) * across.cross(tip - start) + (of_start + 2.0 * of_end) * across.cross(tip - end.translation()));
+          const Eigen::Vector3d moved = compliance / 6.0 *
+                                        ((2.0 * of_start + of_end) * across.cross(tip - start) +
+                                         (of_start + 2.0 * of_end) * across.cross(tip - end.translation()));
           CHECK((by_law.row(static_cast<Eigen::Index>(row)).transpose() - moved).norm() < 1e-3 * moved.norm() + 1e-12);
         }
       }
@@ -494,7 +526,8 @@ TEST_CASE("base_frame and tool_frame free the model's own parameters") {
   options.free = {"J3.a"};
   options.effects = {{"base_frame", {}}, {"tool_frame", {}}};
   const truing::Identification found = truing::identify(robot, table->data, options);
-  CHECK(found.robot.targets[0].T_last_target.translation().isApprox(truth.targets[0].T_last_target.translation(), 1e-9));
+  CHECK(
+      found.robot.targets[0].T_last_target.translation().isApprox(truth.targets[0].T_last_target.translation(), 1e-9));
   CHECK(found.robot.effects.empty());
   CHECK(found.train.after.rms < 1e-10);
 }

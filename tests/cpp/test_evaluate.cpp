@@ -29,7 +29,8 @@ std::vector<int> all_parameters(const detail::Model& model) {
 }
 
 /// Residual and dense Jacobian of all rows, in order of tiles.
-void dense(const detail::Evaluator& evaluator, const Eigen::VectorXd& values, const detail::Weighing& weighing, Eigen::VectorXd* r, Eigen::MatrixXd* j) {
+void dense(const detail::Evaluator& evaluator, const Eigen::VectorXd& values, const detail::Weighing& weighing,
+           Eigen::VectorXd* r, Eigen::MatrixXd* j) {
   const auto p = static_cast<Eigen::Index>(evaluator.free().size());
   r->resize(static_cast<Eigen::Index>(evaluator.components()));
   if (j) j->resize(r->size(), p);
@@ -64,7 +65,8 @@ void add_directions(Table* table, unsigned seed) {
 void check_columns(const Robot& near, const Measurements& data, const std::vector<truing::EffectRequest>& effects) {
   const detail::Model model = detail::make_model(near, data, effects);
   const auto bases = detail::make_bases(model, data);
-  const detail::Evaluator evaluator(model, data, bases, detail::make_segments(data, all_rows(data)), all_parameters(model), 1);
+  const detail::Evaluator evaluator(model, data, bases, detail::make_segments(data, all_rows(data)),
+                                    all_parameters(model), 1);
   Eigen::VectorXd values = detail::initial_values(model);
   for (Eigen::Index k = 0; k < values.size(); ++k) {  // effects and orientation corrections away from zero
     const bool per_torque = model.parameters[static_cast<std::size_t>(k)].unit.find("Nm") != std::string::npos;
@@ -75,7 +77,8 @@ void check_columns(const Robot& near, const Measurements& data, const std::vecto
   Eigen::MatrixXd j;
   dense(evaluator, values, weighing, &r, &j);
   for (std::size_t k = 0; k < model.parameters.size(); ++k) {
-    const bool per_torque = model.parameters[k].unit.find("Nm") != std::string::npos;  // torques are up to thousands of Nm
+    const bool per_torque =
+        model.parameters[k].unit.find("Nm") != std::string::npos;  // torques are up to thousands of Nm
     const double step = per_torque ? 1e-8 : 1e-5;
     Eigen::VectorXd moved = values;
     moved[static_cast<Eigen::Index>(k)] += step;
@@ -118,7 +121,8 @@ TEST_CASE("predictions equal the plain forward kinematics") {
       const Eigen::Isometry3d T = truing::forward_kinematics(robot, q).back();
       const auto i = static_cast<Eigen::Index>(row);
       CHECK((p.position.row(i).transpose() - T.translation()).norm() < 2e-15 * 20);
-      const Eigen::Quaterniond expected(T.rotation()), got(p.orientation(i, 0), p.orientation(i, 1), p.orientation(i, 2), p.orientation(i, 3));
+      const Eigen::Quaterniond expected(T.rotation()),
+          got(p.orientation(i, 0), p.orientation(i, 1), p.orientation(i, 2), p.orientation(i, 3));
       CHECK(expected.angularDistance(got) < 1e-7);
     }
   }
@@ -184,7 +188,9 @@ TEST_CASE("one and two threads give the same bits") {
   const auto bases = detail::make_bases(model, table->data);
   detail::NormalEquations one, two;
   for (const int threads : {1, 2}) {
-    const detail::Evaluator evaluator(model, table->data, bases, detail::make_segments(table->data, all_rows(table->data)), all_parameters(model), threads);
+    const detail::Evaluator evaluator(model, table->data, bases,
+                                      detail::make_segments(table->data, all_rows(table->data)), all_parameters(model),
+                                      threads);
     evaluator.normal_equations(detail::initial_values(model), detail::Weighing{}, threads == 1 ? &one : &two);
   }
   CHECK(one.gram == two.gram);
@@ -199,8 +205,10 @@ TEST_CASE("the streamed Gram equals the dense product") {
   measure(table.get(), truth, What::pose, 1e-4, 63);
   const detail::Model model = detail::make_model(truth, table->data, kEffects);
   const auto bases = detail::make_bases(model, table->data);
-  const detail::Evaluator evaluator(model, table->data, bases, detail::make_segments(table->data, all_rows(table->data)), all_parameters(model), 1);
-  for (const auto loss : {truing::kernel::RowLoss::none, truing::kernel::RowLoss::huber, truing::kernel::RowLoss::cauchy, truing::kernel::RowLoss::tukey}) {
+  const detail::Evaluator evaluator(
+      model, table->data, bases, detail::make_segments(table->data, all_rows(table->data)), all_parameters(model), 1);
+  for (const auto loss : {truing::kernel::RowLoss::none, truing::kernel::RowLoss::huber,
+                          truing::kernel::RowLoss::cauchy, truing::kernel::RowLoss::tukey}) {
     detail::Weighing weighing;
     weighing.loss = loss;
     weighing.loss_scale = 2e-4;
@@ -236,9 +244,11 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
     f->gram_add(c.data(), length, columns, length, acc.data());
     f->gram_reduce(acc.data(), columns, out.data());
     for (int j = 0; j < columns; ++j) {
-      for (int i = 0; i <= j; ++i) CHECK(out[j * columns + i] == doctest::Approx(expected[j * columns + i]).epsilon(1e-13));
+      for (int i = 0; i <= j; ++i)
+        CHECK(out[j * columns + i] == doctest::Approx(expected[j * columns + i]).epsilon(1e-13));
     }
-    // Sine and cosine, through a chain of one rotation about z and a step along x: also where the quadrant changes, and many turns away.
+    // Sine and cosine, through a chain of one rotation about z and a step along x: also where the quadrant changes, and
+    // many turns away.
     using namespace truing::kernel;
     const Step steps[2] = {{Code::rotate, 0, 0, {0, 1, 0}, {0, 1, 0}}, {Code::translate, -1, 0, {3, 0, 0}, {3, 0, 0}}};
     const double constants[1] = {1.0}, start[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};

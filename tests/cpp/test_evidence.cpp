@@ -58,7 +58,8 @@ struct Problem {
 
 /// log p(y) with the nuisance integrated over a flat prior and the noise at its most probable size, by n x n matrices:
 /// y ~ N(0, sigma^2 C), C = I + X (sigma^2 P)^-1 X^T. `ridge` is sigma^2 P.
-double dense_evidence(const Eigen::MatrixXd& nuisance, const Eigen::MatrixXd& x, const Eigen::VectorXd& ridge, const Eigen::VectorXd& y) {
+double dense_evidence(const Eigen::MatrixXd& nuisance, const Eigen::MatrixXd& x, const Eigen::VectorXd& ridge,
+                      const Eigen::VectorXd& y) {
   const Eigen::Index n = y.size();
   const Eigen::MatrixXd c = Eigen::MatrixXd::Identity(n, n) + x * ridge.cwiseInverse().asDiagonal() * x.transpose();
   const Eigen::LLT<Eigen::MatrixXd> factor(c);
@@ -104,7 +105,9 @@ TEST_CASE("Gram matrices add up, and leave out columns") {
   sum.add(gram_of(x.topRows(15), y.head(15)));
   sum.add(gram_of(x.bottomRows(25), y.tail(25)), 0.5);
   CHECK(sum.n == 27.5);
-  CHECK((sum.xx - x.topRows(15).transpose() * x.topRows(15) - 0.5 * x.bottomRows(25).transpose() * x.bottomRows(25)).cwiseAbs().maxCoeff() < 1e-13);
+  CHECK((sum.xx - x.topRows(15).transpose() * x.topRows(15) - 0.5 * x.bottomRows(25).transpose() * x.bottomRows(25))
+            .cwiseAbs()
+            .maxCoeff() < 1e-13);
   const Gram some = sum.of({4, 1});
   CHECK(some.xx(0, 1) == sum.xx(4, 1));
   CHECK(some.xy[1] == sum.xy[1]);
@@ -113,13 +116,15 @@ TEST_CASE("Gram matrices add up, and leave out columns") {
 
 TEST_CASE("the evidence of a choice is that of the dense formula") {
   const Problem problem(60, 11);
-  const Eigen::VectorXd y = 2.0 * problem.x.col(0) + 0.3 * problem.x.col(4) + 0.05 * problem.x.col(6) + problem.noise(0.1, 12);
+  const Eigen::VectorXd y =
+      2.0 * problem.x.col(0) + 0.3 * problem.x.col(4) + 0.05 * problem.x.col(6) + problem.noise(0.1, 12);
   const Gram gram = gram_of(problem.x, y);
   const Evidence evidence(gram, problem.groups, problem.nuisance, problem.prior);
   const Eigen::MatrixXd flat = problem.x.leftCols(3);
   const double nothing = evidence.evaluate({}).evidence;
   const double dense_nothing = dense_evidence(flat, Eigen::MatrixXd(60, 0), Eigen::VectorXd(0), y);
-  const std::vector<Choice> choices = {{{0}, {1.0}}, {{0}, {0.1}}, {{1, 2}, {0.1, 0.01}}, {{4, 0, 3}, {1.0, 0.1, 0.001}}};
+  const std::vector<Choice> choices = {
+      {{0}, {1.0}}, {{0}, {0.1}}, {{1, 2}, {0.1, 0.01}}, {{4, 0, 3}, {1.0, 0.1, 0.001}}};
   for (const Choice& choice : choices) {
     CAPTURE(choice.groups[0]);
     const Evidence::State state = evidence.evaluate(choice);
@@ -127,17 +132,20 @@ TEST_CASE("the evidence of a choice is that of the dense formula") {
     Eigen::MatrixXd x(60, columns);
     for (Eigen::Index k = 0; k < columns; ++k) {
       x.col(k) = problem.x.col(state.columns[static_cast<std::size_t>(k + 3)]);
-      const double own = state.precision[k + 3] * std::pow(problem.prior[state.columns[static_cast<std::size_t>(k + 3)]], 2.0);
+      const double own =
+          state.precision[k + 3] * std::pow(problem.prior[state.columns[static_cast<std::size_t>(k + 3)]], 2.0);
       double scale = 0.0;
       for (std::size_t g = 0; g < choice.groups.size(); ++g) {
         const std::vector<int>& of = problem.groups[static_cast<std::size_t>(choice.groups[g])].columns;
-        if (std::find(of.begin(), of.end(), state.columns[static_cast<std::size_t>(k + 3)]) != of.end()) scale = choice.scales[g];
+        if (std::find(of.begin(), of.end(), state.columns[static_cast<std::size_t>(k + 3)]) != of.end())
+          scale = choice.scales[g];
       }
       CHECK(own * scale * scale == doctest::Approx(state.sigma2).epsilon(5e-3));  // the noise has settled
     }
     const double dense = dense_evidence(flat, x, state.precision.tail(columns), y);
     CHECK(state.evidence - nothing == doctest::Approx(dense - dense_nothing).epsilon(1e-6));
-    CHECK(state.score == doctest::Approx(state.evidence - static_cast<double>(choice.groups.size()) * std::log(5.0)).epsilon(1e-12));
+    CHECK(state.score ==
+          doctest::Approx(state.evidence - static_cast<double>(choice.groups.size()) * std::log(5.0)).epsilon(1e-12));
     // The solution is that of ridge regression.
     Eigen::MatrixXd all(60, 3 + columns);
     all << flat, x;
@@ -149,7 +157,8 @@ TEST_CASE("the evidence of a choice is that of the dense formula") {
 
 TEST_CASE("what a group wins is the difference of two evaluations") {
   const Problem problem(90, 21);
-  const Eigen::VectorXd y = problem.x.col(2) + 0.2 * problem.x.col(3) - 0.1 * problem.x.col(10) + problem.noise(0.1, 22);
+  const Eigen::VectorXd y =
+      problem.x.col(2) + 0.2 * problem.x.col(3) - 0.1 * problem.x.col(10) + problem.noise(0.1, 22);
   const Gram gram = gram_of(problem.x, y);
   const Evidence evidence(gram, problem.groups, problem.nuisance, problem.prior);
   const std::vector<Choice> starts = {{}, {{0}, {0.1}}, {{0, 4}, {0.1, 0.1}}};
@@ -165,8 +174,10 @@ TEST_CASE("what a group wins is the difference of two evaluations") {
         grown.scales.push_back(scale);
         return evidence.evaluate(grown).evidence - state.evidence;
       };
-      // Exact but for the noise that has not quite settled; with groups in, their shrinkage stays that of the larger noise.
-      const double tolerance = start.groups.empty() ? 0.02 + 0.01 * std::abs(gain.evidence) : 0.05 + 0.06 * std::abs(gain.evidence);
+      // Exact but for the noise that has not quite settled; with groups in, their shrinkage stays that of the larger
+      // noise.
+      const double tolerance =
+          start.groups.empty() ? 0.02 + 0.01 * std::abs(gain.evidence) : 0.05 + 0.06 * std::abs(gain.evidence);
       CHECK(std::abs(gain.evidence - difference(gain.scale)) < tolerance);
       CHECK(gain.score == doctest::Approx(gain.evidence - std::log(5.0)).epsilon(1e-12));
       CHECK(gain.rank == static_cast<int>(problem.groups[static_cast<std::size_t>(gain.group)].columns.size()));
@@ -181,7 +192,8 @@ TEST_CASE("the search finds the groups that are there, and none in noise") {
   for (unsigned seed = 30; seed < 50; ++seed) {
     const Problem problem(150, seed);
     const Eigen::VectorXd y = problem.x.col(1) + problem.noise(0.1, seed + 100);
-    const Gram noise = gram_of(problem.x, y), signal = gram_of(problem.x, y + 0.2 * problem.x.col(5) + 0.1 * problem.x.col(8));
+    const Gram noise = gram_of(problem.x, y),
+               signal = gram_of(problem.x, y + 0.2 * problem.x.col(5) + 0.1 * problem.x.col(8));
     none += Evidence(noise, problem.groups, problem.nuisance, problem.prior).search({}).choice.groups.empty() ? 1 : 0;
     std::vector<int> found = Evidence(signal, problem.groups, problem.nuisance, problem.prior).search({}).choice.groups;
     std::sort(found.begin(), found.end());
@@ -193,8 +205,8 @@ TEST_CASE("the search finds the groups that are there, and none in noise") {
 
 TEST_CASE("a law's correction enters only with its law, a shadow never") {
   Problem problem(100, 61);
-  problem.groups[0].law_at = 7;                                    // the law
-  problem.groups[1].corrects_law_at = problem.groups[1].law_at = 7;    // its correction
+  problem.groups[0].law_at = 7;                                      // the law
+  problem.groups[1].corrects_law_at = problem.groups[1].law_at = 7;  // its correction
   problem.groups[3].shadow = true;
   const Eigen::VectorXd noise = problem.noise(0.1, 62);
   const auto found = [&](const Eigen::VectorXd& y) {
@@ -236,7 +248,8 @@ TEST_CASE("held-out squares are those of the prediction") {
   const Eigen::VectorXd solution = random_matrix(2, 1, 83);
   Eigen::MatrixXd two(30, 2);
   two << x.col(4), x.col(1);
-  CHECK(held_out_squares(gram_of(x, y), {4, 1}, solution) == doctest::Approx((y - two * solution).squaredNorm()).epsilon(1e-12));
+  CHECK(held_out_squares(gram_of(x, y), {4, 1}, solution) ==
+        doctest::Approx((y - two * solution).squaredNorm()).epsilon(1e-12));
 }
 
 TEST_CASE("one group can do what another does, or a part of it") {

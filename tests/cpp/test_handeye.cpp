@@ -59,7 +59,8 @@ Eigen::Isometry3d disturbed(const Eigen::Isometry3d& T, double position, double 
 }
 
 /// `turn`: largest rotation vector component of the hand about each axis [rad].
-Scene make_scene(HandEyeSetup setup, int n, const Noise& noise, std::uint64_t seed, const Eigen::Vector3d& turn = {0.7, 0.7, 0.7}) {
+Scene make_scene(HandEyeSetup setup, int n, const Noise& noise, std::uint64_t seed,
+                 const Eigen::Vector3d& turn = {0.7, 0.7, 0.7}) {
   Random random(seed);
   Scene s;
   s.setup = setup;
@@ -67,7 +68,8 @@ Scene make_scene(HandEyeSetup setup, int n, const Noise& noise, std::uint64_t se
   // Cameras look at their boards, boards' z axes away from them.
   s.X = make({0.05, -0.03, 0.08}, {3.0, 0.1, -0.2}), s.Y = make({0.6, 0.1, -0.45}, {3.1, 0.1, 0.2});
   if (!in_hand) {
-    const Eigen::Vector3d position(1.6, 0.2, 0.5), z = (Eigen::Vector3d(0.6, 0.0, 0.3) - position).normalized(), x = z.cross(Eigen::Vector3d(0.1, 0.0, 1.0)).normalized();
+    const Eigen::Vector3d position(1.6, 0.2, 0.5), z = (Eigen::Vector3d(0.6, 0.0, 0.3) - position).normalized(),
+                                                   x = z.cross(Eigen::Vector3d(0.1, 0.0, 1.0)).normalized();
     s.X.translation() = position;
     s.X.linear() << x, z.cross(x), z;
     s.Y = make({0.03, -0.05, 0.15}, {0.0, 0.0, 0.0});
@@ -76,10 +78,11 @@ Scene make_scene(HandEyeSetup setup, int n, const Noise& noise, std::uint64_t se
   for (int i = 0; i < n; ++i) {
     Eigen::Vector3d r;
     for (int k = 0; k < 3; ++k) r(k) = random.uniform(-turn(k), turn(k));
-    const Eigen::Vector3d p(0.6 + random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), 0.3 + random.uniform(-0.2, 0.2));
+    const Eigen::Vector3d p(0.6 + random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2),
+                            0.3 + random.uniform(-0.2, 0.2));
     const Eigen::Isometry3d hand = make(p, r);
-    s.poses.T_camera_board.push_back(
-        disturbed(predicted_board(s.X, moving_frames({hand}, setup)[0], s.Y), noise.camera_position, noise.camera_rotation, &random));
+    s.poses.T_camera_board.push_back(disturbed(predicted_board(s.X, moving_frames({hand}, setup)[0], s.Y),
+                                               noise.camera_position, noise.camera_rotation, &random));
     s.poses.T_base_hand.push_back(disturbed(hand, noise.hand_position, noise.hand_rotation, &random));
   }
   return s;
@@ -91,13 +94,18 @@ HandEyeOptions options_for(const Scene& scene) {
   return o;
 }
 
-double position_error(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) { return (a.translation() - b.translation()).norm(); }
-double rotation_error(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) { return vector_from_rotation(a.linear() * b.linear().transpose()).norm(); }
+double position_error(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  return (a.translation() - b.translation()).norm();
+}
+double rotation_error(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  return vector_from_rotation(a.linear() * b.linear().transpose()).norm();
+}
 
 const HandEyeSetup kSetups[] = {HandEyeSetup::eye_in_hand, HandEyeSetup::eye_to_hand};
 
 /// A 9 x 6 board of 25 mm seen by a camera with distortion; pixel noise as told.
-Scene make_pixel_scene(int n, double hand_position, double hand_rotation, double pixel, std::uint64_t seed, const Camera& camera) {
+Scene make_pixel_scene(int n, double hand_position, double hand_rotation, double pixel, std::uint64_t seed,
+                       const Camera& camera) {
   Random random(seed);
   Scene s;
   s.setup = HandEyeSetup::eye_in_hand;
@@ -157,7 +165,8 @@ TEST_CASE("the factor of a motion vanishes at the true camera, and sums are thos
   Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
   for (std::size_t i = 0; i < 12; ++i)
     for (std::size_t j = i + 1; j < 12; ++j) {
-      const Eigen::Matrix<double, 8, 8> S = motion_factor(screws.M[i] * conjugate(screws.M[j]), screws.B[i] * conjugate(screws.B[j]));
+      const Eigen::Matrix<double, 8, 8> S =
+          motion_factor(screws.M[i] * conjugate(screws.M[j]), screws.B[i] * conjugate(screws.B[j]));
       CHECK((S * x).norm() < 1e-13);
       normal += S.transpose() * S;
     }
@@ -172,7 +181,8 @@ TEST_CASE("the quadratic of the null vectors finds the unit dual quaternion, wha
     x << q.real.w(), q.real.vec(), q.dual.w(), q.dual.vec();
     tangent << 0, 0, 0, 0, q.real.w(), q.real.vec();  // q e: the other null vector of perfect motions
     const double angle = random.uniform(0.0, 6.28);
-    const Vector8d v7 = std::cos(angle) * x + std::sin(angle) * tangent, v8 = -std::sin(angle) * x + std::cos(angle) * tangent;
+    const Vector8d v7 = std::cos(angle) * x + std::sin(angle) * tangent,
+                   v8 = -std::sin(angle) * x + std::cos(angle) * tangent;
     const Vector8d y = unit_combination(v7, v8);
     CHECK(std::min((y - x).norm(), (y + x).norm()) < 1e-9);
   }
@@ -225,9 +235,11 @@ TEST_CASE("neither the order of the poses, nor the unit of length, nor the base 
       Random random(4);
       for (std::size_t i = shuffled.poses.T_base_hand.size() - 1; i > 0; --i) {
         const std::size_t j = random.below(i + 1);
-        std::swap(shuffled.poses.T_base_hand[i], shuffled.poses.T_base_hand[j]), std::swap(shuffled.poses.T_camera_board[i], shuffled.poses.T_camera_board[j]);
+        std::swap(shuffled.poses.T_base_hand[i], shuffled.poses.T_base_hand[j]),
+            std::swap(shuffled.poses.T_camera_board[i], shuffled.poses.T_camera_board[j]);
       }
-      const double tight = method == HandEyeMethod::closed_form ? 1e-9 : 1e-6;  // the refinement stops at a share of its standard errors
+      const double tight =
+          method == HandEyeMethod::closed_form ? 1e-9 : 1e-6;  // the refinement stops at a share of its standard errors
       CHECK(position_error(handeye(shuffled.poses, o).camera.T, X) < tight);
       Scene scaled = s, elsewhere = s;
       const Eigen::Isometry3d F = make({2.0, -1.0, 3.0}, {0.5, 1.0, -0.7});
@@ -249,7 +261,8 @@ TEST_CASE("derivatives of the closure agree with differences") {
   for (const HandEyeSetup setup : kSetups) {
     const Scene s = make_scene(setup, 3, {}, 31);
     LoopProblem problem;
-    problem.setup = setup, problem.A = s.poses.T_base_hand, problem.M = moving_frames(problem.A, setup), problem.B = s.poses.T_camera_board;
+    problem.setup = setup, problem.A = s.poses.T_base_hand, problem.M = moving_frames(problem.A, setup),
+    problem.B = s.poses.T_camera_board;
     const LoopRow row = loop_row(problem, 1, s.X, s.Y, {});
     for (int k = 0; k < 12; ++k) {
       Eigen::Matrix<double, 12, 1> d = Eigen::Matrix<double, 12, 1>::Zero();
@@ -283,8 +296,8 @@ TEST_CASE("standard errors are the scatter over 300 seeds, with noise told and w
       const Scene s = make_scene(HandEyeSetup::eye_to_hand, 25, kUsual, seed);
       HandEyeOptions o = options_for(s);
       if (told)
-        o.hand_position_sigma = kUsual.hand_position, o.hand_rotation_sigma = kUsual.hand_rotation, o.camera_position_sigma = kUsual.camera_position,
-        o.camera_rotation_sigma = kUsual.camera_rotation;
+        o.hand_position_sigma = kUsual.hand_position, o.hand_rotation_sigma = kUsual.hand_rotation,
+        o.camera_position_sigma = kUsual.camera_position, o.camera_rotation_sigma = kUsual.camera_rotation;
       const HandEyeResult r = handeye(s.poses, o);
       REQUIRE(r.status == HandEyeStatus::done);
       const Eigen::Vector3d e = r.camera.T * r.working_point - s.X * r.working_point;
@@ -314,7 +327,8 @@ TEST_CASE("both noises are found from many poses") {
 TEST_CASE("a pose left out is the fit without it") {
   const Scene s = make_scene(HandEyeSetup::eye_in_hand, 12, kUsual, 41);
   HandEyeOptions o = options_for(s);
-  o.hand_position_sigma = 1e-4, o.hand_rotation_sigma = 1e-3, o.camera_position_sigma = 5e-4, o.camera_rotation_sigma = 2e-3;
+  o.hand_position_sigma = 1e-4, o.hand_rotation_sigma = 1e-3, o.camera_position_sigma = 5e-4,
+  o.camera_rotation_sigma = 2e-3;
   const HandEyeResult all = handeye(s.poses, o);
   for (const std::size_t i : {std::size_t{0}, std::size_t{5}}) {
     HandEyePoses rest = s.poses;
@@ -331,7 +345,8 @@ TEST_CASE("a pose left out is the fit without it") {
 TEST_CASE("noise told too small is said, and standard errors are widened") {
   const Scene s = make_scene(HandEyeSetup::eye_to_hand, 40, kUsual, 9);
   HandEyeOptions o = options_for(s);
-  o.hand_position_sigma = 1e-5, o.hand_rotation_sigma = 1e-5, o.camera_position_sigma = 5e-5, o.camera_rotation_sigma = 2e-4;
+  o.hand_position_sigma = 1e-5, o.hand_rotation_sigma = 1e-5, o.camera_position_sigma = 5e-5,
+  o.camera_rotation_sigma = 2e-4;
   const HandEyeResult told = handeye(s.poses, o), found = handeye(s.poses, options_for(s));
   REQUIRE(told.rejected.empty());
   REQUIRE(told.warnings.size() == 1);
@@ -384,7 +399,8 @@ TEST_CASE("what is wrong with a pose is named") {
   CHECK(cause(s, 4).find("turned by 180 deg about its normal") != std::string::npos);
   s = clean;
   std::swap(s.poses.T_camera_board[2], s.poses.T_camera_board[9]);
-  CHECK(cause(s, 2).find("hand of pose 9") == std::string::npos);  // pose 9 is itself rejected: its hand is not among those that agree
+  CHECK(cause(s, 2).find("hand of pose 9") ==
+        std::string::npos);  // pose 9 is itself rejected: its hand is not among those that agree
   s = clean;
   s.poses.T_camera_board[2] = s.poses.T_camera_board[9];
   CHECK(cause(s, 2).find("belongs to the hand of pose 9") != std::string::npos);
@@ -409,13 +425,15 @@ TEST_CASE("a board that looks the same turned is read as the loop needs it") {
     if (k > 0) s.poses.T_camera_board[i] = s.poses.T_camera_board[i] * s.poses.board_symmetries[k - 1].inverse();
   }
   s.poses.set.assign(20, 0);
-  for (const std::size_t i : {3, 8, 14}) s.poses.set[i] = 1;  // held-out boards are read in the turn that closes as well
+  for (const std::size_t i : {3, 8, 14})
+    s.poses.set[i] = 1;  // held-out boards are read in the turn that closes as well
   const HandEyeResult r = handeye(s.poses, options_for(s));
   CHECK(r.status == HandEyeStatus::done);
   CHECK(r.rejected.empty());
   REQUIRE(r.test);
   CHECK(r.test->position_max < 5e-3);
-  CHECK(position_error(r.camera.T, straight.camera.T) < 1e-3);  // the board's origin may be another corner: noise acts there
+  CHECK(position_error(r.camera.T, straight.camera.T) <
+        1e-3);  // the board's origin may be another corner: noise acts there
 }
 
 // ---- Other readings of the same numbers ----------------------------------------------------------------------------
@@ -438,36 +456,65 @@ TEST_CASE("a wrong reading is recognised, named, and closes when it is applied")
     };
     if (name == "hand-inverted") each(&hand, [](const Eigen::Isometry3d& T) { return T.inverse(); });
     if (name == "board-inverted") each(&board, [](const Eigen::Isometry3d& T) { return T.inverse(); });
-    if (name == "hand-millimetres") each(&hand, [](Eigen::Isometry3d T) { T.translation() *= 1e3; return T; });
-    if (name == "board-millimetres") each(&board, [](Eigen::Isometry3d T) { T.translation() *= 1e3; return T; });
+    if (name == "hand-millimetres")
+      each(&hand, [](Eigen::Isometry3d T) {
+        T.translation() *= 1e3;
+        return T;
+      });
+    if (name == "board-millimetres")
+      each(&board, [](Eigen::Isometry3d T) {
+        T.translation() *= 1e3;
+        return T;
+      });
     if (name == "hand-xyzw") each(&hand, as_xyzw);
     if (name == "board-xyzw") each(&board, as_xyzw);
     if (name == "hand-left-handed") each(&hand, mirrored);
-    if (name == "hand-y-negated") each(&hand, [](Eigen::Isometry3d T) { T.translation().y() *= -1.0; return T; });
-    if (name == "hand-transposed") each(&hand, [](Eigen::Isometry3d T) { T.linear().transposeInPlace(); return T; });
+    if (name == "hand-y-negated")
+      each(&hand, [](Eigen::Isometry3d T) {
+        T.translation().y() *= -1.0;
+        return T;
+      });
+    if (name == "hand-transposed")
+      each(&hand, [](Eigen::Isometry3d T) {
+        T.linear().transposeInPlace();
+        return T;
+      });
     if (name == "hand-zyx-as-xyz")
       each(&hand, [](Eigen::Isometry3d T) {  // Rz(c) Ry(b) Rx(a) written, Rx(a) Ry(b) Rz(c) read
         const Eigen::Vector3d a = T.linear().eulerAngles(2, 1, 0);
-        T.linear() = (Eigen::AngleAxisd(a(2), Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(a(1), Eigen::Vector3d::UnitY()) *
-                      Eigen::AngleAxisd(a(0), Eigen::Vector3d::UnitZ())).toRotationMatrix();
+        T.linear() =
+            (Eigen::AngleAxisd(a(2), Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(a(1), Eigen::Vector3d::UnitY()) *
+             Eigen::AngleAxisd(a(0), Eigen::Vector3d::UnitZ()))
+                .toRotationMatrix();
         return T;
       });
     if (name == "hand-rotation-vector-as-zyx")
       each(&hand, [](Eigen::Isometry3d T) {
         const Eigen::Vector3d v = vector_from_rotation(T.linear());
-        T.linear() = (Eigen::AngleAxisd(v(2), Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(v(1), Eigen::Vector3d::UnitY()) *
-                      Eigen::AngleAxisd(v(0), Eigen::Vector3d::UnitX())).toRotationMatrix();
+        T.linear() =
+            (Eigen::AngleAxisd(v(2), Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(v(1), Eigen::Vector3d::UnitY()) *
+             Eigen::AngleAxisd(v(0), Eigen::Vector3d::UnitX()))
+                .toRotationMatrix();
         return T;
       });
     if (name == "hand-radians-as-degrees")
-      each(&hand, [](Eigen::Isometry3d T) { T.linear() = rotation_from_vector(kDegree * vector_from_rotation(T.linear())); return T; });
+      each(&hand, [](Eigen::Isometry3d T) {
+        T.linear() = rotation_from_vector(kDegree * vector_from_rotation(T.linear()));
+        return T;
+      });
     if (name == "board-one-later") std::rotate(board.begin(), board.begin() + 1, board.end());
-    if (name == "hand-millimetres+hand-inverted") each(&hand, [](Eigen::Isometry3d T) { T = T.inverse(); T.translation() *= 1e3; return T; });
+    if (name == "hand-millimetres+hand-inverted")
+      each(&hand, [](Eigen::Isometry3d T) {
+        T = T.inverse();
+        T.translation() *= 1e3;
+        return T;
+      });
   };
   for (const HandEyeSetup setup : kSetups)
-    for (const std::string name : {"hand-inverted", "board-inverted", "hand-millimetres", "board-millimetres", "hand-xyzw", "board-xyzw", "hand-left-handed",
-                             "hand-y-negated", "hand-transposed", "hand-zyx-as-xyz", "hand-rotation-vector-as-zyx", "hand-radians-as-degrees",
-                             "board-one-later", "hand-millimetres+hand-inverted"}) {
+    for (const std::string name :
+         {"hand-inverted", "board-inverted", "hand-millimetres", "board-millimetres", "hand-xyzw", "board-xyzw",
+          "hand-left-handed", "hand-y-negated", "hand-transposed", "hand-zyx-as-xyz", "hand-rotation-vector-as-zyx",
+          "hand-radians-as-degrees", "board-one-later", "hand-millimetres+hand-inverted"}) {
       if (kSanitized && (setup == HandEyeSetup::eye_in_hand || name.find("board") == std::string::npos)) continue;
       CAPTURE(name);
       Scene s = make_scene(setup, 25, kUsual, 51, {1.2, 1.0, 2.0});
@@ -500,7 +547,8 @@ TEST_CASE("a board of another size is said") {
   for (Eigen::Isometry3d& T : s.poses.T_camera_board) T.translation() *= 0.96;
   const HandEyeResult r = handeye(s.poses, options_for(s));
   CHECK(r.board_scale == doctest::Approx(1.0 / 0.96).epsilon(0.01));
-  CHECK(std::any_of(r.warnings.begin(), r.warnings.end(), [](const std::string& w) { return w.find("% larger than told") != std::string::npos; }));
+  CHECK(std::any_of(r.warnings.begin(), r.warnings.end(),
+                    [](const std::string& w) { return w.find("% larger than told") != std::string::npos; }));
 }
 
 // ---- What motions cannot show --------------------------------------------------------------------------------------
@@ -515,7 +563,8 @@ TEST_CASE("one axis of rotation: the height along it is refused, or told") {
       REQUIRE(r.unobservable.size() == 1);
       CHECK(std::abs(r.unobservable[0].direction.z()) > 0.999);
       CHECK(r.message.find("known height") != std::string::npos);
-      CHECK_THROWS_WITH_AS(handeye_closed_form(s.poses, setup), doctest::Contains("known height"), std::invalid_argument);
+      CHECK_THROWS_WITH_AS(handeye_closed_form(s.poses, setup), doctest::Contains("known height"),
+                           std::invalid_argument);
       o.known_height = s.X.translation().z();
       const HandEyeResult told = handeye(s.poses, o);
       CHECK(told.status == HandEyeStatus::done);
@@ -619,7 +668,8 @@ TEST_CASE("what is about board poses is refused, and not proposed, where boards 
   options.camera_position_sigma = 1e-3;
   CHECK_THROWS_AS(handeye(s.poses, options), std::invalid_argument);
   options.camera_position_sigma = HandEyeOptions().camera_position_sigma;
-  for (Eigen::Isometry3d& T : s.poses.T_base_hand) T = T.inverse();  // the hand's side is the only one that can be read otherwise
+  for (Eigen::Isometry3d& T : s.poses.T_base_hand)
+    T = T.inverse();  // the hand's side is the only one that can be read otherwise
   const HandEyeResult r = handeye(s.poses, options);
   REQUIRE(r.status == HandEyeStatus::not_closing);
   for (const Reading& reading : r.readings) CHECK(reading.name.find("board-") == std::string::npos);
@@ -636,10 +686,12 @@ TEST_CASE("boards that scatter beyond their pixels are said, and weighed by that
   }
   const HandEyeResult r = handeye(s.poses, options_for(s));
   REQUIRE(r.status == HandEyeStatus::done);
-  CHECK(std::any_of(r.warnings.begin(), r.warnings.end(), [](const std::string& w) { return w.find("what their pixels can tell") != std::string::npos; }));
+  CHECK(std::any_of(r.warnings.begin(), r.warnings.end(),
+                    [](const std::string& w) { return w.find("what their pixels can tell") != std::string::npos; }));
   CHECK(r.noise.camera_rotation == doctest::Approx(0.5 * kDegree).epsilon(0.3));
   CHECK(position_error(r.camera.T, s.X) < 5e-3);
-  const HandEyeResult clean = handeye(make_pixel_scene(25, 1e-4, 0.05 * kDegree, 0.1, 8, kCamera).poses, options_for(s));
+  const HandEyeResult clean =
+      handeye(make_pixel_scene(25, 1e-4, 0.05 * kDegree, 0.1, 8, kCamera).poses, options_for(s));
   CHECK(clean.warnings.empty());
 }
 
@@ -647,7 +699,8 @@ TEST_CASE("the elimination of robot poses finds Ceres' minimum over all of them"
   // refine_loop holds the board's pixel covariance, refine_images goes through the pixels with every robot pose free.
   const Scene s = make_pixel_scene(20, 1e-4, 0.05 * kDegree, 0.1, 3, kCamera);
   LoopProblem problem;
-  problem.setup = s.setup, problem.A = s.poses.T_base_hand, problem.M = moving_frames(problem.A, s.setup), problem.B = s.poses.T_camera_board;
+  problem.setup = s.setup, problem.A = s.poses.T_base_hand, problem.M = moving_frames(problem.A, s.setup),
+  problem.B = s.poses.T_camera_board;
   problem.pixel_shape.resize(20);
   Rows rows(20);
   std::iota(rows.begin(), rows.end(), std::size_t{0});
@@ -659,7 +712,8 @@ TEST_CASE("the elimination of robot poses finds Ceres' minimum over all of them"
   LoopNoise noise;
   noise.variance = {1e-8, std::pow(0.05 * kDegree, 2), 0.0, 0.01}, noise.estimate = {false, false, false, false};
   const LoopEstimate a = refine_loop(problem, rows, s.X, s.Y, noise, 50);
-  const ImageEstimate b = refine_images(problem, s.poses.images, rows, kCamera, s.X, s.Y, {0.1, 1e-4, 0.05 * kDegree}, false, 50);
+  const ImageEstimate b =
+      refine_images(problem, s.poses.images, rows, kCamera, s.X, s.Y, {0.1, 1e-4, 0.05 * kDegree}, false, 50);
   const double sigma = std::sqrt(a.covariance.topLeftCorner<3, 3>().trace());
   CHECK(position_error(a.X, b.X) < 0.02 * sigma);
   CHECK((a.covariance - b.covariance).norm() < 0.02 * a.covariance.norm());
@@ -670,8 +724,8 @@ TEST_CASE("the elimination of robot poses finds Ceres' minimum over all of them"
 TEST_CASE("planned poses shrink the standard error as promised, more than as many random ones") {
   const Scene s = make_scene(HandEyeSetup::eye_in_hand, 8, kUsual, 13, {0.25, 0.25, 0.25});
   HandEyeOptions o = options_for(s);
-  o.hand_position_sigma = kUsual.hand_position, o.hand_rotation_sigma = kUsual.hand_rotation, o.camera_position_sigma = kUsual.camera_position,
-  o.camera_rotation_sigma = kUsual.camera_rotation;
+  o.hand_position_sigma = kUsual.hand_position, o.hand_rotation_sigma = kUsual.hand_rotation,
+  o.camera_position_sigma = kUsual.camera_position, o.camera_rotation_sigma = kUsual.camera_rotation;
   const HandEyeResult before = handeye(s.poses, o);
   const std::vector<NextHandPose> next = handeye_plan(s.poses, before, o);
   REQUIRE(next.size() == 5);
@@ -686,13 +740,15 @@ TEST_CASE("planned poses shrink the standard error as promised, more than as man
     planned.poses.T_camera_board.push_back(disturbed(B, kUsual.camera_position, kUsual.camera_rotation, &random));
   }
   const HandEyeResult after = handeye(planned.poses, o);
-  CHECK(std::sqrt(after.working_point_covariance.trace() / 3.0) == doctest::Approx(next.back().working_point_sigma).epsilon(0.3));
+  CHECK(std::sqrt(after.working_point_covariance.trace() / 3.0) ==
+        doctest::Approx(next.back().working_point_sigma).epsilon(0.3));
 }
 
 TEST_CASE("the offset between two clocks is found within three standard errors, and refused where nothing turns") {
   const auto hand_at = [](double t) {
-    return make({0.6 + 0.1 * std::sin(0.9 * t), 0.1 * std::cos(1.3 * t), 0.3 + 0.1 * std::sin(0.5 * t)},
-                {0.6 * std::sin(1.1 * t), 0.5 * std::sin(0.7 * t + 1.0) + 0.1 * std::sin(3.1 * t), 0.7 * std::sin(0.43 * t)});
+    return make(
+        {0.6 + 0.1 * std::sin(0.9 * t), 0.1 * std::cos(1.3 * t), 0.3 + 0.1 * std::sin(0.5 * t)},
+        {0.6 * std::sin(1.1 * t), 0.5 * std::sin(0.7 * t + 1.0) + 0.1 * std::sin(3.1 * t), 0.7 * std::sin(0.43 * t)});
   };
   const Scene s = make_scene(HandEyeSetup::eye_to_hand, 3, {}, 1);
   for (std::uint64_t seed = 1; seed <= (kSanitized ? 1 : 10); ++seed) {
@@ -726,14 +782,16 @@ TEST_CASE("the offset between two clocks is found within three standard errors, 
   for (int i = 0; i < 200; ++i) other.push_back(disturbed(hand_at(0.0), 1e-4, 1e-3, &random));
   CHECK(!handeye_clock(time, still, time, other, s.setup, 0.5).found);
   std::swap(time[4], time[5]);
-  CHECK_THROWS_WITH_AS(handeye_clock(time, still, time, other, s.setup, 0.5), doctest::Contains("goes back in time at row 5"), std::invalid_argument);
+  CHECK_THROWS_WITH_AS(handeye_clock(time, still, time, other, s.setup, 0.5),
+                       doctest::Contains("goes back in time at row 5"), std::invalid_argument);
 }
 
 TEST_CASE("with the robot's kinematics a wrong link is found, and the camera with it") {
   for (const HandEyeSetup setup : kSetups) {
     Robot nominal;
     nominal.convention = Convention::dh;
-    const double a[6] = {0.15, 0.6, 0.12, 0.0, 0.0, 0.0}, d[6] = {0.45, 0.0, 0.0, 0.62, 0.0, 0.1}, alpha[6] = {-90, 0, -90, 90, -90, 0};
+    const double a[6] = {0.15, 0.6, 0.12, 0.0, 0.0, 0.0}, d[6] = {0.45, 0.0, 0.0, 0.62, 0.0, 0.1},
+                 alpha[6] = {-90, 0, -90, 90, -90, 0};
     for (int k = 0; k < 6; ++k) {
       Joint j;
       j.name = "J" + std::to_string(k + 1), j.a = a[k], j.d = d[k], j.alpha = alpha[k] * kDegree;
@@ -752,7 +810,8 @@ TEST_CASE("with the robot's kinematics a wrong link is found, and the camera wit
       const Eigen::VectorXd reading = q.row(i).transpose();
       s.poses.T_base_hand.push_back(forward_kinematics(nominal, reading).back());
       const Eigen::Isometry3d hand = forward_kinematics(real, reading).back();
-      s.poses.T_camera_board.push_back(disturbed(predicted_board(s.X, moving_frames({hand}, setup)[0], s.Y), 1e-4, 2e-4, &random));
+      s.poses.T_camera_board.push_back(
+          disturbed(predicted_board(s.X, moving_frames({hand}, setup)[0], s.Y), 1e-4, 2e-4, &random));
       s.poses.set.push_back(i % 4 == 0);
     }
     IdentifyOptions fit;
@@ -760,7 +819,8 @@ TEST_CASE("with the robot's kinematics a wrong link is found, and the camera wit
     REQUIRE(k.test_after);
     CHECK(k.test_after->position_rms < 0.15 * k.test_before->position_rms);
     CHECK(k.test_after->position_rms < 4e-4);
-    // What the camera sees at the working point is where it is, up to what link parameters can take on themselves: closures say it.
+    // What the camera sees at the working point is where it is, up to what link parameters can take on themselves:
+    // closures say it.
     CHECK(position_error(k.camera.T, s.X) < 3e-3);
     CHECK(k.working_point_covariance.trace() > 0.0);
     CHECK(k.robot.targets[0].T_last_target.isApprox(nominal.targets[0].T_last_target));

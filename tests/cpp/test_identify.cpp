@@ -65,7 +65,8 @@ TEST_CASE("without noise the robot is found exactly") {
       measure(table.get(), truth, what, 0.0, 7);
       const Identification result = truing::identify(nominal, table->data);
       CHECK(result.solver.converged);
-      // Directions that only the errors themselves make visible (parallel axes no longer quite parallel) stay at nominal: second order.
+      // Directions that only the errors themselves make visible (parallel axes no longer quite parallel) stay at
+      // nominal: second order.
       const double second_order = nominal.name == "palletizer" ? 1e-6 : 1e-10;
       CHECK(fresh_rms(truth, result.robot, 8) < second_order);
       CHECK(result.test->after.max < second_order);
@@ -104,7 +105,9 @@ TEST_CASE("a frozen combination moves no measurement") {
     for (const auto& [name, weight] : frozen.combination) {
       const std::string owner = name.substr(0, name.find('.')), value = name.substr(name.find('.') + 1);
       const double delta = step * weight;
-      Eigen::Isometry3d* frame = owner == "base" ? &moved.T_measurement_base : owner == "tool" ? &moved.targets[0].T_last_target : nullptr;
+      Eigen::Isometry3d* frame = owner == "base"   ? &moved.T_measurement_base
+                                 : owner == "tool" ? &moved.targets[0].T_last_target
+                                                   : nullptr;
       if (frame) {
         const int axis = value.back() - 'x';
         if (value.size() == 1) {
@@ -115,7 +118,11 @@ TEST_CASE("a frozen combination moves no measurement") {
         continue;
       }
       Joint& joint = moved.joints[moved.joint_index(owner)];
-      (value == "theta" ? joint.theta : value == "d" ? joint.d : value == "a" ? joint.a : value == "alpha" ? joint.alpha : joint.beta) += delta;
+      (value == "theta"   ? joint.theta
+       : value == "d"     ? joint.d
+       : value == "a"     ? joint.a
+       : value == "alpha" ? joint.alpha
+                          : joint.beta) += delta;
     }
     CHECK(fresh_rms(result.before, moved, 16) < 2e-3 * step);
   }
@@ -145,7 +152,8 @@ TEST_CASE("both solvers agree under a robust loss") {
     const Identification lm = truing::identify(c.nominal, c.table->data, options);
     options.solver = truing::Solver::ceres;
     const Identification ceres = truing::identify(c.nominal, c.table->data, options);
-    for (std::size_t k = 0; k < lm.parameters.size(); ++k) CHECK(std::abs(lm.parameters[k].value - ceres.parameters[k].value) < 1e-3 * lm.noise_sigma + 1e-7);
+    for (std::size_t k = 0; k < lm.parameters.size(); ++k)
+      CHECK(std::abs(lm.parameters[k].value - ceres.parameters[k].value) < 1e-3 * lm.noise_sigma + 1e-7);
   }
 }
 
@@ -196,7 +204,8 @@ TEST_CASE("a row of weight zero counts for nothing") {
   const Identification without = truing::identify(half.nominal, half.table->data);
   for (std::size_t k = 0; k < without.parameters.size(); ++k) {
     CHECK(with_zeros.parameters[k].value == doctest::Approx(without.parameters[k].value).epsilon(1e-9));
-    if (!without.parameters[k].frozen) CHECK(with_zeros.parameters[k].sigma == doctest::Approx(without.parameters[k].sigma).epsilon(1e-6));
+    if (!without.parameters[k].frozen)
+      CHECK(with_zeros.parameters[k].sigma == doctest::Approx(without.parameters[k].sigma).epsilon(1e-6));
   }
 }
 
@@ -206,7 +215,8 @@ TEST_CASE("the undamped iteration of the differential error model ends in the sa
   const Identification damped = truing::identify(c.nominal, c.table->data, options);
   options.undamped = true;
   const Identification undamped = truing::identify(c.nominal, c.table->data, options);
-  for (std::size_t k = 0; k < damped.parameters.size(); ++k) CHECK(std::abs(damped.parameters[k].value - undamped.parameters[k].value) < 1e-9);
+  for (std::size_t k = 0; k < damped.parameters.size(); ++k)
+    CHECK(std::abs(damped.parameters[k].value - undamped.parameters[k].value) < 1e-9);
 }
 
 TEST_CASE("the result does not depend on where the measurement frame stands") {
@@ -226,7 +236,8 @@ TEST_CASE("the result does not depend on where the measurement frame stands") {
     if (here.parameters[k].name.rfind("base.", 0) == 0) continue;
     INFO(here.parameters[k].name);
     CHECK(std::abs(here.parameters[k].value - there.parameters[k].value) < 1e-9);
-    if (!here.parameters[k].frozen) CHECK(here.parameters[k].sigma == doctest::Approx(there.parameters[k].sigma).epsilon(1e-3));
+    if (!here.parameters[k].frozen)
+      CHECK(here.parameters[k].sigma == doctest::Approx(there.parameters[k].sigma).epsilon(1e-3));
   }
 }
 
@@ -330,14 +341,16 @@ TEST_CASE("the palletizer's eighteen parameters are found to the noise floor fro
   truth.joints[3].a -= 0.8e-3;
   truth.T_measurement_base = somewhere();
   truing::PlanOptions plan_options;
-  plan_options.free = {"J1.a", "J2.a", "J3.a", "J4.a", "J1.d", "J4.d", "J5.d", "*.ratio", "J1.offset", "J2.offset", "J3.offset", "J5.offset", "tool.x", "tool.y", "tool.z"};
+  plan_options.free = {"J1.a",      "J2.a",      "J3.a",      "J4.a",      "J1.d",   "J4.d",   "J5.d",  "*.ratio",
+                       "J1.offset", "J2.offset", "J3.offset", "J5.offset", "tool.x", "tool.y", "tool.z"};
   plan_options.seed = 30;
   plan_options.proposals = 16;
   plan_options.sweeps = 2;
   const truing::PlanResult plan = truing::plan(nominal, plan_options);
   REQUIRE(plan.joints.rows() == 50);
   CHECK(plan.index_end > plan.index_start);
-  for (Eigen::Index i = 1; i < 50; ++i) CHECK((plan.joints.row(i) - plan.joints.row(i - 1)).cwiseAbs().minCoeff() > plan_options.min_step);
+  for (Eigen::Index i = 1; i < 50; ++i)
+    CHECK((plan.joints.row(i) - plan.joints.row(i - 1)).cwiseAbs().minCoeff() > plan_options.min_step);
 
   Table table(50);
   for (int k = 0; k < 4; ++k) {
@@ -352,7 +365,8 @@ TEST_CASE("the palletizer's eighteen parameters are found to the noise floor fro
   options.test_share = 0.0;
   const Identification result = truing::identify(nominal, table.data, options);
   CHECK(result.columns == 18 + 6);
-  CHECK(result.frozen.size() >= 3);  // d1 and J1's zero are the base's; among the tool, d4, d5, a4 and joint 5's zero one is not seen
+  CHECK(result.frozen.size() >=
+        3);  // d1 and J1's zero are the base's; among the tool, d4, d5, a4 and joint 5's zero one is not seen
   CHECK(result.noise_sigma == doctest::Approx(sigma).epsilon(0.25));
   CHECK(fresh_rms(truth, result.robot, 32) < 2.0 * sigma);
   CHECK(fresh_rms(truth, result.before, 32) > 1e-3);
@@ -373,7 +387,12 @@ TEST_CASE("effects are found beside the geometry") {
   truth.joints[0] = nominal.joints[0];  // a tilt of the first axis is the base's to the eye, but not to gravity
   truth.T_measurement_base = somewhere();
   truth.effects = {{"backlash", {"J2"}, {{"backlash.J2", 3e-4}}},
-                   {"harmonic", {"J3"}, {{"harmonic.J3.cos1", 2e-4}, {"harmonic.J3.sin1", -1e-4}, {"harmonic.J3.cos2", 0.0}, {"harmonic.J3.sin2", 1e-4}}},
+                   {"harmonic",
+                    {"J3"},
+                    {{"harmonic.J3.cos1", 2e-4},
+                     {"harmonic.J3.sin1", -1e-4},
+                     {"harmonic.J3.cos2", 0.0},
+                     {"harmonic.J3.sin2", 1e-4}}},
                    {"joint_compliance", {"J2", "J3"}, {{"joint_compliance.J2", 2e-6}, {"joint_compliance.J3", 5e-6}}}};
   auto table = random_joints(truth, 400, 34);
   std::mt19937_64 random(35);
@@ -402,7 +421,10 @@ TEST_CASE("an effect of the caller's own may put one parameter on several sites"
   truing::Effect lag;
   lag.name = "lag";
   lag.terms = [](const Robot& robot, std::size_t joint, const Measurements&) {
-    return std::vector<truing::Term>{{"lag.all", "s", robot.joints[joint].name, [joint](const truing::Inputs& in) { return std::cos(3.0 * in.joints[static_cast<Eigen::Index>(joint)]); }, false}};
+    return std::vector<truing::Term>{
+        {"lag.all", "s", robot.joints[joint].name,
+         [joint](const truing::Inputs& in) { return std::cos(3.0 * in.joints[static_cast<Eigen::Index>(joint)]); },
+         false}};
   };
   Robot nominal = ur10(), truth = nominal;
   truth.T_measurement_base = somewhere();
@@ -468,14 +490,16 @@ TEST_CASE("touching fixed points finds the arm up to its scale") {
   CHECK(said);
   CHECK(parameter(result, "J3.a").frozen);
   // Up to scale: the other long link is right relative to the one held.
-  CHECK(parameter(result, "J4.a").value / parameter(result, "J3.a").value == doctest::Approx(truth.joints[3].a / truth.joints[2].a).epsilon(1e-6));
+  CHECK(parameter(result, "J4.a").value / parameter(result, "J3.a").value ==
+        doctest::Approx(truth.joints[3].a / truth.joints[2].a).epsilon(1e-6));
 }
 
 TEST_CASE("orientation may be missing on some rows, and rows may carry sigmas and weights") {
   Ur10Case c(200, 1e-5, 43, What::pose);
   std::vector<double> q[4], sigma(200), turn(200);
   for (int k = 0; k < 4; ++k) {
-    for (std::size_t i = 0; i < 200; ++i) q[k].push_back(i % 3 ? c.table->data.orientation[static_cast<std::size_t>(k)][i] : std::nan(""));
+    for (std::size_t i = 0; i < 200; ++i)
+      q[k].push_back(i % 3 ? c.table->data.orientation[static_cast<std::size_t>(k)][i] : std::nan(""));
   }
   for (int k = 0; k < 4; ++k) c.table->data.orientation[static_cast<std::size_t>(k)] = c.table->add(q[k]);
   const Identification plain = truing::identify(c.nominal, c.table->data);
@@ -502,8 +526,11 @@ TEST_CASE("several targets on the tool are found together") {
   measure(table.get(), truth, What::position, 0.0, 47);
   const Identification result = truing::identify(nominal, table->data);
   CHECK(result.test->after.max < 1e-10);
-  // Places on the tool are seen up to a turn about the last axis and a shift along it, which the last link shares: their distance is seen.
-  const auto gap = [](const Robot& r) { return (r.targets[1].T_last_target.translation() - r.targets[0].T_last_target.translation()).norm(); };
+  // Places on the tool are seen up to a turn about the last axis and a shift along it, which the last link shares:
+  // their distance is seen.
+  const auto gap = [](const Robot& r) {
+    return (r.targets[1].T_last_target.translation() - r.targets[0].T_last_target.translation()).norm();
+  };
   CHECK(gap(result.robot) == doctest::Approx(gap(truth)).epsilon(1e-8));
 }
 
@@ -520,7 +547,8 @@ TEST_CASE("pose groups stay together, and the split depends on the seed alone") 
   for (std::size_t i = 0; i < 100; ++i) c.table->data.pose.push_back(static_cast<std::int32_t>(i / 5));
   IdentifyOptions options;
   options.free = {"tool.*"};
-  const Identification a = truing::identify(c.nominal, c.table->data, options), b = truing::identify(c.nominal, c.table->data, options);
+  const Identification a = truing::identify(c.nominal, c.table->data, options),
+                       b = truing::identify(c.nominal, c.table->data, options);
   CHECK(a.set == b.set);
   for (std::size_t i = 0; i < 100; ++i) CHECK(a.set[i] == a.set[i - i % 5]);
   CHECK(std::count(a.set.begin(), a.set.end(), 1) == 20);
@@ -548,7 +576,8 @@ TEST_CASE("a joint column that makes no sense is suspected aloud") {
   Ur10Case c(100, 1e-5, 54);
   std::swap(c.table->data.joints[1], c.table->data.joints[2]);
   bool said = false;
-  for (const std::string& w : truing::identify(c.nominal, c.table->data).warnings) said = said || w.find("is a joint column wrong") != std::string::npos;
+  for (const std::string& w : truing::identify(c.nominal, c.table->data).warnings)
+    said = said || w.find("is a joint column wrong") != std::string::npos;
   CHECK(said);
 }
 

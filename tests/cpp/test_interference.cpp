@@ -20,8 +20,10 @@ namespace {
 /// Capsules along the wrist arm's links.
 Scene scene_of_wrist_arm() {
   Scene scene;
-  scene.capsules = {{"pedestal", "base", {0, 0, 0}, {0, 0, 0.2}, 0.15},   {"upper arm", "J2", {-0.9, 0, 0}, {0, 0, 0}, 0.1},
-                    {"forearm", "J4", {0, -0.8, 0}, {0, 0, 0}, 0.07},    {"torch", "tool", {0, 0, -0.2}, {0, 0, -0.02}, 0.02}};
+  scene.capsules = {{"pedestal", "base", {0, 0, 0}, {0, 0, 0.2}, 0.15},
+                    {"upper arm", "J2", {-0.9, 0, 0}, {0, 0, 0}, 0.1},
+                    {"forearm", "J4", {0, -0.8, 0}, {0, 0, 0}, 0.07},
+                    {"torch", "tool", {0, 0, -0.2}, {0, 0, -0.02}, 0.02}};
   return scene;
 }
 
@@ -61,10 +63,10 @@ TEST_CASE("distances of segments and boxes are those of their nearest points") {
     CHECK(box <= sampled + 1e-9);
   }
   const Vector3d o = Vector3d::Zero(), x = Vector3d::UnitX(), y = Vector3d::UnitY();
-  CHECK(truing::detail::segment_distance(o, o, 2 * x, 3 * x) == doctest::Approx(2.0));     // a point
-  CHECK(truing::detail::segment_distance(o, x, y, x + y) == doctest::Approx(1.0));         // parallel
-  CHECK(truing::detail::segment_distance(o, x, 2 * x, 3 * x) == doctest::Approx(1.0));     // on one line
-  CHECK(truing::detail::segment_distance(-x, x, -y, y) == doctest::Approx(0.0));           // crossing
+  CHECK(truing::detail::segment_distance(o, o, 2 * x, 3 * x) == doctest::Approx(2.0));  // a point
+  CHECK(truing::detail::segment_distance(o, x, y, x + y) == doctest::Approx(1.0));      // parallel
+  CHECK(truing::detail::segment_distance(o, x, 2 * x, 3 * x) == doctest::Approx(1.0));  // on one line
+  CHECK(truing::detail::segment_distance(-x, x, -y, y) == doctest::Approx(0.0));        // crossing
   CHECK(truing::detail::segment_box_distance(2 * x, 3 * x, Vector3d::Ones()) == doctest::Approx(1.0));
   CHECK(truing::detail::segment_box_distance(o, 3 * x, Vector3d::Ones()) == doctest::Approx(-1.0));
 }
@@ -83,11 +85,13 @@ TEST_CASE("an answer that interferes is none: another branch is taken, or the pa
     const Solution solution = solver.solve(task, q);
     CHECK(solution.reached());
     CHECK(solution.contact_distance > 0.0);
-    CHECK(solution.contact_distance == doctest::Approx(truing::nearest_contact(options.scene, robot, solution.joints).distance));
+    CHECK(solution.contact_distance ==
+          doctest::Approx(truing::nearest_contact(options.scene, robot, solution.joints).distance));
   }
   SUBCASE("a ball at the elbow leaves other ways") {
     const Vector3d elbow = truing::forward_kinematics(robot, nearby)[1].translation();
-    options.scene.obstacles = {{"ball", truing::Shape::sphere, Isometry3d(Eigen::Translation3d(elbow)), Vector3d::Zero(), 0.05}};
+    options.scene.obstacles = {
+        {"ball", truing::Shape::sphere, Isometry3d(Eigen::Translation3d(elbow)), Vector3d::Zero(), 0.05}};
     const InverseSolver solver(robot, options), blind(robot);
     CHECK(truing::nearest_contact(options.scene, robot, nearby).distance < 0.0);
     CHECK((blind.solve(task, q).joints - q).norm() < 1e-6);
@@ -98,7 +102,9 @@ TEST_CASE("an answer that interferes is none: another branch is taken, or the pa
     CHECK((solution.joints - q).norm() > 0.1);
   }
   SUBCASE("a ball at the target leaves none") {
-    options.scene.obstacles = {{"ball", truing::Shape::sphere, Isometry3d(Eigen::Translation3d(task.T_measurement_target.translation())), Vector3d::Zero(), 0.05}};
+    options.scene.obstacles = {{"ball", truing::Shape::sphere,
+                                Isometry3d(Eigen::Translation3d(task.T_measurement_target.translation())),
+                                Vector3d::Zero(), 0.05}};
     options.scene.ignored = {{"forearm", "ball"}, {"upper arm", "ball"}};
     const InverseSolver solver(robot, options);
     const Solution solution = solver.solve(task, q);
@@ -117,7 +123,8 @@ TEST_CASE("a target that interferes is moved back by the least that frees it, an
   InverseOptions options;
   options.scene = scene_of_wrist_arm();
   options.scene.clearance = 0.005;
-  // A plate across the torch, its face 10 mm behind the torch's end: 20 mm radius, 5 mm clearance, 20 mm from the end to the point.
+  // A plate across the torch, its face 10 mm behind the torch's end: 20 mm radius, 5 mm clearance, 20 mm from the end
+  // to the point.
   Isometry3d T_plate = task.T_measurement_target;
   T_plate.translation() += T_plate.linear() * Vector3d(0, 0, -0.03 + 0.05);
   options.scene.obstacles = {{"plate", truing::Shape::box, T_plate, {0.4, 0.4, 0.1}, 0.0}};

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Inverse kinematics against forward kinematics: what is claimed to be reached is looked at again by forward_kinematics, which
-// shares no code with the solver.
+// Inverse kinematics against forward kinematics: what is claimed to be reached is looked at again by
+// forward_kinematics, which shares no code with the solver.
 
 #include <doctest/doctest.h>
 
@@ -56,7 +56,8 @@ bool has(const Branches& found, const Joints& q, double tolerance) {
 
 }  // namespace
 
-// ---- Forward ---------------------------------------------------------------------------------------------------------
+// ---- Forward
+// ---------------------------------------------------------------------------------------------------------
 
 TEST_CASE("the compiled arm is forward_kinematics, in every convention, with ratios, zeros, rails and passive joints") {
   for (Robot robot : {ur10(), wrist_arm(), palletizer(), rail_arm(), urdf_arm(), gantry(), as_urdf(ur10())}) {
@@ -74,7 +75,9 @@ TEST_CASE("the compiled arm is forward_kinematics, in every convention, with rat
       Sampler sampler(robot, 5);
       for (int k = 0; k < 20; ++k) {
         const Joints q = sampler.joints();
-        CHECK((solver.forward(q).matrix() - truing::forward_kinematics(robot, q, target).back().matrix()).cwiseAbs().maxCoeff() < 1e-12);
+        CHECK((solver.forward(q).matrix() - truing::forward_kinematics(robot, q, target).back().matrix())
+                  .cwiseAbs()
+                  .maxCoeff() < 1e-12);
       }
     }
   }
@@ -103,7 +106,8 @@ TEST_CASE("its Jacobian is the derivative") {
   }
 }
 
-// ---- Branches --------------------------------------------------------------------------------------------------------
+// ---- Branches
+// --------------------------------------------------------------------------------------------------------
 
 TEST_CASE("closed forms are found from the axes, whatever convention they are written in, and with rails before them") {
   CHECK(InverseSolver(ur()).closed_form() == truing::ClosedFormKind::three_parallel);
@@ -211,13 +215,15 @@ TEST_CASE("a calibrated arm has the branches that a general search finds") {
       Branches found, all;
       solver.branches(task, solver.middle(), &found);
       general.branches(task, solver.middle(), &all);
-      for (int i = 0; i < found.count; ++i) CHECK(holds(robot, task, found.solution[static_cast<std::size_t>(i)], 1e-9, 1e-9));
+      for (int i = 0; i < found.count; ++i)
+        CHECK(holds(robot, task, found.solution[static_cast<std::size_t>(i)], 1e-9, 1e-9));
       for (int i = 0; i < all.count; ++i) CHECK(has(found, all.solution[static_cast<std::size_t>(i)].joints, 1e-4));
     }
   }
 }
 
-// ---- One answer ------------------------------------------------------------------------------------------------------
+// ---- One answer
+// ------------------------------------------------------------------------------------------------------
 
 TEST_CASE("every reachable pose is reached from a random seed, and never claimed when it is not") {
   for (const Robot& nominal : {ur(), wrist_arm(), gantry(), as_urdf(gantry())}) {
@@ -306,10 +312,12 @@ TEST_CASE("singular targets are reached: wrist straight, arm stretched, wrist ab
   }
 }
 
-// ---- Tasks -----------------------------------------------------------------------------------------------------------
+// ---- Tasks
+// -----------------------------------------------------------------------------------------------------------
 
 TEST_CASE("a torch's axis is met in the tool's frame, whichever way the roll goes") {
-  // A mask of the rotation about z acts in the base's frame elsewhere, and success is claimed with the axis 0.2 to 0.33 rad off.
+  // A mask of the rotation about z acts in the base's frame elsewhere, and success is claimed with the axis 0.2 to 0.33
+  // rad off.
   for (const Robot& nominal : {ur(), wrist_arm(), gantry()}) {
     const Robot robot = perturbed(nominal, 1e-3, 1e-3, 21);
     const InverseSolver solver(robot);
@@ -321,7 +329,8 @@ TEST_CASE("a torch's axis is met in the tool's frame, whichever way the roll goe
       const Solution solution = solver.solve(task, sampler.joints());
       CHECK(solution.reached());
       CHECK(holds(robot, task, solution));
-      const Matrix3d rolled = task.T_measurement_target.linear() * Eigen::AngleAxisd(solution.roll, task.axis).toRotationMatrix();
+      const Matrix3d rolled =
+          task.T_measurement_target.linear() * Eigen::AngleAxisd(solution.roll, task.axis).toRotationMatrix();
       CHECK(turn_between(rolled, reached(robot, solution.joints).linear()) < 1e-5);
     }
   }
@@ -354,7 +363,8 @@ TEST_CASE("lead and work angles are inequalities that hold to the last digit") {
     task.work = {-0.15, 0.0};
     // The wanted frame leans back, so that what was reached lies in the window's middle.
     const Vector3d leant = Vector3d(std::tan(0.15), std::tan(-0.075), 1.0).normalized();
-    task.T_measurement_target.linear() *= Eigen::Quaterniond::FromTwoVectors(leant, Vector3d::UnitZ()).toRotationMatrix();
+    task.T_measurement_target.linear() *=
+        Eigen::Quaterniond::FromTwoVectors(leant, Vector3d::UnitZ()).toRotationMatrix();
     const Solution solution = solver.solve(task, sampler.joints());
     CHECK(solution.reached());
     CHECK(holds(robot, task, solution));
@@ -438,7 +448,8 @@ TEST_CASE("an arm on a rail that comes to its end keeps its configuration") {
   CHECK(longest < 0.05);
 }
 
-// ---- Effects ---------------------------------------------------------------------------------------------------------
+// ---- Effects
+// ---------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -457,8 +468,13 @@ Loaded loaded_ur() {
   add("joint_compliance", {"J2", "J3"}, {{"joint_compliance.J2", 2e-5}, {"joint_compliance.J3", 3e-5}});
   add("link_compliance", {"J2"}, {{"link_compliance.J2.ry", 1e-5}, {"link_compliance.J2.rz", 1e-5}});
   add("gravity_backlash", {"J3"}, {{"gravity_backlash.J3", 1e-4}});
-  add("harmonic", {"J2"}, {{"harmonic.J2.cos1", 1e-3}, {"harmonic.J2.sin1", -5e-4}, {"harmonic.J2.cos2", 2e-4}, {"harmonic.J2.sin2", 1e-4}});
-  add("transmission_error@24", {"J1"}, {{"transmission_error@24.J1.cos", 1e-4}, {"transmission_error@24.J1.sin", 2e-4}});
+  add("harmonic", {"J2"},
+      {{"harmonic.J2.cos1", 1e-3},
+       {"harmonic.J2.sin1", -5e-4},
+       {"harmonic.J2.cos2", 2e-4},
+       {"harmonic.J2.sin2", 1e-4}});
+  add("transmission_error@24", {"J1"},
+      {{"transmission_error@24.J1.cos", 1e-4}, {"transmission_error@24.J1.sin", 2e-4}});
   add("thermal", {"J3"}, {{"thermal.J3", 2e-5}, {"thermal.reference_C", 22.0}});
   add("drift", {}, {{"drift.base.x", 1e-7}, {"drift.base.rz", 1e-8}, {"drift.reference_s", 100.0}});
   add("joint_coupling", {}, {{"joint_coupling.J6.J4", 1e-3}});
@@ -475,14 +491,16 @@ Loaded loaded_ur() {
 Isometry3d predicted(const Robot& robot, const Joints& q, const truing::Conditions& conditions) {
   Table table(1);
   for (Eigen::Index k = 0; k < q.size(); ++k) table.data.joints.push_back(table.add({q[k]}));
-  for (const int direction : conditions.direction) table.data.direction.push_back(table.add({static_cast<double>(direction)}));
+  for (const int direction : conditions.direction)
+    table.data.direction.push_back(table.add({static_cast<double>(direction)}));
   table.data.payload = table.add({conditions.payload});
   if (std::isfinite(conditions.temperature)) table.data.temperature = table.add({conditions.temperature});
   if (std::isfinite(conditions.time)) table.data.time = table.add({conditions.time});
   const truing::Prediction p = truing::predict(robot, table.data);
   Isometry3d T = Isometry3d::Identity();
   T.translation() = p.position.row(0);
-  T.linear() = Eigen::Quaterniond(p.orientation(0, 0), p.orientation(0, 1), p.orientation(0, 2), p.orientation(0, 3)).toRotationMatrix();
+  T.linear() = Eigen::Quaterniond(p.orientation(0, 0), p.orientation(0, 1), p.orientation(0, 2), p.orientation(0, 3))
+                   .toRotationMatrix();
   return T;
 }
 
@@ -515,7 +533,8 @@ TEST_CASE("effects at a second target, and with rails and passive joints, are th
     j.lower = -1.5;
     j.upper = 1.5;
   }
-  robot.effects = {{"joint_compliance", {"J2"}, {{"joint_compliance.J2", 1e-6}}}, {"linkage", {"J4"}, {{"linkage.J4.cos", 1e-3}, {"linkage.J4.sin", 5e-4}}}};
+  robot.effects = {{"joint_compliance", {"J2"}, {{"joint_compliance.J2", 1e-6}}},
+                   {"linkage", {"J4"}, {{"linkage.J4.cos", 1e-3}, {"linkage.J4.sin", 5e-4}}}};
   const InverseSolver solver(robot);
   Sampler sampler(robot, 33);
   for (int k = 0; k < 20; ++k) {
@@ -542,7 +561,9 @@ TEST_CASE("backlash goes by the way from the seed, where nobody says otherwise")
     REQUIRE(solution.reached());
     truing::Conditions conditions;
     conditions.direction.assign(6, rising ? 1 : -1);
-    CHECK((predicted(robot, solution.joints, conditions).translation() - task.T_measurement_target.translation()).norm() < 1e-9);
+    CHECK(
+        (predicted(robot, solution.joints, conditions).translation() - task.T_measurement_target.translation()).norm() <
+        1e-9);
     CHECK(solution.joints[1] == doctest::Approx(q[1] + (rising ? -1e-3 : 1e-3)).epsilon(1e-6));
   }
 }
@@ -553,7 +574,8 @@ TEST_CASE("an input that effects lack is named") {
   CHECK_THROWS_WITH_AS(InverseSolver{robot}, doctest::Contains("temp_C"), std::invalid_argument);
 }
 
-// ---- Why not ---------------------------------------------------------------------------------------------------------
+// ---- Why not
+// ---------------------------------------------------------------------------------------------------------
 
 TEST_CASE("out of reach: by how much, in which direction, and the nearest that can be reached") {
   for (const Robot& nominal : {ur(), gantry()}) {
@@ -624,7 +646,8 @@ TEST_CASE("the flag of success is of the joints that are returned: random target
   CHECK(good < 55);
 }
 
-// ---- Bad input, threads ----------------------------------------------------------------------------------------------
+// ---- Bad input, threads
+// ----------------------------------------------------------------------------------------------
 
 TEST_CASE("bad input is one clear error") {
   const Robot robot = wrist_arm();
@@ -663,7 +686,8 @@ TEST_CASE("a batch gives the same bits on any number of threads, and can be stop
     const InverseSolver solver(robot, {}, conditions);
     Sampler sampler(robot, 52);
     std::vector<Task> tasks;
-    for (int k = 0; k < 300; ++k) tasks.push_back(task_at(reached(robot, sampler.joints()), k % 3 ? TaskKind::pose : TaskKind::torch));
+    for (int k = 0; k < 300; ++k)
+      tasks.push_back(task_at(reached(robot, sampler.joints()), k % 3 ? TaskKind::pose : TaskKind::torch));
     const std::vector<Joints> seed = {sampler.joints()};
     const auto one = solver.solve_batch(tasks, seed, {}, 1);
     for (const int threads : {2, 3}) {
@@ -682,7 +706,8 @@ TEST_CASE("a batch gives the same bits on any number of threads, and can be stop
   }
 }
 
-// ---- Which of several answers ----------------------------------------------------------------------------------------
+// ---- Which of several answers
+// ----------------------------------------------------------------------------------------
 
 namespace {
 
@@ -725,10 +750,12 @@ TEST_CASE("the best over rails is no worse than that of a grid of 0.1 m") {
         nearest.branches(task, from, &found);
         for (int i = 0; i < found.count; ++i) {
           const Joints& q = found.solution[static_cast<std::size_t>(i)].joints;
-          grid = std::max(grid, choose == truing::Choose::limits_margin ? limits_margin(robot, q) : -rail_travel(q, seed, 1));
+          grid = std::max(grid,
+                          choose == truing::Choose::limits_margin ? limits_margin(robot, q) : -rail_travel(q, seed, 1));
         }
       }
-      const double ours = choose == truing::Choose::limits_margin ? limits_margin(robot, best.joints) : -rail_travel(best.joints, seed, 1);
+      const double ours = choose == truing::Choose::limits_margin ? limits_margin(robot, best.joints)
+                                                                  : -rail_travel(best.joints, seed, 1);
       CHECK(ours >= grid - 1e-3);
     }
   }

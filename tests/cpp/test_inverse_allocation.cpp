@@ -30,7 +30,8 @@ using namespace inverse_arms;
 
 TEST_CASE("a solve takes nothing from the heap, with effects neither") {
   Robot loaded = perturbed(wrist_arm(), 1e-3, 1e-3, 91);
-  loaded.effects = {{"backlash", {"J2"}, {{"backlash.J2", 1e-3}}}, {"harmonic", {"J1"}, {{"harmonic.J1.cos1", 1e-3}, {"harmonic.J1.sin1", 1e-3}}}};
+  loaded.effects = {{"backlash", {"J2"}, {{"backlash.J2", 1e-3}}},
+                    {"harmonic", {"J1"}, {{"harmonic.J1.cos1", 1e-3}, {"harmonic.J1.sin1", 1e-3}}}};
   for (const Robot& robot : {wrist_arm(), perturbed(wrist_arm(), 1e-3, 1e-3, 91), loaded, gantry()}) {
     const truing::InverseSolver solver(robot);
     Sampler sampler(robot, 92);

@@ -39,8 +39,7 @@ struct Table {
 
   Table() {
     for (int row = 0; row < 4; ++row) {
-      for (const double v : {0.1 * row, 0.2, 1.0, 2.0, 3.0, 0.6, 0.0, -0.8, 0.0, 1.5, 1.0})
-        values.push_back(v);
+      for (const double v : {0.1 * row, 0.2, 1.0, 2.0, 3.0, 0.6, 0.0, -0.8, 0.0, 1.5, 1.0}) values.push_back(v);
     }
   }
   double& at(std::size_t row, std::size_t column) { return values[row * columns + column]; }
@@ -66,17 +65,14 @@ std::string complaint(const Measurements& data, bool joints_only = false) {
   return "";
 }
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 
 TEST_CASE("validate accepts every kind of row") {
   Table table;
-  for (const std::size_t column : {2, 3, 4, 5, 6, 7, 8})
-    table.at(0, column) = not_measured;                                                 // a distance only
-  for (const std::size_t column : {5, 6, 7, 8, 9}) table.at(1, column) = not_measured;  // a position only
+  for (const std::size_t column : {2, 3, 4, 5, 6, 7, 8}) table.at(0, column) = not_measured;  // a distance only
+  for (const std::size_t column : {5, 6, 7, 8, 9}) table.at(1, column) = not_measured;        // a position only
   for (const std::size_t column : {2, 3, 4, 5, 6, 7, 8, 9})
     table.at(2, column) = not_measured;  // touches a fixed point
   Measurements data = table.measurements();

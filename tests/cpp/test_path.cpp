@@ -35,13 +35,15 @@ std::vector<Task> seam(const Vector3d& from, const Vector3d& to, int count, Task
     const double share = static_cast<double>(k) / (count - 1);
     Isometry3d T = Isometry3d::Identity();
     T.translation() = from + share * (to - from);
-    T.linear() = (Eigen::AngleAxisd(M_PI, Vector3d::UnitX()) * Eigen::AngleAxisd(0.3 * share, Vector3d::UnitY())).toRotationMatrix();
+    T.linear() = (Eigen::AngleAxisd(M_PI, Vector3d::UnitX()) * Eigen::AngleAxisd(0.3 * share, Vector3d::UnitY()))
+                     .toRotationMatrix();
     tasks.push_back(task_at(T, kind));
   }
   return tasks;
 }
 
-/// Every answer holds, and every step but those of gaps is within the bounds and within what the path says is its longest.
+/// Every answer holds, and every step but those of gaps is within the bounds and within what the path says is its
+/// longest.
 void check_path(const Robot& robot, const std::vector<Task>& tasks, const Path& path, const PathOptions& options) {
   REQUIRE(path.solutions.size() == tasks.size());
   std::vector<bool> gap(tasks.size(), false);
@@ -53,7 +55,8 @@ void check_path(const Robot& robot, const std::vector<Task>& tasks, const Path& 
     REQUIRE(path.solutions[k].reached());
     REQUIRE(path.solutions[k + 1].reached());
     for (std::size_t j = 0; j < driven.size(); ++j) {
-      const double step = std::abs(path.solutions[k + 1].joints[static_cast<Eigen::Index>(j)] - path.solutions[k].joints[static_cast<Eigen::Index>(j)]);
+      const double step = std::abs(path.solutions[k + 1].joints[static_cast<Eigen::Index>(j)] -
+                                   path.solutions[k].joints[static_cast<Eigen::Index>(j)]);
       const bool slides = robot.joints[driven[j]].type == JointType::prismatic;
       CHECK(step <= (slides ? options.longest_slide : options.longest_turn));
       CHECK(step <= (slides ? path.longest_slide : path.longest_turn));
@@ -154,7 +157,8 @@ TEST_CASE("a path keeps clear of what is in the way") {
   options.scene.capsules = {{"torch", "tool", {0, 0, -0.2}, {0, 0, -0.02}, 0.02}};
   Joints middle = 0.5 * (from + to);
   const Isometry3d T = reached(robot, middle);
-  options.scene.obstacles = {{"ball", truing::Shape::sphere, Isometry3d(Eigen::Translation3d(T * Vector3d(0.1, 0.0, -0.1))), Vector3d::Zero(), 0.04}};
+  options.scene.obstacles = {{"ball", truing::Shape::sphere,
+                              Isometry3d(Eigen::Translation3d(T * Vector3d(0.1, 0.0, -0.1))), Vector3d::Zero(), 0.04}};
   const InverseSolver solver(robot, options);
   const Path path = solver.path(tasks, from);
   check_path(robot, tasks, path, {});

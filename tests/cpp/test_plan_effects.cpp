@@ -24,7 +24,8 @@ Eigen::MatrixXd random_poses(const truing::Robot& robot, int count, std::uint64_
   const std::vector<std::size_t> driven = robot.driven_joints();
   for (Eigen::Index k = 0; k < out.cols(); ++k) {
     const truing::Joint& joint = robot.joints[driven[static_cast<std::size_t>(k)]];
-    const double low = std::isfinite(joint.lower) ? joint.lower : -2.5, high = std::isfinite(joint.upper) ? joint.upper : 2.5;
+    const double low = std::isfinite(joint.lower) ? joint.lower : -2.5,
+                 high = std::isfinite(joint.upper) ? joint.upper : 2.5;
     for (Eigen::Index i = 0; i < count; ++i) out(i, k) = random.uniform(low, high);
   }
   return out;
@@ -37,16 +38,21 @@ const EffectSize* size_of(const Distinction& d, const std::string& effect, const
   return nullptr;
 }
 
-const EffectPair* pair_of(const std::vector<EffectPair>& pairs, const std::string& effect, const std::string& other, const std::string& joint) {
+const EffectPair* pair_of(const std::vector<EffectPair>& pairs, const std::string& effect, const std::string& other,
+                          const std::string& joint) {
   for (const EffectPair& p : pairs) {
-    if (p.joint == joint && p.other_joint == joint && ((p.effect == effect && p.other == other) || (p.effect == other && p.other == effect))) return &p;
+    if (p.joint == joint && p.other_joint == joint &&
+        ((p.effect == effect && p.other == other) || (p.effect == other && p.other == effect)))
+      return &p;
   }
   return nullptr;
 }
 
-const truing::NotTestable* not_testable(const Distinction& d, const std::string& effect, const std::string& joint = "") {
+const truing::NotTestable* not_testable(const Distinction& d, const std::string& effect,
+                                        const std::string& joint = "") {
   for (const truing::NotTestable& n : d.not_testable) {
-    if (n.effect == effect && (joint.empty() ? n.joints.empty() : n.joints == std::vector<std::string>{joint})) return &n;
+    if (n.effect == effect && (joint.empty() ? n.joints.empty() : n.joints == std::vector<std::string>{joint}))
+      return &n;
   }
   return nullptr;
 }
@@ -122,7 +128,11 @@ TEST_CASE("the first joint's zero is the base, the last one's the tool, and geom
 TEST_CASE("what no column shows is said with the column's name") {
   const truing::Robot robot = arms::ur10();
   const Distinction bare = truing::distinguish(robot, random_poses(robot, 30, 4));
-  for (const auto& [effect, column] : {std::pair{"thermal", "temp_C"}, {"thermal_zero", "temp_C"}, {"drift", "t_s"}, {"windup", "tau1"}, {"time_offset", "qd1"}}) {
+  for (const auto& [effect, column] : {std::pair{"thermal", "temp_C"},
+                                       {"thermal_zero", "temp_C"},
+                                       {"drift", "t_s"},
+                                       {"windup", "tau1"},
+                                       {"time_offset", "qd1"}}) {
     const truing::NotTestable* why = not_testable(bare, effect);
     REQUIRE_MESSAGE(why != nullptr, effect);
     CHECK(why->why.find(column) != std::string::npos);
@@ -168,8 +178,10 @@ TEST_CASE("a promised smallest size is as many of identify's standard errors as 
           for (std::size_t row = 0; row < rows; ++row) values[row] = value(static_cast<Eigen::Index>(row));
           return table.add(values);
         };
-        for (Eigen::Index k = 0; k < 6; ++k) table.data.joints.push_back(column([&](Eigen::Index i) { return d.joints(i, k); }));
-        for (Eigen::Index k = 0; k < 6; ++k) table.data.direction.push_back(column([&](Eigen::Index i) { return d.direction(i, k); }));
+        for (Eigen::Index k = 0; k < 6; ++k)
+          table.data.joints.push_back(column([&](Eigen::Index i) { return d.joints(i, k); }));
+        for (Eigen::Index k = 0; k < 6; ++k)
+          table.data.direction.push_back(column([&](Eigen::Index i) { return d.direction(i, k); }));
         table.data.payload = column([&](Eigen::Index i) { return d.payload[i]; });
         truing::Robot truth = robot;
         truth.effects = {{effect, {"J3"}, {{promised->parameter, promised->size}}}};

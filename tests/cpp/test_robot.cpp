@@ -77,9 +77,7 @@ Matrix4d trans(double x, double y, double z) {
   return T;
 }
 
-double difference(const Isometry3d& a, const Isometry3d& b) {
-  return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff();
-}
+double difference(const Isometry3d& a, const Isometry3d& b) { return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff(); }
 double difference(const Isometry3d& a, const Matrix4d& b) { return (a.matrix() - b).cwiseAbs().maxCoeff(); }
 
 /// What validate says, "" when it says nothing.
@@ -92,9 +90,7 @@ std::string complaint(const Robot& robot) {
   return "";
 }
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 
@@ -130,8 +126,8 @@ TEST_CASE("the same arm in DH and in modified DH has the same tool") {
     proximal.joints[i].beta = distal.joints[i - 1].beta;
   }
   const Joint& last = distal.joints[3];
-  proximal.targets[0].T_last_target = Isometry3d(trans(last.a, 0, 0) * rot_x(last.alpha) * rot_y(last.beta)) *
-                                      distal.targets[0].T_last_target;
+  proximal.targets[0].T_last_target =
+      Isometry3d(trans(last.a, 0, 0) * rot_x(last.alpha) * rot_y(last.beta)) * distal.targets[0].T_last_target;
   std::mt19937 random(1);
   std::uniform_real_distribution<double> angle(-3.0, 3.0);
   for (int k = 0; k < 20; ++k) {
@@ -205,8 +201,7 @@ TEST_CASE("a passive joint adds its own offset, ignores its ratio, and may drive
   open.joints[2].type = JointType::revolute;
   const double q1 = 0.3, q4 = -0.7, q3 = -2.0 * q1 + q4 + 0.2, q2 = 0.5 * q3 + 0.01;
   const Isometry3d coupled = truing::forward_kinematics(robot, (VectorXd(2) << q1, q4).finished()).back();
-  const Isometry3d by_hand =
-      truing::forward_kinematics(open, (VectorXd(4) << q1, q2, q3, q4).finished()).back();
+  const Isometry3d by_hand = truing::forward_kinematics(open, (VectorXd(4) << q1, q2, q3, q4).finished()).back();
   CHECK(difference(coupled, by_hand) < 1e-15);
 }
 
@@ -267,8 +262,7 @@ TEST_CASE("validate names the joint and what is wrong with it") {
   }
   SUBCASE("an unknown driver") {
     robot.joints[3].driven_by = {{"J9", 1.0}};
-    CHECK(contains(complaint(robot),
-                   "joint 'J4': driven_by names 'J9', but the joints are J1, J2, J3, J4, J5"));
+    CHECK(contains(complaint(robot), "joint 'J4': driven_by names 'J9', but the joints are J1, J2, J3, J4, J5"));
     CHECK_THROWS_AS(truing::forward_kinematics(robot, VectorXd::Zero(4)), std::invalid_argument);
   }
   SUBCASE("drivers in a circle") {
@@ -314,6 +308,6 @@ TEST_CASE("validate names the joint and what is wrong with it") {
 
 TEST_CASE("an unknown joint name is answered with the names there are") {
   CHECK(palletizer().joint_index("J3") == 2);
-  CHECK_THROWS_WITH_AS(palletizer().joint_index("j3"),
-                       "joint 'j3' does not exist; the joints are J1, J2, J3, J4, J5", std::invalid_argument);
+  CHECK_THROWS_WITH_AS(palletizer().joint_index("j3"), "joint 'j3' does not exist; the joints are J1, J2, J3, J4, J5",
+                       std::invalid_argument);
 }

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// The filter with its window, the deviation from the plan, and what becomes of faulty samples. Seeds are named in every case.
+// The filter with its window, the deviation from the plan, and what becomes of faulty samples. Seeds are named in every
+// case.
 
 #include <doctest/doctest.h>
 
@@ -65,10 +66,13 @@ struct Player {
   void before(const SimulatedStreams& s, double arrival, T* tracker) {
     for (; pose < s.tracker.size() && s.tracker[pose].arrival < arrival; ++pose) tracker->push_pose(s.tracker[pose]);
     if constexpr (std::is_same_v<T, Tracker>) {
-      for (; plan < s.plan.size() && s.plan[plan].arrival < arrival; ++plan) tracker->push_plan(s.plan[plan].t, s.plan[plan].T_base_frame);
-      for (; flange < s.flange.size() && s.flange[flange].arrival < arrival; ++flange) tracker->push_joints(s.flange[flange].t, s.flange[flange].T_base_frame);
+      for (; plan < s.plan.size() && s.plan[plan].arrival < arrival; ++plan)
+        tracker->push_plan(s.plan[plan].t, s.plan[plan].T_base_frame);
+      for (; flange < s.flange.size() && s.flange[flange].arrival < arrival; ++flange)
+        tracker->push_joints(s.flange[flange].t, s.flange[flange].T_base_frame);
     } else {
-      for (; flange < s.flange.size() && s.flange[flange].arrival < arrival; ++flange) tracker->push_flange(s.flange[flange].t, s.flange[flange].T_base_frame);
+      for (; flange < s.flange.size() && s.flange[flange].arrival < arrival; ++flange)
+        tracker->push_flange(s.flange[flange].t, s.flange[flange].T_base_frame);
     }
   }
 };
@@ -100,7 +104,8 @@ TEST_CASE("the filter's transition over a segment agrees with one that is steppe
   std::size_t pose = 0;
   for (const ImuSample& sample : s.imu) {
     if (sample.t > 2.5) break;
-    for (; pose < s.tracker.size() && s.tracker[pose].t < std::min(sample.t, 2.415); ++pose) filter.push_pose(s.tracker[pose]);
+    for (; pose < s.tracker.size() && s.tracker[pose].t < std::min(sample.t, 2.415); ++pose)
+      filter.push_pose(s.tracker[pose]);
     filter.push_imu(sample);
   }
   filter.update();
@@ -141,7 +146,8 @@ TEST_CASE("the pose is known to a fraction of the tracker's noise, and the filte
     Vector6d e;
     e << truth.translation() - belief.x.p, log_rotation(Quaterniond(truth.linear()) * belief.x.q.conjugate());
     Matrix6d P;
-    P << belief.P.block<3, 3>(kP, kP), belief.P.block<3, 3>(kP, kTheta), belief.P.block<3, 3>(kTheta, kP), belief.P.block<3, 3>(kTheta, kTheta);
+    P << belief.P.block<3, 3>(kP, kP), belief.P.block<3, 3>(kP, kTheta), belief.P.block<3, 3>(kTheta, kP),
+        belief.P.block<3, 3>(kTheta, kTheta);
     nees += e.dot(P.ldlt().solve(e)) / 20.0;
     squares += e.head<3>().squaredNorm() / 20.0;
   }
@@ -193,17 +199,26 @@ TEST_CASE("samples in any order within the window give the same state to the las
     Belief end[2];
     for (int shuffled = 0; shuffled < 2; ++shuffled) {
       Random random(seed);
-      struct Item { double arrival; bool pose; std::size_t k; };
+      struct Item {
+        double arrival;
+        bool pose;
+        std::size_t k;
+      };
       std::vector<Item> items;
-      for (std::size_t k = 0; k < s.tracker.size(); ++k) items.push_back({s.tracker[k].t + (shuffled ? random.uniform(0.0, 0.45) : 0.01), true, k});
-      for (std::size_t k = 0; k < s.flange.size(); ++k) items.push_back({s.flange[k].t + (shuffled ? random.uniform(0.0, 0.45) : 0.01), false, k});
+      for (std::size_t k = 0; k < s.tracker.size(); ++k)
+        items.push_back({s.tracker[k].t + (shuffled ? random.uniform(0.0, 0.45) : 0.01), true, k});
+      for (std::size_t k = 0; k < s.flange.size(); ++k)
+        items.push_back({s.flange[k].t + (shuffled ? random.uniform(0.0, 0.45) : 0.01), false, k});
       std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.arrival < b.arrival; });
       PoseFilter filter(setup, FilterOptions());
       std::size_t item = 0;
       const auto push = [&](double until) {
         for (; item < items.size() && items[item].arrival < until; ++item) {
-          if (items[item].pose) CHECK(filter.push_pose(s.tracker[items[item].k]) == Outcome::accepted);
-          else CHECK(filter.push_flange(s.flange[items[item].k].t, s.flange[items[item].k].T_base_frame) == Outcome::accepted);
+          if (items[item].pose)
+            CHECK(filter.push_pose(s.tracker[items[item].k]) == Outcome::accepted);
+          else
+            CHECK(filter.push_flange(s.flange[items[item].k].t, s.flange[items[item].k].T_base_frame) ==
+                  Outcome::accepted);
         }
       };
       for (std::size_t k = 0; k < s.imu.size(); ++k) {
@@ -235,7 +250,8 @@ TEST_CASE("after construction nothing is allocated: seed 20") {
   double sum = 0.0;
   for (double t = 1.01; t < 5.9; t += 0.01) {
     k = play(s, t, &tracker, &player, k);
-    sum += tracker.compensate(t + 0.04).correction.norm() + tracker.clock().sigma + static_cast<double>(tracker.shift().count);
+    sum += tracker.compensate(t + 0.04).correction.norm() + tracker.clock().sigma +
+           static_cast<double>(tracker.shift().count);
   }
   CHECK(allocations == before);
   CHECK(std::isfinite(sum));
@@ -322,7 +338,8 @@ TEST_CASE("a quaternion and its negative are the same measurement: seed 9") {
 TEST_CASE("two sensors on one stamp are both taken, in whatever order they come: seed 19") {
   SimulatedStreams s = boom(SimulatedMotion::gentle, 19, 3.0);
   std::sort(s.tracker.begin(), s.tracker.end(), [](const PoseSample& a, const PoseSample& b) { return a.t < b.t; });
-  for (PoseSample& sample : s.tracker) sample.t = std::round(sample.t * 1000.0) / 1000.0;  // on stamps of the inertial sensor
+  for (PoseSample& sample : s.tracker)
+    sample.t = std::round(sample.t * 1000.0) / 1000.0;  // on stamps of the inertial sensor
   PoseFilter pose_first(s.setup, FilterOptions()), imu_first(s.setup, FilterOptions());
   std::size_t pose = 0;
   for (const ImuSample& sample : s.imu) {
@@ -425,8 +442,10 @@ TEST_CASE("a frozen tracker is refused after its third repetition, and the statu
   int refused = 0;
   for (; s.imu[k].t < 4.0; ++k) {
     tracker.push_imu(s.imu[k]);
-    for (; player.flange < s.flange.size() && s.flange[player.flange].arrival < s.imu[k].t; ++player.flange) tracker.push_joints(s.flange[player.flange].t, s.flange[player.flange].T_base_frame);
-    for (; player.plan < s.plan.size() && s.plan[player.plan].arrival < s.imu[k].t; ++player.plan) tracker.push_plan(s.plan[player.plan].t, s.plan[player.plan].T_base_frame);
+    for (; player.flange < s.flange.size() && s.flange[player.flange].arrival < s.imu[k].t; ++player.flange)
+      tracker.push_joints(s.flange[player.flange].t, s.flange[player.flange].T_base_frame);
+    for (; player.plan < s.plan.size() && s.plan[player.plan].arrival < s.imu[k].t; ++player.plan)
+      tracker.push_plan(s.plan[player.plan].t, s.plan[player.plan].T_base_frame);
     if (k % 10 == 0) {
       frozen.t += 0.01;
       refused += tracker.push_pose(frozen) == Outcome::frozen ? 1 : 0;
@@ -447,7 +466,9 @@ TEST_CASE("gross outliers of the tracker are left out: seed 15") {
   CHECK(tracker.counters().reacquired == 0);
 }
 
-TEST_CASE("without the tracker it coasts inside its covariance, without anything it is lost, never at zero velocity: seed 16") {
+TEST_CASE(
+    "without the tracker it coasts inside its covariance, without anything it is lost, never at zero velocity: seed "
+    "16") {
   StreamSimulationOptions options;
   options.motion = SimulatedMotion::stop_and_go;
   options.seed = 16;
@@ -463,7 +484,9 @@ TEST_CASE("without the tracker it coasts inside its covariance, without anything
     k = play(s, t, &tracker, &player, k);
     const PosePrediction now = tracker.predict(tracker.now());
     CHECK(now.status == Status::coasting);
-    for (int i = 0; i < 3; ++i) CHECK(std::abs((s.tool_at(now.t).translation() - now.T_base_tool.translation())[i]) < 3.0 * std::sqrt(now.covariance(i, i)));
+    for (int i = 0; i < 3; ++i)
+      CHECK(std::abs((s.tool_at(now.t).translation() - now.T_base_tool.translation())[i]) <
+            3.0 * std::sqrt(now.covariance(i, i)));
   }
   play(s, 15.0, &tracker, &player, k);
   CHECK(tracker.predict(tracker.now()).status == Status::valid);
@@ -474,14 +497,17 @@ TEST_CASE("when the inertial sensor dies, forward kinematics and the last static
   Tracker tracker(s.setup);
   Player player;
   play(s, 7.0, &tracker, &player);
-  for (; player.flange < s.flange.size() && s.flange[player.flange].t < 7.09; ++player.flange) tracker.push_joints(s.flange[player.flange].t, s.flange[player.flange].T_base_frame);
+  for (; player.flange < s.flange.size() && s.flange[player.flange].t < 7.09; ++player.flange)
+    tracker.push_joints(s.flange[player.flange].t, s.flange[player.flange].T_base_frame);
   CHECK(tracker.predict(7.05).status == Status::valid);
-  for (; player.flange < s.flange.size() && s.flange[player.flange].t < 7.5; ++player.flange) tracker.push_joints(s.flange[player.flange].t, s.flange[player.flange].T_base_frame);
+  for (; player.flange < s.flange.size() && s.flange[player.flange].t < 7.5; ++player.flange)
+    tracker.push_joints(s.flange[player.flange].t, s.flange[player.flange].T_base_frame);
   const PosePrediction held = tracker.predict(7.5);
   CHECK(held.status == Status::hold);
   const Vector3d error = held.T_base_tool.translation() - s.tool_at(7.5).translation();
   for (int i = 0; i < 3; ++i) CHECK(std::abs(error[i]) < 3.0 * std::sqrt(held.covariance(i, i)));
-  CHECK(error.norm() < 0.5 * (s.tool_at(7.0).translation() - s.tool_at(7.5).translation()).norm());  // better than to stand still
+  CHECK(error.norm() <
+        0.5 * (s.tool_at(7.0).translation() - s.tool_at(7.5).translation()).norm());  // better than to stand still
 }
 
 TEST_CASE("predictions of the deviation beat constant acceleration when the arm stops and goes: seeds 1 and 1001") {
@@ -509,7 +535,8 @@ TEST_CASE("predictions of the deviation beat constant acceleration when the arm 
   REQUIRE(found.model.count >= 3);
   for (std::size_t k = 0; k < static_cast<std::size_t>(found.model.count); ++k) {
     double nearest = 1.0;
-    for (const FlexibleMode& mode : recording.modes) nearest = std::min(nearest, std::abs(found.model.frequency[k] / mode.frequency - 1.0));
+    for (const FlexibleMode& mode : recording.modes)
+      nearest = std::min(nearest, std::abs(found.model.frequency[k] / mode.frequency - 1.0));
     CHECK(nearest < 0.05);
   }
   for (std::size_t n = 1; n < found.error.size(); ++n) CHECK(found.error[n] < found.error[n - 1]);
@@ -634,7 +661,8 @@ TEST_CASE("the compensation, sent, would put the tool where it was planned: seed
   CHECK(last.has_plan);
   CHECK(last.predicted.status == Status::valid);
   // The correction is what the planned tool is ahead of the true one.
-  CHECK((last.wanted.head<3>() - (last.T_base_tool_planned.translation() - s.tool_at(last.predicted.t).translation())).norm() < 3e-3);
+  CHECK((last.wanted.head<3>() - (last.T_base_tool_planned.translation() - s.tool_at(last.predicted.t).translation()))
+            .norm() < 3e-3);
   CHECK((last.correction - last.wanted).norm() < 5e-3);
   const Isometry3d corrected = last.T_base_flange * s.setup.T_flange_tool;
   CHECK((corrected.translation() - last.T_base_tool_planned.translation() - last.correction.head<3>()).norm() < 1e-12);
@@ -652,11 +680,16 @@ TEST_CASE("options that make no sense are refused in words") {
   CHECK_THROWS_WITH_AS(Tracker(TrackSetup(), options), doctest::Contains("reacquire_after"), std::invalid_argument);
 }
 
-// ---- Watch -----------------------------------------------------------------------------------------------------------------
+// ---- Watch
+// -----------------------------------------------------------------------------------------------------------------
 
 namespace {
 
-struct Watched { Shift shift; double worst_before = 0.0, said = -1.0; std::uint64_t before = 0; };
+struct Watched {
+  Shift shift;
+  double worst_before = 0.0, said = -1.0;
+  std::uint64_t before = 0;
+};
 
 /// Plays everything and asks every 0.1 s; `said` is when a shift after `start` was first told.
 Watched watch(const SimulatedStreams& s, double start) {
@@ -667,8 +700,10 @@ Watched watch(const SimulatedStreams& s, double start) {
   for (double t = 0.1; t < s.imu.back().t; t += 0.1) {
     k = play(s, t, &tracker, &player, k);
     const Shift& shift = tracker.shift();
-    if (t < start) out.before = shift.count;
-    else if (out.said < 0.0 && shift.count > out.before) out.said = t - start;
+    if (t < start)
+      out.before = shift.count;
+    else if (out.said < 0.0 && shift.count > out.before)
+      out.said = t - start;
   }
   out.shift = tracker.shift();
   return out;
@@ -695,8 +730,10 @@ TEST_CASE("a base station shifted by 5 mm or by 0.1 degrees is flagged within 2 
       const Vector3d direction = Vector3d(random.normal(), random.normal(), random.normal()).normalized();
       StationShift shift;
       shift.start = 20.0;
-      if (turned) shift.T_old_new.linear() = exp_rotation(M_PI / 1800.0 * direction).toRotationMatrix();
-      else shift.T_old_new.translation() = 0.005 * direction;
+      if (turned)
+        shift.T_old_new.linear() = exp_rotation(M_PI / 1800.0 * direction).toRotationMatrix();
+      else
+        shift.T_old_new.translation() = 0.005 * direction;
       options.shifts = {shift};
       const Watched found = watch(simulate_streams(large_boom(), options), 20.0);
       CHECK(found.before == 0);
@@ -752,11 +789,14 @@ TEST_CASE("corrections keep their rate and jerk whatever is wanted: 300 runs of 
     detail::Vector6d size, phase, step = detail::Vector6d::Zero();
     const double frequency = random.uniform(0.0, 3.0);
     for (int i = 0; i < 6; ++i) size[i] = 0.05 * random.normal(), phase[i] = random.uniform(0.0, 2.0 * M_PI);
-    Eigen::Vector3d x[4] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+    Eigen::Vector3d x[4] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
+                            Eigen::Vector3d::Zero()};
     for (int k = 0; k < 600; ++k) {
       const double t = 0.01 * k;
-      if (random.uniform(0.0, 1.0) < 0.02) for (int i = 0; i < 6; ++i) step[i] = 0.1 * random.normal();
-      const detail::Vector6d wanted = step + (size.array() * (2.0 * M_PI * frequency * t + phase.array()).sin()).matrix();
+      if (random.uniform(0.0, 1.0) < 0.02)
+        for (int i = 0; i < 6; ++i) step[i] = 0.1 * random.normal();
+      const detail::Vector6d wanted =
+          step + (size.array() * (2.0 * M_PI * frequency * t + phase.array()).sin()).matrix();
       std::rotate(x, x + 3, x + 4);
       x[0] = limiter.follow(t, wanted).head<3>();
       rate = std::max(rate, (x[0] - x[1]).norm() / 0.01);

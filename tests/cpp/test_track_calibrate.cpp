@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Calibration of the tracking set-up: zero residual at the truth, standard errors that are the scatter, and faults by their name.
+// Calibration of the tracking set-up: zero residual at the truth, standard errors that are the scatter, and faults by
+// their name.
 
 #include <doctest/doctest.h>
 
@@ -40,9 +41,12 @@ Isometry3d frame(const Vector3d& p, const Vector3d& r) {
   return out;
 }
 
-const Isometry3d kTrackerBase = frame({9.0, -4.0, 1.2}, {0.01, -0.02, 2.1}), kFlangeReceiver = frame({0.15, 0.10, 0.20}, {0.3, -0.2, 1.0});
+const Isometry3d kTrackerBase = frame({9.0, -4.0, 1.2}, {0.01, -0.02, 2.1}),
+                 kFlangeReceiver = frame({0.15, 0.10, 0.20}, {0.3, -0.2, 1.0});
 
-struct Positions { std::vector<Isometry3d> flange, receiver; };
+struct Positions {
+  std::vector<Isometry3d> flange, receiver;
+};
 
 Positions positions(std::size_t n, double position_noise, double rotation_noise, std::uint64_t seed) {
   Random random(seed);
@@ -60,7 +64,8 @@ Positions positions(std::size_t n, double position_noise, double rotation_noise,
 
 Vector6d difference(const Isometry3d& found, const Isometry3d& truth) {
   Vector6d out;
-  out << found.translation() - truth.translation(), log_rotation(Quaterniond(found.linear() * truth.linear().transpose()));
+  out << found.translation() - truth.translation(),
+      log_rotation(Quaterniond(found.linear() * truth.linear().transpose()));
   return out;
 }
 
@@ -112,7 +117,8 @@ TEST_CASE("a position that is off is reported, and counts little: seed 3") {
   Positions p = positions(15, 5e-4, 5e-4, 3);
   const Positions clean = p;
   p.receiver[6].translation() += Vector3d(0.03, -0.02, 0.0);
-  const FramesResult r = calibrate_frames(p.flange, p.receiver), without = calibrate_frames(clean.flange, clean.receiver);
+  const FramesResult r = calibrate_frames(p.flange, p.receiver),
+                     without = calibrate_frames(clean.flange, clean.receiver);
   REQUIRE(r.status == CalibrationStatus::done);
   CHECK(r.errors[6].position > 0.03);
   CHECK(r.errors[6].weight < 0.05);
@@ -122,7 +128,8 @@ TEST_CASE("a position that is off is reported, and counts little: seed 3") {
 TEST_CASE("readings of the tracker's numbers are named: mm for m, left-handed, degrees for radians: seed 4") {
   Positions p = positions(15, 5e-4, 5e-4, 4);
   const auto said = [](const FramesResult& r, const char* what) {
-    return std::any_of(r.warnings.begin(), r.warnings.end(), [&](const std::string& text) { return text.find(what) != std::string::npos; });
+    return std::any_of(r.warnings.begin(), r.warnings.end(),
+                       [&](const std::string& text) { return text.find(what) != std::string::npos; });
   };
   SUBCASE("mm") {
     for (Isometry3d& T : p.receiver) T.translation() *= 1000.0;
@@ -141,7 +148,8 @@ TEST_CASE("readings of the tracker's numbers are named: mm for m, left-handed, d
     CHECK(said(r, "left-handed"));
   }
   SUBCASE("degrees") {
-    for (Isometry3d& T : p.flange) T.linear() = exp_rotation(M_PI / 180.0 * log_rotation(Quaterniond(T.linear()))).toRotationMatrix();
+    for (Isometry3d& T : p.flange)
+      T.linear() = exp_rotation(M_PI / 180.0 * log_rotation(Quaterniond(T.linear()))).toRotationMatrix();
     const FramesResult r = calibrate_frames(p.flange, p.receiver);
     CHECK(r.status == CalibrationStatus::not_consistent);
     CHECK(said(r, "radians"));
@@ -158,7 +166,9 @@ TEST_CASE("readings of the tracker's numbers are named: mm for m, left-handed, d
 TEST_CASE("standstills are found, and averaged over the sway") {
   std::vector<FrameSample> flange;
   std::vector<PoseSample> tracker;
-  const auto where = [](double t) { return frame({8.0 + 0.5 * std::clamp(t - 6.0, 0.0, 2.0), 0.0, 2.0}, {0.0, 0.0, 0.0}); };
+  const auto where = [](double t) {
+    return frame({8.0 + 0.5 * std::clamp(t - 6.0, 0.0, 2.0), 0.0, 2.0}, {0.0, 0.0, 0.0});
+  };
   for (int k = 0; k <= 1400; ++k) flange.push_back({0.01 * k, 0.01 * k, where(0.01 * k)});
   for (int k = 0; k <= 1400; ++k) {
     const double t = 0.01 * k;
@@ -198,13 +208,17 @@ TEST_CASE("tool: point from pivot poses, orientation from prescribed ones, error
       const Matrix3d prescribed = exp_rotation(normal3(&random, 0.3)).toRotationMatrix();
       poses.prescribed.push_back(prescribed);
       poses.orientation.push_back(frame(point, Vector3d::Zero()));
-      poses.orientation.back().linear() = exp_rotation(normal3(&random, noise)).toRotationMatrix() * prescribed * tool.linear().transpose();
+      poses.orientation.back().linear() =
+          exp_rotation(normal3(&random, noise)).toRotationMatrix() * prescribed * tool.linear().transpose();
     }
     const ToolResult r = calibrate_tool(poses);
     REQUIRE(r.status == CalibrationStatus::done);
     const Vector6d e = difference(r.T_flange_tool.T, tool);
-    if (seed == 0) CHECK(e.norm() < 1e-10);
-    else squares += e.head<3>().cwiseAbs2().cwiseQuotient(r.T_flange_tool.covariance.diagonal().head<3>()) / static_cast<double>(seeds);
+    if (seed == 0)
+      CHECK(e.norm() < 1e-10);
+    else
+      squares += e.head<3>().cwiseAbs2().cwiseQuotient(r.T_flange_tool.covariance.diagonal().head<3>()) /
+                 static_cast<double>(seeds);
   }
   if (kSanitized) return;
   for (int i = 0; i < 3; ++i) {  // of a t distribution with 18 degrees of freedom: 1.125
@@ -311,7 +325,8 @@ TEST_CASE("units and hands of inertial sensor and tracker are named: seed 3") {
   SUBCASE("left-handed tracker") {
     for (PoseSample& sample : s.tracker) {
       sample.position.y() *= -1.0;
-      sample.orientation = Quaterniond(sample.orientation.w(), -sample.orientation.x(), sample.orientation.y(), -sample.orientation.z());
+      sample.orientation =
+          Quaterniond(sample.orientation.w(), -sample.orientation.x(), sample.orientation.y(), -sample.orientation.z());
     }
     says("left-handed");
   }
@@ -332,7 +347,8 @@ TEST_CASE("a tracker with y up, and gravity that is not along the base's z, are 
   CHECK(r.warnings[0].find("+y") != std::string::npos);
 
   FramesResult frames;  // a base that is tilted by 5 degrees
-  frames.T_tracker_base.T.linear() = y_up.toRotationMatrix() * s.setup.T_tracker_base.linear() * exp_rotation(Vector3d(5.0 * M_PI / 180.0, 0.0, 0.0)).toRotationMatrix();
+  frames.T_tracker_base.T.linear() = y_up.toRotationMatrix() * s.setup.T_tracker_base.linear() *
+                                     exp_rotation(Vector3d(5.0 * M_PI / 180.0, 0.0, 0.0)).toRotationMatrix();
   std::vector<std::string> notes;
   const TrackSetup setup = assemble_setup(frames, ToolResult(), r, &notes);
   REQUIRE(notes.size() == 2);
@@ -346,8 +362,10 @@ TEST_CASE("records that do not belong together, or cannot be used: seeds 5 and 6
   CHECK(r.status != CalibrationStatus::done);
   std::vector<ImuSample> imu = a.imu;
   imu[70].accel.y() = std::nan("");
-  CHECK_THROWS_WITH_AS(calibrate_inertial(imu, in_order(a.tracker)), doctest::Contains("row 70"), std::invalid_argument);
+  CHECK_THROWS_WITH_AS(calibrate_inertial(imu, in_order(a.tracker)), doctest::Contains("row 70"),
+                       std::invalid_argument);
   imu = a.imu;
   imu[70].t = imu[60].t;
-  CHECK_THROWS_WITH_AS(calibrate_inertial(imu, in_order(a.tracker)), doctest::Contains("back in time"), std::invalid_argument);
+  CHECK_THROWS_WITH_AS(calibrate_inertial(imu, in_order(a.tracker)), doctest::Contains("back in time"),
+                       std::invalid_argument);
 }

@@ -86,15 +86,22 @@ TEST_CASE("a mode rings at its damped frequency and dies away as it should") {
   std::size_t rest = 0;
   double start = 0.0;
   for (std::size_t k = 1; k < s.joints_t.size() && rest < 180; ++k) {
-    rest = s.joints_t[k] > 3.0 && (s.joints.row(static_cast<Eigen::Index>(k)) - s.joints.row(static_cast<Eigen::Index>(k - 1))).norm() < 1e-9 ? rest + 1 : 0;
+    rest =
+        s.joints_t[k] > 3.0 &&
+                (s.joints.row(static_cast<Eigen::Index>(k)) - s.joints.row(static_cast<Eigen::Index>(k - 1))).norm() <
+                    1e-9
+            ? rest + 1
+            : 0;
     if (rest == 1) start = s.joints_t[k];
   }
   REQUIRE(rest == 180);
   start += 0.05;
   const double omega = 2.0 * M_PI * 2.0, period = 2.0 * M_PI / (omega * std::sqrt(1.0 - 0.0004));
-  const double rigid = s.flange[static_cast<std::size_t>(std::lround((start + 0.1) * 250.0))].T_base_frame.translation().z();
+  const double rigid =
+      s.flange[static_cast<std::size_t>(std::lround((start + 0.1) * 250.0))].T_base_frame.translation().z();
   const auto height = [&](double t) { return s.flange_at(t).translation().z() - rigid; };
-  // x(t) - sag shrinks by exp(-zeta omega period) over one period, at any phase: solve for the sag from three instants and check a fourth.
+  // x(t) - sag shrinks by exp(-zeta omega period) over one period, at any phase: solve for the sag from three instants
+  // and check a fourth.
   const double shrink = std::exp(-0.02 * omega * period);
   for (const double t : {start, start + 0.03}) {
     const double x0 = height(t), x1 = height(t + period / 2.0), half = -std::sqrt(shrink);
@@ -106,13 +113,15 @@ TEST_CASE("a mode rings at its damped frequency and dies away as it should") {
 TEST_CASE("encoders do not see the sway, and follow the plan by the actuator's lag") {
   const SimulatedStreams s = simulate_streams(large_boom(), quiet(SimulatedMotion::gentle, 4.0));
   double sway = 0.0;
-  for (const FrameSample& sample : s.flange) sway = std::max(sway, (s.flange_at(sample.t).translation() - sample.T_base_frame.translation()).norm());
+  for (const FrameSample& sample : s.flange)
+    sway = std::max(sway, (s.flange_at(sample.t).translation() - sample.T_base_frame.translation()).norm());
   CHECK(sway > 0.01);
   const FrameSample& late = s.flange[500];  // t = 2 s
   const double planned_at = late.t - 0.04;
   const auto row = static_cast<std::size_t>(std::lround((planned_at - s.plan.front().t) * 100.0));
   CHECK(std::abs(s.plan[row].t - planned_at) < 1e-9);
-  CHECK((s.plan[row].T_base_frame.translation() - (late.T_base_frame * s.setup.T_flange_tool).translation()).norm() < 1e-9);
+  CHECK((s.plan[row].T_base_frame.translation() - (late.T_base_frame * s.setup.T_flange_tool).translation()).norm() <
+        1e-9);
 }
 
 TEST_CASE("the tracker: late, lost in dropouts, out of order, on its own clock, and shifted when its station is") {

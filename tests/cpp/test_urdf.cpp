@@ -96,21 +96,16 @@ Isometry3d turn(const Vector3d& axis, double angle) {
 }
 
 Isometry3d origin(double x, double y, double z, double roll = 0.0, double pitch = 0.0, double yaw = 0.0) {
-  Isometry3d T =
-      turn(Vector3d::UnitZ(), yaw) * turn(Vector3d::UnitY(), pitch) * turn(Vector3d::UnitX(), roll);
+  Isometry3d T = turn(Vector3d::UnitZ(), yaw) * turn(Vector3d::UnitY(), pitch) * turn(Vector3d::UnitX(), roll);
   T.translation() = Vector3d(x, y, z);
   return T;
 }
 
-double difference(const Isometry3d& a, const Isometry3d& b) {
-  return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff();
-}
+double difference(const Isometry3d& a, const Isometry3d& b) { return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff(); }
 
 VectorXd readings(double a, double s, double b) { return (VectorXd(3) << a, s, b).finished(); }
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const auto at = text.find(from);
@@ -136,8 +131,7 @@ Robot disturbed(Robot robot) {
     joint.T_parent_joint = joint.T_parent_joint * truing::frame_from_xyz_rpy(vector(), vector());
     joint.offset += small(random);
   }
-  robot.targets[0].T_last_target =
-      robot.targets[0].T_last_target * truing::frame_from_xyz_rpy(vector(), vector());
+  robot.targets[0].T_last_target = robot.targets[0].T_last_target * truing::frame_from_xyz_rpy(vector(), vector());
   return robot;
 }
 
@@ -160,16 +154,14 @@ TEST_CASE("a URDF chain is the product of its origins and motions, about any axi
   CHECK(robot.driven_count() == 3);
   for (const VectorXd& q : {readings(0, 0, 0), readings(0.7, 0.3, -1.1), readings(-2.0, 0.1, 2.5)}) {
     const auto frames = truing::forward_kinematics(robot, q);
-    Isometry3d T =
-        origin(1, 0, 0.5, 0, 0, 0.3) * origin(0, 0, 0.4, 0.1, -0.2, 0.3) * turn(Vector3d(0, -1, 0), q[0]);
+    Isometry3d T = origin(1, 0, 0.5, 0, 0, 0.3) * origin(0, 0, 0.4, 0.1, -0.2, 0.3) * turn(Vector3d(0, -1, 0), q[0]);
     CHECK(difference(frames[0], T) < 1e-14);
     T = T * origin(0.2, 0.1, 0, 0, 0.5, 0) * origin(0, 0, 0.1, 0, 0, 0.7) *
         Isometry3d(Eigen::Translation3d(q[1] / 3.0, 2.0 * q[1] / 3.0, 2.0 * q[1] / 3.0));
     CHECK(difference(frames[1], T) < 1e-14);
     T = T * turn(Vector3d(-0.3, 0.5, -0.8), q[2]);
     CHECK(difference(frames[2], T) < 1e-14);
-    T = T * origin(0.5, 0, 0) *
-        turn(Vector3d(1, 0, 0), -1.5 * q[0] + 0.2);  // the axis is x when none is given
+    T = T * origin(0.5, 0, 0) * turn(Vector3d(1, 0, 0), -1.5 * q[0] + 0.2);  // the axis is x when none is given
     CHECK(difference(frames[3], T) < 1e-14);
     T = T * origin(0, 0, 0.05, 0, 2 * std::atan(1.0), 0) * origin(0, 0.02, 0.1, 0.4, 0, 0);
     CHECK(difference(frames[4], T) < 1e-14);
@@ -213,10 +205,8 @@ TEST_CASE("a URDF that cannot be used is refused with what is wrong") {
   CHECK(contains(complaint("hello"), "not a URDF"));
   CHECK(contains(complaint(""), "not a URDF"));
   CHECK(contains(complaint("<robot/>"), "not a URDF"));
-  CHECK(contains(complaint(replaced(arm, "<child link=\"motor\"/>", "<child link=\"mottor\"/>"), "", "tcp"),
-                 "mottor"));
-  CHECK(contains(complaint(arm, "bas", "tcp"),
-                 "base link 'bas' does not exist; the links are base, bracket, elbow"));
+  CHECK(contains(complaint(replaced(arm, "<child link=\"motor\"/>", "<child link=\"mottor\"/>"), "", "tcp"), "mottor"));
+  CHECK(contains(complaint(arm, "bas", "tcp"), "base link 'bas' does not exist; the links are base, bracket, elbow"));
   CHECK(contains(complaint(arm, "base", "tool"), "tip link 'tool' does not exist"));
   CHECK(contains(complaint(arm, "elbow", "motor"), "tip link 'motor' is not below base link 'elbow'"));
   CHECK(contains(complaint(arm, "wrist", "tcp"), "nothing moves between"));
@@ -224,8 +214,7 @@ TEST_CASE("a URDF that cannot be used is refused with what is wrong") {
   CHECK(contains(complaint(replaced(arm, "continuous", "floating"), "", "tcp"), "joint 'b' is floating"));
   CHECK(contains(complaint(replaced(arm, "continuous", "planar"), "", "tcp"), "joint 'b' is planar"));
   CHECK(contains(complaint(arm, "shoulder", "tcp"), "joint 'c' mimics 'a'"));
-  CHECK(contains(complaint(replaced(arm, "lower=\"-2.5\"", "lower=\"2.5\""), "", "tcp"),
-                 "joint 'a': lower limit"));
+  CHECK(contains(complaint(replaced(arm, "lower=\"-2.5\"", "lower=\"2.5\""), "", "tcp"), "joint 'a': lower limit"));
 }
 
 TEST_CASE("an uncalibrated robot gives the URDF back as it was") {
@@ -263,10 +252,9 @@ TEST_CASE("what the URDF holds besides the chain survives") {
   const std::string text =
       truing::urdf_with_calibration(arm, disturbed(truing::robot_from_urdf(arm, "", "tcp")), "", "tcp");
   CHECK(text.rfind("<?xml", 0) == 0);
-  for (const char* part :
-       {"<!-- drawn by hand -->", "<!-- the rail -->", "package://arm/shoulder &amp; cover.stl",
-        "<origin xyz=\"1 0 0.5\" rpy=\"0 0 0.3\"/>", "<mimic joint=\"a\" multiplier=\"-1.5\"",
-        "name=\"finger\"", "lower=\"-2.5\""}) {
+  for (const char* part : {"<!-- drawn by hand -->", "<!-- the rail -->", "package://arm/shoulder &amp; cover.stl",
+                           "<origin xyz=\"1 0 0.5\" rpy=\"0 0 0.3\"/>", "<mimic joint=\"a\" multiplier=\"-1.5\"",
+                           "name=\"finger\"", "lower=\"-2.5\""}) {
     CAPTURE(part);
     CHECK(contains(text, part));
   }
@@ -284,8 +272,7 @@ TEST_CASE("what URDF cannot hold is named in a comment that stays a comment") {
   CHECK(contains(text, "effect backlash: backlash.b"));
   const auto begin = text.find("<!--") + 4, end = text.find("-->");
   CHECK(!contains(text.substr(begin, end - begin), "--"));
-  CHECK(worst_difference(truing::robot_from_urdf(text, "", "tcp"), truing::robot_from_urdf(arm, "", "tcp")) <
-        1e-15);
+  CHECK(worst_difference(truing::robot_from_urdf(text, "", "tcp"), truing::robot_from_urdf(arm, "", "tcp")) < 1e-15);
 }
 
 TEST_CASE("a calibrated robot of another chain is refused") {

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of calibration boards by ray casting: the truth of every corner is known, and no board finder had a hand in them."""
+"""Images of calibration boards by ray casting: the truth of every corner is known, and no board finder had a
+hand in them.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +17,24 @@ from truing import Board, Camera
 
 Floats = NDArray[np.float64]
 SUPERSAMPLING = 2
-CAMERA = Camera(width=480, height=360, fx=430.0, fy=432.0, cx=243.0, cy=177.0, distortion=[-0.12, 0.06, 0.001, -0.0007, 0.0])
+CAMERA = Camera(
+    width=480,
+    height=360,
+    fx=430.0,
+    fy=432.0,
+    cx=243.0,
+    cy=177.0,
+    distortion=[-0.12, 0.06, 0.001, -0.0007, 0.0],
+)
 
 
 @functools.lru_cache(maxsize=4)
-def rays(width: int, height: int, fx: float, fy: float, cx: float, cy: float, distortion: tuple[float, ...]) -> Floats:
-    """Directions (x, y, 1) of all subpixels, shape=(height * s, width * s, 2), by undoing the distortion step by step."""
+def rays(
+    width: int, height: int, fx: float, fy: float, cx: float, cy: float, distortion: tuple[float, ...]
+) -> Floats:
+    """Directions (x, y, 1) of all subpixels, shape=(height * s, width * s, 2), by undoing the distortion step
+    by step.
+    """
     s = SUPERSAMPLING
     u = (np.arange(width * s) + 0.5) / s - 0.5
     v = (np.arange(height * s) + 0.5) / s - 0.5
@@ -30,7 +44,10 @@ def rays(width: int, height: int, fx: float, fy: float, cx: float, cy: float, di
     for _ in range(8):
         r2 = x * x + y * y
         radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        x, y = (x0 - 2 * p1 * x * y - p2 * (r2 + 2 * x * x)) / radial, (y0 - p1 * (r2 + 2 * y * y) - 2 * p2 * x * y) / radial
+        x, y = (
+            (x0 - 2 * p1 * x * y - p2 * (r2 + 2 * x * x)) / radial,
+            (y0 - p1 * (r2 + 2 * y * y) - 2 * p2 * x * y) / radial,
+        )
     return np.stack([x, y], axis=-1)
 
 
@@ -46,7 +63,10 @@ def texture(board: Board, x: Floats, y: Floats) -> Floats:
         low, high = points.min(axis=0), points.max(axis=0)
         left, top, right, bottom = low[0] - 1.5 * a, low[1] - 1.5 * a, high[0] + 1.5 * a, high[1] + 1.5 * a
         if board.kind == "circles":
-            nearest = np.hypot(x - a * np.clip(np.rint(x / a), 0, board.columns - 1), y - a * np.clip(np.rint(y / a), 0, board.rows - 1))
+            nearest = np.hypot(
+                x - a * np.clip(np.rint(x / a), 0, board.columns - 1),
+                y - a * np.clip(np.rint(y / a), 0, board.rows - 1),
+            )
             dark = nearest < 0.27 * a
         else:
             dark = np.zeros(x.shape, dtype=bool)
@@ -69,16 +89,22 @@ def texture(board: Board, x: Floats, y: Floats) -> Floats:
     return np.where(dark, 25.0, np.where(paper, 230.0, 128.0))
 
 
-def render(board: Board, T_camera_board: Floats, camera: Camera = CAMERA, noise: float = 2.0, seed: int = 0) -> NDArray[np.uint8]:
+def render(
+    board: Board, T_camera_board: Floats, camera: Camera = CAMERA, noise: float = 2.0, seed: int = 0
+) -> NDArray[np.uint8]:
     """What the camera sees of the board."""
-    direction = rays(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, tuple(camera.distortion))
+    direction = rays(
+        camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, tuple(camera.distortion)
+    )
     R, t = T_camera_board[:3, :3], T_camera_board[:3, 3]
     depth = (R[:, 2] @ t) / (direction @ R[:2, 2] + R[2, 2])
     place = np.concatenate([direction * depth[..., None], depth[..., None]], axis=-1) - t
     grey = np.where(depth > 0, texture(board, place @ R[:, 0], place @ R[:, 1]), 128.0)
     s = SUPERSAMPLING
     grey = grey.reshape(camera.height, s, camera.width, s).mean(axis=(1, 3))
-    return np.clip(np.rint(grey + np.random.default_rng(seed).normal(0, noise, grey.shape)), 0, 255).astype(np.uint8)
+    return np.clip(np.rint(grey + np.random.default_rng(seed).normal(0, noise, grey.shape)), 0, 255).astype(
+        np.uint8
+    )
 
 
 def rotation(vector: Any) -> Floats:
@@ -108,11 +134,19 @@ def board_poses(board: Board, count: int, seed: int = 0, distance: float = 0.0) 
     away = distance or 1.6 * size
     poses = []
     while len(poses) < count:
-        T = frame([*rng.uniform(-0.15, 0.15, 2) * size, away * rng.uniform(0.9, 1.2)], [*rng.uniform(-0.55, 0.55, 2), rng.uniform(-0.6, 0.6)])
+        T = frame(
+            [*rng.uniform(-0.15, 0.15, 2) * size, away * rng.uniform(0.9, 1.2)],
+            [*rng.uniform(-0.55, 0.55, 2), rng.uniform(-0.6, 0.6)],
+        )
         T[:3, 3] -= T[:3, :3] @ middle
-        corners = middle + np.array([[sx, sy, 0] for sx in (-1, 1) for sy in (-1, 1)]) * (np.ptp(points, axis=0) / 2 + 1.8 * board.size)
+        corners = middle + np.array([[sx, sy, 0] for sx in (-1, 1) for sy in (-1, 1)]) * (
+            np.ptp(points, axis=0) / 2 + 1.8 * board.size
+        )
         seen = corners @ T[:3, :3].T + T[:3, 3]
-        u, v = CAMERA.fx * seen[:, 0] / seen[:, 2] + CAMERA.cx, CAMERA.fy * seen[:, 1] / seen[:, 2] + CAMERA.cy
+        u, v = (
+            CAMERA.fx * seen[:, 0] / seen[:, 2] + CAMERA.cx,
+            CAMERA.fy * seen[:, 1] / seen[:, 2] + CAMERA.cy,
+        )
         if u.min() > 2 and v.min() > 2 and u.max() < CAMERA.width - 3 and v.max() < CAMERA.height - 3:
             poses.append(T)
     return poses

@@ -36,12 +36,26 @@ def noisy(T: Floats, position: float, angle: float, rng: np.random.Generator) ->
     return out
 
 
-def scene(count: int = 20, setup: str = "eye-in-hand", *, hand: tuple[float, float] = (1e-4, 3e-4), camera: tuple[float, float] = (3e-4, 8e-4), one_axis: bool = False,
-          turns: float = 0.5, seed: int = 0) -> HandEyeScene:  # fmt: skip
-    """Random poses that look at the board. hand, camera: noise of a component [m], [rad]. one_axis: the hand turns about base z alone."""
+def scene(
+    count: int = 20,
+    setup: str = "eye-in-hand",
+    *,
+    hand: tuple[float, float] = (1e-4, 3e-4),
+    camera: tuple[float, float] = (3e-4, 8e-4),
+    one_axis: bool = False,
+    turns: float = 0.5,
+    seed: int = 0,
+) -> HandEyeScene:
+    """Random poses that look at the board. hand, camera: noise of a component [m], [rad]. one_axis: the hand
+    turns about base z alone.
+    """
     rng = np.random.default_rng(seed)
     eye_in_hand = setup == "eye-in-hand"
-    X, Y = (CAMERA_IN_HAND, BOARD) if eye_in_hand else (CAMERA_IN_BASE, frame([0.02, -0.03, 0.06], [0.2, 0.1, -0.4]))
+    X, Y = (
+        (CAMERA_IN_HAND, BOARD)
+        if eye_in_hand
+        else (CAMERA_IN_BASE, frame([0.02, -0.03, 0.06], [0.2, 0.1, -0.4]))
+    )
     A, B = [], []
     for _ in range(count):
         turn = [0, 0, rng.uniform(-1, 1) * turns] if one_axis else rng.uniform(-1, 1, 3) * turns
@@ -60,12 +74,19 @@ def scene(count: int = 20, setup: str = "eye-in-hand", *, hand: tuple[float, flo
 
 def columns_of(side: str, T: Floats) -> dict[str, Any]:
     q = quaternions_from_rotations(T[:, :3, :3])
-    return {**{f"{side}_{axis}_m": T[:, k, 3] for k, axis in enumerate("xyz")}, **{f"{side}_q{part}": q[:, k] for k, part in enumerate("wxyz")}}
+    return {
+        **{f"{side}_{axis}_m": T[:, k, 3] for k, axis in enumerate("xyz")},
+        **{f"{side}_q{part}": q[:, k] for k, part in enumerate("wxyz")},
+    }
 
 
 def write_csv(path: Path, columns: dict[str, Any]) -> Path:
     rows = list(zip(*columns.values(), strict=True))
-    path.write_text(",".join(columns) + "\n" + "".join(",".join(v if isinstance(v, str) else repr(float(v)) for v in row) + "\n" for row in rows))
+    path.write_text(
+        ",".join(columns)
+        + "\n"
+        + "".join(",".join(v if isinstance(v, str) else repr(float(v)) for v in row) + "\n" for row in rows)
+    )
     return path
 
 

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robots and poses that the tests of inverse kinematics share, and an opinion of their own of whether a task is met."""
+"""Robots and poses that the tests of inverse kinematics share, and an opinion of their own of whether a task
+is met.
+"""
 
 from __future__ import annotations
 
@@ -26,32 +28,56 @@ def calibrated(robot: truing.Robot, seed: int = 0) -> truing.Robot:
     def off(joint: truing.Joint) -> truing.Joint:
         a, d, alpha, offset, ratio = random.normal(0.0, 1.0, 5)
         moved = joint.replace(a=joint.a + 4e-4 * a, d=joint.d + 4e-4 * d, alpha=joint.alpha + 6e-4 * alpha)
-        return moved if joint.passive else moved.replace(offset=joint.offset + 1e-3 * offset, ratio=1.0 + 2e-4 * ratio)
+        return (
+            moved
+            if joint.passive
+            else moved.replace(offset=joint.offset + 1e-3 * offset, ratio=1.0 + 2e-4 * ratio)
+        )
 
     return robot.replace(joints=[off(joint) for joint in robot.joints])
 
 
 def with_effects(robot: truing.Robot) -> truing.Robot:
     """What changes with load, approach direction and angle."""
-    masses = [joint.replace(mass=12.0 - 1.5 * k, center_of_mass=[0.05, 0.02, 0.03]) for k, joint in enumerate(robot.joints)]
-    effects = [truing.AppliedEffect("joint_compliance", ["J2"], {"joint_compliance.J2": 3e-6}), truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 4e-4}),
-               truing.AppliedEffect("harmonic", ["J1"], {"harmonic.J1.cos1": 3e-4, "harmonic.J1.sin1": -2e-4})]  # fmt: skip
+    masses = [
+        joint.replace(mass=12.0 - 1.5 * k, center_of_mass=[0.05, 0.02, 0.03])
+        for k, joint in enumerate(robot.joints)
+    ]
+    effects = [
+        truing.AppliedEffect("joint_compliance", ["J2"], {"joint_compliance.J2": 3e-6}),
+        truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 4e-4}),
+        truing.AppliedEffect("harmonic", ["J1"], {"harmonic.J1.cos1": 3e-4, "harmonic.J1.sin1": -2e-4}),
+    ]
     return robot.replace(joints=masses, effects=effects)
 
 
 def gantry() -> truing.Robot:
     """A six-axis arm under three rails, hanging: 10 m, 4 m, 2 m."""
     quarter = math.pi / 2
-    rails = [truing.Joint(name, type="prismatic", theta=theta, alpha=alpha, lower=0.0, upper=length)
-             for name, theta, alpha, length in (("X", 0.0, -quarter, 10.0), ("Y", quarter, quarter, 4.0), ("Z", 0.0, 0.0, 2.0))]  # fmt: skip
+    rails = [
+        truing.Joint(name, type="prismatic", theta=theta, alpha=alpha, lower=0.0, upper=length)
+        for name, theta, alpha, length in (
+            ("X", 0.0, -quarter, 10.0),
+            ("Y", quarter, quarter, 4.0),
+            ("Z", 0.0, 0.0, 2.0),
+        )
+    ]
     arm = irb()
-    return arm.replace(name="gantry", joints=[*rails, *arm.joints], T_measurement_base=truing.frame_from_xyz_rpy([0, 0, 3], [0, quarter, 0]))
+    return arm.replace(
+        name="gantry",
+        joints=[*rails, *arm.joints],
+        T_measurement_base=truing.frame_from_xyz_rpy([0, 0, 3], [0, quarter, 0]),
+    )
 
 
 def scara() -> truing.Robot:
     """The sliding joint stands near the end of the chain."""
-    joints = [truing.Joint("J1", d=0.4, a=0.3, lower=-2.5, upper=2.5), truing.Joint("J2", a=0.25, alpha=math.pi, lower=-2.5, upper=2.5),
-              truing.Joint("Z", type="prismatic", lower=0.0, upper=0.2), truing.Joint("C", d=0.05, lower=-6.0, upper=6.0)]  # fmt: skip
+    joints = [
+        truing.Joint("J1", d=0.4, a=0.3, lower=-2.5, upper=2.5),
+        truing.Joint("J2", a=0.25, alpha=math.pi, lower=-2.5, upper=2.5),
+        truing.Joint("Z", type="prismatic", lower=0.0, upper=0.2),
+        truing.Joint("C", d=0.05, lower=-6.0, upper=6.0),
+    ]
     return truing.Robot("scara", joints=joints)
 
 

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The layers of docs/architecture.md, checked over every #include and every import: a part knows only what is below it."""
+"""The layers of docs/architecture.md, checked over every #include and every import: a part knows only what is
+below it.
+"""
 
 from __future__ import annotations
 
@@ -14,36 +16,159 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 
-# ---- C++ ---------------------------------------------------------------------------------------------------------------
+# ---- C++
+# ---------------------------------------------------------------------------------------------------------------
 
 # From the ground up. A file may include files of its own layer and of those above it in this list.
 CPP_LAYERS = [
     ("kernel", ["kernel/kernel.hpp", "kernel/kernel.cpp", "kernel/dispatch.cpp"]),
-    ("tools", ["truing/version.hpp", "text.hpp", "random.hpp", "rotation.hpp", "frame.hpp", "dual_quaternion.hpp", "registration.hpp", "registration.cpp", "observability.hpp", "observability.cpp",
-               "evidence.hpp", "evidence.cpp", "trigonometry.hpp", "batch.hpp"]),
-    ("robot", ["truing/robot.hpp", "robot.cpp", "motion.hpp", "truing/urdf.hpp", "urdf.cpp", "truing/interference.hpp"]),
+    (
+        "tools",
+        [
+            "truing/version.hpp",
+            "text.hpp",
+            "random.hpp",
+            "rotation.hpp",
+            "frame.hpp",
+            "dual_quaternion.hpp",
+            "registration.hpp",
+            "registration.cpp",
+            "observability.hpp",
+            "observability.cpp",
+            "evidence.hpp",
+            "evidence.cpp",
+            "trigonometry.hpp",
+            "batch.hpp",
+        ],
+    ),
+    (
+        "robot",
+        [
+            "truing/robot.hpp",
+            "robot.cpp",
+            "motion.hpp",
+            "truing/urdf.hpp",
+            "urdf.cpp",
+            "truing/interference.hpp",
+        ],
+    ),
     ("measurement", ["truing/measurement.hpp", "measurement.cpp"]),
     ("effect", ["truing/effect.hpp", "effect.cpp", "gravity.hpp", "gravity.cpp"]),
     ("model", ["model.hpp", "model.cpp"]),
     ("evaluate", ["evaluate.hpp", "evaluate.cpp"]),
     # what is asked for and what comes back
-    ("options", ["truing/identify.hpp", "truing/diagnose.hpp", "truing/inverse.hpp", "truing/compensate.hpp", "statistics.hpp"]),
-    ("estimation", ["selection.hpp", "selection.cpp", "solvers.hpp", "levenberg_marquardt.cpp", "ceres_solver.cpp"]),
-    ("diagnosis", ["linearise.hpp", "linearise.cpp", "sanity.hpp", "sanity.cpp", "candidates.hpp", "candidates.cpp", "free_search.hpp", "free_search.cpp",
-                   "where.hpp", "where.cpp", "next_poses.hpp", "next_poses.cpp"]),
-    ("reach", ["arm.hpp", "arm.cpp", "closed_form.hpp", "closed_form.cpp", "descent.hpp", "descent.cpp", "surroundings.hpp", "surroundings.cpp",
-               "reach.hpp", "reach.cpp", "why_not.cpp", "best.cpp", "path.cpp"]),
-    ("tasks", ["truing/plan.hpp", "identify.cpp", "plan_poses.hpp", "plan_effects.cpp", "plan.cpp", "diagnosis.hpp", "weigh.cpp", "decide.cpp", "sureness.cpp",
-               "refit.cpp", "describe.cpp", "diagnose.cpp", "inverse.cpp", "compensate.cpp"]),
-    ("hand-eye", ["truing/handeye.hpp", "handeye_closed_form.hpp", "handeye_closed_form.cpp", "handeye_consensus.hpp", "handeye_consensus.cpp",
-                  "handeye_readings.hpp", "handeye_readings.cpp", "handeye_refine.hpp", "handeye_refine.cpp", "handeye_images.hpp", "handeye_images.cpp",
-                  "handeye_errors.hpp", "handeye_errors.cpp", "handeye.cpp", "handeye_plan.cpp", "handeye_clock.cpp", "handeye_kinematics.cpp"]),
+    (
+        "options",
+        [
+            "truing/identify.hpp",
+            "truing/diagnose.hpp",
+            "truing/inverse.hpp",
+            "truing/compensate.hpp",
+            "statistics.hpp",
+        ],
+    ),
+    (
+        "estimation",
+        ["selection.hpp", "selection.cpp", "solvers.hpp", "levenberg_marquardt.cpp", "ceres_solver.cpp"],
+    ),
+    (
+        "diagnosis",
+        [
+            "linearise.hpp",
+            "linearise.cpp",
+            "sanity.hpp",
+            "sanity.cpp",
+            "candidates.hpp",
+            "candidates.cpp",
+            "free_search.hpp",
+            "free_search.cpp",
+            "where.hpp",
+            "where.cpp",
+            "next_poses.hpp",
+            "next_poses.cpp",
+        ],
+    ),
+    (
+        "reach",
+        [
+            "arm.hpp",
+            "arm.cpp",
+            "closed_form.hpp",
+            "closed_form.cpp",
+            "descent.hpp",
+            "descent.cpp",
+            "surroundings.hpp",
+            "surroundings.cpp",
+            "reach.hpp",
+            "reach.cpp",
+            "why_not.cpp",
+            "best.cpp",
+            "path.cpp",
+        ],
+    ),
+    (
+        "tasks",
+        [
+            "truing/plan.hpp",
+            "identify.cpp",
+            "plan_poses.hpp",
+            "plan_effects.cpp",
+            "plan.cpp",
+            "diagnosis.hpp",
+            "weigh.cpp",
+            "decide.cpp",
+            "sureness.cpp",
+            "refit.cpp",
+            "describe.cpp",
+            "diagnose.cpp",
+            "inverse.cpp",
+            "compensate.cpp",
+        ],
+    ),
+    (
+        "hand-eye",
+        [
+            "truing/handeye.hpp",
+            "handeye_closed_form.hpp",
+            "handeye_closed_form.cpp",
+            "handeye_consensus.hpp",
+            "handeye_consensus.cpp",
+            "handeye_readings.hpp",
+            "handeye_readings.cpp",
+            "handeye_refine.hpp",
+            "handeye_refine.cpp",
+            "handeye_images.hpp",
+            "handeye_images.cpp",
+            "handeye_errors.hpp",
+            "handeye_errors.cpp",
+            "handeye.cpp",
+            "handeye_plan.cpp",
+            "handeye_clock.cpp",
+            "handeye_kinematics.cpp",
+        ],
+    ),
     ("streams", ["truing/streams.hpp", "truing/stream_simulation.hpp", "stream_simulation.cpp"]),
-    ("tracking", ["truing/track.hpp", "pose_filter.hpp", "pose_filter.cpp", "deviation.hpp", "deviation.cpp", "modes.cpp", "track_watch.hpp", "track_watch.cpp", "correction_limiter.hpp", "track.cpp",
-                  "truing/track_calibrate.hpp", "track_calibrate.cpp", "track_calibrate_inertial.cpp"]),
+    (
+        "tracking",
+        [
+            "truing/track.hpp",
+            "pose_filter.hpp",
+            "pose_filter.cpp",
+            "deviation.hpp",
+            "deviation.cpp",
+            "modes.cpp",
+            "track_watch.hpp",
+            "track_watch.cpp",
+            "correction_limiter.hpp",
+            "track.cpp",
+            "truing/track_calibrate.hpp",
+            "track_calibrate.cpp",
+            "track_calibrate_inertial.cpp",
+        ],
+    ),
     ("replay", ["truing/track_replay.hpp", "track_replay.cpp"]),
     ("everything", ["truing/truing.hpp"]),
-]  # fmt: skip
+]
 CPP_RANK = {file: rank for rank, (_, files) in enumerate(CPP_LAYERS) for file in files}
 
 # Which files may include what comes from elsewhere.
@@ -86,10 +211,14 @@ def test_a_cpp_file_includes_only_what_is_below_it(file: str) -> None:
     for bracket, name in includes(cpp_files()[file]):
         name = own(file, name)
         if name not in CPP_RANK:
-            assert bracket == "<", f'{file}: "{name}" is no file of ours; what comes from elsewhere stands in < >'
+            assert bracket == "<", (
+                f'{file}: "{name}" is no file of ours; what comes from elsewhere stands in < >'
+            )
             continue
         layer, theirs = CPP_LAYERS[CPP_RANK[file]][0], CPP_LAYERS[CPP_RANK[name]][0]
-        assert CPP_RANK[name] <= CPP_RANK[file], f"{file} ({layer}) includes {name}, which belongs to a higher layer ({theirs})"
+        assert CPP_RANK[name] <= CPP_RANK[file], (
+            f"{file} ({layer}) includes {name}, which belongs to a higher layer ({theirs})"
+        )
 
 
 def test_the_table_of_layers_has_no_files_that_are_gone() -> None:
@@ -99,7 +228,9 @@ def test_the_table_of_layers_has_no_files_that_are_gone() -> None:
 @pytest.mark.parametrize("file", sorted(name for name in cpp_files() if name.startswith("kernel/")))
 def test_the_kernel_knows_nothing_of_what_uses_it(file: str) -> None:
     for _, name in includes(cpp_files()[file]):
-        assert name == "kernel.hpp" or STANDARD.fullmatch(name), f"{file} includes {name}: raw pointers and the standard library are all there is here"
+        assert name == "kernel.hpp" or STANDARD.fullmatch(name), (
+            f"{file} includes {name}: raw pointers and the standard library are all there is here"
+        )
 
 
 @pytest.mark.parametrize("file", sorted(name for name in cpp_files() if name.startswith("truing/")))
@@ -111,8 +242,14 @@ def test_a_public_header_shows_its_users_eigen_and_nothing_else(file: str) -> No
 
 @pytest.mark.parametrize("dependency", sorted(CPP_ONLY_IN))
 def test_a_dependency_is_known_to_one_file_only(dependency: str) -> None:
-    users = {file for file, path in cpp_files().items() if any(name.startswith(dependency) for _, name in includes(path))}
-    assert users <= CPP_ONLY_IN[dependency], f"<{dependency}…> belongs into {sorted(CPP_ONLY_IN[dependency]) or 'no file'}"
+    users = {
+        file
+        for file, path in cpp_files().items()
+        if any(name.startswith(dependency) for _, name in includes(path))
+    }
+    assert users <= CPP_ONLY_IN[dependency], (
+        f"<{dependency}…> belongs into {sorted(CPP_ONLY_IN[dependency]) or 'no file'}"
+    )
 
 
 def test_solvers_and_planning_do_not_know_each_other() -> None:
@@ -122,9 +259,11 @@ def test_solvers_and_planning_do_not_know_each_other() -> None:
         assert {name for bracket, name in includes(files[solver]) if bracket == '"'} == {"solvers.hpp"}
 
 
-# ---- Python ------------------------------------------------------------------------------------------------------------
+# ---- Python
+# ------------------------------------------------------------------------------------------------------------
 
-# What each module of the package may import from it, late imports inside functions and those for type checking included.
+# What each module of the package may import from it, late imports inside functions and those for type
+# checking included.
 # "truing" stands for the public names of the package.
 PYTHON_MAY_IMPORT = {
     "truing.errors": {"truing._core"},
@@ -138,26 +277,78 @@ PYTHON_MAY_IMPORT = {
     "truing.simulation": {"truing", "truing.errors", "truing.files"},
     "truing.handeye_simulation": {"truing.errors"},  # no solver: it says what solvers should find
     "truing.results": {"truing", "truing.errors", "truing.files", "truing.report", "truing.diagnose_report"},
-    "truing.handeye_results": {"truing", "truing.errors", "truing.files", "truing.results", "truing.handeye_report"},
+    "truing.handeye_results": {
+        "truing",
+        "truing.errors",
+        "truing.files",
+        "truing.results",
+        "truing.handeye_report",
+    },
     "truing.inverse_results": {"truing", "truing.files", "truing.results", "truing.inverse_report"},
     "truing.inverse_report": {"truing.inverse_results", "truing.report"},
     "truing.handeye_report": {"truing.handeye_results", "truing.report"},
-    "truing.track_results": {"truing", "truing.files", "truing.track", "truing.results", "truing.handeye_results", "truing.track_report"},
+    "truing.track_results": {
+        "truing",
+        "truing.files",
+        "truing.track",
+        "truing.results",
+        "truing.handeye_results",
+        "truing.track_report",
+    },
     "truing.track_report": {"truing.track", "truing.track_results", "truing.report"},
     "truing.report": {"truing.results"},
     "truing.diagnose_report": {"truing.results", "truing.report"},
     "truing.demo": {"truing", "truing.errors", "truing.files", "truing.simulation", "truing.results"},
     "truing.exam": {"truing"},  # and of that only containers and readers: test_exam.py
-    "truing.cli": {"truing", "truing.errors", "truing.files", "truing.simulation", "truing.results", "truing.report", "truing.diagnose_report",
-                   "truing.handeye_results", "truing.inverse_results", "truing.track", "truing.track_results", "truing.demo", "truing.exam"},
-    "truing": {"truing._core", "truing.errors", "truing.effects", "truing.api", "truing.boards", "truing.files", "truing.hand_eye", "truing.inverse_kinematics", "truing.track", "truing.simulation"},
-}  # fmt: skip
+    "truing.cli": {
+        "truing",
+        "truing.errors",
+        "truing.files",
+        "truing.simulation",
+        "truing.results",
+        "truing.report",
+        "truing.diagnose_report",
+        "truing.handeye_results",
+        "truing.inverse_results",
+        "truing.track",
+        "truing.track_results",
+        "truing.demo",
+        "truing.exam",
+    },
+    "truing": {
+        "truing._core",
+        "truing.errors",
+        "truing.effects",
+        "truing.api",
+        "truing.boards",
+        "truing.files",
+        "truing.hand_eye",
+        "truing.inverse_kinematics",
+        "truing.track",
+        "truing.simulation",
+    },
+}
 
 # Parts of several modules, which may import each other.
 FOLDERS = {"truing.files", "truing.exam"}
 # Those of the examination, from the ground up: each may import those before it.
-EXAM_LAYERS = ["robots", "kinematics", "laws", "surprises", "design", "physics", "worlds", "sizing", "recordings", "confounded", "sets", "answers", "score",
-               "sealing", "run"]  # fmt: skip
+EXAM_LAYERS = [
+    "robots",
+    "kinematics",
+    "laws",
+    "surprises",
+    "design",
+    "physics",
+    "worlds",
+    "sizing",
+    "recordings",
+    "confounded",
+    "sets",
+    "answers",
+    "score",
+    "sealing",
+    "run",
+]
 
 # Packages that are slow to import, or belong to one job: who may import them.
 PYTHON_ONLY_IN = {
@@ -205,7 +396,9 @@ def test_a_module_imports_only_what_its_part_may(file: str) -> None:
     assert part in PYTHON_MAY_IMPORT, f"{file} is in no part: give it one, here and in docs/architecture.md"
     for name in imports(python_files()[file]):
         if name.split(".")[0] == "truing":
-            assert part_of(name) in PYTHON_MAY_IMPORT[part] | ({part} if part in FOLDERS else set()), f"{file} imports {name}"
+            assert part_of(name) in PYTHON_MAY_IMPORT[part] | ({part} if part in FOLDERS else set()), (
+                f"{file} imports {name}"
+            )
 
 
 @pytest.mark.parametrize("file", sorted(python_files()))
@@ -215,7 +408,12 @@ def test_heavy_packages_stay_where_they_are_needed(file: str) -> None:
         if package in PYTHON_ONLY_IN:
             assert part_of_file(file) in PYTHON_ONLY_IN[package], f"{file} imports {package}"
         else:
-            assert package in {"truing", "numpy", "pydantic_core", *sys.stdlib_module_names}, f"{file} imports {package}: a new dependency?"
+            assert package in {
+                "truing",
+                "numpy",
+                "pydantic_core",
+                *sys.stdlib_module_names,
+            }, f"{file} imports {package}: a new dependency?"
 
 
 @pytest.mark.parametrize("module", EXAM_LAYERS)
@@ -223,21 +421,39 @@ def test_a_module_of_the_examination_imports_only_those_below_it(module: str) ->
     below = set(EXAM_LAYERS[: EXAM_LAYERS.index(module)])
     for name in imports(python_files()[f"exam/{module}.py"]):
         words = name.split(".")
-        assert words[:2] != ["truing", "exam"] or (words[2] if len(words) > 2 else "") in below, f"exam/{module}.py imports {name}"
+        assert words[:2] != ["truing", "exam"] or (words[2] if len(words) > 2 else "") in below, (
+            f"exam/{module}.py imports {name}"
+        )
 
 
 def test_every_module_of_the_examination_has_a_layer() -> None:
-    assert {f"exam/{module}.py" for module in EXAM_LAYERS} | {"exam/__init__.py"} == {file for file in python_files() if file.startswith("exam/")}
+    assert {f"exam/{module}.py" for module in EXAM_LAYERS} | {"exam/__init__.py"} == {
+        file for file in python_files() if file.startswith("exam/")
+    }
 
 
 def test_nobody_imports_the_command_line() -> None:
     for file, path in python_files().items():
-        assert not any(part_of(name) == "truing.cli" for name in imports(path)), f"{file} imports the command line"
+        assert not any(part_of(name) == "truing.cli" for name in imports(path)), (
+            f"{file} imports the command line"
+        )
 
 
 def test_importing_truing_stays_cheap() -> None:
     """The package itself needs no plotting, no command line and no report."""
-    later = {"truing.cli", "truing.report", "truing.diagnose_report", "truing.results", "truing.handeye_results", "truing.handeye_report", "truing.inverse_results", "truing.inverse_report", "truing.track_results", "truing.track_report",
-             "truing.demo", "truing.exam"}  # fmt: skip
+    later = {
+        "truing.cli",
+        "truing.report",
+        "truing.diagnose_report",
+        "truing.results",
+        "truing.handeye_results",
+        "truing.handeye_report",
+        "truing.inverse_results",
+        "truing.inverse_report",
+        "truing.track_results",
+        "truing.track_report",
+        "truing.demo",
+        "truing.exam",
+    }
     assert not later & PYTHON_MAY_IMPORT["truing"]
     assert not any(part_of(name) in later for name in imports(python_files()["__init__.py"]))

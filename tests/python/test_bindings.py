@@ -22,8 +22,18 @@ from truing.effects import Inputs, parse_effects
 @pytest.fixture
 def robot() -> truing.Robot:
     """Six driven joints and a passive one, near to a palletizer's start and a wrist."""
-    rows = [(0.5, 0.2, -1.57), (0.0, 0.9, 0.0), (0.1, 0.15, -1.57), (0.0, 0.05, 1.57), (0.8, 0.0, -1.57), (0.0, 0.0, 1.57), (0.1, 0.0, 0.0)]
-    joints = [truing.Joint(f"J{i}", d=d, a=a, alpha=alpha, mass=5.0) for i, (d, a, alpha) in enumerate(rows, 1)]
+    rows = [
+        (0.5, 0.2, -1.57),
+        (0.0, 0.9, 0.0),
+        (0.1, 0.15, -1.57),
+        (0.0, 0.05, 1.57),
+        (0.8, 0.0, -1.57),
+        (0.0, 0.0, 1.57),
+        (0.1, 0.0, 0.0),
+    ]
+    joints = [
+        truing.Joint(f"J{i}", d=d, a=a, alpha=alpha, mass=5.0) for i, (d, a, alpha) in enumerate(rows, 1)
+    ]
     joints[3].driven_by = {"J2": -1.0, "J3": -0.5}
     tool = np.eye(4)
     tool[:3, 3] = 0.05, 0.02, 0.15
@@ -43,7 +53,8 @@ def turn(axis: int, angle: float) -> np.ndarray:
     return frame
 
 
-# ---- Keywords and values -----------------------------------------------------------------------------------------------
+# ---- Keywords and values
+# -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -85,7 +96,11 @@ def test_an_unknown_word_lists_the_choices(make: Any, choices: str) -> None:
 
 
 def test_the_wrappers_defaults_are_those_of_the_core() -> None:
-    for function, options in ((api.identify, truing.IdentifyOptions()), (api.plan, truing.PlanOptions()), (api.distinguish, truing.DistinguishOptions())):
+    for function, options in (
+        (api.identify, truing.IdentifyOptions()),
+        (api.plan, truing.PlanOptions()),
+        (api.distinguish, truing.DistinguishOptions()),
+    ):
         for name, parameter in inspect.signature(function).parameters.items():
             if not hasattr(options, name):
                 assert name in {"robot", "data", "joints", "raise_if_not_converged"}
@@ -144,10 +159,13 @@ def test_copy_replace_and_pickle_make_independent_equals(robot: truing.Robot, q:
 def test_reprs_tell_what_matters(robot: truing.Robot, q: np.ndarray) -> None:
     assert repr(robot) == "Robot('arm', dh, 7 joints (6 driven), targets: tool)"
     assert "driven_by={'J2': -1, 'J3': -0.5}" in repr(robot.joints[3])
-    assert repr(truing.Measurements(q, positions=q[:, :3])) == "Measurements(120 rows, 6 joints, 120 positions)"
+    assert (
+        repr(truing.Measurements(q, positions=q[:, :3])) == "Measurements(120 rows, 6 joints, 120 positions)"
+    )
 
 
-# ---- Frames ------------------------------------------------------------------------------------------------------------
+# ---- Frames
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -184,13 +202,19 @@ def test_frames_of_a_chain(robot: truing.Robot, q: np.ndarray) -> None:
     np.testing.assert_allclose(predicted.position[0], frames[-1, :3, 3], atol=1e-12)
 
 
-# ---- Measurements ------------------------------------------------------------------------------------------------------
+# ---- Measurements
+# ------------------------------------------------------------------------------------------------------
 
 
 def test_float64_arrays_are_not_copied_whatever_their_strides() -> None:
     table = np.arange(200.0).reshape(20, 10)
     wide = np.zeros((40, 10))
-    data = truing.Measurements(table[::2, 1:7], positions=table[::2, 7:10].copy(order="F"), temperature=table[::-2, 0], time=wide[5:15, 3])
+    data = truing.Measurements(
+        table[::2, 1:7],
+        positions=table[::2, 7:10].copy(order="F"),
+        temperature=table[::-2, 0],
+        time=wide[5:15, 3],
+    )
     np.testing.assert_array_equal(data.joints, table[::2, 1:7])
     np.testing.assert_array_equal(data.temperature, table[::-2, 0])
     table[2, 3] = -7.0
@@ -220,8 +244,14 @@ def test_what_is_not_float64_is_converted() -> None:
     packed = np.zeros(4, dtype=[("flag", "i1"), ("value", "f8")])  # strides of 9 bytes
     packed["value"] = np.arange(4.0)
     masked = np.ma.masked_array([0.0, 1.0, 2.0, 3.0], mask=[0, 1, 0, 0])
-    data = truing.Measurements([[0] * 6] * 4, distances=odd, time=packed["value"], temperature=np.arange(4, dtype=np.float32),
-                               payload=2.5, covariates={"hall": masked, "big": np.arange(4.0).astype(">f8")})  # fmt: skip
+    data = truing.Measurements(
+        [[0] * 6] * 4,
+        distances=odd,
+        time=packed["value"],
+        temperature=np.arange(4, dtype=np.float32),
+        payload=2.5,
+        covariates={"hall": masked, "big": np.arange(4.0).astype(">f8")},
+    )
     for values in (data.distances, data.time, data.temperature, data.covariates["big"]):
         np.testing.assert_array_equal(values, np.arange(4.0))
     np.testing.assert_array_equal(data.payload, [2.5] * 4)
@@ -230,12 +260,28 @@ def test_what_is_not_float64_is_converted() -> None:
 
 def test_labels_become_numbers(robot: truing.Robot) -> None:
     q = np.zeros((4, 6))
-    data = truing.Measurements(q, fixed_points=["hole", "", None, "pin"], pose=["b", "a", "b", "a"], set=["train", "test", "train", "test"],
-                               targets=np.array(["tool"] * 4), robot=robot)  # fmt: skip
+    data = truing.Measurements(
+        q,
+        fixed_points=["hole", "", None, "pin"],
+        pose=["b", "a", "b", "a"],
+        set=["train", "test", "train", "test"],
+        targets=np.array(["tool"] * 4),
+        robot=robot,
+    )
     assert data.fixed_point_names == ("hole", "pin")
-    for found, expected in ((data.fixed_points, [0, -1, -1, 1]), (data.pose, [0, 1, 0, 1]), (data.set, [0, 1, 0, 1]), (data.targets, [0] * 4)):
+    for found, expected in (
+        (data.fixed_points, [0, -1, -1, 1]),
+        (data.pose, [0, 1, 0, 1]),
+        (data.set, [0, 1, 0, 1]),
+        (data.targets, [0] * 4),
+    ):
         np.testing.assert_array_equal(found, expected)
-    same = truing.Measurements(q, fixed_points=np.array([0, -1, -1, 1]), fixed_point_names=["hole", "pin"], set=np.array([0, 1, 0, 1], np.int8))
+    same = truing.Measurements(
+        q,
+        fixed_points=np.array([0, -1, -1, 1]),
+        fixed_point_names=["hole", "pin"],
+        set=np.array([0, 1, 0, 1], np.int8),
+    )
     np.testing.assert_array_equal(same.fixed_points, data.fixed_points)
     np.testing.assert_array_equal(truing.pose_groups(data), [0, 1, 0, 1])
 
@@ -251,7 +297,10 @@ def test_labels_become_numbers(robot: truing.Robot) -> None:
         ({"time": ["a"] * 5}, "time holds <U1 values, not numbers"),
         ({"time": [1.0, None, 2.0, 3.0, 4.0]}, "write NaN"),
         ({"directions": np.zeros((5, 4))}, "directions has 4 columns, expected 6"),
-        ({"set": ["train", "test", "hold", "test", "test"]}, "set: row 2 holds 'hold', expected one of: train, test"),
+        (
+            {"set": ["train", "test", "hold", "test", "test"]},
+            "set: row 2 holds 'hold', expected one of: train, test",
+        ),
         ({"set": [0, 1, 2, 0, 0]}, "set: row 2 holds 2"),
         ({"set": ["train"]}, "set has 1 rows"),
         ({"targets": ["tool", "ball", "tool", "tool", "tool"]}, "targets: row 1 holds 'ball'"),
@@ -266,7 +315,14 @@ def test_columns_that_do_not_fit_are_named(columns: dict[str, Any], message: str
 
 
 def test_measurements_can_be_pickled_and_replaced(q: np.ndarray) -> None:
-    data = truing.Measurements(q, positions=q[:, :3], set=["train", "test"] * 60, fixed_points=["a"] * 120, payload=1.0, covariates={"x": q[:, 0]})
+    data = truing.Measurements(
+        q,
+        positions=q[:, :3],
+        set=["train", "test"] * 60,
+        fixed_points=["a"] * 120,
+        payload=1.0,
+        covariates={"x": q[:, 0]},
+    )
     twin = pickle.loads(pickle.dumps(data))
     np.testing.assert_array_equal(twin.positions, data.positions)
     np.testing.assert_array_equal(twin.set, data.set)
@@ -277,7 +333,10 @@ def test_measurements_can_be_pickled_and_replaced(q: np.ndarray) -> None:
 
 def test_a_million_rows_cost_next_to_nothing() -> None:
     joints, positions = np.zeros((1_000_000, 6)), np.zeros((1_000_000, 3))
-    best = min(_seconds(lambda: truing.Measurements(joints, positions=positions, time=joints[:, 0])) for _ in range(5))
+    best = min(
+        _seconds(lambda: truing.Measurements(joints, positions=positions, time=joints[:, 0]))
+        for _ in range(5)
+    )
     assert best < 5e-3
 
 
@@ -295,7 +354,8 @@ def test_validation_names_the_row(robot: truing.Robot, q: np.ndarray) -> None:
         truing.validate(robot.replace(joints=[]))
 
 
-# ---- Effects -----------------------------------------------------------------------------------------------------------
+# ---- Effects
+# -----------------------------------------------------------------------------------------------------------
 
 
 def test_effects_are_read_from_text() -> None:
@@ -307,7 +367,9 @@ def test_effects_are_read_from_text() -> None:
 
 
 def test_inputs_are_views_of_the_data(robot: truing.Robot, q: np.ndarray) -> None:
-    data = truing.Measurements(q, directions=np.sign(q), temperature=q[:, 0], payload=3.0, covariates={"hall": q[:, 5]})
+    data = truing.Measurements(
+        q, directions=np.sign(q), temperature=q[:, 0], payload=3.0, covariates={"hall": q[:, 5]}
+    )
     inputs = Inputs(robot, data)
     robot.joints[1].ratio = 1.1  # what was read does not depend on the parameters
     np.testing.assert_array_equal(inputs.joint("J3"), q[:, 2])
@@ -336,7 +398,9 @@ def test_inputs_are_views_of_the_data(robot: truing.Robot, q: np.ndarray) -> Non
         (lambda d: d.joint("J9"), "J9"),
     ],
 )
-def test_a_basis_that_cannot_be_used_says_why(basis: Any, message: str, robot: truing.Robot, q: np.ndarray) -> None:
+def test_a_basis_that_cannot_be_used_says_why(
+    basis: Any, message: str, robot: truing.Robot, q: np.ndarray
+) -> None:
     with pytest.raises(truing.InputError, match=message):
         truing.Effect("mine", "J2", basis).evaluate(robot, truing.Measurements(q))
 
@@ -363,19 +427,36 @@ def test_own_effects_are_found_and_predicted(robot: truing.Robot, q: np.ndarray)
         return {"cos": np.cos(2 * d.joint("J2")), "sin": np.sin(2 * d.joint("J2"))}
 
     wave = truing.Effect("wave", "J2", once_per_turn)
-    sag = truing.Effect("sag", "*", lambda d, joint: d.column("heat") * (1.0 if joint == "J5" else d.joint(joint)), unit="rad/K")
+    sag = truing.Effect(
+        "sag",
+        "*",
+        lambda d, joint: d.column("heat") * (1.0 if joint == "J5" else d.joint(joint)),
+        unit="rad/K",
+    )
     heat = np.random.default_rng(4).uniform(0.0, 10.0, len(q))
-    truth = robot.replace(effects=[truing.AppliedEffect("wave", ["J2"], {"wave.J2.cos": 3e-4, "wave.J2.sin": -2e-4}),
-                                   truing.AppliedEffect("sag", ["J5"], {"sag.J5": 4e-5})])  # fmt: skip
+    truth = robot.replace(
+        effects=[
+            truing.AppliedEffect("wave", ["J2"], {"wave.J2.cos": 3e-4, "wave.J2.sin": -2e-4}),
+            truing.AppliedEffect("sag", ["J5"], {"sag.J5": 4e-5}),
+        ]
+    )
     rows = truing.Measurements(q, covariates={"heat": heat})
     measured = truing.predict(truth, rows, effects=[wave, sag]).position
     data = rows.replace(positions=measured)
     assert calls == [len(q)]
 
-    found = truing.identify(robot, data, free=["J3.offset"], effects=[wave, truing.Effect("sag", "J5", lambda d: d.column("heat"))], loss="none")
+    found = truing.identify(
+        robot,
+        data,
+        free=["J3.offset"],
+        effects=[wave, truing.Effect("sag", "J5", lambda d: d.column("heat"))],
+        loss="none",
+    )
     assert calls == [len(q)] * 2
     values = {p.name: p.value for p in found.parameters}
-    np.testing.assert_allclose([values["wave.J2.cos"], values["wave.J2.sin"], values["sag.J5"]], [3e-4, -2e-4, 4e-5], atol=1e-9)
+    np.testing.assert_allclose(
+        [values["wave.J2.cos"], values["wave.J2.sin"], values["sag.J5"]], [3e-4, -2e-4, 4e-5], atol=1e-9
+    )
     assert found.parameter("sag.J5").unit == "rad"
     again = truing.residuals(found.robot, data, effects=[wave, sag])
     assert np.abs(again.position).max() < 1e-8
@@ -383,7 +464,8 @@ def test_own_effects_are_found_and_predicted(robot: truing.Robot, q: np.ndarray)
         truing.predict(found.robot, data)
 
 
-# ---- The four verbs ----------------------------------------------------------------------------------------------------
+# ---- The four verbs
+# ----------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -392,7 +474,9 @@ def data(robot: truing.Robot, q: np.ndarray) -> truing.Measurements:
     truth.joints[1].a += 1e-3
     truth.joints[2].offset += 2e-3
     position = truing.predict(truth, truing.Measurements(q)).position
-    return truing.Measurements(q, positions=position + np.random.default_rng(5).normal(0.0, 2e-5, position.shape))
+    return truing.Measurements(
+        q, positions=position + np.random.default_rng(5).normal(0.0, 2e-5, position.shape)
+    )
 
 
 def test_identify_returns_what_was_wrong(robot: truing.Robot, data: truing.Measurements) -> None:
@@ -413,14 +497,20 @@ def test_identify_returns_what_was_wrong(robot: truing.Robot, data: truing.Measu
         found.rank = 3  # type: ignore[misc]
 
 
-def test_a_fit_that_does_not_converge_raises_with_its_result(robot: truing.Robot, data: truing.Measurements) -> None:
+def test_a_fit_that_does_not_converge_raises_with_its_result(
+    robot: truing.Robot, data: truing.Measurements
+) -> None:
     with pytest.raises(truing.NotConvergedError, match="did not converge") as raised:
         truing.identify(robot, data, max_iterations=1, loss="none")
     assert isinstance(raised.value.result, truing.Identification)
-    assert not truing.identify(robot, data, max_iterations=1, loss="none", raise_if_not_converged=False).solver.converged
+    assert not truing.identify(
+        robot, data, max_iterations=1, loss="none", raise_if_not_converged=False
+    ).solver.converged
 
 
-def test_bad_options_and_data_are_input_errors(robot: truing.Robot, data: truing.Measurements, q: np.ndarray) -> None:
+def test_bad_options_and_data_are_input_errors(
+    robot: truing.Robot, data: truing.Measurements, q: np.ndarray
+) -> None:
     with pytest.raises(truing.InputError):
         truing.identify(robot, data, free=["J2.aa"])
     with pytest.raises(truing.InputError):

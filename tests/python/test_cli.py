@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line keeps its contract: files, exit status, one clear line for bad input, nothing half-written."""
+"""The command line keeps its contract: files, exit status, one clear line for bad input, nothing
+half-written.
+"""
 
 from __future__ import annotations
 
@@ -32,12 +34,16 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.fixture
 def simulated(tmp_path: Path) -> Path:
-    assert main(["simulate", ROBOT, "--poses", "80", "--out", "sim", "--seed", "1", "--outliers", "2%:5mm"]) == 0
+    assert (
+        main(["simulate", ROBOT, "--poses", "80", "--out", "sim", "--seed", "1", "--outliers", "2%:5mm"]) == 0
+    )
     return tmp_path / "sim"
 
 
 def identified(folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
-    code = main(["identify", str(folder / "robot.yaml"), str(folder / "measurements.csv"), "--out", "found", *options])
+    code = main(
+        ["identify", str(folder / "robot.yaml"), str(folder / "measurements.csv"), "--out", "found", *options]
+    )
     return code, json.loads(Path("found/result.json").read_text())
 
 
@@ -47,21 +53,33 @@ def columns(path: str | Path) -> dict[str, list[str]]:
     return {name: [row[k] for row in rows[1:]] for k, name in enumerate(rows[0])}
 
 
-# ---- Quantities --------------------------------------------------------------------------------------------------------
+# ---- Quantities
+# --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("text", "kind", "value"),
-    [("0.03mm", "length", 3e-5), ("1 m", "length", 1.0), ("5µm", "length", 5e-6), ("15deg", "angle", math.radians(15)), ("1mrad", "angle", 1e-3),
-     ("-2e-3rad", "angle", -2e-3), ("40ms", "time", 0.04), ("0", "length", 0.0), (".5 s", "time", 0.5)],
-)  # fmt: skip
+    [
+        ("0.03mm", "length", 3e-5),
+        ("1 m", "length", 1.0),
+        ("5µm", "length", 5e-6),
+        ("15deg", "angle", math.radians(15)),
+        ("1mrad", "angle", 1e-3),
+        ("-2e-3rad", "angle", -2e-3),
+        ("40ms", "time", 0.04),
+        ("0", "length", 0.0),
+        (".5 s", "time", 0.5),
+    ],
+)
 def test_a_quantity_is_read_in_si(text: str, kind: str, value: float) -> None:
     assert quantity(text, kind, "--x") == pytest.approx(value, rel=1e-15)
 
 
 @pytest.mark.parametrize("text", ["3", "", "mm", "3 furlongs", "3deg", "1e999mm", "nanmm", "3 mm 4", "0x3mm"])
 def test_a_length_without_a_proper_unit_is_refused_by_name(text: str) -> None:
-    with pytest.raises(truing.InputError, match=r"--noise: found .* expected a length with its unit .* such as 0\.03mm"):
+    with pytest.raises(
+        truing.InputError, match=r"--noise: found .* expected a length with its unit .* such as 0\.03mm"
+    ):
         quantity(text, "length", "--noise")
 
 
@@ -73,14 +91,23 @@ def test_shares() -> None:
             share(text, "--x")
 
 
-# ---- What is written ---------------------------------------------------------------------------------------------------
+# ---- What is written
+# ---------------------------------------------------------------------------------------------------
 
 
-def test_identify_writes_its_files_and_says_where_the_report_is(simulated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_identify_writes_its_files_and_says_where_the_report_is(
+    simulated: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     capsys.readouterr()
     code, result = identified(simulated)
     assert code == 0
-    assert {path.name for path in Path("found").iterdir()} == {"result.json", "report.html", "robot.yaml", "covariance.csv", "residuals.csv"}
+    assert {path.name for path in Path("found").iterdir()} == {
+        "result.json",
+        "report.html",
+        "robot.yaml",
+        "covariance.csv",
+        "residuals.csv",
+    }
     assert result["format"] == "truing-identification/1"
     assert result["solver"]["converged"] and result["rank"] + len(result["frozen"]) == result["columns"]
     assert {"rms_m", "mean_m", "median_m", "p95_m", "max_m", "n"} <= set(result["errors"]["test"]["after"])
@@ -102,7 +129,12 @@ def test_residuals_tell_the_same_as_result_json(simulated: Path) -> None:
             expected = result["errors"][name][when]
             assert length == pytest.approx([float(table[f"error_{when}_m"][k]) for k in chosen])
             assert len(length) == expected["n"]
-            assert [np.sqrt(np.mean(length**2)), length.mean(), np.quantile(length, 0.95), length.max()] == pytest.approx(
+            assert [
+                np.sqrt(np.mean(length**2)),
+                length.mean(),
+                np.quantile(length, 0.95),
+                length.max(),
+            ] == pytest.approx(
                 [expected["rms_m"], expected["mean_m"], expected["p95_m"], expected["max_m"]], rel=1e-6
             )
 
@@ -133,17 +165,23 @@ def test_json_is_all_that_is_printed(simulated: Path, capsys: pytest.CaptureFixt
 
 def test_prediction_has_a_row_for_every_row_in_order(simulated: Path) -> None:
     identified(simulated)
-    assert main(["predict", "found/robot.yaml", str(simulated / "measurements.csv"), "--out", "predicted"]) == 0
+    assert (
+        main(["predict", "found/robot.yaml", str(simulated / "measurements.csv"), "--out", "predicted"]) == 0
+    )
     table = columns("predicted/predicted.csv")
     assert list(table) == ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"]
     robot = truing.load_robot("found/robot.yaml")
     expected = truing.predict(robot, truing.load_measurements(simulated / "measurements.csv", robot)).position
-    assert np.array([[float(table[name][k]) for name in ("x_m", "y_m", "z_m")] for k in range(80)]) == pytest.approx(expected, abs=1e-15)
+    assert np.array(
+        [[float(table[name][k]) for name in ("x_m", "y_m", "z_m")] for k in range(80)]
+    ) == pytest.approx(expected, abs=1e-15)
     assert json.loads(Path("predicted/result.json").read_text())["errors"]["n"] == 80
 
 
 def test_prediction_needs_no_measurements(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("joints.csv").write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,0,0,0,0\n10,20,30,40,50,60\n")
+    Path("joints.csv").write_text(
+        "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,0,0,0,0\n10,20,30,40,50,60\n"
+    )
     assert main(["predict", ROBOT, "joints.csv", "--out", "predicted"]) == 0
     assert len(columns("predicted/predicted.csv")["x_m"]) == 2
     assert "errors" not in json.loads(Path("predicted/result.json").read_text())
@@ -153,7 +191,9 @@ def test_distances_come_back_as_distances() -> None:
     robot = truing.load_robot(ROBOT)
     robot.anchor = truing.Anchor([1.0, 0.2, 0.1], 0.01)
     truing.save_robot("wire.yaml", robot)
-    Path("wire.csv").write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dist_mm\n0,0,0,0,0,0,900\n10,20,30,40,50,60,\n")
+    Path("wire.csv").write_text(
+        "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dist_mm\n0,0,0,0,0,0,900\n10,20,30,40,50,60,\n"
+    )
     assert main(["predict", "wire.yaml", "wire.csv", "--out", "with"]) == 0
     assert list(columns("with/predicted.csv")) == ["dist_m"]
     Path("joints.csv").write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,0,0,0,0\n")
@@ -181,9 +221,14 @@ def test_a_plan_says_which_effects_it_tells_apart(capsys: pytest.CaptureFixture[
     assert {"dir1", "dir6", "payload_kg", "temp_C", "t_s"} <= set(table)
     assert {float(v) for v in table["dir2"]} == {-1, 1} and {float(v) for v in table["payload_kg"]} == {0, 5}
     assert result["poses"] == len(table["q1_rad"]) == 30 and seen["added_poses"] == 0
-    assert len(seen["r2"]) == len(seen["effects"]) and all(len(row) == len(seen["effects"]) for row in seen["r2"])
+    assert len(seen["r2"]) == len(seen["effects"]) and all(
+        len(row) == len(seen["effects"]) for row in seen["r2"]
+    )
     assert all(e["size"] > 0 and e["size_at_tip_m"] > 0 for e in seen["effects"])
-    assert any(n["effect"] == "joint_offset" and n["joints"] == ["J1"] and "base" in n["why"] for n in seen["not_testable"])
+    assert any(
+        n["effect"] == "joint_offset" and n["joints"] == ["J1"] and "base" in n["why"]
+        for n in seen["not_testable"]
+    )
     assert "Which effects look alike" in Path("full/report.html").read_text(encoding="utf-8")
 
     assert main([*plan, "one", "--separate", "backlash,joint_offset"]) == 0
@@ -208,36 +253,55 @@ def test_a_plan_that_is_asked_nothing_says_nothing_of_effects() -> None:
 
 
 def test_simulated_files_hold_nominal_and_truth() -> None:
-    options = ["--effect", "backlash:J2=0.2mrad", "--effect", "harmonic:J3:sin2=1e-4", "--columns", "payload,temp,t", "--orientation", "--base-unknown"]
+    options = [
+        "--effect",
+        "backlash:J2=0.2mrad",
+        "--effect",
+        "harmonic:J3:sin2=1e-4",
+        "--columns",
+        "payload,temp,t",
+        "--orientation",
+        "--base-unknown",
+    ]
     assert main(["simulate", ROBOT, "--poses", "12", "--out", "sim", *options]) == 0
     header = list(columns("sim/measurements.csv"))
     assert {"qw", "dir1", "payload_kg", "temp_C", "t_s"} <= set(header)
     truth = json.loads(Path("sim/truth.json").read_text())
-    assert {e["parameter"]: e["value"] for e in truth["effects"]} == {"backlash.J2": 2e-4, "harmonic.J3.sin2": 1e-4}
+    assert {e["parameter"]: e["value"] for e in truth["effects"]} == {
+        "backlash.J2": 2e-4,
+        "harmonic.J3.sin2": 1e-4,
+    }
     assert truing.load_robot("sim/robot.yaml").joint("J2").a == truing.load_robot(ROBOT).joint("J2").a
     assert truing.load_robot("sim/true_robot.yaml").joint("J2").a == truth["parameters"]["J2.a"]["true"]
 
 
 def test_a_urdf_comes_back_as_urdf_too() -> None:
     Path("two.urdf").write_text(
-        '<robot name="two"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>'
-        '<joint name="j1" type="continuous"><parent link="a"/><child link="b"/><origin xyz="0 0 0.5"/><axis xyz="0 0 1"/></joint>'
-        '<joint name="j2" type="continuous"><parent link="b"/><child link="c"/><origin xyz="0.4 0 0.1"/><axis xyz="0 1 0"/></joint>'
-        '<joint name="j3" type="continuous"><parent link="c"/><child link="d"/><origin xyz="0.3 0.1 0"/><axis xyz="0 1 0"/></joint></robot>'
+        '<robot name="two"><link name="a"/><link name="b"/><link name="c"/><link name="d"/><joint name="j1"'
+        ' type="continuous"><parent link="a"/><child link="b"/><origin xyz="0 0 0.5"/><axis xyz="0 0'
+        ' 1"/></joint><joint name="j2" type="continuous"><parent link="b"/><child link="c"/><origin xyz="0.4'
+        ' 0 0.1"/><axis xyz="0 1 0"/></joint><joint name="j3" type="continuous"><parent link="c"/><child'
+        ' link="d"/><origin xyz="0.3 0.1 0"/><axis xyz="0 1 0"/></joint></robot>'
     )
-    assert main(["simulate", "two.urdf", "--poses", "60", "--out", "sim", "--base-link", "a", "--tip-link", "d"]) == 0
+    assert (
+        main(["simulate", "two.urdf", "--poses", "60", "--out", "sim", "--base-link", "a", "--tip-link", "d"])
+        == 0
+    )
     assert main(["identify", "two.urdf", "sim/measurements.csv", "--out", "found"]) == 0
     assert truing.load_robot("found/robot.urdf").driven_count == 3
 
 
-# ---- Exit status, errors -----------------------------------------------------------------------------------------------
+# ---- Exit status, errors
+# -----------------------------------------------------------------------------------------------
 
 
 def test_a_fit_that_does_not_converge_exits_1_and_says_why(
     simulated: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     identify = truing.identify
-    monkeypatch.setattr(truing, "identify", lambda *a, **k: identify(*a, **k, max_iterations=1, rms_fall=0.0, gradient=0.0))
+    monkeypatch.setattr(
+        truing, "identify", lambda *a, **k: identify(*a, **k, max_iterations=1, rms_fall=0.0, gradient=0.0)
+    )
     code, result = identified(simulated)
     assert code == 1
     assert not result["solver"]["converged"] and result["solver"]["stopped_because"]
@@ -283,15 +347,21 @@ BAD = [
 
 
 @pytest.mark.parametrize("arguments", BAD, ids=[" ".join(a).replace(ROBOT, "ROBOT") for a in BAD])
-def test_bad_input_is_one_clear_line_and_nothing_is_written(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_is_one_clear_line_and_nothing_is_written(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
     if "DATA" in arguments:
-        truing.save_measurements("data.csv", truing.simulate(truing.load_robot(ROBOT), poses=60).data, truing.load_robot(ROBOT))
+        truing.save_measurements(
+            "data.csv", truing.simulate(truing.load_robot(ROBOT), poses=60).data, truing.load_robot(ROBOT)
+        )
     before = sorted(Path().iterdir())
     code = main([argument.replace("DATA", "data.csv") for argument in arguments])
     captured = capsys.readouterr()
     assert code == 2
     assert captured.out == ""
-    assert captured.err.startswith("truing: ") and captured.err.count("\n") == 1 and captured.err.endswith("\n")
+    assert (
+        captured.err.startswith("truing: ") and captured.err.count("\n") == 1 and captured.err.endswith("\n")
+    )
     assert sorted(Path().iterdir()) == before
 
 
@@ -302,7 +372,9 @@ def test_a_folder_that_cannot_be_written_is_bad_input(capsys: pytest.CaptureFixt
     assert Path("file").read_text() == "mine"
 
 
-def test_warnings_about_the_input_go_to_stderr_and_into_the_result(capsys: pytest.CaptureFixture[str]) -> None:
+def test_warnings_about_the_input_go_to_stderr_and_into_the_result(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     robot = truing.load_robot(ROBOT)
     joints = np.random.default_rng(0).uniform(-1, 1, (60, 6))
     joints[7, 4] = 3.0  # beyond J5's limits
@@ -314,9 +386,23 @@ def test_warnings_about_the_input_go_to_stderr_and_into_the_result(capsys: pytes
 
 
 def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
-    program = "import sys; from truing.cli import main; print('ready', flush=True); sys.exit(main(sys.argv[1:]))"
-    arguments = [sys.executable, "-c", program, "plan", str(example("ur10")), "--poses", "40000", "--out", "planned"]
-    with subprocess.Popen(arguments, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
+    program = (
+        "import sys; from truing.cli import main; print('ready', flush=True); sys.exit(main(sys.argv[1:]))"
+    )
+    arguments = [
+        sys.executable,
+        "-c",
+        program,
+        "plan",
+        str(example("ur10")),
+        "--poses",
+        "40000",
+        "--out",
+        "planned",
+    ]
+    with subprocess.Popen(
+        arguments, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
+    ) as process:
         assert process.stdout is not None and process.stdout.readline() == "ready\n"
         time.sleep(3.0)  # at work, past its imports
         process.send_signal(signal.SIGINT)
@@ -335,8 +421,14 @@ def test_version_and_effects(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_help_is_quick_and_leaves_the_heavy_libraries_alone() -> None:
-    program = "import sys; from truing.cli import main; main(['--help']); sys.exit(any(m in sys.modules for m in ('plotly', 'pandas', 'scipy')))"
-    assert subprocess.run([sys.executable, "-c", program], stdout=subprocess.DEVNULL, check=False).returncode == 0
+    program = (
+        "import sys; from truing.cli import main; main(['--help']); sys.exit(any(m in sys.modules for m in"
+        " ('plotly', 'pandas', 'scipy')))"
+    )
+    assert (
+        subprocess.run([sys.executable, "-c", program], stdout=subprocess.DEVNULL, check=False).returncode
+        == 0
+    )
 
 
 def test_the_demo_finds_the_truth_and_ends_with_the_report(capsys: pytest.CaptureFixture[str]) -> None:
@@ -344,6 +436,12 @@ def test_the_demo_finds_the_truth_and_ends_with_the_report(capsys: pytest.Captur
     assert capsys.readouterr().out.strip().splitlines()[-1] == "report: demo/report.html"
     truth = json.loads(Path("demo/truth.json").read_text())
     assert truth["fresh_poses"]["after_mean_m"] < 2.5e-5 < 1e-3 < truth["fresh_poses"]["before_mean_m"]
-    assert {"result.json", "robot.yaml", "nominal.yaml", "poses.csv", "measurements.csv", "covariance.csv", "residuals.csv"} <= {
-        path.name for path in Path("demo").iterdir()
-    }
+    assert {
+        "result.json",
+        "robot.yaml",
+        "nominal.yaml",
+        "poses.csv",
+        "measurements.csv",
+        "covariance.csv",
+        "residuals.csv",
+    } <= {path.name for path in Path("demo").iterdir()}

@@ -50,7 +50,12 @@ def measured(case: str, *, poses: int = 220, orientation: bool = False) -> truin
         moved[:, 1] += np.where(joints[:, 1] > 0.41, 6e-4, -6e-4)
     predicted = truing.predict(true, truing.Measurements(moved, directions=directions))
     positions = np.asarray(predicted.position) + rng.normal(0, NOISE, (poses, 3))
-    return truing.Measurements(joints, positions=positions, directions=directions, orientations=predicted.orientation if orientation else None)
+    return truing.Measurements(
+        joints,
+        positions=positions,
+        directions=directions,
+        orientations=predicted.orientation if orientation else None,
+    )
 
 
 def in_order(poses: int = 220) -> truing.Measurements:
@@ -88,39 +93,108 @@ def columns(path: str) -> dict[str, list[str]]:
     return {name: [row[k] for row in rows[1:]] for k, name in enumerate(rows[0])}
 
 
-# ---- The contract of result.json ---------------------------------------------------------------------------------------
+# ---- The contract of result.json
+# ---------------------------------------------------------------------------------------
 
 NUMBER = (int, float)
 TEXTS, NUMBERS = [str], [NUMBER]
 MAYBE = (int, float, type(None))
 CI = [NUMBER, NUMBER]
-CURVES = [{"site": str, "input": str, "input_unit": str, "second": (dict, type(None)), "unit": str, "points": [[NUMBER]], "samples": [[NUMBER]]}]
+CURVES = [
+    {
+        "site": str,
+        "input": str,
+        "input_unit": str,
+        "second": (dict, type(None)),
+        "unit": str,
+        "points": [[NUMBER]],
+        "samples": [[NUMBER]],
+    }
+]
 HELD_OUT = {"before_rms_m": NUMBER, "after_rms_m": NUMBER, "shrink": NUMBER, "ci": CI, "n": int}
 PARAMETER = {"name": str, "value": NUMBER, "sigma": MAYBE, "unit": str}
 ALTERNATIVE = {"effect": str, "joints": TEXTS, "probability": NUMBER, "separated_by": str}
-EFFECT = {"effect": str, "joints": TEXTS, "probability": NUMBER, "parameters": [PARAMETER], "held_out": HELD_OUT, "share": NUMBER, "share_alone": NUMBER, "share_last": NUMBER,
-          "confounded_with": [ALTERNATIVE], "note": str, "identify_as": str, "curves": CURVES}  # fmt: skip
-UNKNOWN = {"joint": str, "inputs": TEXTS, "probability": NUMBER, "held_out": HELD_OUT, "share": NUMBER, "curve": [[NUMBER]], "curves": CURVES, "looks_like": str}
-CANDIDATE = {"effect": str, "joints": TEXTS, "columns": int, "gain": MAYBE, "evidence": MAYBE, "held_out_gain": MAYBE, "largest_z": MAYBE}  # fmt: skip
+EFFECT = {
+    "effect": str,
+    "joints": TEXTS,
+    "probability": NUMBER,
+    "parameters": [PARAMETER],
+    "held_out": HELD_OUT,
+    "share": NUMBER,
+    "share_alone": NUMBER,
+    "share_last": NUMBER,
+    "confounded_with": [ALTERNATIVE],
+    "note": str,
+    "identify_as": str,
+    "curves": CURVES,
+}
+UNKNOWN = {
+    "joint": str,
+    "inputs": TEXTS,
+    "probability": NUMBER,
+    "held_out": HELD_OUT,
+    "share": NUMBER,
+    "curve": [[NUMBER]],
+    "curves": CURVES,
+    "looks_like": str,
+}
+CANDIDATE = {
+    "effect": str,
+    "joints": TEXTS,
+    "columns": int,
+    "gain": MAYBE,
+    "evidence": MAYBE,
+    "held_out_gain": MAYBE,
+    "largest_z": MAYBE,
+}
 CONTRACT = {
-    "format": str, "version": str, "robot": str, "verdict": str, "sentence": str,
-    "gap": {"rms_m": NUMBER, "p95_m": NUMBER, "max_m": NUMBER, "noise_floor_m": NUMBER, "closable": NUMBER, "noise_from_repeats": bool, "p": NUMBER,
-            "parts": {"noise": NUMBER, "effects": NUMBERS, "unknown": NUMBERS, "unexplained": NUMBER}},
-    "where": {"joints": [{"joint": str, "share": NUMBER, "ci": CI}], "inputs": [{"input": str, "share": NUMBER}],
-              "workspace": [{"center_m": [NUMBER], "rms_m": NUMBER, "n": int}], "direction": [{"axis": NUMBERS, "rms_m": NUMBER}]},
-    "effects": [EFFECT], "unknown": [UNKNOWN], "after": {"rms_m": NUMBER, "remaining_structure_p": MAYBE}, "after_unknown": {"rms_m": NUMBER, "n": int}, "shrink": {"value": NUMBER, "ci": CI},
+    "format": str,
+    "version": str,
+    "robot": str,
+    "verdict": str,
+    "sentence": str,
+    "gap": {
+        "rms_m": NUMBER,
+        "p95_m": NUMBER,
+        "max_m": NUMBER,
+        "noise_floor_m": NUMBER,
+        "closable": NUMBER,
+        "noise_from_repeats": bool,
+        "p": NUMBER,
+        "parts": {"noise": NUMBER, "effects": NUMBERS, "unknown": NUMBERS, "unexplained": NUMBER},
+    },
+    "where": {
+        "joints": [{"joint": str, "share": NUMBER, "ci": CI}],
+        "inputs": [{"input": str, "share": NUMBER}],
+        "workspace": [{"center_m": [NUMBER], "rms_m": NUMBER, "n": int}],
+        "direction": [{"axis": NUMBERS, "rms_m": NUMBER}],
+    },
+    "effects": [EFFECT],
+    "unknown": [UNKNOWN],
+    "after": {"rms_m": NUMBER, "remaining_structure_p": MAYBE},
+    "after_unknown": {"rms_m": NUMBER, "n": int},
+    "shrink": {"value": NUMBER, "ci": CI},
     "not_testable": [{"effect": str, "joints": TEXTS, "why": str}],
-    "detectable": [{"effect": str, "joint": str, "parameter": str, "unit": str, "size": NUMBER, "size_at_tip_m": NUMBER}],
-    "candidates": [CANDIDATE], "sanity": [{"kind": str, "text": str, "rows": [int]}],
+    "detectable": [
+        {"effect": str, "joint": str, "parameter": str, "unit": str, "size": NUMBER, "size_at_tip_m": NUMBER}
+    ],
+    "candidates": [CANDIDATE],
+    "sanity": [{"kind": str, "text": str, "rows": [int]}],
     "next_measurements": [{"joints": NUMBERS, "direction": [int], "payload_kg": MAYBE, "why": str}],
-    "nearest_neighbour": {"p95_m": MAYBE, "share": MAYBE}, "joint_record": str, "outliers": [int], "seed": int, "warnings": TEXTS,
-}  # fmt: skip
+    "nearest_neighbour": {"p95_m": MAYBE, "share": MAYBE},
+    "joint_record": str,
+    "outliers": [int],
+    "seed": int,
+    "warnings": TEXTS,
+}
 
 
 def check(value: Any, wanted: Any, where: str = "result") -> None:
     """That `value` has at least the keys, and everywhere the types, of `wanted`."""
     if isinstance(wanted, dict):
-        assert isinstance(value, dict) and set(wanted) <= set(value), f"{where} lacks {set(wanted) - set(value)}"
+        assert isinstance(value, dict) and set(wanted) <= set(value), (
+            f"{where} lacks {set(wanted) - set(value)}"
+        )
         for key, inner in wanted.items():
             check(value[key], inner, f"{where}.{key}")
     elif isinstance(wanted, list):
@@ -130,7 +204,9 @@ def check(value: Any, wanted: Any, where: str = "result") -> None:
         for k, item in enumerate(value):
             check(item, wanted[k if len(wanted) > 1 else 0], f"{where}[{k}]")
     else:
-        assert isinstance(value, wanted) and (wanted is bool or not isinstance(value, bool)), f"{where} is {value!r}"
+        assert isinstance(value, wanted) and (wanted is bool or not isinstance(value, bool)), (
+            f"{where} is {value!r}"
+        )
 
 
 def named(effect: dict[str, Any]) -> str:
@@ -146,18 +222,26 @@ def test_result_json_keeps_its_contract(case: str) -> None:
     known = {name for name, _ in truing.catalogue()}
     for effect in result["effects"]:
         assert named(effect) in known
-        assert 0 <= effect["probability"] <= 1 and effect["held_out"]["ci"][0] <= effect["held_out"]["shrink"] <= effect["held_out"]["ci"][1]
+        assert (
+            0 <= effect["probability"] <= 1
+            and effect["held_out"]["ci"][0] <= effect["held_out"]["shrink"] <= effect["held_out"]["ci"][1]
+        )
     assert {named(a) for e in result["effects"] for a in e["confounded_with"]} <= known
     parts = result["gap"]["parts"]
     assert len(parts["effects"]) == len(result["effects"]) and len(parts["unknown"]) == len(result["unknown"])
     every = [parts["noise"], parts["unexplained"], *parts["effects"], *parts["unknown"]]
     assert sum(every) == pytest.approx(1) and min(every) >= 0
-    assert parts["effects"] == [e["share"] for e in result["effects"]] and parts["unknown"] == [u["share"] for u in result["unknown"]]
+    assert parts["effects"] == [e["share"] for e in result["effects"]] and parts["unknown"] == [
+        u["share"] for u in result["unknown"]
+    ]
     closed = 1 - (result["after_unknown"]["rms_m"] / result["gap"]["rms_m"]) ** 2
     assert sum(parts["effects"]) + sum(parts["unknown"]) == pytest.approx(max(0.0, closed), abs=1e-9)
     assert result["gap"]["n"] == result["after"]["n"] == result["after_unknown"]["n"] > 0
     for curve in [c for e in [*result["effects"], *result["unknown"]] for c in e["curves"]]:
-        assert curve["site"].split(".")[0] in {*(joint.name for joint in truing.load_robot(ROBOT).joints), "base"}
+        assert curve["site"].split(".")[0] in {
+            *(joint.name for joint in truing.load_robot(ROBOT).joints),
+            "base",
+        }
         check(curve["second"] or {}, {"input": str, "unit": str, "range": CI} if curve["second"] else {})
 
 
@@ -165,19 +249,24 @@ def test_result_json_keeps_its_contract(case: str) -> None:
 def test_the_verdict_is_that_of_the_hidden_truth(case: str) -> None:
     found = truing.diagnose(truing.load_robot(ROBOT), measured(case))
     assert found.verdict == case
-    assert bool(found.effects) == case.startswith("effects") and bool(found.unknown) == case.endswith("unknown")
+    assert bool(found.effects) == case.startswith("effects") and bool(found.unknown) == case.endswith(
+        "unknown"
+    )
     if case.startswith("effects"):
         assert ("backlash", ("J3",)) in [(e.effect, e.joints) for e in found.effects]
     if case.endswith("unknown"):
         assert found.unknown[0].joint == "J2" and "q2" in found.unknown[0].inputs
 
 
-# ---- What is written ---------------------------------------------------------------------------------------------------
+# ---- What is written
+# ---------------------------------------------------------------------------------------------------
 
 
 def test_diagnose_writes_its_files_and_says_where_the_report_is(capsys: pytest.CaptureFixture[str]) -> None:
     result = diagnosed(measured("effects"))
-    files = {"result.json", "report.html", "robot.yaml", "residuals.csv"} | ({"next_poses.csv"} if result["next_measurements"] else set())
+    files = {"result.json", "report.html", "robot.yaml", "residuals.csv"} | (
+        {"next_poses.csv"} if result["next_measurements"] else set()
+    )
     assert {path.name for path in Path("found").iterdir()} == files
     lines = capsys.readouterr().out.strip().splitlines()
     assert lines[-1] == "report: found/report.html"
@@ -186,7 +275,9 @@ def test_diagnose_writes_its_files_and_says_where_the_report_is(capsys: pytest.C
 
 def rms_of_robot_file(data: truing.Measurements) -> float:
     """Of found/robot.yaml, on the rows held out."""
-    error = np.linalg.norm(np.asarray(truing.residuals(truing.load_robot("found/robot.yaml"), data).position), axis=1)
+    error = np.linalg.norm(
+        np.asarray(truing.residuals(truing.load_robot("found/robot.yaml"), data).position), axis=1
+    )
     test = np.array(columns("found/residuals.csv")["set"]) == "test"
     return float(np.sqrt(np.mean(error[test] ** 2)))
 
@@ -197,20 +288,30 @@ def test_the_robot_file_holds_what_was_named(case: str) -> None:
     result = diagnosed(data)
     robot = truing.load_robot("found/robot.yaml")
     stands_for = {"gravity_moment": "joint_compliance"}  # where the links' masses are not known
-    assert {stands_for.get(e.effect, e.effect) for e in robot.effects} <= {e["effect"] for e in result["effects"]}
+    assert {stands_for.get(e.effect, e.effect) for e in robot.effects} <= {
+        e["effect"] for e in result["effects"]
+    }
     rms = rms_of_robot_file(data)
     assert result["shrink"]["value"] == pytest.approx(1 - rms / result["gap"]["rms_m"], abs=1e-6)
-    assert yaml.safe_load(Path("found/robot.yaml").read_text())["calibration"]["rms_m"] == pytest.approx(rms, rel=1e-6)
+    assert yaml.safe_load(Path("found/robot.yaml").read_text())["calibration"]["rms_m"] == pytest.approx(
+        rms, rel=1e-6
+    )
     if case == "effects":  # neither drifts nor corrections of laws: the robot is all that was named
         assert rms == pytest.approx(result["after"]["rms_m"], rel=1e-6)
 
 
-def test_what_nothing_describes_is_unknown_without_joint_and_input(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_nothing_describes_is_unknown_without_joint_and_input(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     rng = np.random.default_rng(31)
     robot = truing.load_robot(ROBOT)
     joints = np.repeat(random_joints(robot, 80, 9), 3, axis=0)
-    places = np.asarray(truing.predict(robot, truing.Measurements(joints)).position) + np.repeat(rng.normal(0, 1.5e-4, (80, 3)), 3, axis=0)
-    data = truing.Measurements(joints, positions=places + rng.normal(0, 2e-5, places.shape), directions=np.ones_like(joints))
+    places = np.asarray(truing.predict(robot, truing.Measurements(joints)).position) + np.repeat(
+        rng.normal(0, 1.5e-4, (80, 3)), 3, axis=0
+    )
+    data = truing.Measurements(
+        joints, positions=places + rng.normal(0, 2e-5, places.shape), directions=np.ones_like(joints)
+    )
     result = diagnosed(data)
     check(result, CONTRACT)
     assert result["verdict"] == "unknown" and "Repeats show a noise of" in result["sentence"]
@@ -233,7 +334,9 @@ def test_directions_that_were_inferred_are_written_and_serve_the_robot_file() ->
     table = columns("found/residuals.csv")
     inferred = np.array([[float(v) for v in table[f"dir{k + 1}"]] for k in range(6)]).T
     assert np.array_equal(inferred[1:], np.asarray(data.directions)[1:])
-    assert rms_of_robot_file(data.replace(directions=inferred)) == pytest.approx(result["after"]["rms_m"], rel=1e-6)
+    assert rms_of_robot_file(data.replace(directions=inferred)) == pytest.approx(
+        result["after"]["rms_m"], rel=1e-6
+    )
     assert result["after"]["rms_m"] == pytest.approx(given["after"]["rms_m"], rel=0.1)
 
 
@@ -247,7 +350,9 @@ def test_residuals_tell_the_same_as_result_json() -> None:
     for when, expected in (("before", result["gap"]), ("after", result["after"])):
         error = np.array([[float(table[f"error_{when}_{axis}_m"][k]) for axis in "xyz"] for k in chosen])
         assert np.sqrt(np.mean(np.sum(error**2, axis=1))) == pytest.approx(expected["rms_m"], rel=1e-6)
-        rotation = np.array([[float(table[f"rotation_error_{when}_{axis}_rad"][k]) for axis in "xyz"] for k in range(220)])
+        rotation = np.array(
+            [[float(table[f"rotation_error_{when}_{axis}_rad"][k]) for axis in "xyz"] for k in range(220)]
+        )
         assert np.isfinite(rotation).all()
 
 
@@ -282,7 +387,8 @@ def test_next_poses_of_an_earlier_run_do_not_stay() -> None:
     assert Path("found/next_poses.csv").exists() == bool(result["next_measurements"])
 
 
-# ---- Bad and odd input -------------------------------------------------------------------------------------------------
+# ---- Bad and odd input
+# -------------------------------------------------------------------------------------------------
 
 BAD = [
     ["diagnose"],
@@ -301,7 +407,9 @@ BAD = [
 
 
 @pytest.mark.parametrize("arguments", BAD, ids=[" ".join(a).replace(ROBOT, "ROBOT") for a in BAD])
-def test_bad_input_is_one_clear_line_and_nothing_is_written(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_is_one_clear_line_and_nothing_is_written(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
     files = {"palletizer": str(example("palletizer")), "DATA": "data.csv", "UNMEASURED": "joints.csv"}
     data = measured("none", poses=60)
     written(data)
@@ -323,7 +431,9 @@ def test_few_poses_are_answered_or_refused_clearly(poses: int, capsys: pytest.Ca
         check(json.loads(Path("found/result.json").read_text()), CONTRACT)
     else:
         assert code == 2
-        assert captured.err.startswith("truing: ") and captured.err.count("\n") == 1 and "poses" in captured.err
+        assert (
+            captured.err.startswith("truing: ") and captured.err.count("\n") == 1 and "poses" in captured.err
+        )
         assert not Path("found").exists()
 
 
@@ -337,7 +447,9 @@ def test_an_empty_optional_column_is_named_and_ignored() -> None:
 
 def test_an_empty_column_of_ones_own_does_no_harm() -> None:
     data = measured("effects")
-    found = truing.diagnose(truing.load_robot(ROBOT), data.replace(covariates={"humidity": np.full(data.rows, math.nan)}))
+    found = truing.diagnose(
+        truing.load_robot(ROBOT), data.replace(covariates={"humidity": np.full(data.rows, math.nan)})
+    )
     assert ("backlash", ("J3",)) in [(e.effect, e.joints) for e in found.effects]
 
 
@@ -349,18 +461,31 @@ def test_a_missing_column_is_not_testable_and_says_so() -> None:
 
 def test_the_second_record_of_the_joints_can_be_used() -> None:
     data = measured("effects")
-    wrong = data.replace(joints=np.asarray(data.joints) + 0.01, covariates={f"qr{k + 1}_rad": np.asarray(data.joints)[:, k] for k in range(6)})
+    wrong = data.replace(
+        joints=np.asarray(data.joints) + 0.01,
+        covariates={f"qr{k + 1}_rad": np.asarray(data.joints)[:, k] for k in range(6)},
+    )
     by_second = diagnosed(wrong, "--record", "qr")
     assert by_second["gap"]["rms_m"] == pytest.approx(diagnosed(data)["gap"]["rms_m"], rel=1e-6)
 
 
-# ---- From Python -------------------------------------------------------------------------------------------------------
+# ---- From Python
+# -------------------------------------------------------------------------------------------------------
 
 
 def test_the_defaults_are_those_of_the_header() -> None:
     usual = truing.DiagnoseOptions()
     given = inspect.signature(api.diagnose).parameters
-    for name in ("false_alarm", "max_effects", "test_share", "search_poses", "resamples", "rotation_length", "seed", "threads"):
+    for name in (
+        "false_alarm",
+        "max_effects",
+        "test_share",
+        "search_poses",
+        "resamples",
+        "rotation_length",
+        "seed",
+        "threads",
+    ):
         assert given[name].default == getattr(usual, name), name
     assert given["leave_out"].default == usual.leave_out == ()
     with pytest.raises(TypeError):
@@ -385,16 +510,24 @@ def hanging(effect: truing.AppliedEffect) -> truing.Measurements:
         joint.mass, joint.center_of_mass = 4.0, [0.05, -0.08, 0.06]
     true.T_measurement_base = truing.frame_from_xyz_rpy([0.4, -1.6, 0.3], [0.01, -0.02, 0.8])
     true.effects = [effect]
-    inputs = {"directions": rng.choice([-1.0, 1.0], size=(220, 6)), "payload": rng.choice([0.0, 3.0], size=220)}
+    inputs = {
+        "directions": rng.choice([-1.0, 1.0], size=(220, 6)),
+        "payload": rng.choice([0.0, 3.0], size=220),
+    }
     joints = random_joints(true, 220, 5)
     predicted = truing.predict(true, truing.Measurements(joints, **inputs))
-    return truing.Measurements(joints, positions=np.asarray(predicted.position) + rng.normal(0, NOISE, (220, 3)), **inputs)
+    return truing.Measurements(
+        joints, positions=np.asarray(predicted.position) + rng.normal(0, NOISE, (220, 3)), **inputs
+    )
 
 
 @pytest.mark.parametrize(
     ("applied", "asked"),
     [
-        (truing.AppliedEffect("joint_compliance", ["J2"], {"joint_compliance.J2": 6e-5}), "gravity_moment:J2,joint_compliance:J2"),
+        (
+            truing.AppliedEffect("joint_compliance", ["J2"], {"joint_compliance.J2": 6e-5}),
+            "gravity_moment:J2,joint_compliance:J2",
+        ),
         (truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 1e-3}), "backlash:J3"),
         (truing.AppliedEffect("scale", [], {"scale": 1e-3}), "scale"),
     ],
@@ -431,16 +564,37 @@ def test_what_is_handed_out_has_shapes_and_cannot_be_changed() -> None:
 
 
 def test_the_names_of_the_results_are_public() -> None:
-    for name in ("DiagnoseOptions", "Diagnosis", "FoundEffect", "UnknownEffect", "Alternative", "Curve", "NotTestable", "Detectable", "Candidate",
-                 "SanityFinding", "WhereJoint", "WhereInput", "WorkspaceCell", "NextPose", "Share", "diagnose"):  # fmt: skip
+    for name in (
+        "DiagnoseOptions",
+        "Diagnosis",
+        "FoundEffect",
+        "UnknownEffect",
+        "Alternative",
+        "Curve",
+        "NotTestable",
+        "Detectable",
+        "Candidate",
+        "SanityFinding",
+        "WhereJoint",
+        "WhereInput",
+        "WorkspaceCell",
+        "NextPose",
+        "Share",
+        "diagnose",
+    ):
         assert name in truing.__all__ and getattr(truing, name).__doc__
 
 
-# ---- The examination ---------------------------------------------------------------------------------------------------
+# ---- The examination
+# ---------------------------------------------------------------------------------------------------
 
 
-def test_without_mujoco_the_examination_says_what_to_install(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    for name in [name for name in sys.modules if name == "truing.exam" or name.startswith(("truing.exam.", "mujoco"))]:
+def test_without_mujoco_the_examination_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [
+        name for name in sys.modules if name == "truing.exam" or name.startswith(("truing.exam.", "mujoco"))
+    ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "mujoco", None)
     assert main(["exam", "--quick", "--out", "found"]) == 2

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whatever is in a file, reading it gives a sound object or InputError: no other exception, no crash, no half-read data."""
+"""Whatever is in a file, reading it gives a sound object or InputError: no other exception, no crash, no
+half-read data.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,19 @@ from hypothesis import strategies as st
 
 from truing import _core
 from truing.errors import InputError
-from truing.files import Units, load_calibration, load_measurements, load_robot, load_units, save_measurements, save_robot
+from truing.files import (
+    Units,
+    load_calibration,
+    load_measurements,
+    load_robot,
+    load_units,
+    save_measurements,
+    save_robot,
+)
 
-quick = settings(max_examples=200, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
+quick = settings(
+    max_examples=200, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+)
 
 ROBOT = b"""\
 format: truing-robot/1
@@ -59,7 +71,10 @@ URDF = b"""\
 
 MODEL = _core.Robot(
     "fuzzed",
-    joints=[_core.Joint("J1", d=0.3, a=0.1, alpha=1.5, lower=-3.0, upper=3.0), _core.Joint("S", type="prismatic", a=0.4)],
+    joints=[
+        _core.Joint("J1", d=0.3, a=0.1, alpha=1.5, lower=-3.0, upper=3.0),
+        _core.Joint("S", type="prismatic", a=0.4),
+    ],
     targets=[_core.Target("tool"), _core.Target("p1")],
 )
 
@@ -73,12 +88,81 @@ pose,q1_rad,q2_mm,x_mm,y_mm,z_mm,qw,qx,qy,qz,dist_m,fixed_point,dir1,dir2,payloa
 
 # Pieces that files go wrong with.
 TOKENS = [
-    b"", b",", b"\n", b"\r", b"\r\n", b"\t", b" ", b'"', b"'", b"\x00", b"\xef\xbb\xbf", b"\xff\xfe", b"\xe9", b"nan", b"inf", b"-inf",
-    b".nan", b".inf", b"1e999", b"-1e-999", b"1e99999999999999999999", b"0", b"-0", b"-1", b"1e300", b"9" * 400, b"1_0", b"0x1f", b"1:30",
-    b"null", b"~", b"true", b"{", b"}", b"[", b"]", b"[]", b"{}", b": ", b"- ", b"? ", b"&a ", b"*a", b"!!float ", b"!x ", b"<<: ", b"|",
-    b">", b"%", b"@", b"#", b"---\n", b"...\n", b"\\ud800", b'"\\ud800"', b'"\\UFFFFFFFF"', b"m", b"mm", b"deg", b"rad", b"urdf", b"mdh",
-    b"joints: []\n", b"q1_rad", b"q3_rad", b"x_m", b"target", b"set", b"<", b">", b"</robot>", b"&lt;", b"\xf0\x9f\x98\x80", b"\xc2\x85",
-]  # fmt: skip
+    b"",
+    b",",
+    b"\n",
+    b"\r",
+    b"\r\n",
+    b"\t",
+    b" ",
+    b'"',
+    b"'",
+    b"\x00",
+    b"\xef\xbb\xbf",
+    b"\xff\xfe",
+    b"\xe9",
+    b"nan",
+    b"inf",
+    b"-inf",
+    b".nan",
+    b".inf",
+    b"1e999",
+    b"-1e-999",
+    b"1e99999999999999999999",
+    b"0",
+    b"-0",
+    b"-1",
+    b"1e300",
+    b"9" * 400,
+    b"1_0",
+    b"0x1f",
+    b"1:30",
+    b"null",
+    b"~",
+    b"true",
+    b"{",
+    b"}",
+    b"[",
+    b"]",
+    b"[]",
+    b"{}",
+    b": ",
+    b"- ",
+    b"? ",
+    b"&a ",
+    b"*a",
+    b"!!float ",
+    b"!x ",
+    b"<<: ",
+    b"|",
+    b">",
+    b"%",
+    b"@",
+    b"#",
+    b"---\n",
+    b"...\n",
+    b"\\ud800",
+    b'"\\ud800"',
+    b'"\\UFFFFFFFF"',
+    b"m",
+    b"mm",
+    b"deg",
+    b"rad",
+    b"urdf",
+    b"mdh",
+    b"joints: []\n",
+    b"q1_rad",
+    b"q3_rad",
+    b"x_m",
+    b"target",
+    b"set",
+    b"<",
+    b">",
+    b"</robot>",
+    b"&lt;",
+    b"\xf0\x9f\x98\x80",
+    b"\xc2\x85",
+]
 
 
 @st.composite

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""`truing handeye` keeps the contract of the command line: the truth within its standard errors, or a refusal that says what to do; never silence."""
+"""`truing handeye` keeps the contract of the command line: the truth within its standard errors, or a refusal
+that says what to do; never silence.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,30 @@ from truing.cli import main
 from truing.demo import example
 from truing.files.handeye_file import rotations_from_quaternions
 
-FORMAT = {"format", "version", "setup", "method", "status", "message", "poses", "camera", "board", "covariance", "working_point", "residuals", "rejected_poses", "observability",
-          "convention", "noise", "errors", "board_scale", "next_poses", "solver", "seed", "warnings"}  # fmt: skip
+FORMAT = {
+    "format",
+    "version",
+    "setup",
+    "method",
+    "status",
+    "message",
+    "poses",
+    "camera",
+    "board",
+    "covariance",
+    "working_point",
+    "residuals",
+    "rejected_poses",
+    "observability",
+    "convention",
+    "noise",
+    "errors",
+    "board_scale",
+    "next_poses",
+    "solver",
+    "seed",
+    "warnings",
+}
 
 
 @pytest.fixture(autouse=True)
@@ -50,19 +74,30 @@ def off(found: Floats, true: Floats) -> tuple[float, float]:
     return float(np.linalg.norm(D[:3, 3])), math.acos(float(np.clip((np.trace(D[:3, :3]) - 1) / 2, -1, 1)))
 
 
-# ---- What is written ---------------------------------------------------------------------------------------------------
+# ---- What is written
+# ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("setup", ["eye-in-hand", "eye-to-hand"])
 @pytest.mark.parametrize("method", ["refined", "closed-form"])
-def test_the_camera_is_found_and_everything_is_written(setup: str, method: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_camera_is_found_and_everything_is_written(
+    setup: str, method: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     s = scene(30, setup, seed=4)
     code, result = run(s, "--method", method, set=["test" if k % 5 == 0 else "train" for k in range(30)])
     assert code == 0
     assert {path.name for path in Path("found").iterdir()} == {"result.json", "report.html", "residuals.csv"}
     assert set(result) >= FORMAT - ({"solver"} if method == "closed-form" else set())
-    assert (result["format"], result["setup"], result["method"], result["status"]) == ("truing-handeye/1", setup, method, "done")
-    assert result["camera"]["in"] == ("hand" if setup == "eye-in-hand" else "base") and result["board"]["in"] != result["camera"]["in"]
+    assert (result["format"], result["setup"], result["method"], result["status"]) == (
+        "truing-handeye/1",
+        setup,
+        method,
+        "done",
+    )
+    assert (
+        result["camera"]["in"] == ("hand" if setup == "eye-in-hand" else "base")
+        and result["board"]["in"] != result["camera"]["in"]
+    )
     limit = (1e-3, 3e-3) if method == "refined" else (3e-3, 6e-3)
     for name, true in (("camera", s.X), ("board", s.Y)):
         position, rotation = off(frame_of(result[name]), true)
@@ -80,7 +115,9 @@ def test_standard_errors_agree_with_the_covariance_and_cover_the_truth() -> None
         _, result = run(s)
         found = result["camera"]
         covariance = np.array(result["covariance"]["camera"])
-        assert [found["sigma"][name] for name in result["covariance"]["of"]] == pytest.approx(np.sqrt(np.diag(covariance)).tolist(), rel=1e-9)
+        assert [found["sigma"][name] for name in result["covariance"]["of"]] == pytest.approx(
+            np.sqrt(np.diag(covariance)).tolist(), rel=1e-9
+        )
         off_by = np.array([found[f"{axis}_m"] for axis in "xyz"]) - s.X[:3, 3]
         z.extend(off_by / np.sqrt(np.diag(covariance))[:3])
         point = np.array(result["working_point"]["covariance_m2"])
@@ -91,17 +128,25 @@ def test_standard_errors_agree_with_the_covariance_and_cover_the_truth() -> None
 def test_residuals_tell_the_same_as_result_json() -> None:
     _, result = run(scene(20))
     table = columns("found/residuals.csv")
-    assert [int(pose) for pose in table["pose"]] == [r["pose"] for r in result["residuals"]] == list(range(20))
+    assert (
+        [int(pose) for pose in table["pose"]] == [r["pose"] for r in result["residuals"]] == list(range(20))
+    )
     for name in ("position_m", "rotation_rad", "position_left_out_m", "rotation_left_out_rad", "distance"):
-        assert [float(value) for value in table[name]] == pytest.approx([r[name] for r in result["residuals"]])
+        assert [float(value) for value in table[name]] == pytest.approx(
+            [r[name] for r in result["residuals"]]
+        )
     left_out = np.array([r["position_left_out_m"] for r in result["residuals"]])
-    assert result["errors"]["left_out"]["rms_m"] == pytest.approx(float(np.sqrt(np.mean(left_out**2))), rel=1e-6)
+    assert result["errors"]["left_out"]["rms_m"] == pytest.approx(
+        float(np.sqrt(np.mean(left_out**2))), rel=1e-6
+    )
 
 
 def test_the_working_point_is_where_it_was_asked_for() -> None:
     _, near = run(scene(20), "--working-point", "0,0,300mm")
     _, far = run(scene(20), "--working-point", "0.1m,0,2m")
-    assert near["working_point"]["in_camera_m"] == pytest.approx([0, 0, 0.3]) and far["working_point"]["in_camera_m"] == pytest.approx([0.1, 0, 2])
+    assert near["working_point"]["in_camera_m"] == pytest.approx([0, 0, 0.3]) and far["working_point"][
+        "in_camera_m"
+    ] == pytest.approx([0.1, 0, 2])
     assert far["working_point"]["sigma_m"] > 1.5 * near["working_point"]["sigma_m"]
 
 
@@ -113,7 +158,9 @@ def test_noise_that_is_given_is_used() -> None:
     assert given["camera"]["sigma"]["x_m"] > 3 * found["camera"]["sigma"]["x_m"]
 
 
-def test_json_is_all_that_is_printed_and_the_same_data_give_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_is_all_that_is_printed_and_the_same_data_give_the_same(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     _, first = run(scene(12), "--json")
     assert json.loads(capsys.readouterr().out) == first
     report = Path("found/report.html").read_bytes()
@@ -121,7 +168,8 @@ def test_json_is_all_that_is_printed_and_the_same_data_give_the_same(capsys: pyt
     assert again == first and Path("found/report.html").read_bytes() == report
 
 
-# ---- Bad poses, and what the data cannot say ---------------------------------------------------------------------------
+# ---- Bad poses, and what the data cannot say
+# ---------------------------------------------------------------------------
 
 
 def test_bad_poses_are_listed_with_their_cause(capsys: pytest.CaptureFixture[str]) -> None:
@@ -133,13 +181,19 @@ def test_bad_poses_are_listed_with_their_cause(capsys: pytest.CaptureFixture[str
     assert "405 mm" in result["rejected_poses"][0]["cause"]
     assert "rejected: pose 7: " in capsys.readouterr().out
     table = columns("found/residuals.csv")
-    assert [k for k, rejected in enumerate(table["rejected"]) if rejected == "1"] == [7] and table["cause"][7] == result["rejected_poses"][0]["cause"]
+    assert [k for k, rejected in enumerate(table["rejected"]) if rejected == "1"] == [7] and table["cause"][
+        7
+    ] == result["rejected_poses"][0]["cause"]
     code, kept = run(dataclasses.replace(s, A=A), "--keep-all")
     assert kept["rejected_poses"] == []
 
 
-@pytest.mark.parametrize(("turns", "advice"), [(0.5, "rotate about a second one"), (0.0, "the hand did not turn")])
-def test_motions_that_do_not_show_the_camera_are_refused_with_what_to_do(turns: float, advice: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("turns", "advice"), [(0.5, "rotate about a second one"), (0.0, "the hand did not turn")]
+)
+def test_motions_that_do_not_show_the_camera_are_refused_with_what_to_do(
+    turns: float, advice: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     code, result = run(scene(20, one_axis=True, turns=turns))
     captured = capsys.readouterr()
     assert code == 1
@@ -158,7 +212,9 @@ def test_a_known_height_makes_one_axis_enough() -> None:
     assert off(frame_of(result["camera"]), s.X)[0] < 3e-3
 
 
-def test_poses_that_are_inverted_are_recognised_and_can_be_read_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_poses_that_are_inverted_are_recognised_and_can_be_read_so(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     s = scene(24, "eye-to-hand", seed=3)
     inverted = dataclasses.replace(s, A=np.linalg.inv(s.A))
     code, result = run(inverted)
@@ -166,7 +222,10 @@ def test_poses_that_are_inverted_are_recognised_and_can_be_read_so(capsys: pytes
     assert code == 1 and result["status"] == "not closing" and "camera" not in result
     readings = {reading["reading"] for reading in result["convention"]["other_readings"]}
     assert "hand-inverted" in readings
-    assert "--reading hand-inverted" in captured.out and "--reading hand-inverted" in Path("found/report.html").read_text()
+    assert (
+        "--reading hand-inverted" in captured.out
+        and "--reading hand-inverted" in Path("found/report.html").read_text()
+    )
     code, result = run(inverted, "--reading", "hand-inverted")
     assert code == 0 and result["convention"]["reading"] == "hand-inverted"
     assert off(frame_of(result["camera"]), s.X)[0] < 1.5e-3
@@ -178,7 +237,8 @@ def test_poses_that_do_not_belong_together_are_no_camera() -> None:
     assert code == 1 and result["status"] == "not closing" and "camera" not in result
 
 
-# ---- Images ------------------------------------------------------------------------------------------------------------
+# ---- Images
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -205,7 +265,12 @@ def test_images_give_the_camera_and_its_own_values(imaged: tuple[Path, Floats]) 
     folder, true = imaged
     code, result = run(folder / "poses.csv", "--board", "circles:8x5:25mm")
     assert code == 0
-    assert {path.name for path in Path("found").iterdir()} == {"result.json", "report.html", "residuals.csv", "camera.yaml"}
+    assert {path.name for path in Path("found").iterdir()} == {
+        "result.json",
+        "report.html",
+        "residuals.csv",
+        "camera.yaml",
+    }
     assert off(frame_of(result["camera"]), true)[0] < 3e-3
     found = truing.load_camera("found/camera.yaml")
     assert [found.fx, found.fy] == pytest.approx([CAMERA.fx, CAMERA.fy], rel=6e-3)
@@ -227,7 +292,9 @@ def test_a_camera_that_is_given_is_kept_unless_it_is_to_be_refined(imaged: tuple
 
 def test_a_wrong_size_of_the_board_is_said(imaged: tuple[Path, Floats]) -> None:
     folder, _ = imaged
-    code, result = run(folder / "poses.csv", "--board", "circles:8x5:26.5mm", "--camera", str(folder / "camera.yaml"))
+    code, result = run(
+        folder / "poses.csv", "--board", "circles:8x5:26.5mm", "--camera", str(folder / "camera.yaml")
+    )
     if code == 0:
         assert result["board_scale"]["value"] == pytest.approx(25 / 26.5, abs=0.02)
         assert any("check the size of its squares" in warning for warning in result["warnings"])
@@ -235,11 +302,16 @@ def test_a_wrong_size_of_the_board_is_said(imaged: tuple[Path, Floats]) -> None:
         assert result["status"] == "not closing"
 
 
-# ---- Clocks, plan, kinematics ------------------------------------------------------------------------------------------
+# ---- Clocks, plan, kinematics
+# ------------------------------------------------------------------------------------------
 
 
-def moving(seconds: float, rate: float, offset: float = 0.0, *, still: bool = False, seed: int = 0) -> tuple[Floats, Floats, Floats]:
-    """Times, hand poses and board poses of an uneven motion; `offset` is added to the times at which the poses are taken."""
+def moving(
+    seconds: float, rate: float, offset: float = 0.0, *, still: bool = False, seed: int = 0
+) -> tuple[Floats, Floats, Floats]:
+    """Times, hand poses and board poses of an uneven motion; `offset` is added to the times at which the
+    poses are taken.
+    """
     t = np.arange(0, seconds, 1 / rate)
     rng = np.random.default_rng(5)  # of the motion: the same for every record of it
     speed, phase = rng.uniform(0.7, 4.0, (6, 4)), rng.uniform(0, 7, (6, 4))
@@ -248,7 +320,9 @@ def moving(seconds: float, rate: float, offset: float = 0.0, *, still: bool = Fa
     A, B = [], []
     for moment in t + offset:
         swing = np.sin(speed * moment + phase).mean(axis=1) * (0 if still else 1)
-        T = frame(np.array([0.5, 0, 0.4]) + 0.15 * swing[:3], 0.8 * swing[3:]) @ frame([0, 0, 0], [3.0, 0.1, 0.0])
+        T = frame(np.array([0.5, 0, 0.4]) + 0.15 * swing[:3], 0.8 * swing[3:]) @ frame(
+            [0, 0, 0], [3.0, 0.1, 0.0]
+        )
         A.append(T)
         seen = np.linalg.inv(T @ CAMERA_IN_HAND) @ Y
         seen[:3, 3] += noise.normal(0, 1e-4, 3)
@@ -269,7 +343,15 @@ def test_streams_with_clocks_of_their_own_are_brought_together() -> None:
 
 def test_records_without_motion_have_no_offset_and_say_so(capsys: pytest.CaptureFixture[str]) -> None:
     t, A, _ = moving(5, 50, still=True)
-    A = np.array([A[k] @ frame(np.random.default_rng(k).normal(0, 1e-4, 3), np.random.default_rng(k + 999).normal(0, 1e-4, 3)) for k in range(len(A))])
+    A = np.array(
+        [
+            A[k]
+            @ frame(
+                np.random.default_rng(k).normal(0, 1e-4, 3), np.random.default_rng(k + 999).normal(0, 1e-4, 3)
+            )
+            for k in range(len(A))
+        ]
+    )
     s, _, B = moving(5, 50, still=True)
     write_csv(Path("hand.csv"), {"t_s": t, **columns_of("hand", A)})
     write_csv(Path("board.csv"), {"t_s": s, **columns_of("board", B)})
@@ -282,9 +364,15 @@ def test_next_poses_shrink_the_error_and_do_not_outlive_their_run() -> None:
     _, result = run(scene(8), "--plan", "4")
     assert len(result["next_poses"]) == 4
     sigmas = [result["working_point"]["sigma_m"], *(p["working_point_sigma_m"] for p in result["next_poses"])]
-    assert all(after <= before * (1 + 1e-9) for before, after in zip(sigmas, sigmas[1:], strict=False)) and sigmas[-1] < 0.95 * sigmas[0]
+    assert (
+        all(after <= before * (1 + 1e-9) for before, after in zip(sigmas, sigmas[1:], strict=False))
+        and sigmas[-1] < 0.95 * sigmas[0]
+    )
     table = columns("found/next_poses.csv")
-    assert list(table)[:7] == ["hand_x_m", "hand_y_m", "hand_z_m", "hand_qw", "hand_qx", "hand_qy", "hand_qz"] and len(table["hand_x_m"]) == 4
+    assert (
+        list(table)[:7] == ["hand_x_m", "hand_y_m", "hand_z_m", "hand_qw", "hand_qx", "hand_qy", "hand_qz"]
+        and len(table["hand_x_m"]) == 4
+    )
     run(scene(8))
     assert not Path("found/next_poses.csv").exists()
 
@@ -311,10 +399,13 @@ def test_camera_and_robot_are_found_together() -> None:
     assert code == 0
     errors = result["kinematics"]["errors"]["train"]
     assert errors["after"]["rms_m"] < 0.3 * errors["before"]["rms_m"]
-    assert truing.load_robot("found/robot.yaml").joint(robot.joints[2].name).offset == pytest.approx(true.joints[2].offset, abs=3e-4)
+    assert truing.load_robot("found/robot.yaml").joint(robot.joints[2].name).offset == pytest.approx(
+        true.joints[2].offset, abs=3e-4
+    )
 
 
-# ---- Bad input ---------------------------------------------------------------------------------------------------------
+# ---- Bad input
+# ---------------------------------------------------------------------------------------------------------
 
 BAD = [
     ["handeye"],
@@ -353,8 +444,12 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize("arguments", BAD, ids=[" ".join(a[1:]).replace(str(example("ur10")), "ROBOT") or "none" for a in BAD])
-def test_bad_input_is_one_clear_line_and_nothing_is_written(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    "arguments", BAD, ids=[" ".join(a[1:]).replace(str(example("ur10")), "ROBOT") or "none" for a in BAD]
+)
+def test_bad_input_is_one_clear_line_and_nothing_is_written(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
     s = scene(6)
     write_scene(Path("poses.csv"), s)
     write_csv(Path("images.csv"), {**columns_of("hand", s.A), "image": [f"{k}.png" for k in range(6)]})
@@ -365,11 +460,14 @@ def test_bad_input_is_one_clear_line_and_nothing_is_written(arguments: list[str]
     captured = capsys.readouterr()
     assert code == 2
     assert captured.out == ""
-    assert captured.err.startswith("truing: ") and captured.err.count("\n") == 1 and captured.err.endswith("\n")
+    assert (
+        captured.err.startswith("truing: ") and captured.err.count("\n") == 1 and captured.err.endswith("\n")
+    )
     assert sorted(Path().iterdir()) == before
 
 
-# ---- In Python ---------------------------------------------------------------------------------------------------------
+# ---- In Python
+# ---------------------------------------------------------------------------------------------------------
 
 
 def test_python_raises_where_the_data_do_not_decide_and_hands_the_result_over() -> None:
@@ -406,7 +504,9 @@ def test_poses_and_options_can_be_copied_and_pickled() -> None:
     import pickle
 
     s = scene(5)
-    poses = truing.HandEyePoses(s.A, s.B, set=[0, 0, 0, 1, 1], board_symmetries=[frame([0.1, 0, 0], [0, 0, math.pi])])
+    poses = truing.HandEyePoses(
+        s.A, s.B, set=[0, 0, 0, 1, 1], board_symmetries=[frame([0.1, 0, 0], [0, 0, math.pi])]
+    )
     again = pickle.loads(pickle.dumps(poses))
     assert np.array_equal(again.T_base_hand, poses.T_base_hand) and np.array_equal(again.set, poses.set)
     assert again.replace(set=None).set is None

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The report of a hand-eye calibration says what result.json says, for every status, escapes what it quotes, and stands alone."""
+"""The report of a hand-eye calibration says what result.json says, for every status, escapes what it quotes,
+and stands alone.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +26,17 @@ from truing.results import without_nan
 
 
 def solved(tmp_path: Path, s: HandEyeScene, **options: Any) -> tuple[dict[str, Any], Scene | None]:
-    data = truing.load_handeye(write_scene(tmp_path / "poses.csv", s, set=["test" if k % 6 == 5 else "train" for k in range(len(s.A))]))
+    data = truing.load_handeye(
+        write_scene(
+            tmp_path / "poses.csv", s, set=["test" if k % 6 == 5 else "train" for k in range(len(s.A))]
+        )
+    )
     keywords = {"setup": s.setup, **options}
-    result = Solved(data, truing.handeye_options(data, **keywords), truing.handeye(data, **keywords, raise_if_undecided=False))
+    result = Solved(
+        data,
+        truing.handeye_options(data, **keywords),
+        truing.handeye(data, **keywords, raise_if_undecided=False),
+    )
     return without_nan(handeye_dict(result)), scene_of(result)
 
 
@@ -38,14 +48,23 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Scen
     return solved(tmp_path_factory.mktemp("good"), dataclasses.replace(s, A=A))
 
 
-def test_the_first_screen_says_where_the_camera_is_and_whether_to_trust_it(good: tuple[dict[str, Any], Scene | None]) -> None:
+def test_the_first_screen_says_where_the_camera_is_and_whether_to_trust_it(
+    good: tuple[dict[str, Any], Scene | None],
+) -> None:
     result, scene = good
     text = visible(handeye_report(result, scene))
     camera, point = result["camera"], result["working_point"]
-    assert text.startswith("Hand-eye calibration truing handeye · eye to hand · 24 poses camera found The camera sits at (")
+    assert text.startswith(
+        "Hand-eye calibration truing handeye · eye to hand · 24 poses camera found The camera sits at ("
+    )
     assert f"{1e3 * camera['x_m']:.1f}"[:6] in text[:200] and "in the robot base" in text
     assert f"±{1e3 * point['sigma_m']:.2f} mm" in text[:300]
-    assert text.index("How far each pose is") < text.index("Usable, but look at the marked points") < text.index("1 pose rejected") < text.index("The scene")
+    assert (
+        text.index("How far each pose is")
+        < text.index("Usable, but look at the marked points")
+        < text.index("1 pose rejected")
+        < text.index("The scene")
+    )
     assert "Held-out poses are" in text
 
 
@@ -55,7 +74,10 @@ def test_every_pose_is_a_dot_and_a_rejected_one_says_why(good: tuple[dict[str, A
     assert {"closure_position", "closure_rotation", "workspace", "directions", "singular"} <= set(charts)
     traces = {trace["name"]: trace for trace in charts["closure_position"]["data"]}
     assert len(traces["left out"]["x"]) + len(traces["held out"]["x"]) + len(traces["rejected"]["x"]) == 24
-    assert traces["rejected"]["x"] == [7] and result["rejected_poses"][0]["cause"] in traces["rejected"]["text"][0]
+    assert (
+        traces["rejected"]["x"] == [7]
+        and result["rejected_poses"][0]["cause"] in traces["rejected"]["text"][0]
+    )
     assert traces["rejected"]["y"][0] == pytest.approx(1e3 * result["residuals"][7]["position_left_out_m"])
     assert "95 % below, by the noise" in traces
 
@@ -63,11 +85,15 @@ def test_every_pose_is_a_dot_and_a_rejected_one_says_why(good: tuple[dict[str, A
 def test_about_all_poses_are_below_what_the_noise_predicts(good: tuple[dict[str, Any], Scene | None]) -> None:
     result, scene = good
     assert scene is not None
-    below = [r["position_m"] < scene.predicted_m[k] for k, r in enumerate(result["residuals"]) if not r["rejected"]]
+    below = [
+        r["position_m"] < scene.predicted_m[k] for k, r in enumerate(result["residuals"]) if not r["rejected"]
+    ]
     assert np.mean(below) > 0.8
 
 
-def test_seen_and_predicted_boards_lie_together_in_the_scene(good: tuple[dict[str, Any], Scene | None]) -> None:
+def test_seen_and_predicted_boards_lie_together_in_the_scene(
+    good: tuple[dict[str, Any], Scene | None],
+) -> None:
     result, scene = good
     assert scene is not None
     off = np.linalg.norm(scene.T_base_board_seen[:, :3, 3] - scene.T_base_board[:, :3, 3], axis=1)
@@ -85,9 +111,17 @@ def test_without_an_answer_it_says_what_to_do_and_gives_no_camera(tmp_path: Path
     result, drawn = solved(tmp_path, s)
     assert drawn is None and "camera" not in result
     text = html.unescape(visible(handeye_report(result, drawn)))
-    assert result["message"].rstrip(".")[1:] in text and "No camera pose is given" in text and "The camera sits at" not in text
+    assert (
+        result["message"].rstrip(".")[1:] in text
+        and "No camera pose is given" in text
+        and "The camera sits at" not in text
+    )
     assert text.index("What to do") < text.index("What the motions show")
-    expected = {"one axis": "cannot be seen", "inverted": "--reading hand-inverted", "mixed up": "No other reading of the numbers closes it either"}
+    expected = {
+        "one axis": "cannot be seen",
+        "inverted": "--reading hand-inverted",
+        "mixed up": "No other reading of the numbers closes it either",
+    }
     assert expected[kind] in text
     assert ("Other readings of the same numbers" in text) == (kind == "inverted")
 
@@ -100,16 +134,68 @@ def fabricated(result: dict[str, Any]) -> dict[str, Any]:
     full["noise"]["pixel"] = 0.12
     for errors in full["errors"].values():
         errors["rms_px"] = 0.3
-    full["images"] = {"board": "circles:8x5:25mm", "found": 24, "not_found": ["images/99.png"], "camera_given": False, "camera_refined": True, "rms_px": [0.1] * 24,
-                      "camera": {"width": 640, "height": 480, "fx": 550.0, "fy": 551.0, "cx": 320.0, "cy": 240.0,
-                                 "distortion": {"model": "plumb_bob", "coefficients": [0.1, 0, 0, 0, 0]}, "sigma": {"fx": 0.5, "k1": None}}}  # fmt: skip
-    full["next_poses"] = [{"x_m": 0.1, "y_m": -0.2, "z_m": 0.3, "qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0, "working_point_sigma_m": 1e-4}]
-    full["clock"] = {"offset_s": -0.0123, "sigma_s": 1e-4, "correlation": 0.99, "found": True, "message": "", "rows": 24}
+    full["images"] = {
+        "board": "circles:8x5:25mm",
+        "found": 24,
+        "not_found": ["images/99.png"],
+        "camera_given": False,
+        "camera_refined": True,
+        "rms_px": [0.1] * 24,
+        "camera": {
+            "width": 640,
+            "height": 480,
+            "fx": 550.0,
+            "fy": 551.0,
+            "cx": 320.0,
+            "cy": 240.0,
+            "distortion": {"model": "plumb_bob", "coefficients": [0.1, 0, 0, 0, 0]},
+            "sigma": {"fx": 0.5, "k1": None},
+        },
+    }
+    full["next_poses"] = [
+        {
+            "x_m": 0.1,
+            "y_m": -0.2,
+            "z_m": 0.3,
+            "qw": 1.0,
+            "qx": 0.0,
+            "qy": 0.0,
+            "qz": 0.0,
+            "working_point_sigma_m": 1e-4,
+        }
+    ]
+    full["clock"] = {
+        "offset_s": -0.0123,
+        "sigma_s": 1e-4,
+        "correlation": 0.99,
+        "found": True,
+        "message": "",
+        "rows": 24,
+    }
     errors = {"before": full["errors"]["train"], "after": full["errors"]["left_out"]}
-    parameter = {"name": "J2.offset", "nominal": 0.0, "value": 1e-3, "sigma": 1e-5, "unit": "rad", "frozen": False}
-    full["kinematics"] = {"robot": "arm", "errors": {"train": errors, "test": errors}, "parameters": [parameter, parameter | {"name": "J1.a", "sigma": None, "frozen": True}], "frozen": [],
-                          "rejected_poses": [], "rank": 1, "columns": 2, "converged": True, "warnings": []}  # fmt: skip
-    full["convention"] |= {"reading": "hand-inverted", "explanation": "hand poses are inverted (base in hand)"}
+    parameter = {
+        "name": "J2.offset",
+        "nominal": 0.0,
+        "value": 1e-3,
+        "sigma": 1e-5,
+        "unit": "rad",
+        "frozen": False,
+    }
+    full["kinematics"] = {
+        "robot": "arm",
+        "errors": {"train": errors, "test": errors},
+        "parameters": [parameter, parameter | {"name": "J1.a", "sigma": None, "frozen": True}],
+        "frozen": [],
+        "rejected_poses": [],
+        "rank": 1,
+        "columns": 2,
+        "converged": True,
+        "warnings": [],
+    }
+    full["convention"] |= {
+        "reading": "hand-inverted",
+        "explanation": "hand poses are inverted (base in hand)",
+    }
     full["warnings"] = ["the board's lengths would fit best if they were 2 % larger"]
     return full
 
@@ -117,21 +203,38 @@ def fabricated(result: dict[str, Any]) -> dict[str, Any]:
 def with_pixels(scene: Scene | None) -> Scene:
     assert scene is not None
     rng = np.random.default_rng(0)
-    return dataclasses.replace(scene, pixel_errors=rng.normal(0, 0.1, (500, 2)), pixel_places=rng.uniform(0, 480, (500, 2)))
+    return dataclasses.replace(
+        scene, pixel_errors=rng.normal(0, 0.1, (500, 2)), pixel_places=rng.uniform(0, 480, (500, 2))
+    )
 
 
 def test_what_a_run_may_come_to_is_all_said(good: tuple[dict[str, Any], Scene | None]) -> None:
     result, scene = good
     page = handeye_report(fabricated(result), with_pixels(scene))
     text = visible(page)
-    for part in ("Worst images", "images/23.png", "images/99.png", "fx 550.00 px ± 0.50", "What is left in the images", "Measure next", "next_poses.csv", "t_hand = t_camera − 12.30 ms",
-                 "Camera and robot together", "J2.offset +1 mrad", "Read otherwise than the file says", "Warnings", "0.12 px"):  # fmt: skip
+    for part in (
+        "Worst images",
+        "images/23.png",
+        "images/99.png",
+        "fx 550.00 px ± 0.50",
+        "What is left in the images",
+        "Measure next",
+        "next_poses.csv",
+        "t_hand = t_camera − 12.30 ms",
+        "Camera and robot together",
+        "J2.offset +1 mrad",
+        "Read otherwise than the file says",
+        "Warnings",
+        "0.12 px",
+    ):
         assert part in text, part
     assert "J1.a" not in text
     assert {"reprojection", "places"} <= set(charts_of(page))
 
 
-def test_with_the_robot_found_as_well_nothing_is_called_left_out(good: tuple[dict[str, Any], Scene | None]) -> None:
+def test_with_the_robot_found_as_well_nothing_is_called_left_out(
+    good: tuple[dict[str, Any], Scene | None],
+) -> None:
     result, scene = good
     full = fabricated(result)
     full["errors"].pop("left_out")
@@ -157,16 +260,28 @@ def test_names_from_files_cannot_become_markup(good: tuple[dict[str, Any], Scene
     evil = "<img src=x onerror=alert(1)>"
     result, scene = good
     full = fabricated(result)
-    words = [full["rejected_poses"][0]["cause"], full["convention"]["explanation"], full["images"]["board"], "images/99.png", "arm", "J2.offset", *full["warnings"],
-             *(r["image"] for r in full["residuals"])]  # fmt: skip
+    words = [
+        full["rejected_poses"][0]["cause"],
+        full["convention"]["explanation"],
+        full["images"]["board"],
+        "images/99.png",
+        "arm",
+        "J2.offset",
+        *full["warnings"],
+        *(r["image"] for r in full["residuals"]),
+    ]
     text = json.dumps(full)
     for word in words:
         text = text.replace(json.dumps(word), json.dumps(evil))
     page = handeye_report(json.loads(text), with_pixels(scene))
     assert "<img" not in page[page.index("<body>") : page.index("<script>")]
     undecided = {**json.loads(text), "status": "not closing", "message": evil}
-    undecided["convention"]["other_readings"] = [{"reading": evil, "explanation": evil, "rms_m": 1e-3, "rotation_rms_rad": 1e-3}]
-    undecided["observability"]["unobservable"] = [{"what": evil, "direction": [0, 0, 1], "rotation": False, "sigma": None, "advice": evil}]
+    undecided["convention"]["other_readings"] = [
+        {"reading": evil, "explanation": evil, "rms_m": 1e-3, "rotation_rms_rad": 1e-3}
+    ]
+    undecided["observability"]["unobservable"] = [
+        {"what": evil, "direction": [0, 0, 1], "rotation": False, "sigma": None, "advice": evil}
+    ]
     page = handeye_report(undecided, None)
     assert "<img" not in page[page.index("<body>") : page.index("<script>")]
 
@@ -182,6 +297,10 @@ def test_what_is_not_known_is_left_out_and_breaks_nothing(good: tuple[dict[str, 
     bare["board"]["sigma"] = dict.fromkeys(bare["board"]["sigma"])
     bare["board_scale"]["sigma"] = None
     bare.pop("solver", None)
-    nowhere = dataclasses.replace(scene, T_base_board_seen=np.full_like(scene.T_base_board_seen, np.nan), predicted_m=np.full(24, np.nan), predicted_rad=np.full(24, np.nan))
+    nowhere = dataclasses.replace(
+        scene,
+        T_base_board_seen=np.full_like(scene.T_base_board_seen, np.nan),
+        predicted_m=np.full(24, np.nan),
+        predicted_rad=np.full(24, np.nan),
+    )
     assert "The camera sits at" in visible(handeye_report(bare, nowhere))
-

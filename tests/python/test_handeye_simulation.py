@@ -49,10 +49,21 @@ def setup(request: pytest.FixtureRequest) -> Setup:
 
 
 def gaps(scene: HandEyeScene, hand: Floats, seen: Floats) -> tuple[Floats, Floats]:
-    """By how much the loop does not close, pose by pose: rotation vectors [rad] and translations [m], in the frame that does not move."""
-    chain = hand @ scene.T_parent_board if scene.setup == "eye-to-hand" else hand @ scene.T_parent_camera @ seen
-    wanted = scene.T_parent_camera @ seen if scene.setup == "eye-to-hand" else np.broadcast_to(scene.T_parent_board, chain.shape)
-    return rotation_vector(np.swapaxes(wanted[:, :3, :3], 1, 2) @ chain[:, :3, :3]), chain[:, :3, 3] - wanted[:, :3, 3]
+    """By how much the loop does not close, pose by pose: rotation vectors [rad] and translations [m], in the
+    frame that does not move.
+    """
+    chain = (
+        hand @ scene.T_parent_board if scene.setup == "eye-to-hand" else hand @ scene.T_parent_camera @ seen
+    )
+    wanted = (
+        scene.T_parent_camera @ seen
+        if scene.setup == "eye-to-hand"
+        else np.broadcast_to(scene.T_parent_board, chain.shape)
+    )
+    return (
+        rotation_vector(np.swapaxes(wanted[:, :3, :3], 1, 2) @ chain[:, :3, :3]),
+        chain[:, :3, 3] - wanted[:, :3, 3],
+    )
 
 
 def worst(scene: HandEyeScene) -> float:
@@ -60,7 +71,8 @@ def worst(scene: HandEyeScene) -> float:
     return float(max(np.abs(turned).max(), np.abs(shifted).max()))
 
 
-# ---- The scene -------------------------------------------------------------------------------------------------------
+# ---- The scene
+# -------------------------------------------------------------------------------------------------------
 
 
 def test_without_noise_the_loop_closes(setup: Setup) -> None:
@@ -72,7 +84,12 @@ def test_without_noise_the_loop_closes(setup: Setup) -> None:
 
 def test_frames_are_proper(setup: Setup) -> None:
     scene = simulate_handeye(setup, 40, seed=5)
-    for frames in (scene.T_base_hand, scene.T_camera_board, scene.T_parent_camera[None], scene.T_parent_board[None]):
+    for frames in (
+        scene.T_base_hand,
+        scene.T_camera_board,
+        scene.T_parent_camera[None],
+        scene.T_parent_board[None],
+    ):
         R = frames[:, :3, :3]
         np.testing.assert_allclose(R @ np.swapaxes(R, 1, 2), np.broadcast_to(np.eye(3), R.shape), atol=1e-14)
         assert (np.linalg.det(R) > 0).all()
@@ -83,9 +100,13 @@ def test_noise_has_the_stated_size_and_is_white(setup: Setup) -> None:
     sizes: dict[str, Any] = {"hand_m": 2e-4, "hand_rad": 1e-3, "camera_m": 7e-4, "camera_rad": 3e-3}
     scene = simulate_handeye(setup, 4000, **sizes, seed=1)
     R = np.swapaxes(scene.T_base_hand[:, :3, :3], 1, 2) @ scene.true_T_base_hand[:, :3, :3]
-    hand = np.column_stack([scene.true_T_base_hand[:, :3, 3] - scene.T_base_hand[:, :3, 3], rotation_vector(R)])
+    hand = np.column_stack(
+        [scene.true_T_base_hand[:, :3, 3] - scene.T_base_hand[:, :3, 3], rotation_vector(R)]
+    )
     R = np.swapaxes(scene.true_T_camera_board[:, :3, :3], 1, 2) @ scene.T_camera_board[:, :3, :3]
-    camera = np.column_stack([scene.T_camera_board[:, :3, 3] - scene.true_T_camera_board[:, :3, 3], rotation_vector(R)])
+    camera = np.column_stack(
+        [scene.T_camera_board[:, :3, 3] - scene.true_T_camera_board[:, :3, 3], rotation_vector(R)]
+    )
     drawn = np.column_stack([hand, camera]) / np.repeat(list(sizes.values()), 3)
     np.testing.assert_allclose(drawn.std(axis=0), 1, atol=4 / math.sqrt(2 * len(drawn)))
     np.testing.assert_allclose(drawn.mean(axis=0), 0, atol=4.5 / math.sqrt(len(drawn)))
@@ -93,7 +114,9 @@ def test_noise_has_the_stated_size_and_is_white(setup: Setup) -> None:
 
 
 def test_the_same_seed_gives_the_same_scene_and_another_another(setup: Setup) -> None:
-    one, two, other = (simulate_handeye(setup, 20, board=Board(), outliers=0.1, seed=seed) for seed in (7, 7, 8))
+    one, two, other = (
+        simulate_handeye(setup, 20, board=Board(), outliers=0.1, seed=seed) for seed in (7, 7, 8)
+    )
     for name in ("T_base_hand", "T_camera_board", "T_parent_camera", "T_parent_board", "pixels"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
         assert not np.array_equal(getattr(one, name), getattr(other, name))
@@ -122,7 +145,11 @@ def test_the_scene_is_of_the_size_of_an_arm(setup: Setup) -> None:
     tilts = np.arccos(scene.T_camera_board[:, 2, 2])
     assert 0.9 * layout.tilt < tilts.max() <= layout.tilt
     assert np.linalg.norm(scene.T_base_hand[:, :3, 3], axis=1).max() < 2.0
-    carried = scene.T_parent_board @ np.append(scene.board.centre, 1) if setup == "eye-to-hand" else scene.T_parent_camera[:, 3]
+    carried = (
+        scene.T_parent_board @ np.append(scene.board.centre, 1)
+        if setup == "eye-to-hand"
+        else scene.T_parent_camera[:, 3]
+    )
     assert np.linalg.norm(carried[:3]) == pytest.approx(layout.lever)
 
 
@@ -131,7 +158,10 @@ def test_gross_outliers_are_where_and_as_large_as_stated(setup: Setup) -> None:
     assert len(scene.outlier_rows) == 4
     clean = simulate_handeye(setup, 40, **QUIET, seed=6)
     shifted = np.linalg.norm(scene.T_camera_board[:, :3, 3] - clean.T_camera_board[:, :3, 3], axis=1)
-    turned = np.linalg.norm(rotation_vector(np.swapaxes(clean.T_camera_board[:, :3, :3], 1, 2) @ scene.T_camera_board[:, :3, :3]), axis=1)
+    turned = np.linalg.norm(
+        rotation_vector(np.swapaxes(clean.T_camera_board[:, :3, :3], 1, 2) @ scene.T_camera_board[:, :3, :3]),
+        axis=1,
+    )
     wrong = np.isin(np.arange(40), scene.outlier_rows)
     np.testing.assert_allclose(shifted, np.where(wrong, 0.03, 0), atol=1e-14)
     np.testing.assert_allclose(turned, np.where(wrong, math.radians(10), 0), atol=1e-12)
@@ -146,13 +176,16 @@ def test_select_keeps_the_outliers_where_they_go() -> None:
     np.testing.assert_array_equal(chosen.pixels[2], scene.pixels[first])
 
 
-@pytest.mark.parametrize("wrong", [{"setup": "eye"}, {"poses": 0}, {"outliers": 1.0}, {"hand_m": -1.0}, {"pixel": -0.1}])
+@pytest.mark.parametrize(
+    "wrong", [{"setup": "eye"}, {"poses": 0}, {"outliers": 1.0}, {"hand_m": -1.0}, {"pixel": -0.1}]
+)
 def test_what_cannot_be_is_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(InputError):
         simulate_handeye(**wrong)  # type: ignore[arg-type]
 
 
-# ---- Images ----------------------------------------------------------------------------------------------------------
+# ---- Images
+# ----------------------------------------------------------------------------------------------------------
 
 
 def test_every_point_of_the_board_is_in_the_image(setup: Setup) -> None:
@@ -163,7 +196,9 @@ def test_every_point_of_the_board_is_in_the_image(setup: Setup) -> None:
 
 
 def test_pixel_noise_has_the_stated_size() -> None:
-    noisy, exact = (simulate_handeye(poses=200, board=Board(), pixel=pixel, seed=2).pixels for pixel in (0.1, 0.0))
+    noisy, exact = (
+        simulate_handeye(poses=200, board=Board(), pixel=pixel, seed=2).pixels for pixel in (0.1, 0.0)
+    )
     assert noisy is not None and exact is not None
     assert (noisy - exact).std() == pytest.approx(0.1, rel=0.03)
 
@@ -172,7 +207,9 @@ def test_rays_undo_the_projection() -> None:
     camera = PinholeCamera()
     pixels = np.stack(np.meshgrid(np.linspace(0, 1279, 30), np.linspace(0, 959, 20)), axis=-1)
     rays = camera.rays(pixels)
-    np.testing.assert_allclose(camera.project(np.concatenate([rays, np.ones((20, 30, 1))], axis=-1)), pixels, atol=1e-8)
+    np.testing.assert_allclose(
+        camera.project(np.concatenate([rays, np.ones((20, 30, 1))], axis=-1)), pixels, atol=1e-8
+    )
 
 
 def test_projection_is_that_of_opencv() -> None:
@@ -180,7 +217,13 @@ def test_projection_is_that_of_opencv() -> None:
     scene = simulate_handeye(poses=3, board=Board(), pixel=0.0, seed=2)
     assert scene.pixels is not None
     for T, pixels in zip(scene.true_T_camera_board, scene.pixels, strict=True):
-        theirs, _ = cv2.projectPoints(scene.board.points, rotation_vector(T[:3, :3]), T[:3, 3], scene.camera.matrix, np.array(scene.camera.distortion))
+        theirs, _ = cv2.projectPoints(
+            scene.board.points,
+            rotation_vector(T[:3, :3]),
+            T[:3, 3],
+            scene.camera.matrix,
+            np.array(scene.camera.distortion),
+        )
         np.testing.assert_allclose(pixels, theirs.reshape(-1, 2), atol=1e-9)
 
 
@@ -223,7 +266,8 @@ def test_a_board_behind_the_camera_is_refused() -> None:
         render_board(PinholeCamera(), Board(), T)
 
 
-# ---- Data that cannot tell -------------------------------------------------------------------------------------------
+# ---- Data that cannot tell
+# -------------------------------------------------------------------------------------------
 
 
 def motions(scene: HandEyeScene) -> Floats:
@@ -262,7 +306,8 @@ def test_equal_poses_are_equal(setup: Setup) -> None:
     np.testing.assert_array_equal(scene.T_camera_board, scene.T_camera_board[[0] * 5])
 
 
-# ---- Data that are wrong ---------------------------------------------------------------------------------------------
+# ---- Data that are wrong
+# ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", MISTAKES)
@@ -276,7 +321,9 @@ def test_a_mistake_breaks_the_loop_and_leaves_the_truth(setup: Setup, name: str)
     np.testing.assert_array_equal(spoilt.T_base_hand, again.T_base_hand)
     np.testing.assert_array_equal(spoilt.T_camera_board, again.T_camera_board)
     R = spoilt.T_base_hand[:, :3, :3]
-    np.testing.assert_allclose(np.linalg.det(R), 1, atol=1e-12)  # nothing that a check of single poses would find
+    np.testing.assert_allclose(
+        np.linalg.det(R), 1, atol=1e-12
+    )  # nothing that a check of single poses would find
 
 
 def test_a_mistake_undone_closes_the_loop(setup: Setup) -> None:
@@ -294,7 +341,10 @@ def test_a_flipped_board_is_the_same_board_from_its_other_end() -> None:
     scene = simulate_handeye(poses=30, **QUIET, board=Board(), seed=3)
     spoilt = flipped_boards(scene)
     assert len(spoilt.outlier_rows) == 9 and spoilt.pixels is not None
-    points = scene.board.points @ np.swapaxes(spoilt.T_camera_board[:, :3, :3], 1, 2) + spoilt.T_camera_board[:, None, :3, 3]
+    points = (
+        scene.board.points @ np.swapaxes(spoilt.T_camera_board[:, :3, :3], 1, 2)
+        + spoilt.T_camera_board[:, None, :3, 3]
+    )
     np.testing.assert_allclose(scene.camera.project(points), spoilt.pixels, atol=1e-9)
 
 
@@ -321,23 +371,35 @@ def test_order_and_unit_are_no_mistakes(setup: Setup) -> None:
     assert not np.array_equal(shuffled(scene).T_base_hand, scene.T_base_hand)
 
 
-# ---- Streams ---------------------------------------------------------------------------------------------------------
+# ---- Streams
+# ---------------------------------------------------------------------------------------------------------
 
 
 def test_streams_agree_once_the_clocks_do(setup: Setup) -> None:
     streams = simulate_streams(setup, seconds=6, hand_m=0, hand_rad=0, camera_m=0, camera_rad=0, seed=2)
-    assert np.diff(streams.t_hand) == pytest.approx(1 / 125) and np.diff(streams.t_camera) == pytest.approx(1 / 30)
+    assert np.diff(streams.t_hand) == pytest.approx(1 / 125) and np.diff(streams.t_camera) == pytest.approx(
+        1 / 30
+    )
 
     def gap(offset: float) -> float:
-        """Median distance in which the loop does not close, with the board interpolated to the hand's instants."""
+        """Median distance in which the loop does not close, with the board interpolated to the hand's
+        instants.
+        """
         t = streams.t_hand + offset
         within = (t > streams.t_camera[0]) & (t < streams.t_camera[-1])
-        board = np.column_stack([np.interp(t[within], streams.t_camera, column) for column in streams.T_camera_board[:, :3, 3].T])
+        board = np.column_stack(
+            [np.interp(t[within], streams.t_camera, column) for column in streams.T_camera_board[:, :3, 3].T]
+        )
         hand = streams.T_base_hand[within]
         if setup == "eye-to-hand":
-            one, two = hand @ streams.T_parent_board[:, 3], board @ streams.T_parent_camera[:3, :3].T + streams.T_parent_camera[:3, 3]
+            one, two = (
+                hand @ streams.T_parent_board[:, 3],
+                board @ streams.T_parent_camera[:3, :3].T + streams.T_parent_camera[:3, 3],
+            )
         else:
-            one = (hand @ streams.T_parent_camera @ np.column_stack([board, np.ones(len(board))])[..., None])[..., 0]
+            one = (hand @ streams.T_parent_camera @ np.column_stack([board, np.ones(len(board))])[..., None])[
+                ..., 0
+            ]
             two = np.broadcast_to(streams.T_parent_board[:3, 3], (len(one), 3))
         return float(np.median(np.linalg.norm(one[:, :3] - two, axis=1)))
 
@@ -353,7 +415,8 @@ def test_streams_move_smoothly(setup: Setup) -> None:
     assert (np.diff(streams.t_camera) > 0).all()
 
 
-# ---- Rotations -------------------------------------------------------------------------------------------------------
+# ---- Rotations
+# -------------------------------------------------------------------------------------------------------
 
 
 def test_rotations_there_and_back() -> None:
@@ -364,4 +427,6 @@ def test_rotations_there_and_back() -> None:
     R = rotation(vectors)
     np.testing.assert_allclose(rotation_vector(R), vectors, atol=1e-8)
     np.testing.assert_allclose(rotation_of_quaternion(quaternion_of_rotation(R)), R, atol=1e-14)
-    np.testing.assert_allclose(rotation(np.array([0, 0, np.pi / 2])), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+    np.testing.assert_allclose(
+        rotation(np.array([0, 0, np.pi / 2])), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15
+    )

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics and compensation in Python: what is claimed is true by Pinocchio and by `predict`, and what other tools get wrong stays right."""
+"""Inverse kinematics and compensation in Python: what is claimed is true by Pinocchio and by `predict`, and
+what other tools get wrong stays right.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,22 @@ import threading
 
 import numpy as np
 import pytest
-from inverse_arms import Floats, axis_off, calibrated, gantry, irb, is_within_limits, limits, poses_of, position_off, random_joints, rotation_off, scara, with_effects, wrapped
+from inverse_arms import (
+    Floats,
+    axis_off,
+    calibrated,
+    gantry,
+    irb,
+    is_within_limits,
+    limits,
+    poses_of,
+    position_off,
+    random_joints,
+    rotation_off,
+    scara,
+    with_effects,
+    wrapped,
+)
 
 import truing
 from truing.demo import example
@@ -20,7 +37,9 @@ TOLERANCE = 1e-6  # [m], [rad]
 
 
 def check(robot: truing.Robot, found: truing.Solutions, wanted: Floats, kind: str = "pose") -> None:
-    """Whatever is claimed to be reached is, by plain forward kinematics (of robots without effects), and within limits."""
+    """Whatever is claimed to be reached is, by plain forward kinematics (of robots without effects), and
+    within limits.
+    """
     for solution, T in zip(found, wanted, strict=True):
         if not solution.reached:
             continue
@@ -31,11 +50,21 @@ def check(robot: truing.Robot, found: truing.Solutions, wanted: Floats, kind: st
         assert is_within_limits(robot, solution.joints)
 
 
-# ---- Every kind of chain -----------------------------------------------------------------------------------------------
+# ---- Every kind of chain
+# -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("robot", [irb(), calibrated(irb(), 3), truing.load_robot(example("ur10")), calibrated(truing.load_robot(example("ur10")), 4), gantry()],
-                         ids=["wrist", "wrist calibrated", "three parallel", "three parallel calibrated", "gantry"])  # fmt: skip
+@pytest.mark.parametrize(
+    "robot",
+    [
+        irb(),
+        calibrated(irb(), 3),
+        truing.load_robot(example("ur10")),
+        calibrated(truing.load_robot(example("ur10")), 4),
+        gantry(),
+    ],
+    ids=["wrist", "wrist calibrated", "three parallel", "three parallel calibrated", "gantry"],
+)
 @pytest.mark.parametrize("kind", ["pose", "torch", "point"])
 def test_every_reachable_target_is_reached(robot: truing.Robot, kind: str) -> None:
     solver = truing.InverseSolver(robot)
@@ -46,7 +75,9 @@ def test_every_reachable_target_is_reached(robot: truing.Robot, kind: str) -> No
     check(robot, found, wanted, kind)
 
 
-@pytest.mark.parametrize("robot", [truing.load_robot(example("palletizer")), scara()], ids=["palletizer", "scara"])
+@pytest.mark.parametrize(
+    "robot", [truing.load_robot(example("palletizer")), scara()], ids=["palletizer", "scara"]
+)
 def test_four_axes_reach_their_own_poses(robot: truing.Robot) -> None:
     solver = truing.InverseSolver(robot)
     wanted = poses_of(solver, random_joints(robot, 60, seed=1, share=0.95))
@@ -56,7 +87,10 @@ def test_four_axes_reach_their_own_poses(robot: truing.Robot) -> None:
 
 
 def test_the_closed_form_is_named() -> None:
-    names = [truing.InverseSolver(robot).closed_form for robot in (irb(), calibrated(irb()), truing.load_robot(example("ur10")), scara())]
+    names = [
+        truing.InverseSolver(robot).closed_form
+        for robot in (irb(), calibrated(irb()), truing.load_robot(example("ur10")), scara())
+    ]
     assert names == ["spherical_wrist", "spherical_wrist", "three_parallel", "none"]
 
 
@@ -70,11 +104,16 @@ def test_all_branches_of_a_calibrated_arm_are_those_of_the_nominal_one() -> None
         there, here = nominal.branches(task, q).solutions, real.branches(task, q).solutions
         assert min(float(np.abs(s.joints - q).max()) for s in there) < 1e-5  # its own is among them
         for solution in here:
-            assert solution.reached and position_off(real.forward(solution.joints), task.T_measurement_target) <= TOLERANCE
+            assert (
+                solution.reached
+                and position_off(real.forward(solution.joints), task.T_measurement_target) <= TOLERANCE
+            )
         for those, others in ((there, here), (here, there)):
             for s in those:
                 if stiffness(s.joints) > 0.05 and np.minimum(s.joints - low, high - s.joints).min() > 0.1:
-                    assert min(float(np.abs(wrapped(s.joints - other.joints)).max()) for other in others) < 0.15
+                    assert (
+                        min(float(np.abs(wrapped(s.joints - other.joints)).max()) for other in others) < 0.15
+                    )
                     compared += 1
         joints = np.array([s.joints for s in here])
         apart = [float(np.abs(a - b).max()) for k, a in enumerate(joints) for b in joints[:k]]
@@ -97,7 +136,8 @@ def stiffness(joints: Floats) -> float:
     return float(np.linalg.svd(np.array(columns), compute_uv=False)[-1])
 
 
-# ---- Pinocchio --------------------------------------------------------------------------------------------------------
+# ---- Pinocchio
+# --------------------------------------------------------------------------------------------------------
 
 
 def test_what_is_reached_is_by_pinocchio() -> None:
@@ -109,7 +149,9 @@ def test_what_is_reached_is_by_pinocchio() -> None:
         low, high = np.clip(limits(both.robot), -3.0, 3.0)
         joints = np.random.default_rng(7).uniform(low, high, (30, len(low)))
         wanted = np.array([both.frames(q)[-1] for q in joints])
-        found = truing.inverse(both.robot, wanted, kind=kind, seeds=np.random.default_rng(8).uniform(low, high, joints.shape))  # type: ignore[arg-type]
+        found = truing.inverse(
+            both.robot, wanted, kind=kind, seeds=np.random.default_rng(8).uniform(low, high, joints.shape)
+        )  # type: ignore[arg-type]
         assert found.reached.all()
         for q, T in zip(found.joints, wanted, strict=True):
             there = both.frames(q)[-1]
@@ -118,16 +160,25 @@ def test_what_is_reached_is_by_pinocchio() -> None:
                 assert (rotation_off if kind == "pose" else axis_off)(there, T) <= 1.001 * TOLERANCE
 
 
-# ---- Effects ----------------------------------------------------------------------------------------------------------
+# ---- Effects
+# ----------------------------------------------------------------------------------------------------------
 
 
 def predicted(robot: truing.Robot, joints: Floats, payload: Floats, direction: Floats) -> Floats:
     """shape=(n, 4, 4): where `predict` says that the robot is."""
     from truing.files.handeye_file import rotations_from_quaternions
 
-    said = truing.predict(robot, truing.Measurements(joints, payload=payload, directions=direction, positions=np.zeros((len(joints), 3))))
+    said = truing.predict(
+        robot,
+        truing.Measurements(
+            joints, payload=payload, directions=direction, positions=np.zeros((len(joints), 3))
+        ),
+    )
     frames = np.tile(np.eye(4), (len(joints), 1, 1))
-    frames[:, :3, :3], frames[:, :3, 3] = rotations_from_quaternions(np.asarray(said.orientation)), said.position
+    frames[:, :3, :3], frames[:, :3, 3] = (
+        rotations_from_quaternions(np.asarray(said.orientation)),
+        said.position,
+    )
     return frames
 
 
@@ -136,7 +187,10 @@ def test_effects_in_the_inverse_are_those_of_predict() -> None:
     random = np.random.default_rng(9)
     joints = random_joints(robot, 40, seed=4, share=0.8)
     payload, direction = random.uniform(0.0, 3.0, 40), random.choice([-1.0, 1.0], (40, 6))
-    conditions = [truing.Conditions(payload=float(p), direction=d.astype(int).tolist()) for p, d in zip(payload, direction, strict=True)]
+    conditions = [
+        truing.Conditions(payload=float(p), direction=d.astype(int).tolist())
+        for p, d in zip(payload, direction, strict=True)
+    ]
     solver = truing.InverseSolver(robot, conditions=conditions[0])
     said = predicted(robot, joints, payload, direction)
     forward = np.array([solver.forward(q, c) for q, c in zip(joints, conditions, strict=True)])
@@ -148,13 +202,18 @@ def test_effects_in_the_inverse_are_those_of_predict() -> None:
     assert found.reached.all()
     again = predicted(robot, found.joints, payload, direction)
     for reached, wanted in zip(again, said, strict=True):
-        assert position_off(reached, wanted) <= 1.001 * TOLERANCE and rotation_off(reached, wanted) <= 1.001 * TOLERANCE
+        assert (
+            position_off(reached, wanted) <= 1.001 * TOLERANCE
+            and rotation_off(reached, wanted) <= 1.001 * TOLERANCE
+        )
 
 
 def test_without_directions_those_of_the_way_from_the_seed_are_taken() -> None:
     robot = with_effects(irb())
     solver = truing.InverseSolver(robot)
-    for q, seed in zip(random_joints(robot, 20, seed=6, share=0.7), random_joints(robot, 20, seed=7, share=0.7), strict=True):
+    for q, seed in zip(
+        random_joints(robot, 20, seed=6, share=0.7), random_joints(robot, 20, seed=7, share=0.7), strict=True
+    ):
         wanted = truing.InverseSolver(robot.replace(effects=[])).forward(q)
         found = solver.solve(truing.Task(wanted), seed)
         if not found.reached:
@@ -169,12 +228,15 @@ def test_an_effect_of_ones_own_is_refused_by_name() -> None:
         truing.InverseSolver(robot)
 
 
-# ---- What other tools get wrong ----------------------------------------------------------------------------------------
+# ---- What other tools get wrong
+# ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
 def test_a_free_roll_is_about_the_tools_axis_not_about_the_bases(axis: int) -> None:
-    """Robotics Toolbox, mask=[1,1,1,1,1,0]: success with a tool axis 0.2 to 0.33 rad off, for its mask acts in the base frame."""
+    """Robotics Toolbox, mask=[1,1,1,1,1,0]: success with a tool axis 0.2 to 0.33 rad off, for its mask acts
+    in the base frame.
+    """
     robot = irb()
     solver = truing.InverseSolver(robot)
     unit, travel = np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
@@ -185,7 +247,9 @@ def test_a_free_roll_is_about_the_tools_axis_not_about_the_bases(axis: int) -> N
     rolls = []
     for solution, T in zip(found, wanted, strict=True):
         reached = truing.forward_kinematics(robot, solution.joints)[-1]
-        assert position_off(reached, T) <= 1.001 * TOLERANCE and axis_off(reached, T, axis) <= 1.001 * TOLERANCE
+        assert (
+            position_off(reached, T) <= 1.001 * TOLERANCE and axis_off(reached, T, axis) <= 1.001 * TOLERANCE
+        )
         rolls.append(rotation_off(reached, T))
     assert max(rolls) > 0.5  # the freedom is used
 
@@ -220,14 +284,18 @@ def test_sliding_joints_are_not_wrapped_by_a_turn() -> None:
     check(robot, found, wanted)
     three = robot.replace(joints=robot.joints[:3])  # three rails alone: one answer
     rails = np.array([[9.9, 3.7, 1.9], [6.4, 0.1, 0.2], [3.2, 3.9, 0.01]])
-    found = truing.inverse(three, np.array([truing.forward_kinematics(three, q)[-1] for q in rails]), kind="point")
+    found = truing.inverse(
+        three, np.array([truing.forward_kinematics(three, q)[-1] for q in rails]), kind="point"
+    )
     assert found.reached.all() and np.abs(found.joints - rails).max() < 2e-6
 
 
 def test_success_is_never_stale_and_limits_are_never_violated() -> None:
     """bio_ik#48: the flag from before clamping. pick_ik#43: answers beyond the limits."""
     wide = irb()
-    narrow = wide.replace(joints=[joint.replace(lower=0.4 * joint.lower, upper=0.4 * joint.upper) for joint in wide.joints])
+    narrow = wide.replace(
+        joints=[joint.replace(lower=0.4 * joint.lower, upper=0.4 * joint.upper) for joint in wide.joints]
+    )
     wanted = poses_of(truing.InverseSolver(wide), random_joints(wide, 150, seed=14))
     for kind in ("pose", "torch"):
         found = truing.inverse(narrow, wanted, kind=kind, max_restarts=20)
@@ -245,7 +313,9 @@ def test_success_is_never_stale_and_limits_are_never_violated() -> None:
 def test_a_sliding_joint_inside_the_arm_is_no_trouble() -> None:
     """OptIK ends the process on one."""
     robot = scara()
-    found = truing.inverse(robot, poses_of(truing.InverseSolver(robot), random_joints(robot, 20, seed=15, share=0.9)))
+    found = truing.inverse(
+        robot, poses_of(truing.InverseSolver(robot), random_joints(robot, 20, seed=15, share=0.9))
+    )
     assert found.reached.all()
 
 
@@ -276,7 +346,9 @@ def test_a_path_does_not_jump() -> None:
     robot = irb()
     solver = truing.InverseSolver(robot)
     t = np.linspace(0.0, 1.0, 200)[:, None]
-    joints = np.array([0.2, 0.1, -0.2, 0.3, 0.9, -0.3]) + 0.7 * np.sin(2 * math.pi * t * np.array([1.0, 0.7, 0.6, 1.3, 0.4, 1.7]))
+    joints = np.array([0.2, 0.1, -0.2, 0.3, 0.9, -0.3]) + 0.7 * np.sin(
+        2 * math.pi * t * np.array([1.0, 0.7, 0.6, 1.3, 0.4, 1.7])
+    )
     wanted = poses_of(solver, joints)
     for kind in ("pose", "torch"):
         path = truing.inverse_path(robot, wanted, kind=kind, seed=joints[0])
@@ -294,7 +366,11 @@ def test_a_gap_is_told_where_no_path_is() -> None:
     ends = np.array([[0.2, 0.1, -0.2, 0.3, 0.9, -0.3], [1.9, 0.1, -0.2, 0.3, 0.9, -0.3]])
     path = truing.inverse_path(robot, poses_of(solver, np.repeat(ends, 5, axis=0)), seed=ends[0])
     assert not path.continuous and [gap.start for gap in path.gaps] == [4]
-    assert path.gaps[0].step == pytest.approx(np.abs(np.diff(path.solutions.joints[4:6], axis=0)).max(), rel=1e-9) and path.gaps[0].step > 0.35
+    assert (
+        path.gaps[0].step
+        == pytest.approx(np.abs(np.diff(path.solutions.joints[4:6], axis=0)).max(), rel=1e-9)
+        and path.gaps[0].step > 0.35
+    )
     far = poses_of(solver, ends[:1].repeat(3, axis=0))
     far[1, :3, 3] += 5.0
     assert {(gap.start, gap.joint) for gap in truing.inverse_path(robot, far).gaps} == {(0, -1), (1, -1)}
@@ -322,18 +398,25 @@ def test_threads_share_a_solver() -> None:
             assert np.array_equal(a.joints, b.joints) and a.reason == b.reason
 
 
-@pytest.mark.parametrize("robot", [irb(), with_effects(calibrated(irb())), gantry()], ids=["nominal", "effects", "gantry"])
+@pytest.mark.parametrize(
+    "robot", [irb(), with_effects(calibrated(irb())), gantry()], ids=["nominal", "effects", "gantry"]
+)
 def test_any_number_of_threads_gives_the_same_bits(robot: truing.Robot) -> None:
     wanted = poses_of(truing.InverseSolver(robot), random_joints(robot, 150, seed=18))
     wanted[::10, :3, 3] += 0.5
-    results = [truing.inverse(robot, wanted, kind=kind, threads=threads, max_restarts=20) for kind in ("pose", "torch") for threads in (1, 2, 3, 0)]
+    results = [
+        truing.inverse(robot, wanted, kind=kind, threads=threads, max_restarts=20)
+        for kind in ("pose", "torch")
+        for threads in (1, 2, 3, 0)
+    ]
     for first, others in ((results[0], results[1:4]), (results[4], results[5:])):
         for other in others:
             assert np.array_equal(first.joints, other.joints) and first.reasons == other.reasons
             assert np.array_equal(first.position_error, other.position_error)
 
 
-# ---- What cannot be reached --------------------------------------------------------------------------------------------
+# ---- What cannot be reached
+# --------------------------------------------------------------------------------------------
 
 
 def test_out_of_reach_says_how_far_and_where() -> None:
@@ -390,17 +473,29 @@ def test_what_is_chosen_is_the_best_of_all_branches() -> None:
     best = truing.InverseSolver(robot, truing.InverseOptions(choose="limits_margin"))
     for q in random_joints(robot, 20, seed=21, share=0.8):
         task = truing.Task(best.forward(q))
-        margins = [float((np.minimum(s.joints - low, high - s.joints) / (high - low)).min()) for s in best.branches(task, q).solutions]
+        margins = [
+            float((np.minimum(s.joints - low, high - s.joints) / (high - low)).min())
+            for s in best.branches(task, q).solutions
+        ]
         chosen = best.solve(task, q).joints
         assert float((np.minimum(chosen - low, high - chosen) / (high - low)).min()) >= max(margins) - 1e-6
 
 
-# ---- What is in the way ------------------------------------------------------------------------------------------------
+# ---- What is in the way
+# ------------------------------------------------------------------------------------------------
 
 
 def scene(wall_at: float) -> truing.Scene:
-    wall = truing.Obstacle("wall", shape="box", T_measurement_shape=truing.frame_from_xyz_rpy([wall_at, 0, 0.5], [0, 0, 0]), size=[0.04, 4.0, 4.0])
-    return truing.Scene(obstacles=[wall], capsules=[truing.LinkCapsule("hand", link="tool", start=[0, 0, -0.1], end=[0, 0, 0], radius=0.02)])
+    wall = truing.Obstacle(
+        "wall",
+        shape="box",
+        T_measurement_shape=truing.frame_from_xyz_rpy([wall_at, 0, 0.5], [0, 0, 0]),
+        size=[0.04, 4.0, 4.0],
+    )
+    return truing.Scene(
+        obstacles=[wall],
+        capsules=[truing.LinkCapsule("hand", link="tool", start=[0, 0, -0.1], end=[0, 0, 0], radius=0.02)],
+    )
 
 
 def test_what_interferes_is_not_reached_and_retreats_by_the_least() -> None:
@@ -409,7 +504,12 @@ def test_what_interferes_is_not_reached_and_retreats_by_the_least() -> None:
     options = truing.InverseOptions(scene=scene(float(T[0, 3])))
     solver = truing.InverseSolver(robot, options)
     found = solver.solve(truing.Task(T))
-    assert found.reason == "interference" and not found.reached and found.contact is not None and found.contact_distance < 0
+    assert (
+        found.reason == "interference"
+        and not found.reached
+        and found.contact is not None
+        and found.contact_distance < 0
+    )
     assert "hand and wall" in solver.describe(found)
     away = -T[:3, :3].T @ np.array([1.0, 0.0, 0.0])
     retreating = solver.solve(truing.Task(T, retreat=away, longest_retreat=0.2))
@@ -423,16 +523,21 @@ def test_what_interferes_is_not_reached_and_retreats_by_the_least() -> None:
 def test_a_free_scene_changes_nothing() -> None:
     robot = irb()
     wanted = poses_of(truing.InverseSolver(robot), random_joints(robot, 30, seed=22, share=0.7))
-    assert np.array_equal(truing.inverse(robot, wanted).joints, truing.inverse(robot, wanted, scene=scene(50.0)).joints)
+    assert np.array_equal(
+        truing.inverse(robot, wanted).joints, truing.inverse(robot, wanted, scene=scene(50.0)).joints
+    )
 
 
-# ---- Compensation ------------------------------------------------------------------------------------------------------
+# ---- Compensation
+# ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("in_base", [False, True])
 def test_the_real_robot_goes_where_it_is_wanted(in_base: bool) -> None:
     nominal = irb().replace(T_measurement_base=truing.frame_from_xyz_rpy([0.5, -0.2, 0.1], [0, 0, 0.3]))
-    real = with_effects(calibrated(nominal, 8)).replace(T_measurement_base=truing.frame_from_xyz_rpy([0.501, -0.2, 0.1], [0.001, 0, 0.3]))
+    real = with_effects(calibrated(nominal, 8)).replace(
+        T_measurement_base=truing.frame_from_xyz_rpy([0.501, -0.2, 0.1], [0.001, 0, 0.3])
+    )
     base = np.asarray(real.T_measurement_base) if in_base else np.eye(4)
     solver, believed = truing.InverseSolver(real), truing.InverseSolver(nominal)
     joints = random_joints(nominal, 60, seed=23, share=0.8)
@@ -446,7 +551,12 @@ def test_the_real_robot_goes_where_it_is_wanted(in_base: bool) -> None:
             command = np.linalg.inv(nominal.T_measurement_base) @ command
         assert np.abs(command - one.T_command).max() < 1e-12  # the nominal robot takes these joints for it
         # The backlash is on one of its two sides, or in the middle.
-        errors = [position_off(solver.forward(q, truing.Conditions(direction=[0, 0, side, 0, 0, 0])), base @ wanted[k]) for side in (-1, 0, 1)]
+        errors = [
+            position_off(
+                solver.forward(q, truing.Conditions(direction=[0, 0, side, 0, 0, 0])), base @ wanted[k]
+            )
+            for side in (-1, 0, 1)
+        ]
         assert min(errors) <= 1.001 * TOLERANCE
         assert one.position_before is None or one.position_before > 1e-5
 
@@ -459,7 +569,9 @@ def test_a_program_of_joints_keeps_its_configuration() -> None:
     for k in np.flatnonzero(made.solutions.reached):
         wanted = truing.forward_kinematics(nominal, program[k])[-1]
         assert position_off(truing.forward_kinematics(real, joints[k])[-1], wanted) <= 1.001 * TOLERANCE
-    usual = made.solutions.reached & (np.array([stiffness(q) for q in program]) > 0.02)  # beside singularities joints are far apart by necessity
+    usual = made.solutions.reached & (
+        np.array([stiffness(q) for q in program]) > 0.02
+    )  # beside singularities joints are far apart by necessity
     assert usual.sum() > 50 and not made.other_configuration[usual].any()
     assert np.abs(joints - program)[usual].max() < 0.5 and np.median(np.abs(joints - program)[usual]) < 0.02
 
@@ -474,7 +586,10 @@ def test_near_the_wrist_singularity_compensation_is_right_or_labelled() -> None:
     for T, one in zip(wanted, made, strict=True):
         if one.solution.reached:
             reached = truing.forward_kinematics(real, one.solution.joints)[-1]
-            assert position_off(reached, T) <= 1.001 * TOLERANCE and rotation_off(reached, T) <= 1.001 * TOLERANCE
+            assert (
+                position_off(reached, T) <= 1.001 * TOLERANCE
+                and rotation_off(reached, T) <= 1.001 * TOLERANCE
+            )
         else:
             assert one.solution.reason in ("limit", "singular", "out_of_reach")
     assert made.solutions.reached.mean() > 0.9
@@ -486,7 +601,11 @@ def test_the_standard_error_is_that_of_the_parameters() -> None:
     covariance = np.diag(sigma**2)
     covariance[0, 1] = covariance[1, 0] = 0.6 * sigma[0] * sigma[1]
     wanted = poses_of(truing.InverseSolver(real), random_joints(real, 10, seed=27, share=0.7))
-    known = truing.Uncertainty(("J2.a", "J3.d", "J4.alpha"), (real.joint("J2").a, real.joint("J3").d, real.joint("J4").alpha), covariance)
+    known = truing.Uncertainty(
+        ("J2.a", "J3.d", "J4.alpha"),
+        (real.joint("J2").a, real.joint("J3").d, real.joint("J4").alpha),
+        covariance,
+    )
     made = truing.compensate(nominal, real, wanted, uncertainty=known)
     assert np.isnan(truing.compensate(nominal, real, wanted).sigma).all()
     for one in made:
@@ -511,7 +630,8 @@ def test_robots_with_other_joints_are_refused() -> None:
         truing.Compensator(irb(), irb()).set_uncertainty(["J2.a"], [0.0], np.eye(2))
 
 
-# ---- In Python ---------------------------------------------------------------------------------------------------------
+# ---- In Python
+# ---------------------------------------------------------------------------------------------------------
 
 
 def test_progress_counts_up_and_what_it_raises_stops_the_work() -> None:
@@ -528,7 +648,11 @@ def test_progress_counts_up_and_what_it_raises_stops_the_work() -> None:
         if done > 100:
             raise Enough
 
-    for run in (lambda: truing.inverse(robot, wanted, progress=stop), lambda: truing.compensate(robot, robot, wanted, progress=stop), lambda: truing.inverse_path(robot, wanted, progress=stop)):
+    for run in (
+        lambda: truing.inverse(robot, wanted, progress=stop),
+        lambda: truing.compensate(robot, robot, wanted, progress=stop),
+        lambda: truing.inverse_path(robot, wanted, progress=stop),
+    ):
         with pytest.raises(Enough):
             run()
 
@@ -539,14 +663,21 @@ def test_ctrl_c_stops_a_batch() -> None:
     robot = gantry()
     wanted = poses_of(truing.InverseSolver(robot), random_joints(robot, 64 * 40, seed=29))
     with pytest.raises(KeyboardInterrupt):
-        truing.inverse(robot, wanted, threads=1, progress=lambda done: _thread.interrupt_main() if done == 128 else None)
+        truing.inverse(
+            robot, wanted, threads=1, progress=lambda done: _thread.interrupt_main() if done == 128 else None
+        )
 
 
 def test_a_batch_is_a_sequence_and_arrays() -> None:
     robot = irb()
     solver = truing.InverseSolver(robot)
     found = solver.solve_batch(poses_of(solver, random_joints(robot, 5, seed=30)))
-    assert len(found) == 5 and found.joints.shape == (5, 6) and found.direction.shape == (5, 3) and found.branch.shape == (5,)
+    assert (
+        len(found) == 5
+        and found.joints.shape == (5, 6)
+        and found.direction.shape == (5, 3)
+        and found.branch.shape == (5,)
+    )
     assert np.array_equal(found[2].joints, found.joints[2]) and found[-1].reason == found.reasons[4]
     with pytest.raises(IndexError):
         found[5]
@@ -555,9 +686,21 @@ def test_a_batch_is_a_sequence_and_arrays() -> None:
 
 
 def test_tasks_scenes_and_options_survive_pickle_and_replace() -> None:
-    task = truing.Task(truing.frame_from_xyz_rpy([1, 2, 3], [0.1, 0.2, 0.3]), kind="torch", roll=(-0.1, 0.2), preferred_roll=0.05, lead=(0.0, 0.1), longest_retreat=0.02)
+    task = truing.Task(
+        truing.frame_from_xyz_rpy([1, 2, 3], [0.1, 0.2, 0.3]),
+        kind="torch",
+        roll=(-0.1, 0.2),
+        preferred_roll=0.05,
+        lead=(0.0, 0.1),
+        longest_retreat=0.02,
+    )
     again = pickle.loads(pickle.dumps(task))
-    assert np.array_equal(again.T_measurement_target, task.T_measurement_target) and (again.kind, again.roll, again.preferred_roll, again.lead) == ("torch", (-0.1, 0.2), 0.05, (0.0, 0.1))
+    assert np.array_equal(again.T_measurement_target, task.T_measurement_target) and (
+        again.kind,
+        again.roll,
+        again.preferred_roll,
+        again.lead,
+    ) == ("torch", (-0.1, 0.2), 0.05, (0.0, 0.1))
     assert task.replace(kind="point").kind == "point" and task.kind == "torch"
     here = pickle.loads(pickle.dumps(scene(1.0)))
     assert [o.name for o in here.obstacles] == ["wall"] and here.capsules[0].link == "tool"
@@ -578,23 +721,47 @@ def test_tasks_scenes_and_options_survive_pickle_and_replace() -> None:
         (lambda s: s.solve(truing.Task(2 * np.eye(4))), "rigid"),
         (lambda s: s.solve(truing.Task(np.full((4, 4), math.nan))), "finite"),
         (lambda s: s.solve(truing.Task(np.eye(4), kind="torch", axis=[0, 0, 2])), "unit length"),
-        (lambda s: s.solve(truing.Task(np.eye(4), kind="torch", roll=(1.0, -1.0))), "window of roll is empty"),
-        (lambda s: s.solve(truing.Task(np.eye(4)).replace(kind="flat")), "choose one of 'pose', 'torch', 'point'"),
+        (
+            lambda s: s.solve(truing.Task(np.eye(4), kind="torch", roll=(1.0, -1.0))),
+            "window of roll is empty",
+        ),
+        (
+            lambda s: s.solve(truing.Task(np.eye(4)).replace(kind="flat")),
+            "choose one of 'pose', 'torch', 'point'",
+        ),
         (lambda s: s.branches(truing.Task(np.eye(4), kind="torch")), "full pose"),
         (lambda s: s.solve_batch(np.eye(4)), "shape"),
         (lambda s: s.solve_batch([np.eye(4), np.full((4, 4), math.nan)]), "pose 1: .*NaN"),
         (lambda s: s.solve_batch(np.tile(np.eye(4), (3, 1, 1)), np.zeros((2, 6))), "2 seeds for 3"),
         (lambda s: s.solve_batch(np.tile(np.eye(4), (3, 1, 1)), np.zeros((3, 5))), r"found \(3, 5\)"),
-        (lambda s: s.solve_batch(np.tile(np.eye(4), (3, 1, 1)), conditions=[truing.Conditions()] * 2), "2 conditions for 3"),
+        (
+            lambda s: s.solve_batch(np.tile(np.eye(4), (3, 1, 1)), conditions=[truing.Conditions()] * 2),
+            "2 conditions for 3",
+        ),
         (lambda s: s.path(np.tile(np.eye(4), (3, 1, 1)), options=truing.PathOptions(rolls=0)), "rolls"),
         (lambda s: s.forward([math.inf] * 6), "finite"),
-        (lambda _: truing.InverseSolver(irb(), truing.InverseOptions(position_tolerance=-1.0)), "position_tolerance"),
+        (
+            lambda _: truing.InverseSolver(irb(), truing.InverseOptions(position_tolerance=-1.0)),
+            "position_tolerance",
+        ),
         (lambda _: truing.InverseSolver(irb(), target=3), "target"),
         (lambda _: truing.inverse(irb(), "poses.csv"), "array of numbers"),
         (lambda _: truing.inverse(irb(), []), "shape"),
-        (lambda _: truing.InverseSolver(irb(), truing.InverseOptions(scene=truing.Scene(capsules=[truing.LinkCapsule("c", link="J9", start=[0, 0, 0], end=[0, 0, 1], radius=0.1)]))), "J9"),
+        (
+            lambda _: truing.InverseSolver(
+                irb(),
+                truing.InverseOptions(
+                    scene=truing.Scene(
+                        capsules=[
+                            truing.LinkCapsule("c", link="J9", start=[0, 0, 0], end=[0, 0, 1], radius=0.1)
+                        ]
+                    )
+                ),
+            ),
+            "J9",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_used_is_refused(call: object, message: str) -> None:
     with pytest.raises(truing.InputError, match=message):
         call(truing.InverseSolver(irb()))  # type: ignore[operator]

@@ -30,19 +30,35 @@ QUARTER = math.pi / 2
 
 def six_axis(lower: float = -math.inf, upper: float = math.inf) -> _core.Robot:
     """An arm of 0.9 m reach with three targets."""
-    table = [(0.29, 0.0, -QUARTER), (0.0, 0.27, 0.0), (0.0, 0.07, -QUARTER), (0.302, 0.0, QUARTER), (0.0, 0.0, -QUARTER), (0.072, 0.0, 0.0)]
-    joints = [_core.Joint(f"J{i}", d=d, a=a, alpha=alpha, lower=lower, upper=upper) for i, (d, a, alpha) in enumerate(table, 1)]
-    targets = [_core.Target(name, _core.frame_from_xyz_rpy([x, 0.02, 0.1], [0, 0, 0])) for name, x in (("tool", 0.1), ("p1", 0.0), ("p2", -0.1))]
+    table = [
+        (0.29, 0.0, -QUARTER),
+        (0.0, 0.27, 0.0),
+        (0.0, 0.07, -QUARTER),
+        (0.302, 0.0, QUARTER),
+        (0.0, 0.0, -QUARTER),
+        (0.072, 0.0, 0.0),
+    ]
+    joints = [
+        _core.Joint(f"J{i}", d=d, a=a, alpha=alpha, lower=lower, upper=upper)
+        for i, (d, a, alpha) in enumerate(table, 1)
+    ]
+    targets = [
+        _core.Target(name, _core.frame_from_xyz_rpy([x, 0.02, 0.1], [0, 0, 0]))
+        for name, x in (("tool", 0.1), ("p1", 0.0), ("p2", -0.1))
+    ]
     return _core.Robot("arm", joints=joints, targets=targets)
 
 
 def rail() -> _core.Robot:
     """A prismatic joint, a revolute one, and a passive one between."""
-    return _core.Robot("rail", joints=[
-        _core.Joint("lift", type="prismatic", d=0.3),
-        _core.Joint("passive", a=0.2, driven_by={"turn": -1.0}),
-        _core.Joint("turn", a=0.4),
-    ])  # fmt: skip
+    return _core.Robot(
+        "rail",
+        joints=[
+            _core.Joint("lift", type="prismatic", d=0.3),
+            _core.Joint("passive", a=0.2, driven_by={"turn": -1.0}),
+            _core.Joint("turn", a=0.4),
+        ],
+    )
 
 
 def measured(robot: _core.Robot, joints: Floats, target: int = 0) -> Floats:
@@ -84,7 +100,8 @@ def read(path: Path, robot: _core.Robot, **options: bool) -> Any:
     return load_measurements(path, robot, **options)
 
 
-# ---- What is read ----------------------------------------------------------------------------------------------------
+# ---- What is read
+# ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["data.csv", "data.parquet"])
@@ -102,18 +119,30 @@ def test_every_column_arrives_in_si(tmp_path: Path, name: str) -> None:
         columns[f"tau{number}_Nm"] = random.normal(size=ROWS)
     columns |= dict(zip(("qw", "qx", "qy", "qz"), quaternions.T, strict=True))
     columns |= {
-        "payload_kg": np.full(ROWS, 2.5), "temp_C": random.normal(20, 1, ROWS), "t_s": np.arange(ROWS) * 0.5, "pose": np.arange(ROWS) // 2,
-        "target": ["p1", None, "p2", "tool"] * (ROWS // 4), "set": ["train", "test"] * (ROWS // 2), "sigma_mm": np.full(ROWS, 0.05),
-        "sigma_deg": np.full(ROWS, 0.1), "weight": np.linspace(0, 1, ROWS), "humidity": np.linspace(40, 50, ROWS),
-        "std_x_mm": np.ones(ROWS), "u95_m": np.full(ROWS, 1e-5), "u95_x_m": np.full(ROWS, 1e-5), "empty": np.full(ROWS, np.nan),
-    }  # fmt: skip
+        "payload_kg": np.full(ROWS, 2.5),
+        "temp_C": random.normal(20, 1, ROWS),
+        "t_s": np.arange(ROWS) * 0.5,
+        "pose": np.arange(ROWS) // 2,
+        "target": ["p1", None, "p2", "tool"] * (ROWS // 4),
+        "set": ["train", "test"] * (ROWS // 2),
+        "sigma_mm": np.full(ROWS, 0.05),
+        "sigma_deg": np.full(ROWS, 0.1),
+        "weight": np.linspace(0, 1, ROWS),
+        "humidity": np.linspace(40, 50, ROWS),
+        "std_x_mm": np.ones(ROWS),
+        "u95_m": np.full(ROWS, 1e-5),
+        "u95_x_m": np.full(ROWS, 1e-5),
+        "empty": np.full(ROWS, np.nan),
+    }
     data = read(write(tmp_path, columns, name), robot)
 
     assert data.rows == ROWS
     assert np.array_equal(data.joints, np.column_stack([columns[f"q{number}_rad"] for number in range(1, 7)]))
     assert np.array_equal(data.positions, np.column_stack([columns[axis] for axis in ("x_m", "y_m", "z_m")]))
     assert np.array_equal(data.orientations, quaternions, equal_nan=True)
-    assert np.array_equal(data.directions, np.column_stack([columns[f"dir{number}"] for number in range(1, 7)]))
+    assert np.array_equal(
+        data.directions, np.column_stack([columns[f"dir{number}"] for number in range(1, 7)])
+    )
     np.testing.assert_allclose(data.joint_speeds[:, 2], np.radians(columns["qd3_deg_s"]))
     assert np.array_equal(data.payload, columns["payload_kg"])
     assert np.array_equal(data.temperature, columns["temp_C"])
@@ -124,14 +153,24 @@ def test_every_column_arrives_in_si(tmp_path: Path, name: str) -> None:
     np.testing.assert_allclose(data.position_sigma, 5e-5)
     np.testing.assert_allclose(data.rotation_sigma, np.radians(0.1))
     assert np.array_equal(data.weight, columns["weight"])
-    names = {f"{stem}{number}_{unit}" for number in range(1, 7) for stem, unit in (("qr", "rad"), ("qd", "rad_s"), ("tau", "Nm"))}
+    names = {
+        f"{stem}{number}_{unit}"
+        for number in range(1, 7)
+        for stem, unit in (("qr", "rad"), ("qd", "rad_s"), ("tau", "Nm"))
+    }
     assert set(data.covariates) == names | {"humidity", "std_x_mm", "u95_m", "u95_x_m", "empty"}
     np.testing.assert_allclose(data.covariates["qr2_rad"], columns["q2_rad"])
     assert np.isnan(data.covariates["empty"]).all()
 
 
 def test_prismatic_and_passive_joints(tmp_path: Path) -> None:
-    columns = {"q1_mm": [100.0, 250.0], "q2_deg": [0.0, 90.0], "x_mm": [1.0, 2.0], "y_mm": [1.0, 2.0], "z_mm": [1.0, 290.0]}
+    columns = {
+        "q1_mm": [100.0, 250.0],
+        "q2_deg": [0.0, 90.0],
+        "x_mm": [1.0, 2.0],
+        "y_mm": [1.0, 2.0],
+        "z_mm": [1.0, 290.0],
+    }
     data = read(write(tmp_path, columns), rail())
     assert data.joints.tolist() == [[0.1, 0.0], [0.25, math.pi / 2]]
     assert data.positions[1].tolist() == [0.002, 0.002, 0.29]  # the nearest doubles
@@ -149,7 +188,12 @@ def test_units_may_differ_between_columns(tmp_path: Path) -> None:
 
 
 def test_distances_and_fixed_points_share_a_file(tmp_path: Path) -> None:
-    columns = {"q1_m": [0.1, 0.2, 0.3], "q2_rad": [0, 1, 2], "dist_mm": [500.0, None, np.nan], "fixed_point": [None, "cone", "plate"]}
+    columns = {
+        "q1_m": [0.1, 0.2, 0.3],
+        "q2_rad": [0, 1, 2],
+        "dist_mm": [500.0, None, np.nan],
+        "fixed_point": [None, "cone", "plate"],
+    }
     columns["dist_mm"] = np.array([500.0, np.nan, np.nan])
     data = read(write(tmp_path, columns), rail())
     assert data.distances[0] == 0.5
@@ -158,13 +202,18 @@ def test_distances_and_fixed_points_share_a_file(tmp_path: Path) -> None:
     assert data.fixed_point_names == ("cone", "plate")
 
 
-@pytest.mark.parametrize("change", [
-    lambda text: b"\xef\xbb\xbf" + text,
-    lambda text: text.replace(b"\n", b"\r\n"),
-    lambda text: text.replace(b",", b" , "),
-    lambda text: text.replace(b"\n", b"\n\n", 3)[:-1],
-    lambda text: b",".join(b'"%s"' % name for name in text.split(b"\n")[0].split(b",")) + text[text.index(b"\n") :],
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: b"\xef\xbb\xbf" + text,
+        lambda text: text.replace(b"\n", b"\r\n"),
+        lambda text: text.replace(b",", b" , "),
+        lambda text: text.replace(b"\n", b"\n\n", 3)[:-1],
+        lambda text: (
+            b",".join(b'"%s"' % name for name in text.split(b"\n")[0].split(b",")) + text[text.index(b"\n") :]
+        ),
+    ],
+)
 def test_how_the_text_was_saved_does_not_matter(tmp_path: Path, change: Callable[[bytes], bytes]) -> None:
     robot = six_axis()
     columns = table(robot) | {"target": ["p1"] * ROWS, "set": ["train"] * ROWS}
@@ -172,7 +221,9 @@ def test_how_the_text_was_saved_does_not_matter(tmp_path: Path, change: Callable
     plain = read(path, robot)
     first, rest = path.read_bytes().split(b"\n", 1)
     changed = change(first + b"\n" + rest)
-    if changed.startswith(b"q1_rad,") and b"\n\n" in changed:  # a blank line is passed over below the names, not above
+    if (
+        changed.startswith(b"q1_rad,") and b"\n\n" in changed
+    ):  # a blank line is passed over below the names, not above
         changed = changed.replace(b"\n\n", b"\n", 1)
     path.write_bytes(changed)
     data = read(path, robot)
@@ -182,9 +233,13 @@ def test_how_the_text_was_saved_does_not_matter(tmp_path: Path, change: Callable
 
 def test_rows_without_measurements_can_be_asked_for(tmp_path: Path) -> None:
     robot = six_axis()
-    columns = {name: values for name, values in table(robot).items() if name.startswith("q")} | {"temp_C": np.full(ROWS, 20.0)}
+    columns = {name: values for name, values in table(robot).items() if name.startswith("q")} | {
+        "temp_C": np.full(ROWS, 20.0)
+    }
     path = write(tmp_path, columns)
-    with pytest.raises(InputError, match="nothing is measured: expected the columns x_m y_m z_m, or dist_m, or fixed_point"):
+    with pytest.raises(
+        InputError, match="nothing is measured: expected the columns x_m y_m z_m, or dist_m, or fixed_point"
+    ):
         read(path, robot)
     data = read(path, robot, joints_only=True)
     assert (data.rows, data.positions) == (ROWS, None)
@@ -203,7 +258,8 @@ def test_incomplete_joint_speeds_are_covariates(tmp_path: Path) -> None:
     assert list(data.covariates) == ["qd1_rad_s"]
 
 
-# ---- What is written -------------------------------------------------------------------------------------------------
+# ---- What is written
+# -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["data.csv", "data.parquet"])
@@ -214,16 +270,40 @@ def test_saved_measurements_load_bit_for_bit(tmp_path: Path, name: str) -> None:
     quaternions = random.normal(size=(ROWS, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
     data = _core.Measurements(
-        joints, positions=measured(robot, joints), orientations=quaternions, targets=random.integers(0, 3, ROWS),
-        directions=random.integers(-1, 2, (ROWS, 6)), joint_speeds=random.normal(size=(ROWS, 6)), payload=random.uniform(0, 5, ROWS),
-        temperature=random.normal(size=ROWS), time=random.normal(size=ROWS), pose=random.integers(0, 9, ROWS),
-        set=random.integers(0, 2, ROWS), position_sigma=np.full(ROWS, 1e-5), rotation_sigma=np.full(ROWS, 1e-4),
-        weight=random.uniform(0, 1, ROWS), covariates={"u1_rad": random.normal(size=ROWS), "strange name": random.normal(size=ROWS)},
-    )  # fmt: skip
+        joints,
+        positions=measured(robot, joints),
+        orientations=quaternions,
+        targets=random.integers(0, 3, ROWS),
+        directions=random.integers(-1, 2, (ROWS, 6)),
+        joint_speeds=random.normal(size=(ROWS, 6)),
+        payload=random.uniform(0, 5, ROWS),
+        temperature=random.normal(size=ROWS),
+        time=random.normal(size=ROWS),
+        pose=random.integers(0, 9, ROWS),
+        set=random.integers(0, 2, ROWS),
+        position_sigma=np.full(ROWS, 1e-5),
+        rotation_sigma=np.full(ROWS, 1e-4),
+        weight=random.uniform(0, 1, ROWS),
+        covariates={"u1_rad": random.normal(size=ROWS), "strange name": random.normal(size=ROWS)},
+    )
     save_measurements(tmp_path / name, data, robot)
     again = read(tmp_path / name, robot)
-    for field in ("joints", "positions", "orientations", "targets", "directions", "joint_speeds", "payload", "temperature", "time",
-                  "pose", "set", "position_sigma", "rotation_sigma", "weight"):  # fmt: skip
+    for field in (
+        "joints",
+        "positions",
+        "orientations",
+        "targets",
+        "directions",
+        "joint_speeds",
+        "payload",
+        "temperature",
+        "time",
+        "pose",
+        "set",
+        "position_sigma",
+        "rotation_sigma",
+        "weight",
+    ):
         assert np.array_equal(getattr(again, field), getattr(data, field)), field
     for covariate in data.covariates:
         assert np.array_equal(again.covariates[covariate], data.covariates[covariate])
@@ -241,7 +321,9 @@ def test_saved_in_other_units(tmp_path: Path) -> None:
 
 
 def test_touched_points_survive(tmp_path: Path) -> None:
-    data = _core.Measurements(np.zeros((3, 2)), fixed_points=["cone", None, "plate"], distances=np.array([np.nan, 0.5, np.nan]))
+    data = _core.Measurements(
+        np.zeros((3, 2)), fixed_points=["cone", None, "plate"], distances=np.array([np.nan, 0.5, np.nan])
+    )
     save_measurements(tmp_path / "data.csv", data, rail())
     again = read(tmp_path / "data.csv", rail())
     assert again.fixed_points.tolist() == [0, -1, 1]
@@ -257,7 +339,8 @@ def test_a_covariate_must_not_pass_for_something_else(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-# ---- What is refused -------------------------------------------------------------------------------------------------
+# ---- What is refused
+# -------------------------------------------------------------------------------------------------
 
 
 def renamed(old: str, new: str) -> Callable[[Columns], Any]:
@@ -291,51 +374,120 @@ def without(name: str) -> Callable[[Columns], Any]:
 WRONG_NAMES: dict[str, tuple[Callable[[Columns], Any], str]] = {
     "unknown length unit": (renamed("x_m", "x_cm"), "column 'x_cm': unknown unit 'cm', expected x_m or x_mm"),
     "no length unit": (renamed("x_m", "x"), "column 'x': no unit, expected x_m or x_mm"),
-    "unknown joint unit": (renamed("q1_rad", "q1_foo"), "column 'q1_foo': unknown unit 'foo', expected q1_rad or q1_deg or q1_m"),
+    "unknown joint unit": (
+        renamed("q1_rad", "q1_foo"),
+        "column 'q1_foo': unknown unit 'foo', expected q1_rad or q1_deg or q1_m",
+    ),
     "no joint unit": (renamed("q1_rad", "q1"), "column 'q1': no unit, expected q1_rad"),
-    "unknown distance unit": (renamed("x_m", "dist_ft"), "column 'dist_ft': unknown unit 'ft', expected dist_m or dist_mm"),
-    "unknown temperature unit": (added(temp_K=np.ones(ROWS)), "column 'temp_K': unknown unit 'K', expected temp_C"),
+    "unknown distance unit": (
+        renamed("x_m", "dist_ft"),
+        "column 'dist_ft': unknown unit 'ft', expected dist_m or dist_mm",
+    ),
+    "unknown temperature unit": (
+        added(temp_K=np.ones(ROWS)),
+        "column 'temp_K': unknown unit 'K', expected temp_C",
+    ),
     "unknown time unit": (added(t_ms=np.ones(ROWS)), "column 't_ms': unknown unit 'ms', expected t_s"),
-    "unknown torque unit": (added(tau1_kNm=np.ones(ROWS)), "column 'tau1_kNm': unknown unit 'kNm', expected tau1_Nm or tau1_N"),
-    "unknown speed unit": (added(qd1_rad=np.ones(ROWS)), "column 'qd1_rad': unknown unit 'rad', expected qd1_rad_s"),
+    "unknown torque unit": (
+        added(tau1_kNm=np.ones(ROWS)),
+        "column 'tau1_kNm': unknown unit 'kNm', expected tau1_Nm or tau1_N",
+    ),
+    "unknown speed unit": (
+        added(qd1_rad=np.ones(ROWS)),
+        "column 'qd1_rad': unknown unit 'rad', expected qd1_rad_s",
+    ),
     "direction with a unit": (added(dir1_rad=np.ones(ROWS)), "column 'dir1_rad': a direction has no unit"),
-    "length for a revolute joint": (renamed("q1_rad", "q1_mm"), "column 'q1_mm': joint 'J1' is revolute, expected q1_rad or q1_deg"),
+    "length for a revolute joint": (
+        renamed("q1_rad", "q1_mm"),
+        "column 'q1_mm': joint 'J1' is revolute, expected q1_rad or q1_deg",
+    ),
     "missing joint": (without("q3_rad"), "no column q3_rad or q3_deg for joint 'J3'"),
     "joint in capitals": (renamed("q3_rad", "Q3_rad"), "no column q3_rad .* did you mean 'Q3_rad'"),
-    "one joint too many": (added(q7_rad=np.ones(ROWS)), "column 'q7_rad': the robot has 6 driven joints: J1, J2"),
+    "one joint too many": (
+        added(q7_rad=np.ones(ROWS)),
+        "column 'q7_rad': the robot has 6 driven joints: J1, J2",
+    ),
     "joint twice": (added(q1_deg=np.ones(ROWS)), "column 'q1_deg': column 'q1_rad' is there too"),
     "position twice": (added(x_mm=np.ones(ROWS)), "column 'x_mm': column 'x_m' is there too"),
-    "record twice": (added(qr1_deg=np.ones(ROWS), qr1_rad=np.ones(ROWS)), "column 'qr1_rad': column 'qr1_deg' is there too"),
-    "two coordinates": (without("z_m"), "there is x_m but no column z_m or z_mm: a position has three coordinates"),
+    "record twice": (
+        added(qr1_deg=np.ones(ROWS), qr1_rad=np.ones(ROWS)),
+        "column 'qr1_rad': column 'qr1_deg' is there too",
+    ),
+    "two coordinates": (
+        without("z_m"),
+        "there is x_m but no column z_m or z_mm: a position has three coordinates",
+    ),
     "half a quaternion": (added(qw=np.ones(ROWS)), "there is qw but no column qx"),
-    "one direction": (added(dir2=np.ones(ROWS)), "there is dir2 but no column dir1: .* 0 where it is not known"),
+    "one direction": (
+        added(dir2=np.ones(ROWS)),
+        "there is dir2 but no column dir1: .* 0 where it is not known",
+    ),
     "nothing measured": (lambda columns: [columns.pop(f"{axis}_m") for axis in "xyz"], "nothing is measured"),
     "blank name": (added(**{"": np.ones(ROWS)}), "line 1: column 10 has no name"),
-}  # fmt: skip
+}
 
 WRONG_CELLS: dict[str, tuple[Callable[[Columns], Any], str]] = {
     # Row 7 stands in line 9.
-    "empty joint": (put("q3_rad", 7, ""), "line 9, column 'q3_rad': found an empty cell, expected a finite number"),
+    "empty joint": (
+        put("q3_rad", 7, ""),
+        "line 9, column 'q3_rad': found an empty cell, expected a finite number",
+    ),
     "NaN joint": (put("q3_rad", 7, "nan"), "line 9, column 'q3_rad': found 'nan', expected a finite number"),
-    "infinite joint": (put("q3_rad", 7, "inf"), "line 9, column 'q3_rad': found 'inf', expected a finite number"),
-    "huge joint": (put("q3_rad", 7, "1e999"), "line 9, column 'q3_rad': found '1e999', expected a finite number"),
+    "infinite joint": (
+        put("q3_rad", 7, "inf"),
+        "line 9, column 'q3_rad': found 'inf', expected a finite number",
+    ),
+    "huge joint": (
+        put("q3_rad", 7, "1e999"),
+        "line 9, column 'q3_rad': found '1e999', expected a finite number",
+    ),
     "text in a joint": (put("q3_rad", 7, "abc"), "line 9, column 'q3_rad': found 'abc', expected a number"),
-    "half a position": (put("y_m", 7, ""), "line 9, column 'y_m': found an empty cell, expected a coordinate"),
+    "half a position": (
+        put("y_m", 7, ""),
+        "line 9, column 'y_m': found an empty cell, expected a coordinate",
+    ),
     "NaN position": (put("y_m", 7, "NaN"), "line 9, column 'y_m': found 'NaN', expected a finite number"),
-    "infinite position": (put("y_m", 7, "-inf"), "line 9, column 'y_m': found '-inf', expected a finite number"),
-    "decimal comma": (put("y_m", 7, '"0,5"'), "line 9, column 'y_m': found '0,5', expected a number with a point"),
-    "NaN temperature": (put("temp_C", 7, ""), "line 9, column 'temp_C': found an empty cell, expected a finite number"),
-    "negative payload": (put("payload_kg", 7, "-1"), "line 9, column 'payload_kg': found '-1', expected a mass of zero or more"),
-    "sigma of zero": (put("sigma_m", 7, "0"), "column 'sigma_m': found '0', expected a standard deviation above zero"),
-    "negative weight": (put("weight", 7, "-0.5"), "line 9, column 'weight': found '-0.5', expected a weight of zero or more"),
-    "half a pose number": (put("pose", 7, "1.5"), "line 9, column 'pose': found '1.5', expected the number of a pose"),
+    "infinite position": (
+        put("y_m", 7, "-inf"),
+        "line 9, column 'y_m': found '-inf', expected a finite number",
+    ),
+    "decimal comma": (
+        put("y_m", 7, '"0,5"'),
+        "line 9, column 'y_m': found '0,5', expected a number with a point",
+    ),
+    "NaN temperature": (
+        put("temp_C", 7, ""),
+        "line 9, column 'temp_C': found an empty cell, expected a finite number",
+    ),
+    "negative payload": (
+        put("payload_kg", 7, "-1"),
+        "line 9, column 'payload_kg': found '-1', expected a mass of zero or more",
+    ),
+    "sigma of zero": (
+        put("sigma_m", 7, "0"),
+        "column 'sigma_m': found '0', expected a standard deviation above zero",
+    ),
+    "negative weight": (
+        put("weight", 7, "-0.5"),
+        "line 9, column 'weight': found '-0.5', expected a weight of zero or more",
+    ),
+    "half a pose number": (
+        put("pose", 7, "1.5"),
+        "line 9, column 'pose': found '1.5', expected the number of a pose",
+    ),
     "pose with a name": (put("pose", 7, "A7"), "line 9, column 'pose': found 'A7', expected a number"),
-    "unknown target": (put("target", 7, "smr9"), "column 'target': the robot has no target '0'; its targets are tool, p1, p2"),
+    "unknown target": (
+        put("target", 7, "smr9"),
+        "column 'target': the robot has no target '0'; its targets are tool, p1, p2",
+    ),
     "unknown set": (put("set", 7, "validate"), "line 2, column 'set': found '0', expected train or test"),
-    "text column": (put("operator", 7, "Jane"), "line 9, column 'operator': found 'Jane', expected a number: an unknown column"),
+    "text column": (
+        put("operator", 7, "Jane"),
+        "line 9, column 'operator': found 'Jane', expected a number: an unknown column",
+    ),
     "too few cells": (put("z_m", 7, "cut here"), "line 9: found 8 cells, expected 9"),
     "too many cells": (put("z_m", 7, "1,2"), "line 9: found 10 cells, expected 9"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", WRONG_NAMES)
@@ -359,7 +511,10 @@ def test_wrong_cells_are_named_with_line_and_column(tmp_path: Path, case: str) -
     robot = six_axis()
     columns = table(robot)
     change(columns)
-    rows = [",".join(columns), *(",".join(str(cell) for cell in row) for row in zip(*columns.values(), strict=True))]
+    rows = [
+        ",".join(columns),
+        *(",".join(str(cell) for cell in row) for row in zip(*columns.values(), strict=True)),
+    ]
     text = "\n".join(rows) + "\n"
     with pytest.raises(InputError, match=message) as error:
         read(write_text(tmp_path, text.replace(",cut here", "")), robot)
@@ -385,7 +540,10 @@ def test_a_fault_far_down_a_long_file_is_found(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("quaternion", "message"),
     [
-        ((1.0, 0.1, 0.0, 0.0), r"line 9: found the quaternion 1 0.1 0 0, of length 1.00499; expected a unit quaternion"),
+        (
+            (1.0, 0.1, 0.0, 0.0),
+            r"line 9: found the quaternion 1 0.1 0 0, of length 1.00499; expected a unit quaternion",
+        ),
         ((0.0, 0.0, 0.0, 0.0), "of length 0"),
         ((1.0, np.nan, 0.0, 0.0), "which is incomplete"),
         ((np.inf, 0.0, 0.0, 0.0), "which is incomplete"),
@@ -393,7 +551,12 @@ def test_a_fault_far_down_a_long_file_is_found(tmp_path: Path) -> None:
 )
 def test_quaternions_are_of_unit_length(tmp_path: Path, quaternion: tuple[float, ...], message: str) -> None:
     robot = six_axis()
-    columns = table(robot) | {"qw": np.ones(ROWS), "qx": np.zeros(ROWS), "qy": np.zeros(ROWS), "qz": np.zeros(ROWS)}
+    columns = table(robot) | {
+        "qw": np.ones(ROWS),
+        "qx": np.zeros(ROWS),
+        "qy": np.zeros(ROWS),
+        "qz": np.zeros(ROWS),
+    }
     read(write(tmp_path, columns), robot)
     for name, value in zip(("qw", "qx", "qy", "qz"), quaternion, strict=True):
         columns[name][7] = value
@@ -406,7 +569,9 @@ def test_every_row_needs_a_measurement(tmp_path: Path) -> None:
     columns = table(robot)
     for axis in "xyz":
         columns[f"{axis}_m"][7] = np.nan
-    with pytest.raises(InputError, match="line 9: nothing is measured: found empty cells, expected values in x_m, y_m, z_m"):
+    with pytest.raises(
+        InputError, match="line 9: nothing is measured: found empty cells, expected values in x_m, y_m, z_m"
+    ):
         read(write(tmp_path, columns), robot)
     columns["dist_m"] = np.where(np.arange(ROWS) == 7, 0.4, np.nan)
     read(write(tmp_path, columns), robot)
@@ -460,12 +625,17 @@ def test_parquet_columns_of_other_types_are_refused(tmp_path: Path) -> None:
         pa.parquet.write_table(pa.table(columns | {name: values}), tmp_path / "data.parquet")
         with pytest.raises(InputError, match=message):
             read(tmp_path / "data.parquet", rail())
-    pa.parquet.write_table(pa.table({"q1_m": [0, 1], "q2_rad": [None, 1], "dist_m": [1.0, 1.0]}), tmp_path / "data.parquet")
-    with pytest.raises(InputError, match="row 1, column 'q2_rad': found an empty cell, expected a finite number"):
+    pa.parquet.write_table(
+        pa.table({"q1_m": [0, 1], "q2_rad": [None, 1], "dist_m": [1.0, 1.0]}), tmp_path / "data.parquet"
+    )
+    with pytest.raises(
+        InputError, match="row 1, column 'q2_rad': found an empty cell, expected a finite number"
+    ):
         read(tmp_path / "data.parquet", rail())
 
 
-# ---- Suspicions ------------------------------------------------------------------------------------------------------
+# ---- Suspicions
+# ------------------------------------------------------------------------------------------------------
 
 
 def scaled(factor: float, *names: str) -> Callable[[Columns], Any]:
@@ -529,14 +699,23 @@ def test_millimetres_in_a_column_of_distances(tmp_path: Path) -> None:
         read(write(tmp_path, columns), robot)
 
 
-@pytest.mark.parametrize(("column", "word"), [("q1_rad", "radians"), ("q3_rad", "radians"), ("q2_deg", "degrees")])
-def test_one_column_in_another_angle_unit_is_found_by_where_the_robot_was(tmp_path: Path, column: str, word: str) -> None:
+@pytest.mark.parametrize(
+    ("column", "word"), [("q1_rad", "radians"), ("q3_rad", "radians"), ("q2_deg", "degrees")]
+)
+def test_one_column_in_another_angle_unit_is_found_by_where_the_robot_was(
+    tmp_path: Path, column: str, word: str
+) -> None:
     robot = six_axis()
     columns = table(robot)
     if word == "radians":  # called degrees, but radians
-        columns = {(name.replace("_rad", "_deg") if name == column else name): values for name, values in columns.items()}
+        columns = {
+            (name.replace("_rad", "_deg") if name == column else name): values
+            for name, values in columns.items()
+        }
     else:
-        columns = {name: (np.degrees(values) if name == "q2_rad" else values) for name, values in columns.items()}
+        columns = {
+            name: np.degrees(values) if name == "q2_rad" else values for name, values in columns.items()
+        }
     with pytest.raises(InputError, match=f"{column[:2]}.* look like {word}"):
         read(write(tmp_path, columns), robot)
 
@@ -565,12 +744,15 @@ def test_one_point_touched_from_all_sides_is_believed(tmp_path: Path) -> None:
     read(write(tmp_path, columns), robot)
 
 
-@pytest.mark.parametrize("change", [
-    scaled(4.0, *JOINTS),  # up to 6 rad
-    scaled(60.0, "q6_rad"),  # a turntable that counts its turns
-    lambda columns: columns["x_m"].__setitem__(slice(0, 3), 1e4),  # gross outliers are not a unit
-    lambda columns: columns.update(q1_rad=np.zeros(ROWS)),  # a joint that stands still
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change",
+    [
+        scaled(4.0, *JOINTS),  # up to 6 rad
+        scaled(60.0, "q6_rad"),  # a turntable that counts its turns
+        lambda columns: columns["x_m"].__setitem__(slice(0, 3), 1e4),  # gross outliers are not a unit
+        lambda columns: columns.update(q1_rad=np.zeros(ROWS)),  # a joint that stands still
+    ],
+)
 def test_odd_data_are_believed(tmp_path: Path, change: Callable[[Columns], Any]) -> None:
     columns = table(six_axis())
     change(columns)
@@ -583,12 +765,16 @@ def test_a_joint_beyond_its_limits_is_a_warning(tmp_path: Path) -> None:
     columns["q2_rad"][7] = 1.5009  # within 1e-3
     read(write(tmp_path, columns), robot)
     columns["q2_rad"][7] = 1.6
-    with pytest.warns(InputWarning, match=r"line 9, column 'q2_rad': joint 'J2' is at 1.6 rad, beyond its limits -1.5 to 1.5") as found:
+    with pytest.warns(
+        InputWarning,
+        match=r"line 9, column 'q2_rad': joint 'J2' is at 1.6 rad, beyond its limits -1.5 to 1.5",
+    ) as found:
         read(write(tmp_path, columns), robot)
     assert found[0].filename == __file__
 
 
-# ---- Recorded data ---------------------------------------------------------------------------------------------------
+# ---- Recorded data
+# ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.realdata

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recorded measurements of real robots: as good as the baseline on held-out poses, and not taken in by what is wrong with them.
+"""Recorded measurements of real robots: as good as the baseline on held-out poses, and not taken in by what
+is wrong with them.
 
-The recordings are not part of the repository (docs/real-data.md says where they are from). Set TRUING_REALDATA to their folder.
+The recordings are not part of the repository (docs/real-data.md says where they are from). Set
+TRUING_REALDATA to their folder.
 """
 
 from __future__ import annotations
@@ -36,11 +38,16 @@ pytestmark = [
 
 SLACK = 1.02
 
-# Where the default loss stays behind a baseline that fits the outliers as well, as measured: {name: (mean, p95) in mm}.
-# Both have outliers in the test part too, and a model that does not bend towards those of the training part misses them by more.
+# Where the default loss stays behind a baseline that fits the outliers as well, as measured: {name: (mean,
+# p95) in mm}.
+# Both have outliers in the test part too, and a model that does not bend towards those of the training part
+# misses them by more.
 BEHIND_BY_DEFAULT = {
     "IRB 120, tracker, recorded joints": (0.492, 1.328),  # baseline 0.489, 1.299
-    "IRB 120, draw-wire": (0.897, 4.114),  # baseline 1.081, 3.019: mean and median are better, the shifted block shows
+    "IRB 120, draw-wire": (
+        0.897,
+        4.114,
+    ),  # baseline 1.081, 3.019: mean and median are better, the shifted block shows
 }
 
 
@@ -68,7 +75,8 @@ def warned(found: truing.Identification, words: str) -> bool:
     return any(words in warning for warning in found.warnings)
 
 
-# ---- Figures ---------------------------------------------------------------------------------------------------------
+# ---- Figures
+# ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("loss", ["none", "reject"])
@@ -81,7 +89,10 @@ def test_held_out_errors_are_those_of_the_baseline(recording: Any, loss: str) ->
         return
     mean, p95 = SLACK * recording.after.mean, SLACK * recording.after.p95
     if loss == "reject" and recording.name in BEHIND_BY_DEFAULT:
-        mean, p95 = (max(1.005 * measured, bound) for measured, bound in zip(BEHIND_BY_DEFAULT[recording.name], (mean, p95), strict=True))
+        mean, p95 = (
+            max(1.005 * measured, bound)
+            for measured, bound in zip(BEHIND_BY_DEFAULT[recording.name], (mean, p95), strict=True)
+        )
     assert after.mean <= mean and after.p95 <= p95
     if not math.isnan(recording.after.rotation):
         assert after.rotation <= SLACK * recording.after.rotation
@@ -97,7 +108,8 @@ def test_nominal_robot_with_fitted_frames_has_the_published_errors(recording: An
             assert getattr(before, key) == pytest.approx(published, rel=3e-3), key
 
 
-# ---- Traps -----------------------------------------------------------------------------------------------------------
+# ---- Traps
+# -----------------------------------------------------------------------------------------------------------
 
 
 def test_irb120_poses_where_the_arm_was_elsewhere_are_found() -> None:
@@ -108,15 +120,20 @@ def test_irb120_poses_where_the_arm_was_elsewhere_are_found() -> None:
     error = lengths(found.robot, data)
     outliers = {int(p) for p in np.unique(pose[error > 0.7])}
     assert len(outliers) == 19 and outliers >= {73, 180, 211, 353, 356, 393}
-    assert {int(pose[row]) for row in found.rejected_rows} == {p for p in outliers if not test[pose == p].any()}
+    assert {int(pose[row]) for row in found.rejected_rows} == {
+        p for p in outliers if not test[pose == p].any()
+    }
     assert warned(found, f"{len(found.rejected_rows)} training rows left out as gross outliers")
     assert not test[list(found.rejected_rows)].any()
-    # The model is better for it: without the ten bad poses of the test part it is below what the baseline has with or without.
+    # The model is better for it: without the ten bad poses of the test part it is below what the baseline has
+    # with or without.
     assert np.mean(error[test & ~np.isin(pose, list(outliers))]) < 0.16
 
 
 def test_irb120_recorded_joints_are_the_worse_ones() -> None:
-    commanded, recorded = (fitted(f"IRB 120, tracker, {which} joints", "none") for which in ("commanded", "recorded"))
+    commanded, recorded = (
+        fitted(f"IRB 120, tracker, {which} joints", "none") for which in ("commanded", "recorded")
+    )
     assert commanded.test is not None and recorded.test is not None
     assert recorded.test.after.mean > 2.0 * commanded.test.after.mean
 
@@ -155,8 +172,12 @@ def test_talos_warns_of_too_many_parameters_and_fewer_are_better() -> None:
     found = fitted(name, "none")
     assert found.rank == 39 and warned(found, "the data cannot support this many parameters")
     # The choice is made on training rows alone; that it helps is seen on the others.
-    assert real_data.cross_validated_rms(robot, data, True) < 0.97 * real_data.cross_validated_rms(robot, data, False)
-    fewer = truing.identify(robot, data, loss="none", hold=real_data.hold_what_is_barely_seen(robot, data, loss="none"))
+    assert real_data.cross_validated_rms(robot, data, True) < 0.97 * real_data.cross_validated_rms(
+        robot, data, False
+    )
+    fewer = truing.identify(
+        robot, data, loss="none", hold=real_data.hold_what_is_barely_seen(robot, data, loss="none")
+    )
     before, after = (real_data.on_test(result)[1] for result in (found, fewer))
     assert after.rms < before.rms and after.mean < before.mean and after.p95 < before.p95
     baseline = next(r for r in real_data.RECORDINGS if r.name == name).after
@@ -174,7 +195,9 @@ def test_talos_urdf_and_link_table_are_the_same_arm() -> None:
     b = np.array([truing.forward_kinematics(urdf, row)[-1] for row in q])
     # b = F a T. Motions from the first pose: (T^-1 m T = n), so T turns the axes of n into those of m.
     m, n = np.linalg.inv(a[0]) @ a[1:], np.linalg.inv(b[0]) @ b[1:]
-    turn = Rotation.align_vectors(Rotation.from_matrix(m[:, :3, :3]).as_rotvec(), Rotation.from_matrix(n[:, :3, :3]).as_rotvec())[0].as_matrix()
+    turn = Rotation.align_vectors(
+        Rotation.from_matrix(m[:, :3, :3]).as_rotvec(), Rotation.from_matrix(n[:, :3, :3]).as_rotvec()
+    )[0].as_matrix()
     left = (m[:, :3, :3] - np.eye(3)).reshape(-1, 3)
     shift = np.linalg.lstsq(left, (n[:, :3, 3] @ turn.T - m[:, :3, 3]).ravel(), rcond=None)[0]
     behind = np.eye(4)
@@ -186,7 +209,11 @@ def test_talos_urdf_and_link_table_are_the_same_arm() -> None:
 
 def test_touched_points_large_joint_zeros_are_found() -> None:
     found = fitted("IRB 120, touched points", "reject")
-    moved = {p.name: math.degrees(p.value - p.nominal) for p in found.parameters if p.unit == "rad" and not p.frozen}
+    moved = {
+        p.name: math.degrees(p.value - p.nominal)
+        for p in found.parameters
+        if p.unit == "rad" and not p.frozen
+    }
     assert moved["J2.theta"] == pytest.approx(-1.4, abs=0.2)
     assert moved["J4.theta"] == pytest.approx(-2.1, abs=0.2)
     assert moved["J5.theta"] == pytest.approx(-1.1, abs=0.2)
@@ -213,7 +240,8 @@ def test_fr3_arm_and_camera_are_found_together_and_the_gap_is_said() -> None:
     name = "FR3, camera, seen at the camera"
     found = fitted(name, "reject")
     assert warned(found, "the data cannot support this many parameters")
-    # At the board, whose baseline minimises the error there (1.341, 1.075, 2.506 mm): ours is measured, not promised.
+    # At the board, whose baseline minimises the error there (1.341, 1.075, 2.506 mm): ours is measured, not
+    # promised.
     robot, data = loaded(name)
     test = np.asarray(data.set) == 1
     board = real_data.summary(real_data.at_the_board(found.robot, data)[test])

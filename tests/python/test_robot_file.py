@@ -99,7 +99,9 @@ def load(folder: Path, text: str | bytes) -> _core.Robot:
 
 
 def bits(values: Any) -> bytes:
-    return (np.asarray(values, dtype=float) + 0.0).tobytes()  # +0.0: the sign of a zero inside a rotation is no matter
+    return (
+        np.asarray(values, dtype=float) + 0.0
+    ).tobytes()  # +0.0: the sign of a zero inside a rotation is no matter
 
 
 def assert_same(found: _core.Robot, expected: _core.Robot) -> None:
@@ -110,7 +112,10 @@ def assert_same(found: _core.Robot, expected: _core.Robot) -> None:
     for a, b in zip(found.joints, expected.joints, strict=True):
         assert (a.name, a.type, a.mass, list(a.driven_by)) == (b.name, b.type, b.mass, list(b.driven_by))
         for field in ("theta", "d", "a", "alpha", "beta", "ratio", "offset", "lower", "upper"):
-            assert np.float64(getattr(a, field)).tobytes() == np.float64(getattr(b, field)).tobytes(), (a.name, field)
+            assert np.float64(getattr(a, field)).tobytes() == np.float64(getattr(b, field)).tobytes(), (
+                a.name,
+                field,
+            )
         for field in ("T_parent_joint", "axis", "center_of_mass"):
             assert bits(getattr(a, field)) == bits(getattr(b, field)), (a.name, field)
     assert [target.name for target in found.targets] == [target.name for target in expected.targets]
@@ -125,20 +130,30 @@ def assert_same(found: _core.Robot, expected: _core.Robot) -> None:
         assert found.anchor.zero == expected.anchor.zero
 
 
-# ---- What is read ----------------------------------------------------------------------------------------------------
+# ---- What is read
+# ----------------------------------------------------------------------------------------------------
 
 
 def test_every_key_arrives_in_si(tmp_path: Path) -> None:
     robot = load(tmp_path, PALLETIZER)
     assert (robot.name, robot.convention, robot.driven_count) == ("palletizer", "dh", 4)
     first, second, _, fourth, rail = robot.joints
-    assert (first.d, first.a, first.alpha, first.lower, first.upper, first.mass) == (0.7425, 0.26, -1.5708, -2.6, 2.6, 220.0)
+    assert (first.d, first.a, first.alpha, first.lower, first.upper, first.mass) == (
+        0.7425,
+        0.26,
+        -1.5708,
+        -2.6,
+        2.6,
+        220.0,
+    )
     assert list(first.center_of_mass) == [-0.1, 0.1, 0.0]
     assert (second.beta, second.ratio, second.offset) == (1e-4, 1.0002, 1e-3)
     assert list(fourth.driven_by) == [("J2", -1.0), ("J3", -1.0)]
     assert (rail.type, rail.lower, rail.upper) == ("prismatic", -math.inf, 0.5)
     assert [target.name for target in robot.targets] == ["tool", "smr2"]
-    np.testing.assert_allclose(robot.T_measurement_base[:2, 0], [math.cos(0.3), math.sin(0.3)], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        robot.T_measurement_base[:2, 0], [math.cos(0.3), math.sin(0.3)], rtol=0, atol=1e-15
+    )
 
 
 def test_millimetres_and_degrees_are_converted_to_the_nearest_double(tmp_path: Path) -> None:
@@ -168,11 +183,19 @@ def test_chain_anchor_effects_and_calibration(tmp_path: Path) -> None:
     assert robot.anchor is not None
     assert (list(robot.anchor.point), robot.anchor.zero) == ([1.0, 0.5, 0.2], -0.03)
     (effect,) = robot.effects
-    assert (effect.effect, list(effect.joints), dict(effect.parameters)) == ("backlash", ["elbow"], {"backlash.elbow": 2.1e-4})
+    assert (effect.effect, list(effect.joints), dict(effect.parameters)) == (
+        "backlash",
+        ["elbow"],
+        {"backlash.elbow": 2.1e-4},
+    )
     calibration = load_calibration(tmp_path / "robot.yaml")
     assert calibration == {
-        "source": "tracker.csv", "date": "2026-02-03", "rms_m": 4.5e-5, "covariance": "covariance.csv", "poses": 50,
-    }  # fmt: skip
+        "source": "tracker.csv",
+        "date": "2026-02-03",
+        "rms_m": 4.5e-5,
+        "covariance": "covariance.csv",
+        "poses": 50,
+    }
 
 
 def test_urdf_is_a_robot_file(tmp_path: Path) -> None:
@@ -191,11 +214,14 @@ def test_numbers_may_have_an_exponent_without_a_point(tmp_path: Path) -> None:
     assert load(tmp_path, PALLETIZER.replace("a: 0.26", "a: 26e-2")).joints[0].a == 0.26
 
 
-# ---- What is written -------------------------------------------------------------------------------------------------
+# ---- What is written
+# -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("text", [PALLETIZER, UR10, CHAIN])
-@pytest.mark.parametrize("units", [Units("m", "rad"), Units("mm", "deg"), Units("mm", "rad"), Units("m", "deg")])
+@pytest.mark.parametrize(
+    "units", [Units("m", "rad"), Units("mm", "deg"), Units("mm", "rad"), Units("m", "deg")]
+)
 def test_saved_robot_loads_bit_for_bit(tmp_path: Path, text: str, units: Units) -> None:
     robot = load(tmp_path, text)
     save_robot(tmp_path / "saved.yaml", robot, units=units)
@@ -210,8 +236,19 @@ def test_arbitrary_doubles_survive_in_any_unit(tmp_path: Path, units: Units) -> 
         joints = []
         for number in range(6):
             theta, d, a, alpha, offset = random.uniform(-1.5, 1.5, 5) * 10.0 ** random.integers(-9, 1, 5)
-            joints.append(_core.Joint(f"J{number}", theta=theta, d=d, a=a, alpha=alpha, offset=offset,
-                                      ratio=random.normal(1, 1e-3), lower=-random.uniform(1, 3), upper=random.uniform(1, 3)))  # fmt: skip
+            joints.append(
+                _core.Joint(
+                    f"J{number}",
+                    theta=theta,
+                    d=d,
+                    a=a,
+                    alpha=alpha,
+                    offset=offset,
+                    ratio=random.normal(1, 1e-3),
+                    lower=-random.uniform(1, 3),
+                    upper=random.uniform(1, 3),
+                )
+            )
         joints[0].a = random.uniform(0.5, 1.0)
         robot = _core.Robot("random", joints=joints, gravity=random.normal(size=3))
         save_robot(tmp_path / "saved.yaml", robot, units=units)
@@ -221,7 +258,11 @@ def test_arbitrary_doubles_survive_in_any_unit(tmp_path: Path, units: Units) -> 
 def test_any_rotation_survives_to_the_last_digits(tmp_path: Path) -> None:
     random = np.random.default_rng(seed=2)
     angles = [random.uniform(-math.pi, math.pi, 3) for _ in range(50)]
-    angles += [np.array([a, p, b]) for p in (math.pi / 2, -math.pi / 2, math.pi / 2 - 1e-9) for a, b in random.uniform(-3, 3, (5, 2))]
+    angles += [
+        np.array([a, p, b])
+        for p in (math.pi / 2, -math.pi / 2, math.pi / 2 - 1e-9)
+        for a, b in random.uniform(-3, 3, (5, 2))
+    ]
     for rpy in angles:
         first = _core.frame_from_xyz_rpy([0.1, 0.2, 0.3], rpy)
         # A product of rotations is what a fit comes to: no three angles make just these nine numbers.
@@ -233,14 +274,34 @@ def test_any_rotation_survives_to_the_last_digits(tmp_path: Path) -> None:
 
 
 def test_calibration_is_kept(tmp_path: Path) -> None:
-    calibration = {"source": "C:\\data\\new \"set\".csv", "date": "2026-02-03", "rms_m": 1e-5, "n": 50, "1e-3": True,
-                   "nested": {"list": [1, 2.5, "yes", None], "numpy": np.float64(0.1)}}  # fmt: skip
+    calibration = {
+        "source": 'C:\\data\\new "set".csv',
+        "date": "2026-02-03",
+        "rms_m": 1e-5,
+        "n": 50,
+        "1e-3": True,
+        "nested": {"list": [1, 2.5, "yes", None], "numpy": np.float64(0.1)},
+    }
     save_robot(tmp_path / "saved.yaml", load(tmp_path, UR10), calibration=calibration)
     assert load_calibration(tmp_path / "saved.yaml") == calibration
 
 
 def test_odd_names_survive(tmp_path: Path) -> None:
-    names = ["no", "1.5", "a: b", "Gelenk äöü", "#1", "tab\there", "line\nbreak", "{x}", "null", '"', "\\", "\x85", "😀"]
+    names = [
+        "no",
+        "1.5",
+        "a: b",
+        "Gelenk äöü",
+        "#1",
+        "tab\there",
+        "line\nbreak",
+        "{x}",
+        "null",
+        '"',
+        "\\",
+        "\x85",
+        "😀",
+    ]
     robot = _core.Robot("true", joints=[_core.Joint(name, a=0.1) for name in names])
     save_robot(tmp_path / "saved.yaml", robot)
     assert_same(load_robot(tmp_path / "saved.yaml"), robot)
@@ -257,7 +318,10 @@ def test_few_digits_stay_few(tmp_path: Path) -> None:
     [
         (_core.Robot("r", joints=[]), "has no joints"),
         (_core.Robot("r", joints=[_core.Joint("J1", a=math.nan)]), "finite"),
-        (_core.Robot("r", joints=[_core.Joint("J1")], targets=[_core.Target("flange")]), "must be called 'tool'"),
+        (
+            _core.Robot("r", joints=[_core.Joint("J1")], targets=[_core.Target("flange")]),
+            "must be called 'tool'",
+        ),
     ],
 )
 def test_an_unsound_robot_is_not_written(tmp_path: Path, robot: _core.Robot, why: str) -> None:
@@ -266,27 +330,60 @@ def test_an_unsound_robot_is_not_written(tmp_path: Path, robot: _core.Robot, why
     assert list(tmp_path.iterdir()) == []
 
 
-# ---- What is refused -------------------------------------------------------------------------------------------------
+# ---- What is refused
+# -------------------------------------------------------------------------------------------------
 
 WRONG: dict[str, tuple[str, str, str]] = {
     # name: (text in PALLETIZER, what it becomes, what the error says)
-    "unknown key": ("beta: 0,", "betta: 0,", r"line 8: joints\[0\] \(J1\) betta: unknown key; did you mean 'beta'\?"),
-    "unknown key at the top": ("gravity:", "gravty:", r"line 5: gravty: unknown key; did you mean 'gravity'\?"),
+    "unknown key": (
+        "beta: 0,",
+        "betta: 0,",
+        r"line 8: joints\[0\] \(J1\) betta: unknown key; did you mean 'beta'\?",
+    ),
+    "unknown key at the top": (
+        "gravity:",
+        "gravty:",
+        r"line 5: gravty: unknown key; did you mean 'gravity'\?",
+    ),
     "missing key": ("a: 1.15, ", "", r"line 10: joints\[1\] \(J2\): key 'a' is missing"),
     "missing units": ("units: {length: m, angle: rad, mass: kg}\n", "", "key 'units' is missing"),
     "missing unit": ("length: m, ", "", "line 3: units: key 'length' is missing"),
     "unknown unit": ("length: m,", "length: cm,", "line 3: units length: found 'cm', expected one of m, mm"),
-    "duplicate key": ("a: 1.15,", "a: 1.15, a: 1.2,", r"line 10: key 'a' is there twice \(first in line 10\)"),
-    "duplicate key at the top": ("tool:", "name: two\ntool:", r"line 14: key 'name' is there twice \(first in line 2\)"),
-    "duplicate joint": ("name: J3", "name: J2", r"line 11: .*the name 'J2' is there twice \(first in line 10\)"),
+    "duplicate key": (
+        "a: 1.15,",
+        "a: 1.15, a: 1.2,",
+        r"line 10: key 'a' is there twice \(first in line 10\)",
+    ),
+    "duplicate key at the top": (
+        "tool:",
+        "name: two\ntool:",
+        r"line 14: key 'name' is there twice \(first in line 2\)",
+    ),
+    "duplicate joint": (
+        "name: J3",
+        "name: J2",
+        r"line 11: .*the name 'J2' is there twice \(first in line 10\)",
+    ),
     "target called like a joint": ("smr2:", "J1:", "line 15: targets J1: the name 'J1' is there twice"),
     "target called tool": ("smr2:", "tool:", "line 15: targets tool: the name 'tool' is there twice"),
     "kept name": ("name: J3", "name: base", "line 11: .*'base' is kept for parameters"),
-    "unknown driver": ("{J2: -1, J3: -1}", "{J2: -1, J9: -1}", "line 12: .*J9: there is no such joint; the joints are J1, J2"),
+    "unknown driver": (
+        "{J2: -1, J3: -1}",
+        "{J2: -1, J9: -1}",
+        "line 12: .*J9: there is no such joint; the joints are J1, J2",
+    ),
     "own driver": ("{J2: -1, J3: -1}", "{J4: -1}", r"line 12: .*circle \(J4 -> J4\)"),
-    "circle": ("a: 1.2, alpha: 0}", "a: 1.2, alpha: 0, driven_by: {J4: 1}}", r"line 11: .*circle \(J3 -> J4 -> J3\)"),
+    "circle": (
+        "a: 1.2, alpha: 0}",
+        "a: 1.2, alpha: 0, driven_by: {J4: 1}}",
+        r"line 11: .*circle \(J3 -> J4 -> J3\)",
+    ),
     "no driver": ("{J2: -1, J3: -1}", "{}", "line 12: .*driven_by: is empty"),
-    "ratio of a passive joint": ("driven_by:", "ratio: 1.1, driven_by:", "line 12: .*passive joint has no reading"),
+    "ratio of a passive joint": (
+        "driven_by:",
+        "ratio: 1.1, driven_by:",
+        "line 12: .*passive joint has no reading",
+    ),
     "NaN": ("a: 1.15", "a: .nan", r"line 10: joints\[1\] \(J2\) a: found NaN, expected a finite number"),
     "infinity": ("a: 1.15", "a: .inf", "line 10: .*found Infinity, expected a finite number"),
     "too large": ("a: 1.15", "a: 1e999", "line 10: .*found Infinity, expected a finite number"),
@@ -294,14 +391,30 @@ WRONG: dict[str, tuple[str, str, str]] = {
     "quoted number": ("a: 1.15", "a: '1.15'", r"line 10: .* a: found '1.15', expected a finite number"),
     "decimal comma": ("d: 0.7425", "d: 0,7425", "line 8: .*unknown key"),
     "nothing": ("a: 1.15", "a:", "line 10: .*found nothing, expected a finite number"),
-    "short list": ("[0, 0, -9.81]", "[0, -9.81]", "line 5: gravity: found a list of 2, expected a list of 3 numbers"),
+    "short list": (
+        "[0, 0, -9.81]",
+        "[0, -9.81]",
+        "line 5: gravity: found a list of 2, expected a list of 3 numbers",
+    ),
     "long list": ("[0.15, 0.08, 0.12]", "[0.15, 0.08, 0.12, 1]", "line 14: tool xyz: found a list of 4"),
     "limits": ("[-2.6, 2.6]", "[2.6, -2.6]", r"line 8: .*limits: .*\[lower, upper\]"),
     "no list": ("[-2.6, 2.6]", "2.6", r"line 8: .*limits: found 2.6, expected a list of 2 numbers"),
-    "unknown type": ("type: prismatic", "type: linear", "line 13: .*type: found 'linear', expected one of revolute, prismatic"),
-    "unknown convention": ("convention: dh", "convention: DH", "line 4: convention: found 'DH', expected one of dh, mdh, urdf"),
+    "unknown type": (
+        "type: prismatic",
+        "type: linear",
+        "line 13: .*type: found 'linear', expected one of revolute, prismatic",
+    ),
+    "unknown convention": (
+        "convention: dh",
+        "convention: DH",
+        "line 4: convention: found 'DH', expected one of dh, mdh, urdf",
+    ),
     "keys of another convention": ("convention: dh", "convention: urdf", "line 8: .*theta: unknown key"),
-    "wrong format": ("truing-robot/1", "truing-camera/1", "line 1: format: found 'truing-camera/1', expected 'truing-robot/1'"),
+    "wrong format": (
+        "truing-robot/1",
+        "truing-camera/1",
+        "line 1: format: found 'truing-camera/1', expected 'truing-robot/1'",
+    ),
     "no format": ("format: truing-robot/1\n", "", "key 'format' is missing"),
     "mass below zero": ("mass: 220", "mass: -220", "line 9: .*mass: found -220, expected zero or more"),
     "number as a name": ("name: J3", "name: 3", "line 11: .*name: found 3, expected a name .*quotes"),
@@ -311,14 +424,22 @@ WRONG: dict[str, tuple[str, str, str]] = {
     "not YAML": ("[-2.6, 2.6]", "[-2.6, 2.6", "line .*is not YAML"),
     "tab": ("  - {name: J3", "\t- {name: J3", "line 11.*is not YAML"),
     # Suspicions: right in form, but the unit cannot be meant.
-    "degrees as rad": ("alpha: -1.5708", "alpha: -90", r"line 8: .*alpha: -90 looks like degrees.*angle: rad"),
+    "degrees as rad": (
+        "alpha: -1.5708",
+        "alpha: -90",
+        r"line 8: .*alpha: -90 looks like degrees.*angle: rad",
+    ),
     "degrees as limits": ("[-2.6, 2.6]", "[-150, 150]", "line 8: .*limits: -150 looks like degrees"),
     "degrees as rpy": ("rpy: [0, 0, 0.3]", "rpy: [0, 0, 90]", "line 6: base rpy: 90 looks like degrees"),
     "millimetres as m": ("a: 1.15", "a: 1150", "line 10: .*a: 1150 looks like millimetres.*length: m"),
-    "millimetres as tool": ("[0.15, 0.08, 0.12]", "[150, 80, 120]", "line 14: tool xyz: 150 looks like millimetres"),
+    "millimetres as tool": (
+        "[0.15, 0.08, 0.12]",
+        "[150, 80, 120]",
+        "line 14: tool xyz: 150 looks like millimetres",
+    ),
     "metres as mm": ("length: m,", "length: mm,", "line 3: .*looks like metres"),
     "radians as deg": ("angle: rad", "angle: deg", "line 8: .*alpha: -1.5708 looks like radians"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -362,7 +483,9 @@ def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
         load_robot(write(tmp_path, UR10), base_link="base")
 
 
-@pytest.mark.parametrize("content", [b"", b"<robot", b"not xml", b"\x00\x01", URDF.replace("hand", "other", 1).encode()])
+@pytest.mark.parametrize(
+    "content", [b"", b"<robot", b"not xml", b"\x00\x01", URDF.replace("hand", "other", 1).encode()]
+)
 def test_urdf_that_is_none_is_refused(tmp_path: Path, content: bytes) -> None:
     with pytest.raises(InputError, match=r"arm\.urdf"):
         load_robot(write(tmp_path, content, "arm.urdf"))
@@ -375,21 +498,27 @@ def test_axis_must_be_a_unit_vector(tmp_path: Path, axis: str) -> None:
 
 
 def test_effect_at_an_unknown_joint_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"line 11: effects\[0\] \(backlash\) joints\[0\]: there is no joint 'wrist'"):
+    with pytest.raises(
+        InputError, match=r"line 11: effects\[0\] \(backlash\) joints\[0\]: there is no joint 'wrist'"
+    ):
         load(tmp_path, CHAIN.replace("joints: [elbow]", "joints: [wrist]"))
 
 
-@pytest.mark.parametrize("text", [
-    PALLETIZER.replace("[-2.6, 2.6]", "[-6.3, 6.3]"),
-    PALLETIZER.replace("theta: -1.5708", "theta: 6.28"),
-    UR10.replace("alpha: 90", "alpha: 89.98").replace("alpha: -90", "alpha: 0.0021"),
-    UR10.replace("alpha: 90", "alpha: 0").replace("alpha: -90", "alpha: 0"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        PALLETIZER.replace("[-2.6, 2.6]", "[-6.3, 6.3]"),
+        PALLETIZER.replace("theta: -1.5708", "theta: 6.28"),
+        UR10.replace("alpha: 90", "alpha: 89.98").replace("alpha: -90", "alpha: 0.0021"),
+        UR10.replace("alpha: 90", "alpha: 0").replace("alpha: -90", "alpha: 0"),
+    ],
+)
 def test_suspicion_does_not_fall_on_the_innocent(tmp_path: Path, text: str) -> None:
     load(tmp_path, text)
 
 
-# ---- Output that is whole or not there -------------------------------------------------------------------------------
+# ---- Output that is whole or not there
+# -------------------------------------------------------------------------------
 
 
 def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:

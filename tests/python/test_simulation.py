@@ -36,7 +36,9 @@ def test_without_errors_and_noise_the_nominal_robot_explains_everything(robot: t
 
 
 def test_the_true_robot_leaves_nothing_but_the_noise(robot: truing.Robot) -> None:
-    simulated = simulate(robot, poses=3000, noise=5e-5, orientation=True, rotation_noise=2e-4, base_unknown=True, seed=3)
+    simulated = simulate(
+        robot, poses=3000, noise=5e-5, orientation=True, rotation_noise=2e-4, base_unknown=True, seed=3
+    )
     residuals = truing.residuals(simulated.truth.robot, simulated.data)
     assert np.std(residuals.position) == pytest.approx(5e-5, rel=0.05)
     assert np.std(residuals.rotation) == pytest.approx(2e-4, rel=0.05)
@@ -45,7 +47,9 @@ def test_the_true_robot_leaves_nothing_but_the_noise(robot: truing.Robot) -> Non
 def test_hidden_errors_have_the_size_asked_for(robot: truing.Robot) -> None:
     found: dict[str, list[float]] = {"m": [], "rad": [], "-": []}
     for seed in range(40):
-        for nominal, true, unit in true_robot(robot, lengths=2e-3, angles=5e-4, ratios=1e-4, seed=seed).parameters.values():
+        for nominal, true, unit in true_robot(
+            robot, lengths=2e-3, angles=5e-4, ratios=1e-4, seed=seed
+        ).parameters.values():
             found[unit].append(true - nominal)
     for unit, sigma in (("m", 2e-3), ("rad", 5e-4), ("-", 1e-4)):
         assert np.std(found[unit]) == pytest.approx(sigma, rel=0.15)
@@ -53,7 +57,11 @@ def test_hidden_errors_have_the_size_asked_for(robot: truing.Robot) -> None:
 
 def test_the_same_seed_gives_the_same_data_and_another_seed_does_not(robot: truing.Robot) -> None:
     first, again, other = (simulate(robot, poses=20, seed=seed) for seed in (5, 5, 6))
-    assert first.data.positions is not None and again.data.positions is not None and other.data.positions is not None
+    assert (
+        first.data.positions is not None
+        and again.data.positions is not None
+        and other.data.positions is not None
+    )
     assert np.array_equal(first.data.positions, again.data.positions)
     assert not np.allclose(first.data.positions, other.data.positions)
 
@@ -100,14 +108,21 @@ def test_effects_of_the_model_become_its_parameters() -> None:
 
 @pytest.mark.parametrize(
     ("effects", "complaint"),
-    [({"slack.J1": 1.0}, "there are"), ({"backlash.J9": 1.0}, "J9"), ({"link_geometry.J1": 1.0}, "link geometry"), ({"gear_ratio.J1.x": 1.0}, "one parameter")],
+    [
+        ({"slack.J1": 1.0}, "there are"),
+        ({"backlash.J9": 1.0}, "J9"),
+        ({"link_geometry.J1": 1.0}, "link geometry"),
+        ({"gear_ratio.J1.x": 1.0}, "one parameter"),
+    ],
 )
 def test_an_effect_that_cannot_be_is_refused(effects: dict[str, float], complaint: str) -> None:
     with pytest.raises(truing.InputError, match=complaint):
         simulate(truing.load_robot(example("irb120")), effects=effects)
 
 
-@pytest.mark.parametrize("keywords", [{"poses": 0}, {"outlier_share": 1.0}, {"noise": -1.0}, {"columns": ["humidity"]}])
+@pytest.mark.parametrize(
+    "keywords", [{"poses": 0}, {"outlier_share": 1.0}, {"noise": -1.0}, {"columns": ["humidity"]}]
+)
 def test_what_makes_no_sense_is_refused(keywords: dict[str, object]) -> None:
     truth = true_robot(truing.load_robot(example("irb120")))
     with pytest.raises(truing.InputError):
@@ -128,9 +143,10 @@ def test_random_poses_keep_the_limits_and_need_them_for_rails(robot: truing.Robo
 
 def test_a_urdf_robot_gets_errors_too() -> None:
     text = (
-        '<robot name="two"><link name="a"/><link name="b"/><link name="c"/>'
-        '<joint name="j1" type="continuous"><parent link="a"/><child link="b"/><origin xyz="0 0 0.5"/><axis xyz="0 0 1"/></joint>'
-        '<joint name="j2" type="continuous"><parent link="b"/><child link="c"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/></joint></robot>'
+        '<robot name="two"><link name="a"/><link name="b"/><link name="c"/><joint name="j1"'
+        ' type="continuous"><parent link="a"/><child link="b"/><origin xyz="0 0 0.5"/><axis xyz="0 0'
+        ' 1"/></joint><joint name="j2" type="continuous"><parent link="b"/><child link="c"/><origin xyz="0.4'
+        ' 0 0"/><axis xyz="0 1 0"/></joint></robot>'
     )
     truth = true_robot(truing.robot_from_urdf(text))
     assert {"j1.x", "j2.rz", "j1.offset", "tool.z"} <= set(truth.parameters)
@@ -138,18 +154,34 @@ def test_a_urdf_robot_gets_errors_too() -> None:
 
 
 def test_truth_json_holds_what_a_judge_needs() -> None:
-    simulated = simulate(truing.load_robot(example("palletizer")), poses=10, effects={"backlash.J2": 2e-4}, outlier_share=0.1, seed=4)
+    simulated = simulate(
+        truing.load_robot(example("palletizer")),
+        poses=10,
+        effects={"backlash.J2": 2e-4},
+        outlier_share=0.1,
+        seed=4,
+    )
     truth = simulated.to_dict()
     assert truth["format"] == "truing-truth/1"
     assert truth["robot"]["format"] == "truing-robot/1"
-    assert truth["effects"] == [{"effect": "backlash", "joint": "J2", "parameter": "backlash.J2", "value": 2e-4}]
+    assert truth["effects"] == [
+        {"effect": "backlash", "joint": "J2", "parameter": "backlash.J2", "value": 2e-4}
+    ]
     assert truth["seed"] == 4 and truth["rows"] == 10 and len(truth["outlier_rows"]) == 1
 
 
 @pytest.mark.parametrize("solver", ["lm", "ceres"])
 def test_identification_finds_the_hidden_palletizer(solver: str) -> None:
     robot = truing.load_robot(example("palletizer"))
-    simulated = simulate(robot, poses=150, only=PALLETIZER_MODEL, ratios=1e-3, effects={"backlash.J3": 4e-4}, base_unknown=True, seed=2)
+    simulated = simulate(
+        robot,
+        poses=150,
+        only=PALLETIZER_MODEL,
+        ratios=1e-3,
+        effects={"backlash.J3": 4e-4},
+        base_unknown=True,
+        seed=2,
+    )
     found = truing.identify(robot, simulated.data, free=PALLETIZER_FREE, effects="backlash:J3", solver=solver)  # type: ignore[arg-type]
     fresh = truing.Measurements(random_joints(robot, 500, 77), directions=np.ones((500, 4)))
     gap = truing.predict(found.robot, fresh).position - truing.predict(simulated.truth.robot, fresh).position
@@ -160,11 +192,21 @@ def test_identification_finds_the_hidden_palletizer(solver: str) -> None:
             assert abs(p.value - simulated.truth.parameters[p.name][1]) < 4.5 * p.sigma, p.name
 
 
-@pytest.mark.parametrize(("name", "columns"), [("scale", ()), ("drift.base.x", ("t",)), ("thermal.elbow", ("temp",)),
-                                               ("transmission_error@7.5.elbow.cos", ()), ("gravity_backlash.elbow", ("payload",))])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("scale", ()),
+        ("drift.base.x", ("t",)),
+        ("thermal.elbow", ("temp",)),
+        ("transmission_error@7.5.elbow.cos", ()),
+        ("gravity_backlash.elbow", ("payload",)),
+    ],
+)
 def test_effects_of_every_form_can_be_hidden(name: str, columns: tuple[str, ...]) -> None:
     robot = truing.load_robot(example("ur10"))
     plain = truing.simulate(robot, noise=0.0, poses=50, columns=columns, lengths=0.0, angles=0.0, seed=1)
-    hidden = truing.simulate(robot, effects={name: 1e-4}, noise=0.0, poses=50, columns=columns, lengths=0.0, angles=0.0, seed=1)
+    hidden = truing.simulate(
+        robot, effects={name: 1e-4}, noise=0.0, poses=50, columns=columns, lengths=0.0, angles=0.0, seed=1
+    )
     moved = np.linalg.norm(np.asarray(hidden.data.positions) - np.asarray(plain.data.positions), axis=1)
     assert moved.max() > 1e-6

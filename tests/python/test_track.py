@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tracking from Python: samples in any order, faulty samples, recordings replayed without looking ahead, and the truth within what is said."""
+"""Tracking from Python: samples in any order, faulty samples, recordings replayed without looking ahead, and
+the truth within what is said.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ ROBOT = truing.load_robot(example("large_boom"))
 @functools.lru_cache(maxsize=None)
 def recording(motion: str = "gentle", seconds: float = 12.0, offset: float = 0.0) -> truing.SimulatedStreams:
     errors = truing.TrackerErrors(clock_offset=offset, out_of_order=0.02)
-    return truing.simulate_streams(ROBOT, seconds=seconds, motion=motion, imu_rate=500.0, tracker=errors, seed=5)
+    return truing.simulate_streams(
+        ROBOT, seconds=seconds, motion=motion, imu_rate=500.0, tracker=errors, seed=5
+    )
 
 
 @functools.lru_cache(maxsize=None)
@@ -33,7 +37,8 @@ def played(motion: str = "gentle", offset: float = 0.0) -> truing.ReplayResult:
     return truing.replay(streams.recorded, setup)
 
 
-# ---- The simulated arm -------------------------------------------------------------------------------------------------
+# ---- The simulated arm
+# -------------------------------------------------------------------------------------------------
 
 
 def test_the_example_file_is_the_large_boom() -> None:
@@ -46,7 +51,10 @@ def test_the_example_file_is_the_large_boom() -> None:
 
 def test_the_sway_does_not_depend_on_how_the_robot_is_described() -> None:
     t = np.linspace(0.0, 2.0, 21)
-    a, b = (truing.simulate_streams(robot, seconds=2.0, imu_rate=100.0, joint_noise=0.0, seed=2).tool_at(t) for robot in (ROBOT, truing.large_boom()))
+    a, b = (
+        truing.simulate_streams(robot, seconds=2.0, imu_rate=100.0, joint_noise=0.0, seed=2).tool_at(t)
+        for robot in (ROBOT, truing.large_boom())
+    )
     assert np.allclose(a, b, atol=1e-6)
 
 
@@ -57,7 +65,8 @@ def test_encoders_do_not_see_the_sway() -> None:
     assert 2e-3 < np.linalg.norm(true[:, :3, 3] - seen[:, :3, 3], axis=1).std() < 0.1
 
 
-# ---- Sample by sample --------------------------------------------------------------------------------------------------
+# ---- Sample by sample
+# --------------------------------------------------------------------------------------------------
 
 
 def test_faulty_samples_are_refused_by_name_and_change_nothing() -> None:
@@ -113,12 +122,19 @@ def test_the_order_of_arrival_does_not_matter() -> None:
                 j = given.pop(0)
                 tracker.push_pose(s.tracker["t"][j], s.tracker["position"][j], s.tracker["orientation"][j])
             if shuffled and k % 100 == 99:  # what is of the last 0.2 s, newest first
-                mine = sorted((j for j in given if now - 0.2 <= s.tracker["t"][j] <= now), key=lambda j: -s.tracker["t"][j])
+                mine = sorted(
+                    (j for j in given if now - 0.2 <= s.tracker["t"][j] <= now),
+                    key=lambda j: -s.tracker["t"][j],
+                )
                 for j in mine:
-                    tracker.push_pose(s.tracker["t"][j], s.tracker["position"][j], s.tracker["orientation"][j])
+                    tracker.push_pose(
+                        s.tracker["t"][j], s.tracker["position"][j], s.tracker["orientation"][j]
+                    )
                     given.remove(j)
         answers.append(tracker.predict(tracker.now))
-    assert np.allclose(answers[0].T_base_tool, answers[1].T_base_tool, atol=1e-12, rtol=0) and np.allclose(answers[0].covariance, answers[1].covariance, atol=1e-12, rtol=0)
+    assert np.allclose(answers[0].T_base_tool, answers[1].T_base_tool, atol=1e-12, rtol=0) and np.allclose(
+        answers[0].covariance, answers[1].covariance, atol=1e-12, rtol=0
+    )
 
 
 def test_options_are_checked_and_a_typo_raises() -> None:
@@ -133,14 +149,17 @@ def test_options_are_checked_and_a_typo_raises() -> None:
 
 
 def test_options_are_values() -> None:
-    options = truing.TrackOptions(modes=truing.ModalModel([0.6], [0.02]), limits=truing.CorrectionLimits(position=0.1))
+    options = truing.TrackOptions(
+        modes=truing.ModalModel([0.6], [0.02]), limits=truing.CorrectionLimits(position=0.1)
+    )
     options.filter.window = 0.4
     again = pickle.loads(pickle.dumps(options))
     assert (again.filter.window, again.limits.position, again.modes.frequency.tolist()) == (0.4, 0.1, [0.6])
     assert options.replace(coast_position=0.5).coast_position == 0.5 and options.coast_position != 0.5
 
 
-# ---- Replay ------------------------------------------------------------------------------------------------------------
+# ---- Replay
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("motion", ["gentle", "stop-and-go"])
@@ -161,18 +180,26 @@ def test_every_row_of_the_plan_has_one_compensation() -> None:
     assert np.allclose(rows["t"], s.plan["t"] + s.setup.actuator_lag, atol=1e-12)
     made = rows["made"]
     assert made.sum() > 1100 and not made[rows["t"] > 12.1].any()
-    assert (rows["t"][made] - rows["made_at"][made] > 0.035).all() and (rows["t"][made] - rows["made_at"][made] < 0.0401 + 2e-3).all()
+    assert (rows["t"][made] - rows["made_at"][made] > 0.035).all() and (
+        rows["t"][made] - rows["made_at"][made] < 0.0401 + 2e-3
+    ).all()
     # what is wanted is the plan minus what is predicted; what is sent follows it within the limits
     away = rows["T_base_tool_planned"][made][:, :3, 3] - rows["T_base_tool"][made][:, :3, 3]
     assert np.abs(rows["wanted"][made][:, :3] - away).max() < 1e-12
     settled = made & (rows["t"] > 4.0)
     trailing = rows["correction"][settled][:, :3] - rows["wanted"][settled][:, :3]
-    assert np.sqrt(np.mean(np.sum(trailing**2, axis=1))) < 0.1 * np.sqrt(np.mean(np.sum(rows["wanted"][settled][:, :3] ** 2, axis=1)))
+    assert np.sqrt(np.mean(np.sum(trailing**2, axis=1))) < 0.1 * np.sqrt(
+        np.mean(np.sum(rows["wanted"][settled][:, :3] ** 2, axis=1))
+    )
     off = np.abs(rows["correction"] - rows["wanted"]).max(axis=1) > 1e-3
     assert (np.asarray(rows["limited"])[made] == off[made]).all()
     free = made
     corrected = rows["T_base_flange"][free] @ np.asarray(s.setup.T_flange_tool)
-    assert np.allclose(corrected[:, :3, 3], rows["T_base_tool_planned"][free][:, :3, 3] + rows["correction"][free][:, :3], atol=1e-12)
+    assert np.allclose(
+        corrected[:, :3, 3],
+        rows["T_base_tool_planned"][free][:, :3, 3] + rows["correction"][free][:, :3],
+        atol=1e-12,
+    )
 
 
 def test_the_truth_is_within_what_is_said() -> None:
@@ -180,7 +207,12 @@ def test_the_truth_is_within_what_is_said() -> None:
     use = rows["made"] & (rows["t"] > 5.0) & (rows["t"] < 12.0)
     true = s.tool_at(rows["t"][use])
     predicted = rows["T_base_tool"][use]
-    e = np.column_stack([true[:, :3, 3] - predicted[:, :3, 3], rotation_vectors(true[:, :3, :3] @ np.swapaxes(predicted[:, :3, :3], 1, 2))])
+    e = np.column_stack(
+        [
+            true[:, :3, 3] - predicted[:, :3, 3],
+            rotation_vectors(true[:, :3, :3] @ np.swapaxes(predicted[:, :3, :3], 1, 2)),
+        ]
+    )
     sigma = np.sqrt(np.einsum("nii->ni", rows["covariance"][use].reshape(-1, 6, 6)))
     assert np.mean(np.abs(e) <= 3 * sigma) > 0.97
 
@@ -211,7 +243,9 @@ def test_a_dropout_coasts_and_comes_back() -> None:
     s = truing.simulate_streams(ROBOT, seconds=10.0, imu_rate=500.0, dropouts=[(5.0, 1.5)], seed=3)
     p = truing.replay(s.recorded, s.setup)
     t, status = p.timeline["t"], np.array(p.timeline["status"])
-    assert set(status[(t > 5.4) & (t < 6.4)]) <= {"coasting", "hold"} and set(status[(t > 7.5) & (t < 9.9)]) == {"valid"}
+    assert set(status[(t > 5.4) & (t < 6.4)]) <= {"coasting", "hold"} and set(
+        status[(t > 7.5) & (t < 9.9)]
+    ) == {"valid"}
     rows = p.compensation
     use = rows["made"]
     step = np.linalg.norm(np.diff(rows["correction"][use][:, :3], axis=0), axis=1)
@@ -219,7 +253,13 @@ def test_a_dropout_coasts_and_comes_back() -> None:
 
 
 def test_a_shifted_base_station_is_said() -> None:
-    s = truing.simulate_streams(ROBOT, seconds=16.0, imu_rate=500.0, shifts=[(10.0, truing.frame_from_xyz_rpy([0.02, 0.0, 0.0], [0.0, 0.0, 0.004]))], seed=4)
+    s = truing.simulate_streams(
+        ROBOT,
+        seconds=16.0,
+        imu_rate=500.0,
+        shifts=[(10.0, truing.frame_from_xyz_rpy([0.02, 0.0, 0.0], [0.0, 0.0, 0.004]))],
+        seed=4,
+    )
     p = truing.replay(s.recorded, s.setup)
     assert len(p.shifts) == 1 and 9.5 < p.shifts[0].t < 11.0 and p.shifts[0].flagged < 12.5
     assert not played().shifts
@@ -234,7 +274,9 @@ def test_modes_are_learnt_from_the_start_and_used_from_then_on() -> None:
     t, by = p.compensation["made_at"], np.array(p.compensation["predictor"])
     assert "modes" not in set(by[t < p.modes_from - 0.1])
     timeline = p.timeline
-    assert (timeline["frequencies"][timeline["t"] < p.modes_from - 0.1] == 0).all() and (timeline["frequencies"][-1][: p.modes.model.count] > 0.3).all()
+    assert (timeline["frequencies"][timeline["t"] < p.modes_from - 0.1] == 0).all() and (
+        timeline["frequencies"][-1][: p.modes.model.count] > 0.3
+    ).all()
     # given from the start they are taken where they predict better
     given = truing.replay(s.recorded, s.setup, truing.TrackOptions(modes=p.modes.model))
     assert "modes" in set(given.compensation["predictor"])
@@ -283,7 +325,15 @@ def test_gravity_need_not_be_along_z() -> None:
     robot.gravity = tilt @ [0.0, 0.0, -9.81]
     s = truing.simulate_streams(robot, seconds=8.0, imu_rate=500.0, seed=1)
     assert np.allclose(s.setup.gravity, robot.gravity)
-    row: dict[str, Any] = next(row for row in horizon_errors(truing.replay(s.recorded, s.setup).graded) if row["horizon_s"] == 0.04)
+    row: dict[str, Any] = next(
+        row for row in horizon_errors(truing.replay(s.recorded, s.setup).graded) if row["horizon_s"] == 0.04
+    )
     assert row["truing"]["rms_m"] < 4e-3
-    wrong = next(row for row in horizon_errors(truing.replay(s.recorded, s.setup.replace(gravity=[0.0, 0.0, -9.81])).graded) if row["horizon_s"] == 0.04)
+    wrong = next(
+        row
+        for row in horizon_errors(
+            truing.replay(s.recorded, s.setup.replace(gravity=[0.0, 0.0, -9.81])).graded
+        )
+        if row["horizon_s"] == 0.04
+    )
     assert wrong["truing"]["rms_m"] > 1.3 * row["truing"]["rms_m"]

@@ -17,30 +17,31 @@
 
 namespace truing {
 
-/// Compensation: what to tell a controller that believes in the nominal robot, so that the real one, which the calibrated
-/// robot describes, goes where it is wanted.
+/// Compensation: what to tell a controller that believes in the nominal robot, so that the real one, which the
+/// calibrated robot describes, goes where it is wanted.
 
 struct CompensateOptions {
   InverseOptions inverse;
-  /// Wanted poses and commands are in each robot's own base frame, as programs have them; false: in the measurement frame.
+  /// Wanted poses and commands are in each robot's own base frame, as programs have them; false: in the measurement
+  /// frame.
   bool in_base = false;
 };
 
 struct Compensated {
   /// Of the calibrated robot: joints to command, whether the target is reached with them, and why not if it is not.
   Solution solution;
-  /// Pose to command: a controller whose inverse kinematics is the nominal robot's takes these joints for it, if it stays in
-  /// their configuration.
+  /// Pose to command: a controller whose inverse kinematics is the nominal robot's takes these joints for it, if it
+  /// stays in their configuration.
   Eigen::Isometry3d T_command = Eigen::Isometry3d::Identity();
-  /// The joints are more than half a radian from those that the nominal robot would take: a controller that is given T_command may
-  /// choose others.
+  /// The joints are more than half a radian from those that the nominal robot would take: a controller that is given
+  /// T_command may choose others.
   bool other_configuration = false;
-  /// How far the real robot would be from the task if the wanted pose were commanded as it is; NaN: the nominal robot cannot
-  /// reach it. [m], [rad]
+  /// How far the real robot would be from the task if the wanted pose were commanded as it is; NaN: the nominal robot
+  /// cannot reach it. [m], [rad]
   double position_before = std::numeric_limits<double>::quiet_NaN();
   double rotation_before = std::numeric_limits<double>::quiet_NaN();
-  /// Standard error of where the target will be, by what the calibration does not know of its parameters: position [m] and
-  /// rotation [rad] along the measurement frame's axes. NaN: no uncertainty was given.
+  /// Standard error of where the target will be, by what the calibration does not know of its parameters: position [m]
+  /// and rotation [rad] along the measurement frame's axes. NaN: no uncertainty was given.
   Eigen::Matrix<double, 6, 1> sigma = Eigen::Matrix<double, 6, 1>::Constant(std::numeric_limits<double>::quiet_NaN());
 };
 
@@ -48,14 +49,15 @@ struct Compensated {
 class Compensator {
  public:
   /// Throws std::invalid_argument when the robots have different joints, or as InverseSolver does.
-  Compensator(const Robot& nominal, const Robot& calibrated, const CompensateOptions& options = {}, const Conditions& conditions = {},
-              std::size_t target = 0, const std::vector<Effect>& own_effects = {});
+  Compensator(const Robot& nominal, const Robot& calibrated, const CompensateOptions& options = {},
+              const Conditions& conditions = {}, std::size_t target = 0, const std::vector<Effect>& own_effects = {});
   ~Compensator();
   Compensator(Compensator&&) noexcept;
   Compensator& operator=(Compensator&&) noexcept;
 
   /// What `identify` says of its parameters: `parameters` as it lists them, `covariance` of those that are not frozen.
-  /// Throws std::invalid_argument on a parameter that the calibrated robot does not have, or a covariance of another size.
+  /// Throws std::invalid_argument on a parameter that the calibrated robot does not have, or a covariance of another
+  /// size.
   void set_uncertainty(const std::vector<Parameter>& parameters, const Eigen::MatrixXd& covariance);
 
   const InverseSolver& nominal() const;
@@ -67,11 +69,14 @@ class Compensator {
   /// target is not reached.
   Compensated joints(const Joints& program, const Joints& seed, const Conditions* conditions = nullptr) const;
 
-  /// One result per task, the same for any number of threads; seeds, conditions and progress as in InverseSolver::solve_batch.
-  std::vector<Compensated> pose_batch(const std::vector<Task>& tasks, const std::vector<Joints>& seeds, const std::vector<Conditions>& conditions = {},
-                                      int threads = 0, const std::function<bool(std::size_t)>& progress = {}) const;
+  /// One result per task, the same for any number of threads; seeds, conditions and progress as in
+  /// InverseSolver::solve_batch.
+  std::vector<Compensated> pose_batch(const std::vector<Task>& tasks, const std::vector<Joints>& seeds,
+                                      const std::vector<Conditions>& conditions = {}, int threads = 0,
+                                      const std::function<bool(std::size_t)>& progress = {}) const;
   /// One result per joint position of a program; the robot comes from the one before, to the first it does not move.
-  std::vector<Compensated> joints_batch(const std::vector<Joints>& program, const std::vector<Conditions>& conditions = {}, int threads = 0,
+  std::vector<Compensated> joints_batch(const std::vector<Joints>& program,
+                                        const std::vector<Conditions>& conditions = {}, int threads = 0,
                                         const std::function<bool(std::size_t)>& progress = {}) const;
 
  private:

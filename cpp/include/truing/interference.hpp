@@ -33,7 +33,8 @@ struct Obstacle {
 /// Part of a link, a capsule: `radius` about the segment between two points.
 struct LinkCapsule {
   std::string name;
-  std::string link;  ///< the joint whose link carries it, in the frame after it; "base": the base frame; "tool": the target's frame
+  std::string link;  ///< the joint whose link carries it, in the frame after it; "base": the base frame; "tool": the
+                     ///< target's frame
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  ///< [m]
   Eigen::Vector3d to = Eigen::Vector3d::Zero();    ///< [m]
   double radius = 0.0;                             ///< [m]
@@ -43,8 +44,8 @@ struct Scene {
   std::vector<Obstacle> obstacles;
   std::vector<LinkCapsule> capsules;
   double clearance = 0.0;  ///< what comes nearer than this interferes [m]
-  /// Pairs of names that are not looked at. Capsules of one link and of neighbouring links never are, nor is the base's with what
-  /// stands still.
+  /// Pairs of names that are not looked at. Capsules of one link and of neighbouring links never are, nor is the base's
+  /// with what stands still.
   std::vector<std::pair<std::string, std::string>> ignored;
 
   bool empty() const { return capsules.empty(); }
@@ -56,10 +57,12 @@ struct Contact {
   double distance = 0.0;      ///< between their surfaces; negative: how deep they are in each other [m]
 };
 
-/// Throws std::invalid_argument on unknown links, empty or equal names, sizes that are not positive, frames that are not rigid.
+/// Throws std::invalid_argument on unknown links, empty or equal names, sizes that are not positive, frames that are
+/// not rigid.
 void validate(const Scene& scene, const Robot& robot);
 
 /// The nearest pair at these readings (effects left out); no names when there is none to look at.
-Contact nearest_contact(const Scene& scene, const Robot& robot, const Eigen::VectorXd& readings, std::size_t target = 0);
+Contact nearest_contact(const Scene& scene, const Robot& robot, const Eigen::VectorXd& readings,
+                        std::size_t target = 0);
 
 }  // namespace truing

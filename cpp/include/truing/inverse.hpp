@@ -29,7 +29,8 @@ constexpr int kMaxDrivenJoints = 16;
 /// Readings of the driven joints, chain order [rad | m].
 using Joints = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxDrivenJoints, 1>;
 
-/// Geometric Jacobian by readings: linear [m] above angular [rad] motion of the target, about the measurement frame's axes.
+/// Geometric Jacobian by readings: linear [m] above angular [rad] motion of the target, about the measurement frame's
+/// axes.
 using TipJacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxDrivenJoints>;
 
 /// A closed interval; empty when lower > upper.
@@ -54,11 +55,12 @@ struct Task {
   /// Torch: the turn about `axis` that takes the wanted frame to the reached one, in (-pi, pi]. [rad]
   Window roll;
   double preferred_roll = std::numeric_limits<double>::quiet_NaN();  ///< as near to it as can be; NaN: any [rad]
-  /// Torch: how far the axis may lean towards `travel` (lead) and towards axis x travel (work). Zero width: not at all. [rad]
+  /// Torch: how far the axis may lean towards `travel` (lead) and towards axis x travel (work). Zero width: not at all.
+  /// [rad]
   Window lead{0.0, 0.0};
   Window work{0.0, 0.0};
-  /// Where every way to the target interferes with the scene, the target is moved along this direction, in the wanted frame, by
-  /// the least that frees it: back along the torch, as it is. Unit vector.
+  /// Where every way to the target interferes with the scene, the target is moved along this direction, in the wanted
+  /// frame, by the least that frees it: back along the torch, as it is. Unit vector.
   Eigen::Vector3d retreat = -Eigen::Vector3d::UnitZ();
   double longest_retreat = 0.0;  ///< and by no more than this; zero: not at all [m]
 };
@@ -67,17 +69,17 @@ struct Task {
 struct Conditions {
   /// Approach direction of every driven joint, -1, 0 or 1. Empty: the way from the seed to the answer.
   std::vector<int> direction;
-  double payload = 0.0;                      ///< at the tool [kg]
+  double payload = 0.0;                                           ///< at the tool [kg]
   double temperature = std::numeric_limits<double>::quiet_NaN();  ///< [deg C]
   double time = std::numeric_limits<double>::quiet_NaN();         ///< [s]
-  std::vector<double> joint_speed;           ///< of every driven joint [rad/s | m/s]
-  std::map<std::string, double> covariates;  ///< what else the effects look at, by column name
+  std::vector<double> joint_speed;                                ///< of every driven joint [rad/s | m/s]
+  std::map<std::string, double> covariates;                       ///< what else the effects look at, by column name
 };
 
 /// Which of several answers.
 enum class Choose {
-  nearest,         ///< to the seed
-  limits_margin,   ///< furthest from the joint limits: the smallest share of a joint's range that is left on either side
+  nearest,        ///< to the seed
+  limits_margin,  ///< furthest from the joint limits: the smallest share of a joint's range that is left on either side
   manipulability,  ///< of the joints that turn, furthest from singular: sqrt(det(J J^T)), lengths over `reach / pi`
   rail_travel,     ///< least way of the prismatic joints from the seed, then nearest
 };
@@ -86,9 +88,9 @@ struct InverseOptions {
   double position_tolerance = 1e-6;  ///< a solution misses the task by no more [m]
   double rotation_tolerance = 1e-6;  ///< [rad]
   Choose choose = Choose::nearest;
-  int max_iterations = 60;           ///< of one descent
-  int max_restarts = 200;            ///< descents from other seeds before a target is given up
-  double wrist_tolerance = 0.01;     ///< axes that miss each other by no more are taken to meet, for the seeds alone [m]
+  int max_iterations = 60;        ///< of one descent
+  int max_restarts = 200;         ///< descents from other seeds before a target is given up
+  double wrist_tolerance = 0.01;  ///< axes that miss each other by no more are taken to meet, for the seeds alone [m]
   double parallel_tolerance = 0.02;  ///< axes nearer to parallel than this are taken to be, for the seeds alone [rad]
   Scene scene;                       ///< what the robot must not touch
 
@@ -107,22 +109,23 @@ enum class Reason {
 
 /// One answer.
 struct Solution {
-  Joints joints;                          ///< readings; of a failure the nearest that was found, within limits
+  Joints joints;  ///< readings; of a failure the nearest that was found, within limits
   Reason reason = Reason::out_of_reach;
-  double position_error = 0.0;            ///< of the task, from a second forward computation [m]
-  double rotation_error = 0.0;            ///< of the task: what of the orientation is asked for [rad]
-  double roll = 0.0;                      ///< torch: as Task::roll counts it [rad]
-  int branch = -1;                        ///< which of the closed form's branches it came from; -1: by descent
-  int iterations = 0;                     ///< of all descents together
+  double position_error = 0.0;  ///< of the task, from a second forward computation [m]
+  double rotation_error = 0.0;  ///< of the task: what of the orientation is asked for [rad]
+  double roll = 0.0;            ///< torch: as Task::roll counts it [rad]
+  int branch = -1;              ///< which of the closed form's branches it came from; -1: by descent
+  int iterations = 0;           ///< of all descents together
   // Of a failure:
-  double miss = 0.0;                      ///< [m], or [rad] when the position is reached and the orientation is not
+  double miss = 0.0;  ///< [m], or [rad] when the position is reached and the orientation is not
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< from the nearest to the wanted, measurement frame
-  int joint = -1;                         ///< driven joint whose limit stands in the way
-  double excess = 0.0;                    ///< how far beyond its limit it would have to go [rad | m]
+  int joint = -1;                                       ///< driven joint whose limit stands in the way
+  double excess = 0.0;                                  ///< how far beyond its limit it would have to go [rad | m]
   // With a scene:
-  std::array<int, 2> contact{-1, -1};     ///< the nearest pair: index of a capsule; of another one, or capsule count + index of an obstacle
+  std::array<int, 2> contact{
+      -1, -1};  ///< the nearest pair: index of a capsule; of another one, or capsule count + index of an obstacle
   double contact_distance = std::numeric_limits<double>::infinity();  ///< of their surfaces; negative: so deep [m]
-  double retreat = 0.0;                   ///< how far the target was moved along Task::retreat [m]
+  double retreat = 0.0;  ///< how far the target was moved along Task::retreat [m]
 
   bool reached() const { return reason == Reason::reached; }
 };
@@ -165,7 +168,8 @@ struct Path {
 /// Which closed form the robot's geometry has, once axes that nearly meet are taken to meet.
 enum class ClosedFormKind { none, spherical_wrist, three_parallel };
 
-/// A robot made ready for inverse kinematics: built once, then const and safe across threads; a solve allocates nothing.
+/// A robot made ready for inverse kinematics: built once, then const and safe across threads; a solve allocates
+/// nothing.
 class InverseSolver {
  public:
   /// `conditions`: those of every solve that names no others; they also say which inputs there are.
@@ -188,8 +192,8 @@ class InverseSolver {
   /// The same, with the Jacobian of the chain; what effects change in it is left out.
   Eigen::Isometry3d forward(const Joints& joints, TipJacobian* jacobian, const Conditions* conditions = nullptr) const;
 
-  /// One answer, by Choose. Throws std::invalid_argument on a seed of the wrong size, on values that are not finite, on a wanted
-  /// pose that is not rigid. What cannot be reached is told in the result.
+  /// One answer, by Choose. Throws std::invalid_argument on a seed of the wrong size, on values that are not finite, on
+  /// a wanted pose that is not rigid. What cannot be reached is told in the result.
   Solution solve(const Task& task, const Joints& seed, const Conditions* conditions = nullptr) const;
 
   /// Every answer for a full pose: of a closed form its branches, carried over to the robot as it is. Prismatic joints
@@ -197,22 +201,23 @@ class InverseSolver {
   /// Without closed form: what descents from 8 * max_restarts seeds found, not known to be all.
   void branches(const Task& task, const Joints& seed, Branches* found, const Conditions* conditions = nullptr) const;
 
-  /// One answer per task; `seeds`: one for all or one per task; `conditions`: none, one, or one per task. The same for any
-  /// number of threads (0: as many as the machine has).
-  /// `progress` (done) is called now and then from the calling thread; false stops: what is left has reason out_of_reach.
+  /// One answer per task; `seeds`: one for all or one per task; `conditions`: none, one, or one per task. The same for
+  /// any number of threads (0: as many as the machine has). `progress` (done) is called now and then from the calling
+  /// thread; false stops: what is left has reason out_of_reach.
   std::vector<Solution> solve_batch(const std::vector<Task>& tasks, const std::vector<Joints>& seeds,
                                     const std::vector<Conditions>& conditions = {}, int threads = 0,
                                     const std::function<bool(std::size_t)>& progress = {}) const;
 
-  /// The next of a chain of poses that lie close together: Newton from `previous`, which the caller has from the pose before.
-  /// It stays on its branch; where it cannot, the reason says why, and nothing else is tried.
+  /// The next of a chain of poses that lie close together: Newton from `previous`, which the caller has from the pose
+  /// before. It stays on its branch; where it cannot, the reason says why, and nothing else is tried.
   Solution follow(const Task& task, const Joints& previous, const Conditions* conditions = nullptr) const;
 
-  /// A path through the targets in steps as short as can be: the cheapest chain over samples of roll, rails and branches (dynamic
-  /// programming), then evened out and put on the robot as it is. Where no chain keeps within the steps, the gap is told, and the
-  /// path goes on from the cheapest place beyond it. `seed`: where the robot comes from.
-  Path path(const std::vector<Task>& tasks, const Joints& seed, const PathOptions& options = {}, const Conditions* conditions = nullptr,
-            const std::function<bool(std::size_t)>& progress = {}) const;
+  /// A path through the targets in steps as short as can be: the cheapest chain over samples of roll, rails and
+  /// branches (dynamic programming), then evened out and put on the robot as it is. Where no chain keeps within the
+  /// steps, the gap is told, and the path goes on from the cheapest place beyond it. `seed`: where the robot comes
+  /// from.
+  Path path(const std::vector<Task>& tasks, const Joints& seed, const PathOptions& options = {},
+            const Conditions* conditions = nullptr, const std::function<bool(std::size_t)>& progress = {}) const;
 
   /// In a sentence: "J4 would have to go 0.12 rad beyond its limit".
   std::string describe(const Solution& solution) const;

@@ -73,10 +73,10 @@ struct Anchor {
 struct Robot {
   std::string name;
   Convention convention = Convention::dh;
-  Eigen::Vector3d gravity{0.0, 0.0, -9.81};                         ///< in the base frame [m/s^2]
+  Eigen::Vector3d gravity{0.0, 0.0, -9.81};                              ///< in the base frame [m/s^2]
   Eigen::Isometry3d T_measurement_base = Eigen::Isometry3d::Identity();  ///< base in the measurement frame
-  std::vector<Joint> joints;                                        ///< in chain order
-  std::vector<Target> targets;                                      ///< targets[0] is the tool
+  std::vector<Joint> joints;                                             ///< in chain order
+  std::vector<Target> targets;                                           ///< targets[0] is the tool
   std::vector<AppliedEffect> effects;
   std::optional<Anchor> anchor;
 
@@ -88,8 +88,9 @@ struct Robot {
   std::size_t joint_index(const std::string& joint_name) const;
 };
 
-/// Throws std::invalid_argument, naming the joint and what is wrong, when the robot cannot be used: no joints, duplicate
-/// or empty names, unknown or circular `driven_by`, values that are not finite, axis not of unit length, lower > upper.
+/// Throws std::invalid_argument, naming the joint and what is wrong, when the robot cannot be used: no joints,
+/// duplicate or empty names, unknown or circular `driven_by`, values that are not finite, axis not of unit length,
+/// lower > upper.
 void validate(const Robot& robot);
 
 /// Roll-pitch-yaw as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll). [rad]
@@ -99,7 +100,9 @@ Eigen::Vector3d rpy_from_rotation(const Eigen::Matrix3d& rotation);
 Eigen::Isometry3d frame_from_xyz_rpy(const Eigen::Vector3d& xyz, const Eigen::Vector3d& rpy);
 
 /// T_measurement_link of the frame after every joint, then T_measurement_target of target `target`: size n_joints + 1.
-/// `reading`: driven joints in chain order [rad | m]. Effects are left out. The readable twin of the kernel: tests hold them together.
-std::vector<Eigen::Isometry3d> forward_kinematics(const Robot& robot, const Eigen::VectorXd& reading, std::size_t target = 0);
+/// `reading`: driven joints in chain order [rad | m]. Effects are left out. The readable twin of the kernel: tests hold
+/// them together.
+std::vector<Eigen::Isometry3d> forward_kinematics(const Robot& robot, const Eigen::VectorXd& reading,
+                                                  std::size_t target = 0);
 
 }  // namespace truing

@@ -8,15 +8,16 @@
 
 namespace truing {
 
-// Samples of streams. `t` is the stamp of the device's own clock; `arrival` is the true time at which the sample reached the computer [s].
-// Three clocks: the inertial sensor's, in which everything is computed; the tracker's, t_imu = t_tracker - clock_offset; and the
-// controller's (joints and plan), t_imu = t_controller - controller_clock_offset.
+// Samples of streams. `t` is the stamp of the device's own clock; `arrival` is the true time at which the sample
+// reached the computer [s]. Three clocks: the inertial sensor's, in which everything is computed; the tracker's, t_imu
+// = t_tracker - clock_offset; and the controller's (joints and plan), t_imu = t_controller - controller_clock_offset.
 
 struct ImuSample {
   double t = 0.0;
   double arrival = 0.0;
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< angular velocity in the sensor frame [rad/s]
-  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< specific force in the sensor frame, +9.81 upward at rest [m/s^2]
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  ///< angular velocity in the sensor frame [rad/s]
+  Eigen::Vector3d accel =
+      Eigen::Vector3d::Zero();  ///< specific force in the sensor frame, +9.81 upward at rest [m/s^2]
 };
 
 /// The receiver in the tracker frame.

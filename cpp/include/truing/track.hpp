@@ -15,8 +15,8 @@
 
 namespace truing {
 
-// Where the tool of a large, swaying arm will be: from an inertial sensor and a receiver of base-station signals on the last link, encoders, and
-// the plan. See docs/track.md.
+// Where the tool of a large, swaying arm will be: from an inertial sensor and a receiver of base-station signals on the
+// last link, encoders, and the plan. See docs/track.md.
 
 /// What became of a sample. Refused samples leave everything as it was.
 enum class Outcome {
@@ -40,79 +40,84 @@ bool accepted(Outcome outcome);
 /// How many samples met which fate.
 struct Counters {
   std::array<std::uint64_t, 11> imu{}, pose{}, joints{}, plan{};  ///< by Outcome
-  std::uint64_t outliers = 0;       ///< tracker samples that the gate rejected (those that left the window)
-  std::uint64_t reacquired = 0;     ///< times that the filter gave in to a tracker that disagreed for long
+  std::uint64_t outliers = 0;    ///< tracker samples that the gate rejected (those that left the window)
+  std::uint64_t reacquired = 0;  ///< times that the filter gave in to a tracker that disagreed for long
 };
 
 struct FilterOptions {
-  double window = 0.5;                    ///< measurements up to so late are put at their place [s]
-  double future_limit = 0.1;              ///< of a stamp against the newest inertial sample [s]
-  double highest_imu_rate = 2000.0;       ///< sizes the ring buffer [Hz]
-  double highest_pose_rate = 400.0;       ///< [Hz]
-  double gyro_noise = 1e-4;               ///< [rad/s/sqrt(Hz)]
-  double accel_noise = 1e-3;              ///< [m/s^2/sqrt(Hz)]
-  double gyro_bias = 1e-2;                ///< standard deviation before any data [rad/s]
-  double accel_bias = 1e-1;               ///< [m/s^2]
-  double gyro_bias_walk = 2e-5;           ///< [rad/s/sqrt(s)]
-  double accel_bias_walk = 2e-4;          ///< [m/s^2/sqrt(s)]
-  double imu_scale = 5e-4;                ///< standard deviation of the scale of gyro and accelerometer, as a share
-  double gyro_range = 34.0;               ///< a component at or beyond is saturated [rad/s]
-  double accel_range = 156.0;             ///< [m/s^2]
-  double largest_gap = 0.02;              ///< between inertial samples, before uncertainty is widened [s]
-  double restart_gap = 5.0;               ///< [s]
-  double gap_acceleration = 2.0;          ///< standard deviation of what a gap or saturation hides [m/s^2]
-  double gap_rate = 0.2;                  ///< [rad/s]
-  double position_sigma = 1e-3;           ///< of the tracker, one component [m]
-  double rotation_sigma = 1e-3;           ///< [rad]
-  double gate = 50.0;                     ///< tracker samples with a larger normalised innovation squared are outliers
-  int reacquire_after = 25;               ///< outliers in a row, then the tracker is believed
-  int frozen_after = 3;                   ///< equal tracker samples in a row, then they are refused
-  double clock_walk = 2e-5;               ///< of the tracker's clock [s/sqrt(s)]
-  double clock_drift = 1e-4;              ///< standard deviation of its drift [s/s]
-  double clock_drift_walk = 1e-6;         ///< [1/sqrt(s)]
-  double sway_position = 0.02;            ///< standard deviation of the tip about its slow mean, before any data; then as the arm shows it [m]
-  double sway_rotation = 0.003;           ///< [rad]
-  double sway_correlation = 0.5;          ///< time over which sway is like itself [s]
-  double slow_position = 0.05;            ///< standard deviation of the deviation from forward kinematics before any data [m]
-  double slow_rotation = 0.02;            ///< [rad]
-  double slow_position_walk = 3e-3;       ///< how it wanders [m/sqrt(s)]
-  double slow_rotation_walk = 5e-4;       ///< [rad/sqrt(s)]
+  double window = 0.5;               ///< measurements up to so late are put at their place [s]
+  double future_limit = 0.1;         ///< of a stamp against the newest inertial sample [s]
+  double highest_imu_rate = 2000.0;  ///< sizes the ring buffer [Hz]
+  double highest_pose_rate = 400.0;  ///< [Hz]
+  double gyro_noise = 1e-4;          ///< [rad/s/sqrt(Hz)]
+  double accel_noise = 1e-3;         ///< [m/s^2/sqrt(Hz)]
+  double gyro_bias = 1e-2;           ///< standard deviation before any data [rad/s]
+  double accel_bias = 1e-1;          ///< [m/s^2]
+  double gyro_bias_walk = 2e-5;      ///< [rad/s/sqrt(s)]
+  double accel_bias_walk = 2e-4;     ///< [m/s^2/sqrt(s)]
+  double imu_scale = 5e-4;           ///< standard deviation of the scale of gyro and accelerometer, as a share
+  double gyro_range = 34.0;          ///< a component at or beyond is saturated [rad/s]
+  double accel_range = 156.0;        ///< [m/s^2]
+  double largest_gap = 0.02;         ///< between inertial samples, before uncertainty is widened [s]
+  double restart_gap = 5.0;          ///< [s]
+  double gap_acceleration = 2.0;     ///< standard deviation of what a gap or saturation hides [m/s^2]
+  double gap_rate = 0.2;             ///< [rad/s]
+  double position_sigma = 1e-3;      ///< of the tracker, one component [m]
+  double rotation_sigma = 1e-3;      ///< [rad]
+  double gate = 50.0;                ///< tracker samples with a larger normalised innovation squared are outliers
+  int reacquire_after = 25;          ///< outliers in a row, then the tracker is believed
+  int frozen_after = 3;              ///< equal tracker samples in a row, then they are refused
+  double clock_walk = 2e-5;          ///< of the tracker's clock [s/sqrt(s)]
+  double clock_drift = 1e-4;         ///< standard deviation of its drift [s/s]
+  double clock_drift_walk = 1e-6;    ///< [1/sqrt(s)]
+  double sway_position =
+      0.02;  ///< standard deviation of the tip about its slow mean, before any data; then as the arm shows it [m]
+  double sway_rotation = 0.003;   ///< [rad]
+  double sway_correlation = 0.5;  ///< time over which sway is like itself [s]
+  double slow_position = 0.05;    ///< standard deviation of the deviation from forward kinematics before any data [m]
+  double slow_rotation = 0.02;    ///< [rad]
+  double slow_position_walk = 3e-3;  ///< how it wanders [m/sqrt(s)]
+  double slow_rotation_walk = 5e-4;  ///< [rad/sqrt(s)]
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
 };
 
-/// The sway as damped modes: each component c of the deviation from the plan is slow + sum of modes, and mode k of it obeys
+/// The sway as damped modes: each component c of the deviation from the plan is slow + sum of modes, and mode k of it
+/// obeys
 ///
 ///     x'' + 2 zeta_k omega_k x' + omega_k^2 x = gain_k(c, :) . a_plan + noise
 ///
-/// with the planned acceleration in the frame of the planned inertial sensor. Components: translation [m], rotation vector [rad], in that frame.
+/// with the planned acceleration in the frame of the planned inertial sensor. Components: translation [m], rotation
+/// vector [rad], in that frame.
 struct ModalModel {
   static constexpr int kMost = 4;
   int count = 0;
-  std::array<double, kMost> frequency{};                   ///< undamped [Hz]
-  std::array<double, kMost> damping{};                     ///< ratio
-  std::array<double, kMost> frequency_sigma{};             ///< standard error [Hz]
-  std::array<Eigen::Matrix<double, 6, 3>, kMost> gain{};   ///< [-], [rad/m]
+  std::array<double, kMost> frequency{};                  ///< undamped [Hz]
+  std::array<double, kMost> damping{};                    ///< ratio
+  std::array<double, kMost> frequency_sigma{};            ///< standard error [Hz]
+  std::array<Eigen::Matrix<double, 6, 3>, kMost> gain{};  ///< [-], [rad/m]
 
-  ModalModel() { for (auto& g : gain) g.setZero(); }
+  ModalModel() {
+    for (auto& g : gain) g.setZero();
+  }
 };
 
 struct DeviationOptions {
-  double period = 0.01;               ///< of the model's steps, on multiples of it [s]
-  double horizon = 0.04;              ///< for which predictions are graded [s]
-  double position_noise = 3e-4;       ///< of the filter's position, as the model sees it [m], rotations as 1 m
-  double velocity_noise = 1e-3;       ///< [m/s]
-  double slow_noise = 3e-3;           ///< acceleration that drives the slow part [m/s^2/sqrt(Hz)]
-  double static_time = 2.0;           ///< over which the static deviation is averaged [s]
-  double mode_noise = 2e-2;           ///< acceleration that drives a mode beside the plan's [m/s^2/sqrt(Hz)]
-  double frequency_sigma = 0.05;      ///< standard deviation of the given frequencies, as a share; 0: they stay
-  double frequency_walk = 0.003;      ///< how they wander, as a share [1/sqrt(s)]
-  double frequency_range = 0.2;       ///< and how far at most, as a share
-  double grade_time = 3.0;            ///< over which grades are averaged [s]
-  double settle_time = 0.1;           ///< after so long no more late samples are waited for, and a prediction is graded [s]
-  double least_evidence = 1.0;        ///< predictions of modes are used after so long of grades [s]
-  double plan_limit = 10.0;           ///< plan samples further ahead are refused [s]
+  double period = 0.01;           ///< of the model's steps, on multiples of it [s]
+  double horizon = 0.04;          ///< for which predictions are graded [s]
+  double position_noise = 3e-4;   ///< of the filter's position, as the model sees it [m], rotations as 1 m
+  double velocity_noise = 1e-3;   ///< [m/s]
+  double slow_noise = 3e-3;       ///< acceleration that drives the slow part [m/s^2/sqrt(Hz)]
+  double static_time = 2.0;       ///< over which the static deviation is averaged [s]
+  double mode_noise = 2e-2;       ///< acceleration that drives a mode beside the plan's [m/s^2/sqrt(Hz)]
+  double frequency_sigma = 0.05;  ///< standard deviation of the given frequencies, as a share; 0: they stay
+  double frequency_walk = 0.003;  ///< how they wander, as a share [1/sqrt(s)]
+  double frequency_range = 0.2;   ///< and how far at most, as a share
+  double grade_time = 3.0;        ///< over which grades are averaged [s]
+  double settle_time = 0.1;       ///< after so long no more late samples are waited for, and a prediction is graded [s]
+  double least_evidence = 1.0;    ///< predictions of modes are used after so long of grades [s]
+  double plan_limit = 10.0;       ///< plan samples further ahead are refused [s]
 
   bool is_valid(std::string* error) const;
 };
@@ -125,7 +130,8 @@ enum class Predictor {
 };
 constexpr int kPredictors = 3;
 
-/// One row for `identify_modes`: the deviation, its rate, and the plan's acceleration, in the frame of the planned inertial sensor.
+/// One row for `identify_modes`: the deviation, its rate, and the plan's acceleration, in the frame of the planned
+/// inertial sensor.
 struct DeviationRow {
   double t = 0.0;
   Eigen::Matrix<double, 6, 1> deviation = Eigen::Matrix<double, 6, 1>::Zero();  ///< [m], [rad]
@@ -135,15 +141,17 @@ struct DeviationRow {
 
 struct ModesResult {
   ModalModel model;
-  std::vector<double> error;   ///< rms of predictions `2 * horizon` ahead: of no change, with one mode, two … [m]
-  double rows = 0;             ///< used
+  std::vector<double> error;  ///< rms of predictions `2 * horizon` ahead: of no change, with one mode, two … [m]
+  double rows = 0;            ///< used
   std::string stopped_because;
 };
 
-/// Frequencies, damping and gains from a recording of rows `options.period` apart. The start is the eigensystem realisation of the acceleration's
-/// autocovariance; then the errors of predictions `2 * options.horizon` ahead by the model's own Kalman filter are made least. Another mode is taken
-/// while it lowers that error by at least `worth`. Throws std::invalid_argument on fewer than 500 rows.
-ModesResult identify_modes(const std::vector<DeviationRow>& rows, const DeviationOptions& options = {}, int most = ModalModel::kMost, double worth = 0.03);
+/// Frequencies, damping and gains from a recording of rows `options.period` apart. The start is the eigensystem
+/// realisation of the acceleration's autocovariance; then the errors of predictions `2 * options.horizon` ahead by the
+/// model's own Kalman filter are made least. Another mode is taken while it lowers that error by at least `worth`.
+/// Throws std::invalid_argument on fewer than 500 rows.
+ModesResult identify_modes(const std::vector<DeviationRow>& rows, const DeviationOptions& options = {},
+                           int most = ModalModel::kMost, double worth = 0.03);
 
 /// Bounds of what is sent to the arm.
 struct CorrectionLimits {
@@ -157,9 +165,10 @@ struct CorrectionLimits {
 
 /// Watches for jumps of the tracker against inertial sensor and forward kinematics.
 struct WatchOptions {
-  double threshold = 55.0;         ///< of averages that are chi-square distributed with six degrees of freedom
-  double forget = 1.0;             ///< after a gap of the tracker longer than this, averages begin anew [s]
-  double compare = 120.0;          ///< after a shift, station and receiver are told apart for so long, and what else is odd is taken for its after-effect [s]
+  double threshold = 55.0;  ///< of averages that are chi-square distributed with six degrees of freedom
+  double forget = 1.0;      ///< after a gap of the tracker longer than this, averages begin anew [s]
+  double compare = 120.0;   ///< after a shift, station and receiver are told apart for so long, and what else is odd is
+                            ///< taken for its after-effect [s]
 
   bool is_valid(std::string* error) const;
 };
@@ -174,24 +183,26 @@ const char* name(ShiftCause cause);
 
 /// The last jump that was noticed.
 struct Shift {
-  std::uint64_t count = 0;         ///< since the start; 0: none, and the rest means nothing
-  double t = 0.0;                  ///< when it happened, the inertial sensor's clock [s]
-  double flagged = 0.0;            ///< stamp of the tracker sample that it was noticed by [s]
-  Eigen::Matrix<double, 6, 1> jump = Eigen::Matrix<double, 6, 1>::Zero();  ///< of the receiver as measured, base frame [m], rotation vector [rad]
+  std::uint64_t count = 0;  ///< since the start; 0: none, and the rest means nothing
+  double t = 0.0;           ///< when it happened, the inertial sensor's clock [s]
+  double flagged = 0.0;     ///< stamp of the tracker sample that it was noticed by [s]
+  Eigen::Matrix<double, 6, 1> jump =
+      Eigen::Matrix<double, 6, 1>::Zero();  ///< of the receiver as measured, base frame [m], rotation vector [rad]
   ShiftCause cause = ShiftCause::station_or_receiver;
-  double odds = 0.0;               ///< logarithm of the odds of station against receiver
+  double odds = 0.0;  ///< logarithm of the odds of station against receiver
 };
 
 struct TrackOptions {
   FilterOptions filter;
   DeviationOptions deviation;
   WatchOptions watch;
-  ModalModel modes;                ///< of `identify_modes`; none: predictions at constant acceleration
+  ModalModel modes;  ///< of `identify_modes`; none: predictions at constant acceleration
   CorrectionLimits limits;
-  double coast_position = 0.03;    ///< without the tracker, estimates with a larger standard deviation than this and than forward kinematics' are not used [m]
-  double coast_rotation = 0.02;    ///< [rad]
-  double imu_timeout = 0.1;        ///< the inertial sensor is taken for dead when it is so much older than the joints [s]
-  double joints_timeout = 0.5;     ///< [s]
+  double coast_position = 0.03;  ///< without the tracker, estimates with a larger standard deviation than this and than
+                                 ///< forward kinematics' are not used [m]
+  double coast_rotation = 0.02;  ///< [rad]
+  double imu_timeout = 0.1;      ///< the inertial sensor is taken for dead when it is so much older than the joints [s]
+  double joints_timeout = 0.5;   ///< [s]
 
   bool is_valid(std::string* error) const;
 };
@@ -207,9 +218,10 @@ const char* name(Predictor predictor);
 
 /// The tool at time `t`, as known at time `made`.
 struct PosePrediction {
-  double t = 0.0, made = 0.0;                            ///< [s], the inertial sensor's clock
+  double t = 0.0, made = 0.0;  ///< [s], the inertial sensor's clock
   Eigen::Isometry3d T_base_tool = Eigen::Isometry3d::Identity();
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();  ///< position [m], then rotation vector [rad], about the base frame's axes
+  Eigen::Matrix<double, 6, 6> covariance =
+      Eigen::Matrix<double, 6, 6>::Zero();  ///< position [m], then rotation vector [rad], about the base frame's axes
   Status status = Status::lost;
   Predictor predictor = Predictor::slow;
 };
@@ -217,15 +229,18 @@ struct PosePrediction {
 /// What to add to the plan so that the tool is where it was planned.
 struct Compensation {
   PosePrediction predicted;
-  bool has_plan = false;                                 ///< false: the plan does not reach that far, and nothing is corrected
+  bool has_plan = false;  ///< false: the plan does not reach that far, and nothing is corrected
   Eigen::Isometry3d T_base_tool_planned = Eigen::Isometry3d::Identity();
-  Eigen::Matrix<double, 6, 1> wanted = Eigen::Matrix<double, 6, 1>::Zero();      ///< correction in the base frame [m], rotation vector [rad]
+  Eigen::Matrix<double, 6, 1> wanted =
+      Eigen::Matrix<double, 6, 1>::Zero();  ///< correction in the base frame [m], rotation vector [rad]
   Eigen::Matrix<double, 6, 1> correction = Eigen::Matrix<double, 6, 1>::Zero();  ///< the same within the limits
-  bool limited = false;                                  ///< the two differ by more than 1 mm or 1 mrad
-  Eigen::Isometry3d T_base_flange = Eigen::Isometry3d::Identity();               ///< corrected
+  bool limited = false;                                             ///< the two differ by more than 1 mm or 1 mrad
+  Eigen::Isometry3d T_base_flange = Eigen::Isometry3d::Identity();  ///< corrected
 };
 
-struct ClockEstimate { double offset = 0.0, sigma = 0.0, drift = 0.0; };  ///< t_imu = t_tracker - offset [s], [s/s]
+struct ClockEstimate {
+  double offset = 0.0, sigma = 0.0, drift = 0.0;
+};  ///< t_imu = t_tracker - offset [s], [s/s]
 
 /// A tracker sample against what was expected of it.
 struct Innovation {
@@ -234,8 +249,8 @@ struct Innovation {
   bool accepted = false;
 };
 
-/// Fusion and prediction, sample by sample. No heap allocation after construction; the same samples give the same result in whatever order they arrive
-/// within the window. Not for use from two threads at once.
+/// Fusion and prediction, sample by sample. No heap allocation after construction; the same samples give the same
+/// result in whatever order they arrive within the window. Not for use from two threads at once.
 class Tracker {
  public:
   /// Throws std::invalid_argument on options that make no sense.
@@ -257,10 +272,11 @@ class Tracker {
   Compensation compensate(double t);
 
   void set_modes(const ModalModel& modes);
-  double now() const;                         ///< stamp of the newest inertial sample
+  double now() const;  ///< stamp of the newest inertial sample
   ClockEstimate clock();
   std::array<double, ModalModel::kMost> frequencies() const;  ///< as tracked [Hz]
-  /// Settled rows since the last call for `identify_modes`, and settled innovations: the number written, at most `capacity`. Call often: few are kept.
+  /// Settled rows since the last call for `identify_modes`, and settled innovations: the number written, at most
+  /// `capacity`. Call often: few are kept.
   int take_rows(DeviationRow* out, int capacity);
   int take_innovations(Innovation* out, int capacity);
   const Counters& counters() const;

@@ -24,9 +24,10 @@ struct RecordedStreams {
 };
 
 struct ReplayOptions {
-  TrackOptions track;                                ///< compensations are made `track.deviation.horizon` before the instant they are for
-  std::vector<double> horizons = {0.02, 0.04, 0.08};  ///< at which predictions are graded against the tracker's later samples [s]
-  double learn_modes = 0.0;                          ///< modes are identified from so many seconds, and used from then on; 0: never [s]
+  TrackOptions track;  ///< compensations are made `track.deviation.horizon` before the instant they are for
+  std::vector<double> horizons = {0.02, 0.04,
+                                  0.08};  ///< at which predictions are graded against the tracker's later samples [s]
+  double learn_modes = 0.0;  ///< modes are identified from so many seconds, and used from then on; 0: never [s]
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
@@ -44,28 +45,29 @@ const char* name(Baseline baseline);
 
 /// A row of the plan: what to add there.
 struct CompensationRow {
-  bool made = false;                 ///< false: the streams do not reach there, and nothing else is set but `t`
-  double t = 0.0;                    ///< when the tool is to be there, the inertial sensor's clock [s]
+  bool made = false;  ///< false: the streams do not reach there, and nothing else is set but `t`
+  double t = 0.0;     ///< when the tool is to be there, the inertial sensor's clock [s]
   Compensation compensation;
 };
 
-/// A prediction, and what the tracker said when its time had come. Errors are measured minus predicted, of the receiver, in the base frame.
+/// A prediction, and what the tracker said when its time had come. Errors are measured minus predicted, of the
+/// receiver, in the base frame.
 struct GradedPrediction {
-  double t = 0.0, made = 0.0;        ///< the inertial sensor's clock [s]
-  double horizon = 0.0;              ///< asked for [s]
-  Status status = Status::lost;      ///< lost: nothing was predicted
+  double t = 0.0, made = 0.0;    ///< the inertial sensor's clock [s]
+  double horizon = 0.0;          ///< asked for [s]
+  Status status = Status::lost;  ///< lost: nothing was predicted
   Predictor predictor = Predictor::slow;
-  int dimensions = 0;                ///< 6, 3 for a tracker without orientations, 0 where nothing was predicted
+  int dimensions = 0;  ///< 6, 3 for a tracker without orientations, 0 where nothing was predicted
   Eigen::Vector3d position = Eigen::Vector3d::Zero();        ///< error [m]
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();        ///< error, rotation vector [rad]
   Eigen::Vector3d position_sigma = Eigen::Vector3d::Zero();  ///< expected, tracker noise included [m]
-  double squares = 0.0;              ///< normalised error squared, `dimensions` expected
-  std::array<double, kBaselines> baselines{};                ///< length of the position error [m]; infinite: not to be had yet
+  double squares = 0.0;                                      ///< normalised error squared, `dimensions` expected
+  std::array<double, kBaselines> baselines{};  ///< length of the position error [m]; infinite: not to be had yet
 };
 
 /// How things stood, every tenth of a second.
 struct TimelineRow {
-  double t = 0.0;                    ///< [s]
+  double t = 0.0;  ///< [s]
   Status status = Status::lost;
   Predictor predictor = Predictor::slow;
   ClockEstimate clock;
@@ -73,20 +75,21 @@ struct TimelineRow {
 };
 
 struct ReplayResult {
-  std::vector<CompensationRow> rows;           ///< one per row of the plan, in its order
-  std::vector<GradedPrediction> graded;        ///< by tracker sample, then by horizon
+  std::vector<CompensationRow> rows;     ///< one per row of the plan, in its order
+  std::vector<GradedPrediction> graded;  ///< by tracker sample, then by horizon
   std::vector<Innovation> innovations;
   std::vector<TimelineRow> timeline;
-  std::vector<Shift> shifts;                   ///< of the tracker, as they were noticed
-  ModesResult modes;                           ///< identified; count 0 where none were asked for or found
-  double modes_from = 0.0;                     ///< they are used from then on [s]; 0: never
+  std::vector<Shift> shifts;  ///< of the tracker, as they were noticed
+  ModesResult modes;          ///< identified; count 0 where none were asked for or found
+  double modes_from = 0.0;    ///< they are used from then on [s]; 0: never
   Counters counters;
-  ClockEstimate clock;                         ///< at the end
-  bool stopped = false;                        ///< `progress` said so
+  ClockEstimate clock;   ///< at the end
+  bool stopped = false;  ///< `progress` said so
 };
 
 /// `progress` is told the share that is done, about a hundred times; false stops the replay.
 /// Throws std::invalid_argument on options that make no sense, and on streams that are not sorted by arrival.
-ReplayResult replay(const RecordedStreams& streams, const TrackSetup& setup, const ReplayOptions& options = {}, const std::function<bool(double)>& progress = {});
+ReplayResult replay(const RecordedStreams& streams, const TrackSetup& setup, const ReplayOptions& options = {},
+                    const std::function<bool(double)>& progress = {});
 
 }  // namespace truing

@@ -11,18 +11,27 @@
 
 namespace truing::kernel {
 
-namespace scalar { extern const Functions table; }
-namespace sse2 { extern const Functions table; }
+namespace scalar {
+extern const Functions table;
+}
+namespace sse2 {
+extern const Functions table;
+}
 #if TRUING_X86
-namespace avx2 { extern const Functions table; }
-namespace avx512 { extern const Functions table; }
+namespace avx2 {
+extern const Functions table;
+}
+namespace avx512 {
+extern const Functions table;
+}
 #endif
 
 const Functions* functions(const char* name) {
   const auto is = [name](const char* other) { return std::strcmp(name, other) == 0; };
 #if TRUING_X86
   __builtin_cpu_init();
-  if (is("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
+  if (is("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl"))
     return &avx512::table;
   if (is("avx2") && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return &avx2::table;
 #endif
@@ -32,10 +41,11 @@ const Functions* functions(const char* name) {
 }
 
 const Functions& functions() {
-  static const Functions& chosen = [] () -> const Functions& {
+  static const Functions& chosen = []() -> const Functions& {
     if (const char* wanted = std::getenv("TRUING_KERNEL")) {
       if (const Functions* found = functions(wanted)) return *found;
-      throw std::runtime_error(std::string("TRUING_KERNEL=") + wanted + " is not to be had here; scalar, sse2, avx2, avx512 may be");
+      throw std::runtime_error(std::string("TRUING_KERNEL=") + wanted +
+                               " is not to be had here; scalar, sse2, avx2, avx512 may be");
     }
     for (const char* name : {"avx512", "avx2"}) {
       if (const Functions* found = functions(name)) return *found;

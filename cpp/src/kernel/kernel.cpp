@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 // Compiled once per instruction set, with TRUING_KERNEL_NAMESPACE and TRUING_LANES given by the build.
-// Everything but the table of functions at the end is in that namespace, so that no copy's code can be linked into another's.
+// Everything but the table of functions at the end is in that namespace, so that no copy's code can be linked into
+// another's.
 
 #include "kernel.hpp"
 
@@ -16,7 +17,11 @@ constexpr int kLanes = TRUING_LANES;
 typedef double Pack __attribute__((vector_size(8 * TRUING_LANES)));
 typedef std::int64_t Mask __attribute__((vector_size(8 * TRUING_LANES)));
 
-inline Pack load(const double* p) { Pack v; std::memcpy(&v, p, sizeof v); return v; }
+inline Pack load(const double* p) {
+  Pack v;
+  std::memcpy(&v, p, sizeof v);
+  return v;
+}
 inline void store(double* p, Pack v) { std::memcpy(p, &v, sizeof v); }
 inline Pack splat(double x) { return Pack{} + x; }
 inline Pack square_root(Pack v) {
@@ -25,7 +30,9 @@ inline Pack square_root(Pack v) {
   return out;
 }
 
-struct Vec { Pack x, y, z; };
+struct Vec {
+  Pack x, y, z;
+};
 inline Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Vec operator-(Vec a, Vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec operator*(Pack s, Vec a) { return {s * a.x, s * a.y, s * a.z}; }
@@ -47,15 +54,26 @@ inline void store_vec(double* p, Vec v) {
 // sin and cos to about one unit in the last place for |angle| < 1e5: Cody-Waite reduction by pi/2 in three parts,
 // then minimax polynomials on [-pi/4, pi/4] (coefficients: S. Moshier, Cephes).
 inline void sine_cosine(Pack angle, Pack* sine, Pack* cosine) {
-  const double magic = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to an integer, whose low bits are the quadrant
+  const double magic =
+      6755399441055744.0;  // 1.5 * 2^52: adding it rounds to an integer, whose low bits are the quadrant
   const Pack shifted = angle * 0.63661977236758134308 + magic;
   const Pack k = shifted - magic;
-  const Pack r = ((angle - k * 1.57079632673412561417) - k * 6.07710050630396597660e-11) - k * 2.02226624879595063154e-21;
+  const Pack r =
+      ((angle - k * 1.57079632673412561417) - k * 6.07710050630396597660e-11) - k * 2.02226624879595063154e-21;
   const Pack r2 = r * r;
-  const Pack s = r + r * r2 * (-1.66666666666666307295e-1 + r2 * (8.33333333332211858878e-3 + r2 * (-1.98412698295895385996e-4 +
-                 r2 * (2.75573136213857245213e-6 + r2 * (-2.50507477628578072866e-8 + r2 * 1.58962301576546568060e-10)))));
-  const Pack c = 1.0 - 0.5 * r2 + r2 * r2 * (4.16666666666665929218e-2 + r2 * (-1.38888888888730564116e-3 + r2 * (2.48015872888517045348e-5 +
-                 r2 * (-2.75573141792967388112e-7 + r2 * (2.08757008419747316778e-9 + r2 * -1.13585365213876817300e-11)))));
+  const Pack s = r + r * r2 *
+                         (-1.66666666666666307295e-1 +
+                          r2 * (8.33333333332211858878e-3 +
+                                r2 * (-1.98412698295895385996e-4 +
+                                      r2 * (2.75573136213857245213e-6 +
+                                            r2 * (-2.50507477628578072866e-8 + r2 * 1.58962301576546568060e-10)))));
+  const Pack c = 1.0 - 0.5 * r2 +
+                 r2 * r2 *
+                     (4.16666666666665929218e-2 +
+                      r2 * (-1.38888888888730564116e-3 +
+                            r2 * (2.48015872888517045348e-5 +
+                                  r2 * (-2.75573141792967388112e-7 +
+                                        r2 * (2.08757008419747316778e-9 + r2 * -1.13585365213876817300e-11)))));
   Mask quadrant;
   std::memcpy(&quadrant, &shifted, sizeof quadrant);
   const Mask odd = (quadrant & 1) != 0;
@@ -96,15 +114,19 @@ inline void rotate(const Program& program, const Tile& tile, const double* angle
 inline void translate(const Program& program, const Tile& tile, const double* lengths, const Step& step) {
   for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
     const Pack length = step.dynamic < 0 ? splat(program.constants[step.constant]) : load(lengths + lane);
-    store_vec(at_slot(tile, step.out[0]) + lane, load_vec(at_slot(tile, step.in[0]) + lane) + length * load_vec(at_slot(tile, step.in[1]) + lane));
+    store_vec(at_slot(tile, step.out[0]) + lane,
+              load_vec(at_slot(tile, step.in[0]) + lane) + length * load_vec(at_slot(tile, step.in[1]) + lane));
   }
 }
 
 // R <- R F.
 inline void rotate_fixed(const Tile& tile, const double* f, const Step& step) {
   for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
-    const Vec x = load_vec(at_slot(tile, step.in[0]) + lane), y = load_vec(at_slot(tile, step.in[1]) + lane), z = load_vec(at_slot(tile, step.in[2]) + lane);
-    for (int k = 0; k < 3; ++k) store_vec(at_slot(tile, step.out[k]) + lane, splat(f[3 * k]) * x + splat(f[3 * k + 1]) * y + splat(f[3 * k + 2]) * z);
+    const Vec x = load_vec(at_slot(tile, step.in[0]) + lane), y = load_vec(at_slot(tile, step.in[1]) + lane),
+              z = load_vec(at_slot(tile, step.in[2]) + lane);
+    for (int k = 0; k < 3; ++k)
+      store_vec(at_slot(tile, step.out[k]) + lane,
+                splat(f[3 * k]) * x + splat(f[3 * k + 1]) * y + splat(f[3 * k + 2]) * z);
   }
 }
 
@@ -114,9 +136,15 @@ inline void sweep(const Program& program, const Tile& tile, int first) {
   for (const Step* step = program.steps; step != program.steps + program.step_count; ++step) {
     const double* values = tile.values + (step->dynamic < 0 ? 0 : step->dynamic) * kTilePoses + first;
     switch (step->code) {
-      case Code::rotate: rotate(program, tile, values, *step); break;
-      case Code::translate: translate(program, tile, values, *step); break;
-      case Code::fixed: rotate_fixed(tile, program.constants + step->constant, *step); break;
+      case Code::rotate:
+        rotate(program, tile, values, *step);
+        break;
+      case Code::translate:
+        translate(program, tile, values, *step);
+        break;
+      case Code::fixed:
+        rotate_fixed(tile, program.constants + step->constant, *step);
+        break;
     }
   }
 }
@@ -126,10 +154,14 @@ inline Pack root_weight(RowLoss loss, double scale, Pack s2) {
   const Pack one = splat(1.0);
   const Pack u2 = s2 / (scale * scale);
   switch (loss) {
-    case RowLoss::none: break;
-    case RowLoss::huber: return u2 <= one ? one : square_root(one / square_root(u2 > one ? u2 : one));
-    case RowLoss::cauchy: return square_root(one / (one + u2));
-    case RowLoss::tukey: return u2 < one ? one - u2 : splat(0.0);
+    case RowLoss::none:
+      break;
+    case RowLoss::huber:
+      return u2 <= one ? one : square_root(one / square_root(u2 > one ? u2 : one));
+    case RowLoss::cauchy:
+      return square_root(one / (one + u2));
+    case RowLoss::tukey:
+      return u2 < one ? one - u2 : splat(0.0);
   }
   return one;
 }
@@ -140,8 +172,8 @@ constexpr int components_of(Kind kind) { return kind == Kind::distance ? 1 : kin
 template <Kind kind>
 struct PackResidual {
   Vec tip;
-  Vec toward;                      ///< distance: unit vector from the anchor to the tip
-  Pack qw;                         ///< pose: the error quaternion of R_predicted R_measured^T
+  Vec toward;  ///< distance: unit vector from the anchor to the tip
+  Pack qw;     ///< pose: the error quaternion of R_predicted R_measured^T
   Vec qv;
   Pack scale[components_of(kind)];  ///< of every row: 1 / sigma, weight and loss
 };
@@ -153,7 +185,8 @@ inline void evaluate_residual(const Program& program, const Tile& tile, int firs
   const int at = first + lane;
   const double* m = tile.measured + at;
   const int* tip = program.tip_slots;
-  const Vec x = load_vec(at_slot(tile, tip[0]) + lane), y = load_vec(at_slot(tile, tip[1]) + lane), z = load_vec(at_slot(tile, tip[2]) + lane);
+  const Vec x = load_vec(at_slot(tile, tip[0]) + lane), y = load_vec(at_slot(tile, tip[1]) + lane),
+            z = load_vec(at_slot(tile, tip[2]) + lane);
   const Vec p = load_vec(at_slot(tile, tip[3]) + lane);
   out->tip = p;
   Pack r[components];
@@ -185,7 +218,8 @@ inline void evaluate_residual(const Program& program, const Tile& tile, int firs
   Pack s2 = splat(0.0);
   for (int k = 0; k < components; ++k) {
     out->scale[k] = splat(k < 3 ? program.position_scale : program.rotation_scale);
-    if (weighted && tile.position_weight) out->scale[k] *= load((k < 3 ? tile.position_weight : tile.rotation_weight) + at);
+    if (weighted && tile.position_weight)
+      out->scale[k] *= load((k < 3 ? tile.position_weight : tile.rotation_weight) + at);
     s2 += out->scale[k] * r[k] * out->scale[k] * r[k];
   }
   if (tile.squared_norm) store(tile.squared_norm + at, s2);
@@ -193,7 +227,8 @@ inline void evaluate_residual(const Program& program, const Tile& tile, int firs
     const Pack root = root_weight(program.loss, program.loss_scale, s2);
     for (int k = 0; k < components; ++k) out->scale[k] *= root;
   }
-  for (int k = 0; k < components; ++k) store(tile.residual + k * kTilePoses + at, weighted ? out->scale[k] * r[k] : r[k]);
+  for (int k = 0; k < components; ++k)
+    store(tile.residual + k * kTilePoses + at, weighted ? out->scale[k] * r[k] : r[k]);
   if (tile.tip) {
     const Vec frame[4] = {p, x, y, z};
     for (int k = 0; k < 4; ++k) {
@@ -204,7 +239,9 @@ inline void evaluate_residual(const Program& program, const Tile& tile, int firs
   }
 }
 
-struct Motion { Vec linear, angular; };
+struct Motion {
+  Vec linear, angular;
+};
 
 // The tip's motion for a unit of one part: translation [axis; 0], rotation [axis x (tip - origin); axis].
 inline Motion part_motion(const Tile& tile, const Part& part, int lane, Vec tip) {
@@ -213,7 +250,8 @@ inline Motion part_motion(const Tile& tile, const Part& part, int lane, Vec tip)
   return {cross(axis, tip - load_vec(at_slot(tile, part.origin) + lane)), axis};
 }
 
-inline Motion column_motion(const Program& program, const Tile& tile, const ColumnPlan& plan, int at, int lane, Vec tip) {
+inline Motion column_motion(const Program& program, const Tile& tile, const ColumnPlan& plan, int at, int lane,
+                            Vec tip) {
   const Part* part = program.parts + plan.first_part;
   Motion sum = part_motion(tile, *part, lane, tip);
   if (plan.part_count > 1 || part->weight != 1.0) {
@@ -231,7 +269,8 @@ inline Motion column_motion(const Program& program, const Tile& tile, const Colu
 }
 
 template <Kind kind, bool weighted>
-inline void evaluate_column(const Program& program, const Tile& tile, const ColumnPlan& plan, int first, const PackResidual<kind>* residuals, double* column) {
+inline void evaluate_column(const Program& program, const Tile& tile, const ColumnPlan& plan, int first,
+                            const PackResidual<kind>* residuals, double* column) {
   constexpr int components = components_of(kind);
   for (int lane = 0; lane < kGroupPoses; lane += kLanes) {
     const PackResidual<kind>& residual = residuals[lane / kLanes];
@@ -259,7 +298,8 @@ inline void evaluate_column(const Program& program, const Tile& tile, const Colu
         out[components - 1] = turn.z;
       }
     }
-    for (int k = 0; k < components; ++k) store(column + k * kTilePoses + first + lane, weighted ? residual.scale[k] * out[k] : out[k]);
+    for (int k = 0; k < components; ++k)
+      store(column + k * kTilePoses + first + lane, weighted ? residual.scale[k] * out[k] : out[k]);
   }
 }
 
@@ -274,23 +314,34 @@ void evaluate_tile(const Program& program, const Tile& tile) {
       evaluate_residual<kind, weighted>(program, tile, first, lane, &residuals[lane / kLanes]);
     }
     for (int c = 0; c < program.column_count; ++c) {
-      evaluate_column<kind, weighted>(program, tile, program.columns[c], first, residuals, tile.jacobian + static_cast<std::ptrdiff_t>(c) * column_size);
+      evaluate_column<kind, weighted>(program, tile, program.columns[c], first, residuals,
+                                      tile.jacobian + static_cast<std::ptrdiff_t>(c) * column_size);
     }
   }
 }
 
 void evaluate(const Program& program, const Tile& tile) {
-  const bool weighted = tile.position_weight || program.loss != RowLoss::none || program.position_scale != 1.0 || program.rotation_scale != 1.0;
+  const bool weighted = tile.position_weight || program.loss != RowLoss::none || program.position_scale != 1.0 ||
+                        program.rotation_scale != 1.0;
   switch (program.kind) {
-    case Kind::position: weighted ? evaluate_tile<Kind::position, true>(program, tile) : evaluate_tile<Kind::position, false>(program, tile); break;
-    case Kind::pose: weighted ? evaluate_tile<Kind::pose, true>(program, tile) : evaluate_tile<Kind::pose, false>(program, tile); break;
-    case Kind::distance: weighted ? evaluate_tile<Kind::distance, true>(program, tile) : evaluate_tile<Kind::distance, false>(program, tile); break;
+    case Kind::position:
+      weighted ? evaluate_tile<Kind::position, true>(program, tile)
+               : evaluate_tile<Kind::position, false>(program, tile);
+      break;
+    case Kind::pose:
+      weighted ? evaluate_tile<Kind::pose, true>(program, tile) : evaluate_tile<Kind::pose, false>(program, tile);
+      break;
+    case Kind::distance:
+      weighted ? evaluate_tile<Kind::distance, true>(program, tile)
+               : evaluate_tile<Kind::distance, false>(program, tile);
+      break;
   }
 }
 
 // Gram: blocks of kRows x kCols columns whose products stay in registers while the tile's rows stream by.
 #if TRUING_LANES == 8
-constexpr int kRows = 4, kCols = 4;  // 16 of 32 registers; larger blocks gain less than their sums cost in the first-level cache
+constexpr int kRows = 4,
+              kCols = 4;  // 16 of 32 registers; larger blocks gain less than their sums cost in the first-level cache
 #elif TRUING_LANES == 1
 constexpr int kRows = 2, kCols = 2;
 #else
@@ -316,7 +367,8 @@ __attribute__((noinline)) void block_product(const double* const* a, const doubl
     }
   }
   for (int m = 0; m < kRows; ++m)
-    for (int n = 0; n < kCols; ++n) store(acc + (m * kCols + n) * kLanes, load(acc + (m * kCols + n) * kLanes) + sum[m][n]);
+    for (int n = 0; n < kCols; ++n)
+      store(acc + (m * kCols + n) * kLanes, load(acc + (m * kCols + n) * kLanes) + sum[m][n]);
 }
 
 // Calls f(first row column, first col column, accumulator) for each block that touches the upper triangle.

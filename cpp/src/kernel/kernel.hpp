@@ -16,8 +16,9 @@ constexpr int kMostGroupPoses = 16;
 /// A tile's measured rows per pose, at most: position and rotation.
 constexpr int kMaxComponents = 6;
 
-/// One step of the chain sweep. A frame is four vectors: the columns x y z of R and the origin p, each in a slot. A step writes over what it reads
-/// unless some site wants the old vector as its axis or origin: then the new one goes to a slot of its own, and nothing is ever copied.
+/// One step of the chain sweep. A frame is four vectors: the columns x y z of R and the origin p, each in a slot. A
+/// step writes over what it reads unless some site wants the old vector as its axis or origin: then the new one goes to
+/// a slot of its own, and nothing is ever copied.
 enum class Code : int {
   rotate,     ///< the two columns that a rotation mixes: u' = c u + s v, v' = c v - s u
   translate,  ///< p' = p + value * column
@@ -57,34 +58,36 @@ struct Program {
   const Step* steps;
   int step_count;
   const double* constants;
-  const int* start_slots;        ///< vectors before the first step, the same for all poses: those that a step will write over …
+  const int*
+      start_slots;  ///< vectors before the first step, the same for all poses: those that a step will write over …
   const double* start_vectors;
   int start_count;
-  const int* fixed_slots;        ///< … and those that none does
+  const int* fixed_slots;  ///< … and those that none does
   const double* fixed_vectors;
   int fixed_count;
-  int tip_slots[4];              ///< x y z p at the end
+  int tip_slots[4];  ///< x y z p at the end
   const Part* parts;
   const ColumnPlan* columns;
   int column_count;
-  double anchor[4];      ///< distance: the fixed point [m] and the wire's zero [m]
+  double anchor[4];       ///< distance: the fixed point [m] and the wire's zero [m]
   double position_scale;  ///< multiplies position rows (1 / sigma)
   double rotation_scale;
   RowLoss loss;
-  double loss_scale;     ///< on the scaled norm of a row's residual
+  double loss_scale;  ///< on the scaled norm of a row's residual
 };
 
 struct Tile {
   const double* values;    ///< [dynamic][kTilePoses]
   const double* bases;     ///< [basis][kTilePoses]
   const double* measured;  ///< [component][kTilePoses]: x y z | x y z and R column by column | distance
-  const double* position_weight;  ///< [kTilePoses] multiplies position or distance rows (0: a padded pose); null: all one
+  const double*
+      position_weight;  ///< [kTilePoses] multiplies position or distance rows (0: a padded pose); null: all one
   const double* rotation_weight;  ///< [kTilePoses] the same for rotation rows; null exactly when position_weight is
-  double* slots;           ///< scratch, 3 * kMostGroupPoses numbers a slot
-  double* jacobian;        ///< out [column][component][kTilePoses]
-  double* residual;        ///< out [component][kTilePoses], the column after the Jacobian's last; weighted like it
-  double* squared_norm;    ///< out [kTilePoses]: of the scaled residual, before loss and weight; null: not wanted
-  double* tip;             ///< out [12][kTilePoses]: p, then R column by column; null: not wanted
+  double* slots;                  ///< scratch, 3 * kMostGroupPoses numbers a slot
+  double* jacobian;               ///< out [column][component][kTilePoses]
+  double* residual;      ///< out [component][kTilePoses], the column after the Jacobian's last; weighted like it
+  double* squared_norm;  ///< out [kTilePoses]: of the scaled residual, before loss and weight; null: not wanted
+  double* tip;           ///< out [12][kTilePoses]: p, then R column by column; null: not wanted
 };
 
 /// Accumulator of a Gram matrix; `size` doubles, opaque between gram_clear and gram_reduce.
@@ -99,7 +102,8 @@ struct Functions {
   void (*gram_reduce)(double* acc, int columns, double* out);
 };
 
-/// The widest copy that this machine can run; TRUING_KERNEL=scalar|sse2|avx2|avx512 in the environment asks for a narrower one.
+/// The widest copy that this machine can run; TRUING_KERNEL=scalar|sse2|avx2|avx512 in the environment asks for a
+/// narrower one.
 const Functions& functions();
 /// The named copy, or null when this machine or build lacks it.
 const Functions* functions(const char* name);

@@ -13,7 +13,8 @@ import numpy as np
 import truing
 
 _FRAMES = frozenset({"base_frame", "tool_frame"})  # fitted anyway, never an answer
-_SURE = 4.0  # |z| below which fitting everything names nothing: of some 60 values, noise alone stays below it in 99.6 %
+# |z| below which fitting everything names nothing: of some 60 values, noise alone stays below it in 99.6 %
+_SURE = 4.0
 BASELINES = ("gain", "bic", "z")
 
 
@@ -61,7 +62,9 @@ def answer_of(diagnosis: Any) -> Answer:
     return Answer(
         verdict=str(diagnosis.verdict),
         effects=_once(_named(found) for found in diagnosis.effects if _plain(found.effect) not in _FRAMES),
-        unknown=tuple(Unknown(str(u.joint), tuple(u.inputs), float(u.probability)) for u in diagnosis.unknown),
+        unknown=tuple(
+            Unknown(str(u.joint), tuple(u.inputs), float(u.probability)) for u in diagnosis.unknown
+        ),
         not_testable=tuple((_plain(item.effect), tuple(item.joints)) for item in diagnosis.not_testable),
         shrink=(float(share.value), float(share.low), float(share.high)),
         sentence=str(diagnosis.sentence),
@@ -87,7 +90,9 @@ def _named(found: Any) -> Named:
 
 
 def realised_shrink(diagnosis: Any, fresh: truing.Measurements) -> float | None:
-    """Fall of the rms error on fresh poses, from the robot with fitted frames to the diagnosed one. None: it cannot be evaluated."""
+    """Fall of the rms error on fresh poses, from the robot with fitted frames to the diagnosed one. None: it
+    cannot be evaluated.
+    """
     if not diagnosis.effects or diagnosis.unknown:
         return None
     try:
@@ -102,11 +107,16 @@ def _rms(robot: truing.Robot, data: truing.Measurements) -> float:
     return float(np.sqrt(np.nanmean(np.sum(error**2, axis=1))))
 
 
-# ---- Simpler methods -------------------------------------------------------------------------------------------------------
+# ---- Simpler methods
+# -------------------------------------------------------------------------------------------------------
 
 
-def baseline(method: str, candidates: Iterable[Any], rows: int, ignored: frozenset[str] = frozenset()) -> Answer:
-    """gain: the largest improvement of the fit; bic: the same, columns paid for; z: the largest |z| when everything is fitted at once."""
+def baseline(
+    method: str, candidates: Iterable[Any], rows: int, ignored: frozenset[str] = frozenset()
+) -> Answer:
+    """gain: the largest improvement of the fit; bic: the same, columns paid for; z: the largest |z| when
+    everything is fitted at once.
+    """
     score = {"gain": _gain, "bic": _bic, "z": _z}[method]
     entered = [c for c in candidates if _plain(c.effect) not in _FRAMES | ignored]
     rated = [(score(c, 3 * rows), c) for c in entered]
@@ -130,6 +140,8 @@ def _z(candidate: Any, numbers: int) -> float:
 
 
 def baselines(candidates: Sequence[Any], rows: int, geometry_underneath: bool) -> dict[str, Answer]:
-    """Where link values are wrong everywhere, they are taken for granted: else these methods would name nothing else."""
+    """Where link values are wrong everywhere, they are taken for granted: else these methods would name
+    nothing else.
+    """
     ignored = frozenset({"link_geometry", "joint_offset"}) if geometry_underneath else frozenset()
     return {method: baseline(method, candidates, rows, ignored) for method in BASELINES}

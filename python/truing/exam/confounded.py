@@ -33,7 +33,9 @@ Kind = Callable[[Specimen, Chain, Generator], "Twin | None"]
 
 
 def _plan(specimen: Specimen, chain: Chain, rng: Generator, payloads: bool = False) -> Plan:
-    return replace(usual_plan(specimen, chain, rng, int(rng.choice([150, 200, 300])), payloads), both_sides=True)
+    return replace(
+        usual_plan(specimen, chain, rng, int(rng.choice([150, 200, 300])), payloads), both_sides=True
+    )
 
 
 def _revolute(chain: Chain) -> list[int]:
@@ -77,7 +79,14 @@ def short_range(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None
     plan = _plan(specimen, chain, rng)
     column = chain.driven.index(joint)
     center = float(rng.uniform(plan.low[column] + 0.3, plan.high[column] - 0.3))
-    return Twin(laws.joint_offset(joint, rng), "harmonic", joint, _with_range(plan, column, center - 0.12, center + 0.12), frozenset({"dir"}), exact=False)
+    return Twin(
+        laws.joint_offset(joint, rng),
+        "harmonic",
+        joint,
+        _with_range(plan, column, center - 0.12, center + 0.12),
+        frozenset({"dir"}),
+        exact=False,
+    )
 
 
 def one_posture(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
@@ -86,22 +95,39 @@ def one_posture(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None
     if specimen.rod_arm or elbow != shoulder + 1:
         return None
     plan = _plan(specimen, chain, rng)
-    still = {k: float(rng.uniform(plan.low[k], plan.high[k])) for k in range(chain.driven.index(elbow), len(chain.driven) - 1)}
+    still = {
+        k: float(rng.uniform(plan.low[k], plan.high[k]))
+        for k in range(chain.driven.index(elbow), len(chain.driven) - 1)
+    }
     plan = replace(plan, still=still)
-    return Twin(laws.joint_compliance(elbow, rng), "link_compliance", shoulder, plan, frozenset({"masses"}), exact=False)
+    return Twin(
+        laws.joint_compliance(elbow, rng),
+        "link_compliance",
+        shoulder,
+        plan,
+        frozenset({"masses"}),
+        exact=False,
+    )
 
 
 def leaning_arm(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
-    """The arm near upright, its upper part held: the weight's torque is in proportion to the angle, as a wrong gear ratio is."""
+    """The arm near upright, its upper part held: the weight's torque is in proportion to the angle, as a
+    wrong gear ratio is.
+    """
     shoulder, elbow = _arms(chain)
     plan = _plan(specimen, chain, rng)
     column = chain.driven.index(shoulder)
     if specimen.rod_arm:
         return None
-    still = {k: float(rng.uniform(plan.low[k], plan.high[k])) for k in range(chain.driven.index(elbow), len(chain.driven) - 1)}
+    still = {
+        k: float(rng.uniform(plan.low[k], plan.high[k]))
+        for k in range(chain.driven.index(elbow), len(chain.driven) - 1)
+    }
     center = float(rng.uniform(plan.low[column] + 0.3, plan.high[column] - 0.3))
     plan = replace(_with_range(plan, column, center - 0.2, center + 0.2), still=still)
-    return Twin(laws.gear_ratio(shoulder, rng), "joint_compliance", shoulder, plan, frozenset({"masses"}), exact=False)
+    return Twin(
+        laws.gear_ratio(shoulder, rng), "joint_compliance", shoulder, plan, frozenset({"masses"}), exact=False
+    )
 
 
 def one_sided_weight(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
@@ -114,14 +140,18 @@ def one_sided_weight(specimen: Specimen, chain: Chain, rng: Generator) -> Twin |
         low, high = float(plan.low[column]), float(plan.high[column])
         side = float(rng.uniform(0.0, 0.6))
         plan = _with_range(plan, column, low + side * (high - low), low + (side + 0.4) * (high - low))
-    return Twin(laws.gravity_backlash(joint, rng), "joint_offset", joint, plan, frozenset({"masses"}), exact=False)
+    return Twin(
+        laws.gravity_backlash(joint, rng), "joint_offset", joint, plan, frozenset({"masses"}), exact=False
+    )
 
 
 def no_friction(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
     """Motor torques that hold the weight and nothing else: wind-up is compliance."""
     joint = int(rng.choice(_arms(chain)))
     plan = _plan(specimen, chain, rng, payloads=True)
-    return Twin(laws.joint_compliance(joint, rng), "windup", joint, plan, frozenset({"masses", "payload", "bare_tau"}))
+    return Twin(
+        laws.joint_compliance(joint, rng), "windup", joint, plan, frozenset({"masses", "payload", "bare_tau"})
+    )
 
 
 def one_speed(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
@@ -132,4 +162,14 @@ def one_speed(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
 
 
 def twins() -> tuple[Kind, ...]:
-    return (one_sided, steady_warming, long_metre, short_range, one_posture, leaning_arm, one_sided_weight, no_friction, one_speed)
+    return (
+        one_sided,
+        steady_warming,
+        long_metre,
+        short_range,
+        one_posture,
+        leaning_arm,
+        one_sided_weight,
+        no_friction,
+        one_speed,
+    )

@@ -15,7 +15,11 @@ from truing.exam.kinematics import Chain, Floats
 from truing.exam.laws import Inputs
 from truing.exam.robots import Specimen
 
-COVARIATES = {"supply_bar": (6.0, 0.4), "humidity_pct": (45.0, 12.0), "spindle_rpm": (3000.0, 900.0)}  # mean and spread
+COVARIATES = {
+    "supply_bar": (6.0, 0.4),
+    "humidity_pct": (45.0, 12.0),
+    "spindle_rpm": (3000.0, 900.0),
+}  # mean and spread
 
 
 @dataclass(frozen=True)
@@ -35,17 +39,35 @@ class Plan:
     cooling: float = 0.55  # share of the time after which it cools down again; 1: never
     steady_warming: bool = False  # temperature rises in proportion to time
     equal_speed: bool = False
-    still: Mapping[int, float] = field(default_factory=dict)  # driven joints that do not move, and where they stand
+    still: Mapping[int, float] = field(
+        default_factory=dict
+    )  # driven joints that do not move, and where they stand
     moving: tuple[int, ...] = ()  # driven joints that have a speed while measured; empty: all
 
 
 def usual_plan(specimen: Specimen, chain: Chain, rng: Generator, poses: int, payloads: bool) -> Plan:
     low, high = limits(specimen, chain)
-    levels = (0.0,) if not payloads else tuple(specimen.payload * share for share in ((0.0, 1.0) if rng.random() < 0.5 else (0.0, 0.5, 1.0)))
+    levels = (
+        (0.0,)
+        if not payloads
+        else tuple(
+            specimen.payload * share for share in ((0.0, 1.0) if rng.random() < 0.5 else (0.0, 0.5, 1.0))
+        )
+    )
     targets = 2 if poses <= 200 and rng.random() < 0.2 else 1
     repeats = float(rng.choice([0.0, 0.0, 0.1, 0.25]))
-    return Plan(low, high, poses, repeats, targets, both_sides=bool(rng.random() < 0.6), payloads=levels, seconds=float(rng.uniform(10.0, 30.0)),
-                warmth=float(rng.uniform(8.0, 18.0)), cooling=float(rng.uniform(0.45, 0.65)))  # fmt: skip
+    return Plan(
+        low,
+        high,
+        poses,
+        repeats,
+        targets,
+        both_sides=bool(rng.random() < 0.6),
+        payloads=levels,
+        seconds=float(rng.uniform(10.0, 30.0)),
+        warmth=float(rng.uniform(8.0, 18.0)),
+        cooling=float(rng.uniform(0.45, 0.65)),
+    )
 
 
 def limits(specimen: Specimen, chain: Chain) -> tuple[Floats, Floats]:
@@ -72,8 +94,19 @@ def draw(specimen: Specimen, chain: Chain, plan: Plan, rng: Generator, fresh: in
         speed[:, [k for k in range(speed.shape[1]) if k not in plan.moving]] = 0.0
     payload = rng.choice(np.array(plan.payloads), size=count)[visits]
     covariates = {name: _wander(rng, len(visits), *values)[rows] for name, values in COVARIATES.items()}
-    return Inputs(readings[rows], previous[rows], direction[rows], speed[rows], payload[rows], temperature(plan, time)[rows], _reference(plan), time[rows],
-                  covariates, target, visits[rows])  # fmt: skip
+    return Inputs(
+        readings[rows],
+        previous[rows],
+        direction[rows],
+        speed[rows],
+        payload[rows],
+        temperature(plan, time)[rows],
+        _reference(plan),
+        time[rows],
+        covariates,
+        target,
+        visits[rows],
+    )
 
 
 def _poses(specimen: Specimen, chain: Chain, plan: Plan, rng: Generator, count: int) -> Floats:
@@ -125,11 +158,15 @@ def temperature(plan: Plan, time: Floats) -> Floats:
     peak = 1.0 - math.exp(-plan.cooling / 0.25)
     rising = 1.0 - np.exp(-share / 0.25)
     falling = peak * np.exp(-(share - plan.cooling) / 0.2)
-    return np.asarray(20.0 + plan.warmth * np.where(share < plan.cooling, rising, falling) + 0.4 * np.sin(17.0 * share))
+    return np.asarray(
+        20.0 + plan.warmth * np.where(share < plan.cooling, rising, falling) + 0.4 * np.sin(17.0 * share)
+    )
 
 
 def _reference(plan: Plan) -> float:
-    """The mean over the plan: a robot that is right at 20 degrees has wrong zeros as well, which would be a second effect."""
+    """The mean over the plan: a robot that is right at 20 degrees has wrong zeros as well, which would be a
+    second effect.
+    """
     total = plan.seconds * plan.poses * (1.0 + plan.repeats)
     return float(temperature(plan, np.linspace(0.0, total, 1000)).mean())
 

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Forward kinematics of the examiner, in plain numpy and over all poses at once.
 
-It shares no line with the core that is examined. Any link value, joint, frame may differ from pose to pose: `Changes`.
+It shares no line with the core that is examined. Any link value, joint, frame may differ from pose to pose:
+`Changes`.
 """
 
 from __future__ import annotations
@@ -53,10 +54,14 @@ class Chain:
 
 
 def chain_of(robot: truing.Robot) -> Chain:
-    """A truing robot of convention dh or mdh as a chain; ratios and zeros are left out, examination robots have none."""
+    """A truing robot of convention dh or mdh as a chain; ratios and zeros are left out, examination robots
+    have none.
+    """
     joints = list(robot.joints)
     names = [joint.name for joint in joints]
-    drivers = tuple(tuple((names.index(name), weight) for name, weight in joint.driven_by) for joint in joints)
+    drivers = tuple(
+        tuple((names.index(name), weight) for name, weight in joint.driven_by) for joint in joints
+    )
     return Chain(
         names=tuple(names),
         mdh=robot.convention == "mdh",
@@ -91,7 +96,9 @@ class Changes:
     motion: Floats  # (n, J) added to the joints' motions [rad | m]
     links: Floats  # (n, J, 4) added to d, a, alpha, beta
     tilt: Floats  # (n, J, 2) turn about x, y just before the joint [rad]
-    bend: Floats  # (n, J, 3) rotation vector just before the joint: the end of the link that leads there [rad]
+    bend: (
+        Floats  # (n, J, 3) rotation vector just before the joint: the end of the link that leads there [rad]
+    )
     base: Floats  # (n, 6) of the base in the measurement frame: shift [m], rotation vector [rad]
     scale: Floats  # (n,) of the instrument's metre
     tool: Floats  # (n, 3) shift of the target in the last frame [m]
@@ -104,8 +111,15 @@ class Changes:
 
 
 def no_changes(n: int, joints: int) -> Changes:
-    return Changes(np.zeros((n, joints)), np.zeros((n, joints, 4)), np.zeros((n, joints, 2)), np.zeros((n, joints, 3)), np.zeros((n, 6)),
-                   np.zeros(n), np.zeros((n, 3)))  # fmt: skip
+    return Changes(
+        np.zeros((n, joints)),
+        np.zeros((n, joints, 4)),
+        np.zeros((n, joints, 2)),
+        np.zeros((n, joints, 3)),
+        np.zeros((n, 6)),
+        np.zeros(n),
+        np.zeros((n, 3)),
+    )
 
 
 @dataclass
@@ -119,11 +133,15 @@ class Sweep:
     joint_rotation: Floats  # (J, n, 3, 3) before the joint turns
     link_rotation: Floats  # (J, n, 3, 3) after the joint's row
     link_origin: Floats  # (J, n, 3)
-    sites: dict[tuple[str, int, int], tuple[bool, Floats, Floats]] = field(default_factory=dict)  # (kind, joint, k): turns, axis, origin
+    sites: dict[tuple[str, int, int], tuple[bool, Floats, Floats]] = field(
+        default_factory=dict
+    )  # (kind, joint, k): turns, axis, origin
 
 
 class _Frame:
-    """A frame for every pose, moved by elementary transforms. Columns of the rotation are kept apart: a turn touches two."""
+    """A frame for every pose, moved by elementary transforms. Columns of the rotation are kept apart: a turn
+    touches two.
+    """
 
     def __init__(self, n: int, frame: Floats) -> None:
         self.columns = [np.repeat(frame[None, :3, k], n, axis=0) for k in range(3)]
@@ -132,7 +150,10 @@ class _Frame:
     def turn(self, axis: int, angle: Floats) -> None:
         u, v = (axis + 1) % 3, (axis + 2) % 3
         c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        self.columns[u], self.columns[v] = c * self.columns[u] + s * self.columns[v], c * self.columns[v] - s * self.columns[u]
+        self.columns[u], self.columns[v] = (
+            c * self.columns[u] + s * self.columns[v],
+            c * self.columns[v] - s * self.columns[u],
+        )
 
     def shift(self, axis: int, by: Floats) -> None:
         self.origin = self.origin + by[:, None] * self.columns[axis]
@@ -168,7 +189,13 @@ def motions(chain: Chain, readings: Floats, changes: Changes | None = None) -> F
     return every
 
 
-def sweep(chain: Chain, readings: Floats, changes: Changes | None = None, target: Ints | None = None, every_site: bool = False) -> Sweep:
+def sweep(
+    chain: Chain,
+    readings: Floats,
+    changes: Changes | None = None,
+    target: Ints | None = None,
+    every_site: bool = False,
+) -> Sweep:
     """Where target, links and axes are, in the measurement frame."""
     n = len(readings)
     change = changes if changes is not None else no_changes(n, chain.joints)
@@ -215,7 +242,9 @@ class _Walk:
         self.link_origins.append(self.frame.origin)
 
     def _link(self, j: int, values: Floats) -> None:
-        """Rx(alpha), Tx(a) and Ry(beta): x moves and x turns commute, so their order is the same for both conventions."""
+        """Rx(alpha), Tx(a) and Ry(beta): x moves and x turns commute, so their order is the same for both
+        conventions.
+        """
         self._note("link", j, A, False, 0)
         self.frame.shift(0, values[:, A])
         self._note("link", j, ALPHA, True, 0)
@@ -242,12 +271,22 @@ class _Walk:
         tip = self.frame.origin + np.einsum("nij,nj->ni", rotation, places)
         tip = tip * (1.0 + self.change.scale[:, None])
         rotation = rotation @ np.array([t[:3, :3] for t in self.chain.targets])[target]
-        return Sweep(tip, rotation, np.array(self.axes), np.array(self.origins), np.array(self.before), np.array(self.link_rotations),
-                     np.array(self.link_origins), self.sites)  # fmt: skip
+        return Sweep(
+            tip,
+            rotation,
+            np.array(self.axes),
+            np.array(self.origins),
+            np.array(self.before),
+            np.array(self.link_rotations),
+            np.array(self.link_origins),
+            self.sites,
+        )
 
 
 def site_columns(state: Sweep) -> dict[tuple[str, int, int], Floats]:
-    """What each elementary value does to the tip, shape=(n, 3) each. The sweep must have been made with `every_site`."""
+    """What each elementary value does to the tip, shape=(n, 3) each. The sweep must have been made with
+    `every_site`.
+    """
     columns = {}
     for key, (turns, axis, origin) in state.sites.items():
         columns[key] = np.cross(axis, state.tip - origin) if turns else axis
@@ -255,16 +294,24 @@ def site_columns(state: Sweep) -> dict[tuple[str, int, int], Floats]:
 
 
 def gravity_torques(chain: Chain, state: Sweep, payload: Floats) -> Floats:
-    """Torque [Nm] or force [N] of weight on every joint coordinate, its passive followers included, shape=(n, J)."""
+    """Torque [Nm] or force [N] of weight on every joint coordinate, its passive followers included, shape=(n,
+    J).
+    """
     down = chain.base[:3, :3] @ chain.gravity
     centers = state.link_origin + np.einsum("jnab,jb->jna", state.link_rotation, chain.com)
     first = _tool_points(chain, state)
     single = np.zeros((len(payload), chain.joints))
     for j in range(chain.joints):
         load = np.sum(chain.mass[j:]) + payload
-        moment = np.einsum("l,lna->na", chain.mass[j:], centers[j:] - state.joint_origin[j]) + payload[:, None] * (first - state.joint_origin[j])
+        moment = np.einsum("l,lna->na", chain.mass[j:], centers[j:] - state.joint_origin[j]) + payload[
+            :, None
+        ] * (first - state.joint_origin[j])
         axis = state.joint_axis[j]
-        single[:, j] = load * (axis @ down) if chain.prismatic[j] else np.einsum("na,na->n", axis, np.cross(moment, down))
+        single[:, j] = (
+            load * (axis @ down)
+            if chain.prismatic[j]
+            else np.einsum("na,na->n", axis, np.cross(moment, down))
+        )
     total = single.copy()
     for j, drivers in enumerate(chain.drivers):
         for driver, weight in drivers:
@@ -285,8 +332,14 @@ def quaternions(matrices: Floats) -> Floats:
     k[:, 1, 1] = r[:, 0, 0] - r[:, 1, 1] - r[:, 2, 2]
     k[:, 2, 2] = r[:, 1, 1] - r[:, 0, 0] - r[:, 2, 2]
     k[:, 3, 3] = r[:, 2, 2] - r[:, 0, 0] - r[:, 1, 1]
-    for (i, j), value in {(0, 1): r[:, 2, 1] - r[:, 1, 2], (0, 2): r[:, 0, 2] - r[:, 2, 0], (0, 3): r[:, 1, 0] - r[:, 0, 1],
-                          (1, 2): r[:, 0, 1] + r[:, 1, 0], (1, 3): r[:, 0, 2] + r[:, 2, 0], (2, 3): r[:, 1, 2] + r[:, 2, 1]}.items():  # fmt: skip
+    for (i, j), value in {
+        (0, 1): r[:, 2, 1] - r[:, 1, 2],
+        (0, 2): r[:, 0, 2] - r[:, 2, 0],
+        (0, 3): r[:, 1, 0] - r[:, 0, 1],
+        (1, 2): r[:, 0, 1] + r[:, 1, 0],
+        (1, 3): r[:, 0, 2] + r[:, 2, 0],
+        (2, 3): r[:, 1, 2] + r[:, 2, 1],
+    }.items():
         k[:, i, j] = k[:, j, i] = value
     found: Any = np.linalg.eigh(k)[1][:, :, -1]
     return np.asarray(found * np.where(found[:, :1] < 0.0, -1.0, 1.0))

@@ -1,9 +1,12 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Laws of the examiner's hidden effects, written anew from textbooks and data sheets: nothing here comes from the catalogue.
+"""Laws of the examiner's hidden effects, written anew from textbooks and data sheets: nothing here comes from
+the catalogue.
 
-A law says what the true robot does differently for an effect of size 1; sizes are set later, from what is seen at the tip. A law
-may depart from the textbook by a share: springs harden, play grows with load, a link's temperature lags behind the sensor.
+A law says what the true robot does differently for an effect of size 1; sizes are set later, from what is
+seen at the tip. A law
+may depart from the textbook by a share: springs harden, play grows with load, a link's temperature lags
+behind the sensor.
 """
 
 from __future__ import annotations
@@ -15,7 +18,21 @@ from functools import cached_property
 import numpy as np
 from numpy.random import Generator
 
-from truing.exam.kinematics import ALPHA, BETA, A, Chain, Changes, D, Floats, Ints, Sweep, gravity_torques, motions, no_changes, sweep
+from truing.exam.kinematics import (
+    ALPHA,
+    BETA,
+    A,
+    Chain,
+    Changes,
+    D,
+    Floats,
+    Ints,
+    Sweep,
+    gravity_torques,
+    motions,
+    no_changes,
+    sweep,
+)
 
 
 @dataclass(frozen=True)
@@ -42,7 +59,8 @@ class Inputs:
 class Context:
     """The nominal robot at the inputs: what laws look at.
 
-    What a law scales itself by (the largest torque, the range of a joint, the hours) is taken from the context `of` the measurement, so that
+    What a law scales itself by (the largest torque, the range of a joint, the hours) is taken from the
+    context `of` the measurement, so that
     the same robot is met again at fresh poses.
     """
 
@@ -121,7 +139,8 @@ def at_joint(joint: int, values: Callable[[Context], Floats]) -> Law:
     return law
 
 
-# ---- Joints --------------------------------------------------------------------------------------------------------------
+# ---- Joints
+# --------------------------------------------------------------------------------------------------------------
 
 
 def joint_offset(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
@@ -131,7 +150,11 @@ def joint_offset(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
 def gear_ratio(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
     """With departure: the pitch of one half turn differs from that of the other."""
     side = float(rng.choice([-1.0, 1.0]))
-    return Hidden("gear_ratio", (joint,), at_joint(joint, lambda c: c.motion[:, joint] * (1.0 + depart * (side * c.motion[:, joint] > 0.0))))
+    return Hidden(
+        "gear_ratio",
+        (joint,),
+        at_joint(joint, lambda c: c.motion[:, joint] * (1.0 + depart * (side * c.motion[:, joint] > 0.0))),
+    )
 
 
 def harmonic(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
@@ -141,7 +164,11 @@ def harmonic(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
 
     def values(c: Context) -> Floats:
         q = c.motion[:, joint]
-        return np.asarray(first * np.cos(q + phase[0]) + second * np.cos(2 * q + phase[1]) + depart * np.cos(3 * q + phase[2]))
+        return np.asarray(
+            first * np.cos(q + phase[0])
+            + second * np.cos(2 * q + phase[1])
+            + depart * np.cos(3 * q + phase[2])
+        )
 
     return Hidden("harmonic", (joint,), at_joint(joint, values), detail={"first": first, "second": second})
 
@@ -163,7 +190,9 @@ def backlash(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
 
     def values(c: Context) -> Floats:
         share, usual = (np.abs(of.torque[:, joint]) / c.largest(joint) for of in (c, c.of))
-        return np.asarray(0.5 * c.inputs.direction[:, c.column(joint)] * (1.0 + depart * 2.0 * (share - usual.mean())))
+        return np.asarray(
+            0.5 * c.inputs.direction[:, c.column(joint)] * (1.0 + depart * 2.0 * (share - usual.mean()))
+        )
 
     return Hidden("backlash", (joint,), at_joint(joint, values), needs=frozenset({"dir"}))
 
@@ -215,7 +244,9 @@ def motor_torque(context: Context, joint: int, friction: float) -> Floats:
     """What the motor gives at standstill: it holds the weight, and friction holds against the way it came."""
     weight = context.torque[:, joint]
     level = friction * context.largest(joint)
-    return np.asarray(-weight + context.inputs.direction[:, context.column(joint)] * (level + 0.15 * np.abs(weight)))
+    return np.asarray(
+        -weight + context.inputs.direction[:, context.column(joint)] * (level + 0.15 * np.abs(weight))
+    )
 
 
 def windup(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
@@ -247,7 +278,8 @@ def time_offset(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
     return Hidden("time_offset", (), law, needs=frozenset({"speed"}))
 
 
-# ---- Links ---------------------------------------------------------------------------------------------------------------
+# ---- Links
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def link_geometry(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
@@ -263,7 +295,9 @@ def link_geometry(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
 
 
 def all_geometry(chain: Chain, rng: Generator) -> Law:
-    """Errors of manufacture on every link: 0.3 mm and 0.5 mrad. The axes that rods run across stay parallel, else the rods would jam."""
+    """Errors of manufacture on every link: 0.3 mm and 0.5 mrad. The axes that rods run across stay parallel,
+    else the rods would jam.
+    """
     joints = chain.joints
     passive = [j for j in range(joints) if j not in chain.driven]
     across = [driver + chain.mdh for j in passive for driver, _ in chain.drivers[j]]
@@ -317,7 +351,9 @@ def thermal(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
 
 
 def thermal_zero(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
-    return Hidden("thermal_zero", (joint,), at_joint(joint, lambda c: _warm(c, depart)), needs=frozenset({"temp"}))
+    return Hidden(
+        "thermal_zero", (joint,), at_joint(joint, lambda c: _warm(c, depart)), needs=frozenset({"temp"})
+    )
 
 
 def axis_wobble(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
@@ -338,8 +374,10 @@ def axis_wobble(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
 def link_compliance(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
     """A uniform beam under what hangs at and beyond its end.
 
-    The moment M runs straight from start to end. What a slice turns, as seen at the tip, is the same as if the beam turned about its start by
-    (2 M_start + M_end) / 6 and about its end by (M_start + 2 M_end) / 6 of its compliance (conjugate beam). Its own weight is left out.
+    The moment M runs straight from start to end. What a slice turns, as seen at the tip, is the same as if
+    the beam turned about its start by
+    (2 M_start + M_end) / 6 and about its end by (M_start + 2 M_end) / 6 of its compliance (conjugate beam).
+    Its own weight is left out.
     """
 
     def law(context: Context) -> Changes:
@@ -384,7 +422,8 @@ def linkage(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
     return Hidden("linkage", (joint,), at_joint(joint, values), detail={"lower": lower})
 
 
-# ---- Frames and instrument -----------------------------------------------------------------------------------------------
+# ---- Frames and instrument
+# -----------------------------------------------------------------------------------------------
 
 
 def drift(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
@@ -444,12 +483,25 @@ def beta_changes(context: Context, joint: int) -> Changes:
 
 Maker = Callable[..., Hidden]
 LISTED: dict[str, Maker] = {
-    "joint_offset": joint_offset, "gear_ratio": gear_ratio, "harmonic": harmonic, "transmission_error": transmission_error,
-    "backlash": backlash, "gravity_backlash": gravity_backlash, "joint_compliance": joint_compliance, "windup": windup,
-    "joint_coupling": joint_coupling, "time_offset": time_offset, "link_geometry": link_geometry, "thermal": thermal,
-    "thermal_zero": thermal_zero, "axis_wobble": axis_wobble, "link_compliance": link_compliance, "linkage": linkage, "drift": drift,
+    "joint_offset": joint_offset,
+    "gear_ratio": gear_ratio,
+    "harmonic": harmonic,
+    "transmission_error": transmission_error,
+    "backlash": backlash,
+    "gravity_backlash": gravity_backlash,
+    "joint_compliance": joint_compliance,
+    "windup": windup,
+    "joint_coupling": joint_coupling,
+    "time_offset": time_offset,
+    "link_geometry": link_geometry,
+    "thermal": thermal,
+    "thermal_zero": thermal_zero,
+    "axis_wobble": axis_wobble,
+    "link_compliance": link_compliance,
+    "linkage": linkage,
+    "drift": drift,
     "scale": scale,
-}  # fmt: skip
+}
 """Effects that have a name, and who makes them."""
 
 WHOLE_ROBOT = frozenset({"joint_coupling", "time_offset", "drift", "scale"})

@@ -2,13 +2,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The examiner's robots as mechanisms in MuJoCo, and where they come to rest.
 
-Per joint stand, one behind the other on the same axis: a motor hinge, held where it is commanded; a play hinge between two
-stops; an elastic hinge. Links that bend are beams of three elastic hinge pairs. A palletizer has its plate, its wrist and two
+Per joint stand, one behind the other on the same axis: a motor hinge, held where it is commanded; a play
+hinge between two
+stops; an elastic hinge. Links that bend are beams of three elastic hinge pairs. A palletizer has its plate,
+its wrist and two
 rods: a closed loop. Wrong geometry is wrong body frames.
 
-Rest is found by Newton's method on MuJoCo's own generalised forces (`mj_rne` at zero speed), not by stepping through time:
-stops and friction are softened in time stepping, so a gap creeps, and a pose would take thousands of steps. At rest each
-spring holds the weight, each gap lies at the stop that weight and friction push it to, and the rods have their lengths.
+Rest is found by Newton's method on MuJoCo's own generalised forces (`mj_rne` at zero speed), not by stepping
+through time:
+stops and friction are softened in time stepping, so a gap creeps, and a pose would take thousands of steps.
+At rest each
+spring holds the weight, each gap lies at the stop that weight and friction push it to, and the rods have
+their lengths.
 """
 
 from __future__ import annotations
@@ -21,11 +26,27 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from truing.exam.kinematics import ALPHA, BETA, A, Chain, Changes, D, Floats, Ints, motions, no_changes, rotations
+from truing.exam.kinematics import (
+    ALPHA,
+    BETA,
+    A,
+    Chain,
+    Changes,
+    D,
+    Floats,
+    Ints,
+    motions,
+    no_changes,
+    rotations,
+)
 
 Spring = Callable[[Floats], Floats]
 
-_BEAM_AT = (1 / 6, 1 / 2, 5 / 6)  # midpoint rule: tip of a clamped beam under an end force to 3 %, under an end moment exactly
+_BEAM_AT = (
+    1 / 6,
+    1 / 2,
+    5 / 6,
+)  # midpoint rule: tip of a clamped beam under an end force to 3 %, under an end moment exactly
 _TINY = 1e-9  # mass and inertia of what has none [kg, kg m^2]
 _CONVERGED = 1e-13
 _SWEEPS = 60
@@ -45,13 +66,18 @@ class Parts:
     """What a mechanism has beside rigid links."""
 
     springs: Mapping[int, Spring] = field(default_factory=dict)  # joint: deflection of a torque
-    wound_by: Mapping[int, Floats] = field(default_factory=dict)  # joint: friction torque per row that the spring carries as well [Nm]
+    wound_by: Mapping[int, Floats] = field(
+        default_factory=dict
+    )  # joint: friction torque per row that the spring carries as well [Nm]
     plays: Mapping[int, Play] = field(default_factory=dict)
     beams: Mapping[int, float] = field(default_factory=dict)  # link of joint j: compliance [rad/Nm]
     rods: tuple[float, float] = (0.0, 0.0)  # lower and upper rod are longer by [m]
     rod_arm: float = 0.0  # [m]; 0: no rods
     level: float = 0.0  # the wrist's pivot was turned by so much to level the wrist [rad]
-    rod_middle: tuple[float, float] = (0.0, 0.0)  # of the ranges of the two driving joints: rods stand square to the arms there
+    rod_middle: tuple[float, float] = (
+        0.0,
+        0.0,
+    )  # of the ranges of the two driving joints: rods stand square to the arms there
 
 
 @dataclass
@@ -61,7 +87,8 @@ class _Hinge:
 
 
 def link_frames(chain: Chain, links: Floats) -> Floats:
-    """Constant transform from each joint (after its motion) to the next (before its), the first from the base.
+    """Constant transform from each joint (after its motion) to the next (before its), the first from the
+    base.
 
     links: shape=(n, J, 4), link values of n poses. Returns shape=(n, J + 1, 4, 4).
     """
@@ -115,8 +142,15 @@ class Mechanism:
         self.tilts = {(j, k): self._hinge(f"tilt{j}{'xy'[k]}") for j in tilting for k in range(2)}
         self.plays = {j: self._hinge(f"play{j}") for j in parts.plays}
         self.springs = {j: self._hinge(f"spring{j}") for j in parts.springs}
-        self.beams = {(j, i, k): self._hinge(f"beam{j}_{i}{k}") for j in parts.beams for i in range(len(_BEAM_AT)) for k in "uv"}
-        self.bodies = [self._id(mujoco.mjtObj.mjOBJ_BODY, f"joint{j}") for j in range(chain.joints)] + [self._id(mujoco.mjtObj.mjOBJ_BODY, "flange")]
+        self.beams = {
+            (j, i, k): self._hinge(f"beam{j}_{i}{k}")
+            for j in parts.beams
+            for i in range(len(_BEAM_AT))
+            for k in "uv"
+        }
+        self.bodies = [self._id(mujoco.mjtObj.mjOBJ_BODY, f"joint{j}") for j in range(chain.joints)] + [
+            self._id(mujoco.mjtObj.mjOBJ_BODY, "flange")
+        ]
         self.load = self._id(mujoco.mjtObj.mjOBJ_BODY, "load")
         self.sites = [self._id(mujoco.mjtObj.mjOBJ_SITE, f"target{k}") for k in range(len(chain.targets))]
         self.loop = _Loop(self) if parts.rod_arm > 0.0 else None
@@ -128,7 +162,9 @@ class Mechanism:
         joint = self._id(mujoco.mjtObj.mjOBJ_JOINT, name)
         return _Hinge(int(self.model.jnt_qposadr[joint]), int(self.model.jnt_dofadr[joint]))
 
-    def measure(self, readings: Floats, changes: Changes, direction: Floats, payload: Floats, target: Ints) -> tuple[Floats, Floats]:
+    def measure(
+        self, readings: Floats, changes: Changes, direction: Floats, payload: Floats, target: Ints
+    ) -> tuple[Floats, Floats]:
         """Target positions (n, 3) and rotations (n, 3, 3) in the measurement frame, everything at rest."""
         n = len(readings)
         position, rotation = np.empty((n, 3)), np.empty((n, 3, 3))
@@ -141,12 +177,16 @@ class Mechanism:
             self._settle(direction[row], row)
             site = self.sites[int(target[row])]
             turned = self.data.site_xmat[site].reshape(3, 3)
-            position[row] = self.data.site_xpos[site] + turned @ (self.chain.targets[int(target[row])][:3, :3].T @ changes.tool[row])
+            position[row] = self.data.site_xpos[site] + turned @ (
+                self.chain.targets[int(target[row])][:3, :3].T @ changes.tool[row]
+            )
             rotation[row] = turned
         return _placed(self.chain, changes, position, rotation)
 
     def torques(self, readings: Floats, payload: Floats) -> Floats:
-        """What the weight does to each joint's motor at the nominal pose, shape=(n, J): of one joint alone, followers not counted."""
+        """What the weight does to each joint's motor at the nominal pose, shape=(n, J): of one joint alone,
+        followers not counted.
+        """
         found = np.empty((len(readings), self.chain.joints))
         changes = no_changes(len(readings), self.chain.joints)
         motion = motions(self.chain, readings, changes)
@@ -159,7 +199,9 @@ class Mechanism:
     def _command(self, motion: Floats, changes: Changes, row: int) -> None:
         self.data.qpos[:] = 0.0
         for j, motor in enumerate(self.motors):
-            self.data.qpos[motor.qpos] = motion[j] if self.chain.prismatic[j] else self.chain.theta[j] + motion[j]
+            self.data.qpos[motor.qpos] = (
+                motion[j] if self.chain.prismatic[j] else self.chain.theta[j] + motion[j]
+            )
         for (j, k), hinge in self.tilts.items():
             self.data.qpos[hinge.qpos] = changes.tilt[row, j, k]
 
@@ -169,7 +211,9 @@ class Mechanism:
             return
         self.shape = frames
         quaternion = np.empty(4)
-        for body, frame, nominal, j in zip(self.bodies, frames, self.nominal, range(len(self.bodies)), strict=True):
+        for body, frame, nominal, j in zip(
+            self.bodies, frames, self.nominal, range(len(self.bodies)), strict=True
+        ):
             shift = frame[:3, 3].copy()
             if j > 0 and (j - 1) in self.parts.beams:  # the last piece of a beam ends here
                 shift -= _BEAM_AT[-1] * nominal[:3, 3]
@@ -180,7 +224,9 @@ class Mechanism:
             self.loop.resize(frames)
 
     def _settle(self, direction: Floats, row: int) -> None:
-        """Newton on springs and gaps. Springs are far stiffer than the weight's change with pose, so their stiffness is the whole matrix."""
+        """Newton on springs and gaps. Springs are far stiffer than the weight's change with pose, so their
+        stiffness is the whole matrix.
+        """
         for sweep in range(_SWEEPS):
             weight = self._weight()
             if self._give_way(weight, direction, row, afloat=sweep >= _PATIENCE) < _CONVERGED:
@@ -200,7 +246,8 @@ class Mechanism:
     def _give_way(self, weight: Floats, direction: Floats, row: int, afloat: bool) -> float:
         """Moves every spring and gap to where the forces put it; the largest move.
 
-        A joint balanced within its gap touches neither stop: it would go to and fro, and is left `afloat` in the middle.
+        A joint balanced within its gap touches neither stop: it would go to and fro, and is left `afloat` in
+        the middle.
         """
         moved = 0.0
         for j, hinge in self.springs.items():
@@ -216,7 +263,9 @@ class Mechanism:
                 place = 0.0
             moved = max(moved, self._put(hinge, place))
         for (j, _, _), hinge in self.beams.items():
-            moved = max(moved, self._put(hinge, self.parts.beams[j] / len(_BEAM_AT) * float(weight[hinge.dof])))
+            moved = max(
+                moved, self._put(hinge, self.parts.beams[j] / len(_BEAM_AT) * float(weight[hinge.dof]))
+            )
         return moved
 
     def _put(self, hinge: _Hinge, value: float) -> float:
@@ -254,9 +303,13 @@ class _Loop:
         arms = np.array([np.linalg.norm(frames[j + 1][:3, 3]) for j in (self.lower, self.upper)])
         self.lengths = arms + np.array(self.of.parts.rods)
         model = self.of.model
-        model.site_pos[self.ends[0][0]] = frames[self.lower][:3, :3] @ model.site_pos[self.ends[0][1]] + frames[self.lower][:3, 3]
+        model.site_pos[self.ends[0][0]] = (
+            frames[self.lower][:3, :3] @ model.site_pos[self.ends[0][1]] + frames[self.lower][:3, 3]
+        )
         model.body_pos[self.plate_body] = frames[self.upper][:3, 3]
-        mujoco.mju_mat2Quat(model.body_quat[self.plate_body], np.ascontiguousarray(frames[self.upper][:3, :3]).ravel())
+        mujoco.mju_mat2Quat(
+            model.body_quat[self.plate_body], np.ascontiguousarray(frames[self.upper][:3, :3]).ravel()
+        )
 
     def close(self) -> None:
         data = self.of.data
@@ -305,16 +358,21 @@ class _Writer:
 
     def __init__(self, chain: Chain, parts: Parts, tilting: Sequence[int], frames: Floats) -> None:
         self.chain, self.parts, self.tilting, self.frames = chain, parts, tilting, frames
-        self.wrist = next((j for j, drivers in enumerate(chain.drivers) if drivers), -1) if parts.rod_arm > 0.0 else -1
+        self.wrist = (
+            next((j for j, drivers in enumerate(chain.drivers) if drivers), -1) if parts.rod_arm > 0.0 else -1
+        )
         self.lines: list[str] = []
         self.depth = 0
 
     def text(self) -> str:
         gravity = " ".join(f"{g:.17g}" for g in self.chain.gravity)
-        # Hinges one behind the other have no mass between them; the armature keeps MuJoCo's mass matrix regular and does nothing at rest.
-        self.lines = ['<mujoco><compiler angle="radian" autolimits="true"/>',
-                      f'<option gravity="{gravity}"><flag contact="disable"/></option>',
-                      '<default><joint armature="1"/></default><worldbody>']  # fmt: skip
+        # Hinges one behind the other have no mass between them; the armature keeps MuJoCo's mass matrix
+        # regular and does nothing at rest.
+        self.lines = [
+            '<mujoco><compiler angle="radian" autolimits="true"/>',
+            f'<option gravity="{gravity}"><flag contact="disable"/></option>',
+            '<default><joint armature="1"/></default><worldbody>',
+        ]
         for j in range(self.chain.joints):
             self._joint(j)
         self._end()
@@ -330,7 +388,10 @@ class _Writer:
 
     def _mass(self, mass: float, center: Floats) -> None:
         inertia = max(mass * 0.02 * (0.05 + float(center @ center)), _TINY)
-        self.lines.append(f'<inertial mass="{max(mass, _TINY):.17g}" pos="{_words(center)}" diaginertia="{inertia:.9g} {inertia:.9g} {inertia:.9g}"/>')
+        self.lines.append(
+            f'<inertial mass="{max(mass, _TINY):.17g}" pos="{_words(center)}" diaginertia="{inertia:.9g}'
+            f' {inertia:.9g} {inertia:.9g}"/>'
+        )
 
     def _joint(self, j: int) -> None:
         frame = self.frames[j]
@@ -350,11 +411,17 @@ class _Writer:
         if j in self.tilting:
             self.lines += [f'<joint name="tilt{j}x" axis="1 0 0"/>', f'<joint name="tilt{j}y" axis="0 1 0"/>']
         kind = "slide" if self.chain.prismatic[j] else "hinge"
-        names = ["motor"] + (["play"] if j in self.parts.plays else []) + (["spring"] if j in self.parts.springs else [])
+        names = (
+            ["motor"]
+            + (["play"] if j in self.parts.plays else [])
+            + (["spring"] if j in self.parts.springs else [])
+        )
         self.lines += [f'<joint name="{name}{j}" type="{kind}" axis="0 0 1"/>' for name in names]
 
     def _beam(self, j: int, frame: Floats) -> Floats:
-        """Three pieces with elastic hinges about the two axes across; half the link's weight sits on the middle one."""
+        """Three pieces with elastic hinges about the two axes across; half the link's weight sits on the
+        middle one.
+        """
         way = frame[:3, 3]
         across = _across_axes(way)
         after = _along(self.chain.links[j, D : D + 1])[0] if self.chain.mdh else self.frames[j + 1]
@@ -364,8 +431,13 @@ class _Writer:
             piece = np.eye(4)
             piece[:3, 3] = (share - last) * way
             last = share
-            self._body(f"beam{j}_{i}", piece, 0.5 * self.chain.mass[j] if i == 1 else 0.0, center - share * way)
-            self.lines += [f'<joint name="beam{j}_{i}{name}" axis="{_words(axis)}"/>' for name, axis in zip("uv", across, strict=True)]
+            self._body(
+                f"beam{j}_{i}", piece, 0.5 * self.chain.mass[j] if i == 1 else 0.0, center - share * way
+            )
+            self.lines += [
+                f'<joint name="beam{j}_{i}{name}" axis="{_words(axis)}"/>'
+                for name, axis in zip("uv", across, strict=True)
+            ]
         rest = frame.copy()
         rest[:3, 3] -= _BEAM_AT[-1] * way
         return rest
@@ -375,12 +447,15 @@ class _Writer:
         for k, target in enumerate(self.chain.targets):
             quaternion = np.empty(4)
             mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(target[:3, :3]).ravel())
-            self.lines.append(f'<site name="target{k}" pos="{_words(target[:3, 3])}" quat="{_words(quaternion)}"/>')
+            self.lines.append(
+                f'<site name="target{k}" pos="{_words(target[:3, 3])}" quat="{_words(quaternion)}"/>'
+            )
         load = np.eye(4)
         load[:3, 3] = self.chain.targets[0][:3, 3]
         self._body("load", load)
 
-    # The loop of a palletizer: pivots on turret and plate, on plate and wrist, square to the arms in the middle of their ranges.
+    # The loop of a palletizer: pivots on turret and plate, on plate and wrist, square to the arms in the
+    # middle of their ranges.
 
     def _pivots(self) -> tuple[Floats, Floats]:
         lower, upper = (driver for driver, _ in self.chain.drivers[self.wrist])
@@ -397,8 +472,12 @@ class _Writer:
             self.lines.append(f'<site name="turret" pos="{_words(place)}"/>')
         if j == upper:  # turns about the upper arm's axis, on the end of the lower arm
             self._body("plate", frame)
-            self.lines += ['<joint name="plate" axis="0 0 1"/>', f'<site name="plate_below" pos="{_words(below)}"/>',
-                           f'<site name="plate_above" pos="{_words(above)}"/>', "</body>"]  # fmt: skip
+            self.lines += [
+                '<joint name="plate" axis="0 0 1"/>',
+                f'<site name="plate_below" pos="{_words(below)}"/>',
+                f'<site name="plate_above" pos="{_words(above)}"/>',
+                "</body>",
+            ]
             self.depth -= 1
 
     def _loop_after(self, j: int) -> None:

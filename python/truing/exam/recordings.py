@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Real recordings as a source of real noise.
 
-What an instrument and a real arm leave after a flexible fit is neither white nor Gaussian, and wanders and jumps in its own way. It
-is put on top of a robot with one sealed effect, at the poses where it was recorded. The flexible fit takes what is systematic
-(link values, functions of each joint, approach direction, frames that wander), so that the sealed effect is what there is to find.
+What an instrument and a real arm leave after a flexible fit is neither white nor Gaussian, and wanders and
+jumps in its own way. It
+is put on top of a robot with one sealed effect, at the poses where it was recorded. The flexible fit takes
+what is systematic
+(link values, functions of each joint, approach direction, frames that wander), so that the sealed effect is
+what there is to find.
 """
 
 from __future__ import annotations
@@ -24,10 +27,16 @@ from truing.exam.robots import Specimen
 from truing.exam.sizing import View
 
 _FILES = {
-    "development": (("irb120_faro", "robot.yaml", "measurements.csv"), ("motoman_leica", "robot_right.yaml", "measurements_right.csv")),
-    "examination": (("ipa_ur10_leica", "robot.yaml", "measurements_series_c.csv"), ("ipa_ur10_leica", "robot.yaml", "measurements_series_b.csv"),
-                    ("motoman_leica", "robot_left.yaml", "measurements_left.csv")),
-}  # fmt: skip
+    "development": (
+        ("irb120_faro", "robot.yaml", "measurements.csv"),
+        ("motoman_leica", "robot_right.yaml", "measurements_right.csv"),
+    ),
+    "examination": (
+        ("ipa_ur10_leica", "robot.yaml", "measurements_series_c.csv"),
+        ("ipa_ur10_leica", "robot.yaml", "measurements_series_b.csv"),
+        ("motoman_leica", "robot_left.yaml", "measurements_left.csv"),
+    ),
+}
 _SECONDS = 20.0  # between poses, where nobody wrote the time down
 _TIME_KNOTS = 8
 _PASSES = 4  # of the robust fit
@@ -103,15 +112,42 @@ def _inputs(data: truing.Measurements, keep: NDArray[np.bool_]) -> Inputs:
     visit = np.array([place[int(p)] for p in pose])
     previous = came[visit]
     direction = np.where(readings >= previous, 1.0, -1.0)
-    target = np.asarray(data.targets)[keep].astype(np.int64) if data.targets is not None else np.zeros(n, dtype=np.int64)
+    target = (
+        np.asarray(data.targets)[keep].astype(np.int64)
+        if data.targets is not None
+        else np.zeros(n, dtype=np.int64)
+    )
     zero = np.zeros(n)
-    return Inputs(readings, previous, direction, np.zeros_like(readings), zero, zero + 20.0, 20.0, _SECONDS * visit.astype(float), {}, target, visit.astype(np.int64))
+    return Inputs(
+        readings,
+        previous,
+        direction,
+        np.zeros_like(readings),
+        zero,
+        zero + 20.0,
+        20.0,
+        _SECONDS * visit.astype(float),
+        {},
+        target,
+        visit.astype(np.int64),
+    )
 
 
 def rows_of(inputs: Inputs, rows: NDArray[np.int64]) -> Inputs:
     """Some rows of some inputs."""
-    return Inputs(inputs.readings[rows], inputs.previous[rows], inputs.direction[rows], inputs.speed[rows], inputs.payload[rows], inputs.temperature[rows],
-                  inputs.reference, inputs.time[rows], {name: values[rows] for name, values in inputs.covariates.items()}, inputs.target[rows], inputs.pose[rows])  # fmt: skip
+    return Inputs(
+        inputs.readings[rows],
+        inputs.previous[rows],
+        inputs.direction[rows],
+        inputs.speed[rows],
+        inputs.payload[rows],
+        inputs.temperature[rows],
+        inputs.reference,
+        inputs.time[rows],
+        {name: values[rows] for name, values in inputs.covariates.items()},
+        inputs.target[rows],
+        inputs.pose[rows],
+    )
 
 
 def _with_frames(chain: Chain, base: Floats, places: Floats) -> Chain:
@@ -154,10 +190,15 @@ def _registered(points: Floats, measured: Floats) -> Floats:
 
 
 def _flexible_rest(chain: Chain, inputs: Inputs, measured: Floats) -> Floats:
-    """Residuals of a fit that may bend every joint in its own angle and let the frame wander; gross errors stay in."""
+    """Residuals of a fit that may bend every joint in its own angle and let the frame wander; gross errors
+    stay in.
+    """
     context = Context(chain, inputs)
     view = View(context)
-    columns = [np.broadcast_to(c, (context.n, 3)).ravel() for c in view._frame_columns() + view.geometry_columns() + _bends(view) + _wander(view)]
+    columns = [
+        np.broadcast_to(c, (context.n, 3)).ravel()
+        for c in view._frame_columns() + view.geometry_columns() + _bends(view) + _wander(view)
+    ]
     matrix = np.stack(columns, axis=1)
     size = np.linalg.norm(matrix, axis=0)
     matrix = matrix[:, size > 1e-9] / size[size > 1e-9]
@@ -175,17 +216,28 @@ def _flexible_rest(chain: Chain, inputs: Inputs, measured: Floats) -> Floats:
 
 
 def _bends(view: View) -> list[Floats]:
-    """Every joint as a function of its own angle; in long recordings also of two angles, as weight and cables need it."""
+    """Every joint as a function of its own angle; in long recordings also of two angles, as weight and cables
+    need it.
+    """
     context = view.context
     orders = range(1, 4 if context.n < _LONG else 9)
     found = []
     moving = [joint for joint in context.chain.driven if np.ptp(context.motion[:, joint]) > 0.05]
     for joint in moving:
         q = context.motion[:, joint]
-        values = [f(k * q) for f in (np.cos, np.sin) for k in orders] + [q, context.inputs.direction[:, context.column(joint)]]
+        values = [f(k * q) for f in (np.cos, np.sin) for k in orders] + [
+            q,
+            context.inputs.direction[:, context.column(joint)],
+        ]
         if context.n >= _LONG:
-            values += [f(context.motion[:, a] + side * context.motion[:, b]) for f in (np.cos, np.sin) for side in (-1.0, 1.0)
-                       for a in moving for b in moving if a < b]  # fmt: skip
+            values += [
+                f(context.motion[:, a] + side * context.motion[:, b])
+                for f in (np.cos, np.sin)
+                for side in (-1.0, 1.0)
+                for a in moving
+                for b in moving
+                if a < b
+            ]
         found += [value[:, None] * view.columns["motion", joint, 0] for value in values]
     return found
 

@@ -60,10 +60,14 @@ def run_exam(
 ) -> Scores:
     """Makes the sets, has them answered, opens the labels, and scores.
 
-    which: "development" is there to be looked at and learned from, "examination" is not: other robots, seeds, unlisted effects.
-    quick: some 60 sets that take a minute. families: only these, see `sets.COUNTS`. limit: at most so many sets of each family.
-    workers: processes; 1: none but this one. candidate: a function at the top of a module if there are more workers than one.
-    out: folder for sealed.jsonl (written before the answers), answers.jsonl, labels.jsonl (after them), scores.json and scores.md.
+    which: "development" is there to be looked at and learned from, "examination" is not: other robots, seeds,
+    unlisted effects.
+    quick: some 60 sets that take a minute. families: only these, see `sets.COUNTS`. limit: at most so many
+    sets of each family.
+    workers: processes; 1: none but this one. candidate: a function at the top of a module if there are more
+    workers than one.
+    out: folder for sealed.jsonl (written before the answers), answers.jsonl, labels.jsonl (after them),
+    scores.json and scores.md.
     """
     folder = _folder(out)
     names = _limited(sets.ids(which, quick=quick, families=families, seed=seed), limit)
@@ -94,7 +98,9 @@ def sit(id: str, candidate: Candidate = diagnose, folder: Path | None = None) ->
         answer, others = Answer("error", error=f"{type(error).__name__}: {error}"), {}
     else:
         seconds = time.perf_counter() - started
-        answer = replace(answer_of(diagnosis), seconds=seconds, realised=realised_shrink(diagnosis, case.fresh()))
+        answer = replace(
+            answer_of(diagnosis), seconds=seconds, realised=realised_shrink(diagnosis, case.fresh())
+        )
         others = baselines(diagnosis.candidates, case.data.rows, bool(case.label["geometry_underneath"]))
     _append(folder, "answers.jsonl", {"id": id, "answer": answer.to_dict()})
     return Paper(id, envelope.seal, envelope, answer, others)
@@ -126,7 +132,8 @@ def _sat(names: Sequence[str], candidate: Candidate, workers: int, folder: Path 
         for paper in _until_one_crashes(list(left), candidate, workers, folder):
             del left[paper.id]
             yield paper
-        # A candidate that takes its process down takes the others' sets with it: find out which set it was, then go on with all workers.
+        # A candidate that takes its process down takes the others' sets with it: find out which set it was,
+        # then go on with all workers.
         for name in list(left):
             alone = next(_until_one_crashes([name], candidate, 1, folder), None)
             del left[name]
@@ -135,7 +142,9 @@ def _sat(names: Sequence[str], candidate: Candidate, workers: int, folder: Path 
                 break
 
 
-def _until_one_crashes(names: Sequence[str], candidate: Candidate, workers: int, folder: Path | None) -> Iterator[Paper]:
+def _until_one_crashes(
+    names: Sequence[str], candidate: Candidate, workers: int, folder: Path | None
+) -> Iterator[Paper]:
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         try:
             for done in as_completed([pool.submit(sit, name, candidate, folder) for name in names]):
@@ -173,6 +182,10 @@ def _append(folder: Path | None, name: str, line: dict[str, Any]) -> None:
 
 def _write(folder: Path, papers: Sequence[Paper], sheets: Sequence[Sheet], scores: Scores) -> None:
     for paper, sheet in zip(papers, sheets, strict=True):
-        _append(folder, "labels.jsonl", {"id": sheet.id, "seal": paper.seal, "salt": paper.envelope.salt, "label": paper.envelope.text})
+        _append(
+            folder,
+            "labels.jsonl",
+            {"id": sheet.id, "seal": paper.seal, "salt": paper.envelope.salt, "label": paper.envelope.text},
+        )
     (folder / "scores.json").write_text(json.dumps(scores.to_dict(), indent=1), encoding="utf-8")
     (folder / "scores.md").write_text(markdown(scores), encoding="utf-8")

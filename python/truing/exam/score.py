@@ -62,7 +62,8 @@ def wilson(hits: int, n: int, z: float = _Z90) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-# ---- What is right -----------------------------------------------------------------------------------------------------------
+# ---- What is right
+# -----------------------------------------------------------------------------------------------------------
 
 
 def _pairs(items: Iterable[dict[str, Any]]) -> list[Effect]:
@@ -97,7 +98,9 @@ def called_right(named: Named, label: Label) -> bool:
 
 
 def counted(sheet: Sheet) -> list[Named]:
-    """Named effects, without geometry where geometry is wrong underneath: naming it is right there and says nothing."""
+    """Named effects, without geometry where geometry is wrong underneath: naming it is right there and says
+    nothing.
+    """
     named = list(sheet.answer.effects)
     if not sheet.label["geometry_underneath"]:
         return named
@@ -112,7 +115,12 @@ def first_right(sheet: Sheet) -> bool:
 
 def exact_set(sheet: Sheet) -> bool:
     named = counted(sheet)
-    return both_present(sheet) and len(named) == len(sheet.label["effects"]) and not sheet.answer.unknown and all(right(item, sheet.label) for item in named)
+    return (
+        both_present(sheet)
+        and len(named) == len(sheet.label["effects"])
+        and not sheet.answer.unknown
+        and all(right(item, sheet.label) for item in named)
+    )
 
 
 def both_present(sheet: Sheet) -> bool:
@@ -128,11 +136,16 @@ def both_present(sheet: Sheet) -> bool:
 
 
 def _not_testable(sheet: Sheet, true: Effect) -> bool:
-    return any(effect == true[0] and (not joints or not true[1] or set(true[1]) <= set(joints)) for effect, joints in sheet.answer.not_testable)
+    return any(
+        effect == true[0] and (not joints or not true[1] or set(true[1]) <= set(joints))
+        for effect, joints in sheet.answer.not_testable
+    )
 
 
 def class_returned(sheet: Sheet) -> bool:
-    """Effect and twin are both there: named, listed as the same, or declared untestable, and one of them is named."""
+    """Effect and twin are both there: named, listed as the same, or declared untestable, and one of them is
+    named.
+    """
     true, rival = _pairs(sheet.label["effects"])[0], _pairs([sheet.label["rival"]])[0]
     named = sheet.answer.effects
     met = [any(_covers(item, one) for item in named) for one in (true, rival)]
@@ -149,13 +162,17 @@ def _covers(named: Named, one: Effect) -> bool:
 def confidently_wrong(sheet: Sheet) -> bool:
     """Some name is given as all but certain, and the true effect is not in its class."""
     truths = _pairs(sheet.label["effects"])
-    return any(item.probability > _CONFIDENT and not _excused(sheet, item, truths) for item in sheet.answer.effects)
+    return any(
+        item.probability > _CONFIDENT and not _excused(sheet, item, truths) for item in sheet.answer.effects
+    )
 
 
 def _excused(sheet: Sheet, item: Named, truths: Sequence[Effect]) -> bool:
     if any(holds(item, true) or _not_testable(sheet, true) and right(item, sheet.label) for true in truths):
         return True
-    inside = item.effect == "link_geometry" and any(true[0] == "joint_offset" and set(true[1]) <= set(item.joints) for true in truths)
+    inside = item.effect == "link_geometry" and any(
+        true[0] == "joint_offset" and set(true[1]) <= set(item.joints) for true in truths
+    )
     underneath = sheet.label["geometry_underneath"] and item.effect in _GEOMETRY
     if sheet.label["family"] == "confounded":  # the twin alone, for certain, is what must not be said
         return inside or underneath
@@ -178,7 +195,8 @@ def place_right(sheet: Sheet) -> bool:
     return found.joint == sheet.label["unlisted_joint"] and inputs
 
 
-# ---- The table ---------------------------------------------------------------------------------------------------------------
+# ---- The table
+# ---------------------------------------------------------------------------------------------------------------
 
 
 Test = Callable[[Sheet], bool]
@@ -202,7 +220,11 @@ def _family(*families: str) -> Test:
 
 
 def _single(sources: Sequence[str], low: float, high: float = math.inf) -> Test:
-    return lambda s: s.label["family"] == "single" and s.label["source"] in sources and low <= s.label["size_over_noise"] < high
+    return lambda s: (
+        s.label["family"] == "single"
+        and s.label["source"] in sources
+        and low <= s.label["size_over_noise"] < high
+    )
 
 
 def _none(*kinds: str) -> Test:
@@ -231,38 +253,134 @@ def _called(s: Sheet) -> bool:
 
 
 LINES = (
-    Line("first_physics", "first-named effect right, ≥ 1 × noise, physics", _single(["physics"], 1.0), first_right, at_least=0.97),
-    Line("first_departures", "the same on departures and spike-in", _single(["departures", "spike"], 1.0), first_right, at_least=0.90),
-    Line("joint", "joint right given the effect", _placed, lambda s: right(counted(s)[0], s.label), at_least=0.97),
+    Line(
+        "first_physics",
+        "first-named effect right, ≥ 1 × noise, physics",
+        _single(["physics"], 1.0),
+        first_right,
+        at_least=0.97,
+    ),
+    Line(
+        "first_departures",
+        "the same on departures and spike-in",
+        _single(["departures", "spike"], 1.0),
+        first_right,
+        at_least=0.90,
+    ),
+    Line(
+        "joint",
+        "joint right given the effect",
+        _placed,
+        lambda s: right(counted(s)[0], s.label),
+        at_least=0.97,
+    ),
     Line("two_exact", "two effects: exact set", _many(2), exact_set, at_least=0.85),
     Line("two_present", "two effects: both present", _many(2), both_present, at_least=0.95),
-    Line("class", "confounded by design: class returned", _family("confounded"), class_returned, at_least=0.90),
-    Line("class_wrong", "confounded by design: confident single wrong name", _family("confounded"), confidently_wrong, at_most=0.02, good=False),
+    Line(
+        "class", "confounded by design: class returned", _family("confounded"), class_returned, at_least=0.90
+    ),
+    Line(
+        "class_wrong",
+        "confounded by design: confident single wrong name",
+        _family("confounded"),
+        confidently_wrong,
+        at_most=0.02,
+        good=False,
+    ),
     Line("alarm_white", "false alarms: white noise", _none("white"), false_alarm, at_most=0.02, good=False),
-    Line("alarm_other", "false alarms: drift, heavy tails, outliers", _none("drift", "heavy", "outliers"), false_alarm, at_most=0.05, good=False),
-    Line("unlisted", "unlisted effect recognised, ≥ 3 × noise", _unlisted, lambda s: bool(s.answer.unknown), at_least=0.90),
-    Line("unknown_of_listed", "“unknown” said of a listed effect", _known_background, lambda s: bool(s.answer.unknown), at_most=0.05, good=False),
-    Line("unlisted_place", "joint and input of the unlisted effect right", lambda s: _unlisted(s) and bool(s.answer.unknown), place_right, at_least=0.80),
+    Line(
+        "alarm_other",
+        "false alarms: drift, heavy tails, outliers",
+        _none("drift", "heavy", "outliers"),
+        false_alarm,
+        at_most=0.05,
+        good=False,
+    ),
+    Line(
+        "unlisted",
+        "unlisted effect recognised, ≥ 3 × noise",
+        _unlisted,
+        lambda s: bool(s.answer.unknown),
+        at_least=0.90,
+    ),
+    Line(
+        "unknown_of_listed",
+        "“unknown” said of a listed effect",
+        _known_background,
+        lambda s: bool(s.answer.unknown),
+        at_most=0.05,
+        good=False,
+    ),
+    Line(
+        "unlisted_place",
+        "joint and input of the unlisted effect right",
+        lambda s: _unlisted(s) and bool(s.answer.unknown),
+        place_right,
+        at_least=0.80,
+    ),
 )
 # Told as well, without a target.
 MORE = (
-    Line("first_small", "first-named effect right, 0.5 to 1 × noise", _single(["physics", "departures", "spike"], 0.0, 1.0), first_right),
-    Line("first_spike", "first-named effect right, ≥ 1 × noise, spike-in alone", _single(["spike"], 1.0), first_right),
-    Line("spike_unknown", "“unknown” said beside a spike: the recordings' own secrets", lambda s: s.label["source"] == "spike", lambda s: bool(s.answer.unknown),
-         good=False),
-    Line("first_geometry", "first-named right over wrong geometry, ≥ 1 × noise",
-         lambda s: _single(["physics", "departures"], 1.0)(s) and bool(s.label["geometry_underneath"]), first_right),
+    Line(
+        "first_small",
+        "first-named effect right, 0.5 to 1 × noise",
+        _single(["physics", "departures", "spike"], 0.0, 1.0),
+        first_right,
+    ),
+    Line(
+        "first_spike",
+        "first-named effect right, ≥ 1 × noise, spike-in alone",
+        _single(["spike"], 1.0),
+        first_right,
+    ),
+    Line(
+        "spike_unknown",
+        "“unknown” said beside a spike: the recordings' own secrets",
+        lambda s: s.label["source"] == "spike",
+        lambda s: bool(s.answer.unknown),
+        good=False,
+    ),
+    Line(
+        "first_geometry",
+        "first-named right over wrong geometry, ≥ 1 × noise",
+        lambda s: _single(["physics", "departures"], 1.0)(s) and bool(s.label["geometry_underneath"]),
+        first_right,
+    ),
     Line("three_exact", "three effects: exact set", _many(3), exact_set),
     Line("three_present", "three effects: all present", _many(3), both_present),
     Line("wrong_law", "right effect named first though its law is wrong", _family("wrong_law"), first_right),
-    Line("companion", "a second effect named beside one of wrong law", _family("wrong_law"), lambda s: len(counted(s)) > 1, good=False),
-    Line("unlisted_wrong", "unlisted effect: a listed one named for certain", _family("unlisted"), confidently_wrong, good=False),
-    Line("missing_wrong", "column withheld: confident wrong name", _family("missing"), confidently_wrong, good=False),
-    Line("missing_told", "column withheld: named, or called not testable", _family("missing"),
-         lambda s: first_right(s) or any(_not_testable(s, true) for true in _pairs(s.label["effects"]))),
+    Line(
+        "companion",
+        "a second effect named beside one of wrong law",
+        _family("wrong_law"),
+        lambda s: len(counted(s)) > 1,
+        good=False,
+    ),
+    Line(
+        "unlisted_wrong",
+        "unlisted effect: a listed one named for certain",
+        _family("unlisted"),
+        confidently_wrong,
+        good=False,
+    ),
+    Line(
+        "missing_wrong",
+        "column withheld: confident wrong name",
+        _family("missing"),
+        confidently_wrong,
+        good=False,
+    ),
+    Line(
+        "missing_told",
+        "column withheld: named, or called not testable",
+        _family("missing"),
+        lambda s: first_right(s) or any(_not_testable(s, true) for true in _pairs(s.label["effects"])),
+    ),
     Line("twenty", "twenty poses: first-named right", _family("twenty"), first_right),
-    Line("twenty_wrong", "twenty poses: confident wrong name", _family("twenty"), confidently_wrong, good=False),
-)  # fmt: skip
+    Line(
+        "twenty_wrong", "twenty poses: confident wrong name", _family("twenty"), confidently_wrong, good=False
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -281,17 +399,31 @@ class Scores:
 
     def to_dict(self) -> dict[str, Any]:
         return {
-            "format": "truing-exam/1", "which": self.which, "sets": self.sets, "skipped": self.skipped,
+            "format": "truing-exam/1",
+            "which": self.which,
+            "sets": self.sets,
+            "skipped": self.skipped,
             "rows": [_row_dict(row) for row in self.rows],
             "others": {name: [_row_dict(row) for row in rows] for name, rows in self.others.items()},
             "failures": self.failures,
-        }  # fmt: skip
+        }
 
 
 def _row_dict(row: Row) -> dict[str, Any]:
     low, high = row.interval()
-    told = {"key": row.key, "text": row.text, "target": row.target, "n": row.n, "met": row.met, "value": _none_if_nan(row.value)}
-    return {**told, "hits": row.hits, "low": _none_if_nan(low), "high": _none_if_nan(high)} if row.percent else told
+    told = {
+        "key": row.key,
+        "text": row.text,
+        "target": row.target,
+        "n": row.n,
+        "met": row.met,
+        "value": _none_if_nan(row.value),
+    }
+    return (
+        {**told, "hits": row.hits, "low": _none_if_nan(low), "high": _none_if_nan(high)}
+        if row.percent
+        else told
+    )
 
 
 def _none_if_nan(value: float) -> float | None:
@@ -300,9 +432,21 @@ def _none_if_nan(value: float) -> float | None:
 
 def score(sheets: Sequence[Sheet], which: str = "", skipped: dict[str, int] | None = None) -> Scores:
     """Every row of the table, from all sheets."""
-    rows = [_share(line, sheets) for line in LINES] + _values(sheets) + [_share(line, sheets) for line in MORE]
+    rows = (
+        [_share(line, sheets) for line in LINES] + _values(sheets) + [_share(line, sheets) for line in MORE]
+    )
     names = sorted({name for sheet in sheets for name in sheet.others})
-    single = ("first_physics", "first_departures", "joint", "alarm_white", "alarm_other", "first_small", "first_geometry", "wrong_law", "twenty")
+    single = (
+        "first_physics",
+        "first_departures",
+        "joint",
+        "alarm_white",
+        "alarm_other",
+        "first_small",
+        "first_geometry",
+        "wrong_law",
+        "twenty",
+    )
     others = {}
     for name in names:
         theirs = [Sheet(s.id, s.label, s.others[name]) for s in sheets if name in s.others]
@@ -323,24 +467,66 @@ def _share(line: Line, sheets: Sequence[Sheet]) -> Row:
 
 
 def _values(sheets: Sequence[Sheet]) -> list[Row]:
-    # Fresh poses are measured by a quiet instrument: heavy tails and gross errors of the set would be compared with none.
+    # Fresh poses are measured by a quiet instrument: heavy tails and gross errors of the set would be
+    # compared with none.
     told = [s for s in sheets if s.label["family"] != "unlisted" and s.label["noise"] in ("white", "real")]
-    pairs = [(s.answer.shrink, s.answer.realised) for s in told if s.answer.shrink and s.answer.realised is not None]
+    pairs = [
+        (s.answer.shrink, s.answer.realised)
+        for s in told
+        if s.answer.shrink and s.answer.realised is not None
+    ]
     wrong = np.array([abs(shrink[0] - real) for shrink, real in pairs if shrink and real is not None])
-    covered = sum(bool(shrink and real is not None and shrink[1] <= real <= shrink[2]) for shrink, real in pairs)
+    covered = sum(
+        bool(shrink and real is not None and shrink[1] <= real <= shrink[2]) for shrink, real in pairs
+    )
     median = 100.0 * float(np.median(wrong)) if len(wrong) else math.nan
     share = covered / len(pairs) if pairs else math.nan
     error, n = calibration_error(sheets)
     seconds = np.array([s.answer.seconds for s in sheets if math.isfinite(s.answer.seconds)])
-    typical, slow = (float(np.median(seconds)), float(np.quantile(seconds, 0.95))) if len(seconds) else (math.nan, math.nan)
+    typical, slow = (
+        (float(np.median(seconds)), float(np.quantile(seconds, 0.95)))
+        if len(seconds)
+        else (math.nan, math.nan)
+    )
     return [
-        Row("shrink", "predicted shrink against realised: median difference [points]", "≤ 5", n=len(pairs), value=median, met=_met(median <= 5.0, pairs),
-            percent=False),
-        Row("shrink_covered", "predicted shrink: 90 % interval covers", "85-95 %", covered, len(pairs), share, _met(0.85 <= share <= 0.95, pairs)),
-        Row("calibration", "stated confidence against frequency (ECE)", "≤ 0.05", n=n, value=error, met=_met(error <= 0.05, range(n)), percent=False),
-        Row("seconds", "seconds per set, median", "≤ 1", n=len(seconds), value=typical, met=_met(typical <= 1.0, seconds), percent=False),
+        Row(
+            "shrink",
+            "predicted shrink against realised: median difference [points]",
+            "≤ 5",
+            n=len(pairs),
+            value=median,
+            met=_met(median <= 5.0, pairs),
+            percent=False,
+        ),
+        Row(
+            "shrink_covered",
+            "predicted shrink: 90 % interval covers",
+            "85-95 %",
+            covered,
+            len(pairs),
+            share,
+            _met(0.85 <= share <= 0.95, pairs),
+        ),
+        Row(
+            "calibration",
+            "stated confidence against frequency (ECE)",
+            "≤ 0.05",
+            n=n,
+            value=error,
+            met=_met(error <= 0.05, range(n)),
+            percent=False,
+        ),
+        Row(
+            "seconds",
+            "seconds per set, median",
+            "≤ 1",
+            n=len(seconds),
+            value=typical,
+            met=_met(typical <= 1.0, seconds),
+            percent=False,
+        ),
         Row("seconds_p95", "seconds per set, 95th percentile", "", n=len(seconds), value=slow, percent=False),
-    ]  # fmt: skip
+    ]
 
 
 def _met(passed: bool, of: Sequence[Any] | Any) -> bool | None:
@@ -348,7 +534,9 @@ def _met(passed: bool, of: Sequence[Any] | Any) -> bool | None:
 
 
 def calibration_error(sheets: Sequence[Sheet]) -> tuple[float, int]:
-    """Expected calibration error of all named effects, in ten bins, and their number. Not of recordings: what else is in these nobody knows."""
+    """Expected calibration error of all named effects, in ten bins, and their number. Not of recordings: what
+    else is in these nobody knows.
+    """
     said, true = [], []
     for sheet in sheets:
         if sheet.label["source"] == "spike":
@@ -362,7 +550,11 @@ def calibration_error(sheets: Sequence[Sheet]) -> tuple[float, int]:
         return math.nan, 0
     p, hit = np.clip(np.array(said), 0.0, 1.0), np.array(true)
     bins = np.minimum((p * _BINS).astype(int), _BINS - 1)
-    error = sum(float(np.sum(bins == b)) / len(p) * abs(float(p[bins == b].mean()) - float(hit[bins == b].mean())) for b in range(_BINS) if (bins == b).any())
+    error = sum(
+        float(np.sum(bins == b)) / len(p) * abs(float(p[bins == b].mean()) - float(hit[bins == b].mean()))
+        for b in range(_BINS)
+        if (bins == b).any()
+    )
     return error, len(p)
 
 
@@ -370,13 +562,18 @@ def _failures(sheets: Sequence[Sheet]) -> list[dict[str, Any]]:
     """Every set that failed a row, with label and answer."""
     found = []
     for sheet in sheets:
-        failed = [line.key for line in (*LINES, *MORE) if line.chosen(sheet) and line.passed(sheet) != line.good]
+        failed = [
+            line.key for line in (*LINES, *MORE) if line.chosen(sheet) and line.passed(sheet) != line.good
+        ]
         if failed or sheet.answer.error:
-            found.append({"id": sheet.id, "failed": failed, "label": sheet.label, "answer": sheet.answer.to_dict()})
+            found.append(
+                {"id": sheet.id, "failed": failed, "label": sheet.label, "answer": sheet.answer.to_dict()}
+            )
     return found
 
 
-# ---- Printing ----------------------------------------------------------------------------------------------------------------
+# ---- Printing
+# ----------------------------------------------------------------------------------------------------------------
 
 
 def _cell(row: Row) -> str:
@@ -392,14 +589,18 @@ _TITLES = {"gain": "largest gain", "bic": "BIC", "z": "fit all, largest z"}
 
 
 def markdown(scores: Scores) -> str:
-    """The table: every score with its number of sets, 90 % interval, target, and the simpler methods beside it."""
+    """The table: every score with its number of sets, 90 % interval, target, and the simpler methods beside
+    it.
+    """
     names = list(scores.others)
     head = ["score", "target", "sets", "truing", ""] + [_TITLES.get(name, name) for name in names]
     lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
     theirs = {name: {row.key: row for row in rows} for name, rows in scores.others.items()}
     for row in scores.rows:
         mark = {True: "met", False: "**missed**", None: ""}[row.met]
-        cells = [row.text, row.target, str(row.n), _cell(row), mark] + [_cell(theirs[n][row.key]) if row.key in theirs[n] else "" for n in names]
+        cells = [row.text, row.target, str(row.n), _cell(row), mark] + [
+            _cell(theirs[n][row.key]) if row.key in theirs[n] else "" for n in names
+        ]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
@@ -409,8 +610,19 @@ def table(scores: Scores) -> list[dict[str, Any]]:
     theirs = {name: {row.key: row for row in rows} for name, rows in scores.others.items()}
     rows = []
     for row in scores.rows:
-        cells: dict[str, Any] = {"score": row.text, "target": row.target, "sets": row.n, "truing": _cell(row), "passed": row.met}
-        cells.update({_TITLES.get(name, name): _cell(found[row.key]) if row.key in found else "" for name, found in theirs.items()})
+        cells: dict[str, Any] = {
+            "score": row.text,
+            "target": row.target,
+            "sets": row.n,
+            "truing": _cell(row),
+            "passed": row.met,
+        }
+        cells.update(
+            {
+                _TITLES.get(name, name): _cell(found[row.key]) if row.key in found else ""
+                for name, found in theirs.items()
+            }
+        )
         rows.append(cells)
     return rows
 
@@ -418,7 +630,9 @@ def table(scores: Scores) -> list[dict[str, Any]]:
 def plain(scores: Scores) -> str:
     """The same for a terminal."""
     width = max(len(row.text) for row in scores.rows)
-    lines = [f"{scores.which}: {scores.sets} sets"] + [f"left out: {count} sets, {why}" for why, count in scores.skipped.items()]
+    lines = [f"{scores.which}: {scores.sets} sets"] + [
+        f"left out: {count} sets, {why}" for why, count in scores.skipped.items()
+    ]
     for row in scores.rows:
         mark = {True: "met", False: "MISSED", None: ""}[row.met]
         lines.append(f"{row.text:{width}}  {row.target:8} {row.n:5}  {_cell(row):22} {mark}")

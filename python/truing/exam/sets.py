@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sets of the examination: `make("development/single/12")` gives robot, data and label of one of them, the same every time."""
+"""The sets of the examination: `make("development/single/12")` gives robot, data and label of one of them,
+the same every time.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,26 @@ from truing.exam.sizing import SAME, View, explained, lookalikes, rivals
 from truing.exam.surprises import Surprise, surprises
 from truing.exam.worlds import MECHANICAL, Truth
 
-COUNTS = {"none": 120, "single": 300, "double": 150, "confounded": 80, "wrong_law": 80, "unlisted": 120, "missing": 40, "twenty": 40}
-QUICK = {"none": 12, "single": 18, "double": 8, "confounded": 6, "wrong_law": 4, "unlisted": 8, "missing": 2, "twenty": 2}
+COUNTS = {
+    "none": 120,
+    "single": 300,
+    "double": 150,
+    "confounded": 80,
+    "wrong_law": 80,
+    "unlisted": 120,
+    "missing": 40,
+    "twenty": 40,
+}
+QUICK = {
+    "none": 12,
+    "single": 18,
+    "double": 8,
+    "confounded": 6,
+    "wrong_law": 4,
+    "unlisted": 8,
+    "missing": 2,
+    "twenty": 2,
+}
 WHICH = ("development", "examination")
 _TRIES = 400
 _SMALL = 1000  # numbers from here on are those of small sets
@@ -46,8 +66,12 @@ class Case:
     fresh: Callable[[], truing.Measurements]  # new noisy poses of the same truth
 
 
-def ids(which: str, *, quick: bool = False, families: Sequence[str] | None = None, seed: int = 0) -> list[str]:
-    """Names of all sets of an examination. Quick: a few small ones of each family, that the whole examination does not have."""
+def ids(
+    which: str, *, quick: bool = False, families: Sequence[str] | None = None, seed: int = 0
+) -> list[str]:
+    """Names of all sets of an examination. Quick: a few small ones of each family, that the whole examination
+    does not have.
+    """
     found = []
     for family in families or COUNTS:
         first, count = (_SMALL, QUICK[family]) if quick else (0, COUNTS[family])
@@ -62,12 +86,16 @@ def make(id: str) -> tuple[truing.Robot, truing.Measurements, Label]:
 
 
 def build(id: str) -> Case:
-    """A set with everything about it. id: "development/single/12", with "@7" after it for another seed than 0."""
+    """A set with everything about it. id: "development/single/12", with "@7" after it for another seed than
+    0.
+    """
     words, _, seed = id.partition("@")
     which, family, number = words.split("/")
     if which not in WHICH or family not in COUNTS:
         raise ValueError(f"no set {id!r}: expected {'|'.join(WHICH)}/{'|'.join(COUNTS)}/number")
-    rng = np.random.default_rng([int(seed or 0), WHICH.index(which), list(COUNTS).index(family), int(number), 77])
+    rng = np.random.default_rng(
+        [int(seed or 0), WHICH.index(which), list(COUNTS).index(family), int(number), 77]
+    )
     return _FAMILIES[family](Request(id, which, family, int(number), rng))
 
 
@@ -88,16 +116,21 @@ class Request:
         return int(self.rng.choice(_FEW if self.small else usual))
 
     def specimens(self) -> list[Specimen]:
-        return [specimen for specimen in specimens(self.which) if len(specimen.robot.joints) < 7 or not self.small]
+        return [
+            specimen for specimen in specimens(self.which) if len(specimen.robot.joints) < 7 or not self.small
+        ]
 
     def specimen(self) -> Specimen:
-        """A set's own robot, nearly always: were it drawn anew with every attempt, those on which most effects fit would be met most."""
+        """A set's own robot, nearly always: were it drawn anew with every attempt, those on which most
+        effects fit would be met most.
+        """
         every = self.specimens()
         rng = self.rng if self.rng.random() < 0.1 else np.random.default_rng([self.number, len(self.family)])
         return every[int(rng.integers(len(every)))]
 
 
-# ---- A scene: robot, plan and instrument, before anything is wrong ---------------------------------------------------------
+# ---- A scene: robot, plan and instrument, before anything is wrong
+# ---------------------------------------------------------
 
 
 @dataclass
@@ -130,8 +163,18 @@ class Scene:
         return Truth(self.specimen, self.chain, self.physics, tuple(hidden), self.geometry, self.context)
 
 
-def _scene(request: Request, source: str, *, poses: int | None = None, masses: bool | None = None, needs: frozenset[str] = frozenset(),
-           specimen: Specimen | None = None, plan: Plan | None = None, geometry: bool = False, only: frozenset[str] | None = None) -> Scene:  # fmt: skip
+def _scene(
+    request: Request,
+    source: str,
+    *,
+    poses: int | None = None,
+    masses: bool | None = None,
+    needs: frozenset[str] = frozenset(),
+    specimen: Specimen | None = None,
+    plan: Plan | None = None,
+    geometry: bool = False,
+    only: frozenset[str] | None = None,
+) -> Scene:
     """Draws robot, poses and columns. needs: columns that must be there; only: exactly these columns."""
     if source == "spike":
         return _spike_scene(request, needs, poses)
@@ -161,7 +204,9 @@ def _columns(rng: Generator, needs: frozenset[str], masses: bool | None) -> froz
 
 def _true_chain(specimen: Specimen, rng: Generator) -> Chain:
     """The robot where it stands, its links up to 1 % heavier or lighter than the data sheet says."""
-    place = truing.frame_from_xyz_rpy(rng.uniform(-2.0, 2.0, 3), rng.uniform([-0.03, -0.03, -3.0], [0.03, 0.03, 3.0]))
+    place = truing.frame_from_xyz_rpy(
+        rng.uniform(-2.0, 2.0, 3), rng.uniform([-0.03, -0.03, -3.0], [0.03, 0.03, 3.0])
+    )
     chain = chain_of(specimen.robot.replace(T_measurement_base=place))
     return replace(chain, mass=chain.mass * rng.uniform(0.99, 1.01, chain.joints))
 
@@ -170,7 +215,9 @@ def _nominal(specimen: Specimen, chain: Chain, rng: Generator, targets: int, mas
     """What is handed over: rough frames, and masses or none."""
     robot = specimen.robot.copy()
     if not masses:
-        robot = robot.replace(joints=[joint.replace(mass=None, center_of_mass=np.zeros(3)) for joint in robot.joints])
+        robot = robot.replace(
+            joints=[joint.replace(mass=None, center_of_mass=np.zeros(3)) for joint in robot.joints]
+        )
     kept = []
     for target in list(robot.targets)[:targets]:
         frame = np.array(target.T_last_target)
@@ -196,18 +243,55 @@ def _spike_scene(request: Request, needs: frozenset[str], poses: int | None) -> 
     low, high = inputs.readings.min(axis=0), inputs.readings.max(axis=0)
     plan = Plan(low, high, count)
     handed = frozenset({"pose"} | {name for name in ("dir", "t") if rng.random() < 0.7} | set(needs))
-    return Scene(request, recording.specimen, recording.chain, recording.nominal, plan, inputs, handed, recording.sigma, False,
-                 recording=recording, rows=rows, noise_kind="real")  # fmt: skip
+    return Scene(
+        request,
+        recording.specimen,
+        recording.chain,
+        recording.nominal,
+        plan,
+        inputs,
+        handed,
+        recording.sigma,
+        False,
+        recording=recording,
+        rows=rows,
+        noise_kind="real",
+    )
 
 
-# ---- Drawing effects -------------------------------------------------------------------------------------------------------
+# ---- Drawing effects
+# -------------------------------------------------------------------------------------------------------
 
 _WEIGHTS = {
-    "joint_compliance": 15, "backlash": 14, "harmonic": 12, "gear_ratio": 8, "joint_offset": 8, "link_geometry": 8, "thermal": 6,
-    "thermal_zero": 4, "gravity_backlash": 5, "drift": 5, "axis_wobble": 4, "link_compliance": 3, "joint_coupling": 3, "scale": 2,
-    "transmission_error": 3, "windup": 3, "time_offset": 2, "linkage": 12,
-}  # fmt: skip
-_SPIKES = {"backlash": 5, "harmonic": 4, "gear_ratio": 3, "joint_offset": 3, "link_geometry": 3, "joint_coupling": 1, "axis_wobble": 1, "drift": 1}
+    "joint_compliance": 15,
+    "backlash": 14,
+    "harmonic": 12,
+    "gear_ratio": 8,
+    "joint_offset": 8,
+    "link_geometry": 8,
+    "thermal": 6,
+    "thermal_zero": 4,
+    "gravity_backlash": 5,
+    "drift": 5,
+    "axis_wobble": 4,
+    "link_compliance": 3,
+    "joint_coupling": 3,
+    "scale": 2,
+    "transmission_error": 3,
+    "windup": 3,
+    "time_offset": 2,
+    "linkage": 12,
+}
+_SPIKES = {
+    "backlash": 5,
+    "harmonic": 4,
+    "gear_ratio": 3,
+    "joint_offset": 3,
+    "link_geometry": 3,
+    "joint_coupling": 1,
+    "axis_wobble": 1,
+    "drift": 1,
+}
 _GEOMETRIC = frozenset({"joint_offset", "link_geometry", "scale"})
 _NEED_MASSES = frozenset({"gravity_backlash", "link_compliance"})
 _TURN = 2.5  # [rad] of travel that a once-per-turn effect needs
@@ -238,9 +322,15 @@ def _places(name: str, scene: Scene) -> list[int]:
     if name == "link_compliance":
         return [] if loop else _long_links(scene)
     if name in ("thermal", "link_geometry"):
-        return [j for j in range(chain.joints) if j in chain.driven and (name != "thermal" or np.abs(chain.links[j, :2]).max() > 0.1)]
+        return [
+            j
+            for j in range(chain.joints)
+            if j in chain.driven and (name != "thermal" or np.abs(chain.links[j, :2]).max() > 0.1)
+        ]
     if name in ("harmonic", "axis_wobble", "transmission_error"):
-        return [j for j in revolute if travel[j] > _TURN and not (loop and name == "axis_wobble" and j in (1, 2))]
+        return [
+            j for j in revolute if travel[j] > _TURN and not (loop and name == "axis_wobble" and j in (1, 2))
+        ]
     if name in ("gear_ratio", "backlash"):
         return list(chain.driven)
     if name in ("joint_compliance", "gravity_backlash", "windup"):
@@ -256,7 +346,11 @@ def _loaded(scene: Scene, both_sides: bool) -> list[int]:
     found = []
     for j in scene.chain.driven:
         ahead = float(np.mean(torque[:, j] > 0.0))
-        if float(np.abs(torque[:, j]).max()) > least and not scene.chain.prismatic[j] and (not both_sides or 0.05 < ahead < 0.95):
+        if (
+            float(np.abs(torque[:, j]).max()) > least
+            and not scene.chain.prismatic[j]
+            and (not both_sides or 0.05 < ahead < 0.95)
+        ):
             found.append(j)
     return found
 
@@ -264,11 +358,19 @@ def _loaded(scene: Scene, both_sides: bool) -> list[int]:
 def _long_links(scene: Scene) -> list[int]:
     state = scene.context.state
     ways = state.joint_origin[1:] - state.joint_origin[:-1]
-    return [j for j in range(scene.chain.joints - 1) if float(np.linalg.norm(ways[j], axis=1).max()) > 0.2 and j in scene.chain.driven]
+    return [
+        j
+        for j in range(scene.chain.joints - 1)
+        if float(np.linalg.norm(ways[j], axis=1).max()) > 0.2 and j in scene.chain.driven
+    ]
 
 
-def _draw_effect(scene: Scene, name: str, view: View, over_noise: float, depart: float = 0.0) -> tuple[Hidden, Floats] | None:
-    """An effect of a stated size at a joint where it can be seen, and how it moves the tips. None: not on this robot, not so large."""
+def _draw_effect(
+    scene: Scene, name: str, view: View, over_noise: float, depart: float = 0.0
+) -> tuple[Hidden, Floats] | None:
+    """An effect of a stated size at a joint where it can be seen, and how it moves the tips. None: not on
+    this robot, not so large.
+    """
     rng = scene.request.rng
     places = _places(name, scene)
     if not places:
@@ -308,8 +410,16 @@ def _spread(moved: Floats) -> float:
 
 
 # What machines really do: largest changes [rad, m, 1/K], whatever the noise.
-_MOST_MOTION = {"joint_offset": 0.02, "gear_ratio": 0.01, "transmission_error": 6e-4, "thermal_zero": 1.5e-3, "time_offset": 0.012,
-                "joint_coupling": 6e-3, "backlash": 1.5e-3, "gravity_backlash": 1e-3}  # fmt: skip
+_MOST_MOTION = {
+    "joint_offset": 0.02,
+    "gear_ratio": 0.01,
+    "transmission_error": 6e-4,
+    "thermal_zero": 1.5e-3,
+    "time_offset": 0.012,
+    "joint_coupling": 6e-3,
+    "backlash": 1.5e-3,
+    "gravity_backlash": 1e-3,
+}
 _MOST = 5e-3
 _MOST_EXPANSION = 4e-5
 _MOST_SCALE = 5e-4
@@ -324,7 +434,8 @@ def _sensible(scene: Scene, hidden: Hidden) -> bool:
     return bool(
         np.abs(changes.motion).max() < _MOST_MOTION.get(hidden.effect, _MOST)
         and np.abs(changes.links[:, :, :2]).max() < 4e-3
-        and max(np.abs(changes.links[:, :, 2:]).max(), np.abs(changes.tilt).max(), np.abs(changes.bend).max()) < _MOST
+        and max(np.abs(changes.links[:, :, 2:]).max(), np.abs(changes.tilt).max(), np.abs(changes.bend).max())
+        < _MOST
         and np.abs(changes.base).max() < 4e-3
         and np.abs(changes.scale).max() < _MOST_SCALE
     )
@@ -334,10 +445,13 @@ def _size(rng: Generator, low: float = _SMALLEST, high: float = _LARGEST) -> flo
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-# ---- Handing over ----------------------------------------------------------------------------------------------------------
+# ---- Handing over
+# ----------------------------------------------------------------------------------------------------------
 
 
-def _measured(scene: Scene, truth: Truth, inputs: Inputs, rng: Generator, noise: Floats | None = None) -> truing.Measurements:
+def _measured(
+    scene: Scene, truth: Truth, inputs: Inputs, rng: Generator, noise: Floats | None = None
+) -> truing.Measurements:
     """Noisy measurements with the columns that are handed over."""
     tip, rotation = truth.observe(inputs)
     n = inputs.rows
@@ -345,7 +459,9 @@ def _measured(scene: Scene, truth: Truth, inputs: Inputs, rng: Generator, noise:
     handed, chain = scene.handed, scene.chain
     columns: dict[str, Any] = {"positions": positions}
     if "orientation" in handed:
-        columns["orientations"] = quaternions(recordings.turned(rotation, rng.normal(0.0, scene.sigma / 0.15, (n, 3))))
+        columns["orientations"] = quaternions(
+            recordings.turned(rotation, rng.normal(0.0, scene.sigma / 0.15, (n, 3)))
+        )
     if "dir" in handed:
         columns["directions"] = inputs.direction
     if "payload" in handed:
@@ -374,12 +490,20 @@ def _covariates(scene: Scene, truth: Truth, inputs: Inputs, handed: frozenset[st
     found = {name: values for name, values in inputs.covariates.items() if name in handed}
     if "bare_tau" in handed:  # as a model would give it: weight without friction
         weight = Context(scene.chain, inputs).torque
-        found.update({f"tau{scene.chain.number(j)}_{_unit(scene.chain, j)}": -weight[:, j] for j in scene.chain.driven})
+        found.update(
+            {f"tau{scene.chain.number(j)}_{_unit(scene.chain, j)}": -weight[:, j] for j in scene.chain.driven}
+        )
     if "tau" in handed:
         context = Context(scene.chain, inputs, truth.of)
-        friction = {effect.joints[0]: effect.detail["friction"] for effect in truth.hidden if "friction" in effect.detail}
+        friction = {
+            effect.joints[0]: effect.detail["friction"]
+            for effect in truth.hidden
+            if "friction" in effect.detail
+        }
         for j in scene.chain.driven:
-            found[f"tau{scene.chain.number(j)}_{_unit(scene.chain, j)}"] = motor_torque(context, j, friction.get(j, 0.3))
+            found[f"tau{scene.chain.number(j)}_{_unit(scene.chain, j)}"] = motor_torque(
+                context, j, friction.get(j, 0.3)
+            )
     return found
 
 
@@ -394,7 +518,12 @@ def _noise(scene: Scene, rng: Generator, n: int) -> Floats:
     if scene.noise_kind == "outliers":
         bad = rng.choice(n, size=max(1, round(float(rng.uniform(0.03, 0.05)) * n)), replace=False)
         away = rng.normal(size=(len(bad), 3))
-        noise[bad] += away / np.linalg.norm(away, axis=1, keepdims=True) * scene.sigma * rng.uniform(15.0, 60.0, (len(bad), 1))
+        noise[bad] += (
+            away
+            / np.linalg.norm(away, axis=1, keepdims=True)
+            * scene.sigma
+            * rng.uniform(15.0, 60.0, (len(bad), 1))
+        )
     return np.asarray(noise)
 
 
@@ -405,12 +534,23 @@ def _case(scene: Scene, hidden: Sequence[Hidden], sizes: Sequence[float], **more
     noise = scene.recording.noise[scene.rows] if scene.recording else None
     data = _measured(scene, truth, scene.inputs, rng, noise)
     label: Label = {
-        "family": scene.request.family, "source": scene.source, "robot": scene.specimen.name,
+        "family": scene.request.family,
+        "source": scene.source,
+        "robot": scene.specimen.name,
         "effects": [_named(scene.chain, h.effect, h.joints) for h in hidden if h.listed],
-        "geometry_underneath": scene.geometry is not None, "acceptable": [], "unlisted": "", "unlisted_joint": "", "unlisted_inputs": [],
-        "size_over_noise": min(sizes) if sizes else 0.0, "sizes": list(sizes), "sigma": scene.sigma, "noise": scene.noise_kind,
-        "rows": scene.inputs.rows, "columns": sorted(scene.handed), "parameters": [_parameter(h) for h in hidden],
-    }  # fmt: skip
+        "geometry_underneath": scene.geometry is not None,
+        "acceptable": [],
+        "unlisted": "",
+        "unlisted_joint": "",
+        "unlisted_inputs": [],
+        "size_over_noise": min(sizes) if sizes else 0.0,
+        "sizes": list(sizes),
+        "sigma": scene.sigma,
+        "noise": scene.noise_kind,
+        "rows": scene.inputs.rows,
+        "columns": sorted(scene.handed),
+        "parameters": [_parameter(h) for h in hidden],
+    }
     label.update(more)
     if scene.recording:
         label["robot"] = scene.recording.name
@@ -419,7 +559,10 @@ def _case(scene: Scene, hidden: Sequence[Hidden], sizes: Sequence[float], **more
 
 
 def _named(chain: Chain, effect: str, joints: Sequence[int]) -> dict[str, Any]:
-    return {"effect": effect, "joints": [] if effect in WHOLE_ROBOT else [chain.names[j] for j in joints if j >= 0]}
+    return {
+        "effect": effect,
+        "joints": [] if effect in WHOLE_ROBOT else [chain.names[j] for j in joints if j >= 0],
+    }
 
 
 def _parameter(hidden: Hidden) -> dict[str, Any]:
@@ -427,7 +570,9 @@ def _parameter(hidden: Hidden) -> dict[str, Any]:
 
 
 def _fresh(scene: Scene, truth: Truth, seed: int) -> truing.Measurements:
-    """200 new noisy poses, or of a recording those that were held back. Gross errors of the instrument stay at home."""
+    """200 new noisy poses, or of a recording those that were held back. Gross errors of the instrument stay
+    at home.
+    """
     rng = np.random.default_rng(seed)
     if scene.recording is None:
         quiet = replace(scene, noise_kind="white")
@@ -441,19 +586,25 @@ def _fresh(scene: Scene, truth: Truth, seed: int) -> truing.Measurements:
 
 def _acceptable(scene: Scene, view: View, hidden: Hidden, moved: Floats) -> list[dict[str, Any]]:
     """Other answers that are as right."""
-    found = [_named(scene.chain, effect, (joint,)) for effect, joint in lookalikes(view, moved, hidden, scene.handed)]
+    found = [
+        _named(scene.chain, effect, (joint,))
+        for effect, joint in lookalikes(view, moved, hidden, scene.handed)
+    ]
     if hidden.effect == "joint_offset":
         found.append(_named(scene.chain, "link_geometry", hidden.joints))
     if hidden.effect == "joint_compliance" and "masses" not in scene.handed:
         found.append(_named(scene.chain, "gravity_moment", hidden.joints))
-    if hidden.effect == "joint_compliance" and (hidden.detail.get("depart", 0.0) > 0.3 or "dead_band" in hidden.detail):
+    if hidden.effect == "joint_compliance" and (
+        hidden.detail.get("depart", 0.0) > 0.3 or "dead_band" in hidden.detail
+    ):
         found.append(_named(scene.chain, "stiffness_zones", hidden.joints))
     if hidden.effect == "linkage":
         found.append(_named(scene.chain, "harmonic", hidden.joints))
     return [item for k, item in enumerate(found) if item not in found[:k]]
 
 
-# ---- Families --------------------------------------------------------------------------------------------------------------
+# ---- Families
+# --------------------------------------------------------------------------------------------------------------
 
 
 def _none(request: Request) -> Case:
@@ -482,14 +633,34 @@ def _single(request: Request) -> Case:
     return _one_effect(request, source, geometry=geometry, depart=0.15 if source == "departures" else 0.0)
 
 
-def _one_effect(request: Request, source: str, *, geometry: bool = False, depart: float = 0.0, poses: int | None = None,
-                sizes: tuple[float, float] = (_SMALLEST, _LARGEST), names: Sequence[str] = (), withheld: bool = False) -> Case:  # fmt: skip
+def _one_effect(
+    request: Request,
+    source: str,
+    *,
+    geometry: bool = False,
+    depart: float = 0.0,
+    poses: int | None = None,
+    sizes: tuple[float, float] = (_SMALLEST, _LARGEST),
+    names: Sequence[str] = (),
+    withheld: bool = False,
+) -> Case:
     """One listed effect; `withheld`: without the column that it needs."""
     rng = request.rng
     for _ in range(_TRIES):
-        name = str(rng.choice(list(names))) if names else _draw_name(rng, source, without=_GEOMETRIC if geometry else frozenset())
+        name = (
+            str(rng.choice(list(names)))
+            if names
+            else _draw_name(rng, source, without=_GEOMETRIC if geometry else frozenset())
+        )
         needs = _needs(name, rng)
-        scene = _scene(request, source, poses=poses, needs=needs, masses=True if name in _NEED_MASSES else None, geometry=geometry)
+        scene = _scene(
+            request,
+            source,
+            poses=poses,
+            needs=needs,
+            masses=True if name in _NEED_MASSES else None,
+            geometry=geometry,
+        )
         view = View(scene.context, geometry)
         drawn = _draw_effect(scene, name, view, _size(rng, *sizes), depart)
         if drawn is None:
@@ -498,7 +669,13 @@ def _one_effect(request: Request, source: str, *, geometry: bool = False, depart
         if withheld:
             scene.handed = scene.handed - needs
         acceptable = _acceptable(scene, view, hidden, moved)
-        return _case(scene, [hidden], [view.rms(moved) / scene.sigma], acceptable=acceptable, **({"withheld": sorted(needs)} if withheld else {}))
+        return _case(
+            scene,
+            [hidden],
+            [view.rms(moved) / scene.sigma],
+            acceptable=acceptable,
+            **({"withheld": sorted(needs)} if withheld else {}),
+        )
     raise RuntimeError(f"{request.id}: no effect fits")
 
 
@@ -516,10 +693,19 @@ def _double(request: Request) -> Case:
     geometry = request.number % 2 == 1
     count = 3 if request.number % 5 == 4 else 2
     for _ in range(_TRIES):
-        names = [_draw_name(rng, "physics", without=_GEOMETRIC | {"transmission_error"}) for _ in range(count)]
+        names = [
+            _draw_name(rng, "physics", without=_GEOMETRIC | {"transmission_error"}) for _ in range(count)
+        ]
         needs = frozenset().union(*(_needs(name, rng) for name in names))
         masses = True if _NEED_MASSES & set(names) else None
-        scene = _scene(request, "physics", needs=needs, masses=masses, geometry=geometry, poses=request.poses(200, 300, 400))
+        scene = _scene(
+            request,
+            "physics",
+            needs=needs,
+            masses=masses,
+            geometry=geometry,
+            poses=request.poses(200, 300, 400),
+        )
         view = View(scene.context, geometry)
         drawn = [_draw_effect(scene, name, view, _size(rng, 1.5)) for name in names]
         complete = [item for item in drawn if item is not None]
@@ -527,7 +713,9 @@ def _double(request: Request) -> Case:
             continue
         sizes = _apart(view, [moved for _, moved in complete], scene.sigma)
         if min(sizes) >= 1.0:
-            acceptable = [item for hidden, moved in complete for item in _acceptable(scene, view, hidden, moved)]
+            acceptable = [
+                item for hidden, moved in complete for item in _acceptable(scene, view, hidden, moved)
+            ]
             return _case(scene, [hidden for hidden, _ in complete], sizes, acceptable=acceptable)
     raise RuntimeError(f"{request.id}: no two effects fit")
 
@@ -570,27 +758,63 @@ def _confounded(request: Request) -> Case:
             hidden, moved = drawn
             rival = _named(scene.chain, twin.rival, (twin.rival_joint,))
             acceptable = [rival, *(item for item in _acceptable(scene, view, hidden, moved) if item != rival)]
-            return _case(scene, [hidden], [view.rms(moved) / scene.sigma], acceptable=acceptable, twin=kind.__name__.strip("_"), rival=rival)
+            return _case(
+                scene,
+                [hidden],
+                [view.rms(moved) / scene.sigma],
+                acceptable=acceptable,
+                twin=kind.__name__.strip("_"),
+                rival=rival,
+            )
     raise RuntimeError(f"{request.id}: no twins fit")
 
 
 def _too_small_to_tell(view: View, moved: Floats, twin: Twin) -> float:
-    """Size over noise up to which an effect and its twin differ by less than two standard errors. 0: they do not look alike."""
+    """Size over noise up to which an effect and its twin differ by less than two standard errors. 0: they do
+    not look alike.
+    """
     for rival in rivals(view, twin.handed):
         if rival.effect == twin.rival and rival.joint == twin.rival_joint:
             different = 1.0 - explained(view, moved, rival.columns)
-            return float(np.sqrt(4.0 / max(different * view.context.n, 1e-12))) if different < 1.0 - SAME else 0.0
+            return (
+                float(np.sqrt(4.0 / max(different * view.context.n, 1e-12)))
+                if different < 1.0 - SAME
+                else 0.0
+            )
     return 0.0
 
 
 def _wrong_law(request: Request) -> Case:
     """The right effect by a law that nobody wrote down."""
     rng = request.rng
-    name = ("joint_compliance", "thermal_zero", "backlash", "harmonic", "transmission_error", "joint_compliance", "drift", "thermal")[request.number % 8]
+    name = (
+        "joint_compliance",
+        "thermal_zero",
+        "backlash",
+        "harmonic",
+        "transmission_error",
+        "joint_compliance",
+        "drift",
+        "thermal",
+    )[request.number % 8]
     if name == "joint_compliance" and request.number % 16 >= 8:
         return _dead_band(request)
-    depart = {"joint_compliance": 0.9, "thermal_zero": 0.7, "thermal": 0.7, "backlash": 0.9, "harmonic": 0.6, "transmission_error": 0.8, "drift": 0.8}[name]
-    return _one_effect(request, "departures" if request.number % 3 else "physics", names=[name], depart=depart * float(rng.uniform(0.7, 1.0)), sizes=(1.0, 10.0))
+    depart = {
+        "joint_compliance": 0.9,
+        "thermal_zero": 0.7,
+        "thermal": 0.7,
+        "backlash": 0.9,
+        "harmonic": 0.6,
+        "transmission_error": 0.8,
+        "drift": 0.8,
+    }[name]
+    return _one_effect(
+        request,
+        "departures" if request.number % 3 else "physics",
+        names=[name],
+        depart=depart * float(rng.uniform(0.7, 1.0)),
+        sizes=(1.0, 10.0),
+    )
 
 
 def _dead_band(request: Request) -> Case:
@@ -601,7 +825,12 @@ def _dead_band(request: Request) -> Case:
         place = int(rng.choice(_places("joint_compliance", scene)))  # every robot has a loaded joint
         drawn = _sized(scene, laws.dead_band(place, rng), view, _size(rng, 1.0))
         if drawn:
-            return _case(scene, [drawn[0]], [view.rms(drawn[1]) / scene.sigma], acceptable=_acceptable(scene, view, *drawn))
+            return _case(
+                scene,
+                [drawn[0]],
+                [view.rms(drawn[1]) / scene.sigma],
+                acceptable=_acceptable(scene, view, *drawn),
+            )
     raise RuntimeError(f"{request.id}: no effect fits")
 
 
@@ -620,8 +849,14 @@ def _unlisted(request: Request) -> Case:
         drawn = _sized(scene, hidden, view, _size(rng, 1.0))
         if drawn and _beyond(view, drawn[1], scene.handed):
             joint = chain.names[hidden.joints[0]] if hidden.joints else "base"
-            return _case(scene, [drawn[0]], [view.rms(drawn[1]) / scene.sigma], unlisted=hidden.effect, unlisted_joint=joint,
-                         unlisted_inputs=list(hidden.inputs))  # fmt: skip
+            return _case(
+                scene,
+                [drawn[0]],
+                [view.rms(drawn[1]) / scene.sigma],
+                unlisted=hidden.effect,
+                unlisted_joint=joint,
+                unlisted_inputs=list(hidden.inputs),
+            )
     raise RuntimeError(f"{request.id}: no unlisted effect fits")
 
 
@@ -637,18 +872,36 @@ def _beyond(view: View, moved: Floats, handed: frozenset[str]) -> bool:
 
 def _missing(request: Request) -> Case:
     """The column that the effect needs is withheld."""
-    names = (("backlash",), ("thermal_zero", "thermal"), ("windup",), ("time_offset", "backlash"))[request.number % 4]
+    names = (("backlash",), ("thermal_zero", "thermal"), ("windup",), ("time_offset", "backlash"))[
+        request.number % 4
+    ]
     spike = request.number % 8 == 0 and not recordings.missing(request.which)
-    return _one_effect(request, "spike" if spike else "physics", names=names if not spike else ["backlash"], sizes=(1.5, 10.0), withheld=True)
+    return _one_effect(
+        request,
+        "spike" if spike else "physics",
+        names=names if not spike else ["backlash"],
+        sizes=(1.5, 10.0),
+        withheld=True,
+    )
 
 
 def _twenty(request: Request) -> Case:
     """Twenty poses only."""
-    return _one_effect(request, "physics" if request.number % 2 else "departures", poses=20, sizes=(2.0, 10.0))
+    return _one_effect(
+        request, "physics" if request.number % 2 else "departures", poses=20, sizes=(2.0, 10.0)
+    )
 
 
-_FAMILIES: dict[str, Callable[[Request], Case]] = {"none": _none, "single": _single, "double": _double, "confounded": _confounded,
-                                                   "wrong_law": _wrong_law, "unlisted": _unlisted, "missing": _missing, "twenty": _twenty}  # fmt: skip
+_FAMILIES: dict[str, Callable[[Request], Case]] = {
+    "none": _none,
+    "single": _single,
+    "double": _double,
+    "confounded": _confounded,
+    "wrong_law": _wrong_law,
+    "unlisted": _unlisted,
+    "missing": _missing,
+    "twenty": _twenty,
+}
 
 
 def skipped(which: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -100,7 +100,11 @@ def explained(view: View, moved: Floats, columns: Sequence[Floats]) -> float:
     total = float(look @ look)
     looks = [view.look(column) for column in columns]
     raw = [float(np.linalg.norm(column)) for column in columns]
-    seen = [look_of for look_of, size in zip(looks, raw, strict=True) if np.linalg.norm(look_of) > 1e-6 * max(size, 1e-12)]
+    seen = [
+        look_of
+        for look_of, size in zip(looks, raw, strict=True)
+        if np.linalg.norm(look_of) > 1e-6 * max(size, 1e-12)
+    ]
     if total == 0.0 or not seen:
         return 0.0
     basis = _orthonormal(seen)
@@ -121,7 +125,10 @@ def rivals(view: View, handed: frozenset[str]) -> list[Rival]:
     context = view.context
     found: list[Rival] = []
     for joint in range(context.chain.joints):
-        found += [Rival(name, joint, tuple(view.displaced(c) for c in changes)) for name, changes in _at_joint(context, joint, handed)]
+        found += [
+            Rival(name, joint, tuple(view.displaced(c) for c in changes))
+            for name, changes in _at_joint(context, joint, handed)
+        ]
         found.append(Rival("link_geometry", joint, tuple(view.geometry_columns([joint]))))
     unit = context.still()
     unit.scale[:] = 1.0
@@ -156,7 +163,9 @@ def _at_joint(context: Context, joint: int, handed: frozenset[str]) -> list[tupl
         if "dir" in handed:
             found.append(("backlash", [_moving(context, joint, inputs.direction[:, context.column(joint)])]))
     if not chain.prismatic[joint]:
-        found.append(("harmonic", [_moving(context, joint, f(k * q)) for f in (np.cos, np.sin) for k in (1, 2)]))
+        found.append(
+            ("harmonic", [_moving(context, joint, f(k * q)) for f in (np.cos, np.sin) for k in (1, 2)])
+        )
         found.append(("axis_wobble", _wobbles(context, joint)))
     if "masses" in handed or "payload" in handed:
         torque = context.torque[:, joint]
@@ -164,7 +173,9 @@ def _at_joint(context: Context, joint: int, handed: frozenset[str]) -> list[tupl
         found.append(("stiffness_zones", _zones(context, joint)))
         found.append(("gravity_backlash", [_moving(context, joint, np.sign(torque))]))
         if joint + 1 < chain.joints:
-            found.append(("link_compliance", [laws.link_compliance(joint, np.random.default_rng(0)).changes(context)]))
+            found.append(
+                ("link_compliance", [laws.link_compliance(joint, np.random.default_rng(0)).changes(context)])
+            )
     if "temp" in handed:
         found.append(("thermal_zero", [_moving(context, joint, context.warmth)]))
         found.append(("thermal", [laws.thermal(joint, np.random.default_rng(0)).changes(context)]))
@@ -175,7 +186,9 @@ def _zones(context: Context, joint: int) -> list[Changes]:
     """Torque in three zones that part the data in thirds."""
     torque = context.torque[:, joint]
     knots = [0.0, *np.quantile(np.abs(torque), [1 / 3, 2 / 3]), np.inf]
-    parts = [np.clip(np.abs(torque), low, high) - low for low, high in zip(knots[:-1], knots[1:], strict=True)]
+    parts = [
+        np.clip(np.abs(torque), low, high) - low for low, high in zip(knots[:-1], knots[1:], strict=True)
+    ]
     return [_moving(context, joint, np.copysign(part, torque)) for part in parts]
 
 
@@ -195,8 +208,16 @@ def lookalikes(view: View, moved: Floats, effect: Hidden, handed: frozenset[str]
     found = []
     for rival in rivals(view, handed):
         own = rival.effect == effect.effect and (not effect.joints or rival.joint in effect.joints)
-        own |= rival.effect == "stiffness_zones" and effect.effect == "joint_compliance" and rival.joint in effect.joints  # a law with room to spare
-        if own or (rival.effect == "link_geometry" and rival.joint < 0 and effect.effect not in ("scale", "joint_offset")):
+        own |= (
+            rival.effect == "stiffness_zones"
+            and effect.effect == "joint_compliance"
+            and rival.joint in effect.joints
+        )  # a law with room to spare
+        if own or (
+            rival.effect == "link_geometry"
+            and rival.joint < 0
+            and effect.effect not in ("scale", "joint_offset")
+        ):
             continue
         if explained(view, moved, rival.columns) > SAME:
             found.append((rival.effect, rival.joint))

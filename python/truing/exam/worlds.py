@@ -15,7 +15,9 @@ from truing.exam.kinematics import Chain, Changes, Floats, sweep
 from truing.exam.laws import Context, Hidden, Inputs, Law, hardening, motor_torque
 from truing.exam.robots import Specimen
 
-MECHANICAL = frozenset({"joint_compliance", "link_compliance", "backlash", "gravity_backlash", "windup", "linkage"})
+MECHANICAL = frozenset(
+    {"joint_compliance", "link_compliance", "backlash", "gravity_backlash", "windup", "linkage"}
+)
 """Effects that a mechanism brings about by itself, by springs, stops, beams and rods."""
 
 
@@ -31,7 +33,9 @@ class Truth:
     of: Context | None = None  # of the measurement, where fresh poses are observed
 
     def observe(self, inputs: Inputs, hidden: Sequence[Hidden] | None = None) -> tuple[Floats, Floats]:
-        """Positions (n, 3) and rotations (n, 3, 3) of the targets, with the truth's own effects or with others."""
+        """Positions (n, 3) and rotations (n, 3, 3) of the targets, with the truth's own effects or with
+        others.
+        """
         effects = self.hidden if hidden is None else tuple(hidden)
         context = Context(self.chain, inputs, self.of)
         if self.physics:
@@ -66,10 +70,14 @@ class Truth:
                 springs[joint] = _spring(effect, largest)
             elif effect.effect == "windup":
                 springs[joint] = _spring(effect, largest)
-                wound[joint] = motor_torque(context, joint, effect.detail["friction"]) + context.torque[:, joint]
+                wound[joint] = (
+                    motor_torque(context, joint, effect.detail["friction"]) + context.torque[:, joint]
+                )
             elif effect.effect == "backlash":
                 # Friction holds the joint back; a loose one lets the weight decide where it is the stronger.
-                plays[joint] = Play(effect.size, (2.0 * largest + 1.0) * (1.0 - effect.detail.get("loose", 0.0)))
+                plays[joint] = Play(
+                    effect.size, (2.0 * largest + 1.0) * (1.0 - effect.detail.get("loose", 0.0))
+                )
             elif effect.effect == "gravity_backlash":
                 plays[joint] = Play(effect.size, 0.0)
             elif effect.effect == "link_compliance":
@@ -89,7 +97,9 @@ class Truth:
 
     def _rod_middle(self) -> tuple[float, float]:
         low, high = limits(self.specimen, self.chain)
-        drivers = [self.chain.driven.index(driver) for driver, _ in next(by for by in self.chain.drivers if by)]
+        drivers = [
+            self.chain.driven.index(driver) for driver, _ in next(by for by in self.chain.drivers if by)
+        ]
         first, second = 0.5 * (low + high)[drivers]
         return float(first), float(second)
 
@@ -98,7 +108,9 @@ def _spring(effect: Hidden, largest: float) -> Callable[[Floats], Floats]:
     """Deflection of a torque."""
     depart, band, size = effect.detail.get("depart", 0.0), effect.detail.get("dead_band", 0.0), effect.size
     if band:
-        return lambda torque: np.asarray(size * np.copysign(np.maximum(np.abs(torque) - band * largest, 0.0), torque))
+        return lambda torque: np.asarray(
+            size * np.copysign(np.maximum(np.abs(torque) - band * largest, 0.0), torque)
+        )
     if depart:
         return lambda torque: size * hardening(np.asarray(torque), largest, depart)
     return lambda torque: size * torque

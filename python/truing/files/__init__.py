@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading and writing files: robots, measurements, tables. Every error names file, line or column, found and expected."""
+"""Reading and writing files: robots, measurements, tables. Every error names file, line or column, found and
+expected.
+"""
 
 from __future__ import annotations
 

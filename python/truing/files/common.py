@@ -42,7 +42,8 @@ class Units:
     def __post_init__(self) -> None:
         if self.length not in ("m", "mm") or self.angle not in ("rad", "deg"):
             raise InputError(
-                f"units: found length {self.length!r} and angle {self.angle!r}, expected length m or mm, angle rad or deg"
+                f"units: found length {self.length!r} and angle {self.angle!r}, expected length m or mm,"
+                " angle rad or deg"
             )
 
 
@@ -66,7 +67,9 @@ def read_bytes(path: Path, largest: int) -> bytes:
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {reason(error)}") from None
     if len(data) > largest:
-        raise InputError(f"{path}: has more than {largest // 1_000_000} MB, far too much for this kind of file")
+        raise InputError(
+            f"{path}: has more than {largest // 1_000_000} MB, far too much for this kind of file"
+        )
     return data
 
 
@@ -82,7 +85,8 @@ def decoded(path: Path, data: bytes) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(
-            f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8: a binary file, or text in another encoding"
+            f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8: a binary file, or text in"
+            " another encoding"
         ) from None
 
 
@@ -93,7 +97,8 @@ def reason(error: BaseException) -> str:
     return str(error).strip().split("\n")[0] or type(error).__name__
 
 
-# ---- Output that is whole or not there -------------------------------------------------------------------------------
+# ---- Output that is whole or not there
+# -------------------------------------------------------------------------------
 
 
 def _temporary_beside(path: Path) -> Path:
@@ -104,8 +109,10 @@ def _temporary_beside(path: Path) -> Path:
 def atomic_write(path: PathLike) -> Iterator[Path]:
     """Write a file so that it is there as a whole or not at all.
 
-    Yields the path of an empty temporary file in the same folder (with the same suffix) to write to; it is renamed to `path`
-    when the block ends well and removed when it raises, Ctrl-C included. Raises InputError when `path` cannot be written.
+    Yields the path of an empty temporary file in the same folder (with the same suffix) to write to; it is
+    renamed to `path`
+    when the block ends well and removed when it raises, Ctrl-C included. Raises InputError when `path` cannot
+    be written.
     """
     path = Path(path)
     if path.is_dir():
@@ -129,8 +136,10 @@ def atomic_write(path: PathLike) -> Iterator[Path]:
 def atomic_output_dir(path: PathLike) -> Iterator[Path]:
     """Write several files so that all of them appear, or none.
 
-    Yields a temporary folder on the same disk. When the block ends well its content moves to `path` (made if needed; files of
-    the same names are replaced, others stay); when it raises, Ctrl-C included, nothing is left behind. Raises InputError
+    Yields a temporary folder on the same disk. When the block ends well its content moves to `path` (made if
+    needed; files of
+    the same names are replaced, others stay); when it raises, Ctrl-C included, nothing is left behind. Raises
+    InputError
     when `path` cannot be written.
     """
     path = Path(path)
@@ -189,7 +198,8 @@ def _interrupts_held_back() -> Iterator[None]:
             raise KeyboardInterrupt
 
 
-# ---- Tables ----------------------------------------------------------------------------------------------------------
+# ---- Tables
+# ----------------------------------------------------------------------------------------------------------
 
 
 def write_table(path: PathLike, columns: Mapping[str, ArrayLike | Sequence[str | None]]) -> None:

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hand-eye files: poses.csv (one row per robot pose), what a camera saw of a board there, and camera.yaml (format truing-camera/1)."""
+"""Hand-eye files: poses.csv (one row per robot pose), what a camera saw of a board there, and camera.yaml
+(format truing-camera/1).
+"""
 
 from __future__ import annotations
 
@@ -79,15 +81,18 @@ class Stream:
     T: Floats  # shape=(n, 4, 4)
 
 
-# ---- Rotations -------------------------------------------------------------------------------------------------------
+# ---- Rotations
+# -------------------------------------------------------------------------------------------------------
 
 
 def rotations_from_quaternions(q: Floats) -> Floats:
     """shape=(n, 3, 3) of shape=(n, 4), scalar first; brought to unit length first."""
     w, x, y, z = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
-    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]  # fmt: skip
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
     return np.moveaxis(np.array(rows), 2, 0)
 
 
@@ -105,7 +110,15 @@ def quaternions_from_rotations(rotations: Floats) -> Floats:
             continue
         m, s = r[rows], 2 * np.sqrt(squares[rows, k])
         if k == 0:
-            out[rows] = np.stack([s / 4, (m[:, 2, 1] - m[:, 1, 2]) / s, (m[:, 0, 2] - m[:, 2, 0]) / s, (m[:, 1, 0] - m[:, 0, 1]) / s], axis=1)
+            out[rows] = np.stack(
+                [
+                    s / 4,
+                    (m[:, 2, 1] - m[:, 1, 2]) / s,
+                    (m[:, 0, 2] - m[:, 2, 0]) / s,
+                    (m[:, 1, 0] - m[:, 0, 1]) / s,
+                ],
+                axis=1,
+            )
         else:
             i, j, l = k - 1, k % 3, (k + 1) % 3
             out[rows, 0] = (m[:, l, j] - m[:, j, l]) / s
@@ -118,8 +131,10 @@ def quaternions_from_rotations(rotations: Floats) -> Floats:
 def rotations_from_angles(angles: Floats, convention: str) -> Floats:
     """shape=(n, 3, 3) of three angles a row [rad].
 
-    convention: "rotation-vector" (axis times angle, as Universal Robots), or the order in which rotations about turned axes are multiplied:
-    "zyx" is Rz(rz) Ry(ry) Rx(rx). Where an axis comes twice ("zyz"), the columns rx, ry, rz hold first, second and third angle.
+    convention: "rotation-vector" (axis times angle, as Universal Robots), or the order in which rotations
+    about turned axes are multiplied:
+    "zyx" is Rz(rz) Ry(ry) Rx(rx). Where an axis comes twice ("zyz"), the columns rx, ry, rz hold first,
+    second and third angle.
     """
     if convention == "rotation-vector":
         angle = np.linalg.norm(angles, axis=1)
@@ -142,20 +157,33 @@ def rotations_from_angles(angles: Floats, convention: str) -> Floats:
 
 
 def check_angles(convention: str | None, *, needed_by: str = "") -> str | None:
-    """A convention of angles by its name; InputError when it is none, or when it is missing and a column needs it."""
-    names = ("rotation-vector (Universal Robots), zyx (KUKA A B C and Fanuc W P R: turned axes z, y, x, which is fixed axes x, y, z), "
-             "xyz (Staubli), zyz (Kawasaki O A T), or another order of turned axes")  # fmt: skip
+    """A convention of angles by its name; InputError when it is none, or when it is missing and a column
+    needs it.
+    """
+    names = (
+        "rotation-vector (Universal Robots), zyx (KUKA A B C and Fanuc W P R: turned axes z, y, x, which is"
+        " fixed axes x, y, z), xyz (Staubli), zyz (Kawasaki O A T), or another order of turned axes"
+    )
     if convention is None or convention == "":
         if needed_by:
-            raise InputError(f"{needed_by}: angles mean nothing without their convention: say it with --angles (in Python: angles=…), one of {names}")
+            raise InputError(
+                f"{needed_by}: angles mean nothing without their convention: say it with --angles (in Python:"
+                f" angles=…), one of {names}"
+            )
         return None
     if convention in ANGLE_CONVENTIONS:
         return convention
-    hint = f"; rotations about fixed axes in the order {convention.lower()} are {convention.lower()[::-1]!r} here" if convention.lower() in EULER_ORDERS else ""
+    hint = (
+        f"; rotations about fixed axes in the order {convention.lower()} are {convention.lower()[::-1]!r}"
+        " here"
+        if convention.lower() in EULER_ORDERS
+        else ""
+    )
     raise InputError(f"--angles: found {convention!r}, expected {names}{hint}")
 
 
-# ---- Columns ---------------------------------------------------------------------------------------------------------
+# ---- Columns
+# ---------------------------------------------------------------------------------------------------------
 
 
 class _Plan:
@@ -193,7 +221,10 @@ class _Plan:
             if of_joint[2] not in _JOINT_UNITS:
                 self._refuse_unit(name, f"q{of_joint[1]}", _JOINT_UNITS)
             if int(of_joint[1]) in self.joints:
-                self.table.refuse(f"joint {of_joint[1]} has two columns, {self.joints[int(of_joint[1])]!r} and {name!r}: remove one")
+                self.table.refuse(
+                    f"joint {of_joint[1]} has two columns, {self.joints[int(of_joint[1])]!r} and {name!r}:"
+                    " remove one"
+                )
             self.joints[int(of_joint[1])] = name
             return
         stem, _, unit = name.partition("_")
@@ -203,24 +234,37 @@ class _Plan:
 
     def _place_of_side(self, name: str, side: str, rest: str) -> None:
         stem, _, unit = rest.partition("_")
-        kinds = {**dict.fromkeys(_POSITION, _LENGTH_UNITS), **dict.fromkeys(_QUATERNION, ("",)), **dict.fromkeys(_ANGLES, _ANGLE_UNITS)}
+        kinds = {
+            **dict.fromkeys(_POSITION, _LENGTH_UNITS),
+            **dict.fromkeys(_QUATERNION, ("",)),
+            **dict.fromkeys(_ANGLES, _ANGLE_UNITS),
+        }
         if stem not in kinds:
             names = [f"{side}_{axis}_m" for axis in _POSITION] + [f"{side}_{part}" for part in _QUATERNION]
             close = difflib.get_close_matches(name, names, n=1)
             hint = f"did you mean {close[0]!r}? " if close else ""
-            self.table.refuse(f"unknown column; {hint}of the {side} ({_SIDES[side]}) there are {listed(names)}, or angles: {side}_rx_deg …", column=name)
+            self.table.refuse(
+                f"unknown column; {hint}of the {side} ({_SIDES[side]}) there are {listed(names)}, or angles:"
+                f" {side}_rx_deg …",
+                column=name,
+            )
         if unit not in kinds[stem]:
             if kinds[stem] == ("",):
                 self.table.refuse(f"a quaternion has no unit, expected the name {side}_{stem}", column=name)
             self._refuse_unit(name, f"{side}_{stem}", kinds[stem])
         role = f"{side}_{stem}"
         if role in self.columns:
-            self.table.refuse(f"there are two columns for it, {self.columns[role]!r} and {name!r}: remove one", column=name)
+            self.table.refuse(
+                f"there are two columns for it, {self.columns[role]!r} and {name!r}: remove one", column=name
+            )
         self.columns[role] = name
         self.units[role] = unit
 
     def _refuse_unit(self, name: str, stem: str, units: Sequence[str]) -> None:
-        self.table.refuse(f"no known unit in the name, expected {' or '.join(f'{stem}_{unit}' for unit in units)}", column=name)
+        self.table.refuse(
+            f"no known unit in the name, expected {' or '.join(f'{stem}_{unit}' for unit in units)}",
+            column=name,
+        )
 
     def has(self, side: str) -> bool:
         return any(role.startswith(f"{side}_") for role in self.columns)
@@ -231,20 +275,36 @@ class _Plan:
         quaternion = [part for part in _QUATERNION if f"{side}_{part}" in self.columns]
         angles = [part for part in _ANGLES if f"{side}_{part}" in self.columns]
         if quaternion and angles:
-            self.table.refuse(f"the {side} has an orientation twice, {self.columns[f'{side}_{quaternion[0]}']} … and {self.columns[f'{side}_{angles[0]}']} …: remove one")
+            self.table.refuse(
+                f"the {side} has an orientation twice, {self.columns[f'{side}_{quaternion[0]}']} … and"
+                f" {self.columns[f'{side}_{angles[0]}']} …: remove one"
+            )
         if angles:
             self._require(side, _ANGLES, "_deg", "an orientation has three angles")
             return "angles"
-        self._require(side, _QUATERNION, "", "an orientation is a quaternion, scalar first, or three angles with --angles")
+        self._require(
+            side,
+            _QUATERNION,
+            "",
+            "an orientation is a quaternion, scalar first, or three angles with --angles",
+        )
         return "quaternion"
 
     def _require(self, side: str, stems: Sequence[str], ending: str, why: str) -> None:
         missing = [stem for stem in stems if f"{side}_{stem}" not in self.columns]
         if missing:
             wanted = f"{side}_{missing[0]}{ending}"
-            close = difflib.get_close_matches(wanted, [name for name in self.table.names if name not in self.columns.values()], n=1, cutoff=0.75)
+            close = difflib.get_close_matches(
+                wanted,
+                [name for name in self.table.names if name not in self.columns.values()],
+                n=1,
+                cutoff=0.75,
+            )
             hint = f"did you mean {close[0]!r}? " if close else ""
-            self.table.refuse(f"there is no column {wanted} ({_SIDES[side]}: {why}); {hint}the columns are {listed(self.table.names)}")
+            self.table.refuse(
+                f"there is no column {wanted} ({_SIDES[side]}: {why}); {hint}the columns are"
+                f" {listed(self.table.names)}"
+            )
         units = {self.units[f"{side}_{stem}"] for stem in stems}
         if len(units) > 1:
             names = [self.columns[f"{side}_{stem}"] for stem in stems]
@@ -260,20 +320,29 @@ class _Reader:
         self.angles = angles
 
     def _columns(self, side: str, stems: Sequence[str], gaps: bool) -> Floats:
-        return np.column_stack([self.table.numbers(self.plan.columns[f"{side}_{stem}"], gaps=gaps) for stem in stems])
+        return np.column_stack(
+            [self.table.numbers(self.plan.columns[f"{side}_{stem}"], gaps=gaps) for stem in stems]
+        )
 
     def frames(self, side: str, kind: str, *, gaps: bool = False) -> Floats:
         """shape=(n, 4, 4); NaN in rows whose cells are all empty, where `gaps` allows them."""
         position = self._columns(side, _POSITION, gaps)
         orientation = self._columns(side, _ANGLES if kind == "angles" else _QUATERNION, gaps)
-        names = [self.plan.columns[f"{side}_{stem}"] for stem in (*_POSITION, *(_ANGLES if kind == "angles" else _QUATERNION))]
+        names = [
+            self.plan.columns[f"{side}_{stem}"]
+            for stem in (*_POSITION, *(_ANGLES if kind == "angles" else _QUATERNION))
+        ]
         empty = np.isnan(np.column_stack([position, orientation]))
         absent = empty.all(axis=1)
         half = empty.any(axis=1) & ~absent
         if half.any():
             row = int(np.argmax(half))
-            self.table.refuse(f"found an empty cell, expected a number, or empty cells in all of {listed(names)} where there is no pose", row=row,
-                              column=names[int(np.argmax(empty[row]))])  # fmt: skip
+            self.table.refuse(
+                f"found an empty cell, expected a number, or empty cells in all of {listed(names)} where"
+                " there is no pose",
+                row=row,
+                column=names[int(np.argmax(empty[row]))],
+            )
         if self.plan.units[f"{side}_x"] == "mm":
             position = position / 1000.0
         out = np.full((len(position), 4, 4), np.nan)
@@ -297,12 +366,20 @@ class _Reader:
             beyond = np.abs(values) > 2 * math.pi + 1e-6
             if beyond.any():
                 place, column = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
-                self.table.refuse(f"found {values[place, column]:.6g}, more than a turn: these look like degrees; call the columns "
-                                  f"{listed([name.removesuffix('_rad') + '_deg' for name in names])}, or convert them", row=int(there[place]), column=names[column])  # fmt: skip
+                self.table.refuse(
+                    f"found {values[place, column]:.6g}, more than a turn: these look like degrees; call the"
+                    f" columns {listed([name.removesuffix('_rad') + '_deg' for name in names])}, or convert"
+                    " them",
+                    row=int(there[place]),
+                    column=names[column],
+                )
             return rotations_from_angles(values, convention)
         if len(values) and np.abs(values).max() <= math.pi + 0.01 and np.ptp(values, axis=0).max() > 0.2:
-            self._warn(f"columns {listed(names)}: all values lie within ±{math.pi:.3g}, which is next to no rotation in degrees: are these radians? "
-                       f"Then call them {listed([name.removesuffix('_deg') + '_rad' for name in names])}")  # fmt: skip
+            self._warn(
+                f"columns {listed(names)}: all values lie within ±{math.pi:.3g}, which is next to no rotation"
+                " in degrees: are these radians? Then call them"
+                f" {listed([name.removesuffix('_deg') + '_rad' for name in names])}"
+            )
         return rotations_from_angles(np.radians(values), convention)
 
     def _require_unit_quaternions(self, side: str, q: Floats, there: NDArray[np.intp]) -> None:
@@ -322,8 +399,12 @@ class _Reader:
             hint = "all have the same length: scaled?"
         else:
             hint = "a column in the wrong place, or too few digits?"
-        self.table.refuse(f"found the {side} quaternion {' '.join(f'{v:.6g}' for v in values)} of length {size:.6g}, expected a unit quaternion (to 1e-3), scalar first "
-                          f"({', '.join(f'{side}_{part}' for part in _QUATERNION)}); {hint}", row=row)  # fmt: skip
+        self.table.refuse(
+            f"found the {side} quaternion {' '.join(f'{v:.6g}' for v in values)} of length {size:.6g},"
+            " expected a unit quaternion (to 1e-3), scalar first"
+            f" ({', '.join(f'{side}_{part}' for part in _QUATERNION)}); {hint}",
+            row=row,
+        )
 
     def _warn(self, message: str) -> None:
         warnings.warn(InputWarning(f"{self.table.path}: {message}"), stacklevel=4)
@@ -336,14 +417,21 @@ class _Reader:
             back = np.diff(values) <= 0
             if back.any():
                 row = int(np.argmax(back)) + 1
-                self.table.refuse(f"found {values[row]:.9g} after {values[row - 1]:.9g}, expected times that increase from row to row", row=row, column=name)
+                self.table.refuse(
+                    f"found {values[row]:.9g} after {values[row - 1]:.9g}, expected times that increase from"
+                    " row to row",
+                    row=row,
+                    column=name,
+                )
         return values
 
     def sets(self) -> NDArray[np.int8] | None:
         if "set" not in self.plan.labels:
             return None
         codes, names = self.table.labels("set")
-        lookup = np.array([*(_SETS.index(name) if name in _SETS else -1 for name in names), -1], dtype=np.int8)
+        lookup = np.array(
+            [*(_SETS.index(name) if name in _SETS else -1 for name in names), -1], dtype=np.int8
+        )
         sets = lookup[codes]
         if (sets < 0).any():
             self.table.refuse_cell(int(np.argmax(sets < 0)), "set", "train or test")
@@ -355,38 +443,63 @@ class _Reader:
             return None
         if numbers != list(range(1, len(numbers) + 1)):
             missing = next(k for k in range(1, len(numbers) + 2) if k not in numbers)
-            self.table.refuse(f"there is no column q{missing}_rad (or another unit), but {self.plan.joints[numbers[-1]]}: joints are counted from 1 without gaps")
+            self.table.refuse(
+                f"there is no column q{missing}_rad (or another unit), but {self.plan.joints[numbers[-1]]}:"
+                " joints are counted from 1 without gaps"
+            )
         columns = []
         for number in numbers:
             name = self.plan.joints[number]
             values = self.table.numbers(name)
             unit = name.rpartition("_")[2]
             if unit == "rad" and np.median(np.abs(values)) > 4 * math.pi:
-                self.table.refuse(f"values from {values.min():.4g} to {values.max():.4g} look like degrees: call the column q{number}_deg, or convert them", column=name)
-            columns.append(np.radians(values) if unit == "deg" else values / 1000.0 if unit == "mm" else values)
+                self.table.refuse(
+                    f"values from {values.min():.4g} to {values.max():.4g} look like degrees: call the column"
+                    f" q{number}_deg, or convert them",
+                    column=name,
+                )
+            columns.append(
+                np.radians(values) if unit == "deg" else values / 1000.0 if unit == "mm" else values
+            )
         return np.column_stack(columns)
 
     def images(self, folder: Path) -> tuple[list[str], list[Path]]:
         """Names and paths of the images, one per row; all have to be there."""
         codes, names = self.table.labels("image")
         if (codes < 0).any():
-            self.table.refuse_cell(int(np.argmax(codes < 0)), "image", "the path of an image, relative to this file")
+            self.table.refuse_cell(
+                int(np.argmax(codes < 0)), "image", "the path of an image, relative to this file"
+            )
         paths = [folder / name for name in names]
         missing = [k for k, path in enumerate(paths) if not path.is_file()]
         if missing:
             row = min(int(np.argmax(codes == k)) for k in missing)
             first = int(codes[row])
             rest = [names[k] for k in missing if k != first]
-            more = f"; {len(rest)} more {'are' if len(rest) > 1 else 'is'} missing: {listed(rest, 8)}" if rest else ""
-            self.table.refuse(f"there is no image {names[first]!r} in {folder or Path()}{os.sep} (paths are relative to this file){more}", row=row, column="image")
+            more = (
+                f"; {len(rest)} more {'are' if len(rest) > 1 else 'is'} missing: {listed(rest, 8)}"
+                if rest
+                else ""
+            )
+            self.table.refuse(
+                f"there is no image {names[first]!r} in {folder or Path()}{os.sep} (paths are relative to"
+                f" this file){more}",
+                row=row,
+                column="image",
+            )
         twice = np.flatnonzero(np.bincount(codes, minlength=len(names)) > 1)
         if twice.size:
             rows = np.flatnonzero(codes == twice[0])
-            self.table.refuse(f"the image {names[twice[0]]!r} is already that of an earlier row: one image for each pose", row=int(rows[1]), column="image")
+            self.table.refuse(
+                f"the image {names[twice[0]]!r} is already that of an earlier row: one image for each pose",
+                row=int(rows[1]),
+                column="image",
+            )
         return [names[code] for code in codes], [paths[code] for code in codes]
 
 
-# ---- Reading ---------------------------------------------------------------------------------------------------------
+# ---- Reading
+# ---------------------------------------------------------------------------------------------------------
 
 
 def load_handeye(
@@ -399,14 +512,19 @@ def load_handeye(
 ) -> HandEyeData:
     """Read robot poses, and what the camera saw of the board at each, from CSV or Parquet.
 
-    Columns, with their unit in the name: hand_x_m hand_y_m hand_z_m (or _mm) and hand_qw hand_qx hand_qy hand_qz, the flange in the robot base as
-    the controller reports it; then board_x_m … board_qz, the board in the camera, or `image`, a path relative to the file. Instead of a quaternion
-    hand_rx_deg hand_ry_deg hand_rz_deg (or _rad; board likewise). Optional: t_s, board_t_s, set (train, test), q1_rad … (for
+    Columns, with their unit in the name: hand_x_m hand_y_m hand_z_m (or _mm) and hand_qw hand_qx hand_qy
+    hand_qz, the flange in the robot base as
+    the controller reports it; then board_x_m … board_qz, the board in the camera, or `image`, a path relative
+    to the file. Instead of a quaternion
+    hand_rx_deg hand_ry_deg hand_rz_deg (or _rad; board likewise). Optional: t_s, board_t_s, set (train,
+    test), q1_rad … (for
     `handeye_with_kinematics`). Rows whose board cells are all empty are left out, with a warning.
 
-    board: what is in the images, "chessboard:9x6:25mm" (inner corners), "charuco:5x7:40mm:30mm", "circles:10x10:25.4mm", "acircles:4x11:20mm";
+    board: what is in the images, "chessboard:9x6:25mm" (inner corners), "charuco:5x7:40mm:30mm",
+    "circles:10x10:25.4mm", "acircles:4x11:20mm";
     needs OpenCV. camera: file, or `Camera`; None: its values are found from the same images.
-    angles: convention of angle columns: "rotation-vector" (UR), or the order of turned axes, "zyx" for Rz Ry Rx (KUKA, Fanuc), "xyz", "zyz" …
+    angles: convention of angle columns: "rotation-vector" (UR), or the order of turned axes, "zyx" for Rz Ry
+    Rx (KUKA, Fanuc), "xyz", "zyz" …
     progress: called with images done, and images in all.
 
     Raises InputError that names the line, the column, what was found and what was expected.
@@ -418,11 +536,16 @@ def load_handeye(
     kind = plan.require_whole("hand")
     use_images = "image" in plan.labels and (parsed is not None or not plan.has("board"))
     if not use_images and not plan.has("board"):
-        table.refuse("there is nothing that the camera saw: expected the columns board_x_m … board_qz (board in the camera), or image; "
-                     f"the columns are {listed(table.names)}")  # fmt: skip
+        table.refuse(
+            "there is nothing that the camera saw: expected the columns board_x_m … board_qz (board in the"
+            f" camera), or image; the columns are {listed(table.names)}"
+        )
     if use_images and parsed is None:
-        table.refuse("the column image needs to know what is in the images: say it with --board (in Python: board=…), such as chessboard:9x6:25mm (inner corners), "
-                     "charuco:5x7:40mm:30mm or circles:10x10:25.4mm", column="image")  # fmt: skip
+        table.refuse(
+            "the column image needs to know what is in the images: say it with --board (in Python: board=…),"
+            " such as chessboard:9x6:25mm (inner corners), charuco:5x7:40mm:30mm or circles:10x10:25.4mm",
+            column="image",
+        )
     if not use_images and parsed is not None:
         table.refuse("a board was named, but there is no column image; the board poses of the file need none")
     board_kind = "" if use_images else plan.require_whole("board")
@@ -433,7 +556,10 @@ def load_handeye(
     sets, joints = reader.sets(), reader.joints()
     streams = "board_t_s" in plan.times
     if streams and "t_s" not in plan.times:
-        table.refuse("there is no column t_s: board_t_s is the camera's time, and needs the robot's beside it", column="board_t_s")
+        table.refuse(
+            "there is no column t_s: board_t_s is the camera's time, and needs the robot's beside it",
+            column="board_t_s",
+        )
     time, board_time = reader.times("t_s", increasing=streams), reader.times("board_t_s", increasing=True)
     views: BoardViews | None = None
     symmetries: Sequence[Floats] = ()
@@ -443,12 +569,25 @@ def load_handeye(
         images, paths = reader.images(table.path.parent)
         assert parsed is not None
         given = load_camera(camera) if camera is not None and not isinstance(camera, _core.Camera) else camera
-        views = find_board(paths, parsed, camera=given, names=images, progress=progress, where=str(camera) if camera is not None and given is not camera else "")
+        views = find_board(
+            paths,
+            parsed,
+            camera=given,
+            names=images,
+            progress=progress,
+            where=str(camera) if camera is not None and given is not camera else "",
+        )
         rows = np.asarray(views.found, dtype=np.intp)
         unused = [f"the board was not found in {images[row]}" for row in views.missing]
         if unused:
             which = listed([images[row] for row in views.missing], 12)
-            warnings.warn(InputWarning(f"{table.path}: the board was not found in {len(unused)} of {len(images)} images, which are left out: {which}"), stacklevel=2)
+            warnings.warn(
+                InputWarning(
+                    f"{table.path}: the board was not found in {len(unused)} of {len(images)} images, which"
+                    f" are left out: {which}"
+                ),
+                stacklevel=2,
+            )
         seen = views.T_camera_board
         symmetries = parsed.symmetries()
     else:
@@ -458,8 +597,13 @@ def load_handeye(
         absent = np.setdiff1d(np.arange(table.rows), rows)
         if absent.size:
             unused = [f"row {row} (from 0) has no board pose" for row in absent]
-            warnings.warn(InputWarning(f"{table.path}: {absent.size} of {table.rows} rows have no board pose and are left out: {listed([str(r) for r in absent], 12)} "
-                                       "(from 0)"), stacklevel=2)  # fmt: skip
+            warnings.warn(
+                InputWarning(
+                    f"{table.path}: {absent.size} of {table.rows} rows have no board pose and are left out:"
+                    f" {listed([str(r) for r in absent], 12)} (from 0)"
+                ),
+                stacklevel=2,
+            )
     _check_count(table, len(rows), "with a board")
     _check_poses(table, hand[rows], seen, views is not None)
     poses = _core.HandEyePoses(
@@ -487,17 +631,23 @@ def load_handeye(
 
 
 def load_stream(path: PathLike, side: Literal["hand", "board"], *, angles: str | None = None) -> Stream:
-    """Read poses with times: t_s and hand_x_m … hand_qz, or board_x_m … board_qz. Columns as in `load_handeye`; times increase.
+    """Read poses with times: t_s and hand_x_m … hand_qz, or board_x_m … board_qz. Columns as in
+    `load_handeye`; times increase.
 
     Raises InputError that names the line, the column, what was found and what was expected.
     """
     table = Table(Path(path))
     plan = _Plan(table, ("hand", "board"))
     if not plan.has(side):
-        table.refuse(f"expected the columns {side}_x_m … {side}_qz ({_SIDES[side]}); the columns are {listed(table.names)}")
+        table.refuse(
+            f"expected the columns {side}_x_m … {side}_qz ({_SIDES[side]}); the columns are"
+            f" {listed(table.names)}"
+        )
     kind = plan.require_whole(side)
     if "t_s" not in plan.times:
-        table.refuse(f"there is no column t_s: a stream has a time in every row; the columns are {listed(table.names)}")
+        table.refuse(
+            f"there is no column t_s: a stream has a time in every row; the columns are {listed(table.names)}"
+        )
     table.read(plan.numbers, plan.labels)
     reader = _Reader(table, plan, check_angles(angles))
     frames = reader.frames(side, kind, gaps=side == "board")
@@ -510,32 +660,54 @@ def load_stream(path: PathLike, side: Literal["hand", "board"], *, angles: str |
 
 def _check_count(table: Table, count: int, what: str = "") -> None:
     if count < _FEWEST:
-        table.refuse(f"has {count} {'pose' if count == 1 else 'poses'}{f' {what}' if what else ''}, expected at least {_FEWEST} (better 15 or more, turned about different axes)")
+        table.refuse(
+            f"has {count} {'pose' if count == 1 else 'poses'}{f' {what}' if what else ''}, expected at least"
+            f" {_FEWEST} (better 15 or more, turned about different axes)"
+        )
 
 
 def _check_poses(table: Table, hand: Floats, board: Floats, images: bool) -> None:
     """Values that no hand-eye data has."""
     if max(np.ptp(hand[:, :3, 3], axis=0).max(), np.abs(hand[:, :3, :3] - hand[0, :3, :3]).max()) < _EQUAL:
-        table.refuse(f"all {len(hand)} robot poses are equal: nothing moved, or one pose was written again and again")
-    if not images and max(np.ptp(board[:, :3, 3], axis=0).max(), np.abs(board[:, :3, :3] - board[0, :3, :3]).max()) < _EQUAL:
-        table.refuse(f"all {len(board)} board poses are equal: the camera did not see the hand move, or one pose was written again and again")
+        table.refuse(
+            f"all {len(hand)} robot poses are equal: nothing moved, or one pose was written again and again"
+        )
+    if (
+        not images
+        and max(np.ptp(board[:, :3, 3], axis=0).max(), np.abs(board[:, :3, :3] - board[0, :3, :3]).max())
+        < _EQUAL
+    ):
+        table.refuse(
+            f"all {len(board)} board poses are equal: the camera did not see the hand move, or one pose was"
+            " written again and again"
+        )
 
     def spread(frames: Floats) -> float:
         low, high = np.percentile(frames[:, :3, 3], (10, 90), axis=0)
         return float(max((high - low).max(), np.median(np.linalg.norm(frames[:, :3, 3], axis=1)) / 10))
 
-    # Where one side alone is in another unit, the loop shows it (and which); where both are, nothing else does.
+    # Where one side alone is in another unit, the loop shows it (and which); where both are, nothing else
+    # does.
     if spread(hand) > _FARTHEST and (images or spread(board) > _FARTHEST):
         sides = ("hand",) if images else ("hand", "board")
         names = [f"{side}_x_mm …" for side in sides]
-        table.refuse(f"the hand's positions spread over {spread(hand):.4g} m: these look like millimetres; call the columns {listed(names)}, or convert them")
+        table.refuse(
+            f"the hand's positions spread over {spread(hand):.4g} m: these look like millimetres; call the"
+            f" columns {listed(names)}, or convert them"
+        )
 
 
-# ---- Cameras ---------------------------------------------------------------------------------------------------------
+# ---- Cameras
+# ---------------------------------------------------------------------------------------------------------
 
 
 def _pixels(value: object) -> int:
-    if not isinstance(value, Decimal) or not value.is_finite() or value != value.to_integral_value() or not 1 <= value <= 100_000:
+    if (
+        not isinstance(value, Decimal)
+        or not value.is_finite()
+        or value != value.to_integral_value()
+        or not 1 <= value <= 100_000
+    ):
         raise expected(value, "a number of pixels")
     return int(value)
 
@@ -547,7 +719,12 @@ def _coefficients(value: object) -> list[Decimal]:
         if not isinstance(item, Decimal) or not item.is_finite():
             raise expected(item, "a finite number")
     if len(value) not in (4, 5):
-        more = ": more coefficients belong to another model (rational, fisheye), which is not read; calibrate the camera with five" if len(value) > 5 else ""
+        more = (
+            ": more coefficients belong to another model (rational, fisheye), which is not read; calibrate"
+            " the camera with five"
+            if len(value) > 5
+            else ""
+        )
         raise expected(value, f"5 coefficients [k1, k2, p1, p2, k3] (or 4, without k3){more}")
     return value
 
@@ -571,15 +748,22 @@ class _CameraFile(Strict):
 
 
 def load_camera(path: PathLike) -> _core.Camera:
-    """Read a camera file (format truing-camera/1): image size, fx fy cx cy [px], distortion k1 k2 p1 p2 k3 (plumb bob, as OpenCV).
+    """Read a camera file (format truing-camera/1): image size, fx fy cx cy [px], distortion k1 k2 p1 p2 k3
+    (plumb bob, as OpenCV).
 
     Raises InputError that names the line, what was found and what was expected.
     """
     document = Document.read(Path(path), _CAMERA)
     told = document.value.get("format")
     if told != CAMERA_FORMAT:
-        document.refuse(("format",) if "format" in document.value else (), f"found {found(told)}, expected {CAMERA_FORMAT}" if "format" in document.value
-                        else f"key 'format' is missing: expected format: {CAMERA_FORMAT}")  # fmt: skip
+        document.refuse(
+            ("format",) if "format" in document.value else (),
+            (
+                f"found {found(told)}, expected {CAMERA_FORMAT}"
+                if "format" in document.value
+                else f"key 'format' is missing: expected format: {CAMERA_FORMAT}"
+            ),
+        )
     file = document.validated(_CameraFile)
     camera = _core.Camera(
         width=file.width,
@@ -596,8 +780,16 @@ def load_camera(path: PathLike) -> _core.Camera:
     return camera
 
 
-def save_camera(path: PathLike, camera: _core.Camera, *, sigma: Mapping[str, float] | None = None, calibration: Mapping[str, object] | None = None) -> None:
-    """Write a camera file, atomically. `sigma`: standard errors by name; `calibration`: where the values come from."""
+def save_camera(
+    path: PathLike,
+    camera: _core.Camera,
+    *,
+    sigma: Mapping[str, float] | None = None,
+    calibration: Mapping[str, object] | None = None,
+) -> None:
+    """Write a camera file, atomically. `sigma`: standard errors by name; `calibration`: where the values come
+    from.
+    """
 
     def number(value: float) -> str:
         return repr(float(value))
@@ -608,7 +800,9 @@ def save_camera(path: PathLike, camera: _core.Camera, *, sigma: Mapping[str, flo
     lines.append(f"distortion: {{model: plumb_bob, coefficients: [{coefficients}]}}  # k1 k2 p1 p2 k3")
     for key, mapping in (("sigma", sigma), ("calibration", calibration)):
         if mapping:
-            lines.append(f"{key}: {{{', '.join(f'{name}: {_scalar(value)}' for name, value in mapping.items())}}}")
+            lines.append(
+                f"{key}: {{{', '.join(f'{name}: {_scalar(value)}' for name, value in mapping.items())}}}"
+            )
     with atomic_write(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -619,4 +813,8 @@ def _scalar(value: object) -> str:
     if isinstance(value, float):
         return repr(value) if math.isfinite(value) else "null"
     text = str(value)
-    return text if re.fullmatch(r"[A-Za-z][A-Za-z0-9_.-]*", text) else '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return (
+        text
+        if re.fullmatch(r"[A-Za-z][A-Za-z0-9_.-]*", text)
+        else '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    )

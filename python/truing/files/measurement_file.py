@@ -76,7 +76,9 @@ class _Plan:
         self._require_whole(_POSITION, "a position has three coordinates")
         self._require_whole(_ORIENTATION, "an orientation is a quaternion, scalar first")
         if "qw" in self.known and "x" not in self.known:
-            self._refuse("qw", "an orientation without a position: expected the columns x_m, y_m, z_m (or _mm) too")
+            self._refuse(
+                "qw", "an orientation without a position: expected the columns x_m, y_m, z_m (or _mm) too"
+            )
         if any(f"dir{number}" in self.known for number in self._numbers()):
             joints = tuple(f"dir{number}" for number in self._numbers())
             self._require_whole(joints, "give all joints an approach direction, 0 where it is not known")
@@ -114,12 +116,16 @@ class _Plan:
 
     def _place_of_joint(self, name: str, stem: str, number: int, unit: str | None) -> None:
         if number > len(self.joints):
-            raise InputError(f"{self.table.path}, column {name!r}: the robot has {len(self.joints)} driven joints: "
-                             f"{listed([joint.name for joint in self.joints])} (passive joints have no column)")  # fmt: skip
+            raise InputError(
+                f"{self.table.path}, column {name!r}: the robot has {len(self.joints)} driven joints: "
+                f"{listed([joint.name for joint in self.joints])} (passive joints have no column)"
+            )
         units = _JOINT_UNITS[stem]
         if stem == "dir":
             if unit is not None:
-                self.table.refuse(f"a direction has no unit (-1, 0 or 1), expected the name dir{number}", column=name)
+                self.table.refuse(
+                    f"a direction has no unit (-1, 0 or 1), expected the name dir{number}", column=name
+                )
             self._take(f"dir{number}", name, "")
             return
         if unit not in units:
@@ -136,13 +142,17 @@ class _Plan:
 
     def _take(self, role: str, name: str, unit: str) -> None:
         if role in self.known:
-            self.table.refuse(f"column {self.known[role].column!r} is there too and means the same: remove one", column=name)
+            self.table.refuse(
+                f"column {self.known[role].column!r} is there too and means the same: remove one", column=name
+            )
         self.known[role] = _Source(name, unit)
 
     def _add_covariate(self, name: str, source: _Source) -> None:
         if name in self.covariates:
             other = self.covariates[name].column
-            self.table.refuse(f"column {other!r} is there too and means the same: remove one", column=source.column)
+            self.table.refuse(
+                f"column {other!r} is there too and means the same: remove one", column=source.column
+            )
         self.covariates[name] = source
 
     def _refuse(self, role: str, message: str) -> NoReturn:
@@ -151,7 +161,9 @@ class _Plan:
     def _refuse_unit(self, name: str, stem: str, unit: str, units: Sequence[str]) -> NoReturn:
         what = f"unknown unit {unit!r}" if unit else "no unit"
         expected = " or ".join(f"{stem}_{word}" for word in units)
-        self.table.refuse(f"{what}, expected {expected} (rename a column that means something else)", column=name)
+        self.table.refuse(
+            f"{what}, expected {expected} (rename a column that means something else)", column=name
+        )
 
     def _require_joints(self) -> None:
         for number, joint in enumerate(self.joints, 1):
@@ -161,8 +173,10 @@ class _Plan:
             close = [name for name in self.table.names if name.lower() in wanted]
             close = close or difflib.get_close_matches(wanted[0], self.table.names, n=1, cutoff=0.8)
             hint = f"did you mean {close[0]!r}? " if close and close[0] not in self.numbers else ""
-            self.table.refuse(f"there is no column {' or '.join(wanted)} for joint {joint.name!r}; {hint}"
-                              f"the columns are {listed(self.table.names)}")  # fmt: skip
+            self.table.refuse(
+                f"there is no column {' or '.join(wanted)} for joint {joint.name!r}; {hint}"
+                f"the columns are {listed(self.table.names)}"
+            )
 
     def _require_whole(self, roles: Sequence[str], why: str) -> None:
         there = [role for role in roles if role in self.known]
@@ -178,13 +192,17 @@ def load_measurements(
 ) -> _core.Measurements:
     """Read measurements of `robot` from CSV or Parquet.
 
-    Columns, with their unit in the name: q1_rad ... (the driven joints, in chain order), then x_m y_m z_m with or without
-    qw qx qy qz, or dist_m, or fixed_point; optional dir1 ..., payload_kg, temp_C, t_s, target, pose, set, sigma_m and
-    sigma_rad (standard deviation of the row), weight. Any other column of numbers becomes a covariate of its own name;
+    Columns, with their unit in the name: q1_rad ... (the driven joints, in chain order), then x_m y_m z_m
+    with or without
+    qw qx qy qz, or dist_m, or fixed_point; optional dir1 ..., payload_kg, temp_C, t_s, target, pose, set,
+    sigma_m and
+    sigma_rad (standard deviation of the row), weight. Any other column of numbers becomes a covariate of its
+    own name;
     qr1_..., u1_..., qd1_..., tau1_... do so in SI units and under their SI name (qr1_deg as qr1_rad).
 
     set_column: False passes over the column `set`. joints_only: rows need no measurement (for predictions).
-    Raises InputError that names the line, the column, what was found and what was expected. Warns (InputWarning) about joints
+    Raises InputError that names the line, the column, what was found and what was expected. Warns
+    (InputWarning) about joints
     beyond their limits.
     """
     table = Table(Path(path))
@@ -192,8 +210,10 @@ def load_measurements(
     reader = _Reader(table, plan)
     positions, orientations, distance, fixed_points = ("x",), ("qw",), ("dist",), ("fixed_point",)
     if not joints_only and not any(plan.has(roles) for roles in (positions, distance, fixed_points)):
-        table.refuse("nothing is measured: expected the columns x_m y_m z_m, or dist_m, or fixed_point; "
-                     f"the columns are {listed(table.names)}")  # fmt: skip
+        table.refuse(
+            "nothing is measured: expected the columns x_m y_m z_m, or dist_m, or fixed_point; "
+            f"the columns are {listed(table.names)}"
+        )
     table.read(plan.numbers, plan.labels)
 
     numbers = range(1, len(plan.joints) + 1)
@@ -222,7 +242,11 @@ def load_measurements(
             columns[keyword] = reader.values(role)
     if "payload" in columns:
         reader.require("payload", columns["payload"] >= 0.0, "a mass of zero or more")
-    for role, keyword in (("sigma m", "position_sigma"), ("sigma rad", "rotation_sigma"), ("weight", "weight")):
+    for role, keyword in (
+        ("sigma m", "position_sigma"),
+        ("sigma rad", "rotation_sigma"),
+        ("weight", "weight"),
+    ):
         if plan.has([role]):
             columns[keyword] = reader.values(role)
     for role, keyword in (("sigma m", "position_sigma"), ("sigma rad", "rotation_sigma")):
@@ -235,10 +259,14 @@ def load_measurements(
     if set_column and plan.has(["set"]):
         columns["set"] = reader.sets()
 
-    speeds = [f"qd{number}_{'rad_s' if joint.type == 'revolute' else 'm_s'}" for number, joint in enumerate(plan.joints, 1)]
+    speeds = [
+        f"qd{number}_{'rad_s' if joint.type == 'revolute' else 'm_s'}"
+        for number, joint in enumerate(plan.joints, 1)
+    ]
     speeds_known = all(speed in plan.covariates for speed in speeds)
     covariates = {
-        name: reader.column(source, any_value=not (speeds_known and name in speeds)) for name, source in plan.covariates.items()
+        name: reader.column(source, any_value=not (speeds_known and name in speeds))
+        for name, source in plan.covariates.items()
     }
     columns["covariates"] = covariates
     if speeds_known:
@@ -293,12 +321,21 @@ class _Reader:
         if not good.all():
             row = int(np.argmin(good))
             found = " ".join(f"{column[row]:.6g}" for column in columns)
-            length = f"of length {math.sqrt(squared[row]):.6g}" if math.isfinite(squared[row]) else "which is incomplete"
-            self.table.refuse(f"found the quaternion {found}, {length}; expected a unit quaternion (to 1e-3), scalar first, "
-                              "or four empty cells", row=row)  # fmt: skip
+            length = (
+                f"of length {math.sqrt(squared[row]):.6g}"
+                if math.isfinite(squared[row])
+                else "which is incomplete"
+            )
+            self.table.refuse(
+                f"found the quaternion {found}, {length}; expected a unit quaternion (to 1e-3), scalar first,"
+                " or four empty cells",
+                row=row,
+            )
         alone = ~gap & np.isnan(positions[0])
         if alone.any():
-            self.table.refuse("found an orientation without a position, expected both", row=int(np.argmax(alone)))
+            self.table.refuse(
+                "found an orientation without a position, expected both", row=int(np.argmax(alone))
+            )
         return columns
 
     def require_a_measurement_in_every_row(self, columns: dict[str, Any]) -> None:
@@ -316,7 +353,9 @@ class _Reader:
             expected.append("fixed_point")
         if not measured.all():
             row = int(np.argmin(measured))
-            self.table.refuse(f"nothing is measured: found empty cells, expected values in {' or '.join(expected)}", row=row)
+            self.table.refuse(
+                f"nothing is measured: found empty cells, expected values in {' or '.join(expected)}", row=row
+            )
 
     def targets(self, robot: _core.Robot) -> Codes | None:
         """Index into the robot's targets; None: all the tool."""
@@ -326,8 +365,11 @@ class _Reader:
         known = {target.name: index for index, target in enumerate(robot.targets)}
         for code, name in enumerate(names):
             if name not in known:
-                self.table.refuse(f"the robot has no target {name!r}; its targets are {listed(list(known))}",
-                                  row=int(np.argmax(codes == code)), column="target")  # fmt: skip
+                self.table.refuse(
+                    f"the robot has no target {name!r}; its targets are {listed(list(known))}",
+                    row=int(np.argmax(codes == code)),
+                    column="target",
+                )
         lookup = np.array([*(known[name] for name in names), 0], dtype=np.int32)
         return np.asarray(lookup[codes]) if len(names) > 0 else None
 
@@ -339,12 +381,18 @@ class _Reader:
 
     def poses(self) -> Codes:
         values = self.values("pose")
-        self.require("pose", (values == np.floor(values)) & (np.abs(values) < 2**31), "the number of a pose, an integer below 2^31")
+        self.require(
+            "pose",
+            (values == np.floor(values)) & (np.abs(values) < 2**31),
+            "the number of a pose, an integer below 2^31",
+        )
         return values.astype(np.int32)
 
     def sets(self) -> Codes:
         codes, names = self.table.labels("set")
-        lookup = np.array([*(_SETS.index(name) if name in _SETS else -1 for name in names), -1], dtype=np.int32)
+        lookup = np.array(
+            [*(_SETS.index(name) if name in _SETS else -1 for name in names), -1], dtype=np.int32
+        )
         sets = lookup[codes]
         self.require("set", sets >= 0, "train or test")
         return np.asarray(sets)
@@ -369,18 +417,25 @@ def _warn_about_limits(reader: _Reader, joints: list[Floats]) -> None:
         row = int(np.argmax(beyond))
         unit = "rad" if joint.type == "revolute" else "m"
         try:
-            reader.table.refuse(f"joint {joint.name!r} is at {values[row]:.6g} {unit}, beyond its limits {joint.lower:.6g} to "
-                                f"{joint.upper:.6g} {unit} (so in {int(beyond.sum())} of {len(values)} rows)",
-                                row=row, column=reader.name(f"q{number}"))  # fmt: skip
+            reader.table.refuse(
+                f"joint {joint.name!r} is at {values[row]:.6g} {unit}, beyond its limits {joint.lower:.6g} to"
+                f" {joint.upper:.6g} {unit} (so in {int(beyond.sum())} of {len(values)} rows)",
+                row=row,
+                column=reader.name(f"q{number}"),
+            )
         except InputError as error:
             warnings.warn(InputWarning(str(error)), stacklevel=3)
 
 
-# ---- Writing ---------------------------------------------------------------------------------------------------------
+# ---- Writing
+# ---------------------------------------------------------------------------------------------------------
 
 
-def save_measurements(path: PathLike, data: _core.Measurements, robot: _core.Robot, *, units: Units | None = None) -> None:
-    """Write measurements as CSV (Parquet when `path` ends in .parquet), atomically, in the given units (default m, rad).
+def save_measurements(
+    path: PathLike, data: _core.Measurements, robot: _core.Robot, *, units: Units | None = None
+) -> None:
+    """Write measurements as CSV (Parquet when `path` ends in .parquet), atomically, in the given units
+    (default m, rad).
 
     Covariates are written as they are. In m and rad every number reads back bit for bit.
     """
@@ -427,7 +482,9 @@ def save_measurements(path: PathLike, data: _core.Measurements, robot: _core.Rob
             columns[f"qd{number}_{'rad_s' if joint.type == 'revolute' else 'm_s'}"] = values
     for name, values in data.covariates.items():
         if name in columns and not name.startswith("qd"):
-            raise InputError(f"{path}: a covariate is called {name!r}, which means something else in this file: rename it")
+            raise InputError(
+                f"{path}: a covariate is called {name!r}, which means something else in this file: rename it"
+            )
         columns[name] = values
     if data.set is not None:
         columns["set"] = [_SETS[index] for index in data.set]

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Robot files: robot.yaml (format truing-robot/1) and URDF.
 
-A number in a file is read with all its digits, converted once and rounded once; it is written with as few digits as lead
-back to the same double. So a saved robot loads bit for bit, in any unit. Frames are written as xyz and rpy: their rotation
+A number in a file is read with all its digits, converted once and rounded once; it is written with as few
+digits as lead
+back to the same double. So a saved robot loads bit for bit, in any unit. Frames are written as xyz and rpy:
+their rotation
 comes back bit for bit if it was made from rpy, else to 1e-15.
 """
 
@@ -43,18 +45,22 @@ _KIND = "robot file"
 _LARGEST_URDF = 64_000_000
 _URDF_SUFFIXES = (".urdf", ".xml")
 _TOOL = "tool"
-# Parameters are called after joints and targets (J2.a, tool.x), and these two are taken (base.x, anchor.zero).
+# Parameters are called after joints and targets (J2.a, tool.x), and these two are taken (base.x,
+# anchor.zero).
 _KEPT_NAMES = ("base", "anchor")
 
 _ZERO = (Decimal(0), Decimal(0), Decimal(0))
 _EXACT = Context(prec=60, Emax=10**6, Emin=-(10**6), traps=[])
-_RADIANS_PER_DEGREE = _EXACT.divide(Decimal("3.14159265358979323846264338327950288419716939937510582097494459"), Decimal(180))
+_RADIANS_PER_DEGREE = _EXACT.divide(
+    Decimal("3.14159265358979323846264338327950288419716939937510582097494459"), Decimal(180)
+)
 _SI = Decimal(1)
 _SI_PER_LENGTH = {"m": _SI, "mm": Decimal("0.001")}
 _SI_PER_ANGLE = {"rad": _SI, "deg": _RADIANS_PER_DEGREE}
 
 
-# ---- The file's models -----------------------------------------------------------------------------------------------
+# ---- The file's models
+# -----------------------------------------------------------------------------------------------
 
 
 class _UnitsOfFile(Strict):
@@ -129,7 +135,8 @@ class _UrdfChain(_RobotFile):
     joints: Annotated[list[_UrdfJoint], Field(min_length=1)]
 
 
-# ---- Reading ---------------------------------------------------------------------------------------------------------
+# ---- Reading
+# ---------------------------------------------------------------------------------------------------------
 
 
 def load_robot(path: PathLike, base_link: str = "", tip_link: str = "") -> _core.Robot:
@@ -142,7 +149,9 @@ def load_robot(path: PathLike, base_link: str = "", tip_link: str = "") -> _core
     if path.suffix.lower() in _URDF_SUFFIXES:
         return _from_urdf(path, base_link, tip_link)
     if base_link or tip_link:
-        raise InputError(f"{path}: base and tip links choose a chain from a URDF file, and this is not one (.urdf, .xml)")
+        raise InputError(
+            f"{path}: base and tip links choose a chain from a URDF file, and this is not one (.urdf, .xml)"
+        )
     document, model = _read(path)
     _check_names(document, model)
     _check_joints(document, model)
@@ -209,11 +218,15 @@ def _read(path: Path) -> tuple[Document, _LinkTable | _UrdfChain]:
 
 def _check_names(document: Document, model: _LinkTable | _UrdfChain) -> None:
     taken: dict[str, Loc] = {_TOOL: ("tool",)}
-    places: list[tuple[str, Loc]] = [(joint.name, ("joints", i, "name")) for i, joint in enumerate(model.joints)]
+    places: list[tuple[str, Loc]] = [
+        (joint.name, ("joints", i, "name")) for i, joint in enumerate(model.joints)
+    ]
     places += [(name, ("targets", name)) for name in model.targets]
     for name, loc in places:
         if name in _KEPT_NAMES:
-            document.refuse(loc, f"the name {name!r} is kept for parameters such as base.x and anchor.zero: rename it")
+            document.refuse(
+                loc, f"the name {name!r} is kept for parameters such as base.x and anchor.zero: rename it"
+            )
         if name in taken:
             line = document.line(taken[name])
             first = f"in line {line}" if line else "of the tool frame"
@@ -229,23 +242,39 @@ def _check_joints(document: Document, model: _LinkTable | _UrdfChain) -> None:
         if joint.mass is not None and joint.mass < 0:
             document.refuse((*loc, "mass"), f"found {joint.mass}, expected zero or more")
         if joint.ratio == 0:
-            document.refuse((*loc, "ratio"), "found 0, expected the joint's gear ratio relative to the nominal one, near 1")
+            document.refuse(
+                (*loc, "ratio"),
+                "found 0, expected the joint's gear ratio relative to the nominal one, near 1",
+            )
         if isinstance(joint, _UrdfJoint):
             length = math.sqrt(sum(float(value) ** 2 for value in joint.axis))
             if abs(length - 1.0) > 1e-6:
-                document.refuse((*loc, "axis"), f"has length {length:.6g}, expected a unit vector: divide it by its length")
+                document.refuse(
+                    (*loc, "axis"),
+                    f"has length {length:.6g}, expected a unit vector: divide it by its length",
+                )
         if joint.driven_by is None:
             continue
         if not joint.driven_by:
-            document.refuse((*loc, "driven_by"), "is empty, expected {joint: factor}; leave it out for a joint with a reading")
+            document.refuse(
+                (*loc, "driven_by"),
+                "is empty, expected {joint: factor}; leave it out for a joint with a reading",
+            )
         if joint.ratio != 1:
-            document.refuse((*loc, "ratio"), "a passive joint has no reading that a ratio could act on: remove it")
+            document.refuse(
+                (*loc, "ratio"), "a passive joint has no reading that a ratio could act on: remove it"
+            )
         for driver in joint.driven_by:
             if driver not in drivers:
-                document.refuse((*loc, "driven_by", driver), f"there is no such joint; the joints are {listed(names)}")
+                document.refuse(
+                    (*loc, "driven_by", driver), f"there is no such joint; the joints are {listed(names)}"
+                )
         circle = _circle(joint.name, drivers)
         if circle:
-            document.refuse((*loc, "driven_by"), f"goes round in a circle ({' -> '.join(circle)}): one of them must have a reading")
+            document.refuse(
+                (*loc, "driven_by"),
+                f"goes round in a circle ({' -> '.join(circle)}): one of them must have a reading",
+            )
 
 
 def _circle(start: str, drivers: Mapping[str, Sequence[str]]) -> list[str]:
@@ -271,10 +300,14 @@ def _check_effects(document: Document, model: _LinkTable | _UrdfChain) -> None:
     for i, effect in enumerate(model.effects):
         for k, joint in enumerate(effect.joints):
             if joint not in names:
-                document.refuse(("effects", i, "joints", k), f"there is no joint {shown(joint)}; the joints are {listed(names)}")
+                document.refuse(
+                    ("effects", i, "joints", k),
+                    f"there is no joint {shown(joint)}; the joints are {listed(names)}",
+                )
 
 
-# ---- Do the numbers look like the unit that the file names? ----------------------------------------------------------
+# ---- Do the numbers look like the unit that the file names?
+# ----------------------------------------------------------
 
 
 def _angles(model: _LinkTable | _UrdfChain) -> Iterator[tuple[Loc, Decimal]]:
@@ -317,35 +350,55 @@ def _check_units_look_right(document: Document, model: _LinkTable | _UrdfChain) 
     if model.units.angle == "rad":
         for loc, value in angles:
             if abs(value) > 2 * math.pi + 0.1:
-                document.refuse(loc, f"{value:g} looks like degrees, but units says `angle: rad` and a link angle stays within "
-                                     "one turn: change units to `angle: deg`, or this value")  # fmt: skip
+                document.refuse(
+                    loc,
+                    f"{value:g} looks like degrees, but units says `angle: rad` and a link angle stays within"
+                    " one turn: change units to `angle: deg`, or this value",
+                )
         for i, joint in enumerate(model.joints):
             for limit in (joint.limits or ()) if joint.type == "revolute" else ():
                 if limit is not None and abs(limit) > 100:
-                    document.refuse(("joints", i, "limits"), f"{float(limit):g} looks like degrees, but units says `angle: rad`: "
-                                    "change units to `angle: deg`, or these limits")  # fmt: skip
+                    document.refuse(
+                        ("joints", i, "limits"),
+                        f"{float(limit):g} looks like degrees, but units says `angle: rad`: "
+                        "change units to `angle: deg`, or these limits",
+                    )
     else:
         # Twists are multiples of a quarter turn on nearly every robot: 1.5708 and 3.1416 give radians away.
-        twists = [(loc, value) for loc, value in angles if loc[-1] in ("alpha", "rpy") and loc[0] == "joints" and value != 0.0]
+        twists = [
+            (loc, value)
+            for loc, value in angles
+            if loc[-1] in ("alpha", "rpy") and loc[0] == "joints" and value != 0.0
+        ]
         quarters = [abs(value) / (math.pi / 2) for _, value in twists]
         if quarters and all(quarter < 2.002 and abs(quarter - round(quarter)) < 1e-3 for quarter in quarters):
             loc, value = twists[0]
-            document.refuse(loc, f"{value:g} looks like radians (every {loc[-1]} of the file is 0 or a multiple of pi/2), but units "
-                                 "says `angle: deg`: change units to `angle: rad`, or the angles")  # fmt: skip
+            document.refuse(
+                loc,
+                f"{value:g} looks like radians (every {loc[-1]} of the file is 0 or a multiple of pi/2), but"
+                " units says `angle: deg`: change units to `angle: rad`, or the angles",
+            )
 
     if model.units.length == "m":
         for loc, value in lengths:
             if abs(value) > 50:
-                document.refuse(loc, f"{value:g} looks like millimetres, but units says `length: m` and no link is that long: "
-                                     "change units to `length: mm`, or this value")  # fmt: skip
+                document.refuse(
+                    loc,
+                    f"{value:g} looks like millimetres, but units says `length: m` and no link is that long: "
+                    "change units to `length: mm`, or this value",
+                )
     else:
         reach = sum(abs(value) for loc, value in lengths)
         if 0.0 < reach < 8.0 and len(model.joints) > 2:
-            document.refuse(("units",), f"all lengths of the robot add up to {reach:g} mm, which looks like metres: change units to "
-                                        "`length: m`, or the lengths")  # fmt: skip
+            document.refuse(
+                ("units",),
+                f"all lengths of the robot add up to {reach:g} mm, which looks like metres: change units to "
+                "`length: m`, or the lengths",
+            )
 
 
-# ---- File to robot ---------------------------------------------------------------------------------------------------
+# ---- File to robot
+# ---------------------------------------------------------------------------------------------------
 
 
 def _to_si(value: Decimal, si_per_unit: Decimal) -> float:
@@ -392,12 +445,16 @@ def _to_robot(model: _LinkTable | _UrdfChain, default_name: str) -> _core.Robot:
         joints=[joint(entry) for entry in model.joints],
         targets=[_core.Target(name, frame(target.xyz, target.rpy)) for name, target in targets.items()],
         effects=[
-            _core.AppliedEffect(entry.effect, entry.joints, {name: float(value) for name, value in entry.parameters.items()})
+            _core.AppliedEffect(
+                entry.effect, entry.joints, {name: float(value) for name, value in entry.parameters.items()}
+            )
             for entry in model.effects
         ],
-        anchor=None
-        if model.anchor is None
-        else _core.Anchor(vector(model.anchor.xyz, length), _to_si(model.anchor.zero, length)),
+        anchor=(
+            None
+            if model.anchor is None
+            else _core.Anchor(vector(model.anchor.xyz, length), _to_si(model.anchor.zero, length))
+        ),
     )
 
 
@@ -407,24 +464,34 @@ def _unit(axis: NDArray[np.float64]) -> NDArray[np.float64]:
     return axis if abs(norm - 1.0) <= 1e-12 else axis / norm
 
 
-# ---- Robot to file ---------------------------------------------------------------------------------------------------
+# ---- Robot to file
+# ---------------------------------------------------------------------------------------------------
 
 
 def save_robot(
-    path: PathLike, robot: _core.Robot, *, units: Units | None = None, calibration: Mapping[str, Any] | None = None
+    path: PathLike,
+    robot: _core.Robot,
+    *,
+    units: Units | None = None,
+    calibration: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write `robot` as robot.yaml, atomically. `units`: of the file, default m and rad; `calibration`: where the values come
+    """Write `robot` as robot.yaml, atomically. `units`: of the file, default m and rad; `calibration`: where
+    the values come
     from (source, date, rms_m, covariance ...), kept as it is."""
     text = robot_to_yaml(robot, units=units, calibration=calibration)
     try:
         data = text.encode()
     except UnicodeEncodeError as error:
-        raise InputError(f"{path}: a name holds {shown(error.object[error.start])}, which no text file can hold") from None
+        raise InputError(
+            f"{path}: a name holds {shown(error.object[error.start])}, which no text file can hold"
+        ) from None
     with atomic_write(path) as temporary:
         temporary.write_bytes(data)
 
 
-def robot_to_yaml(robot: _core.Robot, *, units: Units | None = None, calibration: Mapping[str, Any] | None = None) -> str:
+def robot_to_yaml(
+    robot: _core.Robot, *, units: Units | None = None, calibration: Mapping[str, Any] | None = None
+) -> str:
     """`robot` as the text of a robot.yaml. Raises InputError when the robot itself is not sound."""
     units = units or Units()
     try:
@@ -432,8 +499,10 @@ def robot_to_yaml(robot: _core.Robot, *, units: Units | None = None, calibration
     except ValueError as error:
         raise InputError(f"robot {shown(robot.name)} cannot be written: {error}") from None
     if robot.targets[0].name != _TOOL:
-        raise InputError(f"robot {shown(robot.name)} cannot be written: its first target is the tool and must be called "
-                         f"{_TOOL!r}, found {shown(robot.targets[0].name)}")  # fmt: skip
+        raise InputError(
+            f"robot {shown(robot.name)} cannot be written: its first target is the tool and must be called "
+            f"{_TOOL!r}, found {shown(robot.targets[0].name)}"
+        )
     return _Writer(robot, units).text(calibration or {})
 
 
@@ -461,7 +530,10 @@ class _Writer:
         lines.append(f"tool: {self._frame(robot.targets[0].T_last_target)}")
         if len(robot.targets) > 1:
             lines.append("targets:")
-            lines += [f"  {_quoted(target.name)}: {self._frame(target.T_last_target)}" for target in robot.targets[1:]]
+            lines += [
+                f"  {_quoted(target.name)}: {self._frame(target.T_last_target)}"
+                for target in robot.targets[1:]
+            ]
         if robot.anchor is not None:
             zero = _digits(robot.anchor.zero, self._length)
             lines.append(f"anchor: {{xyz: {self._vector(robot.anchor.point, self._length)}, zero: {zero}}}")
@@ -495,10 +567,15 @@ class _Writer:
         if not _is_plain_zero(joint.offset):
             parts.append(f"offset: {_digits(joint.offset, own)}")
         if joint.driven_by:
-            drivers = ", ".join(f"{_quoted(name)}: {_digits(weight, _SI)}" for name, weight in joint.driven_by)
+            drivers = ", ".join(
+                f"{_quoted(name)}: {_digits(weight, _SI)}" for name, weight in joint.driven_by
+            )
             parts.append(f"driven_by: {{{drivers}}}")
         if math.isfinite(joint.lower) or math.isfinite(joint.upper):
-            limits = (_digits(value, own) if math.isfinite(value) else "null" for value in (joint.lower, joint.upper))
+            limits = (
+                _digits(value, own) if math.isfinite(value) else "null"
+                for value in (joint.lower, joint.upper)
+            )
             parts.append(f"limits: [{', '.join(limits)}]")
         if joint.mass is not None:
             parts.append(f"mass: {_digits(joint.mass, _SI)}")
@@ -508,7 +585,9 @@ class _Writer:
 
     def _effect(self, effect: _core.AppliedEffect) -> str:
         joints = ", ".join(_quoted(name) for name in effect.joints)
-        parameters = ", ".join(f"{_quoted(name)}: {_digits(value, _SI)}" for name, value in effect.parameters.items())
+        parameters = ", ".join(
+            f"{_quoted(name)}: {_digits(value, _SI)}" for name, value in effect.parameters.items()
+        )
         return f"{{effect: {_quoted(effect.effect)}, joints: [{joints}], parameters: {{{parameters}}}}}"
 
     def _vector(self, values: Any, si_per_unit: Decimal) -> str:
@@ -519,12 +598,19 @@ class _Writer:
         return f"{{xyz: {self._vector(T[:3, 3], self._length)}, rpy: [{', '.join(rpy)}]}}"
 
     def _rpy(self, rotation: NDArray[np.float64]) -> tuple[str, ...]:
-        """The angles, as text, whose rotation is `rotation` bit for bit if there are such near by; else as near as angles get."""
+        """The angles, as text, whose rotation is `rotation` bit for bit if there are such near by; else as
+        near as angles get.
+        """
         rpy = _core.rpy_from_rotation(rotation)
         nearest = tuple(_digits(value, self._angle) for value in rpy)
-        # Someone wrote this rotation as rpy, most likely with few digits; or it was one of the neighbouring doubles.
-        short = (tuple(_rounded(value, self._angle, digits) for value in rpy) for digits in (6, 8, 10, 12, 14))
-        neighbours = itertools.product(*([_digits(value, self._angle) for value in _neighbours(value)] for value in rpy))
+        # Someone wrote this rotation as rpy, most likely with few digits; or it was one of the neighbouring
+        # doubles.
+        short = (
+            tuple(_rounded(value, self._angle, digits) for value in rpy) for digits in (6, 8, 10, 12, 14)
+        )
+        neighbours = itertools.product(
+            *([_digits(value, self._angle) for value in _neighbours(value)] for value in rpy)
+        )
         for texts in itertools.chain(short, [nearest], neighbours):
             angles = np.array([_to_si(Decimal(text), self._angle) for text in texts])
             if np.array_equal(_core.rotation_from_rpy(angles), rotation):
@@ -578,7 +664,11 @@ def _plain(number: Decimal) -> str:
 
 def _quoted(text: str) -> str:
     """A YAML scalar that every reader takes for this text."""
-    plain = text.isascii() and text.replace("_", "").replace("-", "").replace(".", "").isalnum() and text[0].isalpha()
+    plain = (
+        text.isascii()
+        and text.replace("_", "").replace("-", "").replace(".", "").isalnum()
+        and text[0].isalpha()
+    )
     if plain and text.lower() not in ("true", "false", "null", "yes", "no", "on", "off", "y", "n"):
         return text
     escaped = (f"\\U{ord(c):08x}" if not c.isprintable() or 0xD800 <= ord(c) < 0xE000 else c for c in text)
@@ -597,7 +687,11 @@ def _flow(value: Any) -> str:
     if isinstance(value, int):
         return str(value)
     if isinstance(value, float):
-        return _plain(Decimal(repr(value))) if math.isfinite(value) else str(value).replace("inf", ".inf").replace("nan", ".nan")
+        return (
+            _plain(Decimal(repr(value)))
+            if math.isfinite(value)
+            else str(value).replace("inf", ".inf").replace("nan", ".nan")
+        )
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{_quoted(str(key))}: {_flow(item)}' for key, item in value.items())}}}"
     if isinstance(value, list | tuple):

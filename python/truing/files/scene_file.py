@@ -15,7 +15,18 @@ from pydantic import PlainValidator
 from truing import _core
 from truing.errors import InputError
 from truing.files.common import PathLike, shown
-from truing.files.yaml_tree import AngleName, Document, LengthName, Loc, Number, Strict, Text, Vector3, choice, expected
+from truing.files.yaml_tree import (
+    AngleName,
+    Document,
+    LengthName,
+    Loc,
+    Number,
+    Strict,
+    Text,
+    Vector3,
+    choice,
+    expected,
+)
 
 SCENE_FORMAT = "truing-scene/1"
 _KIND = "scene file"
@@ -24,7 +35,11 @@ _LARGEST_ROOM = 1000.0  # [m]
 
 
 def _name_pair(value: object) -> tuple[str, str]:
-    if not isinstance(value, list) or len(value) != 2 or not all(isinstance(name, str) and name for name in value):
+    if (
+        not isinstance(value, list)
+        or len(value) != 2
+        or not all(isinstance(name, str) and name for name in value)
+    ):
         raise expected(value, "a pair of names, [forearm, table]")
     return value[0], value[1]
 
@@ -74,7 +89,9 @@ def load_scene(path: PathLike, robot: _core.Robot) -> _core.Scene:
     if "format" not in document.value:
         document.refuse((), f"key 'format' is missing: a scene file starts with `format: {SCENE_FORMAT}`")
     if document.value["format"] != SCENE_FORMAT:
-        document.refuse(("format",), f"found {shown(str(document.value['format']))}, expected {SCENE_FORMAT!r}")
+        document.refuse(
+            ("format",), f"found {shown(str(document.value['format']))}, expected {SCENE_FORMAT!r}"
+        )
     model = document.validated(_SceneFile)
     for k, obstacle in enumerate(model.obstacles):
         _require_sizes(document, ("obstacles", k), obstacle)
@@ -83,7 +100,16 @@ def load_scene(path: PathLike, robot: _core.Robot) -> _core.Scene:
     _check_lengths(document, model, to_metres)
     scene = _core.Scene(
         obstacles=[_obstacle(obstacle, model.units.angle, to_metres) for obstacle in model.obstacles],
-        capsules=[_core.LinkCapsule(c.name, link=c.link, start=_point(c.start, to_metres), end=_point(c.end, to_metres), radius=float(c.radius) * to_metres) for c in model.capsules],
+        capsules=[
+            _core.LinkCapsule(
+                c.name,
+                link=c.link,
+                start=_point(c.start, to_metres),
+                end=_point(c.end, to_metres),
+                radius=float(c.radius) * to_metres,
+            )
+            for c in model.capsules
+        ],
         clearance=float(model.clearance) * to_metres,
         ignored=model.ignored,
     )
@@ -94,7 +120,9 @@ def load_scene(path: PathLike, robot: _core.Robot) -> _core.Scene:
     return scene
 
 
-def _point(values: tuple[Decimal, Decimal, Decimal], scale: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _point(
+    values: tuple[Decimal, Decimal, Decimal], scale: float
+) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.array([float(value) for value in values]) * scale
 
 
@@ -105,8 +133,13 @@ def _obstacle(o: _Obstacle, angle: str, to_metres: float) -> _core.Obstacle:
         size = _point(o.size, to_metres)
     elif o.length is not None:
         size[2] = float(o.length) * to_metres
-    return _core.Obstacle(o.name, shape=o.shape, T_measurement_shape=_core.frame_from_xyz_rpy(_point(o.xyz, to_metres), rpy), size=size,
-                          radius=0.0 if o.radius is None else float(o.radius) * to_metres)  # fmt: skip
+    return _core.Obstacle(
+        o.name,
+        shape=o.shape,
+        T_measurement_shape=_core.frame_from_xyz_rpy(_point(o.xyz, to_metres), rpy),
+        size=size,
+        radius=0.0 if o.radius is None else float(o.radius) * to_metres,
+    )
 
 
 def _require_sizes(document: Document, loc: Loc, obstacle: _Obstacle) -> None:
@@ -124,16 +157,25 @@ def _require_sizes(document: Document, loc: Loc, obstacle: _Obstacle) -> None:
 def _check_names(document: Document, model: _SceneFile, robot: _core.Robot) -> None:
     """Equal names, links that the robot does not have, pairs of what is not there: each with its line."""
     taken: dict[str, Loc] = {}
-    names: list[tuple[str, Loc]] = [(obstacle.name, ("obstacles", k, "name")) for k, obstacle in enumerate(model.obstacles)]
+    names: list[tuple[str, Loc]] = [
+        (obstacle.name, ("obstacles", k, "name")) for k, obstacle in enumerate(model.obstacles)
+    ]
     names += [(capsule.name, ("capsules", k, "name")) for k, capsule in enumerate(model.capsules)]
     for name, loc in names:
         if name in taken:
-            document.refuse(loc, f"the name {shown(name)} is there twice (first in line {document.line(taken[name])}): rename one")
+            document.refuse(
+                loc,
+                f"the name {shown(name)} is there twice (first in line {document.line(taken[name])}):"
+                " rename one",
+            )
         taken[name] = loc
     links = ["base", *(joint.name for joint in robot.joints), "tool"]
     for k, capsule in enumerate(model.capsules):
         if capsule.link not in links:
-            document.refuse(("capsules", k, "link"), f"there is no link {shown(capsule.link)}; the links are {', '.join(links)}")
+            document.refuse(
+                ("capsules", k, "link"),
+                f"there is no link {shown(capsule.link)}; the links are {', '.join(links)}",
+            )
         if capsule.radius <= 0:
             document.refuse(("capsules", k, "radius"), "expected more than zero")
     for k, pair in enumerate(model.ignored):
@@ -152,4 +194,8 @@ def _check_lengths(document: Document, model: _SceneFile, to_metres: float) -> N
                 value = getattr(entry, key, None)
                 numbers = () if value is None else value if isinstance(value, tuple) else (value,)
                 if any(abs(float(number)) * to_metres > _LARGEST_ROOM for number in numbers):
-                    document.refuse((part, k, key), f"is more than {_LARGEST_ROOM:g} m: it looks like millimetres; write units: {{length: mm}}, or this value in metres")
+                    document.refuse(
+                        (part, k, key),
+                        f"is more than {_LARGEST_ROOM:g} m: it looks like millimetres; write units: {{length:"
+                        " mm}, or this value in metres",
+                    )

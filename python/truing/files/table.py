@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """CSV and Parquet files as columns of numbers and labels, with errors that name line and column.
 
-Arrow reads on all cores. Where a file is at fault it says so in its own words, or not at which line; the file is then read a
+Arrow reads on all cores. Where a file is at fault it says so in its own words, or not at which line; the file
+is then read a
 second time, slowly, to find the place: only a file that is refused anyway costs that time.
 """
 
@@ -29,9 +30,12 @@ Codes = NDArray[np.int32]
 
 _PARQUET_MAGIC = b"PAR1"
 _LONGEST_HEADER = 1_000_000
-# What programs write for "no value"; "nan" is not among them: a number that came out as NaN is another matter.
+# What programs write for "no value"; "nan" is not among them: a number that came out as NaN is another
+# matter.
 _EMPTY = ["", "NA", "N/A", "#N/A", "null", "NULL"]
-_NUMBER = re.compile(r"\s*[-+]?(([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?|inf(inity)?|nan)\s*", re.IGNORECASE)
+_NUMBER = re.compile(
+    r"\s*[-+]?(([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?|inf(inity)?|nan)\s*", re.IGNORECASE
+)
 
 
 class Table:
@@ -83,10 +87,13 @@ class Table:
             if name not in labels and not _is_number(kind):
                 self._refuse_text(name, str(kind), known=name in numbers)
 
-    def numbers(self, name: str, expected: str = "a finite number", *, gaps: bool = False, any_value: bool = False) -> Floats:
+    def numbers(
+        self, name: str, expected: str = "a finite number", *, gaps: bool = False, any_value: bool = False
+    ) -> Floats:
         """The column as contiguous doubles, without a copy where Arrow has them so.
 
-        Empty cells become NaN if `gaps`, else they are refused; NaN and infinity in the file are refused. With `any_value`
+        Empty cells become NaN if `gaps`, else they are refused; NaN and infinity in the file are refused.
+        With `any_value`
         everything is taken.
         """
         column = self._columns[name]
@@ -124,13 +131,17 @@ class Table:
         names = [word for word in dict.fromkeys(words) if word]
         for name_found in names:
             if not name_found.isprintable():
-                self.refuse(f"found {shown(name_found)}, expected a name without unprintable characters", column=name)
+                self.refuse(
+                    f"found {shown(name_found)}, expected a name without unprintable characters", column=name
+                )
         place = {word: code for code, word in enumerate(names)}
         lookup = np.array([*(place.get(word, -1) for word in words), -1], dtype=np.int32)
         codes = np.empty(self.rows, dtype=np.int32)
         start = 0
         for chunk in column.chunks:
-            codes[start : start + len(chunk)] = lookup[chunk.indices.fill_null(len(words)).to_numpy(zero_copy_only=False)]
+            codes[start : start + len(chunk)] = lookup[
+                chunk.indices.fill_null(len(words)).to_numpy(zero_copy_only=False)
+            ]
             start += len(chunk)
         return codes, names
 
@@ -141,15 +152,26 @@ class Table:
         if len(self.names) == 1:
             for separator, called in ((";", "semicolons"), ("\t", "tabs")):
                 if separator in self.names[0]:
-                    raise InputError(f"{where}: columns are separated by {called}, expected commas (and points as decimal marks)")
+                    raise InputError(
+                        f"{where}: columns are separated by {called}, expected commas (and points as decimal"
+                        " marks)"
+                    )
         first: dict[str, int] = {}
         for number, name in enumerate(self.names, 1):
             if not name:
-                raise InputError(f"{where}: column {number} has no name; the others are {listed([n for n in self.names if n])}")
+                raise InputError(
+                    f"{where}: column {number} has no name; the others are"
+                    f" {listed([n for n in self.names if n])}"
+                )
             if not name.isprintable():
-                raise InputError(f"{where}: the name of column {number}, {shown(name)}, holds characters that cannot be printed")
+                raise InputError(
+                    f"{where}: the name of column {number}, {shown(name)}, holds characters that cannot be"
+                    " printed"
+                )
             if name in first:
-                raise InputError(f"{where}: columns {first[name]} and {number} are both called {name!r}: remove one")
+                raise InputError(
+                    f"{where}: columns {first[name]} and {number} are both called {name!r}: remove one"
+                )
             first[name] = number
 
     def _parquet_names(self) -> list[str]:
@@ -161,7 +183,9 @@ class Table:
     def _csv_names(self, head: bytes, first_line: bytes) -> list[str]:
         decoded(self.path, head[: head.rfind(b"\n") + 1] or head)  # binary or of another encoding?
         if len(first_line) >= _LONGEST_HEADER:
-            raise InputError(f"{self.path}, line 1: has more than {_LONGEST_HEADER} characters, expected column names")
+            raise InputError(
+                f"{self.path}, line 1: has more than {_LONGEST_HEADER} characters, expected column names"
+            )
         line = re.split(r"[\r\n]", decoded(self.path, first_line))[0]
         if not line.strip():
             raise InputError(f"{self.path}, line 1: is blank, expected column names")
@@ -170,7 +194,9 @@ class Table:
         try:
             return [name.strip() for name in next(csv.reader([line]))]
         except (csv.Error, StopIteration) as error:
-            raise InputError(f"{self.path}, line 1: expected column names, separated by commas ({error})") from None
+            raise InputError(
+                f"{self.path}, line 1: expected column names, separated by commas ({error})"
+            ) from None
 
     # ---- Loading
 
@@ -181,10 +207,14 @@ class Table:
             raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
 
     def _read_csv(self, numbers: Collection[str], labels: Collection[str]) -> Any:
-        types = dict.fromkeys(numbers, pa.float64()) | dict.fromkeys(labels, pa.dictionary(pa.int32(), pa.string()))
+        types = dict.fromkeys(numbers, pa.float64()) | dict.fromkeys(
+            labels, pa.dictionary(pa.int32(), pa.string())
+        )
         # The header is skipped, not parsed again: Arrow would leave spaces around the names.
         read = pa.csv.ReadOptions(column_names=self.names, skip_rows=1)
-        convert = pa.csv.ConvertOptions(column_types=types, null_values=_EMPTY, true_values=[], false_values=[])
+        convert = pa.csv.ConvertOptions(
+            column_types=types, null_values=_EMPTY, true_values=[], false_values=[]
+        )
         try:
             return pa.csv.read_csv(str(self.path), read_options=read, convert_options=convert)
         except (pa.ArrowException, OSError, ValueError) as error:
@@ -204,20 +234,26 @@ class Table:
                     yield reader.line_num, cells
 
     def _find_fault(self, numbers: Collection[str]) -> None:
-        """Raises InputError for the first line with a wrong number of cells, or without a number where one belongs."""
+        """Raises InputError for the first line with a wrong number of cells, or without a number where one
+        belongs.
+        """
         places = [(self.names.index(name), name) for name in numbers]
         last = 1
         try:
             for line, cells in self._csv_lines():
                 last = line
                 if len(cells) != len(self.names):
-                    raise InputError(f"{self.path}, line {line}: found {len(cells)} cells, expected {len(self.names)} "
-                                     "as there are column names")  # fmt: skip
+                    raise InputError(
+                        f"{self.path}, line {line}: found {len(cells)} cells, expected {len(self.names)} "
+                        "as there are column names"
+                    )
                 for place, name in places:
                     if cells[place] not in _EMPTY and not _NUMBER.fullmatch(cells[place]):
                         hint = " with a point as decimal mark" if "," in cells[place] else ""
-                        raise InputError(f"{self.path}, line {line}, column {name!r}: found {shown(cells[place])}, "
-                                         f"expected a number{hint}")  # fmt: skip
+                        raise InputError(
+                            f"{self.path}, line {line}, column {name!r}: found {shown(cells[place])}, "
+                            f"expected a number{hint}"
+                        )
         except csv.Error as error:
             raise InputError(f"{self.path}, after line {last}: cannot be read as a table: {error}") from None
 
@@ -238,14 +274,22 @@ class Table:
         place = self.names.index(name)
         for line, cells in self._csv_lines():
             if place < len(cells) and cells[place] not in _EMPTY and not _NUMBER.fullmatch(cells[place]):
-                what = "a number" if known else "a number: an unknown column is kept as a covariate, and text cannot be one"
-                raise InputError(f"{self.path}, line {line}, column {name!r}: found {shown(cells[place])}, expected {what}")
+                what = (
+                    "a number"
+                    if known
+                    else "a number: an unknown column is kept as a covariate, and text cannot be one"
+                )
+                raise InputError(
+                    f"{self.path}, line {line}, column {name!r}: found {shown(cells[place])}, expected {what}"
+                )
         self.refuse(f"holds {kind} values, expected numbers", column=name)
 
 
 def _is_number(kind: Any) -> bool:
     types = pa.types
-    return bool(types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind) or types.is_null(kind))
+    return bool(
+        types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind) or types.is_null(kind)
+    )
 
 
 def sample_rows(rows: int, at_most: int) -> NDArray[np.intp]:

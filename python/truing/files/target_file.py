@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Target files: what a robot shall reach, CSV or Parquet, one row per target, every unit in its column's name."""
+"""Target files: what a robot shall reach, CSV or Parquet, one row per target, every unit in its column's
+name.
+"""
 
 from __future__ import annotations
 
@@ -61,16 +63,27 @@ class TargetData:
         return len(self.tasks) if self.tasks or self.joints is None else len(self.joints)
 
     def path_conditions(self) -> _core.Conditions | None:
-        """Those of a path, which has one load, temperature and approach direction for all of its targets; time is that of the first."""
+        """Those of a path, which has one load, temperature and approach direction for all of its targets;
+        time is that of the first.
+        """
         for row, other in enumerate(self.conditions):
             first = self.conditions[0]
-            if (other.payload, other.temperature, other.direction) != (first.payload, first.temperature, first.direction):
-                raise InputError(f"{self.path}: row {row} (from 0) has another payload, temperature or approach direction than the first, but a path has one: split the file there")
+            if (other.payload, other.temperature, other.direction) != (
+                first.payload,
+                first.temperature,
+                first.direction,
+            ):
+                raise InputError(
+                    f"{self.path}: row {row} (from 0) has another payload, temperature or approach direction"
+                    " than the first, but a path has one: split the file there"
+                )
         return self.conditions[0] if self.conditions else None
 
 
 class _Plan:
-    """Which column of the file is what. Whatever else there is, is refused: a mistyped window would be no window."""
+    """Which column of the file is what. Whatever else there is, is refused: a mistyped window would be no
+    window.
+    """
 
     def __init__(self, table: Table, robot: _core.Robot) -> None:
         self.table = table
@@ -94,7 +107,9 @@ class _Plan:
         there = [role for role in roles if role in self.columns]
         missing = [role for role in roles if role not in self.columns]
         if there and missing:
-            self.table.refuse(f"there is {self.columns[there[0]]} but no column {self._wanted(missing[0])}: {why}")
+            self.table.refuse(
+                f"there is {self.columns[there[0]]} but no column {self._wanted(missing[0])}: {why}"
+            )
 
     def joint_roles(self, stem: str) -> list[str]:
         return [f"{stem}{number}" for number in range(1, len(self.robot_joints) + 1)]
@@ -127,22 +142,31 @@ class _Plan:
 
     def _place_of_joint(self, name: str, stem: str, number: int, unit: str | None) -> None:
         if number > len(self.robot_joints):
-            self.table.refuse(f"the robot has {len(self.robot_joints)} driven joints: {listed([joint.name for joint in self.robot_joints])} (passive joints have no column)",
-                              column=name)  # fmt: skip
+            self.table.refuse(
+                f"the robot has {len(self.robot_joints)} driven joints:"
+                f" {listed([joint.name for joint in self.robot_joints])} (passive joints have no column)",
+                column=name,
+            )
         if stem == "dir":
             if unit is not None:
-                self.table.refuse(f"a direction has no unit (-1, 0 or 1), expected the name dir{number}", column=name)
+                self.table.refuse(
+                    f"a direction has no unit (-1, 0 or 1), expected the name dir{number}", column=name
+                )
             self._take(f"dir{number}", name, "")
             return
         units = self._joint_units(number)
         if unit not in units:
             joint = self.robot_joints[number - 1]
-            self.table.refuse(f"joint {joint.name!r} is {joint.type}, expected {self._wanted(f'q{number}')}", column=name)
+            self.table.refuse(
+                f"joint {joint.name!r} is {joint.type}, expected {self._wanted(f'q{number}')}", column=name
+            )
         self._take(f"q{number}", name, unit or "")
 
     def _take(self, role: str, name: str, unit: str) -> None:
         if role in self.columns:
-            self.table.refuse(f"column {self.columns[role]!r} is there too and means the same: remove one", column=name)
+            self.table.refuse(
+                f"column {self.columns[role]!r} is there too and means the same: remove one", column=name
+            )
         self.columns[role] = name
         self.units[role] = unit
 
@@ -152,10 +176,17 @@ class _Plan:
         stem, _, unit = name.rpartition("_")
         if stem in _UNITS and _UNITS[stem] != ("",):
             self.table.refuse(f"unknown unit {unit!r}, expected {self._wanted(stem)}", column=name)
-        known = [self._wanted(role).split(" or ")[0] for role in _UNITS] + [_TASK] + [self._wanted(role).split(" or ")[0] for role in self.joint_roles("q")]
+        known = (
+            [self._wanted(role).split(" or ")[0] for role in _UNITS]
+            + [_TASK]
+            + [self._wanted(role).split(" or ")[0] for role in self.joint_roles("q")]
+        )
         close = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
         hint = f"did you mean {close[0]!r}? " if close else ""
-        self.table.refuse(f"unknown column; {hint}expected {listed(known)}, dir1 …; remove what is no part of a target", column=name)
+        self.table.refuse(
+            f"unknown column; {hint}expected {listed(known)}, dir1 …; remove what is no part of a target",
+            column=name,
+        )
 
 
 class _Reader:
@@ -180,7 +211,11 @@ class _Reader:
         codes, names = self.table.labels(_TASK)
         for code, name in enumerate(names):
             if name not in _KINDS:
-                self.table.refuse(f"found {shown(name)}, expected {', '.join(_KINDS[:-1])} or {_KINDS[-1]}", row=int(np.argmax(codes == code)), column=_TASK)
+                self.table.refuse(
+                    f"found {shown(name)}, expected {', '.join(_KINDS[:-1])} or {_KINDS[-1]}",
+                    row=int(np.argmax(codes == code)),
+                    column=_TASK,
+                )
         words = [*names, usual]  # -1: an empty cell
         return [words[code] for code in codes]
 
@@ -192,7 +227,11 @@ class _Reader:
         if not self.plan.has(_QUATERNION):
             if not point.all():
                 row = int(np.argmin(point))
-                self.table.refuse(f"a {kinds[row]} has an orientation: expected the columns {', '.join(_QUATERNION)}, or the task point (position alone)", row=row)
+                self.table.refuse(
+                    f"a {kinds[row]} has an orientation: expected the columns {', '.join(_QUATERNION)}, or"
+                    " the task point (position alone)",
+                    row=row,
+                )
             return frames
         q = np.column_stack([self.values(role, gaps=bool(point.any())) for role in _QUATERNION])
         norm = np.linalg.norm(q, axis=1)
@@ -207,9 +246,14 @@ class _Reader:
     def _refuse_quaternion(self, row: int, q: Floats, norm: Floats) -> None:
         found = " ".join(f"{value:.6g}" for value in q[row])
         length = f"of length {norm[row]:.6g}" if math.isfinite(norm[row]) else "which is incomplete"
-        self.table.refuse(f"found the quaternion {found}, {length}; expected a unit quaternion (to 1e-3), scalar first", row=row)
+        self.table.refuse(
+            f"found the quaternion {found}, {length}; expected a unit quaternion (to 1e-3), scalar first",
+            row=row,
+        )
 
-    def window(self, name: str, kinds: Sequence[str], usual: tuple[float, float]) -> list[tuple[float, float]]:
+    def window(
+        self, name: str, kinds: Sequence[str], usual: tuple[float, float]
+    ) -> list[tuple[float, float]]:
         """Pairs (lower, upper), those of `usual` where nothing is given."""
         ends = []
         for end, otherwise in zip(("lower", "upper"), usual, strict=True):
@@ -221,7 +265,11 @@ class _Reader:
         empty = ends[0] > ends[1]
         if empty.any():
             row = int(np.argmax(empty))
-            self.table.refuse(f"the window of {name} is empty: its lower end {ends[0][row]:.6g} rad is above the upper one {ends[1][row]:.6g} rad", row=row)
+            self.table.refuse(
+                f"the window of {name} is empty: its lower end {ends[0][row]:.6g} rad is above the upper one"
+                f" {ends[1][row]:.6g} rad",
+                row=row,
+            )
         return list(zip(ends[0].tolist(), ends[1].tolist(), strict=True))
 
     def preferred_roll(self, kinds: Sequence[str], usual: float | None) -> list[float | None]:
@@ -234,15 +282,27 @@ class _Reader:
         wrong = np.isfinite(values) & np.array([kind != "torch" for kind in kinds])
         if wrong.any():
             row = int(np.argmax(wrong))
-            self.table.refuse(f"a {kinds[row]} has no {role.replace('_', ' ')}: that is of the task torch; say so in a column task, or with --task torch", row=row,
-                              column=self.plan.columns[role])  # fmt: skip
+            self.table.refuse(
+                f"a {kinds[row]} has no {role.replace('_', ' ')}: that is of the task torch; say so in a"
+                " column task, or with --task torch",
+                row=row,
+                column=self.plan.columns[role],
+            )
 
     def _require_angle(self, role: str, values: Floats, most: float) -> None:
         beyond = np.abs(values) > most + 1e-6
         if beyond.any():
             row = int(np.argmax(beyond))
-            hint = f"; these look like degrees: call the column {role}_deg" if self.plan.units[role] == "rad" else ""
-            self.table.refuse(f"found {values[row]:.6g} rad, expected an angle within ±{most:.4g} rad{hint}", row=row, column=self.plan.columns[role])
+            hint = (
+                f"; these look like degrees: call the column {role}_deg"
+                if self.plan.units[role] == "rad"
+                else ""
+            )
+            self.table.refuse(
+                f"found {values[row]:.6g} rad, expected an angle within ±{most:.4g} rad{hint}",
+                row=row,
+                column=self.plan.columns[role],
+            )
 
     def joints(self) -> Floats:
         return np.column_stack([self.values(role) for role in self.plan.joint_roles("q")])
@@ -261,20 +321,36 @@ class _Reader:
             if role in self.plan.columns:
                 columns[keyword] = self.values(role).tolist()
         if "payload" in columns and min(columns["payload"]) < 0:
-            self.table.refuse_cell(int(np.argmin(columns["payload"])), self.plan.columns["payload"], "a mass of zero or more")
+            self.table.refuse_cell(
+                int(np.argmin(columns["payload"])), self.plan.columns["payload"], "a mass of zero or more"
+            )
         if not columns:
             return ()
-        return tuple(_core.Conditions(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
+        return tuple(
+            _core.Conditions(**dict(zip(columns, row, strict=True)))
+            for row in zip(*columns.values(), strict=True)
+        )
 
 
-def load_targets(path: PathLike, robot: _core.Robot, *, like: _core.Task | None = None, program: bool = False, in_base: bool = False) -> TargetData:
+def load_targets(
+    path: PathLike,
+    robot: _core.Robot,
+    *,
+    like: _core.Task | None = None,
+    program: bool = False,
+    in_base: bool = False,
+) -> TargetData:
     """Read what `robot` shall reach from CSV or Parquet, one row per target.
 
-    Columns, with their unit in the name: x_m y_m z_m (or _mm) and qw qx qy qz, the target in the measurement frame (points need no orientation);
-    optional task (pose, torch, point), of a torch roll_rad (preferred), roll_lower_rad roll_upper_rad, lead_… and work_lower_rad … (or _deg),
-    q1_rad … (where the robot comes from), dir1 …, payload_kg, temp_C, t_s. An empty cell of these means what `like` says.
+    Columns, with their unit in the name: x_m y_m z_m (or _mm) and qw qx qy qz, the target in the measurement
+    frame (points need no orientation);
+    optional task (pose, torch, point), of a torch roll_rad (preferred), roll_lower_rad roll_upper_rad, lead_…
+    and work_lower_rad … (or _deg),
+    q1_rad … (where the robot comes from), dir1 …, payload_kg, temp_C, t_s. An empty cell of these means what
+    `like` says.
 
-    like: task of rows that say no other; None: a full pose. program: joints q1_rad … without x_m … are a program of joint positions.
+    like: task of rows that say no other; None: a full pose. program: joints q1_rad … without x_m … are a
+    program of joint positions.
     in_base: poses are in the robot's own base frame, not in the measurement frame.
     Raises InputError that names the line, the column, what was found and what was expected.
     """
@@ -284,15 +360,22 @@ def load_targets(path: PathLike, robot: _core.Robot, *, like: _core.Task | None 
     plan.require_whole(_POSITION, "a position has three coordinates")
     plan.require_whole(_QUATERNION, "an orientation is a quaternion, scalar first")
     plan.require_whole(joint_roles, f"{len(joint_roles)} driven joints")
-    plan.require_whole(plan.joint_roles("dir"), "give all joints an approach direction, 0 where it is not known")
+    plan.require_whole(
+        plan.joint_roles("dir"), "give all joints an approach direction, 0 where it is not known"
+    )
     is_program = program and not plan.has(_POSITION) and plan.has(joint_roles)
     if not is_program and not plan.has(_POSITION):
         more = f", or {plan._wanted(joint_roles[0])} … for a program of joint positions" if program else ""
-        table.refuse(f"there are no targets: expected the columns x_m y_m z_m and qw qx qy qz{more}; the columns are {listed(table.names)}")
+        table.refuse(
+            f"there are no targets: expected the columns x_m y_m z_m and qw qx qy qz{more}; the columns are"
+            f" {listed(table.names)}"
+        )
     if is_program:
         for role in plan.columns:
             if role in _UNITS and role not in ("payload", "temp", "t") or role == _TASK:
-                table.refuse("is about poses, but there are no columns x_m y_m z_m", column=plan.columns[role])
+                table.refuse(
+                    "is about poses, but there are no columns x_m y_m z_m", column=plan.columns[role]
+                )
     table.read(plan.numbers, plan.labels)
     reader = _Reader(table, plan)
     joints = reader.joints() if plan.has(joint_roles) else None
@@ -308,7 +391,12 @@ def load_targets(path: PathLike, robot: _core.Robot, *, like: _core.Task | None 
 def _tasks(reader: _Reader, like: _core.Task) -> tuple[_core.Task, ...]:
     kinds = reader.kinds(like.kind)
     frames = reader.frames(kinds)
-    same: dict[str, Any] = {"axis": like.axis, "travel": like.travel, "retreat": like.retreat, "longest_retreat": like.longest_retreat}
+    same: dict[str, Any] = {
+        "axis": like.axis,
+        "travel": like.travel,
+        "retreat": like.retreat,
+        "longest_retreat": like.longest_retreat,
+    }
     columns: Mapping[str, Sequence[Any]] = {
         "kind": kinds,
         "roll": reader.window("roll", kinds, like.roll),
@@ -317,6 +405,9 @@ def _tasks(reader: _Reader, like: _core.Task) -> tuple[_core.Task, ...]:
         "work": reader.window("work", kinds, like.work),
     }
     try:
-        return tuple(_core.Task(frame, **dict(zip(columns, row, strict=True)), **same) for frame, row in zip(frames, zip(*columns.values(), strict=True), strict=True))
+        return tuple(
+            _core.Task(frame, **dict(zip(columns, row, strict=True)), **same)
+            for frame, row in zip(frames, zip(*columns.values(), strict=True), strict=True)
+        )
     except ValueError as error:
         raise InputError(f"{reader.table.path}: {error}") from None

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an identification left unknown: the fitted parameters of its result.json, and covariance.csv beside it."""
+"""What an identification left unknown: the fitted parameters of its result.json, and covariance.csv beside
+it.
+"""
 
 from __future__ import annotations
 
@@ -41,15 +43,25 @@ def load_uncertainty(path: PathLike) -> Uncertainty:
     names = [name for name in table.names if name != "name"]
     if "name" not in table.names:
         table.refuse(f"there is no column 'name'; the columns are {listed(table.names)}")
-    missing, more = [name for name in values if name not in names], [name for name in names if name not in values]
+    missing, more = (
+        [name for name in values if name not in names],
+        [name for name in names if name not in values],
+    )
     if missing or more:
-        table.refuse(f"{'lacks' if missing else 'has'} {listed(missing or more)}, which {'was' if missing else 'was not'} fitted in {path}: the two files are not of one identification")
+        table.refuse(
+            f"{'lacks' if missing else 'has'} {listed(missing or more)}, which"
+            f" {'was' if missing else 'was not'} fitted in {path}: the two files are not of one"
+            " identification"
+        )
     table.read(names, ["name"])
     codes, rows = table.labels("name")
     if [rows[code] if code >= 0 else "" for code in codes] != names:
         table.refuse("rows and columns have different names: this is no covariance of truing identify")
     covariance = np.column_stack([table.numbers(name) for name in names]) if names else np.empty((0, 0))
-    if np.abs(covariance - covariance.T).max(initial=0.0) > 1e-6 * np.abs(covariance).max(initial=0.0) or (np.diag(covariance) < 0).any():
+    if (
+        np.abs(covariance - covariance.T).max(initial=0.0) > 1e-6 * np.abs(covariance).max(initial=0.0)
+        or (np.diag(covariance) < 0).any()
+    ):
         table.refuse("is not symmetric, or has a variance below zero: this is no covariance")
     return Uncertainty(tuple(names), tuple(values[name] for name in names), covariance)
 
@@ -63,11 +75,15 @@ def _fitted(path: Path) -> dict[str, float]:
         raise InputError(f"{path}: is not JSON: {error}") from None
     if not isinstance(result, dict) or result.get("format") != _FORMAT:
         found = result.get("format") if isinstance(result, dict) else None
-        raise InputError(f"{path}: found format {found!r}, expected {_FORMAT!r}: the result.json of truing identify")
+        raise InputError(
+            f"{path}: found format {found!r}, expected {_FORMAT!r}: the result.json of truing identify"
+        )
     try:
         fitted = {str(p["name"]): float(p["value"]) for p in result["parameters"] if not p["frozen"]}
     except (KeyError, TypeError, ValueError):
-        raise InputError(f"{path}: its parameters cannot be read, expected a list of name, value, frozen") from None
+        raise InputError(
+            f"{path}: its parameters cannot be read, expected a list of name, value, frozen"
+        ) from None
     if not fitted or not all(math.isfinite(value) for value in fitted.values()):
         raise InputError(f"{path}: has no fitted parameters, or values that are not finite")
     return fitted

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""YAML as a tree of plain values that remembers its line numbers, and pydantic's complaints in terms of those lines.
+"""YAML as a tree of plain values that remembers its line numbers, and pydantic's complaints in terms of those
+lines.
 
-Numbers are read as Decimal, with every digit that the file has: a unit conversion then rounds once, and what is written
+Numbers are read as Decimal, with every digit that the file has: a unit conversion then rounds once, and what
+is written
 in degrees or millimetres comes back bit for bit.
 """
 
@@ -62,7 +64,9 @@ class Document:
         if self.value is None:
             raise InputError(f"{path}: is empty, expected a {kind}")
         if not isinstance(self.value, dict):
-            raise InputError(f"{path}, line 1: found {found(self.value)}, expected a {kind}: keys and values in YAML")
+            raise InputError(
+                f"{path}, line 1: found {found(self.value)}, expected a {kind}: keys and values in YAML"
+            )
 
     @classmethod
     def read(cls, path: Path, kind: str) -> Document:
@@ -111,7 +115,9 @@ class Document:
     def _plain(self, node: Any, loc: Loc) -> Any:
         # An alias is the same node again. Followed blindly, a few lines can stand for billions of values.
         if id(node) in self._seen:
-            self._refuse_node(node, f"YAML anchors and aliases (&, *) are not read in a {self.kind}: write the value out")
+            self._refuse_node(
+                node, f"YAML anchors and aliases (&, *) are not read in a {self.kind}: write the value out"
+            )
         self._seen.add(id(node))
         if isinstance(node, yaml.ScalarNode):
             self._require_characters(node)
@@ -130,7 +136,9 @@ class Document:
     def _require_characters(self, node: Any) -> None:
         # "\\ud800" in quotes is half a character: no text that leaves Python can hold it.
         if any(0xD800 <= ord(character) < 0xE000 for character in node.value):
-            self._refuse_node(node, f"found half a character in {shown(node.value)}: remove the \\ud800 ... \\udfff")
+            self._refuse_node(
+                node, f"found half a character in {shown(node.value)}: remove the \\ud800 ... \\udfff"
+            )
 
     def _mapping(self, node: Any, loc: Loc) -> dict[str, Any]:
         values: dict[str, Any] = {}
@@ -141,7 +149,9 @@ class Document:
             key = key_node.value
             if key in values:
                 first = self._lines[(*loc, key)]
-                self._refuse_node(key_node, f"key {shown(key)} is there twice (first in line {first}): remove one")
+                self._refuse_node(
+                    key_node, f"key {shown(key)} is there twice (first in line {first}): remove one"
+                )
             self._lines[(*loc, key)] = key_node.start_mark.line + 1
             values[key] = self._plain(value_node, (*loc, key))
         return values
@@ -173,7 +183,8 @@ def _plain_scalar(text: str) -> Any:
     return text
 
 
-# ---- What the models are made of -------------------------------------------------------------------------------------
+# ---- What the models are made of
+# -------------------------------------------------------------------------------------
 
 
 class Strict(BaseModel):
@@ -193,7 +204,9 @@ def found(value: object) -> str:
 
 
 def expected(value: object, what: str) -> PydanticCustomError:
-    return PydanticCustomError("expected", "found {found}, expected {what}", {"found": found(value), "what": what})
+    return PydanticCustomError(
+        "expected", "found {found}, expected {what}", {"found": found(value), "what": what}
+    )
 
 
 def _number(value: object) -> Decimal:
