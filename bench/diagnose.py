@@ -15,8 +15,8 @@ import resource
 import time
 
 import truing
-from truing.demo import example
-from truing.simulation import simulate
+from truing.examples import example
+from truing.testing.simulation import simulate
 
 POSES = (300, 3000, 100_000)
 HIDDEN = {"backlash.shoulder_lift": 3e-4, "harmonic.elbow.cos1": 2e-4}

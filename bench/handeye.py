@@ -27,10 +27,11 @@ from typing import Any
 
 import cv2
 import numpy as np
-import truing
 from numpy.typing import NDArray
-from truing import handeye_simulation as simulation
-from truing.handeye_simulation import Board, HandEyeScene, simulate_handeye
+
+import truing
+from truing.testing import scenes as simulation
+from truing.testing.scenes import Board, HandEyeScene, simulate_handeye
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import handeye_oracle as oracle

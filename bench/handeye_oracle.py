@@ -27,7 +27,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from truing.handeye_simulation import Board, HandEyeScene, rotation, rotation_vector, simulate_handeye
+
+from truing.testing.scenes import Board, HandEyeScene, rotation, rotation_vector, simulate_handeye
 
 Floats = NDArray[np.float64]
 STEP = 1e-6  # of the differences [m], [rad]

@@ -7,7 +7,7 @@ docs/real-data.md.
 
 FOLDER (default: $TRUING_REALDATA, else shared/data beside the checkout) holds a subfolder for each recording.
 What is
-missing is left out and said. tests/python/test_real_data.py holds the same sets to the figures below.
+missing is left out and said. tests/python/identification/test_real_data.py holds the same sets to the figures below.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 import truing
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))

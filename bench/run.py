@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 import truing
 
 HERE = Path(__file__).resolve().parent

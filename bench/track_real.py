@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 import truing
 from truing.files.handeye_file import quaternions_from_rotations
-from truing.track import interpolated, rotation_vectors
-from truing.track_results import BASELINES, horizon_errors
+from truing.tracking.api import interpolated, rotation_vectors
+from truing.tracking.result import BASELINES, horizon_errors
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,6 @@ the truth, which no fit may read.
 import argparse
 
 import numpy as np
-
 from mdh import positions, rotation
 
 # Modified DH, as pybotics publishes it; columns alpha, a, beta, theta, d

@@ -3,9 +3,8 @@
 """BLAS dsyrk of a tall matrix: the price of forming a Gram matrix after the Jacobian exists."""
 
 import numpy as np
-from scipy.linalg.blas import dsyrk
-
 from result import best_of
+from scipy.linalg.blas import dsyrk
 
 ROWS, COLUMNS = 3_000_000, 39
 

@@ -16,7 +16,6 @@ import time
 
 import numpy as np
 import yaml
-
 from mdh import JOINTS, urdf
 from result import score
 

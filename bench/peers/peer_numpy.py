@@ -3,7 +3,6 @@
 """What a careful user writes in an afternoon: Gauss-Newton with an analytic Jacobian in NumPy."""
 
 import numpy as np
-
 from mdh import align, positions, positions_and_jacobian, rotation
 from result import best_of, score
 

@@ -4,7 +4,6 @@
 
 import numpy as np
 import pinocchio as pin
-
 from mdh import chain, positions
 from result import best_of
 

@@ -9,15 +9,14 @@ and so are the world frame (6) and the position of the tool (3).
 import time
 
 import numpy as np
+from mdh import align, positions
 from pybotics.geometry import matrix_2_vector, vector_2_matrix
 from pybotics.kinematic_chain import MDHKinematicChain
 from pybotics.optimization import OptimizationHandler, optimize_accuracy
 from pybotics.robot import Robot
 from pybotics.tool import Tool
-from scipy.optimize import least_squares
-
-from mdh import align, positions
 from result import score
+from scipy.optimize import least_squares
 
 MM = 1e3
 

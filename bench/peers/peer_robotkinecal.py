@@ -16,10 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import roboticstoolbox as rtb
-from robotkinecal import SerialRobotKineCal
-
 from mdh import align, positions, urdf
 from result import score
+from robotkinecal import SerialRobotKineCal
 
 
 def run(data):

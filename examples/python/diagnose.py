@@ -9,7 +9,7 @@ the catalogue, the second is not.
 import numpy as np
 
 import truing
-from truing.demo import example
+from truing.examples import example
 
 NOISE = 3e-5  # [m] of one coordinate
 

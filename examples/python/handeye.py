@@ -10,7 +10,7 @@ one axis only.
 import numpy as np
 
 import truing
-from truing.handeye_simulation import one_rotation_axis, simulate_handeye
+from truing.testing.scenes import one_rotation_axis, simulate_handeye
 
 
 def main() -> None:

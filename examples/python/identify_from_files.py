@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import truing
-from truing.demo import example
+from truing.examples import example
 
 
 def simulate_files(folder: Path) -> None:

@@ -7,7 +7,7 @@ controller that knows the nominal arm only.
 import numpy as np
 
 import truing
-from truing.demo import example
+from truing.examples import example
 
 
 def main() -> None:

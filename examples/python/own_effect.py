@@ -10,7 +10,7 @@ temperature above 20 °C. The Jacobian follows by itself.
 import numpy as np
 
 import truing
-from truing.demo import example
+from truing.examples import example
 
 GROWTH = 25e-6  # [m/K] of the true robot: about a metre of aluminium
 

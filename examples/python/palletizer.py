@@ -10,7 +10,7 @@ links, gear ratios, joint zeros and the tool. Where the robot stands is found al
 import numpy as np
 
 import truing
-from truing.demo import PALLETIZER_FREE, PALLETIZER_MODEL, example
+from truing.examples import PALLETIZER_FREE, PALLETIZER_MODEL, example
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ and once more as a replay.
 import numpy as np
 
 import truing
-from truing.track_results import horizon_errors
+from truing.tracking.result import horizon_errors
 
 
 def main() -> None:

@@ -23,8 +23,8 @@ from truing._core import (
     ClockEstimate,
     ClockOffset,
     ClosedForm,
-    CompensateOptions,
     Compensated,
+    CompensateOptions,
     Compensation,
     CompensationRow,
     Compensations,
@@ -97,10 +97,10 @@ from truing._core import (
     Target,
     Task,
     ToolResult,
-    TrackOptions,
-    TrackSetup,
     Tracker,
     TrackerErrors,
+    TrackOptions,
+    TrackSetup,
     UncertainFrame,
     UnknownEffect,
     Unobservable,
@@ -135,8 +135,7 @@ from truing._core import (
     validate_scene,
     version,
 )
-from truing.api import diagnose, distinguish, identify, plan, predict, residuals
-from truing.boards import Board, BoardViews, find_board, parse_board
+from truing.diagnosis.api import diagnose
 from truing.effects import Effect
 from truing.errors import InputError, InputWarning, NotConvergedError, UndecidedError
 from truing.files import (
@@ -154,6 +153,7 @@ from truing.files import (
     save_measurements,
     save_robot,
 )
+from truing.files.boards import Board, BoardViews, find_board, parse_board
 from truing.files.stream_file import (
     ImuData,
     JointData,
@@ -169,15 +169,17 @@ from truing.files.stream_file import (
     load_tracker,
     save_setup,
 )
-from truing.hand_eye import handeye, handeye_clock, handeye_options, handeye_plan, handeye_with_kinematics
-from truing.inverse_kinematics import compensate, inverse, inverse_path
-from truing.simulation import simulate
-from truing.track import (
+from truing.hand_eye.api import handeye, handeye_clock, handeye_options, handeye_plan, handeye_with_kinematics
+from truing.identification.api import identify, predict, residuals
+from truing.inverse_kinematics.api import compensate, inverse, inverse_path
+from truing.planning.api import distinguish, plan
+from truing.testing.simulation import simulate
+from truing.testing.streams import simulate_streams
+from truing.tracking.api import (
     TrackCalibration,
     actuator_lag,
     check_streams,
     recorded_streams,
-    simulate_streams,
     track_calibrate,
 )
 

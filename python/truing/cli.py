@@ -42,7 +42,7 @@ if TYPE_CHECKING:
         TargetData,
         Task,
     )
-    from truing.inverse_results import Solved
+    from truing.inverse_kinematics.result import Solved
 
 Result = TypeVar("Result")
 
@@ -400,7 +400,7 @@ def identify(
 
         found = _busy("identifying", work)
         with atomic_output_dir(folder) as temporary, _progress("writing"):
-            from truing.results import write_identification
+            from truing.identification.result import write_identification
 
             result = write_identification(
                 temporary,
@@ -470,7 +470,7 @@ def diagnose(
     with _warnings_heard() as heard:
         model, table = _load(robot, data, base_link, tip_link)
         if record is RecordName.qr:
-            from truing.results import with_second_record
+            from truing.diagnosis.result import with_second_record
 
             table = with_second_record(model, table)
 
@@ -483,7 +483,7 @@ def diagnose(
 
         found = _busy("diagnosing", work)
         with atomic_output_dir(folder) as temporary, _progress("writing"):
-            from truing.results import write_diagnosis
+            from truing.diagnosis.result import write_diagnosis
 
             result = write_diagnosis(
                 temporary,
@@ -532,7 +532,8 @@ def predict(
 
         def work() -> tuple[dict[str, Any], Any, dict[str, Any]]:
             import truing
-            from truing.results import predicted_rows, prediction_columns, prediction_dict, without_nan
+            from truing.identification.result import predicted_rows, prediction_columns, prediction_dict
+            from truing.report.json_text import without_nan
 
             predicted = truing.predict(model, table)
             columns = prediction_columns(model, table, predicted)
@@ -541,8 +542,8 @@ def predict(
 
         columns, rows, result = _busy("predicting", work)
         with atomic_output_dir(folder) as temporary:
-            from truing.report import prediction_report
-            from truing.results import to_json
+            from truing.identification.page import prediction_report
+            from truing.report.json_text import to_json
 
             write_table(temporary / "predicted.csv", columns)
             (temporary / "result.json").write_text(to_json(result), encoding="utf-8")
@@ -684,7 +685,7 @@ def simulate(
         joints = None if plan is None else load_measurements(plan, model, joints_only=True).joints
 
         def work() -> Any:
-            from truing.simulation import simulate as run
+            from truing.testing.simulation import simulate as run
 
             return run(
                 model,
@@ -707,7 +708,7 @@ def simulate(
 
         simulated = _busy("simulating", work)
         with atomic_output_dir(folder) as temporary:
-            from truing.results import to_json
+            from truing.report.json_text import to_json
 
             truth = simulated.to_dict()
             units = load_units(robot)
@@ -787,7 +788,7 @@ def _simulate_stream(
 
         streams = _busy("simulating", work)
         with atomic_output_dir(folder) as temporary, _progress("writing"):
-            from truing.track_results import write_simulation
+            from truing.tracking.result import write_simulation
 
             truth = write_simulation(temporary, model, streams, options)
             save_robot(temporary / "robot.yaml", model, units=load_units(robot))
@@ -913,8 +914,9 @@ def plan(
 
         planned, seen = _busy("planning", work)
         with atomic_output_dir(folder) as temporary:
-            from truing.report import plan_report
-            from truing.results import plan_columns, plan_dict, to_json, without_nan
+            from truing.planning.page import plan_report
+            from truing.planning.result import plan_columns, plan_dict
+            from truing.report.json_text import to_json, without_nan
 
             result: dict[str, Any] = without_nan(
                 plan_dict(model, planned, index=long_index, noise=sigma, seed=seed, seen=seen, warnings=heard)
@@ -967,7 +969,7 @@ def _temperatures(text: str) -> tuple[float, float]:
 
 def _distinction_table(seen: Mapping[str, Any]) -> None:
     """Which effects a plan tells apart, on stdout."""
-    from truing.report import effect_at, size_words
+    from truing.planning.page import effect_at, size_words
 
     every: dict[str, list[Mapping[str, Any]]] = {}
     for effect in seen["effects"]:
@@ -1258,7 +1260,7 @@ def handeye(
         if data is None:
             assert clock is not None
             with atomic_output_dir(folder) as temporary:
-                from truing.handeye_results import write_without_clock
+                from truing.hand_eye.result import write_without_clock
 
                 result = write_without_clock(temporary, clock, keywords, warnings=heard)
             _finish_handeye(result, folder, json)
@@ -1276,7 +1278,7 @@ def handeye(
         options = truing.handeye_options(data, **keywords)
 
         def work() -> Any:
-            from truing.handeye_results import Solved
+            from truing.hand_eye.result import Solved
 
             found = truing.handeye(data, **keywords, raise_if_undecided=False)
             both = None
@@ -1300,7 +1302,7 @@ def handeye(
 
         solved = _busy("solving", work)
         with atomic_output_dir(folder) as temporary, _progress("writing"):
-            from truing.handeye_results import write_handeye
+            from truing.hand_eye.result import write_handeye
 
             result = write_handeye(
                 temporary,
@@ -1415,7 +1417,7 @@ def track_calibrate(
         prescribed = None if tool is None else load_tool_poses(tool, model)
 
         def work() -> Any:
-            from truing.track import track_calibrate as calibrate
+            from truing.tracking.api import track_calibrate as calibrate
 
             return calibrate(
                 model, encoders, seen, inertial, plan=planned, tool=prescribed, clock_wanted=wanted
@@ -1423,7 +1425,7 @@ def track_calibrate(
 
         found = _busy("calibrating", work)
         with atomic_output_dir(folder) as temporary, _progress("writing"):
-            from truing.track_results import write_calibration
+            from truing.tracking.result import write_calibration
 
             result = write_calibration(temporary, model, found, source=tracker.name, warnings=heard)
         if found.status != "done":  # that of an earlier run would be taken for this one's
@@ -1520,7 +1522,7 @@ def track_run(
 
         def work(progress: Callable[[float], bool]) -> Any:
             import truing
-            from truing.track_results import Played
+            from truing.tracking.result import Played
 
             streams = truing.recorded_streams(model, where, **files, plan=planned)
             options = where.options()
@@ -1545,7 +1547,7 @@ def track_run(
 
         run = _counted("replaying", work)
         with atomic_output_dir(folder) as temporary, _progress("writing"):
-            from truing.track_results import write_run
+            from truing.tracking.result import write_run
 
             result = write_run(temporary, run, warnings=heard)
         for name, stale in (
@@ -1642,7 +1644,7 @@ def ik(
         )
 
         def work(progress: Callable[[int], None]) -> Any:
-            from truing.inverse_results import Solved
+            from truing.inverse_kinematics.result import Solved
 
             every = np.arange(data.count)
             if path:
@@ -1665,7 +1667,7 @@ def ik(
 
         solved = _busy_counting("solving", data.count, work)
         with atomic_output_dir(folder) as temporary, _progress("writing"):
-            from truing.inverse_results import write_inverse
+            from truing.inverse_kinematics.result import write_inverse
 
             result = write_inverse(temporary, solved, warnings=heard)
     if json:
@@ -1795,7 +1797,7 @@ def compensate(
 
         made = _busy_counting("compensating", data.count, work)
         with atomic_output_dir(folder) as temporary, _progress("writing"):
-            from truing.inverse_results import CompensatedProgram, write_compensation
+            from truing.inverse_kinematics.result import CompensatedProgram, write_compensation
 
             result = write_compensation(
                 temporary,
@@ -1860,7 +1862,7 @@ def exam(
             ' "truing[exam]"'
         ) from None
     with _warnings_heard(), atomic_output_dir(folder) as temporary, _counting("examining") as progress:
-        from truing.results import write_exam
+        from truing.exam.result import write_exam
 
         scores = run_exam(
             which.value,
@@ -1993,7 +1995,7 @@ def _every_branch(
     progress: Callable[[int], None],
 ) -> Solved:
     """All configurations of every target; of a target without any, why."""
-    from truing.inverse_results import Solved
+    from truing.inverse_kinematics.result import Solved
 
     solutions: list[Solution] = []
     owners: list[int] = []
@@ -2219,7 +2221,7 @@ def _last_line(folder: Path) -> None:
 
 
 def _print_json(result: Mapping[str, Any]) -> None:
-    from truing.results import to_json
+    from truing.report.json_text import to_json
 
     sys.stdout.write(to_json(result))
 
@@ -2275,7 +2277,7 @@ def identification_table(result: Mapping[str, Any], folder: Path) -> None:
 
 def diagnosis_table(result: Mapping[str, Any], folder: Path) -> None:
     """The short answer of `truing diagnose`, on stdout; the last line is the path of the report."""
-    from truing.diagnose_report import at_joints, size_text, trouble
+    from truing.diagnosis.page import at_joints, size_text, trouble
 
     for finding in trouble(result):
         _say(f"look at the data first: {finding['text']}")
@@ -2590,7 +2592,7 @@ def track_run_table(result: Mapping[str, Any], folder: Path) -> None:
 
 def exam_table(result: Mapping[str, Any], folder: Path) -> None:
     """The score table of `truing exam`, on stdout; the last line is the path of the report."""
-    from truing.diagnose_report import plain
+    from truing.exam.page import plain
 
     names = list(dict.fromkeys(name for score in result["scores"] for name in score))
     _table(

@@ -7,15 +7,15 @@ has.
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
 import truing
+from truing.examples import PALLETIZER_FREE, PALLETIZER_MODEL, example
 from truing.files import atomic_output_dir, save_measurements, save_robot, write_table
-from truing.simulation import Truth, random_joints, simulate
+from truing.testing.simulation import Truth, random_joints, simulate
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,28 +23,6 @@ if TYPE_CHECKING:
 
 Result = TypeVar("Result")
 
-# The palletizer method's 18 parameters. The measurement frame (base.*) comes on top of them.
-PALLETIZER_MODEL = (
-    "J1.a",
-    "J2.a",
-    "J3.a",
-    "J4.a",
-    "J1.d",
-    "J4.d",
-    "J5.d",
-    "J1.ratio",
-    "J2.ratio",
-    "J3.ratio",
-    "J5.ratio",
-    "J1.offset",
-    "J2.offset",
-    "J3.offset",
-    "J5.offset",
-    "tool.x",
-    "tool.y",
-    "tool.z",
-)
-PALLETIZER_FREE = (*PALLETIZER_MODEL, "base.*")
 
 POSES = 120
 FRESH_POSES = 1000
@@ -58,11 +36,6 @@ class Busy(Protocol):
     def __call__(self, what: str, work: Callable[[], Result]) -> Result: ...
 
 
-def example(name: str) -> Path:
-    """Path of a shipped robot file: "palletizer", "ur10" or "irb120"."""
-    return Path(str(resources.files("truing") / "examples" / f"{name}.yaml"))
-
-
 def run(out: Path, *, seed: int, busy: Busy, console: Console) -> dict[str, Any]:
     """Runs the demo, writes all of its files to `out`, and returns what result.json holds. The last line said
     is the report's path.
@@ -70,7 +43,8 @@ def run(out: Path, *, seed: int, busy: Busy, console: Console) -> dict[str, Any]
     from rich import box
     from rich.table import Table
 
-    from truing.results import to_json, write_identification
+    from truing.identification.result import write_identification
+    from truing.report.json_text import to_json
 
     nominal = truing.load_robot(example("palletizer"))
 

@@ -246,3 +246,20 @@ def split_effects(effects: Effects) -> tuple[list[EffectRequest | Effect], list[
 def evaluated(own: Sequence[Effect], robot: Robot, data: Measurements) -> list[OwnEffect]:
     """The own effects' values for `data`."""
     return [effect.evaluate(robot, data) for effect in own]
+
+
+def name_list(names: str | Sequence[str]) -> list[str]:
+    if isinstance(names, str):
+        return [name.strip() for name in names.split(",") if name.strip()]
+    return list(names)
+
+
+def own_effects(effects: Effect | Iterable[Effect]) -> list[Effect]:
+    own = [effects] if isinstance(effects, Effect) else list(effects)
+    for effect in own:
+        if not isinstance(effect, Effect):
+            raise InputError(
+                f"effects holds {effect!r}: only definitions of own effects are needed here; effects of the"
+                " catalogue are known"
+            )
+    return own

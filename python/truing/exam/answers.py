@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+
 import truing
 
 _FRAMES = frozenset({"base_frame", "tool_frame"})  # fitted anyway, never an answer

@@ -14,8 +14,9 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-import truing
 from numpy.typing import NDArray
+
+import truing
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import truing
 from numpy.typing import NDArray
 
+import truing
 from truing.exam.kinematics import Chain, Floats, chain_of, rotations, sweep
 from truing.exam.laws import Context, Inputs
 from truing.exam.robots import Specimen

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import truing
 from numpy.random import Generator
 
+import truing
 from truing.exam import laws, recordings
 from truing.exam.confounded import Twin, twins
 from truing.exam.design import Plan, draw, usual_plan
@@ -456,7 +456,7 @@ def _measured(
     tip, rotation = truth.observe(inputs)
     n = inputs.rows
     positions = tip + (noise if noise is not None else _noise(scene, rng, n))
-    handed, chain = scene.handed, scene.chain
+    handed = scene.handed
     columns: dict[str, Any] = {"positions": positions}
     if "orientation" in handed:
         columns["orientations"] = quaternions(

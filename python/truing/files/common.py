@@ -15,15 +15,18 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from truing.errors import InputError
+
+if TYPE_CHECKING:
+    from truing._core import Robot
 
 PathLike = str | os.PathLike[str]
 LengthUnit = Literal["m", "mm"]
@@ -247,3 +250,9 @@ def _write_csv(path: Path, table: Any) -> None:
                     raise
                 continue
         return
+
+
+def joint_columns(robot: Robot, joints: NDArray[np.float64]) -> dict[str, Any]:
+    """Joint readings as columns: `q1_rad` …, `_m` for prismatic joints."""
+    units = ["rad" if robot.joints[index].type == "revolute" else "m" for index in robot.driven_joints()]
+    return {f"q{k + 1}_{unit}": joints[:, k] for k, unit in enumerate(units)}

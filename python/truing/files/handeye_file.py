@@ -15,15 +15,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import PlainValidator
 
 from truing import _core
-from truing.boards import Board, BoardViews, find_board, parse_board, plausible_camera
 from truing.errors import InputError, InputWarning
+from truing.files.boards import Board, BoardViews, find_board, parse_board, plausible_camera
 from truing.files.common import PathLike, atomic_write, listed
 from truing.files.table import Floats, Table
 from truing.files.yaml_tree import Document, FreeMapping, Number, Strict, Text, choice, expected, found

@@ -1,0 +1,303 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""What ``truing diagnose`` writes: ``result.json``, ``residuals.csv``, ``next_poses.csv`` and the robot."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import truing
+from truing.errors import InputError
+from truing.files.common import joint_columns
+from truing.identification.result import (
+    block,
+    column,
+    joint_inputs,
+    parameter_dict,
+    residual_columns,
+    statistics_dict,
+    write_robot,
+)
+from truing.report.json_text import to_json, without_nan
+from truing.report.rows import Rows
+
+DIAGNOSIS_FORMAT = "truing-diagnosis/1"
+Floats = NDArray[np.float64]
+
+
+def with_second_record(robot: truing.Robot, data: truing.Measurements) -> truing.Measurements:
+    """The same measurements by the second record of the joints (columns qr1 …), without the first. Raises
+    InputError.
+    """
+    units = ["rad" if robot.joints[index].type == "revolute" else "m" for index in robot.driven_joints()]
+    second, covariates = [], dict(data.covariates)
+    for k, unit in enumerate(units):
+        name = f"qr{k + 1}_{unit}"
+        if name not in covariates:
+            raise InputError(
+                f"--record qr: the data has no column {name}; a second record has one for every driven joint"
+                f" (qr1 … qr{len(units)})"
+            )
+        second.append(np.array(covariates.pop(name)))
+    for row in np.flatnonzero(~np.isfinite(np.array(second)).all(axis=0))[:1]:
+        raise InputError(f"--record qr: row {row} (from 0) has no second record of every joint")
+    return data.replace(joints=np.stack(second, axis=1), covariates=covariates)
+
+
+def diagnosis_dict(found: truing.Diagnosis, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
+    """What ``result.json`` of ``truing diagnose`` holds. `warnings`: more of them, first."""
+    return {
+        "format": DIAGNOSIS_FORMAT,
+        "version": truing.__version__,
+        "robot": found.robot.name,
+        "verdict": found.verdict,
+        "sentence": found.sentence,
+        "gap": {
+            **statistics_dict(found.gap),
+            "noise_floor_m": found.noise_floor,
+            "noise_from_repeats": found.noise_from_repeats,
+            "closable": found.closable,
+            "p": found.p_gap,
+            "parts": _parts(found),
+        },
+        "after": {**statistics_dict(found.after), "remaining_structure_p": found.remaining_structure_p},
+        "after_unknown": statistics_dict(found.after_unknown),
+        "shrink": {"value": found.shrink.value, "ci": _interval(found.shrink)},
+        "effects": [_effect(e, found.robot) for e in found.effects],
+        "unknown": [_unknown(u, found.robot) for u in found.unknown],
+        "where": {
+            "joints": [
+                {"joint": w.joint, "share": w.share.value, "ci": _interval(w.share)}
+                for w in found.where_joints
+            ],
+            "inputs": [{"input": w.input, "share": w.share} for w in found.where_inputs],
+            "workspace": [{"center_m": w.center, "rms_m": w.rms, "n": w.n} for w in found.workspace],
+            "direction": [{"axis": found.direction[:, k], "rms_m": found.direction_rms[k]} for k in range(3)],
+        },
+        "sanity": [{"kind": s.kind, "text": s.text, "rows": list(s.rows)} for s in found.sanity],
+        "not_testable": [
+            {"effect": n.effect, "joints": list(n.joints), "why": n.why} for n in found.not_testable
+        ],
+        "detectable": [
+            {
+                "effect": d.effect,
+                "joint": d.joint,
+                "parameter": d.parameter,
+                "unit": d.unit,
+                "size": d.size,
+                "size_at_tip_m": d.size_at_tip,
+            }
+            for d in found.detectable
+        ],
+        "next_measurements": [_next_pose(p) for p in found.next_poses],
+        "candidates": [
+            {
+                "effect": c.effect,
+                "joints": list(c.joints),
+                "columns": c.columns,
+                "gain": c.gain,
+                "evidence": c.evidence,
+                "held_out_gain": c.held_out_gain,
+                "largest_z": c.largest_z,
+            }
+            for c in found.candidates
+        ],
+        "nearest_neighbour": {"p95_m": found.neighbour_p95, "share": found.neighbour_share},
+        "joint_record": found.joint_record,
+        "outliers": list(found.outliers),
+        "seed": found.seed,
+        "warnings": [*warnings, *found.warnings],
+    }
+
+
+def _interval(share: truing.Share) -> list[float]:
+    return [share.low, share.high]
+
+
+def _held_out(found: truing.FoundEffect | truing.UnknownEffect) -> dict[str, Any]:
+    before, after = found.held_out_before, found.held_out_after
+    return {
+        "before_rms_m": before.rms,
+        "after_rms_m": after.rms,
+        "before_p95_m": before.p95,
+        "after_p95_m": after.p95,
+        "before_max_m": before.max,
+        "after_max_m": after.max,
+        "n": after.n,
+        "shrink": found.shrink.value,
+        "ci": _interval(found.shrink),
+    }
+
+
+def _curve(c: truing.Curve, robot: truing.Robot) -> dict[str, Any]:
+    second = (
+        {
+            "input": c.second_input,
+            "unit": _input_unit(c.second_input, robot),
+            "range": [c.second_low, c.second_high],
+        }
+        if c.second_input
+        else None
+    )
+    return {
+        "site": c.site,
+        "input": c.input,
+        "input_unit": c.input_unit,
+        "second": second,
+        "unit": c.unit,
+        "points": c.points,
+        "samples": c.samples,
+    }
+
+
+def _input_unit(name: str, robot: truing.Robot) -> str:
+    """Unit of what a free function depends on: "q3", "torque2", "temp" …"""
+    joint = re.fullmatch(r"q([0-9]+)", name)
+    if joint:
+        return "rad" if robot.joints[int(joint[1]) - 1].type == "revolute" else "m"
+    return {"torque": "Nm", "payload": "kg", "temp": "deg C", "time": "s"}.get(name.rstrip("0123456789"), "")
+
+
+def _effect(e: truing.FoundEffect, robot: truing.Robot) -> dict[str, Any]:
+    return {
+        "effect": e.effect,
+        "joints": list(e.joints),
+        "probability": e.probability,
+        "parameters": [parameter_dict(p) for p in e.parameters],
+        "held_out": _held_out(e),
+        "share": e.share,
+        "share_alone": e.share_alone,
+        "share_last": e.share_last,
+        "confounded_with": [
+            {
+                "effect": a.effect,
+                "joints": list(a.joints),
+                "probability": a.probability,
+                "separated_by": a.separated_by,
+            }
+            for a in e.confounded_with
+        ],
+        "note": e.note,
+        "identify_as": e.identify_as,
+        "curves": [_curve(c, robot) for c in e.curves],
+    }
+
+
+def _unknown(u: truing.UnknownEffect, robot: truing.Robot) -> dict[str, Any]:
+    first: Floats | list[Any] = u.curves[0].points[:, :2] if u.curves else []
+    return {
+        "joint": u.joint,
+        "inputs": list(u.inputs),
+        "probability": u.probability,
+        "held_out": _held_out(u),
+        "share": u.share,
+        "curve": first,
+        "curves": [_curve(c, robot) for c in u.curves],
+        "looks_like": u.looks_like,
+    }
+
+
+def _next_pose(p: truing.NextPose) -> dict[str, Any]:
+    return {"joints": p.joints, "direction": list(p.direction), "payload_kg": p.payload, "why": p.why}
+
+
+def _parts(found: truing.Diagnosis) -> dict[str, Any]:
+    """The gap's mean square cut into parts that add up to 1: noise, each effect, each unknown function,
+    unexplained.
+    """
+    effects, unknown = [e.share for e in found.effects], [u.share for u in found.unknown]
+    left = max(0.0, 1.0 - sum(effects) - sum(unknown))
+    noise = min(left, (found.noise_floor / found.gap.rms) ** 2) if found.gap.rms > 0 else left
+    return {"noise": noise, "effects": effects, "unknown": unknown, "unexplained": left - noise}
+
+
+def diagnosis_rows(found: truing.Diagnosis, data: truing.Measurements) -> Rows:
+    """Errors of every row of `data` before and after; `rejected`: rows that counted for little."""
+    before, after = found.residuals_before, found.residuals_after
+    out = np.zeros(data.rows, dtype=bool)
+    out[list(found.outliers)] = True
+    return Rows(
+        **joint_inputs(found.robot, data),
+        position=np.full((data.rows, 3), np.nan) if data.positions is None else np.asarray(data.positions),
+        error_before=block(before.position, data.rows),
+        error_after=block(after.position, data.rows),
+        distance_before=column(before.distance, data.rows),
+        distance_after=column(after.distance, data.rows),
+        rotation_before=block(before.rotation, data.rows),
+        rotation_after=block(after.rotation, data.rows),
+        test=np.asarray(found.set) == 1,
+        rejected=out,
+    )
+
+
+def diagnosis_columns(
+    rows: Rows, measured: truing.Measurements, target_names: Sequence[str], directions: Floats | None = None
+) -> dict[str, Any]:
+    """Columns of diagnose's ``residuals.csv``: those of identify, the rotation errors component by component,
+    and approach directions
+    that were inferred."""
+    columns = residual_columns(rows, measured, target_names)
+    columns["outlier"] = columns.pop("rejected")
+    if directions is not None:
+        for k in range(directions.shape[1]):
+            columns[f"dir{k + 1}"] = directions[:, k]
+    if np.isfinite(rows.rotation_after).any():
+        for when, error in (("before", rows.rotation_before), ("after", rows.rotation_after)):
+            for k, axis in enumerate("xyz"):
+                columns[f"rotation_error_{when}_{axis}_rad"] = error[:, k]
+    return columns
+
+
+def next_pose_columns(found: truing.Diagnosis) -> dict[str, Any]:
+    """Columns of ``next_poses.csv``: joints, and what else the poses ask for. Made to be measured, or given
+    to ``simulate --plan``.
+    """
+    poses = found.next_poses
+    columns = joint_columns(found.robot, np.array([p.joints for p in poses]))
+    for k in range(max(len(p.direction) for p in poses)):
+        columns[f"dir{k + 1}"] = np.array([p.direction[k] if k < len(p.direction) else 0 for p in poses])
+    payload = np.array([p.payload for p in poses])
+    if np.isfinite(payload).all():
+        columns["payload_kg"] = payload
+    return columns
+
+
+def write_diagnosis(
+    folder: Path,
+    found: truing.Diagnosis,
+    data: truing.Measurements,
+    *,
+    source: str,
+    warnings: Iterable[str] = (),
+    nominal_file: Path | None = None,
+    base_link: str = "",
+    tip_link: str = "",
+) -> dict[str, Any]:
+    """Writes everything that ``truing diagnose`` found into `folder`, and returns what result.json holds.
+
+    `source` names the data in the robot file.
+    """
+    from truing.diagnosis.page import diagnosis_report
+    from truing.files import write_table
+
+    result: dict[str, Any] = without_nan(diagnosis_dict(found, warnings=warnings))
+    if found.joint_record == "qr":  # what it went by
+        data = with_second_record(found.robot, data)
+    rows = diagnosis_rows(found, data)
+    (folder / "result.json").write_text(to_json(result), encoding="utf-8")
+    own = found.gap.rms * (1.0 - found.shrink.value)  # the robot file holds no drifts and no free functions
+    write_robot(folder, found.robot, source, {"rms_m": own}, nominal_file, base_link, tip_link)
+    write_table(
+        folder / "residuals.csv",
+        diagnosis_columns(rows, data, [target.name for target in found.robot.targets], found.directions),
+    )
+    if found.next_poses:
+        write_table(folder / "next_poses.csv", next_pose_columns(found))
+    (folder / "report.html").write_text(diagnosis_report(result, rows), encoding="utf-8")
+    return result

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Identification: fit a robot's parameters to measurements, and compare it with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal
+
+from truing import _core
+from truing._core import Identification, Measurements, Prediction, Residuals, Robot
+from truing.effects import Effect, Effects, evaluated, name_list, own_effects, split_effects
+from truing.errors import NotConvergedError
+
+_USUAL = _core.IdentifyOptions()  # the defaults stand in identify.hpp and diagnose.hpp alone
+
+
+def identify(
+    robot: Robot,
+    data: Measurements,
+    *,
+    free: str | Sequence[str] = (),
+    hold: str | Sequence[str] = (),
+    effects: Effects = (),
+    solver: Literal["lm", "ceres"] = "lm",
+    loss: Literal["reject", "none", "huber", "cauchy", "tukey"] = "reject",
+    frame_by: Literal["parameters", "svd"] = "parameters",
+    rotation_length: float = _USUAL.rotation_length,
+    test_share: float = _USUAL.test_share,
+    seed: int = _USUAL.seed,
+    max_iterations: int = _USUAL.max_iterations,
+    initial_damping: float = _USUAL.initial_damping,
+    rms_fall: float = _USUAL.rms_fall,
+    gradient: float = _USUAL.gradient,
+    undamped: bool = _USUAL.undamped,
+    rank_tolerance: float = _USUAL.rank_tolerance,
+    hayati_angle: float = _USUAL.hayati_angle,
+    reject_beyond: float = _USUAL.reject_beyond,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    threads: int = 0,
+    raise_if_not_converged: bool = True,
+) -> Identification:
+    """Find the robot's parameters from measurements.
+
+    Base, targets (anchor, fixed points) are found first; what the data cannot see is frozen at nominal and
+    named in the
+    result; then the fit runs on the training rows.
+
+    robot: nominal. data: measurements, see `Measurements`.
+    free: names and globs, "J2.*,*.ratio" or a list; empty: every geometric value, base and targets.
+    hold: names and globs that stay at nominal whatever else is asked for, "base.*" for a frame that is known.
+    effects: effects to fit as well: "backlash,harmonic:J2+J3", or a list of such words, `EffectRequest` and
+    `Effect`.
+    solver: "lm" (Levenberg-Marquardt) or "ceres" (takes bounds).
+    loss: "reject" finds gross outliers, lists them and fits without; or "none", "huber", "cauchy", "tukey".
+    frame_by: the measurement frame as six "parameters", or registered after every step ("svd"; positions
+    only).
+    rotation_length: [m] a rotation error of 1 rad counts as this length, where rows give no sigma.
+    test_share: of the pose groups, held out when the data has no `set`. seed: of that split.
+    max_iterations, initial_damping, rms_fall [m], gradient, undamped: of the iteration, see
+    `IdentifyOptions`.
+    rank_tolerance: a unit column that the others explain but for this share is not observable.
+    hayati_angle: [rad] neighbouring axes nearer to parallel get beta.
+    reject_beyond: loss "reject": rows whose residual is longer than this many medians.
+    bounds: {parameter: (lowest, highest)}, solver "ceres" only. threads: 0: as many as the machine has.
+
+    Raises InputError on data or options that cannot be used, and NotConvergedError (it carries the result),
+    unless
+    `raise_if_not_converged` is False.
+    """
+    asked, own = split_effects(effects)
+    options = _core.IdentifyOptions(
+        free=name_list(free),
+        hold=name_list(hold),
+        effects=[item.request(robot) if isinstance(item, Effect) else item for item in asked],
+        solver=solver,
+        loss=loss,
+        frame_by=frame_by,
+        rotation_length=rotation_length,
+        test_share=test_share,
+        seed=seed,
+        max_iterations=max_iterations,
+        initial_damping=initial_damping,
+        rms_fall=rms_fall,
+        gradient=gradient,
+        undamped=undamped,
+        rank_tolerance=rank_tolerance,
+        hayati_angle=hayati_angle,
+        reject_beyond=reject_beyond,
+        bounds=bounds or {},
+        threads=threads,
+    )
+    result = _core.identify(robot, data, options, evaluated(own, robot, data))
+    if raise_if_not_converged and not result.solver.converged:
+        raise NotConvergedError(result)
+    return result
+
+
+def predict(
+    robot: Robot, data: Measurements, *, effects: Effect | Iterable[Effect] = (), threads: int = 0
+) -> Prediction:
+    """What the robot, with its fitted effects, predicts for the rows of `data`.
+
+    effects: definitions of one's own effects that the robot carries; those of the catalogue are known.
+    Raises InputError on unknown effects or columns that they need.
+    """
+    return _core.predict(robot, data, evaluated(own_effects(effects), robot, data), threads)
+
+
+def residuals(
+    robot: Robot, data: Measurements, *, effects: Effect | Iterable[Effect] = (), threads: int = 0
+) -> Residuals:
+    """Predicted minus measured, NaN where not measured.
+
+    Rows of a fixed point are compared with the mean of that point's predictions. effects: as in `predict`.
+    Raises InputError on unknown effects or columns that they need.
+    """
+    return _core.residuals(robot, data, evaluated(own_effects(effects), robot, data), threads)

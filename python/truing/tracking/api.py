@@ -1,0 +1,613 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tracking a swaying arm: recordings, their replay, and what is wrong with them. The work is done by
+`Tracker` in the C++ core.
+
+robot, where = truing.load_robot("robot.yaml"), truing.load_setup("setup.yaml")
+streams = truing.recorded_streams(robot, where, imu=truing.load_imu("imu.csv"),
+tracker=truing.load_tracker("tracker.csv"),
+                                  joints=truing.load_joints("joints.csv", robot),
+                                  plan=truing.load_plan("plan.csv"))
+played = truing.replay(streams, where.setup, where.options())
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.errors import InputError
+from truing.files.handeye_file import rotations_from_quaternions
+from truing.files.stream_file import ImuData, JointData, PoseData, SetupData, ToolPoses, TrackerData
+
+Floats = NDArray[np.float64]
+
+PLAN_AHEAD = 1.0  # [s] a plan without arrival_s is known so long before its time
+_FEW = 4000  # samples that checks look at
+_FAR_OFF = (
+    0.25  # of the tracker's spread (or of 1 m, if that is more): a set-up that is off by more is another one
+)
+_FEWEST_RESTS = 6
+_FROM_MOTION = 300  # poses that stand in for test positions
+_SAME_CLOCK = 0.02  # [s]
+_LONGEST_LAG = 0.5  # [s]
+_STRETCH = 10.0  # [s] of a recording, in which the offset of clocks is found on its own
+_DRIFTED = 0.5  # [s] stretches are looked at so far from the whole's offset
+_LEAST_DRIFT = 5e-5  # [s/s] what is less the filter finds by itself
+_TUNED_FOR, _SETTLING = 0.04, 3.0  # [s]
+_FACTORS, _TRACKER_FACTORS = (1.0, 3.0, 10.0, 30.0, 100.0), (1.0, 3.0)
+_STATIC_TIMES = (1.0, 0.5, 0.2, 0.1)  # [s]
+_CLEAR = 0.2  # another reading of the numbers has to be so much better before it is named
+
+
+def recorded_streams(
+    robot: _core.Robot,
+    where: SetupData | _core.TrackSetup,
+    *,
+    imu: ImuData,
+    joints: JointData,
+    tracker: TrackerData | None = None,
+    plan: PoseData | None = None,
+) -> _core.RecordedStreams:
+    """A recording for `replay` from its files: forward kinematics of the encoders, and when each sample
+    arrived. The drift of the tracker's clock that `where` knows is taken off.
+
+    A stream without arrivals is taken to have arrived at its stamps, a plan one second before. Arrivals are
+    of the computer's clock: where the inertial
+    stream has them, its fastest sample ties stamps to arrivals.
+
+    Raises InputError where streams do not overlap in time, or where the tracker, the gyro or the set-up
+    cannot be right: see `check_streams`.
+    """
+    setup = where.setup if isinstance(where, SetupData) else where
+    if tracker is not None and isinstance(where, SetupData):
+        tracker = replace(tracker, t=where.steady(tracker.t))
+    check_streams(robot, setup, imu=imu, joints=joints, tracker=tracker)
+    tied = 0.0 if imu.arrival is None else float(np.min(imu.arrival - imu.t))
+    streams = _core.RecordedStreams()
+    streams.set_imu(imu.t, imu.gyro, imu.accel, _arrival(imu, tied, 0.0))
+    streams.set_flange(
+        joints.t,
+        _core.flange_poses(robot, joints.joints),
+        _arrival(joints, tied, setup.controller_clock_offset),
+    )
+    if tracker is not None:
+        streams.set_tracker(
+            tracker.t, tracker.position, tracker.orientation, _arrival(tracker, tied, setup.clock_offset)
+        )
+    if plan is not None:
+        streams.set_plan(plan.t, plan.T, _arrival(plan, tied - PLAN_AHEAD, setup.controller_clock_offset))
+    return streams
+
+
+def _arrival(stream: ImuData | JointData | TrackerData | PoseData, tied: float, offset: float) -> Floats:
+    return stream.t - offset + tied if stream.arrival is None else stream.arrival
+
+
+def check_streams(
+    robot: _core.Robot,
+    setup: _core.TrackSetup,
+    *,
+    imu: ImuData,
+    joints: JointData,
+    tracker: TrackerData | None = None,
+) -> None:
+    """Raises InputError where streams do not overlap in time, and where numbers are read wrongly: gyro in
+    deg/s, tracker in other axes, left-handed, mm …
+
+    What encoders and the set-up say is compared with what was measured; sway and calibration errors are far
+    below what is looked for.
+    """
+    flange = _core.flange_poses(robot, joints.joints)
+    t = joints.t - setup.controller_clock_offset
+    _require_overlap("joints", joints, t, imu)
+    _check_gyro(imu, t, flange)
+    if tracker is not None:
+        _require_overlap("tracker", tracker, tracker.t - setup.clock_offset, imu)
+        _check_tracker(setup, tracker, t, flange)
+
+
+def _require_overlap(name: str, stream: JointData | TrackerData, t: Floats, imu: ImuData) -> None:
+    overlap = min(t.max(), imu.t[-1]) - max(t.min(), imu.t[0])
+    if overlap < 0.1 * min(np.ptp(t), np.ptp(imu.t)):
+        raise InputError(
+            f"{stream.path}: {name} from {t.min():.6g} to {t.max():.6g} s in the inertial sensor's clock, but"
+            f" {imu.path} from {imu.t[0]:.6g} to {imu.t[-1]:.6g} s: expected streams of the same time; is the"
+            " clock offset in the set-up file right? `truing track calibrate` finds it"
+        )
+
+
+def _spread_out(rows: int) -> NDArray[np.intp]:
+    return np.linspace(0, rows - 1, min(rows, _FEW)).astype(np.intp)
+
+
+def _check_gyro(imu: ImuData, t: Floats, flange: Floats) -> None:
+    """The gyro's rms against that of the flange's turns: the same, but for sway."""
+    step = max(1, int(0.05 / max(1e-6, float(np.median(np.diff(t))))))
+    a, b = flange[:-step:step, :3, :3], flange[step::step, :3, :3]
+    trace = np.einsum("nij,nij->n", a, b)
+    rate = np.arccos(np.clip((trace - 1) / 2, -1, 1)) / np.maximum(1e-6, (t[step:] - t[:-step])[::step])
+    told = float(np.sqrt(np.mean(rate**2)))
+    bias = np.median(imu.gyro, axis=0)
+    measured = float(np.sqrt(np.mean(np.sum((imu.gyro - bias) ** 2, axis=1))))
+    if told > 0.01 and 30 < measured / told < 110:
+        raise InputError(
+            f"{imu.path}, column 'gx_rad_s': the rates are {measured / told:.3g} times those of the joints:"
+            " these look like deg/s, expected rad/s"
+        )
+
+
+def _check_tracker(setup: _core.TrackSetup, tracker: TrackerData, t: Floats, flange: Floats) -> None:
+    """Measured receiver positions against those of forward kinematics; where they are far off, the reading of
+    the numbers that mends it is named.
+    """
+    stamps = tracker.t - setup.clock_offset
+    rows = _spread_out(len(stamps))
+    rows = rows[(stamps[rows] >= t[0]) & (stamps[rows] <= t[-1])]
+    near = np.clip(np.searchsorted(t, stamps[rows]), 0, len(t) - 1)
+    expected = np.asarray(setup.T_tracker_base) @ flange[near] @ np.asarray(setup.T_flange_receiver)
+    p, measured = expected[:, :3, 3], tracker.position[rows]
+    limit = _FAR_OFF * max(1.0, float(np.median(np.linalg.norm(p - np.median(p, axis=0), axis=1))))
+
+    def off(read: Floats) -> float:
+        return float(np.median(np.linalg.norm(read - p, axis=1)))
+
+    usual = off(measured)
+    if usual <= limit:
+        _check_orientation(tracker, rows, expected)
+        return
+    readings = [
+        (off(1e-3 * measured), "positions in mm: call the columns x_mm y_mm z_mm, or convert them"),
+        (off(1e3 * measured), "positions in km?"),
+    ]
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            axes = np.zeros((3, 3))
+            axes[range(3), order] = signs
+            if (axes == np.eye(3)).all():
+                continue
+            words = " ".join(
+                f"{'' if sign > 0 else '-'}{'xyz'[k]}" for k, sign in zip(order, signs, strict=True)
+            )
+            kind = (
+                "left-handed axes"
+                if np.linalg.det(axes) < 0
+                else "a y-up frame"
+                if order[2] == 1
+                else "other axes"
+            )
+            readings.append(
+                (
+                    off(measured @ axes.T),
+                    (
+                        f"{kind}: the set-up's x y z are its {words}; convert positions and quaternions, or"
+                        " calibrate with this tracker frame"
+                    ),
+                )
+            )
+    best, what = min(readings)
+    where = f"{tracker.path}: positions are {usual:.4g} m from where encoders and set-up put the receiver"
+    if best < _CLEAR * usual and best <= limit:
+        raise InputError(f"{where}, but {best:.3g} m with {what}")
+    raise InputError(
+        f"{where}, expected below {limit:.3g} m: is this the set-up of this recording? `truing track"
+        " calibrate` finds it anew"
+    )
+
+
+def _check_orientation(tracker: TrackerData, rows: NDArray[np.intp], expected: Floats) -> None:
+    if tracker.orientation is None:
+        return
+    q = tracker.orientation[rows]
+
+    def off(read: Floats) -> float:
+        trace = np.einsum("nij,nij->n", rotations_from_quaternions(read), expected[:, :3, :3])
+        return float(np.median(np.arccos(np.clip((trace - 1) / 2, -1, 1))))
+
+    usual = off(q)
+    if usual < 0.35:
+        return
+    readings = [
+        (off(q[:, [3, 0, 1, 2]]), "scalar last"),
+        (off(q * np.array([1.0, -1.0, -1.0, -1.0])), "inverted (the tracker in the receiver)"),
+    ]
+    best, what = min(readings)
+    hint = (
+        f", but {best:.2g} rad if the quaternions are {what}: convert them"
+        if best < _CLEAR * usual
+        else ": is this the set-up of this recording?"
+    )
+    raise InputError(
+        f"{tracker.path}, column 'qw': orientations are {usual:.3g} rad from what encoders and set-up"
+        f" say{hint}"
+    )
+
+
+# ---- Frames between frames
+# -------------------------------------------------------------------------------------------
+
+
+def rotation_vectors(R: Floats) -> Floats:
+    """shape=(n, 3) [rad] of shape=(n, 3, 3), for turns well below half a turn."""
+    w = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+    sine, cosine = np.linalg.norm(w, axis=1), (np.einsum("nii->n", R) - 1) / 2
+    angle = np.arctan2(sine, cosine)
+    return np.asarray(w * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-300), 1.0)[:, None])
+
+
+def interpolated(t: Floats, T: Floats, at: Floats) -> Floats:
+    """Frames between two of a stream, shape=(m, 4, 4): positions on a line, orientations by a normalised mean
+    of the neighbours' columns.
+    """
+    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+    x = ((at - t[k]) / (t[k + 1] - t[k]))[:, None, None]
+    out = (1 - x) * T[k] + x * T[k + 1]
+    u, _, vt = np.linalg.svd(out[:, :3, :3])
+    out[:, :3, :3] = u @ vt
+    return np.asarray(out)
+
+
+# ---- Calibration
+# -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TrackCalibration:
+    """What `track_calibrate` found, part by part."""
+
+    where: SetupData  # to be saved as setup.yaml; means nothing unless `status` is "done"
+    status: str  # "done", "not observable", "not consistent", "not converged"
+    message: str
+    frames: _core.FramesResult
+    positions: tuple[_core.RestPose, ...]  # standstills that frames were found from; none: the motion itself
+    times: Floats  # shape=(n,) [s] of the positions used, the controller's clock
+    inertial: _core.InertialResult | None
+    tool: _core.ToolResult | None
+    joints_clock: _core.ClockOffset | None  # t_controller = t_tracker + offset; None: not compared
+    same_clock: bool  # controller and inertial sensor share one
+    actuator_lag: float | None  # [s] None: no plan
+    modes: _core.ModesResult | None
+    notes: tuple[str, ...]
+
+
+def track_calibrate(
+    robot: _core.Robot,
+    joints: JointData,
+    tracker: TrackerData,
+    imu: ImuData | None = None,
+    *,
+    plan: PoseData | None = None,
+    tool: ToolPoses | None = None,
+    clock_wanted: float = 1e-3,
+) -> TrackCalibration:
+    """Find a tracking set-up from one recording: the arm goes from test position to test position, and stands
+    still at each for three seconds or more.
+
+    Joints and tracker give the offset of their clocks, the tracker frame and the receiver on the flange; the
+    inertial sensor, gravity and its clock come from
+    the motion between. Where the arm never stood still, frames come from the motion as well.
+
+    plan: planned tool; gives the actuators' lag and the modes of the sway. tool: prescribed poses of the
+    tool; None: the robot file's tool.
+    clock_wanted: [s] a larger standard error of the inertial sensor's clock offset is not enough, and advice
+    is given.
+
+    Raises InputError on data that cannot be used; what the data do not show is a status, not a number.
+    """
+    if tracker.orientation is None:
+        raise InputError(
+            f"{tracker.path}: there are no columns qw qx qy qz: frames are calibrated from poses of the"
+            " receiver; position alone is enough for `track run`"
+        )
+    stamps, first = np.unique(tracker.t, return_index=True)
+    position, orientation = tracker.position[first], tracker.orientation[first]
+    seen = np.tile(np.eye(4), (len(stamps), 1, 1))
+    seen[:, :3, :3], seen[:, :3, 3] = rotations_from_quaternions(orientation), position
+    flange = _core.flange_poses(robot, joints.joints)
+    clock, drift, reference = _joints_clock(joints.t, flange, stamps, seen)
+    stamps = stamps + drift * (stamps - reference)
+    offset = clock.offset if clock.found else 0.0  # t_controller = t_tracker + offset
+    notes = [] if clock.found else [f"joints and tracker are taken to have one clock: {clock.message}"]
+    notes += (
+        [
+            f"joints and tracker: t_controller = t_tracker {offset:+.4f} s, standard error"
+            f" {1e3 * clock.sigma:.2g} ms"
+        ]
+        if clock.found
+        else []
+    )
+    if drift:
+        rate = 1.0 / float(np.median(np.diff(tracker.t[first])))
+        notes.append(
+            f"the tracker's clock drifts by {1e6 * drift:+.0f} ppm: its stamps say {rate:.2f} Hz, by the"
+            f" controller's clock it ran at {rate / (1.0 + drift):.2f} Hz. setup.yaml has the drift; live,"
+            " take it off the stamps"
+        )
+
+    rests = _core.find_rests(joints.t, flange, stamps, position, orientation, clock_offset=-offset)
+    if len(rests) >= _FEWEST_RESTS:
+        times, hand, board = (
+            np.array([(rest.start + rest.end) / 2 for rest in rests]),
+            np.array([rest.T_base_flange for rest in rests]),
+            np.array([rest.T_tracker_receiver for rest in rests]),
+        )
+    else:
+        notes.append(
+            f"the arm stood still {len(rests)} times (for three seconds or more), fewer than {_FEWEST_RESTS}:"
+            " frames come from the motion, with its sway and the clocks' offset in them"
+        )
+        rests = ()
+        inside = np.flatnonzero((stamps + offset > joints.t[0]) & (stamps + offset < joints.t[-1]))
+        if inside.size < _FEWEST_RESTS:
+            raise InputError(
+                f"{tracker.path}: {inside.size} samples lie within the time of {joints.path}, expected"
+                " streams of the same time"
+            )
+        chosen = inside[np.linspace(0, inside.size - 1, min(_FROM_MOTION, inside.size)).astype(np.intp)]
+        times = stamps[chosen] + offset
+        hand, board = interpolated(joints.t, flange, times), seen[chosen]
+    frames = _core.calibrate_frames(hand, board)
+    status, message = frames.status, re.sub(r': reading "[^"]*"', "", frames.message)
+    notes += list(frames.warnings)
+
+    inertial = None
+    if imu is not None and status == "done":
+        inertial = _core.calibrate_inertial(
+            imu.t, imu.gyro, imu.accel, stamps + offset, position, orientation, clock_wanted=clock_wanted
+        )
+        notes += list(inertial.warnings)
+        if inertial.status != "done":
+            status, message = inertial.status, inertial.message
+    found_tool = None
+    if tool is not None and status == "done":
+        found_tool = _core.calibrate_tool(
+            _core.flange_poses(robot, tool.pivot),
+            _core.flange_poses(robot, tool.orientation) if len(tool.orientation) else None,
+            list(tool.prescribed),
+        )
+        if found_tool.status != "done":
+            status, message = found_tool.status, found_tool.message
+    if status != "done":
+        empty = SetupData(_core.TrackSetup())
+        return TrackCalibration(
+            empty,
+            status,
+            message,
+            frames,
+            tuple(rests),
+            times,
+            inertial,
+            found_tool,
+            clock if clock.found else None,
+            True,
+            None,
+            None,
+            tuple(dict.fromkeys(notes)),
+        )
+
+    where, same_clock, more = _assembled(robot, frames, inertial, found_tool, clock)
+    where = replace(where, clock_drift=-drift, clock_reference=reference)
+    notes += more
+    lag, modes = None, None
+    if plan is not None:
+        lag = actuator_lag(joints.t, flange @ np.asarray(where.setup.T_flange_tool), plan)
+        where = replace(where, setup=where.setup.replace(actuator_lag=lag))
+    if imu is not None:
+        streams = recorded_streams(robot, where, imu=imu, joints=joints, tracker=tracker, plan=plan)
+        where = _tuned(streams, replace(where, filter=_noise(imu, tracker)))
+        if plan is not None:
+            modes = _core.replay(
+                streams, where.setup, where.options(), horizons=[], learn_modes=0.97 * float(np.ptp(imu.t))
+            ).modes
+            where = replace(where, modes=modes.model)
+    return TrackCalibration(
+        where,
+        status,
+        message,
+        frames,
+        tuple(rests),
+        times,
+        inertial,
+        found_tool,
+        clock if clock.found else None,
+        same_clock,
+        lag,
+        modes,
+        tuple(dict.fromkeys(notes)),
+    )
+
+
+def _assembled(
+    robot: _core.Robot,
+    frames: _core.FramesResult,
+    inertial: _core.InertialResult | None,
+    tool: _core.ToolResult | None,
+    clock: _core.ClockOffset,
+) -> tuple[SetupData, bool, list[str]]:
+    """Frames, gravity and clocks together, with covariances; whether controller and inertial sensor share a
+    clock; what to know.
+    """
+    offset = clock.offset if clock.found else 0.0
+    T_tracker_base, T_flange_receiver = (
+        np.asarray(frames.T_tracker_base.T),
+        np.asarray(frames.T_flange_receiver.T),
+    )
+    covariance = {
+        "T_tracker_base": np.asarray(frames.T_tracker_base.covariance),
+        "T_flange_receiver": np.asarray(frames.T_flange_receiver.covariance),
+    }
+    notes: list[str] = []
+    if inertial is None:
+        setup = _core.TrackSetup(
+            T_tracker_base=T_tracker_base,
+            T_flange_receiver=T_flange_receiver,
+            gravity=robot.gravity,
+            clock_offset=-offset,
+        )
+        notes.append(
+            "without --imu the inertial sensor, gravity and its clock are not found: `track run` needs them"
+        )
+        same = True
+    else:
+        setup, told = _core.assemble_setup(frames, inertial)
+        notes += told
+        # The tracker's stamps were shifted by `offset` first: what is left is between controller and inertial
+        # sensor.
+        between, sigma = (
+            inertial.clock_offset,
+            np.hypot(inertial.clock_offset_sigma, clock.sigma if clock.found else 0.0),
+        )
+        same = not clock.found or abs(between) < max(3.0 * float(sigma), _SAME_CLOCK)
+        setup.clock_offset = between - offset
+        setup.controller_clock_offset = 0.0 if same else between
+        if same and clock.found:
+            notes.append(
+                f"joints and inertial sensor are taken to have one clock: {1e3 * between:+.2g} ms between"
+                " them is what sway makes of angular speeds"
+            )
+        turn = np.zeros((6, 6))
+        turn[:3, :3] = turn[3:, 3:] = T_flange_receiver[:3, :3]
+        lever = T_flange_receiver[:3, :3] @ np.asarray(inertial.T_receiver_imu.T)[:3, 3]
+        carry = np.eye(6)
+        carry[:3, 3:] = -np.array(
+            [[0, -lever[2], lever[1]], [lever[2], 0, -lever[0]], [-lever[1], lever[0], 0]]
+        )
+        covariance["T_flange_imu"] = (
+            carry @ covariance["T_flange_receiver"] @ carry.T
+            + turn @ np.asarray(inertial.T_receiver_imu.covariance) @ turn.T
+        )
+    if tool is None:
+        frames_at_zero = _core.forward_kinematics(robot, np.zeros(robot.driven_count))
+        setup.T_flange_tool = np.linalg.inv(frames_at_zero[-2]) @ frames_at_zero[-1]
+    else:
+        setup.T_flange_tool = tool.T_flange_tool.T
+        covariance["T_flange_tool"] = np.asarray(tool.T_flange_tool.covariance)
+    return SetupData(setup, covariance), same, notes
+
+
+def _joints_clock(
+    t: Floats, flange: Floats, stamps: Floats, seen: Floats
+) -> tuple[_core.ClockOffset, float, float]:
+    """t_controller = t_tracker + offset + drift (t_tracker - reference), by the turns that both saw: the
+    whole for the offset, stretches of it for the drift; 0 where none shows.
+    """
+
+    def compare(rows: slice, at: Floats, search: float = 10.0) -> _core.ClockOffset:
+        return _core.handeye_clock(t.tolist(), flange, at[rows].tolist(), seen[rows], "eye-to-hand", search)
+
+    whole = compare(slice(None), stamps)
+    count = int(np.ptp(stamps) / _STRETCH)
+    if not whole.found or count < 3:
+        return whole, 0.0, 0.0
+    edges = np.linspace(0, len(stamps), count + 1).astype(np.intp)
+    found = [
+        (float(np.mean(stamps[a:b])), c)
+        for a, b in zip(edges[:-1], edges[1:], strict=True)
+        if b - a > 100 and (c := compare(slice(a, b), stamps + whole.offset, _DRIFTED)).found
+    ]
+    at, offsets = np.array([when for when, _ in found]), np.array([c.offset for _, c in found])
+    if len(found) < 3 or np.ptp(at) < 2 * _STRETCH:
+        return whole, 0.0, 0.0
+    line = np.polyfit(at - at.mean(), offsets, 1)
+    scatter = float(np.sqrt(np.sum((offsets - np.polyval(line, at - at.mean())) ** 2) / (len(at) - 2)))
+    drift, sigma = float(line[0]), max(scatter, 1e-4) / float(np.sqrt(np.sum((at - at.mean()) ** 2)))
+    if abs(drift) < max(4.0 * sigma, _LEAST_DRIFT) or abs(drift) > 0.01:
+        return whole, 0.0, 0.0
+    reference = float(at.mean())
+    return compare(slice(None), stamps + drift * (stamps - reference)), drift, reference
+
+
+def white_noise(values: Floats, count: int) -> float:
+    """Standard deviation of white noise in evenly sampled values, shape=(n, k): from third differences, in
+    the quietest fifth of stretches of `count`.
+    """
+    third = np.diff(values, n=3, axis=0)  # of white noise: 20 times its variance
+    stretches = third[: len(third) // count * count].reshape(-1, count * values.shape[1])
+    return float(np.sqrt(np.quantile(np.mean(stretches**2, axis=1), 0.2) / 20.0)) if len(stretches) else 0.0
+
+
+def _noise(imu: ImuData, tracker: TrackerData) -> dict[str, float]:
+    """White noise of the sensors, as third differences show it; options of the filter by name."""
+    step = float(np.median(np.diff(imu.t)))
+    count = max(8, int(0.5 / step))
+    position = tracker.position[np.argsort(tracker.t, kind="stable")]
+    found = {
+        "gyro_noise": max(1e-5, white_noise(imu.gyro, count) * step**0.5),
+        "accel_noise": max(1e-4, white_noise(imu.accel, count) * step**0.5),
+        "position_sigma": max(2e-5, white_noise(position, 30)),
+    }
+    if tracker.orientation is not None:
+        # a change of the quaternion is half the turn; signs are made continuous first
+        q = tracker.orientation[np.argsort(tracker.t, kind="stable")]
+        q = q * np.cumprod(np.where(np.sum(q * np.roll(q, 1, axis=0), axis=1) < 0, -1.0, 1.0))[:, None]
+        found["rotation_sigma"] = max(2e-5, 2.0 * white_noise(q, 30) * (4.0 / 3.0) ** 0.5)
+
+    return found
+
+
+def _tuned(streams: _core.RecordedStreams, where: SetupData) -> SetupData:
+    """The set-up with the noise and the static time that predict the tracker's samples best.
+
+    What an inertial sensor's own filter, its scale and the shaking of its mount do is not white: the noise
+    that stands for it is found by trying. How fast the static
+    deviation wanders depends on the arm: slowly on one that sags, with every move on one whose link table is
+    off.
+    """
+
+    def error(tried: SetupData) -> float:
+        graded = _core.replay(streams, tried.setup, tried.options(), horizons=[_TUNED_FOR]).graded
+        use = (graded["dimensions"] > 0) & (graded["t"] > graded["t"].min(initial=np.inf) + _SETTLING)
+        return (
+            float(np.median(np.linalg.norm(graded["position"][use], axis=1))) if use.sum() > 50 else np.inf
+        )  # the tracker's outliers do not count
+
+    best, least = where, error(where)
+    scaled = [
+        {name: value * (tracker_by if name.endswith("sigma") else by) for name, value in where.filter.items()}
+        for by in _FACTORS
+        for tracker_by in _TRACKER_FACTORS
+    ]
+    for tried in (replace(where, filter=values) for values in scaled):
+        now = error(tried)
+        if now < 0.98 * least:  # what is no better is not taken
+            best, least = tried, now
+    for tried in (replace(best, deviation={"static_time": seconds}) for seconds in _STATIC_TIMES):
+        now = error(tried)
+        if now < 0.98 * least:
+            best, least = tried, now
+    return best
+
+
+def actuator_lag(t: Floats, T_base_tool: Floats, plan: PoseData) -> float:
+    """[s] joints are where the plan was so long ago, from 0 to 0.5: the lag with the smallest difference of
+    positions. Tool by forward kinematics, shape=(n, 4, 4).
+    """
+    inside = (t > plan.t[0] + _LONGEST_LAG) & (t < plan.t[-1])
+    if inside.sum() < 10:
+        raise InputError(
+            f"{plan.path}: from {plan.t[0]:.6g} to {plan.t[-1]:.6g} s, the joints from {t[0]:.6g} to"
+            f" {t[-1]:.6g} s: expected a plan of the same time and clock"
+        )
+    at = t[inside][:: max(1, int(inside.sum()) // 20000)]
+    tool = T_base_tool[inside][:: max(1, int(inside.sum()) // 20000), :3, 3]
+
+    def off(lag: float) -> float:
+        return float(
+            sum(np.mean((np.interp(at - lag, plan.t, plan.T[:, k, 3]) - tool[:, k]) ** 2) for k in range(3))
+        )
+
+    step = 0.005
+    lags = np.arange(0.0, _LONGEST_LAG + step, step)
+    squares = np.array([off(lag) for lag in lags])
+    k = int(np.argmin(squares))
+    if np.ptp(squares) < 1e-9 or k in (0, len(lags) - 1):
+        return float(lags[k]) if np.ptp(squares) >= 1e-9 else 0.0
+    low, middle, high = squares[k - 1 : k + 2]
+    return float(
+        lags[k] + 0.5 * step * (low - high) / (low - 2 * middle + high)
+    )  # vertex of the parabola through three

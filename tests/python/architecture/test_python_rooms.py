@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The rooms of the Python package, checked over every import: a room knows only what is below it.
+
+Imports inside functions and those for type checking count as well.
+"""
+
+from __future__ import annotations
+
+import ast
+import graphlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[3] / "python" / "truing"
+
+# Which rooms a room may import, besides itself. A room is a folder or a single file of the package; "truing" stands
+# for the names of the package itself.
+ROOMS: dict[str, set[str]] = {
+    "errors": {"_core"},
+    "effects": {"_core", "errors"},
+    "examples": set(),
+    "report": set(),
+    "files": {"_core", "errors"},
+    "identification": {"truing", "_core", "errors", "effects", "files", "report"},
+    "planning": {"truing", "_core", "errors", "effects", "files", "report", "identification"},
+    "diagnosis": {"truing", "_core", "errors", "effects", "files", "report", "identification"},
+    "hand_eye": {"truing", "_core", "errors", "effects", "files", "report", "identification"},
+    "inverse_kinematics": {"truing", "_core", "errors", "files", "report"},
+    "tracking": {"truing", "_core", "errors", "files", "report", "hand_eye"},
+    "testing": {"truing", "_core", "errors", "files"},
+    "exam": {
+        "truing",
+        "report",
+    },  # of truing only containers and readers, of report only in page and result: test_exam.py
+    "demo": {"truing", "errors", "examples", "files", "report", "identification", "testing"},
+    "cli": {
+        "truing",
+        "errors",
+        "examples",
+        "files",
+        "report",
+        "identification",
+        "planning",
+        "diagnosis",
+        "hand_eye",
+        "inverse_kinematics",
+        "tracking",
+        "testing",
+        "exam",
+        "demo",
+    },
+    "truing": {
+        "_core",
+        "errors",
+        "effects",
+        "files",
+        "identification",
+        "planning",
+        "diagnosis",
+        "hand_eye",
+        "inverse_kinematics",
+        "tracking",
+        "testing",
+    },
+}
+
+# Rooms in which every module has its place, from the ground up: each may import those before it.
+FLOORS = {
+    "exam": [
+        "robots",
+        "kinematics",
+        "laws",
+        "surprises",
+        "design",
+        "physics",
+        "worlds",
+        "sizing",
+        "recordings",
+        "confounded",
+        "sets",
+        "answers",
+        "score",
+        "sealing",
+        "run",
+        "page",
+        "result",
+    ],
+}
+
+# Packages that are slow to import, or belong to one job: which rooms may import them.
+ONLY_IN = {
+    "yaml": {"files", "testing"},
+    "pydantic": {"files"},
+    "pydantic_core": {"files"},
+    "pyarrow": {"files"},
+    "plotly": {"report"},
+    "typer": {"cli"},
+    "rich": {"cli", "demo"},
+    "mujoco": {"exam"},
+    "cv2": {"files"},
+}
+
+FILES = {path.relative_to(PACKAGE).as_posix(): path for path in PACKAGE.rglob("*.py")}
+MODULES = {
+    ".".join(["truing", *file.removesuffix(".py").removesuffix("__init__").strip("/").split("/")]).rstrip(
+        "."
+    ): file
+    for file in FILES
+}
+
+
+def room_of(module: str) -> str:
+    """truing.files.table -> files; a name of the package itself -> truing."""
+    words = module.split(".")
+    return words[1] if len(words) > 1 and words[1] in {*ROOMS, "_core"} else "truing"
+
+
+def module_of(name: str) -> str:
+    """The module that an imported name is in: truing.files.table.Table -> truing.files.table."""
+    while name not in MODULES and "." in name:
+        name = name.rpartition(".")[0]
+    return name
+
+
+def imports(file: str) -> Iterator[str]:
+    """The full name of everything that is imported anywhere in a file."""
+    for node in ast.walk(ast.parse(FILES[file].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file}: write imports out, from truing…"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def ours(file: str) -> Iterator[str]:
+    return (name for name in imports(file) if name.split(".")[0] == "truing")
+
+
+@pytest.mark.parametrize(("module", "file"), sorted(MODULES.items()))
+def test_a_module_imports_only_rooms_below_its_own(module: str, file: str) -> None:
+    room = room_of(module)
+    for name in ours(file):
+        assert room_of(name) in ROOMS[room] | {room}, f"{file} imports {name}"
+
+
+def test_every_room_has_its_place() -> None:
+    there = {file.split("/")[0].removesuffix(".py") for file in FILES} - {"__init__"}
+    assert there == set(ROOMS) - {"truing"}, "a new room gets its place here and in docs/architecture.md"
+
+
+def test_rooms_do_not_import_in_a_circle() -> None:
+    graphlib.TopologicalSorter({room: below - {"truing"} for room, below in ROOMS.items()}).prepare()
+
+
+@pytest.mark.parametrize("file", sorted(FILES))
+def test_heavy_packages_stay_where_they_are_needed(file: str) -> None:
+    room = file.split("/")[0].removesuffix(".py")
+    for name in imports(file):
+        package = name.split(".")[0]
+        if package in ONLY_IN:
+            assert room in ONLY_IN[package], f"{file} imports {package}"
+        else:
+            known = {"truing", "numpy", *sys.stdlib_module_names}
+            assert package in known, f"{file} imports {package}: a new dependency?"
+
+
+@pytest.mark.parametrize("room", sorted(FLOORS))
+def test_a_module_imports_only_those_below_it_in_its_room(room: str) -> None:
+    floors = FLOORS[room]
+    there = {file for file in FILES if file.startswith(f"{room}/")} - {f"{room}/__init__.py"}
+    assert there == {f"{room}/{module}.py" for module in floors}, "a new module gets its floor here"
+    for floor, module in enumerate(floors):
+        for name in ours(f"{room}/{module}.py"):
+            if room_of(name) == room:
+                words = name.split(".")
+                assert (words[2] if len(words) > 2 else "") in floors[:floor], (
+                    f"{room}/{module}.py imports {name}"
+                )

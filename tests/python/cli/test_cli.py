@@ -1,0 +1,441 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line keeps its contract: files, exit status, one clear line for bad input, nothing
+half-written.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import truing
+from tables import columns
+from truing.cli import main, quantity, share
+from truing.examples import example
+
+ROBOT = str(example("irb120"))
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def simulated(tmp_path: Path) -> Path:
+    assert (
+        main(["simulate", ROBOT, "--poses", "80", "--out", "sim", "--seed", "1", "--outliers", "2%:5mm"]) == 0
+    )
+    return tmp_path / "sim"
+
+
+def identified(folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
+    code = main(
+        ["identify", str(folder / "robot.yaml"), str(folder / "measurements.csv"), "--out", "found", *options]
+    )
+    return code, json.loads(Path("found/result.json").read_text())
+
+
+# ---- Quantities
+# --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "value"),
+    [
+        ("0.03mm", "length", 3e-5),
+        ("1 m", "length", 1.0),
+        ("5µm", "length", 5e-6),
+        ("15deg", "angle", math.radians(15)),
+        ("1mrad", "angle", 1e-3),
+        ("-2e-3rad", "angle", -2e-3),
+        ("40ms", "time", 0.04),
+        ("0", "length", 0.0),
+        (".5 s", "time", 0.5),
+    ],
+)
+def test_a_quantity_is_read_in_si(text: str, kind: str, value: float) -> None:
+    assert quantity(text, kind, "--x") == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize("text", ["3", "", "mm", "3 furlongs", "3deg", "1e999mm", "nanmm", "3 mm 4", "0x3mm"])
+def test_a_length_without_a_proper_unit_is_refused_by_name(text: str) -> None:
+    with pytest.raises(
+        truing.InputError, match=r"--noise: found .* expected a length with its unit .* such as 0\.03mm"
+    ):
+        quantity(text, "length", "--noise")
+
+
+def test_shares() -> None:
+    assert share("2%", "--x") == pytest.approx(0.02)
+    assert share("0.2", "--x") == 0.2
+    for text in ("2", "-1%", "100%", "two", "nan"):
+        with pytest.raises(truing.InputError, match="such as 2%"):
+            share(text, "--x")
+
+
+# ---- What is written
+# ---------------------------------------------------------------------------------------------------
+
+
+def test_identify_writes_its_files_and_says_where_the_report_is(
+    simulated: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    code, result = identified(simulated)
+    assert code == 0
+    assert {path.name for path in Path("found").iterdir()} == {
+        "result.json",
+        "report.html",
+        "robot.yaml",
+        "covariance.csv",
+        "residuals.csv",
+    }
+    assert result["format"] == "truing-identification/1"
+    assert result["solver"]["converged"] and result["rank"] + len(result["frozen"]) == result["columns"]
+    assert {"rms_m", "mean_m", "median_m", "p95_m", "max_m", "n"} <= set(result["errors"]["test"]["after"])
+    assert capsys.readouterr().out.strip().splitlines()[-1] == "report: found/report.html"
+    calibrated = truing.load_robot("found/robot.yaml")
+    assert calibrated.joint("J2").a != truing.load_robot(ROBOT).joint("J2").a
+
+
+def test_residuals_tell_the_same_as_result_json(simulated: Path) -> None:
+    _, result = identified(simulated)
+    table = columns("found/residuals.csv")
+    assert [int(row) for row in table["row"]] == list(range(80))
+    assert [k for k, rejected in enumerate(table["rejected"]) if rejected == "1"] == result["rejected_rows"]
+    for name in ("train", "test"):
+        chosen = [k for k in range(80) if table["set"][k] == name and table["rejected"][k] == "0"]
+        for when in ("before", "after"):
+            error = np.array([[float(table[f"error_{when}_{axis}_m"][k]) for axis in "xyz"] for k in chosen])
+            length = np.linalg.norm(error, axis=1)
+            expected = result["errors"][name][when]
+            assert length == pytest.approx([float(table[f"error_{when}_m"][k]) for k in chosen])
+            assert len(length) == expected["n"]
+            assert [
+                np.sqrt(np.mean(length**2)),
+                length.mean(),
+                np.quantile(length, 0.95),
+                length.max(),
+            ] == pytest.approx(
+                [expected["rms_m"], expected["mean_m"], expected["p95_m"], expected["max_m"]], rel=1e-6
+            )
+
+
+def test_covariance_is_labelled_and_agrees_with_the_standard_errors(simulated: Path) -> None:
+    _, result = identified(simulated)
+    table = columns("found/covariance.csv")
+    fitted = [p for p in result["parameters"] if not p["frozen"]]
+    assert list(table) == ["name", *table["name"]]
+    assert table["name"] == [p["name"] for p in fitted]
+    for k, p in enumerate(fitted):
+        assert math.sqrt(float(table[p["name"]][k])) == pytest.approx(p["sigma"], rel=1e-9)
+
+
+def test_the_same_seed_writes_the_same_result(simulated: Path) -> None:
+    _, first = identified(simulated, "--seed", "3")
+    report = Path("found/report.html").read_bytes()
+    _, again = identified(simulated, "--seed", "3", "--threads", "1")
+    assert first == again
+    assert Path("found/report.html").read_bytes() == report
+
+
+def test_json_is_all_that_is_printed(simulated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    _, result = identified(simulated, "--json")
+    assert json.loads(capsys.readouterr().out) == result
+
+
+def test_prediction_has_a_row_for_every_row_in_order(simulated: Path) -> None:
+    identified(simulated)
+    assert (
+        main(["predict", "found/robot.yaml", str(simulated / "measurements.csv"), "--out", "predicted"]) == 0
+    )
+    table = columns("predicted/predicted.csv")
+    assert list(table) == ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"]
+    robot = truing.load_robot("found/robot.yaml")
+    expected = truing.predict(robot, truing.load_measurements(simulated / "measurements.csv", robot)).position
+    assert np.array(
+        [[float(table[name][k]) for name in ("x_m", "y_m", "z_m")] for k in range(80)]
+    ) == pytest.approx(expected, abs=1e-15)
+    assert json.loads(Path("predicted/result.json").read_text())["errors"]["n"] == 80
+
+
+def test_prediction_needs_no_measurements(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("joints.csv").write_text(
+        "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,0,0,0,0\n10,20,30,40,50,60\n"
+    )
+    assert main(["predict", ROBOT, "joints.csv", "--out", "predicted"]) == 0
+    assert len(columns("predicted/predicted.csv")["x_m"]) == 2
+    assert "errors" not in json.loads(Path("predicted/result.json").read_text())
+
+
+def test_distances_come_back_as_distances() -> None:
+    robot = truing.load_robot(ROBOT)
+    robot.anchor = truing.Anchor([1.0, 0.2, 0.1], 0.01)
+    truing.save_robot("wire.yaml", robot)
+    Path("wire.csv").write_text(
+        "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dist_mm\n0,0,0,0,0,0,900\n10,20,30,40,50,60,\n"
+    )
+    assert main(["predict", "wire.yaml", "wire.csv", "--out", "with"]) == 0
+    assert list(columns("with/predicted.csv")) == ["dist_m"]
+    Path("joints.csv").write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,0,0,0,0\n")
+    assert main(["predict", "wire.yaml", "joints.csv", "--out", "without"]) == 0
+    assert list(columns("without/predicted.csv")) == ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "dist_m"]
+
+
+def test_a_plan_is_measured_by_the_simulator(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", ROBOT, "--poses", "20", "--out", "planned", "--min-step", "20deg"]) == 0
+    table = columns("planned/poses.csv")
+    joints = np.array([[float(table[f"q{k}_rad"][row]) for k in range(1, 7)] for row in range(20)])
+    assert np.abs(np.diff(joints, axis=0)).min() > math.radians(20)
+    assert json.loads(Path("planned/result.json").read_text())["index"]["name"] == "d_optimal"
+    assert main(["simulate", ROBOT, "--plan", "planned/poses.csv", "--out", "sim"]) == 0
+    measured = columns("sim/measurements.csv")
+    assert [float(value) for value in measured["q3_rad"]] == joints[:, 2].tolist()
+
+
+def test_a_plan_says_which_effects_it_tells_apart(capsys: pytest.CaptureFixture[str]) -> None:
+    plan = ["plan", ROBOT, "--poses", "30", "--out"]
+    assert main([*plan, "full", "--columns", "payload,dir,temp,t"]) == 0
+    assert "smallest effects" in capsys.readouterr().out
+    result = json.loads(Path("full/result.json").read_text())
+    seen, table = result["distinguish"], columns("full/poses.csv")
+    assert {"dir1", "dir6", "payload_kg", "temp_C", "t_s"} <= set(table)
+    assert {float(v) for v in table["dir2"]} == {-1, 1} and {float(v) for v in table["payload_kg"]} == {0, 5}
+    assert result["poses"] == len(table["q1_rad"]) == 30 and seen["added_poses"] == 0
+    assert len(seen["r2"]) == len(seen["effects"]) and all(
+        len(row) == len(seen["effects"]) for row in seen["r2"]
+    )
+    assert all(e["size"] > 0 and e["size_at_tip_m"] > 0 for e in seen["effects"])
+    assert any(
+        n["effect"] == "joint_offset" and n["joints"] == ["J1"] and "base" in n["why"]
+        for n in seen["not_testable"]
+    )
+    assert "Which effects look alike" in Path("full/report.html").read_text(encoding="utf-8")
+
+    assert main([*plan, "one", "--separate", "backlash,joint_offset"]) == 0
+    one_sided = json.loads(Path("one/result.json").read_text())["distinguish"]
+    assert "dir1" not in columns("one/poses.csv")
+    assert main([*plan, "two", "--separate", "backlash,joint_offset", "--columns", "dir"]) == 0
+    two_sided = json.loads(Path("two/result.json").read_text())["distinguish"]
+
+    def alike(found: dict[str, Any]) -> set[str]:
+        return {p["joint"] for p in found["alike"] if p["joint"] == p["other_joint"]}
+
+    assert {"J2", "J3", "J4", "J5"} <= alike(one_sided) and not alike(two_sided)
+    assert {e["effect"] for e in two_sided["effects"]} == {"backlash", "joint_offset"}
+    rows = len(columns("two/poses.csv")["q1_rad"])
+    assert rows == 30 + two_sided["added_poses"]
+
+
+def test_a_plan_that_is_asked_nothing_says_nothing_of_effects() -> None:
+    assert main(["plan", ROBOT, "--poses", "20", "--out", "planned"]) == 0
+    assert "distinguish" not in json.loads(Path("planned/result.json").read_text())
+    assert list(columns("planned/poses.csv")) == [f"q{k}_rad" for k in range(1, 7)]
+
+
+def test_simulated_files_hold_nominal_and_truth() -> None:
+    options = [
+        "--effect",
+        "backlash:J2=0.2mrad",
+        "--effect",
+        "harmonic:J3:sin2=1e-4",
+        "--columns",
+        "payload,temp,t",
+        "--orientation",
+        "--base-unknown",
+    ]
+    assert main(["simulate", ROBOT, "--poses", "12", "--out", "sim", *options]) == 0
+    header = list(columns("sim/measurements.csv"))
+    assert {"qw", "dir1", "payload_kg", "temp_C", "t_s"} <= set(header)
+    truth = json.loads(Path("sim/truth.json").read_text())
+    assert {e["parameter"]: e["value"] for e in truth["effects"]} == {
+        "backlash.J2": 2e-4,
+        "harmonic.J3.sin2": 1e-4,
+    }
+    assert truing.load_robot("sim/robot.yaml").joint("J2").a == truing.load_robot(ROBOT).joint("J2").a
+    assert truing.load_robot("sim/true_robot.yaml").joint("J2").a == truth["parameters"]["J2.a"]["true"]
+
+
+def test_a_urdf_comes_back_as_urdf_too() -> None:
+    Path("two.urdf").write_text(
+        '<robot name="two"><link name="a"/><link name="b"/><link name="c"/><link name="d"/><joint name="j1"'
+        ' type="continuous"><parent link="a"/><child link="b"/><origin xyz="0 0 0.5"/><axis xyz="0 0'
+        ' 1"/></joint><joint name="j2" type="continuous"><parent link="b"/><child link="c"/><origin xyz="0.4'
+        ' 0 0.1"/><axis xyz="0 1 0"/></joint><joint name="j3" type="continuous"><parent link="c"/><child'
+        ' link="d"/><origin xyz="0.3 0.1 0"/><axis xyz="0 1 0"/></joint></robot>'
+    )
+    assert (
+        main(["simulate", "two.urdf", "--poses", "60", "--out", "sim", "--base-link", "a", "--tip-link", "d"])
+        == 0
+    )
+    assert main(["identify", "two.urdf", "sim/measurements.csv", "--out", "found"]) == 0
+    assert truing.load_robot("found/robot.urdf").driven_count == 3
+
+
+# ---- Exit status, errors
+# -----------------------------------------------------------------------------------------------
+
+
+def test_a_fit_that_does_not_converge_exits_1_and_says_why(
+    simulated: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    identify = truing.identify
+    monkeypatch.setattr(
+        truing, "identify", lambda *a, **k: identify(*a, **k, max_iterations=1, rms_fall=0.0, gradient=0.0)
+    )
+    code, result = identified(simulated)
+    assert code == 1
+    assert not result["solver"]["converged"] and result["solver"]["stopped_because"]
+    assert result["solver"]["stopped_because"] in capsys.readouterr().err
+    assert "did not converge" in Path("found/report.html").read_text()
+
+
+BAD = [
+    ["nonsense"],
+    ["identify"],
+    ["identify", ROBOT],
+    ["identify", "missing.yaml", "missing.csv"],
+    ["identify", ROBOT, "missing.csv"],
+    ["identify", ROBOT, "DATA", "--loss", "softly"],
+    ["identify", ROBOT, "DATA", "--free", "J9.*"],
+    ["identify", ROBOT, "DATA", "--effects", "slack"],
+    ["identify", ROBOT, "DATA", "--effects", "backlash"],
+    ["identify", ROBOT, "DATA", "--rotation-length", "10"],
+    ["identify", ROBOT, "DATA", "--test-share", "3"],
+    ["identify", ROBOT, "DATA", "--tip-link", "flange"],
+    ["identify", ROBOT, ROBOT],
+    ["predict", ROBOT, "missing.csv"],
+    ["simulate", ROBOT, "--noise", "0.03"],
+    ["simulate", ROBOT, "--noise", "-1mm"],
+    ["simulate", ROBOT, "--geometry-error", "1mm"],
+    ["simulate", ROBOT, "--geometry-error", "1mm,-1mrad"],
+    ["simulate", ROBOT, "--effect", "backlash"],
+    ["simulate", ROBOT, "--effect", "backlash:J2=much"],
+    ["simulate", ROBOT, "--effect", "slack:J2=1"],
+    ["simulate", ROBOT, "--outliers", "2%"],
+    ["simulate", ROBOT, "--columns", "humidity"],
+    ["simulate", ROBOT, "--perturb", "J9.*"],
+    ["simulate", ROBOT, "--poses", "none"],
+    ["plan", ROBOT, "--poses", "2"],
+    ["plan", ROBOT, "--min-step", "15"],
+    ["plan", ROBOT, "--min-step", "300deg"],
+    ["plan", ROBOT, "--columns", "humidity"],
+    ["plan", ROBOT, "--separate", "slack"],
+    ["plan", ROBOT, "--separate", "backlash:J9"],
+    ["plan", ROBOT, "--columns", "payload", "--payload", "5"],
+    ["plan", ROBOT, "--columns", "temp", "--temperatures", "35,20"],
+]
+
+
+@pytest.mark.parametrize("arguments", BAD, ids=[" ".join(a).replace(ROBOT, "ROBOT") for a in BAD])
+def test_bad_input_is_one_clear_line_and_nothing_is_written(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    if "DATA" in arguments:
+        truing.save_measurements(
+            "data.csv", truing.simulate(truing.load_robot(ROBOT), poses=60).data, truing.load_robot(ROBOT)
+        )
+    before = sorted(Path().iterdir())
+    code = main([argument.replace("DATA", "data.csv") for argument in arguments])
+    captured = capsys.readouterr()
+    assert code == 2
+    assert captured.out == ""
+    assert (
+        captured.err.startswith("truing: ") and captured.err.count("\n") == 1 and captured.err.endswith("\n")
+    )
+    assert sorted(Path().iterdir()) == before
+
+
+def test_a_folder_that_cannot_be_written_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("file").write_text("mine")
+    assert main(["simulate", ROBOT, "--poses", "3", "--out", "file"]) == 2
+    assert "expected a folder" in capsys.readouterr().err
+    assert Path("file").read_text() == "mine"
+
+
+def test_warnings_about_the_input_go_to_stderr_and_into_the_result(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    robot = truing.load_robot(ROBOT)
+    joints = np.random.default_rng(0).uniform(-1, 1, (60, 6))
+    joints[7, 4] = 3.0  # beyond J5's limits
+    truing.save_measurements("data.csv", truing.simulate(robot, joints=joints).data, robot)
+    assert main(["identify", ROBOT, "data.csv", "--out", "found", "--json"]) == 0
+    captured = capsys.readouterr()
+    assert "warning: " in captured.err and "J5" in captured.err
+    assert any("J5" in warning for warning in json.loads(captured.out)["warnings"])
+
+
+def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
+    program = (
+        "import sys; from truing.cli import main; print('ready', flush=True); sys.exit(main(sys.argv[1:]))"
+    )
+    arguments = [
+        sys.executable,
+        "-c",
+        program,
+        "plan",
+        str(example("ur10")),
+        "--poses",
+        "40000",
+        "--out",
+        "planned",
+    ]
+    with subprocess.Popen(
+        arguments, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
+    ) as process:
+        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        time.sleep(3.0)  # at work, past its imports
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_version_and_effects(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"truing {truing.__version__}\n"
+    assert main(["effects"]) == 0
+    listed = capsys.readouterr().out
+    assert all(name in listed for name, _ in truing.catalogue())
+
+
+def test_help_is_quick_and_leaves_the_heavy_libraries_alone() -> None:
+    program = (
+        "import sys; from truing.cli import main; main(['--help']); sys.exit(any(m in sys.modules for m in"
+        " ('plotly', 'pandas', 'scipy')))"
+    )
+    assert (
+        subprocess.run([sys.executable, "-c", program], stdout=subprocess.DEVNULL, check=False).returncode
+        == 0
+    )
+
+
+def test_the_demo_finds_the_truth_and_ends_with_the_report(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "--out", "demo"]) == 0
+    assert capsys.readouterr().out.strip().splitlines()[-1] == "report: demo/report.html"
+    truth = json.loads(Path("demo/truth.json").read_text())
+    assert truth["fresh_poses"]["after_mean_m"] < 2.5e-5 < 1e-3 < truth["fresh_poses"]["before_mean_m"]
+    assert {
+        "result.json",
+        "robot.yaml",
+        "nominal.yaml",
+        "poses.csv",
+        "measurements.csv",
+        "covariance.csv",
+        "residuals.csv",
+    } <= {path.name for path in Path("demo").iterdir()}

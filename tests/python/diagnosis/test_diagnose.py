@@ -1,0 +1,602 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""truing diagnose keeps its contract, from Python and from the command line, whatever the verdict."""
+
+from __future__ import annotations
+
+import csv
+import inspect
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import truing
+from truing.cli import main
+from truing.examples import example
+from truing.testing.simulation import random_joints
+
+ROBOT = str(example("irb120"))
+NOISE = 3e-5  # [m] of one coordinate
+CASES = ["none", "effects", "unknown", "effects+unknown"]
+
+
+def step(d: Any) -> Any:
+    """What no catalogue has: J2 jumps where it passes 0.41 rad."""
+    return np.where(d.joint("J2") > 0.41, 1.0, -1.0)
+
+
+OWN = truing.Effect("jump", site="J2", basis=step)
+
+
+def measured(case: str, *, poses: int = 220, orientation: bool = False) -> truing.Measurements:
+    """A robot with known geometry, an unknown base, and what the verdict `case` asks for."""
+    robot = truing.load_robot(ROBOT)
+    rng = np.random.default_rng([7, poses])
+    joints = random_joints(robot, poses, 3)
+    directions = rng.choice([-1.0, 1.0], size=joints.shape)
+    true = robot.copy()
+    true.T_measurement_base = truing.frame_from_xyz_rpy([0.4, -1.6, 0.3], [0.01, -0.02, 0.8])
+    if case.startswith("effects"):
+        true.effects = [truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 1e-3})]
+    moved = joints.copy()
+    if case.endswith("unknown"):
+        moved[:, 1] += np.where(joints[:, 1] > 0.41, 6e-4, -6e-4)
+    predicted = truing.predict(true, truing.Measurements(moved, directions=directions))
+    positions = np.asarray(predicted.position) + rng.normal(0, NOISE, (poses, 3))
+    return truing.Measurements(
+        joints,
+        positions=positions,
+        directions=directions,
+        orientations=predicted.orientation if orientation else None,
+    )
+
+
+def in_order(poses: int = 220) -> truing.Measurements:
+    """The verdict "effects", with the approach directions of poses that were driven to one after the other."""
+    base = measured("effects", poses=poses)
+    joints = np.array(base.joints)
+    directions = np.ones_like(joints)
+    directions[1:] = np.sign(np.diff(joints, axis=0))
+    true = truing.load_robot(ROBOT)
+    true.effects = [truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 1e-3})]
+    predicted = truing.predict(true, truing.Measurements(joints, directions=directions))
+    positions = np.asarray(predicted.position) + np.random.default_rng(11).normal(0, NOISE, (poses, 3))
+    return truing.Measurements(joints, positions=positions, directions=directions)
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def written(data: truing.Measurements) -> str:
+    truing.save_measurements("data.csv", data, truing.load_robot(ROBOT))
+    return "data.csv"
+
+
+def diagnosed(data: truing.Measurements, *options: str) -> dict[str, Any]:
+    assert main(["diagnose", ROBOT, written(data), "--out", "found", *options]) == 0
+    result: dict[str, Any] = json.loads(Path("found/result.json").read_text())
+    return result
+
+
+def columns(path: str) -> dict[str, list[str]]:
+    with open(path, newline="") as file:
+        rows = list(csv.reader(file))
+    return {name: [row[k] for row in rows[1:]] for k, name in enumerate(rows[0])}
+
+
+# ---- The contract of result.json
+# ---------------------------------------------------------------------------------------
+
+NUMBER = (int, float)
+TEXTS, NUMBERS = [str], [NUMBER]
+MAYBE = (int, float, type(None))
+CI = [NUMBER, NUMBER]
+CURVES = [
+    {
+        "site": str,
+        "input": str,
+        "input_unit": str,
+        "second": (dict, type(None)),
+        "unit": str,
+        "points": [[NUMBER]],
+        "samples": [[NUMBER]],
+    }
+]
+HELD_OUT = {"before_rms_m": NUMBER, "after_rms_m": NUMBER, "shrink": NUMBER, "ci": CI, "n": int}
+PARAMETER = {"name": str, "value": NUMBER, "sigma": MAYBE, "unit": str}
+ALTERNATIVE = {"effect": str, "joints": TEXTS, "probability": NUMBER, "separated_by": str}
+EFFECT = {
+    "effect": str,
+    "joints": TEXTS,
+    "probability": NUMBER,
+    "parameters": [PARAMETER],
+    "held_out": HELD_OUT,
+    "share": NUMBER,
+    "share_alone": NUMBER,
+    "share_last": NUMBER,
+    "confounded_with": [ALTERNATIVE],
+    "note": str,
+    "identify_as": str,
+    "curves": CURVES,
+}
+UNKNOWN = {
+    "joint": str,
+    "inputs": TEXTS,
+    "probability": NUMBER,
+    "held_out": HELD_OUT,
+    "share": NUMBER,
+    "curve": [[NUMBER]],
+    "curves": CURVES,
+    "looks_like": str,
+}
+CANDIDATE = {
+    "effect": str,
+    "joints": TEXTS,
+    "columns": int,
+    "gain": MAYBE,
+    "evidence": MAYBE,
+    "held_out_gain": MAYBE,
+    "largest_z": MAYBE,
+}
+CONTRACT = {
+    "format": str,
+    "version": str,
+    "robot": str,
+    "verdict": str,
+    "sentence": str,
+    "gap": {
+        "rms_m": NUMBER,
+        "p95_m": NUMBER,
+        "max_m": NUMBER,
+        "noise_floor_m": NUMBER,
+        "closable": NUMBER,
+        "noise_from_repeats": bool,
+        "p": NUMBER,
+        "parts": {"noise": NUMBER, "effects": NUMBERS, "unknown": NUMBERS, "unexplained": NUMBER},
+    },
+    "where": {
+        "joints": [{"joint": str, "share": NUMBER, "ci": CI}],
+        "inputs": [{"input": str, "share": NUMBER}],
+        "workspace": [{"center_m": [NUMBER], "rms_m": NUMBER, "n": int}],
+        "direction": [{"axis": NUMBERS, "rms_m": NUMBER}],
+    },
+    "effects": [EFFECT],
+    "unknown": [UNKNOWN],
+    "after": {"rms_m": NUMBER, "remaining_structure_p": MAYBE},
+    "after_unknown": {"rms_m": NUMBER, "n": int},
+    "shrink": {"value": NUMBER, "ci": CI},
+    "not_testable": [{"effect": str, "joints": TEXTS, "why": str}],
+    "detectable": [
+        {"effect": str, "joint": str, "parameter": str, "unit": str, "size": NUMBER, "size_at_tip_m": NUMBER}
+    ],
+    "candidates": [CANDIDATE],
+    "sanity": [{"kind": str, "text": str, "rows": [int]}],
+    "next_measurements": [{"joints": NUMBERS, "direction": [int], "payload_kg": MAYBE, "why": str}],
+    "nearest_neighbour": {"p95_m": MAYBE, "share": MAYBE},
+    "joint_record": str,
+    "outliers": [int],
+    "seed": int,
+    "warnings": TEXTS,
+}
+
+
+def check(value: Any, wanted: Any, where: str = "result") -> None:
+    """That `value` has at least the keys, and everywhere the types, of `wanted`."""
+    if isinstance(wanted, dict):
+        assert isinstance(value, dict) and set(wanted) <= set(value), (
+            f"{where} lacks {set(wanted) - set(value)}"
+        )
+        for key, inner in wanted.items():
+            check(value[key], inner, f"{where}.{key}")
+    elif isinstance(wanted, list):
+        assert isinstance(value, list), where
+        if len(wanted) > 1:
+            assert len(value) == len(wanted), where
+        for k, item in enumerate(value):
+            check(item, wanted[k if len(wanted) > 1 else 0], f"{where}[{k}]")
+    else:
+        assert isinstance(value, wanted) and (wanted is bool or not isinstance(value, bool)), (
+            f"{where} is {value!r}"
+        )
+
+
+def named(effect: dict[str, Any]) -> str:
+    """Name in the catalogue: a transmission error is reported with its order, "transmission_error@14"."""
+    return str(effect["effect"]).split("@")[0]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_result_json_keeps_its_contract(case: str) -> None:
+    result = diagnosed(measured(case))
+    check(result, CONTRACT)
+    assert result["format"] == "truing-diagnosis/1"
+    known = {name for name, _ in truing.catalogue()}
+    for effect in result["effects"]:
+        assert named(effect) in known
+        assert (
+            0 <= effect["probability"] <= 1
+            and effect["held_out"]["ci"][0] <= effect["held_out"]["shrink"] <= effect["held_out"]["ci"][1]
+        )
+    assert {named(a) for e in result["effects"] for a in e["confounded_with"]} <= known
+    parts = result["gap"]["parts"]
+    assert len(parts["effects"]) == len(result["effects"]) and len(parts["unknown"]) == len(result["unknown"])
+    every = [parts["noise"], parts["unexplained"], *parts["effects"], *parts["unknown"]]
+    assert sum(every) == pytest.approx(1) and min(every) >= 0
+    assert parts["effects"] == [e["share"] for e in result["effects"]] and parts["unknown"] == [
+        u["share"] for u in result["unknown"]
+    ]
+    closed = 1 - (result["after_unknown"]["rms_m"] / result["gap"]["rms_m"]) ** 2
+    assert sum(parts["effects"]) + sum(parts["unknown"]) == pytest.approx(max(0.0, closed), abs=1e-9)
+    assert result["gap"]["n"] == result["after"]["n"] == result["after_unknown"]["n"] > 0
+    for curve in [c for e in [*result["effects"], *result["unknown"]] for c in e["curves"]]:
+        assert curve["site"].split(".")[0] in {
+            *(joint.name for joint in truing.load_robot(ROBOT).joints),
+            "base",
+        }
+        check(curve["second"] or {}, {"input": str, "unit": str, "range": CI} if curve["second"] else {})
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_verdict_is_that_of_the_hidden_truth(case: str) -> None:
+    found = truing.diagnose(truing.load_robot(ROBOT), measured(case))
+    assert found.verdict == case
+    assert bool(found.effects) == case.startswith("effects") and bool(found.unknown) == case.endswith(
+        "unknown"
+    )
+    if case.startswith("effects"):
+        assert ("backlash", ("J3",)) in [(e.effect, e.joints) for e in found.effects]
+    if case.endswith("unknown"):
+        assert found.unknown[0].joint == "J2" and "q2" in found.unknown[0].inputs
+
+
+# ---- What is written
+# ---------------------------------------------------------------------------------------------------
+
+
+def test_diagnose_writes_its_files_and_says_where_the_report_is(capsys: pytest.CaptureFixture[str]) -> None:
+    result = diagnosed(measured("effects"))
+    files = {"result.json", "report.html", "robot.yaml", "residuals.csv"} | (
+        {"next_poses.csv"} if result["next_measurements"] else set()
+    )
+    assert {path.name for path in Path("found").iterdir()} == files
+    lines = capsys.readouterr().out.strip().splitlines()
+    assert lines[-1] == "report: found/report.html"
+    assert result["sentence"] in lines
+
+
+def rms_of_robot_file(data: truing.Measurements) -> float:
+    """Of found/robot.yaml, on the rows held out."""
+    error = np.linalg.norm(
+        np.asarray(truing.residuals(truing.load_robot("found/robot.yaml"), data).position), axis=1
+    )
+    test = np.array(columns("found/residuals.csv")["set"]) == "test"
+    return float(np.sqrt(np.mean(error[test] ** 2)))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_robot_file_holds_what_was_named(case: str) -> None:
+    data = measured(case)
+    result = diagnosed(data)
+    robot = truing.load_robot("found/robot.yaml")
+    stands_for = {"gravity_moment": "joint_compliance"}  # where the links' masses are not known
+    assert {stands_for.get(e.effect, e.effect) for e in robot.effects} <= {
+        e["effect"] for e in result["effects"]
+    }
+    rms = rms_of_robot_file(data)
+    assert result["shrink"]["value"] == pytest.approx(1 - rms / result["gap"]["rms_m"], abs=1e-6)
+    assert yaml.safe_load(Path("found/robot.yaml").read_text())["calibration"]["rms_m"] == pytest.approx(
+        rms, rel=1e-6
+    )
+    if case == "effects":  # neither drifts nor corrections of laws: the robot is all that was named
+        assert rms == pytest.approx(result["after"]["rms_m"], rel=1e-6)
+
+
+def test_what_nothing_describes_is_unknown_without_joint_and_input(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    rng = np.random.default_rng(31)
+    robot = truing.load_robot(ROBOT)
+    joints = np.repeat(random_joints(robot, 80, 9), 3, axis=0)
+    places = np.asarray(truing.predict(robot, truing.Measurements(joints)).position) + np.repeat(
+        rng.normal(0, 1.5e-4, (80, 3)), 3, axis=0
+    )
+    data = truing.Measurements(
+        joints, positions=places + rng.normal(0, 2e-5, places.shape), directions=np.ones_like(joints)
+    )
+    result = diagnosed(data)
+    check(result, CONTRACT)
+    assert result["verdict"] == "unknown" and "Repeats show a noise of" in result["sentence"]
+    (unknown,) = result["unknown"]
+    assert unknown["joint"] == "" and unknown["inputs"] == [] and unknown["curves"] == []
+    assert "unknown somewhere" in capsys.readouterr().out
+    page = Path("found/report.html").read_text()
+    assert "Unknown somewhere <" in page
+    assert "unknown, somewhere: no function" in truing.diagnose(robot, data).summary()
+
+
+def test_directions_that_were_inferred_are_written_and_serve_the_robot_file() -> None:
+    data = in_order()
+    given = diagnosed(data)
+    assert not any(name.startswith("dir") for name in columns("found/residuals.csv"))
+    assert truing.diagnose(truing.load_robot(ROBOT), data).directions is None
+    result = diagnosed(data.replace(directions=None))
+    assert ("backlash", ["J3"]) in [(e["effect"], e["joints"]) for e in result["effects"]]
+    assert any(s["kind"] == "direction" for s in result["sanity"])
+    table = columns("found/residuals.csv")
+    inferred = np.array([[float(v) for v in table[f"dir{k + 1}"]] for k in range(6)]).T
+    assert np.array_equal(inferred[1:], np.asarray(data.directions)[1:])
+    assert rms_of_robot_file(data.replace(directions=inferred)) == pytest.approx(
+        result["after"]["rms_m"], rel=1e-6
+    )
+    assert result["after"]["rms_m"] == pytest.approx(given["after"]["rms_m"], rel=0.1)
+
+
+def test_residuals_tell_the_same_as_result_json() -> None:
+    result = diagnosed(measured("effects", orientation=True))
+    table = columns("found/residuals.csv")
+    assert {"row", "set", "pose", "outlier", "q1_rad", "x_m"} <= set(table)
+    assert [int(row) for row in table["row"]] == list(range(220))
+    assert [k for k, out in enumerate(table["outlier"]) if out == "1"] == sorted(result["outliers"])
+    chosen = [k for k in range(220) if table["set"][k] == "test"]
+    for when, expected in (("before", result["gap"]), ("after", result["after"])):
+        error = np.array([[float(table[f"error_{when}_{axis}_m"][k]) for axis in "xyz"] for k in chosen])
+        assert np.sqrt(np.mean(np.sum(error**2, axis=1))) == pytest.approx(expected["rms_m"], rel=1e-6)
+        rotation = np.array(
+            [[float(table[f"rotation_error_{when}_{axis}_rad"][k]) for axis in "xyz"] for k in range(220)]
+        )
+        assert np.isfinite(rotation).all()
+
+
+def test_the_same_seed_writes_the_same_result() -> None:
+    data = measured("effects")
+    first = diagnosed(data, "--seed", "3")
+    report = Path("found/report.html").read_bytes()
+    assert diagnosed(data, "--seed", "3", "--threads", "1") == first
+    assert first["seed"] == 3
+    assert Path("found/report.html").read_bytes() == report
+
+
+def test_json_is_all_that_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    result = diagnosed(measured("effects"), "--json")
+    assert json.loads(capsys.readouterr().out) == result
+
+
+def test_the_report_has_the_sentence_and_needs_no_network() -> None:
+    result = diagnosed(measured("effects+unknown"))
+    page = Path("found/report.html").read_text()
+    assert f"{1e3 * result['gap']['rms_m']:.3g} mm" in page and "backlash at J3" in page
+    body = page[page.index("<body>") : page.index("<script>")]
+    assert "http" not in body and "<img" not in body and "<link" not in page
+
+
+def test_next_poses_of_an_earlier_run_do_not_stay() -> None:
+    Path("found").mkdir()
+    Path("found/next_poses.csv").write_text("old")
+    Path("found/mine.txt").write_text("mine")
+    result = diagnosed(measured("none"))
+    assert Path("found/mine.txt").exists()
+    assert Path("found/next_poses.csv").exists() == bool(result["next_measurements"])
+
+
+# ---- Bad and odd input
+# -------------------------------------------------------------------------------------------------
+
+BAD = [
+    ["diagnose"],
+    ["diagnose", ROBOT],
+    ["diagnose", ROBOT, "missing.csv"],
+    ["diagnose", ROBOT, ROBOT],
+    ["diagnose", "palletizer", "DATA"],
+    ["diagnose", ROBOT, "UNMEASURED"],
+    ["diagnose", ROBOT, "DATA", "--leave-out", "slack"],
+    ["diagnose", ROBOT, "DATA", "--false-alarm", "2"],
+    ["diagnose", ROBOT, "DATA", "--false-alarm", "0%"],
+    ["diagnose", ROBOT, "DATA", "--seed", "-1"],
+    ["diagnose", ROBOT, "DATA", "--record", "qr"],
+    ["diagnose", ROBOT, "DATA", "--record", "u"],
+]
+
+
+@pytest.mark.parametrize("arguments", BAD, ids=[" ".join(a).replace(ROBOT, "ROBOT") for a in BAD])
+def test_bad_input_is_one_clear_line_and_nothing_is_written(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = {"palletizer": str(example("palletizer")), "DATA": "data.csv", "UNMEASURED": "joints.csv"}
+    data = measured("none", poses=60)
+    written(data)
+    truing.save_measurements("joints.csv", truing.Measurements(data.joints), truing.load_robot(ROBOT))
+    before = sorted(Path().iterdir())
+    code = main([files.get(argument, argument) for argument in arguments])
+    captured = capsys.readouterr()
+    assert code == 2
+    assert captured.out == ""
+    assert captured.err.startswith("truing: ") and captured.err.count("\n") == 1
+    assert sorted(Path().iterdir()) == before
+
+
+@pytest.mark.parametrize("poses", [3, 20])
+def test_few_poses_are_answered_or_refused_clearly(poses: int, capsys: pytest.CaptureFixture[str]) -> None:
+    code = main(["diagnose", ROBOT, written(measured("effects", poses=poses)), "--out", "found"])
+    captured = capsys.readouterr()
+    if code == 0:
+        check(json.loads(Path("found/result.json").read_text()), CONTRACT)
+    else:
+        assert code == 2
+        assert (
+            captured.err.startswith("truing: ") and captured.err.count("\n") == 1 and "poses" in captured.err
+        )
+        assert not Path("found").exists()
+
+
+def test_an_empty_optional_column_is_named_and_ignored() -> None:
+    data = measured("effects")
+    nothing = np.full(data.rows, math.nan)
+    found = truing.diagnose(truing.load_robot(ROBOT), data.replace(temperature=nothing))
+    assert found.verdict == truing.diagnose(truing.load_robot(ROBOT), data).verdict
+    assert any("temp" in n.why for n in found.not_testable if n.effect == "thermal")
+
+
+def test_an_empty_column_of_ones_own_does_no_harm() -> None:
+    data = measured("effects")
+    found = truing.diagnose(
+        truing.load_robot(ROBOT), data.replace(covariates={"humidity": np.full(data.rows, math.nan)})
+    )
+    assert ("backlash", ("J3",)) in [(e.effect, e.joints) for e in found.effects]
+
+
+def test_a_missing_column_is_not_testable_and_says_so() -> None:
+    result = diagnosed(measured("effects"))
+    why = {n["effect"]: n["why"] for n in result["not_testable"]}
+    assert "temp_C" in why["thermal"]
+
+
+def test_the_second_record_of_the_joints_can_be_used() -> None:
+    data = measured("effects")
+    wrong = data.replace(
+        joints=np.asarray(data.joints) + 0.01,
+        covariates={f"qr{k + 1}_rad": np.asarray(data.joints)[:, k] for k in range(6)},
+    )
+    by_second = diagnosed(wrong, "--record", "qr")
+    assert by_second["gap"]["rms_m"] == pytest.approx(diagnosed(data)["gap"]["rms_m"], rel=1e-6)
+
+
+# ---- From Python
+# -------------------------------------------------------------------------------------------------------
+
+
+def test_the_defaults_are_those_of_the_header() -> None:
+    usual = truing.DiagnoseOptions()
+    given = inspect.signature(truing.diagnose).parameters
+    for name in (
+        "false_alarm",
+        "max_effects",
+        "test_share",
+        "search_poses",
+        "resamples",
+        "rotation_length",
+        "seed",
+        "threads",
+    ):
+        assert given[name].default == getattr(usual, name), name
+    assert given["leave_out"].default == usual.leave_out == ()
+    with pytest.raises(TypeError):
+        truing.DiagnoseOptions(false_alarms=0.1)  # type: ignore[call-arg]
+    assert usual.replace(seed=4).seed == 4 and usual.seed == 0
+
+
+def test_an_effect_of_ones_own_takes_part() -> None:
+    robot, data = truing.load_robot(ROBOT), measured("unknown")
+    found = truing.diagnose(robot, data, effects=OWN)
+    assert found.effects and found.effects[0].effect == "jump"
+    value = {p.name: p for p in found.effects[0].parameters}["jump.J2"]
+    assert value.value == pytest.approx(6e-4, abs=5 * value.sigma + 5e-5)
+    assert "jump" in {c.effect for c in found.candidates}
+
+
+def hanging(effect: truing.AppliedEffect) -> truing.Measurements:
+    """Of a robot with heavy links, light and loaded, while its joint or its axis gives way."""
+    rng = np.random.default_rng(23)
+    true = truing.load_robot(ROBOT)
+    for joint in true.joints:
+        joint.mass, joint.center_of_mass = 4.0, [0.05, -0.08, 0.06]
+    true.T_measurement_base = truing.frame_from_xyz_rpy([0.4, -1.6, 0.3], [0.01, -0.02, 0.8])
+    true.effects = [effect]
+    inputs = {
+        "directions": rng.choice([-1.0, 1.0], size=(220, 6)),
+        "payload": rng.choice([0.0, 3.0], size=220),
+    }
+    joints = random_joints(true, 220, 5)
+    predicted = truing.predict(true, truing.Measurements(joints, **inputs))
+    return truing.Measurements(
+        joints, positions=np.asarray(predicted.position) + rng.normal(0, NOISE, (220, 3)), **inputs
+    )
+
+
+@pytest.mark.parametrize(
+    ("applied", "asked"),
+    [
+        (
+            truing.AppliedEffect("joint_compliance", ["J2"], {"joint_compliance.J2": 6e-5}),
+            "gravity_moment:J2,joint_compliance:J2",
+        ),
+        (truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 1e-3}), "backlash:J3"),
+        (truing.AppliedEffect("scale", [], {"scale": 1e-3}), "scale"),
+    ],
+)
+def test_identify_takes_what_was_named(applied: truing.AppliedEffect, asked: str) -> None:
+    robot, data = truing.load_robot(ROBOT), hanging(applied)  # no masses are known
+    found = truing.diagnose(robot, data)
+    asked_for = {e.effect: e.identify_as for e in found.effects}
+    assert asked_for[applied.effect] == asked
+    for text in asked_for.values():
+        assert truing.identify(robot, data, free="tool.*", effects=text).test.after.rms < 0.9 * found.gap.rms
+
+
+def test_an_effect_that_is_left_out_is_not_considered() -> None:
+    robot, data = truing.load_robot(ROBOT), measured("effects")
+    found = truing.diagnose(robot, data, leave_out="backlash")
+    assert "backlash" not in {e.effect for e in found.effects} | {c.effect for c in found.candidates}
+    assert found.verdict != "none"
+
+
+def test_what_is_handed_out_has_shapes_and_cannot_be_changed() -> None:
+    data = measured("effects")
+    found = truing.diagnose(truing.load_robot(ROBOT), data)
+    assert found.error_before.shape == found.error_after.shape == (data.rows,)
+    assert found.set.shape == (data.rows,) and set(found.set) == {0, 1}
+    assert found.residuals_before.position.shape == (data.rows, 3)
+    assert found.direction.shape == (3, 3) and found.direction_rms.shape == (3,)
+    with pytest.raises(ValueError, match="read-only"):
+        found.error_before[0] = 0.0
+    for curve in [c for e in found.effects for c in e.curves]:
+        assert curve.points.shape[1] == 3 and curve.samples.shape[1] == 2
+    assert found.after_unknown.n == found.after.n and found.directions is None
+    assert "Diagnosis('" in repr(found) and found.sentence in found.summary()
+
+
+def test_the_names_of_the_results_are_public() -> None:
+    for name in (
+        "DiagnoseOptions",
+        "Diagnosis",
+        "FoundEffect",
+        "UnknownEffect",
+        "Alternative",
+        "Curve",
+        "NotTestable",
+        "Detectable",
+        "Candidate",
+        "SanityFinding",
+        "WhereJoint",
+        "WhereInput",
+        "WorkspaceCell",
+        "NextPose",
+        "Share",
+        "diagnose",
+    ):
+        assert name in truing.__all__ and getattr(truing, name).__doc__
+
+
+# ---- The examination
+# ---------------------------------------------------------------------------------------------------
+
+
+def test_without_mujoco_the_examination_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [
+        name for name in sys.modules if name == "truing.exam" or name.startswith(("truing.exam.", "mujoco"))
+    ]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert main(["exam", "--quick", "--out", "found"]) == 2
+    captured = capsys.readouterr()
+    assert 'pip install "truing[exam]"' in captured.err and captured.err.count("\n") == 1
+    assert not Path("found").exists()
