@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import truing
-from truing.files.handeye_file import quaternions_from_rotations
-from truing.tracking.api import interpolated, rotation_vectors
+from truing.rotations import interpolated, quaternions_from_rotations, rotation_vectors
 from truing.tracking.result import BASELINES, horizon_errors
 
 Floats = NDArray[np.float64]

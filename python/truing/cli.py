@@ -788,7 +788,7 @@ def _simulate_stream(
 
         streams = _busy("simulating", work)
         with atomic_output_dir(folder) as temporary, _progress("writing"):
-            from truing.tracking.result import write_simulation
+            from truing.testing.streams import write_simulation
 
             truth = write_simulation(temporary, model, streams, options)
             save_robot(temporary / "robot.yaml", model, units=load_units(robot))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from board_images import Floats, frame, rotation
-from truing.files.handeye_file import quaternions_from_rotations
+from truing.rotations import quaternions_from_rotations
 
 CAMERA_IN_HAND = frame([0.04, -0.02, 0.09], [0.1, -0.2, 1.5])
 CAMERA_IN_BASE = frame([1.1, 0.2, 0.7], [-1.9, 0.1, 0.3])

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import truing
+from truing import _core
+from truing.diagnosis.page import diagnosis_report
 from truing.errors import InputError
+from truing.files import write_table
 from truing.files.common import joint_columns
 from truing.identification.result import (
     block,
@@ -31,7 +33,7 @@ DIAGNOSIS_FORMAT = "truing-diagnosis/1"
 Floats = NDArray[np.float64]
 
 
-def with_second_record(robot: truing.Robot, data: truing.Measurements) -> truing.Measurements:
+def with_second_record(robot: _core.Robot, data: _core.Measurements) -> _core.Measurements:
     """The same measurements by the second record of the joints (columns qr1 …), without the first. Raises
     InputError.
     """
@@ -50,11 +52,11 @@ def with_second_record(robot: truing.Robot, data: truing.Measurements) -> truing
     return data.replace(joints=np.stack(second, axis=1), covariates=covariates)
 
 
-def diagnosis_dict(found: truing.Diagnosis, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
+def diagnosis_dict(found: _core.Diagnosis, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
     """What ``result.json`` of ``truing diagnose`` holds. `warnings`: more of them, first."""
     return {
         "format": DIAGNOSIS_FORMAT,
-        "version": truing.__version__,
+        "version": _core.version(),
         "robot": found.robot.name,
         "verdict": found.verdict,
         "sentence": found.sentence,
@@ -116,11 +118,11 @@ def diagnosis_dict(found: truing.Diagnosis, *, warnings: Iterable[str] = ()) -> 
     }
 
 
-def _interval(share: truing.Share) -> list[float]:
+def _interval(share: _core.Share) -> list[float]:
     return [share.low, share.high]
 
 
-def _held_out(found: truing.FoundEffect | truing.UnknownEffect) -> dict[str, Any]:
+def _held_out(found: _core.FoundEffect | _core.UnknownEffect) -> dict[str, Any]:
     before, after = found.held_out_before, found.held_out_after
     return {
         "before_rms_m": before.rms,
@@ -135,7 +137,7 @@ def _held_out(found: truing.FoundEffect | truing.UnknownEffect) -> dict[str, Any
     }
 
 
-def _curve(c: truing.Curve, robot: truing.Robot) -> dict[str, Any]:
+def _curve(c: _core.Curve, robot: _core.Robot) -> dict[str, Any]:
     second = (
         {
             "input": c.second_input,
@@ -156,7 +158,7 @@ def _curve(c: truing.Curve, robot: truing.Robot) -> dict[str, Any]:
     }
 
 
-def _input_unit(name: str, robot: truing.Robot) -> str:
+def _input_unit(name: str, robot: _core.Robot) -> str:
     """Unit of what a free function depends on: "q3", "torque2", "temp" …"""
     joint = re.fullmatch(r"q([0-9]+)", name)
     if joint:
@@ -164,7 +166,7 @@ def _input_unit(name: str, robot: truing.Robot) -> str:
     return {"torque": "Nm", "payload": "kg", "temp": "deg C", "time": "s"}.get(name.rstrip("0123456789"), "")
 
 
-def _effect(e: truing.FoundEffect, robot: truing.Robot) -> dict[str, Any]:
+def _effect(e: _core.FoundEffect, robot: _core.Robot) -> dict[str, Any]:
     return {
         "effect": e.effect,
         "joints": list(e.joints),
@@ -189,7 +191,7 @@ def _effect(e: truing.FoundEffect, robot: truing.Robot) -> dict[str, Any]:
     }
 
 
-def _unknown(u: truing.UnknownEffect, robot: truing.Robot) -> dict[str, Any]:
+def _unknown(u: _core.UnknownEffect, robot: _core.Robot) -> dict[str, Any]:
     first: Floats | list[Any] = u.curves[0].points[:, :2] if u.curves else []
     return {
         "joint": u.joint,
@@ -203,11 +205,11 @@ def _unknown(u: truing.UnknownEffect, robot: truing.Robot) -> dict[str, Any]:
     }
 
 
-def _next_pose(p: truing.NextPose) -> dict[str, Any]:
+def _next_pose(p: _core.NextPose) -> dict[str, Any]:
     return {"joints": p.joints, "direction": list(p.direction), "payload_kg": p.payload, "why": p.why}
 
 
-def _parts(found: truing.Diagnosis) -> dict[str, Any]:
+def _parts(found: _core.Diagnosis) -> dict[str, Any]:
     """The gap's mean square cut into parts that add up to 1: noise, each effect, each unknown function,
     unexplained.
     """
@@ -217,7 +219,7 @@ def _parts(found: truing.Diagnosis) -> dict[str, Any]:
     return {"noise": noise, "effects": effects, "unknown": unknown, "unexplained": left - noise}
 
 
-def diagnosis_rows(found: truing.Diagnosis, data: truing.Measurements) -> Rows:
+def diagnosis_rows(found: _core.Diagnosis, data: _core.Measurements) -> Rows:
     """Errors of every row of `data` before and after; `rejected`: rows that counted for little."""
     before, after = found.residuals_before, found.residuals_after
     out = np.zeros(data.rows, dtype=bool)
@@ -237,7 +239,7 @@ def diagnosis_rows(found: truing.Diagnosis, data: truing.Measurements) -> Rows:
 
 
 def diagnosis_columns(
-    rows: Rows, measured: truing.Measurements, target_names: Sequence[str], directions: Floats | None = None
+    rows: Rows, measured: _core.Measurements, target_names: Sequence[str], directions: Floats | None = None
 ) -> dict[str, Any]:
     """Columns of diagnose's ``residuals.csv``: those of identify, the rotation errors component by component,
     and approach directions
@@ -254,7 +256,7 @@ def diagnosis_columns(
     return columns
 
 
-def next_pose_columns(found: truing.Diagnosis) -> dict[str, Any]:
+def next_pose_columns(found: _core.Diagnosis) -> dict[str, Any]:
     """Columns of ``next_poses.csv``: joints, and what else the poses ask for. Made to be measured, or given
     to ``simulate --plan``.
     """
@@ -270,8 +272,8 @@ def next_pose_columns(found: truing.Diagnosis) -> dict[str, Any]:
 
 def write_diagnosis(
     folder: Path,
-    found: truing.Diagnosis,
-    data: truing.Measurements,
+    found: _core.Diagnosis,
+    data: _core.Measurements,
     *,
     source: str,
     warnings: Iterable[str] = (),
@@ -283,9 +285,6 @@ def write_diagnosis(
 
     `source` names the data in the robot file.
     """
-    from truing.diagnosis.page import diagnosis_report
-    from truing.files import write_table
-
     result: dict[str, Any] = without_nan(diagnosis_dict(found, warnings=warnings))
     if found.joint_record == "qr":  # what it went by
         data = with_second_record(found.robot, data)

@@ -24,6 +24,7 @@ import pyarrow.parquet
 from numpy.typing import ArrayLike, NDArray
 
 from truing.errors import InputError
+from truing.rotations import quaternions_from_rotations
 
 if TYPE_CHECKING:
     from truing._core import Robot
@@ -32,6 +33,8 @@ PathLike = str | os.PathLike[str]
 LengthUnit = Literal["m", "mm"]
 AngleUnit = Literal["rad", "deg"]
 
+# Names of a small motion's six components, as covariances and standard errors have them.
+MOTIONS = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 PARQUET_SUFFIXES = (".parquet", ".pq")
 
 
@@ -256,3 +259,12 @@ def joint_columns(robot: Robot, joints: NDArray[np.float64]) -> dict[str, Any]:
     """Joint readings as columns: `q1_rad` …, `_m` for prismatic joints."""
     units = ["rad" if robot.joints[index].type == "revolute" else "m" for index in robot.driven_joints()]
     return {f"q{k + 1}_{unit}": joints[:, k] for k, unit in enumerate(units)}
+
+
+def frame_dict(T: NDArray[np.float64]) -> dict[str, float]:
+    """A frame as files have it: x_m y_m z_m qw qx qy qz."""
+    q = quaternions_from_rotations(np.asarray(T)[None, :3, :3])[0]
+    return {
+        **{f"{axis}_m": float(T[k, 3]) for k, axis in enumerate("xyz")},
+        **dict(zip(("qw", "qx", "qy", "qz"), map(float, q), strict=True)),
+    }

@@ -27,6 +27,7 @@ from truing.files.boards import Board, BoardViews, find_board, parse_board, plau
 from truing.files.common import PathLike, atomic_write, listed
 from truing.files.table import Floats, Table
 from truing.files.yaml_tree import Document, FreeMapping, Number, Strict, Text, choice, expected, found
+from truing.rotations import rotations_from_quaternions
 
 CAMERA_FORMAT = "truing-camera/1"
 _CAMERA = "camera file"
@@ -83,49 +84,6 @@ class Stream:
 
 # ---- Rotations
 # -------------------------------------------------------------------------------------------------------
-
-
-def rotations_from_quaternions(q: Floats) -> Floats:
-    """shape=(n, 3, 3) of shape=(n, 4), scalar first; brought to unit length first."""
-    w, x, y, z = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
-
-
-def quaternions_from_rotations(rotations: Floats) -> Floats:
-    """shape=(n, 4), scalar first and not negative, of shape=(n, 3, 3)."""
-    r = np.asarray(rotations)
-    trace = np.einsum("nii->n", r)
-    # The largest of four squares is safe to divide by.
-    squares = np.stack([1 + trace, *(1 + 2 * r[:, k, k] - trace for k in range(3))], axis=1)
-    out = np.empty((len(r), 4))
-    best = np.argmax(squares, axis=1)
-    for k in range(4):
-        rows = np.flatnonzero(best == k)
-        if not rows.size:
-            continue
-        m, s = r[rows], 2 * np.sqrt(squares[rows, k])
-        if k == 0:
-            out[rows] = np.stack(
-                [
-                    s / 4,
-                    (m[:, 2, 1] - m[:, 1, 2]) / s,
-                    (m[:, 0, 2] - m[:, 2, 0]) / s,
-                    (m[:, 1, 0] - m[:, 0, 1]) / s,
-                ],
-                axis=1,
-            )
-        else:
-            i, j, l = k - 1, k % 3, (k + 1) % 3
-            out[rows, 0] = (m[:, l, j] - m[:, j, l]) / s
-            out[rows, 1 + i] = s / 4
-            out[rows, 1 + j] = (m[:, j, i] + m[:, i, j]) / s
-            out[rows, 1 + l] = (m[:, l, i] + m[:, i, l]) / s
-    return out * np.where(out[:, :1] < 0, -1.0, 1.0)
 
 
 def rotations_from_angles(angles: Floats, convention: str) -> Floats:

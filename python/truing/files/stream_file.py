@@ -23,7 +23,6 @@ from pydantic import PlainValidator
 from truing import _core
 from truing.errors import InputWarning
 from truing.files.common import PathLike, atomic_write, listed, write_table
-from truing.files.handeye_file import quaternions_from_rotations, rotations_from_quaternions
 from truing.files.table import Floats, Table
 from truing.files.yaml_tree import (
     AngleName,
@@ -37,6 +36,7 @@ from truing.files.yaml_tree import (
     expected,
     found,
 )
+from truing.rotations import quaternions_from_rotations, rotations_from_quaternions
 
 SETUP_FORMAT = "truing-track/1"
 FRAMES = ("T_tracker_base", "T_flange_receiver", "T_flange_tool", "T_flange_imu")

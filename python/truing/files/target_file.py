@@ -19,9 +19,9 @@ import numpy as np
 from truing import _core
 from truing.errors import InputError
 from truing.files.common import PathLike, listed, shown
-from truing.files.handeye_file import rotations_from_quaternions
 from truing.files.plausibility import check_joint_units_look_right, check_targets_look_right
 from truing.files.table import Floats, Table
+from truing.rotations import rotations_from_quaternions
 
 _LENGTHS = ("m", "mm")
 _ANGLES = ("rad", "deg")

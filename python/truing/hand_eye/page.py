@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,6 @@ from numpy.typing import NDArray
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, REJECTED, faded, packed, round_down, subsample
 from truing.report.page import Page, footer, table_cell, warnings_card
 from truing.report.words import angle_text, counted, escaped, figures_text, length_text
-
-if TYPE_CHECKING:
-    from truing.hand_eye.result import Scene
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +43,24 @@ _LABELS = {
     "not converged": ("open", "did not converge"),
     "clock not found": ("open", "clocks not compared"),
 }
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What the report draws, beside what result.json holds. Frames in the robot base, one per pose; NaN where
+    there is none.
+    """
+
+    T_base_hand: Floats  # shape=(n, 4, 4) as found
+    T_base_camera: Floats  # shape=(n, 4, 4)
+    T_base_board_seen: Floats  # shape=(n, 4, 4)
+    T_base_board: Floats  # shape=(n, 4, 4) predicted
+    # shape=(n,) [m] length below which 95 % of position residuals lie by the noise; NaN: not known
+    predicted_m: Floats
+    predicted_rad: Floats  # shape=(n,) [rad]
+    board_m: tuple[float, float, float, float]  # left, top, right, bottom of the board in its frame [m]
+    pixel_errors: Floats  # shape=(k, 2) [px] seen minus predicted, robot poses as found
+    pixel_places: Floats  # shape=(k, 2) [px]
 
 
 def handeye_report(result: Mapping[str, Any], scene: Scene | None) -> str:

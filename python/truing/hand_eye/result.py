@@ -15,13 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import truing
-from truing.files import save_camera, write_table
+from truing import _core
+from truing.files import HandEyeData, save_camera, write_table
+from truing.files.common import MOTIONS, frame_dict
+from truing.hand_eye.page import Scene, handeye_report
+from truing.identification.result import write_robot
 from truing.report.json_text import to_json, without_nan
 
 HANDEYE_FORMAT = "truing-handeye/1"
 AXES = ("x", "y", "z")
-CHANGES = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")  # what covariances are of
 INTRINSICS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 CHI3_95 = 2.7955  # [-] 95 % of the lengths of a vector of three unit normals are below
 _PIXELS_DRAWN = 4000
@@ -30,33 +32,15 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Scene:
-    """What the report draws, beside what result.json holds. Frames in the robot base, one per pose; NaN where
-    there is none.
-    """
-
-    T_base_hand: Floats  # shape=(n, 4, 4) as found
-    T_base_camera: Floats  # shape=(n, 4, 4)
-    T_base_board_seen: Floats  # shape=(n, 4, 4)
-    T_base_board: Floats  # shape=(n, 4, 4) predicted
-    # shape=(n,) [m] length below which 95 % of position residuals lie by the noise; NaN: not known
-    predicted_m: Floats
-    predicted_rad: Floats  # shape=(n,) [rad]
-    board_m: tuple[float, float, float, float]  # left, top, right, bottom of the board in its frame [m]
-    pixel_errors: Floats  # shape=(k, 2) [px] seen minus predicted, robot poses as found
-    pixel_places: Floats  # shape=(k, 2) [px]
-
-
-@dataclass(frozen=True)
 class Solved:
     """Everything that one run came to."""
 
-    data: truing.HandEyeData
-    options: truing.HandEyeOptions
-    result: truing.HandEyeResult
-    next_poses: tuple[truing.NextHandPose, ...] = ()
-    clock: truing.ClockOffset | None = None
-    kinematics: truing.HandEyeKinematics | None = None
+    data: HandEyeData
+    options: _core.HandEyeOptions
+    result: _core.HandEyeResult
+    next_poses: tuple[_core.NextHandPose, ...] = ()
+    clock: _core.ClockOffset | None = None
+    kinematics: _core.HandEyeKinematics | None = None
     seed: int = 0
 
 
@@ -64,26 +48,15 @@ class Solved:
 # -----------------------------------------------------------------------------------------------------
 
 
-def frame_dict(T: Floats) -> dict[str, float]:
-    """A frame as files have it: x_m y_m z_m qw qx qy qz."""
-    from truing.files.handeye_file import quaternions_from_rotations
-
-    q = quaternions_from_rotations(np.asarray(T)[None, :3, :3])[0]
-    return {
-        **{f"{axis}_m": float(T[k, 3]) for k, axis in enumerate(AXES)},
-        **dict(zip(("qw", "qx", "qy", "qz"), map(float, q), strict=True)),
-    }
-
-
-def _uncertain(frame: truing.UncertainFrame, parent: str) -> dict[str, Any]:
+def _uncertain(frame: _core.UncertainFrame, parent: str) -> dict[str, Any]:
     return {
         "in": parent,
         **frame_dict(frame.T),
-        "sigma": dict(zip(CHANGES, map(float, frame.sigma), strict=True)),
+        "sigma": dict(zip(MOTIONS, map(float, frame.sigma), strict=True)),
     }
 
 
-def _errors(e: truing.HandEyeErrors | None) -> dict[str, Any] | None:
+def _errors(e: _core.HandEyeErrors | None) -> dict[str, Any] | None:
     if e is None:
         return None
     found: dict[str, Any] = {
@@ -98,7 +71,7 @@ def _errors(e: truing.HandEyeErrors | None) -> dict[str, Any] | None:
     return {**found, "n": e.n}
 
 
-def camera_model_dict(camera: truing.Camera, sigma: Sequence[float] = ()) -> dict[str, Any]:
+def camera_model_dict(camera: _core.Camera, sigma: Sequence[float] = ()) -> dict[str, Any]:
     """A camera's values as camera.yaml has them, with their standard errors where known."""
     found: dict[str, Any] = {
         "width": camera.width,
@@ -118,7 +91,7 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
     parents = ("hand", "base") if eye_in_hand else ("base", "hand")
     found: dict[str, Any] = {
         "format": HANDEYE_FORMAT,
-        "version": truing.__version__,
+        "version": _core.version(),
         "setup": options.setup,
         "method": options.method,
         "status": r.status,
@@ -133,7 +106,7 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
     if r.status == "done":
         found["camera"] = _uncertain(camera, parents[0])
         found["board"] = _uncertain(board, parents[1])
-        found["covariance"] = {"of": list(CHANGES), "camera": camera.covariance, "board": board.covariance}
+        found["covariance"] = {"of": list(MOTIONS), "camera": camera.covariance, "board": board.covariance}
         found["working_point"] = _working_point(solved)
     k = solved.kinematics
     residuals = list(r.residuals if k is None else k.residuals)
@@ -204,7 +177,7 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
     return found
 
 
-def _clock(c: truing.ClockOffset) -> dict[str, Any]:
+def _clock(c: _core.ClockOffset) -> dict[str, Any]:
     return {
         "offset_s": c.offset,
         "sigma_s": c.sigma,
@@ -215,11 +188,11 @@ def _clock(c: truing.ClockOffset) -> dict[str, Any]:
     }
 
 
-def _known(errors: Mapping[str, truing.HandEyeErrors | None]) -> dict[str, Any]:
+def _known(errors: Mapping[str, _core.HandEyeErrors | None]) -> dict[str, Any]:
     return {name: _errors(e) for name, e in errors.items() if e is not None}
 
 
-def _noise_is_given(options: truing.HandEyeOptions) -> bool:
+def _noise_is_given(options: _core.HandEyeOptions) -> bool:
     given = (
         options.hand_position_sigma,
         options.hand_rotation_sigma,
@@ -231,7 +204,7 @@ def _noise_is_given(options: truing.HandEyeOptions) -> bool:
 
 
 def _working_point(solved: Solved) -> dict[str, Any]:
-    told: truing.HandEyeResult | truing.HandEyeKinematics = (
+    told: _core.HandEyeResult | _core.HandEyeKinematics = (
         solved.result if solved.kinematics is None else solved.kinematics
     )
     point, covariance, camera = (
@@ -255,11 +228,11 @@ def _per_axis(covariance: Floats) -> float:
     return math.sqrt(max(0.0, float(np.trace(covariance))) / 3.0)
 
 
-def _image(data: truing.HandEyeData, k: int) -> dict[str, str]:
+def _image(data: HandEyeData, k: int) -> dict[str, str]:
     return {"image": data.images[k]} if data.images else {}
 
 
-def _residual(solved: Solved, k: int, r: truing.HandEyeResidual) -> dict[str, Any]:
+def _residual(solved: Solved, k: int, r: _core.HandEyeResidual) -> dict[str, Any]:
     data = solved.data
     test = data.poses.set is not None and data.poses.set[k] == 1
     alone = solved.kinematics is None  # with the robot found as well nothing was left out
@@ -280,7 +253,7 @@ def _residual(solved: Solved, k: int, r: truing.HandEyeResidual) -> dict[str, An
 def _convention(solved: Solved) -> dict[str, Any]:
     used = solved.options.reading
     explanation = (
-        next((reading.explanation for reading in truing.handeye_readings() if reading.name == used), "")
+        next((reading.explanation for reading in _core.handeye_readings() if reading.name == used), "")
         if used
         else "as the file says"
     )
@@ -318,13 +291,13 @@ def _images(solved: Solved) -> dict[str, Any]:
     return found
 
 
-def _camera_model(solved: Solved) -> tuple[truing.Camera, Sequence[float]]:
+def _camera_model(solved: Solved) -> tuple[_core.Camera, Sequence[float]]:
     r, views = solved.result, solved.data.views
     assert views is not None
     return (r.camera_model, r.camera_model_sigma) if r.camera_model is not None else (views.camera, ())
 
 
-def _kinematics(k: truing.HandEyeKinematics) -> dict[str, Any]:
+def _kinematics(k: _core.HandEyeKinematics) -> dict[str, Any]:
     i = k.identification
     errors = {"train": {"before": _errors(k.train_before), "after": _errors(k.train_after)}}
     if k.test_before is not None and k.test_after is not None:
@@ -366,7 +339,7 @@ def scene_of(solved: Solved) -> Scene | None:
     A = np.asarray(r.T_base_hand if len(r.T_base_hand) == data.count else data.poses.T_base_hand)
     both = solved.kinematics
     if both is not None and data.joints is not None:
-        A = np.array([truing.forward_kinematics(both.robot, q)[-1] for q in data.joints])
+        A = np.array([_core.forward_kinematics(both.robot, q)[-1] for q in data.joints])
     B = np.array(data.poses.T_camera_board)
     for k, turn in enumerate(r.symmetry):
         if turn:
@@ -403,7 +376,7 @@ def scene_of(solved: Solved) -> Scene | None:
 
 
 def _by_pixels(
-    images: Sequence[tuple[Floats, Floats]], T_camera_board: Floats, camera: truing.Camera, pixel: float
+    images: Sequence[tuple[Floats, Floats]], T_camera_board: Floats, camera: _core.Camera, pixel: float
 ) -> tuple[Floats, Floats]:
     """Rms standard error of a component of the board's position [m] and rotation [rad] that pixels of this
     noise give, one per image.
@@ -429,7 +402,7 @@ def _by_pixels(
     return position, rotation
 
 
-def _board_extent(data: truing.HandEyeData) -> tuple[float, float, float, float]:
+def _board_extent(data: HandEyeData) -> tuple[float, float, float, float]:
     if data.board is not None:
         points = data.board.points
         low, high = points.min(axis=0), points.max(axis=0)
@@ -455,7 +428,7 @@ def _pixel_errors(solved: Solved, A: Floats, X: Floats, Y: Floats) -> tuple[Floa
             T = T @ np.linalg.inv(np.asarray(data.poses.board_symmetries[r.symmetry[k] - 1]))
         in_camera = np.asarray(points) @ T[:3, :3].T + T[:3, 3]
         if (in_camera[:, 2] > 0).all():
-            errors.append(np.asarray(pixels) - truing.project(camera, in_camera))
+            errors.append(np.asarray(pixels) - _core.project(camera, in_camera))
             places.append(np.asarray(pixels))
     if not errors:
         return np.empty((0, 2)), np.empty((0, 2))
@@ -492,7 +465,7 @@ def residual_columns(solved: Solved) -> dict[str, Any]:
     return columns
 
 
-def next_pose_columns(poses: Sequence[truing.NextHandPose]) -> dict[str, Any]:
+def next_pose_columns(poses: Sequence[_core.NextHandPose]) -> dict[str, Any]:
     """Columns of ``next_poses.csv``: hand poses to drive to, as in poses.csv, and what each leaves at the
     working point.
     """
@@ -514,8 +487,6 @@ def write_handeye(
     """Writes everything that ``truing handeye`` found into `folder`, and returns what result.json holds.
     `nominal_file`: of the robot, with kinematics.
     """
-    from truing.hand_eye.page import handeye_report
-
     data, r = solved.data, solved.result
     found: dict[str, Any] = without_nan(handeye_dict(solved, warnings=warnings))
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
@@ -548,17 +519,15 @@ def write_handeye(
 
 
 def write_without_clock(
-    folder: Path, clock: truing.ClockOffset, keywords: Mapping[str, Any], *, warnings: Iterable[str] = ()
+    folder: Path, clock: _core.ClockOffset, keywords: Mapping[str, Any], *, warnings: Iterable[str] = ()
 ) -> dict[str, Any]:
     """Writes that the clocks of robot and camera could not be compared, so that no two poses belong together;
     returns what result.json holds.
     """
-    from truing.hand_eye.page import handeye_report
-
     found: dict[str, Any] = without_nan(
         {
             "format": HANDEYE_FORMAT,
-            "version": truing.__version__,
+            "version": _core.version(),
             "setup": keywords["setup"],
             "method": keywords["method"],
             "status": "clock not found",
@@ -586,8 +555,6 @@ def write_without_clock(
 def _write_robot(
     folder: Path, solved: Solved, found: Mapping[str, Any], nominal_file: Path, base_link: str, tip_link: str
 ) -> None:
-    from truing.identification.result import write_robot
-
     assert solved.kinematics is not None
     errors = found["kinematics"]["errors"]
     rms = errors.get("test", errors["train"])["after"]["rms_m"]

@@ -6,14 +6,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-import truing
+from truing import _core
 from truing.errors import InputError
+from truing.files import load_units, save_robot, write_table
+from truing.identification.api import predict, residuals
+from truing.identification.page import identification_report
 from truing.report.json_text import to_json, without_nan
 from truing.report.rows import Rows, statistics
 
@@ -31,7 +35,7 @@ def correlations(covariance: Floats) -> Floats:
 
 
 def identification_dict(
-    result: truing.Identification, *, seed: int, warnings: Iterable[str] = ()
+    result: _core.Identification, *, seed: int, warnings: Iterable[str] = ()
 ) -> dict[str, Any]:
     """What ``result.json`` of ``truing identify`` holds. `seed`: of the split; `warnings`: more of them,
     first.
@@ -39,7 +43,7 @@ def identification_dict(
     errors = {"train": result.train} if result.test is None else {"train": result.train, "test": result.test}
     return {
         "format": IDENTIFICATION_FORMAT,
-        "version": truing.__version__,
+        "version": _core.version(),
         "robot": result.robot.name,
         "errors": {
             name: {"before": statistics_dict(e.before), "after": statistics_dict(e.after)}
@@ -67,7 +71,7 @@ def identification_dict(
     }
 
 
-def statistics_dict(e: truing.ErrorStatistics) -> dict[str, Any]:
+def statistics_dict(e: _core.ErrorStatistics) -> dict[str, Any]:
     values: dict[str, Any] = {
         "rms_m": e.rms,
         "mean_m": e.mean,
@@ -81,7 +85,7 @@ def statistics_dict(e: truing.ErrorStatistics) -> dict[str, Any]:
     return values
 
 
-def parameter_dict(p: truing.Parameter) -> dict[str, Any]:
+def parameter_dict(p: _core.Parameter) -> dict[str, Any]:
     return {
         "name": p.name,
         "nominal": p.nominal,
@@ -92,14 +96,14 @@ def parameter_dict(p: truing.Parameter) -> dict[str, Any]:
     }
 
 
-def frozen_dict(f: truing.Frozen) -> dict[str, Any]:
+def frozen_dict(f: _core.Frozen) -> dict[str, Any]:
     return {"parameter": f.parameter, "combination": dict(f.combination), "why": f.why}
 
 
 def rows_of(
-    before: truing.Robot,
-    after: truing.Robot,
-    data: truing.Measurements,
+    before: _core.Robot,
+    after: _core.Robot,
+    data: _core.Measurements,
     *,
     test: Bools,
     rejected: Sequence[int] = (),
@@ -109,8 +113,8 @@ def rows_of(
     """
     out = np.zeros(data.rows, dtype=bool)
     out[list(rejected)] = True
-    old, new = truing.residuals(before, data), truing.residuals(after, data)
-    predicted = np.asarray(truing.predict(after, data).position)
+    old, new = residuals(before, data), residuals(after, data)
+    predicted = np.asarray(predict(after, data).position)
     return Rows(
         **joint_inputs(after, data),
         position=(
@@ -129,7 +133,7 @@ def rows_of(
     )
 
 
-def predicted_rows(robot: truing.Robot, data: truing.Measurements, predicted: truing.Prediction) -> Rows:
+def predicted_rows(robot: _core.Robot, data: _core.Measurements, predicted: _core.Prediction) -> Rows:
     """Prediction against measurement where there is one; rows may have none. Before and after are the same.
 
     Rows that touch a fixed point have no errors here: where the point is, is not known.
@@ -168,13 +172,13 @@ def predicted_rows(robot: truing.Robot, data: truing.Measurements, predicted: tr
     )
 
 
-def joint_inputs(robot: truing.Robot, data: truing.Measurements) -> dict[str, Any]:
+def joint_inputs(robot: _core.Robot, data: _core.Measurements) -> dict[str, Any]:
     driven = [robot.joints[index] for index in robot.driven_joints()]
     return {
         "joint_names": tuple(joint.name for joint in driven),
         "joint_units": tuple("rad" if joint.type == "revolute" else "m" for joint in driven),
         "joints": np.asarray(data.joints),
-        "pose": np.asarray(truing.pose_groups(data)),
+        "pose": np.asarray(_core.pose_groups(data)),
         "time": None if data.time is None or not np.isfinite(data.time).all() else np.asarray(data.time),
     }
 
@@ -187,7 +191,7 @@ def column(values: Floats, rows: int) -> Floats:
     return np.asarray(values) if len(values) == rows else np.full(rows, np.nan)
 
 
-def covariance_columns(result: truing.Identification) -> dict[str, Any]:
+def covariance_columns(result: _core.Identification) -> dict[str, Any]:
     """Columns of ``covariance.csv``: the names, then one column per fitted parameter (unit of an entry: both
     units' product).
     """
@@ -195,13 +199,13 @@ def covariance_columns(result: truing.Identification) -> dict[str, Any]:
     return {"name": names, **{name: result.covariance[:, k] for k, name in enumerate(names)}}
 
 
-def fitted_names(result: truing.Identification) -> list[str]:
+def fitted_names(result: _core.Identification) -> list[str]:
     """Names of the parameters that the covariance is of."""
     return [p.name for p in result.parameters if not p.frozen]
 
 
 def residual_columns(
-    rows: Rows, measured: truing.Measurements, target_names: Sequence[str] = ()
+    rows: Rows, measured: _core.Measurements, target_names: Sequence[str] = ()
 ) -> dict[str, Any]:
     """Columns of ``residuals.csv``: every row with what was measured, what is predicted before and after, and
     the difference.
@@ -249,8 +253,8 @@ def residual_columns(
 
 def write_identification(
     folder: Path,
-    result: truing.Identification,
-    data: truing.Measurements,
+    result: _core.Identification,
+    data: _core.Measurements,
     *,
     seed: int,
     source: str,
@@ -264,9 +268,6 @@ def write_identification(
     `source` names the data in the calibrated robot file. A `nominal_file` in URDF is also written calibrated,
     as URDF.
     """
-    from truing import report
-    from truing.files import write_table
-
     found: dict[str, Any] = without_nan(identification_dict(result, seed=seed, warnings=warnings))
     assert result.set is not None
     rows = rows_of(
@@ -286,14 +287,14 @@ def write_identification(
     write_table(folder / "covariance.csv", covariance_columns(result))
     names = [target.name for target in result.robot.targets]
     write_table(folder / "residuals.csv", residual_columns(rows, data, names))
-    page = report.identification_report(found, rows, (fitted_names(result), correlations(result.covariance)))
+    page = identification_report(found, rows, (fitted_names(result), correlations(result.covariance)))
     (folder / "report.html").write_text(page, encoding="utf-8")
     return found
 
 
 def write_robot(
     folder: Path,
-    robot: truing.Robot,
+    robot: _core.Robot,
     source: str,
     calibration: dict[str, Any],
     nominal_file: Path | None,
@@ -301,10 +302,6 @@ def write_robot(
     tip_link: str,
 ) -> None:
     """Writes ``robot.yaml`` in the units of the file that came in, and ``robot.urdf`` too if that was URDF."""
-    from datetime import datetime, timezone
-
-    from truing.files import load_units, save_robot
-
     save_robot(
         folder / "robot.yaml",
         robot,
@@ -318,12 +315,12 @@ def write_robot(
     if nominal_file is not None and robot.convention == "urdf" and nominal_file.suffix.lower() != ".yaml":
         text = nominal_file.read_text(encoding="utf-8-sig")
         (folder / "robot.urdf").write_text(
-            truing.urdf_with_calibration(text, robot, base_link, tip_link), encoding="utf-8"
+            _core.urdf_with_calibration(text, robot, base_link, tip_link), encoding="utf-8"
         )
 
 
 def prediction_columns(
-    robot: truing.Robot, data: truing.Measurements, predicted: truing.Prediction
+    robot: _core.Robot, data: _core.Measurements, predicted: _core.Prediction
 ) -> dict[str, Any]:
     """Columns of ``predicted.csv``, one row per row of `data`: only `dist_m` when `data` has distances, else
     the pose, with
@@ -343,11 +340,11 @@ def prediction_columns(
     return columns
 
 
-def prediction_dict(robot: truing.Robot, rows: Rows, warnings: Iterable[str] = ()) -> dict[str, Any]:
+def prediction_dict(robot: _core.Robot, rows: Rows, warnings: Iterable[str] = ()) -> dict[str, Any]:
     """What ``result.json`` of ``truing predict`` holds; errors only where something was measured."""
     result: dict[str, Any] = {
         "format": PREDICTION_FORMAT,
-        "version": truing.__version__,
+        "version": _core.version(),
         "robot": robot.name,
         "rows": rows.count,
         "warnings": list(warnings),

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +32,6 @@ from truing.report.charts import (
 from truing.report.page import Page, footer, warnings_card
 from truing.report.words import angle_text, counted, escaped, figures_text, length_text
 
-if TYPE_CHECKING:
-    from truing.inverse_kinematics.result import Drawing
-
 Floats = NDArray[np.float64]
 
 CLOUD_POINTS = 4000
@@ -49,6 +47,25 @@ REASONS: Mapping[str, tuple[str, str]] = {
     "limit": ("a joint's limit is in the way", BEFORE),
     "singular": ("singular", INK),
 }
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What the reports draw, beside what result.json holds. In the measurement frame, or in the robot's base
+    frame where the targets are.
+    """
+
+    wanted: Floats  # shape=(n, 3) [m] wanted places of the targets
+    reasons: tuple[str, ...]  # n of them
+    texts: tuple[str, ...]  # n of them: in words
+    robots: tuple[Floats, ...]  # shape=(joints + 2, 3) [m]: base, every joint's frame, target
+    joints: Floats  # shape=(n, driven joints) [rad | m]; NaN where there are none to command
+    obstacles: tuple[
+        tuple[str, Floats], ...
+    ] = ()  # name, and a line along its outline, shape=(k, 3) [m]; gaps are NaN
+    correction: Floats | None = None  # shape=(n, 3) [m] of compensated commands
+    before: Floats | None = None  # shape=(n,) [m]
+    sigma: Floats | None = None  # shape=(n, 6) [m], [rad]
 
 
 def inverse_report(result: Mapping[str, Any], drawing: Drawing) -> str:

@@ -15,16 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import truing
-from truing.files import write_table
-from truing.files.common import joint_columns
+from truing import _core
+from truing.files import TargetData, write_table
+from truing.files.common import MOTIONS, joint_columns
+from truing.inverse_kinematics.page import Drawing, compensation_report, inverse_report
 from truing.report.json_text import to_json, without_nan
 from truing.report.rows import statistics
+from truing.rotations import quaternions_from_rotations
 
 INVERSE_FORMAT = "truing-inverse/1"
 COMPENSATION_FORMAT = "truing-compensation/1"
 AXES = ("x", "y", "z")
-MOTIONS = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 _ROBOTS_DRAWN = 3
 
 Floats = NDArray[np.float64]
@@ -34,60 +35,41 @@ Floats = NDArray[np.float64]
 class Solved:
     """Everything that one run of ``truing ik`` came to."""
 
-    data: truing.TargetData
-    solver: truing.InverseSolver
-    solutions: Sequence[truing.Solution]  # one or more per target, in the order of the targets
+    data: TargetData
+    solver: _core.InverseSolver
+    solutions: Sequence[_core.Solution]  # one or more per target, in the order of the targets
     target: NDArray[np.intp]  # shape=(len(solutions),): which row of the file each is for
     all_branches: bool = False
-    path: truing.JointPath | None = None
-    steps: truing.PathOptions | None = None  # of the path
+    path: _core.JointPath | None = None
+    steps: _core.PathOptions | None = None  # of the path
 
 
 @dataclass(frozen=True)
 class CompensatedProgram:
     """Everything that one run of ``truing compensate`` came to."""
 
-    data: truing.TargetData
-    compensator: truing.Compensator
-    results: truing.Compensations
+    data: TargetData
+    compensator: _core.Compensator
+    results: _core.Compensations
     in_base: bool = False
     uncertain: bool = False  # standard errors are known
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """What the reports draw, beside what result.json holds. In the measurement frame, or in the robot's base
-    frame where the targets are.
-    """
-
-    wanted: Floats  # shape=(n, 3) [m] wanted places of the targets
-    reasons: tuple[str, ...]  # n of them
-    texts: tuple[str, ...]  # n of them: in words
-    robots: tuple[Floats, ...]  # shape=(joints + 2, 3) [m]: base, every joint's frame, target
-    joints: Floats  # shape=(n, driven joints) [rad | m]; NaN where there are none to command
-    obstacles: tuple[
-        tuple[str, Floats], ...
-    ] = ()  # name, and a line along its outline, shape=(k, 3) [m]; gaps are NaN
-    correction: Floats | None = None  # shape=(n, 3) [m] of compensated commands
-    before: Floats | None = None  # shape=(n,) [m]
-    sigma: Floats | None = None  # shape=(n, 6) [m], [rad]
 
 
 # ---- What both write
 # -------------------------------------------------------------------------------------------------
 
 
-def is_commanded(solution: truing.Solution) -> bool:
+def is_commanded(solution: _core.Solution) -> bool:
     """Whether its joints are an answer: a failure's are the nearest that was found."""
     return solution.reason in ("reached", "retreated")
 
 
-def status_text(solver: truing.InverseSolver, solution: truing.Solution) -> str:
+def status_text(solver: _core.InverseSolver, solution: _core.Solution) -> str:
     """The column `status`: "ok", or the reason in words."""
     return "ok" if solution.reached else solver.describe(solution)
 
 
-def solution_columns(solver: truing.InverseSolver, solutions: Sequence[truing.Solution]) -> dict[str, Any]:
+def solution_columns(solver: _core.InverseSolver, solutions: Sequence[_core.Solution]) -> dict[str, Any]:
     """Columns of ``joints.csv``, one row per solution; no joints where the task is not met."""
     joints = _commanded_joints(solver, solutions)
     columns = joint_columns(solver.robot, joints)
@@ -98,14 +80,14 @@ def solution_columns(solver: truing.InverseSolver, solutions: Sequence[truing.So
     return columns
 
 
-def _commanded_joints(solver: truing.InverseSolver, solutions: Sequence[truing.Solution]) -> Floats:
+def _commanded_joints(solver: _core.InverseSolver, solutions: Sequence[_core.Solution]) -> Floats:
     nothing = np.full(solver.driven_count, np.nan)
     return np.array([np.asarray(s.joints) if is_commanded(s) else nothing for s in solutions]).reshape(
         -1, solver.driven_count
     )
 
 
-def _failure(solver: truing.InverseSolver, target: int, s: truing.Solution) -> dict[str, Any]:
+def _failure(solver: _core.InverseSolver, target: int, s: _core.Solution) -> dict[str, Any]:
     """Why a target is not reached, and the nearest that is."""
     found: dict[str, Any] = {"target": target, "reason": s.reason, "text": status_text(solver, s)}
     if s.reason == "retreated":
@@ -132,7 +114,7 @@ def _failure(solver: truing.InverseSolver, target: int, s: truing.Solution) -> d
     }
 
 
-def limited_joint(robot: truing.Robot, index: int) -> truing.Joint:
+def limited_joint(robot: _core.Robot, index: int) -> _core.Joint:
     """As `Solution.joint` counts: driven joints, then passive ones that have limits."""
     driven = [robot.joints[k] for k in robot.driven_joints()]
     passive = [
@@ -143,7 +125,7 @@ def limited_joint(robot: truing.Robot, index: int) -> truing.Joint:
     return [*driven, *passive][index]
 
 
-def contact_names(solver: truing.InverseSolver, s: truing.Solution) -> list[str]:
+def contact_names(solver: _core.InverseSolver, s: _core.Solution) -> list[str]:
     """The pair that interferes."""
     if s.contact is None:
         return []
@@ -152,12 +134,12 @@ def contact_names(solver: truing.InverseSolver, s: truing.Solution) -> list[str]
     return [names[k] for k in s.contact]
 
 
-def is_with_itself(solver: truing.InverseSolver, s: truing.Solution) -> bool:
+def is_with_itself(solver: _core.InverseSolver, s: _core.Solution) -> bool:
     """Whether both of the pair are parts of the robot."""
     return s.contact is not None and max(s.contact) < len(solver.options.scene.capsules)
 
 
-def _ranges(robot: truing.Robot, joints: Floats) -> list[dict[str, Any]]:
+def _ranges(robot: _core.Robot, joints: Floats) -> list[dict[str, Any]]:
     """Of every driven joint its limits, and what of them is used."""
     rows = joints[np.isfinite(joints).all(axis=1)]
     found = []
@@ -175,11 +157,11 @@ def _ranges(robot: truing.Robot, joints: Floats) -> list[dict[str, Any]]:
     return found
 
 
-def _counts(solutions: Iterable[truing.Solution]) -> dict[str, int]:
+def _counts(solutions: Iterable[_core.Solution]) -> dict[str, int]:
     return dict(Counter(s.reason for s in solutions).most_common())
 
 
-def _worst(solutions: Iterable[truing.Solution]) -> dict[str, Any]:
+def _worst(solutions: Iterable[_core.Solution]) -> dict[str, Any]:
     met = [s for s in solutions if s.reached]
     return {
         "position_m": max((s.position_error for s in met), default=None),
@@ -187,7 +169,7 @@ def _worst(solutions: Iterable[truing.Solution]) -> dict[str, Any]:
     }
 
 
-def _skeletons(robot: truing.Robot, joints: Floats) -> tuple[Floats, ...]:
+def _skeletons(robot: _core.Robot, joints: Floats) -> tuple[Floats, ...]:
     """The robot as lines, at a few of its positions."""
     rows = np.flatnonzero(np.isfinite(joints).all(axis=1))
     if not rows.size:
@@ -195,11 +177,11 @@ def _skeletons(robot: truing.Robot, joints: Floats) -> tuple[Floats, ...]:
     pick = rows[np.unique(np.linspace(0, rows.size - 1, min(_ROBOTS_DRAWN, rows.size)).astype(np.intp))]
     base = np.asarray(robot.T_measurement_base)[None, :3, 3]
     return tuple(
-        np.concatenate([base, truing.forward_kinematics(robot, joints[row])[:, :3, 3]]) for row in pick
+        np.concatenate([base, _core.forward_kinematics(robot, joints[row])[:, :3, 3]]) for row in pick
     )
 
 
-def _outlines(scene: truing.Scene) -> tuple[tuple[str, Floats], ...]:
+def _outlines(scene: _core.Scene) -> tuple[tuple[str, Floats], ...]:
     """Edges of boxes; of spheres and capsules circles, and of capsules lines between them."""
     gap = np.full((1, 3), np.nan)
     turn = np.linspace(0.0, 2.0 * np.pi, 33)
@@ -236,7 +218,7 @@ def _outlines(scene: truing.Scene) -> tuple[tuple[str, Floats], ...]:
 # -------------------------------------------------------------------------------------------------------
 
 
-def first_of_each(solved: Solved) -> list[truing.Solution]:
+def first_of_each(solved: Solved) -> list[_core.Solution]:
     """The best answer of every target: branches come nearest first."""
     first = np.unique(solved.target, return_index=True)[1]
     return [solved.solutions[int(k)] for k in first]
@@ -248,7 +230,7 @@ def inverse_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
     reached = [s for s in solutions if s.reached]
     found: dict[str, Any] = {
         "format": INVERSE_FORMAT,
-        "version": truing.__version__,
+        "version": _core.version(),
         "robot": solver.robot.name,
         "effects": [effect.effect for effect in solver.robot.effects],
         "closed_form": solver.closed_form,
@@ -283,11 +265,11 @@ def inverse_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
     return found
 
 
-def not_empty(scene: truing.Scene) -> bool:
+def not_empty(scene: _core.Scene) -> bool:
     return bool(scene.capsules or scene.obstacles)
 
 
-def _path(path: truing.JointPath, steps: truing.PathOptions, robot: truing.Robot) -> dict[str, Any]:
+def _path(path: _core.JointPath, steps: _core.PathOptions, robot: _core.Robot) -> dict[str, Any]:
     joints = [robot.joints[k] for k in robot.driven_joints()]
     gaps = []
     for gap in path.gaps:
@@ -324,8 +306,6 @@ def inverse_columns(solved: Solved) -> dict[str, Any]:
 
 def write_inverse(folder: Path, solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
     """Writes everything that ``truing ik`` found into `folder`, and returns what result.json holds."""
-    from truing.inverse_kinematics.page import inverse_report
-
     found: dict[str, Any] = without_nan(inverse_dict(solved, warnings=warnings))
     first = first_of_each(solved)
     joints = _commanded_joints(solved.solver, first)
@@ -358,7 +338,7 @@ def compensation_dict(
     moved = np.linalg.norm(np.asarray(made.results.T_command)[:, :3, 3] - wanted[:, :3, 3], axis=1)
     found: dict[str, Any] = {
         "format": COMPENSATION_FORMAT,
-        "version": truing.__version__,
+        "version": _core.version(),
         "nominal": made.compensator.nominal.robot.name,
         "calibrated": solver.robot.name,
         "effects": [effect.effect for effect in solver.robot.effects],
@@ -418,8 +398,6 @@ def compensation_columns(made: CompensatedProgram) -> dict[str, Any]:
 
 def pose_columns(made: CompensatedProgram) -> dict[str, Any]:
     """Columns of ``poses.csv``: the pose to command for every target; empty where it is not reached."""
-    from truing.files.handeye_file import quaternions_from_rotations
-
     solutions = list(made.results.solutions)
     good = np.array([is_commanded(s) for s in solutions])
     frames = np.asarray(made.results.T_command)
@@ -440,8 +418,6 @@ def write_compensation(
     folder: Path, made: CompensatedProgram, *, warnings: Iterable[str] = ()
 ) -> dict[str, Any]:
     """Writes everything that ``truing compensate`` found into `folder`, and returns what result.json holds."""
-    from truing.inverse_kinematics.page import compensation_report
-
     wanted = wanted_frames(made)
     found: dict[str, Any] = without_nan(compensation_dict(made, wanted, warnings=warnings))
     solver, solutions = made.compensator.calibrated, list(made.results.solutions)

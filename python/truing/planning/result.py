@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import truing
+from truing import _core
 from truing.files.common import joint_columns
 from truing.identification.result import frozen_dict, parameter_dict
 
@@ -19,13 +19,13 @@ Floats = NDArray[np.float64]
 
 
 def plan_dict(
-    robot: truing.Robot,
-    planned: truing.PlanResult,
+    robot: _core.Robot,
+    planned: _core.PlanResult,
     *,
     index: str,
     noise: float,
     seed: int,
-    seen: truing.Distinction | None = None,
+    seen: _core.Distinction | None = None,
     warnings: Iterable[str] = (),
 ) -> dict[str, Any]:
     """What ``result.json`` of ``truing plan`` holds. `noise` of one position component [m] is what the
@@ -33,7 +33,7 @@ def plan_dict(
     what the plan tells apart, if that was asked for."""
     result: dict[str, Any] = {
         "format": PLAN_FORMAT,
-        "version": truing.__version__,
+        "version": _core.version(),
         "robot": robot.name,
         "poses": len(planned.joints) if seen is None else len(seen.joints),
         "index": {
@@ -53,7 +53,7 @@ def plan_dict(
     return result
 
 
-def distinction_dict(seen: truing.Distinction) -> dict[str, Any]:
+def distinction_dict(seen: _core.Distinction) -> dict[str, Any]:
     """The part of ``result.json`` of ``truing plan`` on effects: their smallest sizes, which are alike, and
     what poses were added for.
     """
@@ -84,7 +84,7 @@ def distinction_dict(seen: truing.Distinction) -> dict[str, Any]:
     }
 
 
-def _effect_pair(p: truing.EffectPair) -> dict[str, Any]:
+def _effect_pair(p: _core.EffectPair) -> dict[str, Any]:
     return {
         "effect": p.effect,
         "joint": p.joint,
@@ -98,9 +98,7 @@ def _effect_pair(p: truing.EffectPair) -> dict[str, Any]:
     }
 
 
-def plan_columns(
-    robot: truing.Robot, joints: Floats, seen: truing.Distinction | None = None
-) -> dict[str, Any]:
+def plan_columns(robot: _core.Robot, joints: Floats, seen: _core.Distinction | None = None) -> dict[str, Any]:
     """Columns of ``poses.csv``: joints, and the inputs to be varied that were asked for."""
     if seen is None:
         return joint_columns(robot, joints)

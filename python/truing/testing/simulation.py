@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import truing
+from truing import _core
 from truing.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -54,7 +54,7 @@ class TrueEffect:
 class Truth:
     """The robot behind simulated measurements."""
 
-    robot: truing.Robot
+    robot: _core.Robot
     parameters: Mapping[
         str, tuple[float, float, str]
     ]  # name: (nominal, true, unit) of every value that differs
@@ -66,7 +66,7 @@ class Simulation:
     """Simulated measurements, and everything that a calibration should find out about them."""
 
     truth: Truth
-    data: truing.Measurements
+    data: _core.Measurements
     noise: float  # of one position component [m]
     rotation_noise: float  # of one rotation component [rad]; 0: no orientation measured
     outlier_rows: tuple[int, ...]
@@ -102,7 +102,7 @@ class Simulation:
 
 
 def simulate(
-    robot: truing.Robot,
+    robot: _core.Robot,
     *,
     joints: Floats | None = None,
     poses: int = 200,
@@ -155,7 +155,7 @@ def simulate(
 
 
 def true_robot(
-    nominal: truing.Robot,
+    nominal: _core.Robot,
     *,
     lengths: float = 1e-3,
     angles: float = 1e-3,
@@ -207,7 +207,7 @@ def true_robot(
             frame = np.array(frame_of)
             moved = frame.copy()
             moved[:3, 3] += draws[:3]
-            moved[:3, :3] = truing.rotation_from_rpy(draws[3:]) @ frame[:3, :3]
+            moved[:3, :3] = _core.rotation_from_rpy(draws[3:]) @ frame[:3, :3]
             apply(moved)
             for k, axis in enumerate("xyz"):
                 if draws[k]:
@@ -225,7 +225,7 @@ def true_robot(
     if base_unknown:
         place = np.eye(4)
         place[:3, 3] = rng.uniform(-2, 2, 3)
-        place[:3, :3] = truing.rotation_from_rpy(
+        place[:3, :3] = _core.rotation_from_rpy(
             rng.uniform([-0.035, -0.035, -math.pi], [0.035, 0.035, math.pi])
         )
         robot.T_measurement_base = place
@@ -270,7 +270,7 @@ def measure(
         joints = random_joints(robot, poses, seed)
     n = len(joints)
     inputs = _inputs(robot, n, wanted, seed)
-    predicted = truing.predict(robot, truing.Measurements(joints, **inputs))
+    predicted = _core.predict(robot, _core.Measurements(joints, **inputs))
 
     rng = np.random.default_rng([seed, 3])
     positions = predicted.position + noise * rng.normal(size=(n, 3))
@@ -281,7 +281,7 @@ def measure(
     rows = np.sort(rng.choice(n, size=round(outlier_share * n), replace=False))
     away = rng.normal(size=(rows.size, 3))
     positions[rows] += outlier_length * away / np.linalg.norm(away, axis=1, keepdims=True)
-    data = truing.Measurements(joints, positions=positions, orientations=orientations, **inputs)
+    data = _core.Measurements(joints, positions=positions, orientations=orientations, **inputs)
     return Simulation(
         truth,
         data,
@@ -294,7 +294,7 @@ def measure(
     )
 
 
-def random_joints(robot: truing.Robot, count: int, seed: int = 0) -> Floats:
+def random_joints(robot: _core.Robot, count: int, seed: int = 0) -> Floats:
     """Configurations drawn evenly between the joint limits, shape=(count, driven joints) [rad | m].
 
     Revolute joints without limits use -pi to pi; a prismatic joint must have limits, or InputError is raised.
@@ -318,11 +318,11 @@ def random_joints(robot: truing.Robot, count: int, seed: int = 0) -> Floats:
     return np.random.default_rng([seed, 2]).uniform(low, high, (count, len(bounds)))
 
 
-def _true_effect(robot: truing.Robot, name: str, value: float) -> TrueEffect:
+def _true_effect(robot: _core.Robot, name: str, value: float) -> TrueEffect:
     """The effect that a parameter name stands for. Raises InputError that lists the effects there are."""
     found = re.fullmatch(r"([a-z_]+(?:@\d+(?:\.\d+)?)?)(?:\.(.*))?", name)
     effect, rest = (found[1], found[2] or "") if found else (name, "")
-    known = [word for word, _ in truing.catalogue() if word not in _NOT_EFFECTS]
+    known = [word for word, _ in _core.catalogue() if word not in _NOT_EFFECTS]
     if effect.partition("@")[0] not in known:
         raise InputError(
             f"effect {effect!r} cannot be simulated; there are {', '.join(known)} (link geometry, base and"
@@ -342,7 +342,7 @@ def _true_effect(robot: truing.Robot, name: str, value: float) -> TrueEffect:
     )
 
 
-def _values(robot: truing.Robot) -> Iterator[tuple[Any, str, str, str]]:
+def _values(robot: _core.Robot) -> Iterator[tuple[Any, str, str, str]]:
     """Object, attribute, parameter name and unit of every single value that can be wrong."""
     last = len(robot.joints) - 1
     for index, joint in enumerate(robot.joints):
@@ -360,7 +360,7 @@ def _values(robot: truing.Robot) -> Iterator[tuple[Any, str, str, str]]:
             yield joint, "ratio", f"{joint.name}.ratio", "-"
 
 
-def _frames(robot: truing.Robot) -> Iterator[tuple[str, Any, Any]]:
+def _frames(robot: _core.Robot) -> Iterator[tuple[str, Any, Any]]:
     """Name, value and setter of every frame that can be wrong."""
 
     def setter(owner: Any, attribute: str) -> Any:
@@ -374,7 +374,7 @@ def _frames(robot: truing.Robot) -> Iterator[tuple[str, Any, Any]]:
 
 
 def _add_effects(
-    robot: truing.Robot, effects: Sequence[TrueEffect], changed: dict[str, tuple[float, float, str]]
+    robot: _core.Robot, effects: Sequence[TrueEffect], changed: dict[str, tuple[float, float, str]]
 ) -> None:
     applied: dict[tuple[str, str], dict[str, float]] = {}
     for effect in effects:
@@ -393,13 +393,13 @@ def _add_effects(
         robot.effects = [
             *robot.effects,
             *(
-                truing.AppliedEffect(name, [joint] if joint else [], values)
+                _core.AppliedEffect(name, [joint] if joint else [], values)
                 for (name, joint), values in applied.items()
             ),
         ]
 
 
-def _inputs(robot: truing.Robot, n: int, columns: Sequence[str], seed: int) -> dict[str, Any]:
+def _inputs(robot: _core.Robot, n: int, columns: Sequence[str], seed: int) -> dict[str, Any]:
     rng = np.random.default_rng([seed, 5])
     direction = rng.choice([-1.0, 1.0], size=(n, robot.driven_count))
     payload = rng.choice([0.0, 0.5, 1.0], size=n) * LARGEST_PAYLOAD

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.errors import InputError
-from truing.files.handeye_file import rotations_from_quaternions
 from truing.files.stream_file import ImuData, JointData, PoseData, SetupData, ToolPoses, TrackerData
+from truing.rotations import interpolated, rotations_from_quaternions
 
 Floats = NDArray[np.float64]
 
@@ -226,30 +226,6 @@ def _check_orientation(tracker: TrackerData, rows: NDArray[np.intp], expected: F
         f"{tracker.path}, column 'qw': orientations are {usual:.3g} rad from what encoders and set-up"
         f" say{hint}"
     )
-
-
-# ---- Frames between frames
-# -------------------------------------------------------------------------------------------
-
-
-def rotation_vectors(R: Floats) -> Floats:
-    """shape=(n, 3) [rad] of shape=(n, 3, 3), for turns well below half a turn."""
-    w = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
-    sine, cosine = np.linalg.norm(w, axis=1), (np.einsum("nii->n", R) - 1) / 2
-    angle = np.arctan2(sine, cosine)
-    return np.asarray(w * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-300), 1.0)[:, None])
-
-
-def interpolated(t: Floats, T: Floats, at: Floats) -> Floats:
-    """Frames between two of a stream, shape=(m, 4, 4): positions on a line, orientations by a normalised mean
-    of the neighbours' columns.
-    """
-    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
-    x = ((at - t[k]) / (t[k + 1] - t[k]))[:, None, None]
-    out = (1 - x) * T[k] + x * T[k + 1]
-    u, _, vt = np.linalg.svd(out[:, :3, :3])
-    out[:, :3, :3] = u @ vt
-    return np.asarray(out)
 
 
 # ---- Calibration

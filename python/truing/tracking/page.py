@@ -11,7 +11,8 @@ became of the samples.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,7 @@ from numpy.typing import NDArray
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, REJECTED, packed
 from truing.report.page import Page, footer, table_cell, warnings_card
 from truing.report.words import counted, escaped, figures_text, length_text
-
-if TYPE_CHECKING:
-    from truing.tracking.result import Played
+from truing.rotations import interpolated
 
 Floats = NDArray[np.float64]
 
@@ -41,12 +40,23 @@ _CONSISTENT, _INCONSISTENT = (0.5, 1.6), (0.25, 3.0)
 _MANY_OUTLIERS = 0.02
 
 
-def run_report(result: Mapping[str, Any], run: Played) -> str:
+@dataclass(frozen=True)
+class Replayed:
+    """What the report draws, beside what result.json holds: the tables of a replay, by column."""
+
+    compensation: Mapping[str, Any]
+    graded: Mapping[str, Any]
+    timeline: Mapping[str, Any]
+    innovations: Mapping[str, Any]
+    true_tool: tuple[Floats, Floats] | None = None  # times, shape=(n,) [s], and frames, shape=(n, 4, 4)
+
+
+def run_report(result: Mapping[str, Any], run: Replayed) -> str:
     """The report of ``truing track run``.
 
     Args:
         result: What ``result.json`` holds (format ``truing-track-run/1``).
-        run: The replay behind it.
+        run: The replay's tables.
     """
     page = Page(f"{result['robot'] or 'Robot'}: tracking", _STYLE)
     page.add(_headline(result))
@@ -296,18 +306,16 @@ def _thinned(rows: NDArray[np.intp]) -> NDArray[np.intp]:
     return rows if rows.size <= _DRAWN else rows[np.linspace(0, rows.size - 1, _DRAWN).astype(np.intp)]
 
 
-def _what_happened(page: Page, result: Mapping[str, Any], run: Played) -> None:
+def _what_happened(page: Page, result: Mapping[str, Any], run: Replayed) -> None:
     """Deviation of the tool from its plan, predicted; and the true one where it is known. Axis by axis."""
-    rows = run.played.compensation
+    rows = run.compensation
     made = np.flatnonzero(rows["made"])
     if not made.size:
         return
-    from truing.tracking.api import interpolated
-
     page.add(
         '<section class="card"><h2>The tool, away from its plan</h2><p class="lead">As predicted '
         f"{figures_text(1e3 * result['horizon_s'], 2)} ms before, in the base frame"
-        f"{'; <span class=truth>green</span>: what then happened' if run.truth is not None else ''}. Minus"
+        f"{'; <span class=truth>green</span>: what then happened' if run.true_tool is not None else ''}. Minus"
         " this is what is sent to the arm.</p>"
     )
     every = _thinned(made)
@@ -315,11 +323,12 @@ def _what_happened(page: Page, result: Mapping[str, Any], run: Played) -> None:
     predicted = rows["T_base_tool"][every][:, :3, 3] - rows["T_base_tool_planned"][every][:, :3, 3]
     sent = -rows["correction"][every][:, :3]
     true = None
-    if run.truth is not None:
-        inside = (t >= run.truth.t[0]) & (t <= run.truth.t[-1])
+    if run.true_tool is not None:
+        times, frames = run.true_tool
+        inside = (t >= times[0]) & (t <= times[-1])
         true = np.full_like(predicted, np.nan)
         true[inside] = (
-            interpolated(run.truth.t, run.truth.T, t[inside])[:, :3, 3]
+            interpolated(times, frames, t[inside])[:, :3, 3]
             - rows["T_base_tool_planned"][every][inside][:, :3, 3]
         )
     for k, axis in enumerate("xyz"):
@@ -360,9 +369,9 @@ def _line(x: Floats, y: Floats, colour: str, name: str, width: float, dash: str 
     }
 
 
-def _over_time(page: Page, result: Mapping[str, Any], run: Played) -> None:
+def _over_time(page: Page, result: Mapping[str, Any], run: Replayed) -> None:
     """Errors against the tracker over the recording, running rms over a second."""
-    told, graded = at_horizon(result), run.played.graded
+    told, graded = at_horizon(result), run.graded
     if told is None:
         return
     rows = np.flatnonzero((graded["horizon"] == told["horizon_s"]) & (graded["dimensions"] > 0))
@@ -406,8 +415,8 @@ def _over_time(page: Page, result: Mapping[str, Any], run: Played) -> None:
     page.add("</section>")
 
 
-def _status(page: Page, result: Mapping[str, Any], run: Played) -> None:
-    timeline = run.played.timeline
+def _status(page: Page, result: Mapping[str, Any], run: Replayed) -> None:
+    timeline = run.timeline
     t, status = timeline["t"], np.array(timeline["status"], dtype=str)
     if not t.size:
         return
@@ -476,8 +485,8 @@ def _status(page: Page, result: Mapping[str, Any], run: Played) -> None:
     )
 
 
-def _clock(page: Page, result: Mapping[str, Any], run: Played) -> None:
-    timeline, clock = run.played.timeline, result["clock"]
+def _clock(page: Page, result: Mapping[str, Any], run: Replayed) -> None:
+    timeline, clock = run.timeline, result["clock"]
     page.add('<section class="card"><h2>Clock of the tracker</h2>')
     if clock["estimated"] and len(timeline["t"]):
         rows = _thinned(np.arange(len(timeline["t"])))
@@ -516,9 +525,9 @@ def _clock(page: Page, result: Mapping[str, Any], run: Played) -> None:
         )
 
 
-def _consistency(page: Page, run: Played) -> None:
+def _consistency(page: Page, run: Replayed) -> None:
     """Innovations squared, as a running mean, against what the filter expects."""
-    i = run.played.innovations
+    i = run.innovations
     used = (i["accepted"] > 0) & (i["dimensions"] > 0)
     page.add('<section class="card"><h2>Is the filter as sure as it should be?</h2>')
     if used.sum() < 20:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 """What ``truing track calibrate`` and ``track run`` found, as it is written: ``setup.yaml``,
-``compensation.csv``, ``result.json``, reports; a simulated recording as files.
+``compensation.csv``, ``result.json``, reports.
 """
 
 from __future__ import annotations
@@ -14,30 +14,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import truing
+from truing import _core
 from truing.files import write_table
-from truing.files.common import joint_columns
+from truing.files.common import MOTIONS, frame_dict, joint_columns
 from truing.files.stream_file import (
     FRAMES,
+    PoseData,
     SetupData,
     pose_columns,
-    save_imu,
-    save_joints,
-    save_plan,
     save_setup,
-    save_tracker,
 )
 from truing.report.json_text import to_json, without_nan
-from truing.tracking.api import TrackCalibration, interpolated, rotation_vectors
+from truing.rotations import interpolated, rotation_vectors
+from truing.tracking.api import TrackCalibration
+from truing.tracking.page import Replayed, calibration_report, run_report
 
 RUN_FORMAT = "truing-track-run/1"
 CALIBRATION_FORMAT = "truing-track-calibration/1"
-SIMULATION_FORMAT = "truing-track-simulation/1"
-CHANGES = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 BASELINES = ("hold", "velocity", "fk", "fk_velocity")
 SETTLING = 5.0  # [s] of the start, in which clock and biases settle: not counted in errors
 _DROPOUT = 0.25  # [s] between tracker samples
-_TRUTH_RATE = 200.0  # [Hz] of truth.csv
 
 Floats = NDArray[np.float64]
 
@@ -46,13 +42,13 @@ Floats = NDArray[np.float64]
 class Played:
     """A replay and what it was made from."""
 
-    robot: truing.Robot
+    robot: _core.Robot
     where: SetupData
-    played: truing.ReplayResult
+    played: _core.ReplayResult
     horizon: float  # [s]
     plan_t: Floats  # shape=(rows of the plan,) [s], their own stamps
     tracker_t: Floats  # shape=(n,) [s], the tracker's stamps in the inertial sensor's clock
-    truth: truing.PoseData | None = None  # of the tool, the inertial sensor's clock
+    truth: PoseData | None = None  # of the tool, the inertial sensor's clock
 
 
 # ---- Errors
@@ -152,7 +148,7 @@ def run_dict(run: Played, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
     settled = used & (innovations["t"] >= (innovations["t"].min() + SETTLING if used.any() else 0.0))
     return {
         "format": RUN_FORMAT,
-        "version": truing.__version__,
+        "version": _core.version(),
         "robot": run.robot.name,
         "horizon_s": run.horizon,
         "rows": len(made),
@@ -257,12 +253,12 @@ def compensation_columns(run: Played) -> dict[str, Any]:
     sigma = np.sqrt(np.einsum("nii->ni", rows["covariance"].reshape(-1, 6, 6)))
     columns: dict[str, Any] = {"t_s": rows["t"], "plan_t_s": run.plan_t, "made_s": known(rows["made_at"])}
     columns |= {name: known(values) for name, values in pose_columns(rows["T_base_tool"]).items()}
-    columns |= {f"d{name}": known(rows["correction"][:, k]) for k, name in enumerate(CHANGES)}
+    columns |= {f"d{name}": known(rows["correction"][:, k]) for k, name in enumerate(MOTIONS)}
     columns |= {
         f"flange_{name}": known(values) for name, values in pose_columns(rows["T_base_flange"]).items()
     }
     columns |= joint_columns(run.robot, corrected_joints(run))
-    columns |= {f"sigma_{name}": known(sigma[:, k]) for k, name in enumerate(CHANGES)}
+    columns |= {f"sigma_{name}": known(sigma[:, k]) for k, name in enumerate(MOTIONS)}
     columns["limited"] = known(np.asarray(rows["limited"], dtype=np.float64))
     columns["predictor"] = [
         word if there else None for word, there in zip(rows["predictor"], made, strict=True)
@@ -281,10 +277,10 @@ def corrected_joints(run: Played) -> Floats:
     rows, robot = run.played.compensation, run.robot
     T_flange_tool = np.asarray(run.where.setup.T_flange_tool)
     bare = robot.replace(
-        T_measurement_base=np.eye(4), targets=[truing.Target("tool", T_flange_tool)], effects=[]
+        T_measurement_base=np.eye(4), targets=[_core.Target("tool", T_flange_tool)], effects=[]
     )  # the flange is that of the link table throughout
-    solver = truing.InverseSolver(bare)
-    like = truing.Task(np.eye(4), kind="pose" if robot.driven_count >= 6 else "point")
+    solver = _core.InverseSolver(bare)
+    like = _core.Task(np.eye(4), kind="pose" if robot.driven_count >= 6 else "point")
     out = np.full((len(rows["t"]), robot.driven_count), np.nan)
     previous = None
     for k in np.flatnonzero(rows["made"]):
@@ -299,8 +295,6 @@ def corrected_joints(run: Played) -> Floats:
 
 def write_run(folder: Path, run: Played, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
     """Writes everything that ``truing track run`` found into `folder`, and returns what result.json holds."""
-    from truing.tracking.page import run_report
-
     found: dict[str, Any] = without_nan(run_dict(run, warnings=warnings))
     if len(run.plan_t):
         write_table(folder / "compensation.csv", compensation_columns(run))
@@ -308,8 +302,15 @@ def write_run(folder: Path, run: Played, *, warnings: Iterable[str] = ()) -> dic
     if learnt.count:  # for the next recording of this arm
         save_setup(folder / "setup.yaml", replace(run.where, modes=learnt))
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
-    (folder / "report.html").write_text(run_report(found, run), encoding="utf-8")
+    (folder / "report.html").write_text(run_report(found, _replayed(run)), encoding="utf-8")
     return found
+
+
+def _replayed(run: Played) -> Replayed:
+    """What the report draws."""
+    p = run.played
+    true_tool = None if run.truth is None else (run.truth.t, run.truth.T)
+    return Replayed(p.compensation, p.graded, p.timeline, p.innovations, true_tool)
 
 
 # ---- Calibration
@@ -317,13 +318,13 @@ def write_run(folder: Path, run: Played, *, warnings: Iterable[str] = ()) -> dic
 
 
 def calibration_dict(
-    robot: truing.Robot, c: TrackCalibration, *, warnings: Iterable[str] = ()
+    robot: _core.Robot, c: TrackCalibration, *, warnings: Iterable[str] = ()
 ) -> dict[str, Any]:
     """What ``result.json`` of ``truing track calibrate`` holds."""
     setup, done = c.where.setup, c.status == "done"
     return {
         "format": CALIBRATION_FORMAT,
-        "version": truing.__version__,
+        "version": _core.version(),
         "robot": robot.name,
         "status": c.status,
         "message": c.message,
@@ -398,12 +399,10 @@ def calibration_dict(
 
 
 def _frame(T: Floats, covariance: Floats | None) -> dict[str, Any]:
-    from truing.hand_eye.result import frame_dict
-
     sigma = (
         None
         if covariance is None
-        else dict(zip(CHANGES, np.sqrt(np.maximum(0.0, np.diag(covariance))).tolist(), strict=True))
+        else dict(zip(MOTIONS, np.sqrt(np.maximum(0.0, np.diag(covariance))).tolist(), strict=True))
     )
     return {**frame_dict(T), "sigma": sigma}
 
@@ -427,79 +426,20 @@ def _calibrated_clock(c: TrackCalibration) -> dict[str, Any]:
 
 
 def write_calibration(
-    folder: Path, robot: truing.Robot, c: TrackCalibration, *, source: str, warnings: Iterable[str] = ()
+    folder: Path, robot: _core.Robot, c: TrackCalibration, *, source: str, warnings: Iterable[str] = ()
 ) -> dict[str, Any]:
     """Writes everything that ``truing track calibrate`` found into `folder`, and returns what result.json
     holds. No setup.yaml where the data did not show it.
     """
-    from truing.tracking.page import calibration_report
-
     found: dict[str, Any] = without_nan(calibration_dict(robot, c, warnings=warnings))
     if c.status == "done":
         told = {
             "source": source,
             "positions": len(c.frames.errors),
             "position_sigma_m": c.frames.position_sigma,
-            "truing": truing.__version__,
+            "truing": _core.version(),
         }
         save_setup(folder / "setup.yaml", replace(c.where, calibration=told))
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
     (folder / "report.html").write_text(calibration_report(found), encoding="utf-8")
     return found
-
-
-# ---- A simulated recording
-# -------------------------------------------------------------------------------------------
-
-
-def write_simulation(
-    folder: Path,
-    robot: truing.Robot,
-    streams: truing.SimulatedStreams,
-    options: truing.StreamSimulationOptions,
-) -> dict[str, Any]:
-    """Writes imu.csv, tracker.csv, joints.csv, plan.csv, setup.yaml, truth.csv and truth.json into `folder`;
-    returns what truth.json holds.
-    """
-    save_imu(folder / "imu.csv", **streams.imu)
-    save_tracker(folder / "tracker.csv", **streams.tracker)
-    save_joints(folder / "joints.csv", robot, **streams.joints)
-    plan = streams.plan
-    save_plan(folder / "plan.csv", plan["t"], plan["T_base_tool"], plan["arrival"])
-    t = np.arange(int(options.seconds * _TRUTH_RATE) + 1) / _TRUTH_RATE
-    save_plan(folder / "truth.csv", t, streams.tool_at(t))
-    setup, offset = streams.setup, options.tracker.clock_offset
-    if offset or options.tracker.clock_drift:  # nobody knows it beforehand
-        setup = setup.replace(clock_offset=0.0, clock_offset_sigma=max(0.01, 1.5 * abs(offset)))
-    save_setup(folder / "setup.yaml", SetupData(setup, calibration={"source": "simulated: the true frames"}))
-    truth: dict[str, Any] = without_nan(
-        {
-            "format": SIMULATION_FORMAT,
-            "version": truing.__version__,
-            "robot": robot.name,
-            "seed": options.seed,
-            "seconds": options.seconds,
-            "motion": options.motion,
-            "clock_offset_s": options.tracker.clock_offset,
-            "clock_drift": options.tracker.clock_drift,
-            "actuator_lag_s": options.actuator_lag,
-            "modes": [{"frequency_hz": mode.frequency, "damping": mode.damping} for mode in streams.modes],
-            "dropouts": [{"start_s": start, "seconds": seconds} for start, seconds in options.dropouts],
-            "station_shifts": [
-                {
-                    "start_s": start,
-                    "jump_m": float(np.linalg.norm(T[:3, 3])),
-                    "jump_rad": float(np.linalg.norm(rotation_vectors(T[None, :3, :3]))),
-                }
-                for start, T in options.shifts
-            ],
-            "samples": {
-                "imu": len(streams.imu["t"]),
-                "tracker": len(streams.tracker["t"]),
-                "joints": len(streams.joints["t"]),
-                "plan": len(plan["t"]),
-            },
-        }
-    )
-    (folder / "truth.json").write_text(to_json(truth), encoding="utf-8")
-    return truth

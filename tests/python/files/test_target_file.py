@@ -23,7 +23,7 @@ from inverse_arms import gantry, irb, poses_of, random_joints
 from scene_files import NAMES, SCENE
 from tables import write
 from truing.errors import InputError
-from truing.files.handeye_file import quaternions_from_rotations
+from truing.rotations import quaternions_from_rotations
 
 ROBOT = irb()
 SEEDS = tuple(f"q{k}_rad" for k in range(1, 7))

@@ -21,7 +21,7 @@ from handeye_scenes import CAMERA_IN_HAND, HandEyeScene, columns_of, scene, writ
 from tables import columns
 from truing.cli import main
 from truing.examples import example
-from truing.files.handeye_file import rotations_from_quaternions
+from truing.rotations import rotations_from_quaternions
 
 FORMAT = {
     "format",

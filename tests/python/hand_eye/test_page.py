@@ -20,8 +20,8 @@ import pytest
 import truing
 from handeye_scenes import HandEyeScene, scene, write_scene
 from pages import charts_of, visible
-from truing.hand_eye.page import handeye_report
-from truing.hand_eye.result import Scene, Solved, handeye_dict, scene_of
+from truing.hand_eye.page import Scene, handeye_report
+from truing.hand_eye.result import Solved, handeye_dict, scene_of
 from truing.report.json_text import without_nan
 
 

@@ -38,7 +38,7 @@ from scene_files import NAMES, SCENE
 from tables import columns, write
 from truing.cli import main
 from truing.examples import example
-from truing.files.handeye_file import quaternions_from_rotations, rotations_from_quaternions
+from truing.rotations import quaternions_from_rotations, rotations_from_quaternions
 
 ROBOT = str(example("irb120"))
 

@@ -166,7 +166,7 @@ def test_what_is_reached_is_by_pinocchio() -> None:
 
 def predicted(robot: truing.Robot, joints: Floats, payload: Floats, direction: Floats) -> Floats:
     """shape=(n, 4, 4): where `predict` says that the robot is."""
-    from truing.files.handeye_file import rotations_from_quaternions
+    from truing.rotations import rotations_from_quaternions
 
     said = truing.predict(
         robot,

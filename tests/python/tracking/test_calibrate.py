@@ -24,7 +24,6 @@ from truing import InputError
 from truing.cli import main
 from truing.examples import example
 from truing.files import write_table
-from truing.files.handeye_file import quaternions_from_rotations, rotations_from_quaternions
 from truing.files.stream_file import (
     ImuData,
     JointData,
@@ -35,7 +34,8 @@ from truing.files.stream_file import (
     save_plan,
     save_tracker,
 )
-from truing.tracking.api import rotation_vectors, white_noise
+from truing.rotations import quaternions_from_rotations, rotation_vectors, rotations_from_quaternions
+from truing.tracking.api import white_noise
 
 Floats = NDArray[np.float64]
 ROBOT = truing.load_robot(example("ur10"))

@@ -19,7 +19,7 @@ from pages import charts_of, visible
 from tables import columns
 from truing.cli import main
 from truing.examples import example
-from truing.files.handeye_file import rotations_from_quaternions
+from truing.rotations import rotations_from_quaternions
 
 FORMAT = {
     "format",

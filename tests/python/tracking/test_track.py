@@ -16,7 +16,7 @@ import pytest
 import truing
 from truing import InputError
 from truing.examples import example
-from truing.tracking.api import interpolated, rotation_vectors
+from truing.rotations import interpolated, rotation_vectors
 from truing.tracking.result import BASELINES, horizon_errors
 
 ROBOT = truing.load_robot(example("large_boom"))
