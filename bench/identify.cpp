@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluate.hpp"
+#include "estimation/evaluate.hpp"
 #include "truing/truing.hpp"
 
 namespace {
@@ -120,27 +120,27 @@ long resident_kilobytes(const char* which) {
 }
 
 struct Problem {
-  detail::Model model;
+  model::Model model;
   std::vector<std::vector<double>> bases;
   std::vector<int> free;
   Eigen::VectorXd values;
   std::vector<std::int32_t> rows;
 
   Problem(const Robot& robot, const Measurements& data)
-      : model(detail::make_model(robot, data)), bases(detail::make_bases(model, data)) {
+      : model(model::make_model(robot, data)), bases(estimation::make_bases(model, data)) {
     for (std::size_t k = 0; k < model.parameters.size(); ++k) {  // 30 link values, 6 base, 3 tool
-      const detail::ParameterInfo& info = model.parameters[k];
-      if (info.role == detail::Role::geometry || info.role == detail::Role::base ||
-          (info.role == detail::Role::target && !info.rotation))
+      const model::ParameterInfo& info = model.parameters[k];
+      if (info.role == model::Role::geometry || info.role == model::Role::base ||
+          (info.role == model::Role::target && !info.rotation))
         free.push_back(static_cast<int>(k));
     }
-    values = detail::initial_values(model);
+    values = model::initial_values(model);
     rows.resize(data.rows);
     std::iota(rows.begin(), rows.end(), 0);
   }
 
-  detail::Evaluator evaluator(const Measurements& data, int threads) const {
-    return detail::Evaluator(model, data, bases, detail::make_segments(data, rows), free, threads);
+  estimation::Evaluator evaluator(const Measurements& data, int threads) const {
+    return estimation::Evaluator(model, data, bases, estimation::make_segments(data, rows), free, threads);
   }
 };
 
@@ -153,19 +153,19 @@ double rms_against(const Robot& truth, const Robot& found, std::mt19937_64* rand
 void time_kernel(const Robot& truth, std::mt19937_64* random) {
   const Data data(truth, 1000, 3e-5, random);
   const Problem problem(truth, data.measurements);
-  const detail::Evaluator evaluator = problem.evaluator(data.measurements, 1);
+  const estimation::Evaluator evaluator = problem.evaluator(data.measurements, 1);
   report("jacobian_columns", static_cast<double>(problem.free.size()), "1");
   double sum = 0.0;
   report("fk_jacobian_1000",
          1e6 * best_seconds(5000,
                             [&] {
-                              evaluator.jacobian_tiles(problem.values, detail::Weighing{},
+                              evaluator.jacobian_tiles(problem.values, estimation::Weighing{},
                                                        [&](const double* j, int, int) { sum += j[0]; });
                             }),
          "us");
-  detail::NormalEquations normal;
+  estimation::NormalEquations normal;
   report("iteration_1000",
-         1e6 * best_seconds(2000, [&] { evaluator.normal_equations(problem.values, detail::Weighing{}, &normal); }),
+         1e6 * best_seconds(2000, [&] { evaluator.normal_equations(problem.values, estimation::Weighing{}, &normal); }),
          "us");
   if (sum == 0.123456789) std::puts("");  // the work is not to be optimised away
 }
@@ -174,15 +174,16 @@ void time_threads(const Robot& truth, std::mt19937_64* random) {
   const Data data(truth, 100000, 3e-5, random);
   const Problem problem(truth, data.measurements);
   double time[3];
-  detail::NormalEquations normal;
-  const detail::Evaluator one = problem.evaluator(data.measurements, 1), two = problem.evaluator(data.measurements, 2);
+  estimation::NormalEquations normal;
+  const estimation::Evaluator one = problem.evaluator(data.measurements, 1),
+                              two = problem.evaluator(data.measurements, 2);
   // In turn, so that a change of the machine's speed hits both.
   std::vector<double> ratios;
-  one.normal_equations(problem.values, detail::Weighing{}, &normal);
-  two.normal_equations(problem.values, detail::Weighing{}, &normal);
+  one.normal_equations(problem.values, estimation::Weighing{}, &normal);
+  two.normal_equations(problem.values, estimation::Weighing{}, &normal);
   for (int k = 0; k < 31; ++k) {
-    time[1] = seconds([&] { one.normal_equations(problem.values, detail::Weighing{}, &normal); });
-    time[2] = seconds([&] { two.normal_equations(problem.values, detail::Weighing{}, &normal); });
+    time[1] = seconds([&] { one.normal_equations(problem.values, estimation::Weighing{}, &normal); });
+    time[2] = seconds([&] { two.normal_equations(problem.values, estimation::Weighing{}, &normal); });
     ratios.push_back(time[1] / time[2]);
   }
   std::nth_element(ratios.begin(), ratios.begin() + 15, ratios.end());
@@ -193,12 +194,13 @@ void time_million(const Robot& nominal, const Robot& truth, std::mt19937_64* ran
   const Data data(truth, 1000000, 3e-5, random);
   {
     const Problem problem(truth, data.measurements);
-    detail::NormalEquations normal;
+    estimation::NormalEquations normal;
     for (const int threads : {1, 2}) {
-      const detail::Evaluator evaluator = problem.evaluator(data.measurements, threads);
-      report("iteration_1000000_threads_" + std::to_string(threads),
-             1e3 * best_seconds(15, [&] { evaluator.normal_equations(problem.values, detail::Weighing{}, &normal); }),
-             "ms");
+      const estimation::Evaluator evaluator = problem.evaluator(data.measurements, threads);
+      report(
+          "iteration_1000000_threads_" + std::to_string(threads),
+          1e3 * best_seconds(15, [&] { evaluator.normal_equations(problem.values, estimation::Weighing{}, &normal); }),
+          "ms");
     }
   }
   reset_peak();

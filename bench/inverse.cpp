@@ -27,10 +27,10 @@
 #include <string>
 #include <vector>
 
-#include "random.hpp"
+#include "math/random.hpp"
 #include "truing/compensate.hpp"
 #include "truing/inverse.hpp"
-#include "truing/robot.hpp"
+#include "truing/model/robot.hpp"
 
 namespace {
 
@@ -148,7 +148,7 @@ Robot rail() {
 
 /// As it is rather than as it was drawn: errors of `length` [m] and `angle` [rad], standard deviation, in every link.
 Robot perturbed(Robot robot, double length, double angle, std::uint64_t seed) {
-  detail::Random random(seed);
+  math::Random random(seed);
   robot.name += "_calibrated";
   for (Joint& j : robot.joints) {
     j.theta += angle * random.normal();
@@ -160,7 +160,7 @@ Robot perturbed(Robot robot, double length, double angle, std::uint64_t seed) {
   return robot;
 }
 
-Joints random_joints(const Robot& robot, detail::Random* random) {
+Joints random_joints(const Robot& robot, math::Random* random) {
   Joints q(static_cast<Eigen::Index>(robot.driven_count()));
   Eigen::Index k = 0;
   for (const Joint& j : robot.joints) {
@@ -211,7 +211,7 @@ void write_cases(const std::string& set, const std::vector<Case>& cases) {
 
 /// The first `count` are the same for any count.
 std::vector<Case> make_cases(const Robot& robot, std::size_t count, TaskKind kind) {
-  detail::Random random(7);
+  math::Random random(7);
   std::vector<Case> cases(count);
   for (Case& c : cases) {
     c.truth = random_joints(robot, &random);
@@ -280,8 +280,7 @@ std::string text(const char* format, double a, double b = 0.0, double c = 0.0) {
   return line;
 }
 
-// ---- Tasks
-// -----------------------------------------------------------------------------------------------------------
+// ---- Tasks ----------------------------------------------------------------------------------------------------------
 
 void one_answer(const std::string& task, const Robot& robot, TaskKind kind, const InverseOptions& options = {}) {
   Report report(task, robot.name, name_of(kind), g_arguments.count(10000));
@@ -428,7 +427,7 @@ void best_over_rails(const Robot& robot, Choose choose, const char* name, std::s
 /// Every joint swings about `middle`, by `swing`, so that the elbow and the wrist stay bent.
 std::vector<Case> make_path(const Robot& robot, const std::vector<double>& middle, const std::vector<double>& swing,
                             std::size_t count) {
-  detail::Random random(13);
+  math::Random random(13);
   const Eigen::Index n = static_cast<Eigen::Index>(middle.size());
   Joints phase(n), turns(n);
   for (Eigen::Index j = 0; j < n; ++j) {

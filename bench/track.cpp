@@ -21,25 +21,25 @@
 #include <string>
 #include <vector>
 
-#include "pose_filter.hpp"
-#include "random.hpp"
-#include "rotation.hpp"
-#include "truing/stream_simulation.hpp"
-#include "truing/track.hpp"
+#include "math/random.hpp"
+#include "math/rotation.hpp"
+#include "tracking/pose_filter.hpp"
+#include "truing/tracking/simulation.hpp"
+#include "truing/tracking/tracker.hpp"
 
 namespace {
 
 using namespace truing;
-using detail::Belief;
-using detail::exp_rotation;
-using detail::log_rotation;
-using detail::Matrix6d;
-using detail::Motion;
-using detail::PoseFilter;
-using detail::Vector6d;
 using Eigen::Isometry3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
+using math::exp_rotation;
+using math::log_rotation;
+using math::Matrix6d;
+using math::Vector6d;
+using tracking::Belief;
+using tracking::Motion;
+using tracking::PoseFilter;
 
 constexpr double kWarmUp = 5.0;  // what comes before is not graded [s]
 int first_seed = 1;
@@ -50,8 +50,7 @@ double cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// ---- Playing streams in the order of their arrival
-// -------------------------------------------------------------------------
+// ---- Playing streams in the order of their arrival ------------------------------------------------------------------
 
 /// Pushes everything that has arrived before each inertial sample, then that sample, then calls `then` with it.
 void play(const SimulatedStreams& streams, Tracker* tracker, const std::function<void(const ImuSample&)>& then) {
@@ -91,8 +90,7 @@ void line(const char* what, double value, const char* unit) {
   std::fflush(stdout);
 }
 
-// ---- What others do
-// --------------------------------------------------------------------------------------------------------------------
+// ---- What others do -------------------------------------------------------------------------------------------------
 
 /// Constant velocity or acceleration of the pose from the filter's state, at the tool.
 Isometry3d extrapolated(const Motion& motion, double h, bool acceleration, const Isometry3d& T_imu_tool) {
@@ -117,7 +115,7 @@ class FiniteDifference {
   Isometry3d held() const { return now_; }
   Isometry3d at(double t) const {
     const double ratio = (t - t_) / (t_ - before_t_);
-    return detail::between(before_, now_, 1.0 + ratio);
+    return math::between(before_, now_, 1.0 + ratio);
   }
 
  private:
@@ -125,8 +123,7 @@ class FiniteDifference {
   double before_t_ = -1.0, t_ = 0.0;
 };
 
-// ---- Recordings
-// --------------------------------------------------------------------------------------------------------------------
+// ---- Recordings -----------------------------------------------------------------------------------------------------
 
 StreamSimulationOptions arm(SimulatedMotion motion, std::uint64_t seed, double seconds) {
   StreamSimulationOptions options;
@@ -160,8 +157,7 @@ ModalModel with_error(ModalModel model, double share) {
   return model;
 }
 
-// ---- Rows
-// --------------------------------------------------------------------------------------------------------------------
+// ---- Rows -----------------------------------------------------------------------------------------------------------
 
 /// Predictions of the tool, ours and others', over seeds.
 void predictions(SimulatedMotion motion, double horizon, int seeds, double frequency_error) {
@@ -298,12 +294,12 @@ void consistency(int seeds, double offset, double drift, bool estimate) {
     found.translation() = belief.x.p;
     found.linear() = belief.x.q.toRotationMatrix();
     Matrix6d P;
-    P << belief.P.block<3, 3>(detail::kP, detail::kP), belief.P.block<3, 3>(detail::kP, detail::kTheta),
-        belief.P.block<3, 3>(detail::kTheta, detail::kP), belief.P.block<3, 3>(detail::kTheta, detail::kTheta);
+    P << belief.P.block<3, 3>(tracking::kP, tracking::kP), belief.P.block<3, 3>(tracking::kP, tracking::kTheta),
+        belief.P.block<3, 3>(tracking::kTheta, tracking::kP), belief.P.block<3, 3>(tracking::kTheta, tracking::kTheta);
     const Vector6d e = error_of(truth, found);
     nees += e.dot(P.ldlt().solve(e)) / seeds;
     const double error = belief.x.clock - (offset + drift * belief.t),
-                 sigma = std::sqrt(belief.P(detail::kClock, detail::kClock));
+                 sigma = std::sqrt(belief.P(tracking::kClock, tracking::kClock));
     clock.add(error);
     if (sigma > 0.0) clock_worst = std::max(clock_worst, std::abs(error) / sigma);
     if (std::abs(error) <= 3.0 * sigma) clock_within += 1.0;
@@ -343,7 +339,7 @@ void order(int seeds) {
     setup.clock_offset_sigma = 0.01;
     Belief end[2];
     for (int shuffled = 0; shuffled < 2; ++shuffled) {
-      detail::Random random(static_cast<std::uint64_t>(seed));
+      math::Random random(static_cast<std::uint64_t>(seed));
       struct Item {
         double arrival;
         bool pose;
@@ -455,7 +451,7 @@ void watch(int seeds, double hours) {
     for (const bool turned : {false, true}) {
       for (const SimulatedMotion motion : {SimulatedMotion::gentle, SimulatedMotion::stop_and_go}) {
         StreamSimulationOptions simulation = arm(motion, static_cast<std::uint64_t>(seed), 23.0);
-        detail::Random random(static_cast<std::uint64_t>(seed));
+        math::Random random(static_cast<std::uint64_t>(seed));
         const Vector3d direction = Vector3d(random.normal(), random.normal(), random.normal()).normalized();
         StationShift shift;
         shift.start = 20.0;

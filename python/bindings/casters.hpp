@@ -26,7 +26,7 @@
 #include "truing/diagnose.hpp"
 #include "truing/handeye.hpp"
 #include "truing/inverse.hpp"
-#include "truing/streams.hpp"
+#include "truing/tracking/streams.hpp"
 #include "truing/truing.hpp"
 
 namespace truing::python {
@@ -54,8 +54,7 @@ class Mapping : public py::object {
   using py::object::object;
 };
 
-// ---- Enums
-// ---------------------------------------------------------------------------------------------------------
+// ---- Enums ----------------------------------------------------------------------------------------------------------
 
 /// The words for an enum's values, in the order of the enum.
 template <class Enum>
@@ -189,8 +188,7 @@ Enum enum_from_word(const std::string& text) {
                               choices);
 }
 
-// ---- Arrays
-// --------------------------------------------------------------------------------------------------------
+// ---- Arrays ---------------------------------------------------------------------------------------------------------
 
 /// The array with its writeable flag taken away.
 inline py::array_t<double> read_only(py::array_t<double> array) {
@@ -222,8 +220,7 @@ std::vector<PoseSample> pose_samples(const ArrayLike& t, const ArrayLike& positi
 std::vector<FrameSample> frame_samples(const ArrayLike& t, const FrameArray& T, const std::optional<ArrayLike>& arrival,
                                        const char* name);
 
-// ---- Sequences and value semantics
-// ---------------------------------------------------------------------------------
+// ---- Sequences and value semantics ----------------------------------------------------------------------------------
 
 template <class T>
 using TupleOf = py::typing::Tuple<T, py::ellipsis>;
@@ -293,8 +290,7 @@ std::string text(double value);
 /// "a, b, c"
 std::string joined(const std::vector<std::string>& words);
 
-// ---- Parts of the module
-// -------------------------------------------------------------------------------------------
+// ---- Parts of the module --------------------------------------------------------------------------------------------
 
 void bind_robot(py::module_& m);
 void bind_measurements(py::module_& m);

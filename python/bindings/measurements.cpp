@@ -261,8 +261,7 @@ Measurements make(const ArrayLike& joints, const std::optional<ArrayLike>& posit
   return data;
 }
 
-// ---- Reading back
-// --------------------------------------------------------------------------------------------------
+// ---- Reading back ---------------------------------------------------------------------------------------------------
 
 using Block = py::typing::Optional<py::array_t<double>>;
 

@@ -7,9 +7,9 @@
 #include <pybind11/functional.h>
 
 #include "casters.hpp"
-#include "truing/stream_simulation.hpp"
-#include "truing/track.hpp"
-#include "truing/track_replay.hpp"
+#include "truing/tracking/replay.hpp"
+#include "truing/tracking/simulation.hpp"
+#include "truing/tracking/tracker.hpp"
 
 namespace truing::python {
 

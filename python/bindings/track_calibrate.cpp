@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "truing/track_calibrate.hpp"
 #include "casters.hpp"
+#include "truing/tracking/calibrate.hpp"
 
 namespace truing::python {
 

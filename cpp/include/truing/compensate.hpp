@@ -13,7 +13,7 @@
 
 #include "truing/identify.hpp"
 #include "truing/inverse.hpp"
-#include "truing/robot.hpp"
+#include "truing/model/robot.hpp"
 
 namespace truing {
 

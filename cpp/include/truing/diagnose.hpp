@@ -10,10 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "truing/effect.hpp"
+#include "truing/common/not_testable.hpp"
 #include "truing/identify.hpp"
-#include "truing/measurement.hpp"
-#include "truing/robot.hpp"
+#include "truing/model/effect.hpp"
+#include "truing/model/measurement.hpp"
+#include "truing/model/robot.hpp"
 
 namespace truing {
 
@@ -98,12 +99,6 @@ struct UnknownEffect {
   std::vector<Curve>
       curves;              ///< along the first input (of two inputs: one curve for each of three ranges of the second)
   std::string looks_like;  ///< "a step at q4 = 0.41 rad"
-};
-
-struct NotTestable {
-  std::string effect;
-  std::vector<std::string> joints;  ///< empty: at any
-  std::string why;                  ///< "no column temp_C", "J1 does not move", "the same as the base frame" …
 };
 
 /// The smallest effect that would have been found.

@@ -11,9 +11,10 @@
 
 #include <Eigen/Geometry>
 
+#include "truing/common/uncertain_frame.hpp"
 #include "truing/identify.hpp"
-#include "truing/measurement.hpp"
-#include "truing/robot.hpp"
+#include "truing/model/measurement.hpp"
+#include "truing/model/robot.hpp"
 
 namespace truing {
 
@@ -85,14 +86,6 @@ struct HandEyeOptions {
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
-};
-
-/// A frame with its uncertainty.
-struct UncertainFrame {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  /// Of (x, y, z [m], rotation vector about the parent's axes [rad]): small changes that move the frame's origin, and
-  /// turn it about that origin.
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
 /// How far a pose is from closing the loop: seen minus predicted board pose, lengths of the vectors.

@@ -3,17 +3,19 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "truing/effect.hpp"
-#include "truing/measurement.hpp"
-#include "truing/robot.hpp"
+#include "truing/common/error_statistics.hpp"
+#include "truing/common/parameter.hpp"
+#include "truing/common/solver_options.hpp"
+#include "truing/model/effect.hpp"
+#include "truing/model/measurement.hpp"
+#include "truing/model/parameter_selection.hpp"
+#include "truing/model/robot.hpp"
 
 namespace truing {
 
@@ -35,70 +37,26 @@ enum class FrameBy {
   svd,         ///< refitted by registration (Umeyama) after every step, as the palletizer method has it; positions only
 };
 
-struct IdentifyOptions {
-  /// Names and globs ("J2.*", "*.ratio"); empty: every geometric value and the targets. What belongs to the instrument
-  /// (base frame, anchor, fixed points) is always found unless it is in `hold`.
-  std::vector<std::string> free;
-  std::vector<std::string> hold;       ///< names and globs that stay at nominal whatever else is asked for
-  std::vector<EffectRequest> effects;  ///< effects to fit as well
-  std::vector<Effect> own_effects;     ///< effects outside the catalogue
+struct IdentifyOptions : ParameterSelection, SolverOptions {
+  std::vector<Effect> own_effects;  ///< effects outside the catalogue
   Solver solver = Solver::lm;
   Loss loss = Loss::reject;
   FrameBy frame_by = FrameBy::parameters;
-  double rotation_length = 0.1;   ///< [m]: a rotation error of 1 rad counts as this length, where rows give no sigma
-  double test_share = 0.2;        ///< of the pose groups, held out when `set` is absent
-  std::uint64_t seed = 0;         ///< of the split
-  int max_iterations = 5000;      ///< long valleys take thousands of short steps; well-seen robots stop after 3 to 5
-  double initial_damping = 1e-9;  ///< mu, on columns of unit norm
-  double rms_fall = 1e-12;  ///< [m] stop when an accepted step lowers the rms by no more (the method's own: 1e-3 mm)
-  double gradient = 1e-14;  ///< stop when |g| of unit columns, relative to the residual's norm, is no more
-  bool undamped = false;    ///< mu = 0: the least-squares iteration of the differential error model
+  double rotation_length = 0.1;  ///< [m]: a rotation error of 1 rad counts as this length, where rows give no sigma
+  double test_share = 0.2;       ///< of the pose groups, held out when `set` is absent
+  std::uint64_t seed = 0;        ///< of the split
   double rank_tolerance = 1e-6;  ///< a unit column that the others explain but for this share is not observable
-  double hayati_angle = 0.08726646259971647;  ///< [rad] neighbouring axes nearer to parallel get beta (5 deg)
-  double reject_beyond = 6.0;                 ///< Loss::reject: rows whose residual is longer than this many medians
-  std::map<std::string, std::pair<double, double>> bounds;  ///< by parameter; Solver::ceres only
-  int threads = 0;                                          ///< 0: as many as the machine has
+  double reject_beyond = 6.0;    ///< Loss::reject: rows whose residual is longer than this many medians
+  int threads = 0;               ///< 0: as many as the machine has
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
 };
 
-/// One parameter of the result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`, `anchor.zero` …
-/// Orientation corrections rx ry rz are rotation vectors from the nominal to the found orientation, about the parent's
-/// axes.
-struct Parameter {
-  std::string name;
-  double nominal = 0.0;
-  double value = 0.0;
-  double sigma = 0.0;  ///< standard error; NaN when frozen
-  std::string unit;    ///< m, rad, -, rad/Nm …
-  bool frozen = false;
-};
-
-/// A combination of parameters that the data cannot see: moving them together so changes no measurement.
-struct Frozen {
-  std::string parameter;                      ///< the one held at nominal
-  std::map<std::string, double> combination;  ///< weights, 1 for `parameter`
-  std::string why;
-};
-
-/// Length of the position (or distance) errors of a set of rows.
-struct ErrorStatistics {
-  double rms = 0.0, mean = 0.0, median = 0.0, p95 = 0.0, max = 0.0;  ///< [m]
-  double rotation_rms = 0.0;                                         ///< [rad]; NaN: no orientation measured
-  std::size_t n = 0;
-};
-
+/// Errors of the nominal robot with base, targets (and anchor, fixed points) fitted, and of the calibrated one.
 struct BeforeAfter {
   ErrorStatistics before;  ///< nominal robot with base, targets (and anchor, fixed points) fitted
   ErrorStatistics after;
-};
-
-struct SolverSummary {
-  std::string name;
-  int iterations = 0;
-  bool converged = false;
-  std::string stopped_because;
 };
 
 struct Identification {

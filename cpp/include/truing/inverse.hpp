@@ -14,9 +14,9 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "truing/effect.hpp"
-#include "truing/interference.hpp"
-#include "truing/robot.hpp"
+#include "truing/model/effect.hpp"
+#include "truing/model/robot.hpp"
+#include "truing/model/scene.hpp"
 
 namespace truing {
 

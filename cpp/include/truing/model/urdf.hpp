@@ -1,0 +1,26 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "truing/model/robot.hpp"
+
+namespace truing {
+
+/// Reads the chain from `base_link` to `tip_link` of a URDF text (Convention::urdf; parsed by urdfdom). Fixed joints
+/// are folded into the next moving joint's T_parent_joint, the last ones into the tool; link masses and centres of mass
+/// are merged the same way; `mimic` of a joint in the chain becomes `driven_by` with its multiplier. Empty link names:
+/// the only root, the only leaf. Throws std::invalid_argument: not a URDF, unknown base or tip (lists the links there
+/// are), tip not below base, planar or floating joint.
+Robot robot_from_urdf(const std::string& urdf_text, const std::string& base_link = "",
+                      const std::string& tip_link = "");
+
+/// The same URDF text with the origins of the chain's joints replaced by those of `calibrated`. What URDF cannot hold
+/// (ratios, offsets that cannot be folded in, base frame, effects) is named in a comment at the top.
+/// A joint zero is folded into the origin (rotation about the axis). Frames, never rpy, are composed.
+std::string urdf_with_calibration(const std::string& urdf_text, const Robot& calibrated,
+                                  const std::string& base_link = "", const std::string& tip_link = "");
+
+}  // namespace truing

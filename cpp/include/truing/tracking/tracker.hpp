@@ -1,0 +1,291 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "truing/tracking/streams.hpp"
+
+namespace truing {
+
+// Where the tool of a large, swaying arm will be: from an inertial sensor and a receiver of base-station signals on the
+// last link, encoders, and the plan. See docs/track.md.
+
+/// What became of a sample. Refused samples leave everything as it was.
+enum class Outcome {
+  accepted,
+  accepted_gap,        ///< inertial sample after a gap: accepted, uncertainty widened for the time between
+  accepted_saturated,  ///< inertial sample at the end of its range: accepted, uncertainty widened
+  accepted_restart,    ///< inertial sample after a gap too long to bridge: the filter starts anew
+  duplicate,           ///< refused: this sensor has a sample with this stamp already
+  backwards,           ///< refused: older than the sensor's newest sample (inertial sensor, plan)
+  future,              ///< refused: stamp further ahead of the newest inertial sample than the options allow
+  too_late,            ///< refused: older than the window
+  not_finite,          ///< refused: NaN or infinite
+  not_unit,            ///< refused: quaternion not of length one
+  frozen,              ///< refused: the tracker repeats itself to the last bit
+};
+/// "accepted", "duplicate", …
+const char* name(Outcome outcome);
+/// True for the outcomes that begin with accepted.
+bool accepted(Outcome outcome);
+
+/// How many samples met which fate.
+struct Counters {
+  std::array<std::uint64_t, 11> imu{}, pose{}, joints{}, plan{};  ///< by Outcome
+  std::uint64_t outliers = 0;    ///< tracker samples that the gate rejected (those that left the window)
+  std::uint64_t reacquired = 0;  ///< times that the filter gave in to a tracker that disagreed for long
+};
+
+struct FilterOptions {
+  double window = 0.5;               ///< measurements up to so late are put at their place [s]
+  double future_limit = 0.1;         ///< of a stamp against the newest inertial sample [s]
+  double highest_imu_rate = 2000.0;  ///< sizes the ring buffer [Hz]
+  double highest_pose_rate = 400.0;  ///< [Hz]
+  double gyro_noise = 1e-4;          ///< [rad/s/sqrt(Hz)]
+  double accel_noise = 1e-3;         ///< [m/s^2/sqrt(Hz)]
+  double gyro_bias = 1e-2;           ///< standard deviation before any data [rad/s]
+  double accel_bias = 1e-1;          ///< [m/s^2]
+  double gyro_bias_walk = 2e-5;      ///< [rad/s/sqrt(s)]
+  double accel_bias_walk = 2e-4;     ///< [m/s^2/sqrt(s)]
+  double imu_scale = 5e-4;           ///< standard deviation of the scale of gyro and accelerometer, as a share
+  double gyro_range = 34.0;          ///< a component at or beyond is saturated [rad/s]
+  double accel_range = 156.0;        ///< [m/s^2]
+  double largest_gap = 0.02;         ///< between inertial samples, before uncertainty is widened [s]
+  double restart_gap = 5.0;          ///< [s]
+  double gap_acceleration = 2.0;     ///< standard deviation of what a gap or saturation hides [m/s^2]
+  double gap_rate = 0.2;             ///< [rad/s]
+  double position_sigma = 1e-3;      ///< of the tracker, one component [m]
+  double rotation_sigma = 1e-3;      ///< [rad]
+  double gate = 50.0;                ///< tracker samples with a larger normalised innovation squared are outliers
+  int reacquire_after = 25;          ///< outliers in a row, then the tracker is believed
+  int frozen_after = 3;              ///< equal tracker samples in a row, then they are refused
+  double clock_walk = 2e-5;          ///< of the tracker's clock [s/sqrt(s)]
+  double clock_drift = 1e-4;         ///< standard deviation of its drift [s/s]
+  double clock_drift_walk = 1e-6;    ///< [1/sqrt(s)]
+  double sway_position =
+      0.02;  ///< standard deviation of the tip about its slow mean, before any data; then as the arm shows it [m]
+  double sway_rotation = 0.003;   ///< [rad]
+  double sway_correlation = 0.5;  ///< time over which sway is like itself [s]
+  double slow_position = 0.05;    ///< standard deviation of the deviation from forward kinematics before any data [m]
+  double slow_rotation = 0.02;    ///< [rad]
+  double slow_position_walk = 3e-3;  ///< how it wanders [m/sqrt(s)]
+  double slow_rotation_walk = 5e-4;  ///< [rad/sqrt(s)]
+
+  /// False, and why, when an option makes no sense.
+  bool is_valid(std::string* error) const;
+};
+
+/// The sway as damped modes: each component c of the deviation from the plan is slow + sum of modes, and mode k of it
+/// obeys
+///
+///     x'' + 2 zeta_k omega_k x' + omega_k^2 x = gain_k(c, :) . a_plan + noise
+///
+/// with the planned acceleration in the frame of the planned inertial sensor. Components: translation [m], rotation
+/// vector [rad], in that frame.
+struct ModalModel {
+  static constexpr int kMost = 4;
+  int count = 0;
+  std::array<double, kMost> frequency{};                  ///< undamped [Hz]
+  std::array<double, kMost> damping{};                    ///< ratio
+  std::array<double, kMost> frequency_sigma{};            ///< standard error [Hz]
+  std::array<Eigen::Matrix<double, 6, 3>, kMost> gain{};  ///< [-], [rad/m]
+
+  ModalModel() {
+    for (auto& g : gain) g.setZero();
+  }
+};
+
+struct DeviationOptions {
+  double period = 0.01;           ///< of the model's steps, on multiples of it [s]
+  double horizon = 0.04;          ///< for which predictions are graded [s]
+  double position_noise = 3e-4;   ///< of the filter's position, as the model sees it [m], rotations as 1 m
+  double velocity_noise = 1e-3;   ///< [m/s]
+  double slow_noise = 3e-3;       ///< acceleration that drives the slow part [m/s^2/sqrt(Hz)]
+  double static_time = 2.0;       ///< over which the static deviation is averaged [s]
+  double mode_noise = 2e-2;       ///< acceleration that drives a mode beside the plan's [m/s^2/sqrt(Hz)]
+  double frequency_sigma = 0.05;  ///< standard deviation of the given frequencies, as a share; 0: they stay
+  double frequency_walk = 0.003;  ///< how they wander, as a share [1/sqrt(s)]
+  double frequency_range = 0.2;   ///< and how far at most, as a share
+  double grade_time = 3.0;        ///< over which grades are averaged [s]
+  double settle_time = 0.1;       ///< after so long no more late samples are waited for, and a prediction is graded [s]
+  double least_evidence = 1.0;    ///< predictions of modes are used after so long of grades [s]
+  double plan_limit = 10.0;       ///< plan samples further ahead are refused [s]
+
+  bool is_valid(std::string* error) const;
+};
+
+/// How predictions are made, the best-graded one is used.
+enum class Predictor {
+  slow,          ///< plan and slow deviation: what forward kinematics would give, and the last static deviation
+  acceleration,  ///< plan and deviation at constant acceleration
+  modes,         ///< plan, slow deviation and damped modes driven by the plan
+};
+constexpr int kPredictors = 3;
+
+/// One row for `identify_modes`: the deviation, its rate, and the plan's acceleration, in the frame of the planned
+/// inertial sensor.
+struct DeviationRow {
+  double t = 0.0;
+  Eigen::Matrix<double, 6, 1> deviation = Eigen::Matrix<double, 6, 1>::Zero();  ///< [m], [rad]
+  Eigen::Matrix<double, 6, 1> rate = Eigen::Matrix<double, 6, 1>::Zero();       ///< [m/s], [rad/s]
+  Eigen::Vector3d plan_acceleration = Eigen::Vector3d::Zero();                  ///< over the following period [m/s^2]
+};
+
+struct ModesResult {
+  ModalModel model;
+  std::vector<double> error;  ///< rms of predictions `2 * horizon` ahead: of no change, with one mode, two … [m]
+  double rows = 0;            ///< used
+  std::string stopped_because;
+};
+
+/// Frequencies, damping and gains from a recording of rows `options.period` apart. The start is the eigensystem
+/// realisation of the acceleration's autocovariance; then the errors of predictions `2 * options.horizon` ahead by the
+/// model's own Kalman filter are made least. Another mode is taken while it lowers that error by at least `worth`.
+/// Throws std::invalid_argument on fewer than 500 rows.
+ModesResult identify_modes(const std::vector<DeviationRow>& rows, const DeviationOptions& options = {},
+                           int most = ModalModel::kMost, double worth = 0.03);
+
+/// Bounds of what is sent to the arm.
+struct CorrectionLimits {
+  double position = 0.15;        ///< size [m]
+  double rotation = 0.05;        ///< [rad]
+  double position_rate = 0.5;    ///< [m/s]
+  double rotation_rate = 0.2;    ///< [rad/s]
+  double position_jerk = 100.0;  ///< [m/s^3]
+  double rotation_jerk = 40.0;   ///< [rad/s^3]
+};
+
+/// Watches for jumps of the tracker against inertial sensor and forward kinematics.
+struct WatchOptions {
+  double threshold = 55.0;  ///< of averages that are chi-square distributed with six degrees of freedom
+  double forget = 1.0;      ///< after a gap of the tracker longer than this, averages begin anew [s]
+  double compare = 120.0;   ///< after a shift, station and receiver are told apart for so long, and what else is odd is
+                            ///< taken for its after-effect [s]
+
+  bool is_valid(std::string* error) const;
+};
+
+/// What a jump of the tracker came from.
+enum class ShiftCause {
+  station_or_receiver,  ///< not told apart (yet): the arm has to move and turn
+  station,              ///< constant in the tracker frame: a base station was moved
+  receiver,             ///< constant on the flange: the receiver has slipped
+};
+const char* name(ShiftCause cause);
+
+/// The last jump that was noticed.
+struct Shift {
+  std::uint64_t count = 0;  ///< since the start; 0: none, and the rest means nothing
+  double t = 0.0;           ///< when it happened, the inertial sensor's clock [s]
+  double flagged = 0.0;     ///< stamp of the tracker sample that it was noticed by [s]
+  Eigen::Matrix<double, 6, 1> jump =
+      Eigen::Matrix<double, 6, 1>::Zero();  ///< of the receiver as measured, base frame [m], rotation vector [rad]
+  ShiftCause cause = ShiftCause::station_or_receiver;
+  double odds = 0.0;  ///< logarithm of the odds of station against receiver
+};
+
+struct TrackOptions {
+  FilterOptions filter;
+  DeviationOptions deviation;
+  WatchOptions watch;
+  ModalModel modes;  ///< of `identify_modes`; none: predictions at constant acceleration
+  CorrectionLimits limits;
+  double coast_position = 0.03;  ///< without the tracker, estimates with a larger standard deviation than this and than
+                                 ///< forward kinematics' are not used [m]
+  double coast_rotation = 0.02;  ///< [rad]
+  double imu_timeout = 0.1;      ///< the inertial sensor is taken for dead when it is so much older than the joints [s]
+  double joints_timeout = 0.5;   ///< [s]
+
+  bool is_valid(std::string* error) const;
+};
+
+enum class Status {
+  valid,     ///< inertial sensor and tracker
+  coasting,  ///< inertial sensor and forward kinematics, the tracker is away
+  hold,      ///< forward kinematics (or the plan) and the last static deviation
+  lost,      ///< nothing to go by
+};
+const char* name(Status status);
+const char* name(Predictor predictor);
+
+/// The tool at time `t`, as known at time `made`.
+struct PosePrediction {
+  double t = 0.0, made = 0.0;  ///< [s], the inertial sensor's clock
+  Eigen::Isometry3d T_base_tool = Eigen::Isometry3d::Identity();
+  Eigen::Matrix<double, 6, 6> covariance =
+      Eigen::Matrix<double, 6, 6>::Zero();  ///< position [m], then rotation vector [rad], about the base frame's axes
+  Status status = Status::lost;
+  Predictor predictor = Predictor::slow;
+};
+
+/// What to add to the plan so that the tool is where it was planned.
+struct Compensation {
+  PosePrediction predicted;
+  bool has_plan = false;  ///< false: the plan does not reach that far, and nothing is corrected
+  Eigen::Isometry3d T_base_tool_planned = Eigen::Isometry3d::Identity();
+  Eigen::Matrix<double, 6, 1> wanted =
+      Eigen::Matrix<double, 6, 1>::Zero();  ///< correction in the base frame [m], rotation vector [rad]
+  Eigen::Matrix<double, 6, 1> correction = Eigen::Matrix<double, 6, 1>::Zero();  ///< the same within the limits
+  bool limited = false;                                             ///< the two differ by more than 1 mm or 1 mrad
+  Eigen::Isometry3d T_base_flange = Eigen::Isometry3d::Identity();  ///< corrected
+};
+
+struct ClockEstimate {
+  double offset = 0.0, sigma = 0.0, drift = 0.0;
+};  ///< t_imu = t_tracker - offset [s], [s/s]
+
+/// A tracker sample against what was expected of it.
+struct Innovation {
+  double t = 0.0, nis = 0.0;
+  int dimensions = 0;
+  bool accepted = false;
+};
+
+/// Fusion and prediction, sample by sample. No heap allocation after construction; the same samples give the same
+/// result in whatever order they arrive within the window. Not for use from two threads at once.
+class Tracker {
+ public:
+  /// Throws std::invalid_argument on options that make no sense.
+  explicit Tracker(const TrackSetup& setup, const TrackOptions& options = {});
+  ~Tracker();
+  Tracker(Tracker&&) noexcept;
+  Tracker& operator=(Tracker&&) noexcept;
+
+  Outcome push_imu(const ImuSample& sample);
+  Outcome push_pose(const PoseSample& sample);
+  /// Flange by forward kinematics of the encoders, stamp of the controller's clock.
+  Outcome push_joints(double t, const Eigen::Isometry3d& T_base_flange);
+  /// Planned tool, ahead of its time, in order; stamp of the controller's clock.
+  Outcome push_plan(double t, const Eigen::Isometry3d& T_base_tool);
+
+  /// The tool at a time of the inertial sensor's clock, past (within the window), now or to come.
+  PosePrediction predict(double t);
+  /// Prediction, and the correction that it asks for, within limits; to be called at growing times.
+  Compensation compensate(double t);
+
+  void set_modes(const ModalModel& modes);
+  double now() const;  ///< stamp of the newest inertial sample
+  ClockEstimate clock();
+  std::array<double, ModalModel::kMost> frequencies() const;  ///< as tracked [Hz]
+  /// Settled rows since the last call for `identify_modes`, and settled innovations: the number written, at most
+  /// `capacity`. Call often: few are kept.
+  int take_rows(DeviationRow* out, int capacity);
+  int take_innovations(Innovation* out, int capacity);
+  const Counters& counters() const;
+  /// The last jump of the tracker. After one, the filter follows the tracker: calibrate anew.
+  const Shift& shift();
+
+ private:
+  struct Inside;
+  std::unique_ptr<Inside> inside_;
+};
+
+}  // namespace truing

@@ -1,0 +1,378 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Where the gap lies, which effect causes it, how far it shrinks. The procedure is that of docs/diagnose.md, section by
+// section.
+
+#include "truing/diagnose.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <set>
+#include <stdexcept>
+
+#include "diagnosis/diagnosis.hpp"
+#include "diagnosis/sanity.hpp"
+#include "diagnosis/where.hpp"
+#include "math/statistics.hpp"
+#include "rooms.hpp"
+
+namespace truing {
+using namespace diagnosis;
+
+namespace diagnosis {
+namespace {
+
+using Kind = Explanation::Kind;
+constexpr double kCorrectionShare = 0.05;  ///< of the gap, from which on a law's correction is something unknown
+constexpr double kLackOfFit = 4.0;         ///< standard errors beyond repeats, from which on what is left is no noise
+constexpr double kNamed = 0.5;             ///< a name is given to what is more likely right than wrong
+
+void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
+  std::string error;
+  if (!options.is_valid(&error)) throw std::invalid_argument("diagnose: " + error);
+  validate(robot);
+  validate(data, robot);
+  bool measured = false;
+  for (std::size_t row = 0; row < data.rows && !measured; ++row)
+    measured = !data.has_fixed_point(row) && (data.has_position(row) || data.has_distance(row));
+  if (!measured)
+    throw std::invalid_argument(
+        "diagnose needs measured positions, poses or distances: touched fixed points alone show no scale, and are for "
+        "identify");
+  for (const std::string& name : options.leave_out) find_effect(name, options.own_effects);
+}
+
+/// Base and targets (and anchor) are always unknown.
+Identification fit_frames(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
+  IdentifyOptions frames_only;
+  frames_only.test_share = options.test_share;
+  frames_only.seed = options.seed;
+  frames_only.threads = options.threads;
+  frames_only.rotation_length = options.rotation_length;
+  frames_only.own_effects = options.own_effects;
+  for (const Target& target : robot.targets) frames_only.free.push_back(target.name + ".*");
+  if (frames_only.free.empty()) frames_only.free = {"tool.*"};
+  Identification frames = identify(robot, data, frames_only);
+  if (!frames.test) throw std::invalid_argument("diagnose needs held-out poses: no row is in the set 'test'");
+  return frames;
+}
+
+/// `rows` of the whole, as a diagnosis of their own. Own effects keep looking into the whole, which must outlive this.
+Work part_of(const Work& whole, const std::vector<std::int32_t>& rows) {
+  Work part = whole;
+  if (rows.size() == whole.data.rows) return part;
+  part.data = subset_of(whole.data, rows);
+  part.options.own_effects = mapped(whole.options.own_effects, whole.data, rows);
+  part.cluster.clear();
+  part.set.clear();
+  for (const std::int32_t row : rows) {
+    part.cluster.push_back(whole.cluster[static_cast<std::size_t>(row)]);
+    part.set.push_back(whole.set[static_cast<std::size_t>(row)]);
+  }
+  return part;
+}
+
+/// Linearised once, where the geometry is about right; weighed; Gram matrices by fold.
+void prepare(Work* work) {
+  std::vector<std::int32_t> every_row(work->data.rows), train_rows;
+  std::iota(every_row.begin(), every_row.end(), 0);
+  for (const std::int32_t row : every_row) {
+    if (!work->set[static_cast<std::size_t>(row)]) train_rows.push_back(row);
+  }
+  const Robot& robot = work->frames.robot;
+  work->linear = linearise(robot, work->data, train_rows, work->options.rotation_length, work->options.threads);
+  work->inputs = make_inputs(work->linear.at, work->data);
+  work->design = make_design({robot, work->linear.at, work->linear.shift, work->data, work->inputs, every_row,
+                              work->set, work->cluster, work->options, work->inferred_direction});
+  weigh(work);
+  make_grams(work);
+}
+
+void say_what_is_not_testable(const Work& work, Diagnosis* out) {
+  for (const NotTestable& n : work.design.candidates.not_testable) {
+    const bool twice = std::any_of(out->not_testable.begin(), out->not_testable.end(), [&](const NotTestable& other) {
+      return other.effect == n.effect && other.joints == n.joints;
+    });
+    if (!twice) out->not_testable.push_back(n);
+  }
+  if (work.inferred_direction) {
+    out->not_testable.push_back(
+        {"backlash", {}, "no columns dir1 …: only a direction inferred from the order of the rows could be tried"});
+  }
+}
+
+void say_outliers(const Work& work, const std::vector<std::int32_t>& rows, Diagnosis* out) {
+  std::set<std::size_t> outliers;
+  for (const std::int32_t row : work.outliers)
+    outliers.insert(static_cast<std::size_t>(rows[static_cast<std::size_t>(row)]));
+  out->outliers.assign(outliers.begin(), outliers.end());
+  if (outliers.empty()) return;
+  out->sanity.push_back({"outliers",
+                         std::to_string(outliers.size()) +
+                             " rows stand so far out that they count for little: look at them first if they are many.",
+                         outliers.size() <= 50 ? out->outliers : std::vector<std::size_t>{}});
+}
+
+/// How sure a named group is, and that as a probability.
+struct Named {
+  Sureness sure;
+  double probability = 0.0;
+};
+
+/// Takes back, one at a time, names that are more likely wrong than right. By group: how sure those are that stay.
+std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evidence, const Resampled& resampled,
+                                         Decision* decision) {
+  for (;;) {
+    std::map<int, Named> out;
+    for (std::size_t at = 0; at < decision->state.choice.groups.size(); ++at) {
+      const int g = decision->state.choice.groups[at];
+      if (!is_named(work.design.candidates.named[static_cast<std::size_t>(g)])) continue;
+      const Sureness sure = how_sure(work, evidence, decision->state, at);
+      out[g] = {sure, calibrated(sure.raw, came_back(work, resampled, sure, g), sure.removal_loss)};
+    }
+    const auto least = std::min_element(out.begin(), out.end(), [](const auto& a, const auto& b) {
+      return a.second.probability < b.second.probability;
+    });
+    if (least == out.end() || least->second.probability >= kNamed) return out;
+    const int gone = least->first;
+    const std::vector<int>& chosen = decision->state.choice.groups;
+    const auto at = std::find(chosen.begin(), chosen.end(), gone) - chosen.begin();
+    decision->state =
+        evidence.evaluate(without(decision->state.choice, work.design.candidates.groups, static_cast<std::size_t>(at)));
+    for (auto& [correction, corrected] : decision->corrects) corrected = corrected == gone ? -1 : corrected;
+  }
+}
+
+/// What a robot file can hold.
+bool is_in_catalogue(const Explanation& e) { return e.kind == Kind::catalogue || e.kind == Kind::all_geometry; }
+
+bool corrects_a_law(const Decision& decision, int group) {
+  const auto found = decision.corrects.find(group);
+  return found != decision.corrects.end() && found->second >= 0;
+}
+
+/// Drifts, corrections and free functions are functions of inputs.
+bool has_functions(const Work& work, const Decision& decision) {
+  const std::vector<int>& chosen = decision.state.choice.groups;
+  return std::any_of(chosen.begin(), chosen.end(), [&](int g) {
+    return !is_in_catalogue(work.design.candidates.named[static_cast<std::size_t>(g)]);
+  });
+}
+
+/// The decision fitted without linearisation to all rows: what a robot file can hold, what has a name, everything.
+struct Fitted {
+  Refit by_catalogue, by_named, by_all;
+  Residuals after_all;
+};
+
+Fitted fit_exactly(const Work& whole, const Robot& robot, const Decision& decision, const Resampled& resampled,
+                   Diagnosis* out) {
+  const std::vector<int>& every_group = decision.state.choice.groups;
+  std::vector<int> named_groups, catalogue_groups;
+  for (const int g : every_group) {
+    const Explanation& e = whole.design.candidates.named[static_cast<std::size_t>(g)];
+    if (e.kind != Kind::free || corrects_a_law(decision, g)) named_groups.push_back(g);
+    if (is_in_catalogue(e)) catalogue_groups.push_back(g);
+  }
+  Fitted fitted;
+  fitted.by_catalogue = refit(whole, robot, decision.state, catalogue_groups);
+  fitted.by_named = named_groups.size() > catalogue_groups.size() ? refit(whole, robot, decision.state, named_groups)
+                                                                  : fitted.by_catalogue;
+  fitted.by_all =
+      every_group.size() > named_groups.size() ? refit(whole, robot, decision.state, every_group) : fitted.by_named;
+
+  const auto left_by = [&](const Robot& of, const std::vector<Effect>& own) {
+    return residuals(of, whole.data, own, whole.options.threads);
+  };
+  const auto lengths = [&](const Residuals& of) { return lengths_of(of, whole.data.rows); };
+  const auto judged = [&](const std::vector<double>& errors) { return error_statistics(held_out(errors, whole.set)); };
+  out->robot = fitted.by_catalogue.found.robot;
+  out->residuals_before = left_by(whole.frames.robot, whole.options.own_effects);
+  out->residuals_after = left_by(fitted.by_named.found.robot, fitted.by_named.own);
+  fitted.after_all = left_by(fitted.by_all.found.robot, fitted.by_all.own);
+  out->error_before = lengths(out->residuals_before);
+  out->error_after = lengths(out->residuals_after);
+  out->gap = judged(out->error_before);
+  out->after = judged(out->error_after);
+  out->after_unknown = judged(lengths(fitted.after_all));
+  if (catalogue_groups.empty()) return fitted;
+  const double by_robot = judged(lengths(left_by(out->robot, whole.options.own_effects))).rms;
+  out->shrink = percentile_interval(resampled.shrink, out->gap.rms > 0.0 ? 1.0 - by_robot / out->gap.rms : 0.0);
+  return fitted;
+}
+
+/// Noise from repeats where there are enough, else what the chosen model leaves; and how much of the gap beyond it is
+/// closed.
+void judge_noise(const Repeats& repeats, const Work& work, const Decision& decision, Diagnosis* out) {
+  const double components = work.data.distance ? 1.0 : 3.0;
+  out->noise_from_repeats = repeats.freedom >= 20.0;
+  out->noise_floor = std::sqrt(components) *
+                     (out->noise_from_repeats ? repeats.sigma : work.position_sigma * std::sqrt(decision.state.sigma2));
+  const double gap2 = std::pow(out->gap.rms, 2.0), floor2 = std::pow(out->noise_floor, 2.0),
+               after2 = std::pow(out->after.rms, 2.0);
+  out->closable = gap2 > floor2 ? std::clamp((gap2 - after2) / (gap2 - floor2), 0.0, 1.0) : 0.0;
+}
+
+/// A drift made of several terms is one effect, and a joint's functions of one input are one unknown.
+void merge_the_same(Diagnosis* out) {
+  for (std::size_t k = 0; k < out->effects.size(); ++k) {
+    for (std::size_t m = out->effects.size(); m-- > k + 1;) {
+      FoundEffect &first = out->effects[k], &second = out->effects[m];
+      if (first.effect != second.effect || first.joints != second.joints) continue;
+      first.probability = std::max(first.probability, second.probability);
+      first.share_alone = std::max(first.share_alone, second.share_alone);
+      first.share_last += second.share_last;
+      first.parameters.insert(first.parameters.end(), second.parameters.begin(), second.parameters.end());
+      if (first.curves.empty()) first.curves = second.curves;
+      out->effects.erase(out->effects.begin() + static_cast<std::ptrdiff_t>(m));
+    }
+  }
+  for (std::size_t k = 0; k < out->unknown.size(); ++k) {
+    for (std::size_t m = out->unknown.size(); m-- > k + 1;) {
+      if (out->unknown[k].joint != out->unknown[m].joint || out->unknown[k].inputs != out->unknown[m].inputs) continue;
+      out->unknown[k].share += out->unknown[m].share;
+      out->unknown.erase(out->unknown.begin() + static_cast<std::ptrdiff_t>(m));
+    }
+  }
+}
+
+/// Shares that add up: between alone and last, scaled to what all together close.
+void share_the_gap(Diagnosis* out) {
+  const double closed =
+      std::max(0.0, 1.0 - std::pow(out->gap.rms > 0.0 ? out->after_unknown.rms / out->gap.rms : 1.0, 2.0));
+  double total = 0.0;
+  for (const FoundEffect& effect : out->effects) total += 0.5 * (effect.share_alone + effect.share_last);
+  for (const UnknownEffect& unknown : out->unknown) total += unknown.share;
+  for (FoundEffect& effect : out->effects)
+    effect.share = total > 0.0 ? closed * 0.5 * (effect.share_alone + effect.share_last) / total : 0.0;
+  for (UnknownEffect& unknown : out->unknown) unknown.share = total > 0.0 ? closed * unknown.share / total : 0.0;
+  std::stable_sort(out->effects.begin(), out->effects.end(),
+                   [](const FoundEffect& a, const FoundEffect& b) { return a.share > b.share; });
+  std::stable_sort(out->unknown.begin(), out->unknown.end(),
+                   [](const UnknownEffect& a, const UnknownEffect& b) { return a.probability > b.probability; });
+}
+
+void describe_all(const Work& work, const Evidence& evidence, const Decision& decision, const Resampled& resampled,
+                  const std::map<int, Named>& names, const Identification& refitted, Diagnosis* out) {
+  for (std::size_t at = 0; at < decision.state.choice.groups.size(); ++at) {
+    const int g = decision.state.choice.groups[at];
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
+    if (e.kind == Kind::free || e.kind == Kind::law) {
+      UnknownEffect unknown = describe_unknown(work, evidence, decision, at, resampled);
+      // A small correction of a law is a remark; a large one is something that nobody has named.
+      if (!corrects_a_law(decision, g) || unknown.share > kCorrectionShare) out->unknown.push_back(std::move(unknown));
+    } else {
+      const Named& named = names.at(g);
+      out->effects.push_back(
+          describe(work, evidence, decision, at, named.sure, named.probability, refitted, resampled));
+    }
+  }
+}
+
+/// A gap that nothing has a shape for, as far as repeats can tell it from noise.
+void question_noise(const Repeats& repeats, const Measurements& data, Diagnosis* out) {
+  if (!out->effects.empty() || !out->unknown.empty() || !out->noise_from_repeats) return;
+  const double excess = lack_of_fit(data, out->error_before, out->set, repeats);
+  if (excess > kLackOfFit) out->unknown.push_back(describe_lack_of_fit(*out, excess));
+}
+
+Verdict verdict_of(const Diagnosis& d) {
+  if (d.effects.empty()) return d.unknown.empty() ? Verdict::none : Verdict::unknown;
+  return d.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown;
+}
+
+std::vector<std::vector<double>> copied(const std::vector<Column>& columns, std::size_t rows) {
+  std::vector<std::vector<double>> out;
+  for (const Column& column : columns) {
+    out.emplace_back();
+    for (std::size_t row = 0; row < rows; ++row) out.back().push_back(column[row]);
+  }
+  return out;
+}
+
+}  // namespace
+}  // namespace diagnosis
+
+bool DiagnoseOptions::is_valid(std::string* error) const {
+  const auto fail = [&](const char* why) {
+    if (error) *error = why;
+    return false;
+  };
+  if (!(false_alarm > 0.0 && false_alarm < 0.5)) return fail("false_alarm must be in (0, 0.5)");
+  if (max_effects < 1) return fail("max_effects must be at least 1");
+  if (!(test_share > 0.0 && test_share < 0.9)) return fail("test_share must be in (0, 0.9)");
+  if (search_poses < 50) return fail("search_poses must be at least 50");
+  if (resamples < 0) return fail("resamples must not be negative");
+  if (!(rotation_length > 0.0)) return fail("rotation_length must be positive [m]");
+  return true;
+}
+
+Diagnosis diagnose(const Robot& robot, const Measurements& given, const DiagnoseOptions& options) {
+  refuse_what_cannot_be_used(robot, given, options);
+  Diagnosis result;
+  result.seed = options.seed;
+
+  // 0. Sanity, before statistics.
+  const Checked checked = check(robot, given, options);
+  result.sanity = checked.findings;
+  result.joint_record = checked.joint_record;
+
+  // 1. Registration: the gap.
+  Work whole;
+  whole.options = options;
+  whole.data = checked.data;
+  whole.inferred_direction = checked.inferred_direction;
+  whole.cluster = pose_groups(whole.data);
+  whole.frames = fit_frames(robot, whole.data, options);
+  whole.set = whole.frames.set;
+  result.set = whole.set;
+  result.robot_before = whole.frames.robot;
+  if (checked.inferred_direction) result.directions = copied(whole.data.direction, whole.data.rows);
+
+  // 1. and 2. Columns, noise and weights, of all rows or, of very many, evenly some.
+  const std::vector<std::int32_t> rows = thinned_rows(whole.data, whole.cluster, options.search_poses);
+  const bool thinned = rows.size() < whole.data.rows;
+  if (thinned)
+    result.warnings.push_back("searched on " + std::to_string(rows.size()) + " of " + std::to_string(whole.data.rows) +
+                              " rows; fitted and judged on all");
+  Work work = part_of(whole, rows);
+  prepare(&work);
+  say_what_is_not_testable(work, &result);
+  say_outliers(work, rows, &result);
+
+  // 3. to 6. What explains it, and 7. how sure that is.
+  Decision decision = decide(&work, robot);
+  const Evidence evidence(work.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
+  const Resampled resampled = resample(work, decision);
+  const std::map<int, Named> names = keep_what_is_likely(work, evidence, resampled, &decision);
+  result.p_gap = decision.p_gap;
+  result.remaining_structure_p = decision.p_left;
+
+  // 8. How far: the exact refit, on all rows.
+  whole.design.candidates = work.design.candidates;
+  whole.design.column_names = work.design.column_names;
+  if (has_functions(work, decision)) whole.inputs = thinned ? make_inputs(work.linear.at, whole.data) : work.inputs;
+  const Fitted fitted = fit_exactly(whole, robot, decision, resampled, &result);
+  const Repeats repeats = noise_of_repeats(whole.data);
+  judge_noise(repeats, work, decision, &result);
+  describe_all(work, evidence, decision, resampled, names, fitted.by_all.found, &result);
+  merge_the_same(&result);
+  question_noise(repeats, whole.data, &result);
+  share_the_gap(&result);
+  result.verdict = verdict_of(result);
+  result.candidates = list_candidates(work, evidence, decision.first);
+  result.detectable = smallest_sizes(work, evidence, decision);
+  share_out(work.design, work.inputs, robot, work.deff, options.seed + 17, &result);
+  map_workspace(whole.frames.robot, whole.data, result.residuals_before, &result);
+  result.neighbour_share = neighbour_share(whole.data, result.set, fitted.after_all, &result.neighbour_p95);
+
+  // 9. What next.
+  add_next_poses(work, whole.data, options, decision, &result);
+  result.sentence = sentence_of(result);
+  return result;
+}
+
+}  // namespace truing

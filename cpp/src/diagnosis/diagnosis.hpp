@@ -1,0 +1,159 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// One diagnosis as it goes: its working state, and the steps that diagnose.cpp puts in order.
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "diagnosis/candidates.hpp"
+#include "diagnosis/linearise.hpp"
+#include "estimation/evidence.hpp"
+#include "rooms.hpp"
+#include "truing/diagnose.hpp"
+
+namespace truing::diagnosis {
+
+struct Work {
+  DiagnoseOptions options;
+  Measurements data;  ///< with the better joint record, and approach directions where they could be inferred
+  std::vector<std::int32_t> cluster;  ///< pose group of every row
+  std::vector<std::int8_t> set;       ///< 0 train, 1 test, for every row
+  std::vector<InputColumn> inputs;
+  Identification frames;  ///< base and targets found, everything else nominal
+  Linearisation linear;
+  Design design;
+  double deff = 1.0;                   ///< values that count as one
+  std::vector<std::int32_t> outliers;  ///< rows that count for little
+  double position_sigma = 0.0;         ///< [m] of a component (or a distance), from the flexible fit
+  std::vector<Gram> fold;              ///< training folds
+  Gram train, test;
+  std::vector<Gram> test_fold;
+  bool inferred_direction = false;
+};
+
+/// Everything that was decided.
+struct Decision {
+  Evidence::State state;  ///< named, laws and free functions
+  SearchOptions search;   ///< with the threshold raised to what noise alone reaches
+  double p_gap = 1.0;
+  double p_left = 1.0;
+  std::vector<Evidence::Gain> first;  ///< every group alone
+  std::map<int, int> corrects;  ///< a law's correction, or a free function that is one: the group whose law it corrects
+};
+
+struct Refit {
+  Identification found;
+  std::vector<Effect> own;
+};
+
+/// Noise of one value [m], as rows measured again at the same pose show it.
+struct Repeats {
+  double sigma = 0.0;
+  double freedom = 0.0;  ///< degrees of freedom that it rests on
+};
+
+/// What may stand in a named group's place.
+struct Rival {
+  int group = -1;
+  double loss = 0.0;  ///< of score [nats]
+  double r2 = 0.0;    ///< share of the named effect's motion of the tip that it can make
+  bool in_class = false;
+};
+
+struct Sureness {
+  std::vector<Rival> rivals;  ///< those in the class first, by loss
+  double raw = 0.0;           ///< posterior of the class
+  double removal_loss = 0.0;  ///< nats lost without it
+};
+
+/// The selection repeated on resampled poses: which groups come back, and how far the held-out error shrinks each time.
+struct Resampled {
+  std::vector<std::vector<int>> chosen;
+  std::vector<double> shrink;                    ///< of the held-out rms, all groups
+  std::map<int, std::vector<double>> shrink_of;  ///< by group of the decision: against all others
+};
+
+// --- weigh.cpp: what noise is ----------------------------------------------------------------------------------------
+
+/// 0 position, 1 rotation, 2 distance.
+inline int kind_of(std::int8_t component) { return component < 3 ? 0 : component < 6 ? 1 : 2; }
+
+void weigh(Work* work);
+void make_grams(Work* work);
+/// After columns were appended: their part of every Gram, nothing else.
+void extend_grams(Work* work);
+
+// --- decide.cpp: what explains the gap -------------------------------------------------------------------------------
+
+inline bool is_named(const Explanation& e) {
+  return e.kind == Explanation::Kind::catalogue || e.kind == Explanation::Kind::all_geometry ||
+         e.kind == Explanation::Kind::drift;
+}
+
+/// Index of an input; -1: there is none of that name.
+int input_named(const Work& work, const std::string& name);
+/// A choice less one group, and less what corrects its law.
+Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std::size_t at);
+/// Sum of squares on every fold of the fit to the others.
+double cross_validated(const Work& work, const Choice& choice);
+
+/// The groups that may enter first, on a Gram of their columns only: corrections of laws and fine drifts are many
+/// columns.
+struct Shortlist {
+  std::vector<ColumnGroup> groups;
+  std::vector<int> which;    ///< of all groups
+  std::vector<int> columns;  ///< of the design; the nuisance comes first
+  std::vector<int> nuisance;
+  Eigen::VectorXd prior;
+};
+
+Shortlist shortlist(const Work& work, const std::vector<int>& also);
+
+Decision decide(Work* work, const Robot& robot);
+
+// --- sureness.cpp: how sure that is ----------------------------------------------------------------------------------
+
+bool same_name(const Explanation& a, const Explanation& b);
+bool contains(const Explanation& large, const Explanation& small);
+Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at);
+Resampled resample(const Work& work, const Decision& decision);
+double came_back(const Work& work, const Resampled& resampled, const Sureness& sure, int group);
+double calibrated(double posterior, double came_back, double removal_loss);
+
+// --- refit.cpp: how far the error shrinks ----------------------------------------------------------------------------
+
+std::vector<double> held_out_lengths(const Design& design, const Evidence::State& state);
+Share percentile_interval(std::vector<double> values, double center);
+Refit refit(const Work& work, const Robot& robot, const Evidence::State& state, const std::vector<int>& groups);
+std::vector<double> lengths_of(const Residuals& residuals, std::size_t rows);
+std::vector<double> held_out(const std::vector<double>& lengths, const std::vector<std::int8_t>& set);
+Repeats noise_of_repeats(const Measurements& data);
+double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set,
+                   const Repeats& repeats);
+std::vector<std::int32_t> thinned_rows(const Measurements& data, const std::vector<std::int32_t>& cluster,
+                                       std::size_t most);
+Measurements subset_of(const Measurements& data, const std::vector<std::int32_t>& rows);
+std::vector<Effect> mapped(const std::vector<Effect>& own, const Measurements& whole,
+                           const std::vector<std::int32_t>& rows);
+
+// --- describe.cpp: what the user reads -------------------------------------------------------------------------------
+
+FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
+                     const Sureness& sure, double probability, const Identification& refitted,
+                     const Resampled& resampled);
+UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
+                               const Resampled& resampled);
+/// A gap beyond the noise of repeats that nothing describes; `excess`: in standard errors.
+UnknownEffect describe_lack_of_fit(const Diagnosis& d, double excess);
+std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidence,
+                                       const std::vector<Evidence::Gain>& first);
+std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidence, const Decision& decision);
+void add_next_poses(const Work& work, const Measurements& data, const DiagnoseOptions& options,
+                    const Decision& decision, Diagnosis* out);
+std::string sentence_of(const Diagnosis& d);
+
+}  // namespace truing::diagnosis

@@ -1,0 +1,452 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include "diagnosis/free_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+
+#include "math/random.hpp"
+#include "math/text.hpp"
+
+namespace truing::diagnosis {
+namespace {
+
+/// The rows that are looked at, weighted, with what the state's columns are on them.
+struct Left {
+  std::vector<Eigen::Index> at;  ///< rows of the design
+  Eigen::MatrixXd columns;       ///< weighted columns of the state, shape (rows, columns)
+  Eigen::VectorXd residual;      ///< weighted
+  Eigen::LLT<Eigen::MatrixXd> factor;
+  double share = 1.0;  ///< of the training rows
+};
+
+Left what_is_left(const Design& design, const Evidence::State& state, std::size_t most) {
+  Left out;
+  std::size_t training = 0;
+  for (const std::int32_t fold : design.fold) training += fold < design.folds ? 1 : 0;
+  int folds = design.folds;
+  while (folds > 2 && training * static_cast<std::size_t>(folds) / static_cast<std::size_t>(design.folds) > most)
+    --folds;
+  for (std::size_t i = 0; i < design.fold.size(); ++i) {
+    if (design.fold[i] < folds && design.weight[static_cast<Eigen::Index>(i)] > 0.0)
+      out.at.push_back(static_cast<Eigen::Index>(i));
+  }
+  out.share = static_cast<double>(out.at.size()) / static_cast<double>(std::max<std::size_t>(1, training));
+  const auto p = static_cast<Eigen::Index>(state.columns.size());
+  out.columns.resize(static_cast<Eigen::Index>(out.at.size()), p);
+  out.residual.resize(out.columns.rows());
+  for (Eigen::Index k = 0; k < out.columns.rows(); ++k) {
+    const Eigen::Index i = out.at[static_cast<std::size_t>(k)];
+    for (Eigen::Index c = 0; c < p; ++c)
+      out.columns(k, c) = design.weight[i] * design.x(i, state.columns[static_cast<std::size_t>(c)]);
+    out.residual[k] = design.weight[i] * design.y[i];
+  }
+  Eigen::MatrixXd d = out.columns.transpose() * out.columns;
+  d.diagonal() += state.precision * out.share + 1e-12 * d.diagonal();
+  out.factor = factorised(std::move(d));
+  out.residual -= out.columns * out.factor.solve(out.columns.transpose() * out.residual);
+  return out;
+}
+
+/// A free function's columns, before they are multiplied by the site's: sparse, at most four values a row.
+struct Trial {
+  Explanation what;
+  std::vector<int> sites;
+};
+
+std::vector<Trial> make_trials(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot,
+                               std::size_t clusters) {
+  std::vector<Trial> out;
+  std::vector<std::int32_t> rows;
+  for (std::size_t i = 0; i < design.row.size(); ++i) {
+    if (design.fold[i] < design.folds && (i == 0 || design.row[i] != design.row[i - 1])) rows.push_back(design.row[i]);
+  }
+  const int one = clusters >= 150 ? 10 : clusters >= 60 ? 7 : 4;
+  const int two = clusters >= 150 ? 5 : clusters >= 60 ? 4 : 3;
+  std::vector<std::vector<double>> fine, coarse;
+  for (const InputColumn& input : inputs) {
+    fine.push_back(knots_of(input, rows, one));
+    coarse.push_back(knots_of(input, rows, two));
+  }
+  const auto add = [&](const std::string& site, const std::vector<int>& columns, const std::vector<int>& which) {
+    Trial trial;
+    trial.what.kind = Explanation::Kind::free;
+    trial.what.effect = "free";
+    trial.what.site = site;
+    if (site != "base") trial.what.joints = {site};
+    trial.what.inputs = which;
+    std::string name = "free." + site;
+    for (const int k : which) {
+      trial.what.knots.push_back((which.size() > 1 ? coarse : fine)[static_cast<std::size_t>(k)]);
+      if (trial.what.knots.back().size() < 2) return;
+      name += "." + inputs[static_cast<std::size_t>(k)].name;
+    }
+    std::size_t count = columns.size();
+    for (const std::vector<double>& knots : trial.what.knots) count *= knots.size();
+    for (std::size_t k = 0; k < count; ++k) trial.what.parameters.push_back(name + "." + std::to_string(k + 1));
+    trial.sites = columns;
+    out.push_back(std::move(trial));
+  };
+  const auto number_of_inputs = static_cast<int>(inputs.size());
+  for (std::size_t joint = 0; joint < robot.joints.size(); ++joint) {
+    const std::string& site = robot.joints[joint].name;
+    for (int a = 0; a < number_of_inputs; ++a) {
+      const InputColumn& first = inputs[static_cast<std::size_t>(a)];
+      if (first.constant) continue;
+      add(site, design.joint_column[joint], {a});
+    }
+    // Two inputs: any two joints; this joint's own motion, direction or torque with anything else.
+    for (int a = 0; a < number_of_inputs; ++a) {
+      const InputColumn& first = inputs[static_cast<std::size_t>(a)];
+      if (first.constant || first.name[0] != 'q' || first.name.find('-') != std::string::npos) continue;
+      for (int b = 0; b < number_of_inputs; ++b) {
+        const InputColumn& second = inputs[static_cast<std::size_t>(b)];
+        if (second.constant || b == a) continue;
+        const bool motion = second.name[0] == 'q' && second.name.find('-') == std::string::npos;
+        if (motion && b < a) continue;
+        if (second.name.rfind("torque", 0) == 0 || second.name.find('-') != std::string::npos ||
+            second.name == "time" || second.name == "order")
+          continue;
+        const bool own = first.joint == static_cast<int>(joint);
+        const bool direction = second.name.rfind("dir", 0) == 0;
+        if (!motion && direction && second.joint != static_cast<int>(joint)) continue;
+        if (!motion && !direction && !own) continue;
+        add(site, design.joint_column[joint], {a, b});
+      }
+    }
+  }
+  if (!design.base_columns.empty()) {
+    for (int a = 0; a < number_of_inputs; ++a) {
+      const InputColumn& first = inputs[static_cast<std::size_t>(a)];
+      if (first.constant || first.name.rfind("torque", 0) == 0 || first.name == "order" || first.name == "time")
+        continue;
+      fine[static_cast<std::size_t>(a)] = knots_of(first, rows, std::min(one, 5));
+      add("base", design.base_columns, {a});
+    }
+  }
+  return out;
+}
+
+/// X^T v of a trial's columns for every column v of `right`, and X^T X, without ever storing X.
+struct Sums {
+  Eigen::MatrixXd xx;     ///< shape (k, k)
+  Eigen::MatrixXd right;  ///< shape (k, columns of right)
+};
+
+Sums sums_of(const Trial& trial, const Design& design, const std::vector<InputColumn>& inputs,
+             const std::vector<Eigen::Index>& at, const Design::Rows& right) {
+  const auto k1 = static_cast<Eigen::Index>(trial.what.knots[0].size());
+  const auto k2 = trial.what.knots.size() > 1 ? static_cast<Eigen::Index>(trial.what.knots[1].size()) : 1;
+  const Eigen::Index per_site = k1 * k2, k = per_site * static_cast<Eigen::Index>(trial.sites.size());
+  Sums out;
+  out.xx = Eigen::MatrixXd::Zero(k, k);
+  Design::Rows sums = Design::Rows::Zero(k, right.cols());
+  std::vector<double> first(static_cast<std::size_t>(k1)), second(static_cast<std::size_t>(k2), 1.0);
+  std::vector<std::pair<Eigen::Index, double>> hats, values;
+  std::int32_t last = -1;
+  for (std::size_t n = 0; n < at.size(); ++n) {
+    const Eigen::Index i = at[n];
+    const std::int32_t row = design.row[static_cast<std::size_t>(i)];
+    if (row != last) {
+      last = row;
+      hats_at(trial.what.knots[0],
+              inputs[static_cast<std::size_t>(trial.what.inputs[0])].values[static_cast<std::size_t>(row)],
+              first.data());
+      if (k2 > 1)
+        hats_at(trial.what.knots[1],
+                inputs[static_cast<std::size_t>(trial.what.inputs[1])].values[static_cast<std::size_t>(row)],
+                second.data());
+      hats.clear();
+      for (Eigen::Index a = 0; a < k1; ++a) {
+        for (Eigen::Index b = 0; b < k2; ++b) {
+          const double value = first[static_cast<std::size_t>(a)] * second[static_cast<std::size_t>(b)];
+          if (value != 0.0) hats.emplace_back(a * k2 + b, value);
+        }
+      }
+    }
+    values.clear();
+    for (std::size_t s = 0; s < trial.sites.size(); ++s) {
+      const double d = design.weight[i] * design.x(i, trial.sites[s]);
+      for (const auto& [hat, value] : hats)
+        values.emplace_back(static_cast<Eigen::Index>(s) * per_site + hat, d * value);
+    }
+    for (const auto& [a, x] : values) {
+      for (const auto& [b, z] : values) out.xx(a, b) += x * z;
+      sums.row(a) += x * right.row(static_cast<Eigen::Index>(n));
+    }
+  }
+  out.right = sums;
+  return out;
+}
+
+/// Slots of the right-hand sides: state's columns, the residual, then sign-flipped residuals.
+Design::Rows right_sides(const Design& design, const Left& left, int flips, std::uint64_t seed) {
+  const Eigen::Index p = left.columns.cols();
+  Design::Rows out(left.columns.rows(), p + 1 + flips);
+  out.leftCols(p) = left.columns;
+  out.col(p) = left.residual;
+  Random random(seed);
+  std::vector<std::int32_t> clusters;
+  for (const Eigen::Index i : left.at) clusters.push_back(design.cluster[static_cast<std::size_t>(i)]);
+  std::vector<std::int32_t> known(clusters);
+  std::sort(known.begin(), known.end());
+  known.erase(std::unique(known.begin(), known.end()), known.end());
+  for (int f = 0; f < flips; ++f) {
+    std::vector<double> sign(known.size());
+    for (double& s : sign) s = random.next() & 1u ? 1.0 : -1.0;
+    Eigen::VectorXd flipped(left.residual.size());
+    for (Eigen::Index n = 0; n < flipped.size(); ++n) {
+      const auto c =
+          std::lower_bound(known.begin(), known.end(), clusters[static_cast<std::size_t>(n)]) - known.begin();
+      flipped[n] = sign[static_cast<std::size_t>(c)] * left.residual[n];
+    }
+    // A fit would have taken its share of this noise, too.
+    flipped -= left.columns * left.factor.solve(left.columns.transpose() * flipped);
+    out.col(p + 1 + f) = flipped;
+  }
+  return out;
+}
+
+}  // namespace
+
+FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidence::State& state,
+                   const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                   const FreeScanOptions& options) {
+  const Left left = what_is_left(design, state, options.most_values);
+  std::vector<std::int32_t> clusters;
+  for (const Eigen::Index i : left.at) clusters.push_back(design.cluster[static_cast<std::size_t>(i)]);
+  std::sort(clusters.begin(), clusters.end());
+  clusters.erase(std::unique(clusters.begin(), clusters.end()), clusters.end());
+  const std::vector<Trial> trials = make_trials(design, inputs, robot, clusters.size());
+  const Eigen::Index p = left.columns.cols();
+  const Design::Rows right = right_sides(design, left, options.flips, options.seed);
+  Evidence::State scaled = state;
+  const double times = 1.0 / (left.share * deff);  // as if all rows were seen, and each counted for as much as it does
+  FreeScan out;
+  out.tried = trials.size();
+  std::vector<double> largest(static_cast<std::size_t>(options.flips), -1e300);
+  const double cost = std::log(static_cast<double>(std::max<std::size_t>(1, out.tried)));
+  double observed_residual = left.residual.squaredNorm() * times;
+  scaled.rss = std::max(observed_residual, 1e-300);
+  scaled.sigma2 = scaled.rss / evidence.freedom();
+  for (const Trial& trial : trials) {
+    const Sums sums = sums_of(trial, design, inputs, left.at, right);
+    const Eigen::Index k = sums.xx.rows();
+    const Eigen::MatrixXd c = sums.right.leftCols(p);
+    const Eigen::MatrixXd half = left.factor.matrixL().solve(c.transpose());
+    Eigen::MatrixXd a = (sums.xx - half.transpose() * half) * times;
+    for (Eigen::Index i = 0; i < k; ++i) a(i, i) += 1e-9 * sums.xx(i, i) * times;
+    const Eigen::VectorXd prior = Eigen::VectorXd::Constant(k, kLargest);
+    FreeGain found;
+    found.gain = evidence.gain_of(scaled, a, sums.right.col(p) * times, prior, cost);
+    if (options.flips > 0) {
+      // At the scale that the data chose, or noise's own: the smallest.
+      for (const double scale : {found.gain.scale, 0.001}) {
+        Eigen::MatrixXd m = a;
+        const double ridge = scaled.sigma2 / std::pow(scale * kLargest, 2.0);
+        m.diagonal().array() += ridge;
+        const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(m));
+        const double determinants =
+            static_cast<double>(k) * std::log(ridge) - 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+        Eigen::MatrixXd flipped = sums.right.rightCols(options.flips) * times;
+        factor.matrixL().solveInPlace(flipped);
+        for (int f = 0; f < options.flips; ++f) {
+          const double fall = std::min(flipped.col(f).squaredNorm(), 0.999 * scaled.rss);
+          const double score = -0.5 * evidence.freedom() * std::log1p(-fall / scaled.rss) + 0.5 * determinants - cost;
+          largest[static_cast<std::size_t>(f)] = std::max(largest[static_cast<std::size_t>(f)], score);
+        }
+      }
+    }
+    found.what = trial.what;
+    found.site_columns = trial.sites;
+    out.best.push_back(std::move(found));
+  }
+  std::sort(out.best.begin(), out.best.end(),
+            [](const FreeGain& a, const FreeGain& b) { return a.gain.score > b.gain.score; });
+  if (!out.best.empty() && options.flips > 0) {
+    int above = 1;
+    for (const double score : largest) above += score >= out.best[0].gain.score ? 1 : 0;
+    out.p = static_cast<double>(above) / (options.flips + 1.0);
+  }
+  if (out.best.size() > 200) out.best.resize(200);
+  return out;
+}
+
+std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, const Evidence::State& state,
+                                const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                                std::size_t most_values) {
+  const Left left = what_is_left(design, state, most_values);
+  const double times = 1.0 / (left.share * deff);
+  Evidence::State scaled = state;
+  scaled.rss = std::max(left.residual.squaredNorm() * times, 1e-300);
+  scaled.sigma2 = scaled.rss / evidence.freedom();
+  std::vector<MeshGain> out;
+  for (const InputColumn& input : inputs) {
+    if (input.joint < 0 || input.constant || input.name != "q" + std::to_string(input.joint + 1)) continue;
+    const auto joint = static_cast<std::size_t>(input.joint);
+    if (robot.joints[joint].type != JointType::revolute || robot.joints[joint].passive()) continue;
+    Eigen::VectorXd d(static_cast<Eigen::Index>(left.at.size()));
+    std::vector<double> q(left.at.size());
+    for (std::size_t n = 0; n < left.at.size(); ++n) {
+      const Eigen::Index i = left.at[n];
+      d[static_cast<Eigen::Index>(n)] = design.weight[i] * design.x(i, design.joint_column[joint][0]);
+      q[n] = input.values[static_cast<std::size_t>(design.row[static_cast<std::size_t>(i)])];
+    }
+    if (q.empty()) return {};
+    // Angles that crowd at a few places cannot show a short wave: any order would do.
+    std::vector<double> sorted(q);
+    std::sort(sorted.begin(), sorted.end());
+    sorted.erase(std::unique(sorted.begin(), sorted.end(), [](double a, double b) { return b - a < 0.01; }),
+                 sorted.end());
+    std::size_t poses = 0;
+    for (std::size_t n = 0; n < left.at.size(); ++n)
+      poses += n == 0 || design.cluster[static_cast<std::size_t>(left.at[n])] !=
+                             design.cluster[static_cast<std::size_t>(left.at[n - 1])]
+                   ? 1
+                   : 0;
+    if (static_cast<double>(sorted.size()) < std::min(0.3 * static_cast<double>(poses), 100.0)) continue;
+    const auto [low, high] = std::minmax_element(q.begin(), q.end());
+    const double step = *high - *low > 6.6 ? 0.5 : 1.0;
+    MeshGain best;
+    best.joint = joint;
+    best.score = -1e300;
+    // Row by row the residual and the state's columns seen through this joint, so that an order costs two products.
+    Design::Rows right(left.columns.rows(), left.columns.cols() + 1);
+    right.leftCols(left.columns.cols()) = d.asDiagonal() * left.columns;
+    right.col(left.columns.cols()) = d.cwiseProduct(left.residual);
+    const Eigen::VectorXd dd = d.cwiseAbs2();
+    std::vector<double> orders;
+    for (double order = 20.0; order <= 240.0; order += step) orders.push_back(order);
+    constexpr std::size_t kBlock = 16;  // orders at a time
+    const double cost = std::log(static_cast<double>(orders.size()) * static_cast<double>(robot.joints.size()));
+    for (std::size_t first = 0; first < orders.size(); first += kBlock) {
+      const std::size_t count = std::min(kBlock, orders.size() - first);
+      Eigen::MatrixXd waves(left.columns.rows(), static_cast<Eigen::Index>(2 * count));
+      for (std::size_t k = 0; k < count; ++k) {
+        double last_q = NAN, c = 0.0, s = 0.0;
+        for (std::size_t n = 0; n < q.size(); ++n) {
+          if (q[n] != last_q) {
+            last_q = q[n];
+            c = std::cos(orders[first + k] * last_q);
+            s = std::sin(orders[first + k] * last_q);
+          }
+          waves(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(2 * k)) = c;
+          waves(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(2 * k + 1)) = s;
+        }
+      }
+      const Eigen::MatrixXd sums = waves.transpose() * right;
+      for (std::size_t k = 0; k < count; ++k) {
+        const auto at = static_cast<Eigen::Index>(2 * k);
+        Eigen::Matrix2d xx;
+        const auto c = waves.col(at).array(), s = waves.col(at + 1).array();
+        xx(0, 0) = (c.square() * dd.array()).sum();
+        xx(1, 1) = (s.square() * dd.array()).sum();
+        xx(0, 1) = xx(1, 0) = (c * s * dd.array()).sum();
+        const Eigen::MatrixXd half = left.factor.matrixL().solve(sums.block(at, 0, 2, left.columns.cols()).transpose());
+        const Eigen::MatrixXd a = (xx - half.transpose() * half) * times;
+        const Eigen::VectorXd b = sums.block(at, left.columns.cols(), 2, 1) * times;
+        const Evidence::Gain gain = evidence.gain_of(scaled, a, b, Eigen::VectorXd::Constant(2, kLargest), cost);
+        if (gain.score > best.score) {
+          best.score = gain.score;
+          best.order = orders[first + k];
+        }
+      }
+    }
+    best.tried = static_cast<int>(orders.size());
+    if (best.score > 0.0) out.push_back(best);
+  }
+  return out;
+}
+
+// --- what a curve looks like -----------------------------------------------------------------------------------------
+
+namespace {
+
+/// Sum of squares that the columns leave of what single poses say.
+double left_by(const Curve& curve, const std::vector<std::vector<double>>& columns) {
+  const auto n = static_cast<Eigen::Index>(curve.samples.size());
+  Eigen::MatrixXd x(n, static_cast<Eigen::Index>(columns.size()));
+  Eigen::VectorXd y(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    y[i] = curve.samples[static_cast<std::size_t>(i)][1];
+    for (Eigen::Index c = 0; c < x.cols(); ++c)
+      x(i, c) = columns[static_cast<std::size_t>(c)][static_cast<std::size_t>(i)];
+  }
+  Eigen::MatrixXd xx = x.transpose() * x;
+  xx.diagonal() *= 1.0 + 1e-12;
+  return std::max(0.0, y.squaredNorm() - (x.transpose() * y).dot(xx.ldlt().solve(x.transpose() * y)));
+}
+
+}  // namespace
+
+std::string shape_of(const Curve& curve) {
+  if (curve.points.size() < 2 || curve.samples.size() < 8) return "";
+  const std::string unit = curve.input_unit.empty() ? "" : " " + curve.input_unit;
+  if (curve.points.size() <= 3) return "different levels of " + curve.input;
+  const std::size_t n = curve.samples.size();
+  const auto column = [&](const auto& f) {
+    std::vector<double> out;
+    for (const auto& sample : curve.samples) out.push_back(f(sample[0]));
+    return out;
+  };
+  const std::vector<double> one(n, 1.0);
+  const double whole = left_by(curve, {one});
+  struct Shape {
+    double left;
+    double parameters;
+    std::string text;
+  };
+  std::vector<Shape> shapes;
+  shapes.push_back({left_by(curve, {one, column([](double x) { return x; })}), 2, "linear in " + curve.input});
+  const std::size_t stride = std::max<std::size_t>(1, n / 80);
+  for (std::size_t k = stride; k < n; k += stride) {
+    const double at = 0.5 * (curve.samples[k - 1][0] + curve.samples[k][0]);
+    shapes.push_back({left_by(curve, {one, column([at](double x) { return x > at ? 1.0 : 0.0; })}), 3,
+                      "a step at " + curve.input + " = " + number(at, 3) + unit});
+    if (k > 3 * stride && k + 3 * stride < n) {
+      const double corner = curve.samples[k][0];
+      shapes.push_back({left_by(curve, {one, column([corner](double x) { return std::max(0.0, x - corner); })}), 3.5,
+                        "flat, then rising from " + curve.input + " = " + number(corner, 3) + unit});
+      shapes.push_back({left_by(curve, {one, column([corner](double x) { return std::abs(x - corner); })}), 3.5,
+                        "a corner at " + curve.input + " = " + number(corner, 3) + unit});
+    }
+  }
+  const double low = curve.samples.front()[0], span = curve.samples.back()[0] - low;
+  shapes.push_back({left_by(curve, {one, column([&](double x) { return x; }), column([&](double x) { return x * x; })}),
+                    3, "quadratic in " + curve.input});
+  for (int k = 1; k < 8 && curve.input[0] == 'q'; ++k) {
+    shapes.push_back({left_by(curve, {one, column([k](double x) { return std::cos(k * x); }),
+                                      column([k](double x) { return std::sin(k * x); })}),
+                      3.5, "a wave of " + std::to_string(k) + " per turn of " + curve.input});
+  }
+  for (std::size_t k = 1; k + 1 < curve.points.size(); ++k) {
+    for (const double width : {0.08, 0.15, 0.25}) {
+      const double at = curve.points[k][0];
+      shapes.push_back({left_by(curve, {one, column([&](double x) {
+                                          return std::exp(-0.5 * std::pow((x - at) / (width * span), 2.0));
+                                        })}),
+                        4, "a bump at " + curve.input + " = " + number(at, 3) + unit});
+    }
+  }
+  // What the free curve leaves is noise: chi-squared and two for each parameter (Akaike 1974).
+  std::vector<double> knots;
+  for (const auto& point : curve.points) knots.push_back(point[0]);
+  std::vector<std::vector<double>> hats(knots.size(), std::vector<double>(n));
+  std::vector<double> values(knots.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    hats_at(knots, curve.samples[i][0], values.data());
+    for (std::size_t k = 0; k < knots.size(); ++k) hats[k][i] = values[k];
+  }
+  const double noise = left_by(curve, hats),
+               unit2 = std::max(noise / std::max(1.0, static_cast<double>(n - std::min(n - 1, knots.size()))), 1e-300);
+  const auto best = std::min_element(shapes.begin(), shapes.end(), [unit2](const Shape& a, const Shape& b) {
+    return a.left / unit2 + 2.0 * a.parameters < b.left / unit2 + 2.0 * b.parameters;
+  });
+  if (whole - best->left < 0.75 * (whole - noise)) return "no simple shape in " + curve.input;
+  return best->text;
+}
+
+}  // namespace truing::diagnosis

@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What is in no catalogue: a joint (or the base) that moves as a function of one or two recorded inputs.
+
+#include <cstdint>
+#include <vector>
+
+#include "diagnosis/candidates.hpp"
+#include "estimation/evidence.hpp"
+#include "rooms.hpp"
+
+namespace truing::diagnosis {
+
+/// One free function tried.
+struct FreeGain {
+  Explanation what;
+  std::vector<int> site_columns;
+  Evidence::Gain gain;
+};
+
+struct FreeScan {
+  std::vector<FreeGain> best;  ///< by score, best first; at most 200
+  std::size_t tried = 0;       ///< functions in all
+  double p = 1.0;              ///< chance of a score as high when the signs of whole poses are random
+};
+
+struct FreeScanOptions {
+  int flips = 99;
+  std::uint64_t seed = 0;
+  std::size_t most_values = 20000;  ///< measured values looked at: of more, whole folds are left out
+};
+
+/// Scores free functions on what `state` leaves of the training rows. `deff`: rows that count as one.
+FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidence::State& state,
+                   const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                   const FreeScanOptions& options);
+
+/// Mesh orders of every revolute joint scanned on what is left: the best order of each joint [per turn], if any wins.
+struct MeshGain {
+  std::size_t joint = 0;
+  double order = 0.0;
+  double score = 0.0;
+  int tried = 0;
+};
+std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, const Evidence::State& state,
+                                const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                                std::size_t most_values = 20000);
+
+/// "a step at q4 = 0.41 rad", "linear in temp", … from points (input, value, standard error).
+std::string shape_of(const Curve& curve);
+
+}  // namespace truing::diagnosis

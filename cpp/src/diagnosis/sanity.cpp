@@ -1,0 +1,256 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include "diagnosis/sanity.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+
+#include "diagnosis/linearise.hpp"
+#include "math/statistics.hpp"
+#include "math/text.hpp"
+
+namespace truing::diagnosis {
+namespace {
+
+constexpr std::size_t kPoses = 400;  ///< that the quick comparisons look at
+
+/// Joint columns of one's own beside the rest of the data.
+struct Owned {
+  std::shared_ptr<const void> rest;
+  std::vector<std::vector<double>> columns;
+};
+
+/// The data with other joint columns (null: as they are), thinned to so many rows.
+Measurements with_joints(const Measurements& data, std::vector<std::vector<double>> columns) {
+  Measurements out = data;
+  auto owned = std::make_shared<Owned>(Owned{data.owner, std::move(columns)});
+  for (std::size_t k = 0; k < owned->columns.size(); ++k) out.joints[k] = {owned->columns[k].data(), 1};
+  out.owner = owned;
+  return out;
+}
+
+std::vector<std::vector<double>> joint_columns(const Measurements& data) {
+  std::vector<std::vector<double>> out(data.joints.size(), std::vector<double>(data.rows));
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    for (std::size_t row = 0; row < data.rows; ++row) out[k][row] = data.joints[k][row];
+  }
+  return out;
+}
+
+/// Median error with base and targets fitted and, if wanted, the geometry under its prior: a few hundred rows will do.
+double median_error(const Robot& robot, const Measurements& data, const DiagnoseOptions& options, bool geometry) {
+  std::vector<std::int32_t> rows;
+  const std::size_t step = data.rows / (3 * kPoses) + 1;
+  std::vector<double> weights(data.rows, 0.0);
+  for (std::size_t row = 0; row < data.rows; row += step) {
+    const double own = data.weight ? data.weight[row] : 1.0;
+    weights[row] = own;
+    if (own > 0.0) rows.push_back(static_cast<std::int32_t>(row));
+  }
+  Measurements some = data;
+  some.weight = {weights.data(), 1};
+  IdentifyOptions fit;
+  fit.test_share = 0.0;
+  fit.own_effects = options.own_effects;
+  fit.threads = options.threads;
+  fit.max_iterations = 60;
+  some.set.assign(data.rows, 0);
+  for (const Target& target : robot.targets) fit.free.push_back(target.name + ".*");
+  if (fit.free.empty()) fit.free = {"tool.*"};
+  const Identification frames = identify(robot, some, fit);
+  if (!geometry) return frames.train.after.median;
+  const Linearisation found = linearise(frames.robot, some, rows, options.rotation_length, options.threads);
+  const Residuals left = residuals(found.at, some, options.own_effects, options.threads);
+  std::vector<double> lengths;
+  for (const std::int32_t row : rows) {
+    const double d = left.distance[row];
+    lengths.push_back(d == d ? std::abs(d) : left.position.row(row).norm());
+  }
+  return median_of(lengths);
+}
+
+std::string in_millimetres(double metres) { return number(1e3 * metres, 3) + " mm"; }
+
+void find_duplicates(const Measurements& data, std::vector<SanityFinding>* findings) {
+  std::map<std::vector<double>, std::size_t> seen;
+  std::vector<std::size_t> twice;
+  for (std::size_t row = 0; row < data.rows; ++row) {
+    std::vector<double> key;
+    for (const Column& column : data.joints) key.push_back(column[row]);
+    for (const Column& column : data.position) key.push_back(column && column[row] == column[row] ? column[row] : 0.0);
+    key.push_back(data.distance && data.distance[row] == data.distance[row] ? data.distance[row] : 0.0);
+    key.push_back(data.target.empty() ? 0.0 : data.target[row]);
+    if (!seen.emplace(std::move(key), row).second) twice.push_back(row);
+  }
+  if (twice.empty()) return;
+  SanityFinding finding;
+  finding.kind = "duplicates";
+  finding.text = std::to_string(twice.size()) +
+                 " rows repeat another row to the last digit, joints and measurement: they are copies, not repeats, "
+                 "and make noise look smaller than it is. Remove them.";
+  if (twice.size() <= 50) finding.rows = twice;
+  findings->push_back(finding);
+}
+
+/// The second record of the joints, if it is complete.
+std::vector<std::vector<double>> second_record(const Measurements& data, std::size_t driven, const Robot& robot) {
+  std::vector<std::vector<double>> out;
+  const std::vector<std::size_t> joints = robot.driven_joints();
+  for (std::size_t k = 0; k < driven; ++k) {
+    const std::string unit = robot.joints[joints[k]].type == JointType::revolute ? "_rad" : "_m";
+    const auto found = data.covariates.find("qr" + std::to_string(k + 1) + unit);
+    if (found == data.covariates.end()) return {};
+    std::vector<double> column(data.rows);
+    for (std::size_t row = 0; row < data.rows; ++row) {
+      column[row] = found->second[row];
+      if (!std::isfinite(column[row])) return {};
+    }
+    out.push_back(std::move(column));
+  }
+  return out;
+}
+
+void choose_record(const Robot& robot, const DiagnoseOptions& options, Checked* out) {
+  std::vector<std::vector<double>> other = second_record(out->data, out->data.joints.size(), robot);
+  if (other.empty()) return;
+  const Measurements alternative = with_joints(out->data, std::move(other));
+  const double first = median_error(robot, out->data, options, true),
+               second = median_error(robot, alternative, options, true);
+  SanityFinding finding;
+  finding.kind = "joint_record";
+  const double ratio = first / std::max(second, 1e-12);
+  if (ratio > 1.1) {
+    finding.text = "the second record of the joints (qr) explains the measurements better than the first (q): median " +
+                   in_millimetres(second) + " against " + in_millimetres(first) +
+                   " after geometry. The diagnosis goes on with qr.";
+    out->data = alternative;
+    out->joint_record = "qr";
+  } else if (ratio < 1.0 / 1.1) {
+    finding.text = "the two records of the joints differ, and the first (q) explains the measurements better: median " +
+                   in_millimetres(first) + " against " + in_millimetres(second) +
+                   " after geometry. The diagnosis goes on with q; was the other read before the arm had settled?";
+  } else {
+    finding.text =
+        "the two records of the joints (q, qr) explain the measurements equally well; the diagnosis goes on with q.";
+  }
+  out->findings.push_back(finding);
+}
+
+/// When hardly anything is explained: would a swap of two joints, another sign or another unit?
+void try_orders(const Robot& robot, const DiagnoseOptions& options, double spread, Checked* out) {
+  const double as_is = median_error(robot, out->data, options, false);
+  if (!(as_is > 0.02 * spread)) return;
+  const std::vector<std::vector<double>> columns = joint_columns(out->data);
+  const std::size_t n = columns.size();
+  double best = 0.5 * as_is;
+  SanityFinding finding;
+  const auto attempt = [&](std::vector<std::vector<double>> changed, const std::string& kind, const std::string& text) {
+    const double error = median_error(robot, with_joints(out->data, std::move(changed)), options, false);
+    if (error >= best) return;
+    best = error;
+    finding.kind = kind;
+    finding.text = text + " explains the measurements far better: median " + in_millimetres(error) + " against " +
+                   in_millimetres(as_is) + " with base and tool fitted. Correct the columns and run again.";
+  };
+  for (std::size_t k = 0; k < n; ++k) {
+    std::vector<std::vector<double>> changed = columns;
+    for (double& q : changed[k]) q = -q;
+    attempt(changed, "joint_sign", "turning the sign of joint column " + std::to_string(k + 1));
+    for (std::size_t m = k + 1; m < n; ++m) {
+      changed = columns;
+      std::swap(changed[k], changed[m]);
+      attempt(changed, "joint_order",
+              "swapping joint columns " + std::to_string(k + 1) + " and " + std::to_string(m + 1));
+    }
+  }
+  for (const double factor : {57.29577951308232, 0.017453292519943295}) {
+    std::vector<std::vector<double>> changed = columns;
+    for (std::vector<double>& column : changed) {
+      for (double& q : column) q *= factor;
+    }
+    attempt(changed, "joint_unit",
+            std::string("reading the joints in ") + (factor > 1.0 ? "rad instead of deg" : "deg instead of rad"));
+  }
+  if (finding.text.empty()) {
+    finding.kind = "joint_order";
+    finding.text = "with base and tool fitted the median error is " + in_millimetres(as_is) + ", " +
+                   number(100.0 * as_is / spread, 2) +
+                   " % of the measured range, and no swap, sign or unit of a joint column explains it: is it the right "
+                   "robot file?";
+  }
+  out->findings.push_back(finding);
+}
+
+/// Approach directions from the order of the poses: the sign of each joint's last motion.
+void infer_directions(const Robot& robot, Checked* out) {
+  const Measurements& data = out->data;
+  if (!data.direction.empty()) return;
+  const std::vector<std::int32_t> group = pose_groups(data);
+  const std::size_t driven = robot.driven_count();
+  std::vector<std::vector<double>> columns(driven, std::vector<double>(data.rows, 0.0));
+  std::vector<double> last(driven, std::numeric_limits<double>::quiet_NaN()), now(driven, 0.0);
+  std::int32_t current = -1;
+  std::vector<double> direction(driven, 0.0);
+  for (std::size_t row = 0; row < data.rows; ++row) {
+    for (std::size_t k = 0; k < driven; ++k) now[k] = data.joints[k][row];
+    if (group[row] != current) {
+      for (std::size_t k = 0; k < driven; ++k) {
+        const double step = now[k] - last[k];
+        if (std::isfinite(step) && std::abs(step) > 1e-4)
+          direction[k] = step > 0.0 ? 1.0 : -1.0;  // a joint that rests keeps its side
+      }
+      last = now;
+      current = group[row];
+    }
+    for (std::size_t k = 0; k < driven; ++k) columns[k][row] = direction[k];
+  }
+  auto owned = std::make_shared<Owned>(Owned{data.owner, std::move(columns)});
+  Measurements changed = data;
+  changed.direction.clear();
+  for (const std::vector<double>& column : owned->columns) changed.direction.push_back({column.data(), 1});
+  changed.owner = owned;
+  out->data = std::move(changed);
+  out->inferred_direction = true;
+  out->findings.push_back({"direction",
+                           "no columns dir1 …: the approach directions were inferred from the order of the rows, as if "
+                           "the poses had been driven to one after the other.",
+                           {}});
+}
+
+}  // namespace
+
+Checked check(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
+  Checked out;
+  out.data = data;
+  const std::vector<std::int32_t> group = pose_groups(data);
+  const std::size_t poses =
+      group.empty() ? 0 : static_cast<std::size_t>(*std::max_element(group.begin(), group.end())) + 1;
+  if (poses < 12)
+    throw std::invalid_argument(std::to_string(poses) +
+                                " poses are too few to diagnose anything: measure at least 12, better 100");
+  find_duplicates(data, &out.findings);
+  // A long path of the measured points tells how large an error is large.
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e300), high = -low;
+  double least = 1e300, most = -1e300;
+  for (std::size_t row = 0; row < data.rows; ++row) {
+    for (int k = 0; k < 3 && data.has_position(row); ++k) {
+      low[k] = std::min(low[k], data.position[static_cast<std::size_t>(k)][row]);
+      high[k] = std::max(high[k], data.position[static_cast<std::size_t>(k)][row]);
+    }
+    if (data.has_distance(row)) {
+      least = std::min(least, data.distance[row]);
+      most = std::max(most, data.distance[row]);
+    }
+  }
+  const double spread = high[0] >= low[0] ? (high - low).norm() : most > least ? most - least : 1.0;
+  choose_record(robot, options, &out);
+  try_orders(robot, options, spread, &out);
+  infer_directions(robot, &out);
+  return out;
+}
+
+}  // namespace truing::diagnosis

@@ -1,0 +1,272 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include "diagnosis/where.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include <Eigen/Eigenvalues>
+
+#include "estimation/evidence.hpp"
+#include "math/random.hpp"
+#include "math/statistics.hpp"
+
+namespace truing::diagnosis {
+namespace {
+
+constexpr int kResamples = 24;
+constexpr std::size_t kMostValues = 6000;
+
+/// Gram of the nuisance columns and some free functions, fold by fold.
+std::vector<Gram> fold_grams(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at,
+                             double deff) {
+  const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size()), p = nuisance + more.cols();
+  std::vector<GramSum> sums(static_cast<std::size_t>(design.folds), GramSum(p));
+  for (std::size_t n = 0; n < at.size(); ++n) {
+    const Eigen::Index i = at[n];
+    GramSum& sum = sums[static_cast<std::size_t>(design.fold[static_cast<std::size_t>(i)])];
+    double* out = sum.row();
+    for (Eigen::Index k = 0; k < nuisance; ++k)
+      out[k * GramSum::stride()] = design.weight[i] * design.x(i, design.nuisance[static_cast<std::size_t>(k)]);
+    for (Eigen::Index k = 0; k < more.cols(); ++k)
+      out[(nuisance + k) * GramSum::stride()] = design.weight[i] * more(static_cast<Eigen::Index>(n), k);
+    out[p * GramSum::stride()] = design.weight[i] * design.y[i];
+    sum.push();
+  }
+  std::vector<Gram> out;
+  for (GramSum& sum : sums) {
+    out.emplace_back();
+    out.back().add(sum.finish(), 1.0 / deff);
+  }
+  return out;
+}
+
+/// Sum of squares that the nuisance alone leaves, less what is left with the free functions, and what those cost in
+/// noise.
+double explained(const Gram& gram, Eigen::Index nuisance, double* closable) {
+  Eigen::MatrixXd d = gram.xx;
+  const Eigen::Index p = d.rows();
+  const Eigen::MatrixXd base =
+      d.topLeftCorner(nuisance, nuisance) + (1e-10 * d.diagonal().head(nuisance)).asDiagonal().toDenseMatrix();
+  const double before = gram.yy - gram.xy.head(nuisance).dot(base.ldlt().solve(gram.xy.head(nuisance)));
+  for (Eigen::Index k = 0; k < p; ++k) d(k, k) += 1e-10 * gram.xx(k, k) + (k < nuisance ? 0.0 : 1.0 / (1e-3 * 1e-3));
+  const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(d));
+  const double after = gram.yy - gram.xy.dot(factor.solve(gram.xy));
+  const double used = factor.solve(gram.xx).trace() - static_cast<double>(nuisance);
+  const double freedom = std::max(1.0, gram.n - static_cast<double>(nuisance) - used);
+  const double noise = after / freedom;
+  *closable = std::max(before - noise * std::max(1.0, gram.n - static_cast<double>(nuisance)), 1e-300);
+  return std::max(0.0, before - after - used * noise);
+}
+
+Share share_of(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at, double deff,
+               double closable, std::uint64_t seed) {
+  const std::vector<Gram> folds = fold_grams(design, more, at, deff);
+  const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size());
+  Gram all;
+  for (const Gram& fold : folds) all.add(fold);
+  double own = 0.0;
+  Share out;
+  out.value = explained(all, nuisance, &own) / closable;
+  std::vector<double> values;
+  Random random(seed);
+  for (int r = 0; r < kResamples; ++r) {
+    std::vector<double> times(folds.size(), 0.0);
+    for (std::size_t k = 0; k < folds.size(); ++k) times[random.below(folds.size())] += 1.0;
+    Gram drawn;
+    for (std::size_t k = 0; k < folds.size(); ++k) {
+      if (times[k] > 0.0) drawn.add(folds[k], times[k]);
+    }
+    values.push_back(explained(drawn, nuisance, &own) / closable);
+  }
+  out.value = std::min(1.0, out.value);
+  out.low = std::clamp(std::min(out.value, quantile(&values, 0.05)), 0.0, 1.0);
+  out.high = std::clamp(std::max(out.value, quantile(&values, 0.95)), 0.0, 1.0);
+  return out;
+}
+
+}  // namespace
+
+void share_out(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+               std::uint64_t seed, Diagnosis* out) {
+  std::vector<Eigen::Index> at;
+  int folds = design.folds;
+  std::size_t training = 0;
+  for (const std::int32_t fold : design.fold) training += fold < design.folds ? 1 : 0;
+  while (folds > 2 && training * static_cast<std::size_t>(folds) / static_cast<std::size_t>(design.folds) > kMostValues)
+    --folds;
+  for (std::size_t i = 0; i < design.fold.size(); ++i) {
+    if (design.fold[i] < folds && design.weight[static_cast<Eigen::Index>(i)] > 0.0)
+      at.push_back(static_cast<Eigen::Index>(i));
+  }
+  std::vector<std::int32_t> rows;
+  for (const Eigen::Index i : at) rows.push_back(design.row[static_cast<std::size_t>(i)]);
+  const auto some = [&](const std::vector<int>& sites, const std::vector<int>& which, int most) {
+    std::vector<Design::Rows> parts;
+    Eigen::Index columns = 0;
+    for (const int input : which) {
+      const std::vector<double> knots = knots_of(inputs[static_cast<std::size_t>(input)], rows, most);
+      if (knots.size() < 2) continue;
+      // Only the rows that count: a design of those.
+      Design::Rows part(static_cast<Eigen::Index>(at.size()), static_cast<Eigen::Index>(sites.size() * knots.size()));
+      std::vector<double> hats(knots.size());
+      for (std::size_t n = 0; n < at.size(); ++n) {
+        hats_at(knots,
+                inputs[static_cast<std::size_t>(input)]
+                    .values[static_cast<std::size_t>(design.row[static_cast<std::size_t>(at[n])])],
+                hats.data());
+        Eigen::Index c = 0;
+        for (const int site : sites) {
+          for (const double hat : hats) part(static_cast<Eigen::Index>(n), c++) = hat * design.x(at[n], site);
+        }
+      }
+      columns += part.cols();
+      parts.push_back(std::move(part));
+    }
+    Design::Rows all(static_cast<Eigen::Index>(at.size()), columns);
+    Eigen::Index c = 0;
+    for (const Design::Rows& part : parts) {
+      all.middleCols(c, part.cols()) = part;
+      c += part.cols();
+    }
+    return all;
+  };
+  std::vector<int> moving;
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    if (!inputs[k].constant && inputs[k].name.rfind("torque", 0) != 0 && moving.size() < 20)
+      moving.push_back(static_cast<int>(k));
+  }
+  // What is closable at all: every joint by its own motion and direction, and by torque, together.
+  std::vector<int> every_site;
+  for (const std::vector<int>& columns : design.joint_column)
+    every_site.insert(every_site.end(), columns.begin(), columns.end());
+  double closable = 0.0;
+  {
+    const Design::Rows all = some(every_site, moving, 3);
+    Gram gram;
+    for (const Gram& fold : fold_grams(design, all, at, deff)) gram.add(fold);
+    explained(gram, static_cast<Eigen::Index>(design.nuisance.size()), &closable);
+  }
+  for (std::size_t joint = 0; joint < robot.joints.size(); ++joint) {
+    out->where_joints.push_back({robot.joints[joint].name, share_of(design, some(design.joint_column[joint], moving, 5),
+                                                                    at, deff, closable, seed + joint)});
+  }
+  for (const int input : moving) {
+    Gram gram;
+    for (const Gram& fold : fold_grams(design, some(every_site, {input}, 5), at, deff)) gram.add(fold);
+    double own = 0.0;
+    const double share = explained(gram, static_cast<Eigen::Index>(design.nuisance.size()), &own) / closable;
+    out->where_inputs.push_back({inputs[static_cast<std::size_t>(input)].name, std::min(1.0, share)});
+  }
+  std::stable_sort(out->where_joints.begin(), out->where_joints.end(),
+                   [](const WhereJoint& a, const WhereJoint& b) { return a.share.value > b.share.value; });
+  std::stable_sort(out->where_inputs.begin(), out->where_inputs.end(),
+                   [](const WhereInput& a, const WhereInput& b) { return a.share > b.share; });
+}
+
+void map_workspace(const Robot& robot, const Measurements& data, const Residuals& residuals, Diagnosis* out) {
+  const Eigen::Isometry3d base_from_measurement = robot.T_measurement_base.inverse();
+  std::vector<Eigen::Vector3d> places, errors;
+  for (std::size_t row = 0; row < data.rows; ++row) {
+    const Eigen::Vector3d e = residuals.position.row(static_cast<Eigen::Index>(row)).transpose();
+    if (!e.allFinite() || !data.has_position(row)) continue;
+    places.push_back(base_from_measurement *
+                     Eigen::Vector3d(data.position[0][row], data.position[1][row], data.position[2][row]));
+    errors.push_back(base_from_measurement.linear() * e);
+  }
+  if (places.size() < 3) return;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& e : errors) covariance += e * e.transpose() / static_cast<double>(errors.size());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
+  out->direction = axes.eigenvectors().rowwise().reverse();
+  out->direction_rms = axes.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
+  Eigen::Vector3d low = places[0], high = places[0];
+  for (const Eigen::Vector3d& p : places) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  // Cubes, six along the longest side.
+  const double side = std::max((high - low).maxCoeff() / 6.0, 1e-6);
+  struct Cell {
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
+    double squares = 0.0;
+    std::size_t n = 0;
+  };
+  std::map<std::array<int, 3>, Cell> cells;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    std::array<int, 3> key{};
+    for (int axis = 0; axis < 3; ++axis)
+      key[static_cast<std::size_t>(axis)] = static_cast<int>((places[k][axis] - low[axis]) / side);
+    Cell& cell = cells[key];
+    cell.place += places[k];
+    cell.squares += errors[k].squaredNorm();
+    ++cell.n;
+  }
+  for (const auto& [key, cell] : cells) {
+    const Eigen::Vector3d center = cell.place / static_cast<double>(cell.n);
+    out->workspace.push_back(
+        {{center.x(), center.y(), center.z()}, std::sqrt(cell.squares / static_cast<double>(cell.n)), cell.n});
+  }
+}
+
+double neighbour_share(const Measurements& data, const std::vector<std::int8_t>& set, const Residuals& residuals,
+                       double* p95) {
+  constexpr std::size_t kMost = 1500;  // poses of each part that are compared
+  constexpr std::size_t kNeighbours = 4;
+  const std::size_t joints = data.joints.size();
+  std::vector<std::size_t> train, test;
+  const auto has = [&](std::size_t row) { return residuals.position.row(static_cast<Eigen::Index>(row)).allFinite(); };
+  for (std::size_t row = 0; row < data.rows; ++row) {
+    if (has(row)) (set[row] ? test : train).push_back(row);
+  }
+  const auto thin = [](std::vector<std::size_t>* rows) {
+    const std::size_t step = rows->size() / kMost + 1;
+    std::vector<std::size_t> kept;
+    for (std::size_t k = 0; k < rows->size(); k += step) kept.push_back((*rows)[k]);
+    *rows = std::move(kept);
+  };
+  thin(&train);
+  thin(&test);
+  if (train.size() < 30 || test.size() < 10) return 0.0;
+  std::vector<double> scale(joints, 0.0);
+  for (std::size_t k = 0; k < joints; ++k) {
+    std::vector<double> values;
+    for (const std::size_t row : train) values.push_back(data.joints[k][row]);
+    std::vector<double> copy = values;
+    const double spread = quantile(&values, 0.9) - quantile(&copy, 0.1);
+    scale[k] = spread > 1e-3 ? 1.0 / spread : 0.0;
+  }
+  double before = 0.0, after = 0.0;
+  std::vector<double> lengths;
+  std::vector<std::pair<double, std::size_t>> near;
+  for (const std::size_t row : test) {
+    near.clear();
+    for (const std::size_t other : train) {
+      if (!data.target.empty() && data.target[other] != data.target[row]) continue;
+      double distance = 0.0;
+      for (std::size_t k = 0; k < joints; ++k) {
+        const double d = scale[k] * (data.joints[k][row] - data.joints[k][other]);
+        distance += d * d;
+      }
+      near.emplace_back(distance, other);
+    }
+    if (near.size() < kNeighbours) continue;
+    std::nth_element(near.begin(), near.begin() + kNeighbours - 1, near.end());
+    Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
+    for (std::size_t k = 0; k < kNeighbours; ++k)
+      mean += residuals.position.row(static_cast<Eigen::Index>(near[k].second)) / kNeighbours;
+    const Eigen::RowVector3d e = residuals.position.row(static_cast<Eigen::Index>(row));
+    before += e.squaredNorm();
+    // A mean of neighbours is itself noisy: half of it is the better guess when they agree only in part.
+    after += (e - 0.5 * mean).squaredNorm();
+    lengths.push_back((e - 0.5 * mean).norm());
+  }
+  if (lengths.empty() || !(before > 0.0)) return 0.0;
+  *p95 = quantile(&lengths, 0.95);
+  return std::max(0.0, 1.0 - after / before);
+}
+
+}  // namespace truing::diagnosis

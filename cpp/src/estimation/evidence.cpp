@@ -1,0 +1,432 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include "estimation/evidence.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "kernel/kernel.hpp"
+#include "math/random.hpp"
+
+namespace truing::estimation {
+namespace {
+
+/// Parts of the prior size that a group's parameters may have: from "as far off as robots get" down to noise.
+constexpr std::array<double, 4> kScales = {1.0, 0.1, 0.01, 0.001};
+/// A nuisance column that the others explain but for this share of its square is held at zero.
+constexpr double kFlat = 1e-9;
+
+Eigen::MatrixXd block(const Eigen::MatrixXd& m, const std::vector<int>& rows, const std::vector<int>& columns) {
+  Eigen::MatrixXd out(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(columns.size()));
+  for (Eigen::Index j = 0; j < out.cols(); ++j) {
+    const double* column = m.data() + static_cast<Eigen::Index>(columns[static_cast<std::size_t>(j)]) * m.rows();
+    for (Eigen::Index i = 0; i < out.rows(); ++i) out(i, j) = column[rows[static_cast<std::size_t>(i)]];
+  }
+  return out;
+}
+
+Eigen::VectorXd part(const Eigen::VectorXd& v, const std::vector<int>& rows) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(rows.size()));
+  for (Eigen::Index i = 0; i < out.size(); ++i) out[i] = v[rows[static_cast<std::size_t>(i)]];
+  return out;
+}
+
+double log_determinant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
+  return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+}
+
+}  // namespace
+
+void Gram::add(const Gram& other, double times) {
+  if (xx.size() == 0) {
+    xx = times * other.xx;
+    xy = times * other.xy;
+    yy = times * other.yy;
+    n = times * other.n;
+    return;
+  }
+  xx += times * other.xx;
+  xy += times * other.xy;
+  yy += times * other.yy;
+  n += times * other.n;
+}
+
+Eigen::LLT<Eigen::MatrixXd> factorised(Eigen::MatrixXd d) {
+  Eigen::LLT<Eigen::MatrixXd> factor(d);
+  for (double more = 1e-10; factor.info() != Eigen::Success && more < 1.0; more *= 100.0) {
+    d.diagonal() *= 1.0 + more;
+    d.diagonal().array() += 1e-300;
+    factor.compute(d);
+  }
+  return factor;
+}
+
+GramSum::GramSum(Eigen::Index columns) : columns_(columns), buffer_(Eigen::MatrixXd::Zero(kLength, columns + 1)) {
+  sums_.assign(kernel::functions().gram_size(static_cast<int>(columns + 1)), 0.0);
+}
+
+void GramSum::push() {
+  n_ += 1.0;
+  if (++filled_ == kLength) fold_in();
+}
+
+void GramSum::fold_in() {
+  if (filled_ < kLength) buffer_.bottomRows(kLength - filled_).setZero();
+  kernel::functions().gram_add(buffer_.data(), kLength, static_cast<int>(columns_ + 1),
+                               static_cast<int>((filled_ + 7) / 8 * 8), sums_.data());
+  filled_ = 0;
+}
+
+Gram GramSum::finish() {
+  if (filled_ > 0) fold_in();
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(columns_ + 1, columns_ + 1);
+  kernel::functions().gram_reduce(sums_.data(), static_cast<int>(columns_ + 1), all.data());
+  Gram out;
+  out.xx = all.topLeftCorner(columns_, columns_).selfadjointView<Eigen::Upper>();
+  out.xy = all.col(columns_).head(columns_);
+  out.yy = all(columns_, columns_);
+  out.n = n_;
+  return out;
+}
+
+Gram Gram::of(const std::vector<int>& columns) const { return {block(xx, columns, columns), part(xy, columns), yy, n}; }
+
+Evidence::Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance,
+                   const Eigen::VectorXd& prior)
+    : gram_(gram), groups_(groups), nuisance_(std::move(nuisance)), prior_(prior) {
+  freedom_ = std::max(1.0, gram.n - static_cast<double>(nuisance_.size()));
+}
+
+// log p(y) = -nu/2 log(y^T y - m^T X^T y) - 1/2 log|X^T X + s^2 P| + 1/2 log|s^2 P| (MacKay 1992, eq. 4.10, with the
+// noise variance s^2 at its most probable value).
+Evidence::State Evidence::evaluate(const Choice& choice) const {
+  State out;
+  out.choice = choice;
+  out.columns = nuisance_;
+  std::vector<double> precision;
+  for (const int k : nuisance_) precision.push_back(-std::max(gram_.xx(k, k), 1e-30));  // negative: flat
+  double cost = 0.0;
+  for (std::size_t g = 0; g < choice.groups.size(); ++g) {
+    const ColumnGroup& group = groups_[static_cast<std::size_t>(choice.groups[g])];
+    cost += group.cost;
+    for (const int k : group.columns) {
+      out.columns.push_back(k);
+      precision.push_back(std::pow(choice.scales[g] * prior_[k], -2.0));
+    }
+  }
+  const auto p = static_cast<Eigen::Index>(out.columns.size());
+  const Eigen::MatrixXd xx = block(gram_.xx, out.columns, out.columns);
+  const Eigen::VectorXd xy = part(gram_.xy, out.columns);
+  out.precision.resize(p);
+  out.sigma2 = gram_.yy / std::max(1.0, gram_.n);
+  double log_prior = 0.0;
+  for (int round = 0; round < 4; ++round) {
+    Eigen::MatrixXd d = xx;
+    log_prior = 0.0;
+    for (Eigen::Index k = 0; k < p; ++k) {
+      const double given = precision[static_cast<std::size_t>(k)];
+      const double ridge = given < 0.0 ? -kFlat * given : out.sigma2 * given;
+      out.precision[k] = ridge;
+      d(k, k) += ridge;
+      if (given >= 0.0) log_prior += std::log(ridge);
+    }
+    out.factor = factorised(std::move(d));
+    out.solution = out.factor.solve(xy);
+    out.rss = std::max(gram_.yy - xy.dot(out.solution), 1e-12 * gram_.yy + 1e-300);
+    const double sigma2 = out.rss / freedom_;
+    const bool settled = std::abs(sigma2 / out.sigma2 - 1.0) < 1e-3;
+    out.sigma2 = sigma2;
+    if (settled) break;
+  }
+  out.evidence = -0.5 * freedom_ * std::log(out.rss) - 0.5 * log_determinant(out.factor) + 0.5 * log_prior;
+  out.score = out.evidence - cost;
+  return out;
+}
+
+struct Evidence::Projected {
+  Eigen::MatrixXd v;  ///< L^-1 X_S^T X
+  Eigen::VectorXd u;  ///< L^-1 X_S^T y
+};
+
+Evidence::Projected Evidence::project(const State& state) const {
+  Projected out;
+  const auto p = static_cast<Eigen::Index>(state.columns.size());
+  out.v.resize(p, gram_.xx.cols());
+  for (Eigen::Index i = 0; i < p; ++i)
+    out.v.row(i) = gram_.xx.col(state.columns[static_cast<std::size_t>(i)]).transpose();
+  state.factor.matrixL().solveInPlace(out.v);
+  out.u = state.factor.matrixL().solve(part(gram_.xy, state.columns));
+  return out;
+}
+
+Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
+                                 const Eigen::VectorXd& prior, double cost) const {
+  Gain best;
+  Eigen::LLT<Eigen::MatrixXd> factor;
+  Eigen::MatrixXd m;
+  for (const double scale : kScales) {
+    double sigma2 = state.sigma2, fall = 0.0, determinants = 0.0;
+    bool good = true;
+    for (int round = 0; round < 3 && good; ++round) {
+      if (b.size() == 1) {  // most groups
+        const double ridge = sigma2 / (scale * scale * prior[0] * prior[0]);
+        fall = b[0] * b[0] / (a(0, 0) + ridge);
+        determinants = std::log(ridge) - std::log(a(0, 0) + ridge);
+      } else {
+        const Eigen::VectorXd ridge = sigma2 * (scale * prior).array().pow(-2.0).matrix();
+        m = a;
+        m.diagonal() += ridge;
+        factor.compute(m);
+        good = factor.info() == Eigen::Success;
+        if (!good) break;
+        fall = factor.matrixL().solve(b).squaredNorm();
+        determinants = ridge.array().log().sum() - log_determinant(factor);
+      }
+      fall = std::min(fall, state.rss * (1.0 - 1e-9));
+      const double next = (state.rss - fall) / freedom_;
+      if (std::abs(next / sigma2 - 1.0) < 0.05) break;
+      sigma2 = next;
+    }
+    if (!good) continue;
+    const double evidence = -0.5 * freedom_ * std::log1p(-fall / state.rss) + 0.5 * determinants;
+    if (evidence > best.evidence) {
+      best.evidence = evidence;
+      best.scale = scale;
+      best.share = fall / state.rss;
+      best.squares = fall;
+    }
+  }
+  best.score = best.evidence - cost;
+  return best;
+}
+
+Evidence::Gain Evidence::gain(const State& state, const std::vector<int>& columns, double cost) const {
+  const Projected projected = project(state);
+  Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
+  for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
+  return gain_of(state, block(gram_.xx, columns, columns) - v.transpose() * v,
+                 part(gram_.xy, columns) - v.transpose() * projected.u, part(prior_, columns), cost);
+}
+
+double Evidence::visible(const State& state, int column) const {
+  Eigen::VectorXd cross(static_cast<Eigen::Index>(state.columns.size()));
+  for (Eigen::Index k = 0; k < cross.size(); ++k)
+    cross[k] = gram_.xx(state.columns[static_cast<std::size_t>(k)], column);
+  return gram_.xx(column, column) - state.factor.matrixL().solve(cross).squaredNorm();
+}
+
+double Evidence::explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta,
+                           const std::vector<int>& by) const {
+  const Projected projected = project(state);
+  const auto columns = [&](const std::vector<int>& which) {
+    Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(which.size()));
+    for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(which[static_cast<std::size_t>(i)]);
+    return v;
+  };
+  const Eigen::MatrixXd v = columns(what), w = columns(by);
+  const Eigen::MatrixXd aa = block(gram_.xx, what, what) - v.transpose() * v;
+  const Eigen::MatrixXd ab = block(gram_.xx, what, by) - v.transpose() * w;
+  Eigen::MatrixXd bb = block(gram_.xx, by, by) - w.transpose() * w;
+  for (Eigen::Index k = 0; k < bb.rows(); ++k)
+    bb(k, k) += 1e-9 * gram_.xx(by[static_cast<std::size_t>(k)], by[static_cast<std::size_t>(k)]) + 1e-300;
+  const double all = theta.dot(aa * theta);
+  const Eigen::VectorXd right = ab.transpose() * theta;
+  return all > 0.0 ? std::min(1.0, right.dot(bb.ldlt().solve(right)) / all) : 0.0;
+}
+
+std::vector<Evidence::Gain> Evidence::gains(const State& state) const {
+  const Projected projected = project(state);
+  std::vector<Gain> out(groups_.size());
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const std::vector<int>& columns = groups_[g].columns;
+    Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
+    for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
+    const Eigen::MatrixXd a = block(gram_.xx, columns, columns) - v.transpose() * v;
+    out[g] = gain_of(state, a, part(gram_.xy, columns) - v.transpose() * projected.u, part(prior_, columns),
+                     groups_[g].cost);
+    if (columns.empty()) out[g].evidence = out[g].score = -1e300;
+    out[g].group = static_cast<int>(g);
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      out[g].rank += a(i, i) > 1e-7 * gram_.xx(columns[k], columns[k]) ? 1 : 0;
+    }
+  }
+  return out;
+}
+
+bool Evidence::may_enter(const State& state, int group) const {
+  const ColumnGroup& g = groups_[static_cast<std::size_t>(group)];
+  if (g.shadow || g.columns.empty()) return false;
+  const std::vector<int>& in = state.choice.groups;
+  if (std::find(in.begin(), in.end(), group) != in.end()) return false;
+  if (g.corrects_law_at < 0) return true;
+  return std::any_of(in.begin(), in.end(), [&](int other) {
+    const ColumnGroup& o = groups_[static_cast<std::size_t>(other)];
+    return o.law_at == g.corrects_law_at && o.corrects_law_at < 0;
+  });
+}
+
+Evidence::State Evidence::improve(State state, const SearchOptions& options) const {
+  const auto without = [&](const Choice& choice, std::size_t at) {
+    Choice out;
+    const ColumnGroup& gone = groups_[static_cast<std::size_t>(choice.groups[at])];
+    for (std::size_t k = 0; k < choice.groups.size(); ++k) {
+      const ColumnGroup& other = groups_[static_cast<std::size_t>(choice.groups[k])];
+      const bool orphan = gone.corrects_law_at < 0 && gone.law_at >= 0 && other.corrects_law_at == gone.law_at;
+      if (k == at || orphan) continue;
+      out.groups.push_back(choice.groups[k]);
+      out.scales.push_back(choice.scales[k]);
+    }
+    return out;
+  };
+  for (int round = 0; round < 6; ++round) {
+    bool changed = false;
+    for (std::size_t at = 0; at < state.choice.groups.size(); ++at) {
+      const State less = evaluate(without(state.choice, at));
+      const std::size_t before = state.choice.groups.size(), after = less.choice.groups.size();
+      if (less.score > state.score - options.threshold * 0.5) {  // not worth its place
+        state = less;
+        changed = true;
+        break;
+      }
+      if (before - after > 1) continue;  // a law with its correction is not swapped
+      Gain best;
+      for (const Gain& gain : gains(less)) {
+        if (may_enter(less, gain.group) && gain.group != state.choice.groups[at] && gain.score > best.score)
+          best = gain;
+      }
+      if (best.group < 0) continue;
+      Choice swapped = less.choice;
+      swapped.groups.push_back(best.group);
+      swapped.scales.push_back(best.scale);
+      const State other = evaluate(swapped);
+      if (other.score > state.score + 1.0) {
+        state = other;
+        changed = true;
+        break;
+      }
+    }
+    if (!changed) break;
+  }
+  return state;
+}
+
+Evidence::State Evidence::search(const SearchOptions& options, const Choice& start) const {
+  std::vector<State> beam = {evaluate(start)};
+  State best = beam[0];
+  std::vector<std::vector<int>> seen;
+  while (!beam.empty() && static_cast<int>(beam[0].choice.groups.size()) < options.most_groups) {
+    std::vector<State> next;
+    for (const State& state : beam) {
+      std::vector<Gain> ranked;
+      for (const Gain& gain : gains(state)) {
+        if (may_enter(state, gain.group) && gain.score > options.threshold && gain.share > options.least_share)
+          ranked.push_back(gain);
+      }
+      std::sort(ranked.begin(), ranked.end(), [](const Gain& a, const Gain& b) { return a.score > b.score; });
+      // The law of what is in already is questioned before a second effect is believed.
+      if (!ranked.empty()) {
+        const auto law = std::find_if(ranked.begin(), ranked.end(), [&](const Gain& gain) {
+          const ColumnGroup& g = groups_[static_cast<std::size_t>(gain.group)];
+          return g.corrects_law_at >= 0 ||
+                 (g.law_at >= 0 && std::any_of(state.choice.groups.begin(), state.choice.groups.end(), [&](int in) {
+                    return groups_[static_cast<std::size_t>(in)].law_at == g.law_at;
+                  }));
+        });
+        if (law != ranked.end() && law->score >= options.law_share * ranked[0].score)
+          std::rotate(ranked.begin(), law, law + 1);
+      }
+      const std::size_t width = state.choice.groups.empty() ? static_cast<std::size_t>(2 * options.beam)
+                                                            : static_cast<std::size_t>(options.beam);
+      for (std::size_t k = 0; k < std::min(ranked.size(), width); ++k) {
+        Choice grown = state.choice;
+        grown.groups.push_back(ranked[k].group);
+        grown.scales.push_back(ranked[k].scale);
+        std::vector<int> key = grown.groups;
+        std::sort(key.begin(), key.end());
+        if (std::find(seen.begin(), seen.end(), key) != seen.end()) continue;
+        seen.push_back(key);
+        next.push_back(evaluate(grown));
+      }
+    }
+    std::sort(next.begin(), next.end(), [](const State& a, const State& b) { return a.score > b.score; });
+    if (next.size() > static_cast<std::size_t>(options.beam)) next.resize(static_cast<std::size_t>(options.beam));
+    if (!next.empty() && next[0].score > best.score)
+      best = next[0];
+    else if (!next.empty() && next[0].score < best.score - 1.0)
+      break;
+    beam = std::move(next);
+  }
+  return improve(best, options);
+}
+
+std::vector<double> Evidence::null_scores(const State& state, int count, std::uint64_t seed) const {
+  // X^T e of white noise has covariance s^2 X^T X: no rows are needed.
+  const Eigen::Index p = gram_.xx.cols();
+  Eigen::MatrixXd jittered = gram_.xx;
+  jittered.diagonal() *= 1.0 + 1e-10;
+  jittered.diagonal().array() += 1e-30;
+  const Eigen::LLT<Eigen::MatrixXd> noise = factorised(std::move(jittered));
+  const Projected projected = project(state);
+  struct Prepared {
+    const ColumnGroup* group;
+    Eigen::MatrixXd v;
+    std::array<Eigen::LLT<Eigen::MatrixXd>, kScales.size()> factor;
+    std::array<double, kScales.size()> determinants;
+  };
+  std::vector<Prepared> prepared;
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    if (!may_enter(state, static_cast<int>(g))) continue;
+    const std::vector<int>& columns = groups_[g].columns;
+    Prepared one;
+    one.group = &groups_[g];
+    one.v.resize(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
+    for (Eigen::Index i = 0; i < one.v.cols(); ++i)
+      one.v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
+    const Eigen::MatrixXd a = block(gram_.xx, columns, columns) - one.v.transpose() * one.v;
+    const Eigen::VectorXd size = part(prior_, columns);
+    for (std::size_t s = 0; s < kScales.size(); ++s) {
+      const Eigen::VectorXd ridge = state.sigma2 * (kScales[s] * size).array().pow(-2.0).matrix();
+      Eigen::MatrixXd m = a;
+      m.diagonal() += ridge;
+      one.factor[s].compute(m);
+      one.determinants[s] = ridge.array().log().sum() - log_determinant(one.factor[s]);
+    }
+    prepared.push_back(std::move(one));
+  }
+  Random random(seed);
+  std::vector<double> out;
+  const double rss = state.sigma2 * freedom_;
+  for (int k = 0; k < count; ++k) {
+    Eigen::VectorXd z(p);
+    for (Eigen::Index i = 0; i < p; ++i) z[i] = random.normal();
+    Eigen::VectorXd xy = noise.matrixL() * z;
+    xy *= std::sqrt(state.sigma2);
+    const Eigen::VectorXd u = state.factor.matrixL().solve(part(xy, state.columns));
+    double largest = -1e300;
+    for (const Prepared& one : prepared) {
+      const Eigen::VectorXd b = part(xy, one.group->columns) - one.v.transpose() * u;
+      for (std::size_t s = 0; s < kScales.size(); ++s) {
+        const double fall = std::min(one.factor[s].matrixL().solve(b).squaredNorm(), 0.99 * rss);
+        largest =
+            std::max(largest, -0.5 * freedom_ * std::log1p(-fall / rss) + 0.5 * one.determinants[s] - one.group->cost);
+      }
+    }
+    out.push_back(largest);
+  }
+  return out;
+}
+
+double detection_nats(double threshold, double cost, std::size_t columns, double values) {
+  return threshold + cost + 0.5 * static_cast<double>(columns) * std::log(1.0 + values);
+}
+
+double held_out_squares(const Gram& held_out, const std::vector<int>& columns, const Eigen::VectorXd& solution) {
+  return held_out.yy - 2.0 * solution.dot(part(held_out.xy, columns)) +
+         solution.dot(block(held_out.xx, columns, columns) * solution);
+}
+
+}  // namespace truing::estimation

@@ -1,0 +1,160 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Which groups of columns explain the data: Gaussian evidence from the Gram matrix alone, and a search over subsets.
+// (MacKay 1992, Bayesian interpolation; the noise is integrated out, each group's prior scale is chosen from a short
+// list.)
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "rooms.hpp"
+
+namespace truing::estimation {
+
+/// Normal equations of unit-weight rows: X^T X, X^T y, y^T y, and how many values went in.
+struct Gram {
+  Eigen::MatrixXd xx;
+  Eigen::VectorXd xy;
+  double yy = 0.0;
+  double n = 0.0;
+
+  void add(const Gram& other, double times = 1.0);
+  Gram of(const std::vector<int>& columns) const;
+};
+
+/// Cholesky, with ever more added to the diagonal where rounding has made the matrix indefinite.
+Eigen::LLT<Eigen::MatrixXd> factorised(Eigen::MatrixXd d);
+
+/// Sums weighted rows to a Gram, on the kernel that the processor is best at.
+class GramSum {
+ public:
+  explicit GramSum(Eigen::Index columns);
+  /// Room for one row: write value k to row()[k * stride()], the measured value last, then push().
+  double* row() { return buffer_.data() + filled_; }
+  static constexpr Eigen::Index stride() { return kLength; }
+  void push();
+  Gram finish();
+
+ private:
+  static constexpr Eigen::Index kLength = 256;
+  void fold_in();
+
+  Eigen::Index columns_;
+  Eigen::Index filled_ = 0;
+  double n_ = 0.0;
+  Eigen::MatrixXd buffer_;    ///< shape (kLength, columns + 1)
+  std::vector<double> sums_;  ///< the kernel's own
+};
+
+/// Columns that come and go together, as the search sees them.
+struct ColumnGroup {
+  std::vector<int> columns;
+  double cost = 0.0;         ///< nats: log of how many groups of its kind there are, and of what was scanned to find it
+  int law_at = -1;           ///< number of "law of a driver at a joint", the same for all groups that are one; -1: none
+  int corrects_law_at = -1;  ///< of a law's correction: may only enter beside a law of this number; -1: free to enter
+  bool shadow = false;       ///< never enters; only an alternative
+};
+
+struct SearchOptions {
+  double threshold = 4.0;      ///< nats that a group must win beyond its cost
+  double least_share = 0.015;  ///< of what is unexplained, that a group must explain
+  double law_share =
+      0.75;  ///< a law's correction goes before a second effect if it wins at least this part of what that one would
+  int beam = 3;
+  int most_groups = 12;
+};
+
+/// A set of groups with the scale of each one's prior.
+struct Choice {
+  std::vector<int> groups;
+  std::vector<double> scales;
+};
+
+/// One Gram, its groups, and everything that the search asks of them.
+class Evidence {
+ public:
+  /// `nuisance`: columns that are always in, with a flat prior. `prior[k]`: the size that column k's parameter may
+  /// have.
+  Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance,
+           const Eigen::VectorXd& prior);
+
+  /// A choice evaluated.
+  struct State {
+    Choice choice;
+    std::vector<int> columns;   ///< nuisance, then the groups'
+    Eigen::VectorXd precision;  ///< prior precision of each column, times the noise variance it has to be multiplied by
+    Eigen::LLT<Eigen::MatrixXd> factor;  ///< of X^T X + sigma^2 P
+    Eigen::VectorXd solution;
+    double rss = 0.0;  ///< penalised
+    double sigma2 = 0.0;
+    double evidence = 0.0;  ///< log, but for a constant of the Gram
+    double score = 0.0;     ///< evidence less the groups' costs
+  };
+
+  State evaluate(const Choice& choice) const;
+
+  /// What adding a group would win.
+  struct Gain {
+    int group = -1;
+    double scale = 1.0;
+    double evidence = -1e300;  ///< log Bayes factor
+    double score = -1e300;     ///< less its cost
+    double share = 0.0;        ///< of the unexplained sum of squares
+    double squares = 0.0;      ///< fall of the sum of squares, plain least squares
+    int rank = 0;              ///< columns that the data can see
+  };
+  std::vector<Gain> gains(const State& state) const;
+
+  /// The same for columns outside the Gram: theirs (X^T X, X^T y) after projection on the state, and their priors.
+  Gain gain_of(const State& state, const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& prior,
+               double cost) const;
+
+  /// What adding columns of the Gram would win.
+  Gain gain(const State& state, const std::vector<int>& columns, double cost) const;
+
+  /// What is left of a column's square beyond the state's columns.
+  double visible(const State& state, int column) const;
+
+  /// Share of what columns `what` times `theta` do, beyond the state's own columns, that columns `by` can do as well.
+  double explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta,
+                   const std::vector<int>& by) const;
+
+  /// Forward with a beam, then backward and swap until nothing helps.
+  State search(const SearchOptions& options, const Choice& start = {}) const;
+  State improve(State state, const SearchOptions& options) const;
+
+  /// Noise-only data: the largest score of any single group, `count` times.
+  std::vector<double> null_scores(const State& state, int count, std::uint64_t seed) const;
+
+  const Gram& gram() const { return gram_; }
+  const std::vector<ColumnGroup>& groups() const { return groups_; }
+  const std::vector<int>& nuisance() const { return nuisance_; }
+  const Eigen::VectorXd& prior() const { return prior_; }
+  double freedom() const { return freedom_; }
+
+ private:
+  struct Projected;
+  Projected project(const State& state) const;
+  bool may_enter(const State& state, int group) const;
+
+  const Gram& gram_;
+  const std::vector<ColumnGroup>& groups_;
+  std::vector<int> nuisance_;
+  Eigen::VectorXd prior_;
+  double freedom_ = 0.0;
+};
+
+/// Nats that a group of so many columns has to win from so many values before the search takes it: the threshold, what
+/// having looked at all of them costs, and what its flexibility does (as the evidence of many values has it: half a log
+/// of their number a column).
+double detection_nats(double threshold, double cost, std::size_t columns, double values);
+
+/// Sum of squares on `held_out` of the ridge fit `state` made on other rows (same columns).
+double held_out_squares(const Gram& held_out, const std::vector<int>& columns, const Eigen::VectorXd& solution);
+
+}  // namespace truing::estimation

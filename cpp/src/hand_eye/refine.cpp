@@ -1,0 +1,255 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include "hand_eye/refine.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "math/frame.hpp"
+
+namespace truing::hand_eye {
+namespace {
+
+constexpr double kStep = 1e-9;          // the estimate stands when a step is this small beside its standard errors …
+constexpr double kVarianceStep = 1e-2;  // … and variances change by no more than this share
+constexpr double kLargestChange = 2.0;  // of a variance's logarithm in one step
+constexpr double kPriorSpread =
+    3.0;  // [log of variance] of the weak prior that keeps what data cannot split near an even split
+constexpr double kLeastVariance = 1e-18;  // [m^2, rad^2, px^2] a nanometre, a nanoradian: data without noise stop there
+constexpr double kSingular = 1e-13;       // smallest eigenvalue of the unit-diagonal information
+
+using Shapes = std::array<Matrix6d, kVariances>;
+
+/// V = sum of variance times shape.
+Shapes shapes(const LoopProblem& problem, std::size_t i, const Eigen::Vector3d& w) {
+  Shapes out{Matrix6d::Zero(), Matrix6d::Identity(), Matrix6d::Zero(), Matrix6d::Zero()};
+  out[0].topLeftCorner<3, 3>().setIdentity();
+  const Eigen::Matrix3d wx = cross_matrix(w);
+  out[1].topLeftCorner<3, 3>() = -wx * wx;
+  out[1].topRightCorner<3, 3>() = -wx;
+  out[1].bottomLeftCorner<3, 3>() = wx;
+  out[2].bottomRightCorner<3, 3>().setIdentity();
+  if (!problem.pixel_shape.empty()) out[3] = problem.pixel_shape[i];
+  return out;
+}
+
+/// Closure and derivatives. With R = R_X^T: moving X by d moves the board by -R d, turning it by d about its own origin
+/// by R (v x d) and -R d, v from X's origin to the board in the parent; moving Y by d moves the board by R R_M d,
+/// turning it turns the board by R R_M d.
+void linearise(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y,
+               Vector6d* e, Eigen::Matrix<double, 6, 12>* J, Eigen::Vector3d* w) {
+  const Eigen::Isometry3d board = problem.M[i] * Y;  // in the camera's parent
+  const Eigen::Matrix3d R = X.linear().transpose();
+  Eigen::Isometry3d predicted;
+  predicted.linear() = R * board.linear();
+  predicted.translation() = R * (board.translation() - X.translation());
+  *e = closure(predicted, problem.B[i]);
+  const Eigen::Matrix3d turned = R * problem.M[i].linear();
+  J->setZero();
+  J->block<3, 3>(0, 0) = -R;
+  J->block<3, 3>(0, 3) = R * cross_matrix(board.translation() - X.translation());
+  J->block<3, 3>(3, 3) = -R;
+  J->block<3, 3>(0, 6) = turned;
+  J->block<3, 3>(3, 9) = turned;
+  const Eigen::Isometry3d& A = problem.A[i];
+  *w = problem.setup == HandEyeSetup::eye_to_hand ? Eigen::Vector3d(R * (A.linear() * Y.translation()))
+                                                  : Eigen::Vector3d(turned * (Y.translation() - A.translation()));
+}
+
+Matrix6d weighted_sum(const Shapes& shape, const LoopNoise& noise) {
+  return noise.variance[0] * shape[0] + noise.variance[1] * shape[1] + noise.variance[2] * shape[2] +
+         noise.variance[3] * shape[3];
+}
+
+/// Sums over poses for a step of X, Y and of the variances.
+struct LoopSums {
+  Matrix12d N = Matrix12d::Zero();                                        // J^T W J, W = V^-1
+  Eigen::Matrix<double, 12, 1> g = Eigen::Matrix<double, 12, 1>::Zero();  // J^T W e
+  double chi2 = 0.0;
+  // For variances: W V_k W between closures, between columns; traces.
+  std::array<double, 3> trace{};                                                             // tr W V_k
+  std::array<double, 3> square{};                                                            // e^T W V_k W e
+  std::array<Matrix12d, 3> spread{Matrix12d::Zero(), Matrix12d::Zero(), Matrix12d::Zero()};  // J^T W V_k W J
+  Eigen::Matrix3d information =
+      Eigen::Matrix3d::Zero();  // tr W V_k W V_l; k, l < 3: the pixels' noise is known from within images
+};
+
+LoopSums sum_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y,
+                  const LoopNoise& noise, bool variances) {
+  LoopSums s;
+  Vector6d e;
+  Eigen::Matrix<double, 6, 12> J;
+  Eigen::Vector3d w;
+  for (const std::size_t i : rows) {
+    linearise(problem, i, X, Y, &e, &J, &w);
+    const Shapes shape = shapes(problem, i, w);
+    const Matrix6d W = weighted_sum(shape, noise).llt().solve(Matrix6d::Identity());
+    const Eigen::Matrix<double, 6, 12> WJ = W * J;
+    const Vector6d We = W * e;
+    s.N.noalias() += J.transpose() * WJ;
+    s.g.noalias() += J.transpose() * We;
+    s.chi2 += e.dot(We);
+    if (!variances) continue;
+    std::array<Matrix6d, 3> WV;
+    for (std::size_t k = 0; k < 3; ++k) {
+      WV[k].noalias() = W * shape[k];
+      s.trace[k] += WV[k].trace();
+      s.square[k] += We.dot(shape[k] * We);
+      s.spread[k].noalias() += WJ.transpose() * shape[k] * WJ;
+    }
+    for (int k = 0; k < 3; ++k)
+      for (int l = 0; l <= k; ++l)
+        s.information(k, l) +=
+            WV[static_cast<std::size_t>(k)].cwiseProduct(WV[static_cast<std::size_t>(l)].transpose()).sum();
+  }
+  s.information = s.information.selfadjointView<Eigen::Lower>();
+  if (problem.known) {
+    const double weight = 1.0 / (problem.known->sigma * problem.known->sigma);
+    const Eigen::Vector3d& a = problem.known->axis;
+    s.N.topLeftCorner<3, 3>() += weight * a * a.transpose();
+    s.g.head<3>() += weight * (a.dot(X.translation()) - problem.known->height) * a;
+  }
+  return s;
+}
+
+/// Inverse of the information, by unit diagonal; false where it has none.
+bool invert(const Matrix12d& N, Matrix12d* C) {
+  const Eigen::Matrix<double, 12, 1> unit = N.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Matrix12d> eigen(unit.asDiagonal() * N * unit.asDiagonal());
+  if (!(eigen.eigenvalues()(0) > kSingular * eigen.eigenvalues()(11))) return false;
+  *C = unit.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+       eigen.eigenvectors().transpose() * unit.asDiagonal();
+  return true;
+}
+
+/// How far the variances are stepped: steps that turn back are halved, as scoring overshoots where a variance is next
+/// to nothing.
+struct Stride {
+  double factor = 1.0;
+  Eigen::VectorXd last;
+};
+
+/// One scoring step of the logarithms of the variances; the largest change. Score of the restricted likelihood: (e^T P
+/// V_k P e - tr P V_k) / 2 with P = W - W J C J^T W, and P e = W e once the fit stands (Searle, Casella, McCulloch
+/// 1992, section 6.6).
+double step_variances(const LoopSums& s, const Matrix12d& C, std::size_t rows, Stride* stride, LoopNoise* noise) {
+  std::vector<int> free;
+  for (int k = 0; k < 3; ++k)
+    if (noise->estimate[static_cast<std::size_t>(k)]) free.push_back(k);
+  if (free.empty()) return 0.0;
+  const double shrink = 1.0 - 2.0 / static_cast<double>(rows);  // 12 of 6 n degrees of freedom
+  const auto n = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd F(n, n);
+  Eigen::VectorXd score(n);
+  for (Eigen::Index a = 0; a < n; ++a) {
+    const auto k = static_cast<std::size_t>(free[static_cast<std::size_t>(a)]);
+    const double v = noise->variance[k];
+    score(a) = 0.5 * v * (s.square[k] - s.trace[k] + C.cwiseProduct(s.spread[k]).sum());
+    for (Eigen::Index b = 0; b < n; ++b) {
+      const int l = free[static_cast<std::size_t>(b)];
+      F(a, b) = 0.5 * shrink * v * noise->variance[static_cast<std::size_t>(l)] * s.information(static_cast<int>(k), l);
+    }
+  }
+  F.diagonal().array() += 1.0 / (kPriorSpread * kPriorSpread);
+  // The prior pulls back to an even split of what there is: shares of the trace.
+  double total = 0.0;
+  for (const int k : free) total += noise->variance[static_cast<std::size_t>(k)] * s.trace[static_cast<std::size_t>(k)];
+  for (Eigen::Index a = 0; a < n; ++a) {
+    const auto k = static_cast<std::size_t>(free[static_cast<std::size_t>(a)]);
+    const double even = total / static_cast<double>(n) / std::max(s.trace[k], 1e-300);
+    score(a) -= std::log(noise->variance[k] / even) / (kPriorSpread * kPriorSpread);
+  }
+  const Eigen::VectorXd full = F.ldlt().solve(score);
+  if (stride->last.size() == n)
+    stride->factor = stride->last.dot(full) < -0.25 * stride->last.squaredNorm() ? 0.5 * stride->factor
+                                                                                 : std::min(1.0, 1.5 * stride->factor);
+  stride->last = full;
+  const Eigen::VectorXd change = stride->factor * full;
+  double largest = 0.0;
+  for (Eigen::Index a = 0; a < n; ++a) {
+    const double d = std::clamp(change(a), -kLargestChange, kLargestChange);
+    double& variance = noise->variance[static_cast<std::size_t>(free[static_cast<std::size_t>(a)])];
+    const double before = variance;
+    variance = std::max(kLeastVariance, variance * std::exp(d));
+    if (variance != before) largest = std::max(largest, std::abs(full(a)));
+  }
+  return largest;
+}
+
+}  // namespace
+
+LoopEstimate refine_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Isometry3d& X,
+                         const Eigen::Isometry3d& Y, LoopNoise noise, int max_iterations) {
+  LoopEstimate out;
+  out.X = X, out.Y = Y, out.noise = noise;
+  const bool estimate = noise.estimate[0] || noise.estimate[1] || noise.estimate[2];
+  double change = 0.0;
+  Stride stride;
+  for (out.iterations = 0; out.iterations < max_iterations && !out.converged; ++out.iterations) {
+    LoopSums s = sum_loop(problem, rows, out.X, out.Y, out.noise, estimate);
+    Matrix12d C;
+    if (!s.N.allFinite() || !invert(s.N, &C)) {
+      out.singular = true;
+      return out;
+    }
+    const Eigen::Matrix<double, 12, 1> step = -C * s.g;
+    const double length = std::sqrt(std::max(0.0, step.dot(s.N * step)) / 12.0);  // in standard errors
+    out.X = moved(out.X, step.head<6>()), out.Y = moved(out.Y, step.tail<6>());
+    out.covariance = C, out.chi2 = s.chi2 + s.g.dot(step);
+    // Variances from closures that the step has already moved: far from the fit they would only see its errors.
+    if (estimate && length < 1.0) change = step_variances(s, C, rows.size(), &stride, &out.noise);
+    out.converged = length < kStep * (estimate ? 1e4 : 1.0) && (!estimate || change < kVarianceStep);
+  }
+  return out;
+}
+
+LoopRow loop_row(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y,
+                 const LoopNoise& noise) {
+  LoopRow row;
+  Eigen::Vector3d w;
+  linearise(problem, i, X, Y, &row.e, &row.J, &w);
+  row.V = weighted_sum(shapes(problem, i, w), noise);
+  return row;
+}
+
+OneMore one_more_unknown(const LoopProblem& problem, const Rows& rows, const LoopEstimate& fit,
+                         const std::function<Vector6d(std::size_t)>& derivative) {
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(13, 13);
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(13);
+  for (const std::size_t i : rows) {
+    const LoopRow row = loop_row(problem, i, fit.X, fit.Y, fit.noise);
+    Eigen::Matrix<double, 6, 13> J;
+    J << row.J, derivative(i);
+    const Eigen::Matrix<double, 6, 13> WJ = row.V.llt().solve(J);
+    N += J.transpose() * WJ, g += WJ.transpose() * row.e;
+  }
+  const Eigen::VectorXd unit = N.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit.asDiagonal() * N * unit.asDiagonal());
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  if (!(eigen.eigenvalues()(0) > kSingular * eigen.eigenvalues()(12))) return {nan, nan};
+  // The last row of the inverse.
+  const Eigen::VectorXd last =
+      unit(12) *
+      (unit.asDiagonal() * (eigen.eigenvectors() *
+                            (eigen.eigenvectors().row(12).transpose().array() / eigen.eigenvalues().array()).matrix()));
+  return {-last.dot(g), std::sqrt(last(12))};
+}
+
+Vector6d left_out(const LoopRow& row, const Matrix12d& covariance) {
+  const Matrix6d hat = row.J * covariance * row.J.transpose() * row.V.llt().solve(Matrix6d::Identity());
+  return (Matrix6d::Identity() - hat).partialPivLu().solve(row.e);
+}
+
+double standardised(const LoopRow& row, const Matrix12d& covariance, bool fitted) {
+  const Matrix6d seen = row.J * covariance * row.J.transpose();
+  const Matrix6d V = fitted ? Matrix6d(row.V - seen) : Matrix6d(row.V + seen);
+  return std::sqrt(std::max(0.0, row.e.dot(V.ldlt().solve(row.e))) / 6.0);
+}
+
+}  // namespace truing::hand_eye

@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "rooms.hpp"
+
+namespace truing::math {
+
+/// Calls work(k) for every k below count, on so many threads (0: as many as the machine has). What work(k) does must
+/// not depend on the others, and then nothing depends on the number of threads. `progress` is called by the calling
+/// thread; false stops. The first exception comes out when all threads have ended.
+inline void for_each_on_threads(std::size_t count, int threads, const std::function<bool(std::size_t)>& progress,
+                                const std::function<void(std::size_t)>& work) {
+  constexpr std::size_t kChunk = 64;
+  const std::size_t chunks = (count + kChunk - 1) / kChunk;
+  std::size_t workers =
+      threads > 0 ? static_cast<std::size_t>(threads) : std::max(1u, std::thread::hardware_concurrency());
+  workers = std::max<std::size_t>(1, std::min(workers, chunks));
+  std::atomic<std::size_t> next{0}, done{0};
+  std::atomic<bool> stop{false};
+  std::exception_ptr failure;
+  std::mutex mutex;
+  const auto run = [&](bool reports) {
+    try {
+      for (std::size_t chunk = next++; chunk < chunks && !stop; chunk = next++) {
+        const std::size_t end = std::min(count, (chunk + 1) * kChunk);
+        for (std::size_t k = chunk * kChunk; k < end; ++k) work(k);
+        done += end - chunk * kChunk;
+        if (reports && progress && !progress(done)) stop = true;
+      }
+    } catch (...) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      if (!failure) failure = std::current_exception();
+      stop = true;
+    }
+  };
+  std::vector<std::thread> helpers;
+  for (std::size_t k = 1; k < workers; ++k) helpers.emplace_back(run, false);
+  run(true);
+  for (std::thread& helper : helpers) helper.join();
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace truing::math

@@ -1,0 +1,312 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "truing/model/robot.hpp"
+
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "math/text.hpp"
+#include "model/motion.hpp"
+#include "rooms.hpp"
+
+namespace truing {
+using namespace model;
+
+namespace {
+
+using Eigen::AngleAxisd;
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+Isometry3d rotation_about(const Vector3d& axis, double angle) { return Isometry3d(AngleAxisd(angle, axis)); }
+
+Isometry3d shift_along(const Vector3d& axis, double length) {
+  Isometry3d T = Isometry3d::Identity();
+  T.translation() = length * axis;
+  return T;
+}
+
+Isometry3d Rx(double angle) { return rotation_about(Vector3d::UnitX(), angle); }
+Isometry3d Ry(double angle) { return rotation_about(Vector3d::UnitY(), angle); }
+Isometry3d Rz(double angle) { return rotation_about(Vector3d::UnitZ(), angle); }
+Isometry3d Tx(double length) { return shift_along(Vector3d::UnitX(), length); }
+Isometry3d Tz(double length) { return shift_along(Vector3d::UnitZ(), length); }
+
+// Denavit and Hartenberg 1955; beta is the fifth value of Hayati 1983: two neighbouring axes that are
+// parallel leave d without meaning, a twist about y says in its place how far from parallel they are.
+Isometry3d dh_frame(double theta, double d, double a, double alpha, double beta) {
+  return Rz(theta) * Tz(d) * Tx(a) * Rx(alpha) * Ry(beta);
+}
+
+// Craig, Introduction to Robotics, 1986, eq. 3.6, with the same twist before the joint.
+Isometry3d mdh_frame(double theta, double d, double a, double alpha, double beta) {
+  return Rx(alpha) * Tx(a) * Ry(beta) * Rz(theta) * Tz(d);
+}
+
+Isometry3d urdf_frame(const Joint& joint, double motion) {
+  return joint.T_parent_joint *
+         (joint.type == JointType::revolute ? rotation_about(joint.axis, motion) : shift_along(joint.axis, motion));
+}
+
+// From the frame before a joint to the frame after its link.
+Isometry3d joint_frame(Convention convention, const Joint& joint, double motion) {
+  const double theta = joint.theta + (joint.type == JointType::revolute ? motion : 0.0);
+  const double d = joint.d + (joint.type == JointType::prismatic ? motion : 0.0);
+  switch (convention) {
+    case Convention::dh:
+      return dh_frame(theta, d, joint.a, joint.alpha, joint.beta);
+    case Convention::mdh:
+      return mdh_frame(theta, d, joint.a, joint.alpha, joint.beta);
+    case Convention::urdf:
+      return urdf_frame(joint, motion);
+  }
+  throw std::invalid_argument("unknown convention");
+}
+
+// A robot without targets has the frame after its last link for a tool.
+Isometry3d target_frame(const Robot& robot, std::size_t target) {
+  if (target < robot.targets.size()) return robot.targets[target].T_last_target;
+  if (target == 0) return Isometry3d::Identity();
+  throw std::invalid_argument("target " + std::to_string(target) + " does not exist; the robot has " +
+                              std::to_string(robot.targets.size()) + " targets, counted from 0");
+}
+
+std::string joint_names(const Robot& robot) {
+  std::vector<std::string> names;
+  for (const Joint& joint : robot.joints) names.push_back(joint.name);
+  return listed(names);
+}
+
+// Passive joints follow their drivers' corrected motions. `depth` counts the drivers followed: a path longer
+// than the robot has joints is a circle.
+void require_no_circle(const Robot& robot, std::size_t index, std::size_t depth) {
+  if (depth <= robot.joints.size()) return;
+  throw std::invalid_argument("joint '" + robot.joints[index].name + "': driven_by goes round in a circle");
+}
+
+double motion_of(const Robot& robot, std::size_t index, const Eigen::VectorXd& all_readings, std::size_t depth) {
+  require_no_circle(robot, index, depth);
+  const Joint& joint = robot.joints[index];
+  if (!joint.passive()) return joint.ratio * all_readings[static_cast<Eigen::Index>(index)] + joint.offset;
+  double motion = joint.offset;
+  for (const auto& [driver, weight] : joint.driven_by) {
+    motion += weight * motion_of(robot, robot.joint_index(driver), all_readings, depth + 1);
+  }
+  return motion;
+}
+
+Eigen::RowVectorXd coupling_row(const Robot& robot, std::size_t index, std::size_t depth) {
+  require_no_circle(robot, index, depth);
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(robot.joints.size()));
+  row[static_cast<Eigen::Index>(index)] = 1.0;
+  for (const auto& [driver, weight] : robot.joints[index].driven_by) {
+    row += weight * coupling_row(robot, robot.joint_index(driver), depth + 1);
+  }
+  return row;
+}
+
+[[noreturn]] void refuse(const std::string& where, const std::string& what) {
+  throw std::invalid_argument(where + ": " + what);
+}
+
+void require_finite(const std::string& where, const char* name, double value) {
+  if (!std::isfinite(value)) refuse(where, std::string(name) + " is " + number(value) + ", expected a finite number");
+}
+
+void require_frame(const std::string& where, const char* name, const Isometry3d& T) {
+  if (!T.matrix().allFinite()) refuse(where, std::string(name) + " has a value that is not finite");
+  const Eigen::Matrix3d R = T.linear();
+  const bool is_rotation = (R.transpose() * R).isIdentity(1e-6) && R.determinant() > 0.0;
+  const bool is_rigid = (T.matrix().row(3) - Eigen::RowVector4d::Unit(3)).isZero(1e-12);
+  if (!is_rotation || !is_rigid) {
+    refuse(where,
+           std::string(name) + " is not a rigid transform: its rotation part must be orthonormal and right-handed");
+  }
+}
+
+void validate_joint(const Joint& joint, Convention convention) {
+  const std::string where = "joint '" + joint.name + "'";
+  require_finite(where, "theta", joint.theta);
+  require_finite(where, "d", joint.d);
+  require_finite(where, "a", joint.a);
+  require_finite(where, "alpha", joint.alpha);
+  require_finite(where, "beta", joint.beta);
+  require_finite(where, "ratio", joint.ratio);
+  require_finite(where, "offset", joint.offset);
+  if (convention == Convention::urdf) {
+    require_frame(where, "T_parent_joint", joint.T_parent_joint);
+    const double length = joint.axis.norm();
+    if (!(std::abs(length - 1.0) <= 1e-9)) {
+      refuse(where, "axis has length " + number(length, 12) + ", expected a unit vector: divide it by its length");
+    }
+  }
+  for (const auto& [driver, weight] : joint.driven_by) {
+    require_finite(where, ("weight of '" + driver + "' in driven_by").c_str(), weight);
+  }
+  if (std::isnan(joint.lower) || std::isnan(joint.upper)) refuse(where, "a limit is not a number");
+  if (joint.lower > joint.upper) {
+    refuse(where, "lower limit " + number(joint.lower) + " is above upper limit " + number(joint.upper));
+  }
+  if (joint.mass) {
+    require_finite(where, "mass", *joint.mass);
+    if (*joint.mass < 0.0) refuse(where, "mass is " + number(*joint.mass) + " kg, expected zero or more");
+  }
+  if (!joint.center_of_mass.allFinite()) refuse(where, "center_of_mass has a value that is not finite");
+}
+
+// Parameters are named after joints and targets (`J2.a`, `tool.x`, `base.rz`, `anchor.zero`), so these names
+// must differ.
+void validate_names(const Robot& robot) {
+  std::set<std::string> taken;
+  const auto take = [&taken](const std::string& kind, std::size_t number_from_1, const std::string& name) {
+    if (name.empty()) refuse(kind + " " + std::to_string(number_from_1), "has no name");
+    if (name == "base" || name == "anchor") {
+      refuse(kind + " '" + name + "'", "this name is kept for parameters such as base.x and anchor.zero: rename it");
+    }
+    if (!taken.insert(name).second) refuse(kind + " '" + name + "'", "this name is used twice: rename one");
+  };
+  for (std::size_t i = 0; i < robot.joints.size(); ++i) take("joint", i + 1, robot.joints[i].name);
+  for (std::size_t i = 0; i < robot.targets.size(); ++i) take("target", i + 1, robot.targets[i].name);
+}
+
+// Depth first along `driven_by`; `path` is how we came here, `done` the joints known to be sound.
+void validate_drivers(const Robot& robot, std::size_t index, std::vector<std::string> path, std::vector<bool>& done) {
+  const Joint& joint = robot.joints[index];
+  const std::string where = "joint '" + joint.name + "'";
+  for (const std::string& earlier : path) {
+    if (earlier == joint.name) {
+      path.push_back(joint.name);
+      refuse(where, "driven_by goes round in a circle (" + listed(path) + "); one of them must have a reading");
+    }
+  }
+  if (done[index]) return;
+  path.push_back(joint.name);
+  for (const auto& driver : joint.driven_by) {
+    bool known = false;
+    for (std::size_t i = 0; i < robot.joints.size(); ++i) {
+      if (robot.joints[i].name != driver.first) continue;
+      known = true;
+      validate_drivers(robot, i, path, done);
+    }
+    if (!known) refuse(where, "driven_by names '" + driver.first + "', but the joints are " + joint_names(robot));
+  }
+  done[index] = true;
+}
+
+void validate_effects(const Robot& robot) {
+  for (const AppliedEffect& applied : robot.effects) {
+    const std::string where = "effect '" + applied.effect + "'";
+    if (applied.effect.empty()) refuse("effects", "one has no name");
+    for (const std::string& joint : applied.joints) {
+      bool known = false;
+      for (const Joint& other : robot.joints) known = known || other.name == joint;
+      if (!known) refuse(where, "joint '" + joint + "' does not exist; the joints are " + joint_names(robot));
+    }
+    for (const auto& [name, value] : applied.parameters) require_finite(where, name.c_str(), value);
+  }
+}
+
+}  // namespace
+
+std::size_t Robot::driven_count() const { return driven_joints().size(); }
+
+std::vector<std::size_t> Robot::driven_joints() const {
+  std::vector<std::size_t> driven;
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    if (!joints[i].passive()) driven.push_back(i);
+  }
+  return driven;
+}
+
+std::size_t Robot::joint_index(const std::string& joint_name) const {
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    if (joints[i].name == joint_name) return i;
+  }
+  throw std::invalid_argument("joint '" + joint_name + "' does not exist; the joints are " + joint_names(*this));
+}
+
+void validate(const Robot& robot) {
+  const std::string where = robot.name.empty() ? "robot" : "robot '" + robot.name + "'";
+  if (robot.joints.empty()) refuse(where, "has no joints");
+  validate_names(robot);
+  for (const Joint& joint : robot.joints) validate_joint(joint, robot.convention);
+  std::vector<bool> done(robot.joints.size(), false);
+  for (std::size_t i = 0; i < robot.joints.size(); ++i) validate_drivers(robot, i, {}, done);
+  if (!robot.gravity.allFinite()) refuse(where, "gravity has a value that is not finite");
+  require_frame(where, "T_measurement_base", robot.T_measurement_base);
+  for (const Target& target : robot.targets)
+    require_frame("target '" + target.name + "'", "T_last_target", target.T_last_target);
+  validate_effects(robot);
+  if (robot.anchor && !(robot.anchor->point.allFinite() && std::isfinite(robot.anchor->zero))) {
+    refuse(where, "anchor has a value that is not finite");
+  }
+}
+
+Eigen::Matrix3d rotation_from_rpy(const Eigen::Vector3d& rpy) {
+  return (AngleAxisd(rpy.z(), Vector3d::UnitZ()) * AngleAxisd(rpy.y(), Vector3d::UnitY()) *
+          AngleAxisd(rpy.x(), Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+Eigen::Vector3d rpy_from_rotation(const Eigen::Matrix3d& rotation) {
+  // Near pitch = +-pi/2 roll and yaw are badly determined each, but not together: yaw is read off what the
+  // rounded roll leaves over, so that the three angles give the rotation back to the last digit everywhere.
+  const bool at_pole = std::hypot(rotation(2, 1), rotation(2, 2)) < 1e-15;
+  const double roll = at_pole ? 0.0 : std::atan2(rotation(2, 1), rotation(2, 2));
+  const Eigen::Matrix3d Rz_Ry = rotation * AngleAxisd(-roll, Vector3d::UnitX()).toRotationMatrix();
+  return {roll, std::atan2(-Rz_Ry(2, 0), Rz_Ry(2, 2)), std::atan2(-Rz_Ry(0, 1), Rz_Ry(1, 1))};
+}
+
+Eigen::Isometry3d frame_from_xyz_rpy(const Eigen::Vector3d& xyz, const Eigen::Vector3d& rpy) {
+  Isometry3d T = Isometry3d::Identity();
+  T.linear() = rotation_from_rpy(rpy);
+  T.translation() = xyz;
+  return T;
+}
+
+namespace model {
+
+Eigen::MatrixXd coupling_matrix(const Robot& robot) {
+  const auto n = static_cast<Eigen::Index>(robot.joints.size());
+  Eigen::MatrixXd coupling(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) coupling.row(i) = coupling_row(robot, static_cast<std::size_t>(i), 0);
+  return coupling;
+}
+
+Eigen::VectorXd joint_motions(const Robot& robot, const Eigen::VectorXd& reading) {
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  if (reading.size() != static_cast<Eigen::Index>(driven.size())) {
+    throw std::invalid_argument("got " + std::to_string(reading.size()) + " joint readings, the robot has " +
+                                std::to_string(driven.size()) + " driven joints");
+  }
+  Eigen::VectorXd all_readings = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.joints.size()));
+  for (std::size_t k = 0; k < driven.size(); ++k) {
+    all_readings[static_cast<Eigen::Index>(driven[k])] = reading[static_cast<Eigen::Index>(k)];
+  }
+  Eigen::VectorXd motions(all_readings.size());
+  for (Eigen::Index i = 0; i < motions.size(); ++i) {
+    motions[i] = motion_of(robot, static_cast<std::size_t>(i), all_readings, 0);
+  }
+  return motions;
+}
+
+}  // namespace model
+
+std::vector<Eigen::Isometry3d> forward_kinematics(const Robot& robot, const Eigen::VectorXd& reading,
+                                                  std::size_t target) {
+  const Isometry3d T_last_target = target_frame(robot, target);
+  const Eigen::VectorXd motion = joint_motions(robot, reading);
+  std::vector<Isometry3d> frames;
+  frames.reserve(robot.joints.size() + 1);
+  Isometry3d T_measurement_link = robot.T_measurement_base;
+  for (std::size_t i = 0; i < robot.joints.size(); ++i) {
+    T_measurement_link =
+        T_measurement_link * joint_frame(robot.convention, robot.joints[i], motion[static_cast<Eigen::Index>(i)]);
+    frames.push_back(T_measurement_link);
+  }
+  frames.push_back(T_measurement_link * T_last_target);
+  return frames;
+}
+
+}  // namespace truing

@@ -1,0 +1,301 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include "truing/plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "estimation/evaluate.hpp"
+#include "estimation/selection.hpp"
+#include "math/observability.hpp"
+#include "math/random.hpp"
+#include "planning/poses.hpp"
+#include "rooms.hpp"
+
+namespace truing {
+using namespace planning;
+
+namespace planning {
+namespace {
+
+constexpr int kRankPoses = 1000;  // random poses that decide what any plan could see
+constexpr int kDraws = 200;       // for one joint, before a proposal is given up
+
+}  // namespace
+
+std::vector<Range> joint_ranges(const Robot& robot, double min_step, double min_step_prismatic, const char* who) {
+  std::vector<Range> ranges;
+  for (const std::size_t k : robot.driven_joints()) {
+    const Joint& joint = robot.joints[k];
+    const bool revolute = joint.type == JointType::revolute;
+    if (!revolute && !(std::isfinite(joint.lower) && std::isfinite(joint.upper))) {
+      throw std::invalid_argument(std::string(who) + ": prismatic joint " + joint.name + " needs limits");
+    }
+    Range range{std::isfinite(joint.lower) ? joint.lower : -M_PI, std::isfinite(joint.upper) ? joint.upper : M_PI,
+                revolute ? min_step : min_step_prismatic};
+    if (range.upper - range.lower <= 2.0 * range.step) {
+      throw std::invalid_argument(std::string(who) + ": the range of joint " + joint.name +
+                                  " is too small for steps of more than " + std::to_string(range.step) +
+                                  (revolute ? " rad" : " m") + " between any two neighbours: lower min_step");
+    }
+    ranges.push_back(range);
+  }
+  return ranges;
+}
+
+namespace {
+
+/// Passive joints keep their limits too.
+bool passive_joints_within(const Robot& robot, const Model& model, const Pose& pose) {
+  for (std::size_t m = 0; m < robot.joints.size(); ++m) {
+    if (!robot.joints[m].passive()) continue;
+    const int own_site = model.coordinates[m].sites.front().first;
+    double motion = 0.0;
+    for (std::size_t k = 0; k < robot.joints.size(); ++k) {
+      const Coordinate& driver = model.coordinates[k];
+      if (driver.reading < 0) continue;
+      for (const auto& [site, weight] : driver.sites) {
+        if (site == own_site) motion += weight * pose[driver.reading];
+      }
+    }
+    if (motion < robot.joints[m].lower || motion > robot.joints[m].upper) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool draw_pose(const Robot& robot, const Model& model, const std::vector<Range>& ranges, const Pose* before,
+               const Pose* after, Random* random, Pose* out) {
+  for (int attempt = 0; attempt < kDraws; ++attempt) {
+    bool found = true;
+    for (std::size_t k = 0; k < ranges.size() && found; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      found = false;
+      for (int draw = 0; draw < kDraws && !found; ++draw) {
+        (*out)[i] = random->uniform(ranges[k].lower, ranges[k].upper);
+        const auto far_from = [&](const Pose* other) {
+          return !other || std::abs((*out)[i] - (*other)[i]) > ranges[k].step;
+        };
+        found = far_from(before) && far_from(after);
+      }
+    }
+    if (found && passive_joints_within(robot, model, *out)) return true;
+  }
+  return false;
+}
+
+namespace {
+
+/// Poses as measurements of the robot itself: only their Jacobian is wanted, at errors of zero.
+class Poses {
+ public:
+  Poses(const Robot& robot, const std::vector<Pose>& poses, bool orientation)
+      : columns_(static_cast<std::size_t>(poses.empty() ? 0 : poses[0].size())) {
+    data.rows = poses.size();
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      for (const Pose& pose : poses) columns_[k].push_back(pose[static_cast<Eigen::Index>(k)]);
+      data.joints.push_back({columns_[k].data(), 1});
+    }
+    Robot plain = robot;
+    plain.effects.clear();
+    predicted_ = predict(plain, data, {}, 1);
+    for (std::size_t k = 0; k < 3; ++k) data.position[k] = {predicted_.position.data() + k, 3};
+    for (std::size_t k = 0; k < 4 && orientation; ++k) data.orientation[k] = {predicted_.orientation.data() + k, 4};
+  }
+  Poses(const Poses&) = delete;
+  Poses& operator=(const Poses&) = delete;
+
+  std::vector<std::int32_t> rows() const {
+    std::vector<std::int32_t> out(data.rows);
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] = static_cast<std::int32_t>(k);
+    return out;
+  }
+
+  Measurements data;
+
+ private:
+  std::vector<std::vector<double>> columns_;
+  Prediction predicted_;
+};
+
+Weighing weighing_of(const PlanOptions& options) {
+  Weighing weighing;
+  weighing.position_scale = 1.0 / options.position_sigma;
+  weighing.rotation_scale = 1.0 / options.rotation_sigma;
+  return weighing;
+}
+
+/// Unit-weight Jacobian of every pose, shape (rows of a pose, parameters).
+std::vector<Eigen::MatrixXd> jacobians(const Model& model, const std::vector<int>& free, const std::vector<Pose>& poses,
+                                       const PlanOptions& options) {
+  const Poses measured(model.robot, poses, options.orientation);
+  const std::vector<std::vector<double>> bases = make_bases(model, measured.data);
+  const Evaluator evaluator(model, measured.data, bases, make_segments(measured.data, measured.rows()), free, 1);
+  const Eigen::VectorXd values = initial_values(model);
+  std::vector<Eigen::MatrixXd> out;
+  for (int tile = 0; tile < evaluator.tile_count(); ++tile) {
+    const int m = evaluator.tile_components(tile);
+    Eigen::VectorXd r(evaluator.tile_rows(tile) * m);
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> j(r.size(),
+                                                                             static_cast<Eigen::Index>(free.size()));
+    evaluator.tile(tile, values, weighing_of(options), r.data(), j.data());
+    for (int k = 0; k < evaluator.tile_rows(tile); ++k) out.push_back(j.middleRows(k * m, m));
+  }
+  return out;
+}
+
+/// The index of an information matrix of unit-scaled parameters; larger is better.
+double index_of(const Eigen::MatrixXd& information, Observability kind) {
+  if (kind == Observability::d_optimal) {
+    const Eigen::LLT<Eigen::MatrixXd> factor(information);
+    if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
+    return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+  }
+  const Eigen::VectorXd eigen =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(information, Eigen::EigenvaluesOnly).eigenvalues();
+  const double least = std::max(eigen.minCoeff(), 0.0), most = eigen.maxCoeff();
+  switch (kind) {
+    case Observability::a_optimal:
+      return least > 0.0 ? -eigen.cwiseInverse().sum() : -std::numeric_limits<double>::infinity();
+    case Observability::e_optimal:
+      return std::sqrt(least);
+    case Observability::inverse_condition:
+      return std::sqrt(least / most);
+    default:
+      return least / std::sqrt(most);  // noise amplification
+  }
+}
+
+}  // namespace
+}  // namespace planning
+
+bool PlanOptions::is_valid(std::string* error) const {
+  const auto fail = [&](const char* why) {
+    if (error) *error = why;
+    return false;
+  };
+  if (poses < 3) return fail("poses must be at least 3");
+  if (!(min_step >= 0.0) || !(min_step_prismatic >= 0.0)) return fail("min_step must not be negative");
+  if (!(position_sigma > 0.0) || !(rotation_sigma > 0.0))
+    return fail("position_sigma and rotation_sigma must be positive");
+  if (sweeps < 0 || proposals < 1) return fail("sweeps must not be negative, proposals at least 1");
+  return true;
+}
+
+PlanResult plan(const Robot& robot, const PlanOptions& options) {
+  std::string error;
+  if (!options.is_valid(&error)) throw std::invalid_argument("plan: " + error);
+  validate(robot);
+  const std::vector<Range> ranges = joint_ranges(robot, options.min_step, options.min_step_prismatic, "plan");
+  Random random(options.seed);
+  const auto n_joints = static_cast<Eigen::Index>(ranges.size());
+
+  // Random poses tell what any plan can see.
+  ParameterSelection wanted;
+  wanted.free = options.free;
+  wanted.effects = options.effects;
+  std::vector<Pose> sample;
+  const Model bare = make_model(robot, Measurements{});
+  while (static_cast<int>(sample.size()) < kRankPoses) {
+    Pose pose(n_joints);
+    if (!draw_pose(robot, bare, ranges, nullptr, nullptr, &random, &pose))
+      throw std::invalid_argument("plan: no pose is within the limits of the passive joints");
+    sample.push_back(pose);
+  }
+  const Poses measured(robot, sample, options.orientation);
+  const Model model = make_model(robot, measured.data, options.effects);
+  const std::vector<Segment> segments = make_segments(measured.data, measured.rows());
+  const std::vector<int> free = select_free(model, content_of(model, segments), wanted);
+  if (free.empty()) throw std::invalid_argument("plan: nothing is free");
+  const std::vector<std::vector<double>> bases = make_bases(model, measured.data);
+  const Evaluator evaluator(model, measured.data, bases, segments, free, 1);
+  NormalEquations normal;
+  evaluator.normal_equations(initial_values(model), weighing_of(options), &normal);
+  std::vector<int> priority;
+  for (const int k : free) priority.push_back(priority_of(model.parameters[k].role));
+  const Selection selection =
+      observable(model, free, find_rank(normal.gram, priority, IdentifyOptions().rank_tolerance));
+  const auto p = static_cast<Eigen::Index>(selection.fitted.size());
+  const int rows_per_pose = options.orientation ? 6 : 3;
+  if (options.poses * rows_per_pose <= p) {
+    throw std::invalid_argument("plan: " + std::to_string(options.poses) + " poses give " +
+                                std::to_string(options.poses * rows_per_pose) + " values for " + std::to_string(p) +
+                                " parameters: ask for more poses");
+  }
+
+  // A random plan that keeps the rule between neighbours.
+  std::vector<Pose> poses;
+  for (int k = 0; k < options.poses; ++k) {
+    Pose pose(n_joints);
+    if (!draw_pose(robot, model, ranges, k ? &poses.back() : nullptr, nullptr, &random, &pose)) {
+      throw std::invalid_argument(
+          "plan: no pose is further than min_step from its neighbour in every joint: lower min_step");
+    }
+    poses.push_back(pose);
+  }
+  std::vector<Eigen::MatrixXd> rows = jacobians(model, selection.fitted, poses, options);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(p, p);
+  for (const Eigen::MatrixXd& j : rows) information.noalias() += j.transpose() * j;
+  const Eigen::VectorXd unit =
+      information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();  // parameters in units of what one plan sees
+  const auto scaled = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
+    return unit.asDiagonal() * m * unit.asDiagonal();
+  };
+
+  // Exchange (Fedorov 1972): each pose in turn gives way to the proposal that raises the index most.
+  PlanResult result;
+  result.index_start = index_of(scaled(information), options.index);
+  double best = result.index_start;
+  for (int sweep = 0; sweep < options.sweeps; ++sweep) {
+    const int exchanged_before = result.exchanges;
+    for (int k = 0; k < options.poses; ++k) {
+      std::vector<Pose> proposals;
+      for (int c = 0; c < options.proposals; ++c) {
+        Pose pose(n_joints);
+        if (draw_pose(robot, model, ranges, k ? &poses[k - 1] : nullptr,
+                      k + 1 < options.poses ? &poses[k + 1] : nullptr, &random, &pose))
+          proposals.push_back(pose);
+      }
+      if (proposals.empty()) continue;
+      const std::vector<Eigen::MatrixXd> candidates = jacobians(model, selection.fitted, proposals, options);
+      const Eigen::MatrixXd others = information - rows[k].transpose() * rows[k];
+      int chosen = -1;
+      for (std::size_t c = 0; c < candidates.size(); ++c) {
+        const double index = index_of(scaled(others + candidates[c].transpose() * candidates[c]), options.index);
+        if (index > best) {
+          best = index;
+          chosen = static_cast<int>(c);
+        }
+      }
+      if (chosen < 0) continue;
+      poses[k] = proposals[chosen];
+      rows[k] = candidates[chosen];
+      information = others + rows[k].transpose() * rows[k];
+      ++result.exchanges;
+    }
+    if (result.exchanges == exchanged_before) break;
+  }
+  result.index_end = best;
+
+  result.joints.resize(options.poses, n_joints);
+  for (int k = 0; k < options.poses; ++k) result.joints.row(k) = poses[k];
+  const Eigen::MatrixXd covariance = inverse_of(information);
+  const Eigen::VectorXd values = initial_values(model);
+  for (Eigen::Index k = 0; k < p; ++k) {
+    const int parameter = selection.fitted[static_cast<std::size_t>(k)];
+    const ParameterInfo& info = model.parameters[parameter];
+    result.parameters.push_back(
+        {info.name, values[parameter], values[parameter], std::sqrt(covariance(k, k)), info.unit, false});
+  }
+  result.frozen = selection.frozen;
+  return result;
+}
+
+}  // namespace truing

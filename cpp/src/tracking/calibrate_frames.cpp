@@ -1,0 +1,337 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+/// Test positions: tracker frame and receiver. Tool from prescribed poses.
+
+#include "truing/tracking/calibrate.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "math/constants.hpp"
+#include "math/registration.hpp"
+#include "math/rotation.hpp"
+#include "math/text.hpp"
+#include "rooms.hpp"
+
+namespace truing {
+using namespace tracking;
+
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using Matrix12d = Eigen::Matrix<double, 12, 12>;
+using Vector12d = Eigen::Matrix<double, 12, 1>;
+using Matrix6x12 = Eigen::Matrix<double, 6, 12>;
+
+constexpr double kFreedom = 5.0;    // degrees of freedom of the t distribution that errors have
+constexpr double kLeastTurn = 0.1;  // [rad] pivot poses that turn less do not show the tool point
+constexpr double kExact = 1e-9;     // [m], [rad] errors below this are rounding
+
+// ---- Standstills ----------------------------------------------------------------------------------------------------
+
+template <typename Sample>
+void check_times(const std::vector<Sample>& rows, const char* what) {
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (!std::isfinite(rows[k].t))
+      throw std::invalid_argument(std::string(what) + " has a time that is not finite in row " + std::to_string(k));
+    if (k > 0 && !(rows[k].t > rows[k - 1].t))
+      throw std::invalid_argument(std::string(what) + " goes back in time at row " + std::to_string(k) + ": " +
+                                  number(rows[k].t, 9) + " s after " + number(rows[k - 1].t, 9) + " s");
+  }
+}
+
+bool moved(const Isometry3d& a, const Isometry3d& b, const RestOptions& options) {
+  return (a.translation() - b.translation()).norm() > options.position ||
+         log_rotation(Quaterniond(a.linear().transpose() * b.linear())).norm() > options.rotation;
+}
+
+/// Mean position and rotation of the tracker's samples with stamps from `start` to `end`.
+void average_tracker(const std::vector<PoseSample>& tracker, double start, double end, RestPose* rest) {
+  Vector3d sum = Vector3d::Zero(), squares = Vector3d::Zero();
+  Matrix3d rotation = Matrix3d::Zero();
+  for (const PoseSample& sample : tracker) {
+    if (sample.t < start || sample.t > end) continue;
+    sum += sample.position;
+    squares += sample.position.cwiseAbs2();
+    rotation += sample.orientation.normalized().toRotationMatrix();
+    ++rest->samples;
+  }
+  if (rest->samples == 0) return;
+  const auto n = static_cast<double>(rest->samples);
+  rest->T_tracker_receiver.translation() = sum / n;
+  rest->T_tracker_receiver.linear() = nearest_rotation(rotation);
+  rest->scatter = std::sqrt(std::max(0.0, (squares / n - (sum / n).cwiseAbs2()).mean()));
+}
+
+// ---- Frames ---------------------------------------------------------------------------------------------------------
+
+/// What `handeye` says of hand, camera and board, said of flange, tracker and receiver.
+std::string in_our_words(std::string text) {
+  const std::pair<const char*, const char*> words[] = {
+      {"camera", "tracker"}, {"board", "receiver"}, {"hand", "flange"}};
+  const auto letter = [&](std::size_t at) {
+    return at < text.size() && (std::isalpha(static_cast<unsigned char>(text[at])) || text[at] == '-');
+  };
+  for (const auto& [theirs, ours] : words) {
+    const std::string from = theirs, to = ours;
+    for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + 1)) {
+      if (!letter(at + from.size()) && (at == 0 || !letter(at - 1))) text.replace(at, from.size(), to);
+    }
+  }
+  return text;
+}
+
+/// Measured minus predicted receiver: position and rotation vector in the tracker frame, T_tracker_base T_base_flange
+/// T_flange_receiver.
+Vector6d frame_error(const Isometry3d& W, const Isometry3d& F, const Isometry3d& R, const Isometry3d& measured,
+                     Matrix6x12* J) {
+  const Isometry3d FR = F * R, predicted = W * FR;
+  Vector6d e;
+  e << measured.translation() - predicted.translation(),
+      log_rotation(Quaterniond(measured.linear() * predicted.linear().transpose()));
+  const Matrix3d R_tracker_flange = W.linear() * F.linear();
+  J->setZero();
+  J->block<3, 3>(0, 0).setIdentity();
+  J->block<3, 3>(0, 3) = -skew(W.linear() * FR.translation());
+  J->block<3, 3>(3, 3).setIdentity();
+  J->block<3, 3>(0, 6) = R_tracker_flange;
+  J->block<3, 3>(3, 9) = R_tracker_flange;
+  return e;
+}
+
+void move(const Eigen::Ref<const Vector6d>& d, Isometry3d* T) {
+  T->translation() += d.head<3>();
+  T->linear() = (exp_rotation(d.tail<3>()) * Quaterniond(T->linear())).normalized().toRotationMatrix();
+}
+
+/// Expectation and maximisation in turn: weights from the errors, frames and sigmas from the weights.
+void refine_frames(const std::vector<Isometry3d>& F, const std::vector<Isometry3d>& T, FramesResult* out) {
+  const auto n = static_cast<double>(F.size());
+  const double freedom = (6.0 * n - 12.0) / (6.0 * n);  // of the residuals
+  Isometry3d &W = out->T_tracker_base.T, &R = out->T_flange_receiver.T;
+  std::vector<Vector6d> e(F.size());
+  std::vector<Matrix6x12> J(F.size());
+  const auto look = [&]() {
+    for (std::size_t i = 0; i < F.size(); ++i) e[i] = frame_error(W, F[i], R, T[i], &J[i]);
+  };
+  const auto scale = [&]() {
+    double p = 0.0, r = 0.0;
+    for (std::size_t i = 0; i < F.size(); ++i)
+      p += out->errors[i].weight * e[i].head<3>().squaredNorm(),
+          r += out->errors[i].weight * e[i].tail<3>().squaredNorm();
+    out->position_sigma = std::max(kExact, std::sqrt(p / (3.0 * n * freedom)));
+    out->rotation_sigma = std::max(kExact, std::sqrt(r / (3.0 * n * freedom)));
+  };
+  Matrix12d information;
+  look();
+  scale();
+  out->status = CalibrationStatus::not_converged;
+  for (out->iterations = 1; out->iterations <= 200; ++out->iterations) {
+    Vector6d weight;
+    weight << Vector3d::Constant(std::pow(out->position_sigma, -2)),
+        Vector3d::Constant(std::pow(out->rotation_sigma, -2));
+    information.setZero();
+    Vector12d right = Vector12d::Zero();
+    for (std::size_t i = 0; i < F.size(); ++i) {
+      const double d = e[i].dot(weight.cwiseProduct(e[i]));
+      out->errors[i].weight = (kFreedom + 6.0) / (kFreedom + d);
+      information += out->errors[i].weight * J[i].transpose() * weight.asDiagonal() * J[i];
+      right += out->errors[i].weight * J[i].transpose() * weight.cwiseProduct(e[i]);
+    }
+    const Vector12d step = information.ldlt().solve(right);
+    if (!step.allFinite()) return;
+    move(step.head<6>(), &W);
+    move(step.tail<6>(), &R);
+    look();
+    const double before = out->position_sigma;
+    scale();
+    if (step.norm() < 1e-11 ||
+        (step.dot(information * step) < 1e-12 && std::abs(out->position_sigma / before - 1.0) < 1e-8)) {
+      out->status = CalibrationStatus::done;
+      break;
+    }
+  }
+  // Covariance of an M-estimate (Huber 1981, eq. (6.5) of chapter 7): psi = w e, its variance over the square of its
+  // mean slope.
+  Vector6d weight;
+  weight << Vector3d::Constant(std::pow(out->position_sigma, -2)),
+      Vector3d::Constant(std::pow(out->rotation_sigma, -2));
+  double psi = 0.0, slope = 0.0;
+  information.setZero();
+  for (std::size_t i = 0; i < F.size(); ++i) {
+    const double d = e[i].dot(weight.cwiseProduct(e[i])), w = (kFreedom + 6.0) / (kFreedom + d);
+    psi += w * w * d / (6.0 * n * freedom);
+    slope += (w - 2.0 / 6.0 * w * d / (kFreedom + d)) / n;
+    information += J[i].transpose() * weight.asDiagonal() * J[i];
+    out->errors[i] = {e[i].head<3>().norm(), e[i].tail<3>().norm(), w};
+  }
+  const Matrix12d covariance = psi / (slope * slope) * information.ldlt().solve(Matrix12d::Identity());
+  out->T_tracker_base.covariance = covariance.topLeftCorner<6, 6>();
+  out->T_flange_receiver.covariance = covariance.bottomRightCorner<6, 6>();
+}
+
+}  // namespace
+
+const char* name(CalibrationStatus status) {
+  static const char* const names[] = {"done", "not_observable", "not_consistent", "not_converged"};
+  return names[static_cast<std::size_t>(status)];
+}
+
+std::vector<RestPose> find_rests(const std::vector<FrameSample>& flange, const std::vector<PoseSample>& tracker,
+                                 const RestOptions& options) {
+  check_times(flange, "the record of the joints");
+  check_times(tracker, "the record of the tracker");
+  std::vector<RestPose> out;
+  for (std::size_t i = 0; i < flange.size();) {
+    std::size_t j = i + 1;
+    while (j < flange.size() && !moved(flange[i].T_base_frame, flange[j].T_base_frame, options)) ++j;
+    RestPose rest;
+    rest.start = flange[i].t + options.margin;
+    rest.end = flange[j - 1].t - options.margin;
+    if (rest.end - rest.start < options.least) {
+      ++i;
+      continue;
+    }
+    rest.T_base_flange = flange[(i + j) / 2].T_base_frame;
+    average_tracker(tracker, rest.start + options.clock_offset, rest.end + options.clock_offset, &rest);
+    if (rest.samples > 0) out.push_back(rest);
+    i = j;
+  }
+  return out;
+}
+
+FramesResult calibrate_frames(const std::vector<Isometry3d>& T_base_flange,
+                              const std::vector<Isometry3d>& T_tracker_receiver) {
+  HandEyePoses poses;
+  poses.T_base_hand = T_base_flange;
+  poses.T_camera_board = T_tracker_receiver;
+  HandEyeOptions options;
+  options.setup = HandEyeSetup::eye_to_hand;
+  const HandEyeResult start = handeye(poses, options);
+  FramesResult out;
+  for (const std::string& warning : start.warnings) {
+    if (warning.find(" lie behind ") == std::string::npos)
+      out.warnings.push_back(in_our_words(warning));  // a camera's trouble: trackers have no lens
+  }
+  out.message = in_our_words(start.message);
+  if (start.status == HandEyeStatus::not_observable || start.status == HandEyeStatus::not_closing) {
+    out.status = start.status == HandEyeStatus::not_observable ? CalibrationStatus::not_observable
+                                                               : CalibrationStatus::not_consistent;
+    for (const Reading& reading : start.readings)
+      out.warnings.push_back("the frames agree if " + in_our_words(reading.explanation));
+    return out;
+  }
+  out.T_tracker_base.T = start.camera.T.inverse();
+  out.T_flange_receiver.T = start.board.T;
+  out.errors.resize(T_base_flange.size());
+  refine_frames(T_base_flange, T_tracker_receiver, &out);
+  if (out.status == CalibrationStatus::not_converged)
+    out.message = "The refinement did not come to an end: look for test positions that are far off.";
+  else
+    out.message = "Tracker frame and receiver are known from " + std::to_string(T_base_flange.size()) +
+                  " positions; usual error " + number(1e3 * out.position_sigma, 3) + " mm, " +
+                  number(out.rotation_sigma / kDegree, 3) + " deg.";
+  return out;
+}
+
+// ---- Tool -----------------------------------------------------------------------------------------------------------
+
+ToolResult calibrate_tool(const ToolPoses& poses) {
+  const std::size_t n = poses.pivot.size();
+  if (n < 3)
+    throw std::invalid_argument("the tool point needs three pivot poses or more, found " + std::to_string(n) +
+                                ": put the tip on one point in at least three orientations");
+  if (poses.orientation.size() != poses.prescribed.size())
+    throw std::invalid_argument("there are " + std::to_string(poses.orientation.size()) + " orientation poses and " +
+                                std::to_string(poses.prescribed.size()) + " prescribed orientations");
+  ToolResult out;
+  // R_i t + p_i = c: linear in tool point t and fixed point c.
+  Eigen::MatrixXd A(3 * n, 6);
+  Eigen::VectorXd b(3 * n);
+  Matrix3d mean = Matrix3d::Zero();
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto row = static_cast<Eigen::Index>(3 * i);
+    if (!poses.pivot[i].matrix().allFinite())
+      throw std::invalid_argument("pivot pose " + std::to_string(i) + " is not finite");
+    A.block<3, 3>(row, 0) = poses.pivot[i].linear();
+    A.block<3, 3>(row, 3) = -Matrix3d::Identity();
+    b.segment<3>(row) = -poses.pivot[i].translation();
+    mean += poses.pivot[i].linear() / static_cast<double>(n);
+  }
+  // What the poses turn by: the normal matrix of t alone is n (I - mean^T mean), zero along an axis they all share.
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> spread(Matrix3d::Identity() - mean.transpose() * mean);
+  if (spread.eigenvalues()[0] < kLeastTurn * kLeastTurn) {
+    out.status = CalibrationStatus::not_observable;
+    const Vector3d axis = spread.eigenvectors().col(0);
+    out.message = "The tool point is not observable along flange (" + number(axis.x(), 2) + ", " + number(axis.y(), 2) +
+                  ", " + number(axis.z(), 2) +
+                  "): tilt the tool by 30 deg or more about two axes while its tip stays on the point.";
+    return out;
+  }
+  const Eigen::Matrix<double, 6, 6> normal = A.transpose() * A;
+  const Vector6d x = normal.ldlt().solve(A.transpose() * b);
+  const Eigen::VectorXd e = A * x - b;
+  out.T_flange_tool.T.translation() = x.head<3>();
+  out.point = x.tail<3>();
+  const double variance = e.squaredNorm() / std::max(1.0, 3.0 * static_cast<double>(n) - 6.0);
+  out.T_flange_tool.covariance.topLeftCorner<3, 3>() =
+      variance * Eigen::Matrix<double, 6, 6>(normal.inverse()).topLeftCorner<3, 3>();
+  for (std::size_t i = 0; i < n; ++i) out.pivot_error.push_back(e.segment<3>(static_cast<Eigen::Index>(3 * i)).norm());
+
+  const std::size_t m = poses.orientation.size();
+  if (m > 0) {
+    Matrix3d sum = Matrix3d::Zero();
+    for (std::size_t i = 0; i < m; ++i) sum += poses.orientation[i].linear().transpose() * poses.prescribed[i];
+    const Matrix3d R = nearest_rotation(sum);
+    out.T_flange_tool.T.linear() = R;
+    double squares = 0.0;
+    for (std::size_t i = 0; i < m; ++i) {
+      const double angle =
+          log_rotation(Quaterniond(R.transpose() * poses.orientation[i].linear().transpose() * poses.prescribed[i]))
+              .norm();
+      out.orientation_error.push_back(angle);
+      squares += angle * angle;
+    }
+    // A single pose shows no scatter: then the covariance of the orientation is not known, and left zero.
+    if (m > 1)
+      out.T_flange_tool.covariance.bottomRightCorner<3, 3>() =
+          squares / (3.0 * static_cast<double>(m - 1)) / static_cast<double>(m) * Matrix3d::Identity();
+  }
+  out.message = "The tool point is known from " + std::to_string(n) + " poses; scatter " +
+                number(1e3 * std::sqrt(variance), 3) + " mm.";
+  return out;
+}
+
+// ---- All together ---------------------------------------------------------------------------------------------------
+
+TrackSetup assemble_setup(const FramesResult& frames, const ToolResult& tool, const InertialResult& inertial,
+                          std::vector<std::string>* notes) {
+  TrackSetup out;
+  out.T_tracker_base = frames.T_tracker_base.T;
+  out.T_flange_receiver = frames.T_flange_receiver.T;
+  out.T_flange_tool = tool.T_flange_tool.T;
+  out.T_flange_imu = frames.T_flange_receiver.T * inertial.T_receiver_imu.T;
+  out.gravity = frames.T_tracker_base.T.linear().transpose() * inertial.gravity;
+  out.clock_offset = inertial.clock_offset;
+  out.clock_offset_sigma = inertial.clock_offset_sigma;
+  if (notes) {
+    const double tilt = std::acos(std::clamp(-out.gravity.z() / out.gravity.norm(), -1.0, 1.0));
+    if (tilt > kDegree)
+      notes->push_back(
+          "gravity is " + number(tilt / kDegree, 3) +
+          " deg from the base's -z: the base is not level, or its z does not point up; gravity as measured is used");
+    if (inertial.tracker_up != "+z")
+      notes->push_back("the tracker's axis " + inertial.tracker_up + " points up, not +z");
+  }
+  return out;
+}
+
+}  // namespace truing

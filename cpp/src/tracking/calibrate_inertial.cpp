@@ -1,0 +1,617 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+/// Where the inertial sensor is on the receiver, gravity, and the offset of the two clocks.
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+
+#include "math/registration.hpp"
+#include "math/rotation.hpp"
+#include "math/text.hpp"
+#include "rooms.hpp"
+#include "truing/tracking/calibrate.hpp"
+
+namespace truing {
+using namespace tracking;
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Matrix3Xd;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kGravity = 9.80665;
+constexpr double kStep = 0.01, kSpan = 0.2;  // of the angular speeds that are correlated [s]
+constexpr double kAlike = 0.5;               // least correlation of two angular speeds of one motion
+constexpr double kMirrored = 0.5;            // of the misfit: a reflection that fits so much better is one
+constexpr double kDegrees = 57.295779513082323;
+constexpr int kGlobal = 16, kLocal = 9;
+enum Global : int { kTurn = 0, kLever = 3, kGyroBias = 6, kAccelBias = 9, kG = 12, kTau = 15 };
+
+using GlobalMatrix = Eigen::Matrix<double, kGlobal, kGlobal>;
+using GlobalVector = Eigen::Matrix<double, kGlobal, 1>;
+
+// ---- A start: angular speeds ----------------------------------------------------------------------------------------
+
+/// Mean angular velocity over `kSpan` around times on a grid, in the sensor's own frame; NaN where there is none.
+/// shape=(3, count)
+Matrix3Xd gyro_means(const std::vector<ImuSample>& imu, double start, Eigen::Index count) {
+  Matrix3Xd out = Matrix3Xd::Constant(3, count, std::nan(""));
+  std::vector<Vector3d> sum(imu.size(), Vector3d::Zero());  // integral up to every sample
+  for (std::size_t k = 1; k < imu.size(); ++k)
+    sum[k] = sum[k - 1] + 0.5 * (imu[k].t - imu[k - 1].t) * (imu[k].gyro + imu[k - 1].gyro);
+  const auto integral = [&](double t, Vector3d* value) {
+    const auto after =
+        std::upper_bound(imu.begin(), imu.end(), t, [](double x, const ImuSample& s) { return x < s.t; });
+    if (after == imu.begin() || after == imu.end()) return false;
+    const auto j = static_cast<std::size_t>(after - imu.begin());
+    *value = sum[j - 1] + (t - imu[j - 1].t) / (imu[j].t - imu[j - 1].t) * (sum[j] - sum[j - 1]);
+    return true;
+  };
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const double t = start + kStep * static_cast<double>(k);
+    Vector3d a, b;
+    if (integral(t - kSpan / 2.0, &a) && integral(t + kSpan / 2.0, &b)) out.col(k) = (b - a) / kSpan;
+  }
+  return out;
+}
+
+bool orientation_at(const std::vector<PoseSample>& tracker, double t, Quaterniond* out) {
+  const auto after =
+      std::upper_bound(tracker.begin(), tracker.end(), t, [](double x, const PoseSample& s) { return x < s.t; });
+  if (after == tracker.begin() || after == tracker.end() || after->t - (after - 1)->t > kSpan) return false;
+  const PoseSample &a = *(after - 1), &b = *after;
+  *out = a.orientation.slerp((t - a.t) / (b.t - a.t), b.orientation);
+  return true;
+}
+
+/// The same of the tracker, by differences, in the receiver's frame.
+Matrix3Xd tracker_means(const std::vector<PoseSample>& tracker, double start, Eigen::Index count) {
+  Matrix3Xd out = Matrix3Xd::Constant(3, count, std::nan(""));
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const double t = start + kStep * static_cast<double>(k);
+    Quaterniond a, b, middle;
+    if (!orientation_at(tracker, t - kSpan / 2.0, &a) || !orientation_at(tracker, t + kSpan / 2.0, &b)) continue;
+    out.col(k) = log_rotation(a.conjugate() * b) / kSpan;
+  }
+  return out;
+}
+
+struct Pairs {
+  Matrix3Xd imu, receiver;
+};
+
+/// Columns that both have, the inertial ones taken `shift` steps earlier: t_imu = t_tracker - shift * kStep.
+Pairs pairs_at(const Matrix3Xd& imu, const Matrix3Xd& receiver, Eigen::Index shift) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index k = 0; k < receiver.cols(); ++k) {
+    const Eigen::Index j = k - shift;
+    if (j >= 0 && j < imu.cols() && receiver.col(k).allFinite() && imu.col(j).allFinite()) rows.push_back(k);
+  }
+  Pairs out{Matrix3Xd(3, static_cast<Eigen::Index>(rows.size())), Matrix3Xd(3, static_cast<Eigen::Index>(rows.size()))};
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    out.imu.col(static_cast<Eigen::Index>(n)) = imu.col(rows[n] - shift);
+    out.receiver.col(static_cast<Eigen::Index>(n)) = receiver.col(rows[n]);
+  }
+  return out;
+}
+
+/// How well one turns into the other by any rotation or reflection: sum of singular values of their covariance over
+/// what it would be if they were one motion. Means are taken away, and with them the gyro's bias.
+double alikeness(const Pairs& pairs, Matrix3d* covariance = nullptr) {
+  if (pairs.imu.cols() < 50) return 0.0;
+  const Matrix3Xd a = pairs.imu.colwise() - pairs.imu.rowwise().mean(),
+                  b = pairs.receiver.colwise() - pairs.receiver.rowwise().mean();
+  const Matrix3d H = b * a.transpose();
+  if (covariance) *covariance = H;
+  const double scale = std::sqrt(a.squaredNorm() * b.squaredNorm());
+  return scale > 0.0 ? Eigen::JacobiSVD<Matrix3d>(H).singularValues().sum() / scale : 0.0;
+}
+
+// ---- Segments -------------------------------------------------------------------------------------------------------
+
+/// Inertial data integrated from a start, with derivatives by the biases (Forster, Carlone, Dellaert and Scaramuzza
+/// 2017, eqs. (32)-(44)).
+struct Integral {
+  double t = 0.0, since = 0.0;
+  Quaterniond R = Quaterniond::Identity();
+  Vector3d v = Vector3d::Zero(), p = Vector3d::Zero(), rate = Vector3d::Zero(),
+           force = Vector3d::Zero();  // rate and force at t, biases taken away
+  Matrix3d R_g = Matrix3d::Zero(), v_g = Matrix3d::Zero(), p_g = Matrix3d::Zero(), v_a = Matrix3d::Zero(),
+           p_a = Matrix3d::Zero();
+
+  void advance(const Vector3d& gyro0, const Vector3d& gyro1, const Vector3d& accel0, const Vector3d& accel1,
+               double dt) {
+    const Vector3d turn = 0.5 * dt * (gyro0 + gyro1);
+    const Quaterniond step = exp_rotation(turn), R1 = R * step;
+    const Vector3d a0 = R * accel0, a1 = R1 * accel1, a = 0.5 * (a0 + a1);
+    const Matrix3d rotation = R.toRotationMatrix(), slope = -rotation * skew(0.5 * (accel0 + accel1)) * R_g;
+    p += dt * v + dt * dt / 6.0 * (2.0 * a0 + a1);
+    v += dt * a;
+    p_g += dt * v_g + 0.5 * dt * dt * slope;
+    p_a += dt * v_a - 0.5 * dt * dt * rotation;
+    v_g += dt * slope;
+    v_a -= dt * rotation;
+    R_g = step.conjugate().toRotationMatrix() * R_g - dt * Matrix3d::Identity();
+    R = R1;
+    rate = gyro1;
+    force = accel1;
+    t += dt;
+    since += dt;
+  }
+};
+
+struct Unknowns {
+  Quaterniond R_receiver_imu = Quaterniond::Identity();
+  Vector3d lever = Vector3d::Zero();  // of the inertial sensor in the receiver's frame
+  Vector3d gyro_bias = Vector3d::Zero(), accel_bias = Vector3d::Zero(), gravity = Vector3d::Zero();
+  double tau = 0.0;
+};
+
+struct Segment {
+  std::size_t first = 0, last = 0;  // tracker samples [first, last)
+  Quaterniond R = Quaterniond::Identity();
+  Vector3d p = Vector3d::Zero(), v = Vector3d::Zero();
+};
+
+/// What one segment says: normal equations with its own pose and speed eliminated (Schur).
+struct Reduced {
+  GlobalMatrix A = GlobalMatrix::Zero();
+  GlobalVector b = GlobalVector::Zero();
+  Eigen::Matrix<double, kLocal, kLocal> local = Eigen::Matrix<double, kLocal, kLocal>::Zero();
+  Eigen::Matrix<double, kLocal, kGlobal> cross = Eigen::Matrix<double, kLocal, kGlobal>::Zero();
+  Eigen::Matrix<double, kLocal, 1> local_b = Eigen::Matrix<double, kLocal, 1>::Zero();
+  double position = 0.0, rotation = 0.0, samples = 0.0;  // squared errors
+};
+
+class Problem {
+ public:
+  Problem(const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker) : imu_(imu), tracker_(tracker) {}
+
+  /// Last inertial sample at or before t, which has one after it; false outside.
+  bool before(double t, std::size_t* k) const {
+    const auto after =
+        std::upper_bound(imu_.begin(), imu_.end(), t, [](double x, const ImuSample& s) { return x < s.t; });
+    if (after == imu_.begin() || after == imu_.end()) return false;
+    *k = static_cast<std::size_t>(after - imu_.begin()) - 1;
+    return true;
+  }
+
+  Integral start_at(double t, const Unknowns& x, std::size_t k) const {
+    Integral out;
+    out.t = t;
+    sample(k, t, x, &out.rate, &out.force);
+    return out;
+  }
+
+  /// On to t, sample by sample.
+  void advance(double t, const Unknowns& x, std::size_t* k, Integral* integral) const {
+    while (integral->t < t) {
+      const double next = std::min(t, imu_[*k + 1].t), dt = next - integral->t;
+      Vector3d gyro, accel;
+      sample(*k, next, x, &gyro, &accel);
+      const Vector3d gyro0 = integral->rate, accel0 = integral->force;
+      integral->advance(gyro0, gyro, accel0, accel, dt);
+      integral->t = next;
+      if (next == imu_[*k + 1].t && *k + 2 < imu_.size())
+        ++*k;
+      else if (next < t)
+        return;
+    }
+  }
+
+  Reduced look(const Unknowns& x, const Segment& s, double position_weight, double rotation_weight) const {
+    Reduced out;
+    std::size_t k = 0;
+    const double start = tracker_[s.first].t - x.tau;
+    if (!before(start, &k)) return out;
+    Integral I = start_at(start, x, k);
+    for (std::size_t n = s.first; n < s.last; ++n) {
+      const PoseSample& sample = tracker_[n];
+      advance(sample.t - x.tau, x, &k, &I);
+      const double dt = I.since;
+      const Matrix3d R0 = s.R.toRotationMatrix(), R_ti = (s.R * I.R).toRotationMatrix(),
+                     R_tr = R_ti * x.R_receiver_imu.conjugate().toRotationMatrix();
+      const Vector3d arm = R_tr * x.lever;  // from the receiver to the inertial sensor
+      const Vector3d turned = s.R * I.p, velocity = s.v + dt * x.gravity + s.R * I.v, rate = R_ti * I.rate;
+      Vector6d e;
+      e << sample.position - (s.p + dt * s.v + 0.5 * dt * dt * x.gravity + turned - arm),
+          log_rotation(sample.orientation * Quaterniond(R_tr).conjugate());
+      const Matrix3d by_gyro = R_ti * I.R_g;  // rotation vector of the receiver, tracker's axes
+      Eigen::Matrix<double, 6, kGlobal> G = Eigen::Matrix<double, 6, kGlobal>::Zero();
+      G.block<3, 3>(0, kTurn) = -skew(arm) * R_tr;
+      G.block<3, 3>(3, kTurn) = -R_tr;
+      G.block<3, 3>(0, kLever) = -R_tr;
+      G.block<3, 3>(0, kGyroBias) = R0 * I.p_g + skew(arm) * by_gyro;
+      G.block<3, 3>(3, kGyroBias) = by_gyro;
+      G.block<3, 3>(0, kAccelBias) = R0 * I.p_a;
+      G.block<3, 3>(0, kG) = 0.5 * dt * dt * Matrix3d::Identity();
+      // The start moves along with the offset: its pose and speed are free, so only what changes since then counts.
+      G.block<3, 1>(0, kTau) = -(velocity - rate.cross(arm));
+      G.block<3, 1>(3, kTau) = -rate;
+      Eigen::Matrix<double, 6, kLocal> L = Eigen::Matrix<double, 6, kLocal>::Zero();
+      L.block<3, 3>(0, 0) = -skew(turned - arm);
+      L.block<3, 3>(3, 0) = Matrix3d::Identity();
+      L.block<3, 3>(0, 3) = Matrix3d::Identity();
+      L.block<3, 3>(0, 6) = dt * Matrix3d::Identity();
+      Vector6d weight;
+      weight << Vector3d::Constant(position_weight), Vector3d::Constant(rotation_weight);
+      const auto WG = (weight.asDiagonal() * G).eval();
+      const auto WL = (weight.asDiagonal() * L).eval();
+      out.A.noalias() += G.transpose() * WG;
+      out.b.noalias() += WG.transpose() * e;
+      out.local.noalias() += L.transpose() * WL;
+      out.cross.noalias() += L.transpose() * WG;
+      out.local_b.noalias() += WL.transpose() * e;
+      out.position += e.head<3>().squaredNorm();
+      out.rotation += e.tail<3>().squaredNorm();
+      out.samples += 1.0;
+    }
+    return out;
+  }
+
+ private:
+  void sample(std::size_t k, double t, const Unknowns& x, Vector3d* gyro, Vector3d* accel) const {
+    const ImuSample &a = imu_[k], &b = imu_[k + 1];
+    const double share = (t - a.t) / (b.t - a.t);
+    *gyro = a.gyro + share * (b.gyro - a.gyro) - x.gyro_bias;
+    *accel = a.accel + share * (b.accel - a.accel) - x.accel_bias;
+  }
+
+  const std::vector<ImuSample>& imu_;
+  const std::vector<PoseSample>& tracker_;
+};
+
+// ---- Checks ---------------------------------------------------------------------------------------------------------
+
+void check(const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker) {
+  const auto fail = [](const std::string& what, std::size_t row) {
+    throw std::invalid_argument(what + " in row " + std::to_string(row));
+  };
+  if (imu.size() < 100)
+    throw std::invalid_argument("the inertial record has " + std::to_string(imu.size()) +
+                                " samples; 100 or more are needed");
+  if (tracker.size() < 50)
+    throw std::invalid_argument("the tracker's record has " + std::to_string(tracker.size()) +
+                                " samples; 50 or more are needed");
+  for (std::size_t k = 0; k < imu.size(); ++k) {
+    if (!std::isfinite(imu[k].t) || !imu[k].gyro.allFinite() || !imu[k].accel.allFinite())
+      fail("the inertial record is not finite", k);
+    if (k > 0 && !(imu[k].t > imu[k - 1].t)) fail("the inertial record goes back in time", k);
+  }
+  for (std::size_t k = 0; k < tracker.size(); ++k) {
+    if (!std::isfinite(tracker[k].t) || !tracker[k].position.allFinite() ||
+        !tracker[k].orientation.coeffs().allFinite())
+      fail("the tracker's record is not finite", k);
+    if (k > 0 && !(tracker[k].t > tracker[k - 1].t)) fail("the tracker's record goes back in time", k);
+    if (std::abs(tracker[k].orientation.norm() - 1.0) > 1e-3) fail("the tracker's record has no unit quaternion", k);
+  }
+}
+
+InertialResult refused(CalibrationStatus status, const std::string& message) {
+  InertialResult out;
+  out.status = status;
+  out.message = message;
+  return out;
+}
+
+std::string axis_of(const Vector3d& up) {
+  Eigen::Index k = 0;
+  up.cwiseAbs().maxCoeff(&k);
+  return std::string(up[k] > 0.0 ? "+" : "-") + "xyz"[k];
+}
+
+/// Tracker samples in runs of `seconds`, without gaps and inside the inertial record for offsets near `tau`.
+std::vector<Segment> segments_of(const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker, double tau,
+                                 double seconds) {
+  std::vector<Segment> out;
+  const double margin = 0.1;
+  for (std::size_t i = 0; i < tracker.size();) {
+    Segment s;
+    s.first = i;
+    std::size_t j = i;
+    while (j < tracker.size() && tracker[j].t < tracker[i].t + seconds &&
+           (j == i || tracker[j].t - tracker[j - 1].t < 0.25 * seconds))
+      ++j;
+    s.last = j;
+    i = j;
+    const double from = tracker[s.first].t - tau, to = tracker[s.last - 1].t - tau;
+    if (to - from < 0.5 * seconds || s.last - s.first < 8 || from < imu.front().t + margin ||
+        to > imu.back().t - margin)
+      continue;
+    out.push_back(s);
+  }
+  return out;
+}
+
+std::string advice_for(double sigma, double rotation_sigma, double wanted, double samples, const Vector3d& rate,
+                       const Vector3d& wobble) {
+  // The offset is known by rotation as sigma_rotation / (rate * sqrt(samples)): the rate at which that is what is
+  // wanted, twice to be sure.
+  const double needed =
+      std::max(2.0 * rotation_sigma / (wanted * std::sqrt(samples)), 1.5 * wobble.norm() * sigma / wanted);
+  std::string text = "rotate faster than " + number(std::ceil(10.0 * needed) / 10.0, 2) +
+                     " rad/s to and fro about two axes; the offset would be known to " + number(1e3 * wanted, 2) +
+                     " ms";
+  if (rate[1] < 0.2 * rate[0]) text += " (now nearly all rotation is about one axis)";
+  return text;
+}
+
+}  // namespace
+
+bool InertialOptions::is_valid(std::string* error) const {
+  const auto no = [&](const char* why) {
+    if (error) *error = why;
+    return false;
+  };
+  if (!(clock_search >= 0.0 && clock_search <= 60.0)) return no("clock_search must be from 0 to 60 s");
+  if (!(clock_wanted > 0.0)) return no("clock_wanted must be above 0 s");
+  if (!(segment >= 0.5 && segment <= 20.0)) return no("segment must be from 0.5 to 20 s");
+  if (!(gyro_bias > 0.0 && accel_bias > 0.0)) return no("biases must have standard deviations above 0");
+  if (max_iterations < 1) return no("max_iterations must be at least 1");
+  return true;
+}
+
+namespace {
+
+/// The numbers as they are given.
+InertialResult fit(const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker,
+                   const InertialOptions& options) {
+  // Units that show by themselves.
+  double force = 0.0;
+  for (const ImuSample& sample : imu) force += sample.accel.norm() / static_cast<double>(imu.size());
+  if (force > 0.7 && force < 1.4)
+    return refused(CalibrationStatus::not_consistent,
+                   "The accelerometer's mean is " + number(force, 3) +
+                       " m/s^2 where 9.81 is expected: it seems to be in g; multiply by 9.80665.");
+  if (force > 700.0 && force < 1400.0)
+    return refused(CalibrationStatus::not_consistent,
+                   "The accelerometer's mean is " + number(force, 3) +
+                       " m/s^2 where 9.81 is expected: it seems to be in mg; multiply by 0.00980665.");
+  if (force < 8.0 || force > 12.0)
+    return refused(CalibrationStatus::not_consistent,
+                   "The accelerometer's mean is " + number(force, 3) +
+                       " m/s^2 where 9.81 is expected: check its unit, and that gravity was not taken away.");
+
+  // Offset on a grid, then orientation.
+  const double start = std::max(imu.front().t, tracker.front().t) - options.clock_search,
+               end = std::min(imu.back().t, tracker.back().t) + options.clock_search;
+  const auto count = static_cast<Eigen::Index>(std::max(0.0, (end - start) / kStep));
+  const Matrix3Xd gyro = gyro_means(imu, start, count), turn = tracker_means(tracker, start, count);
+  const auto most = static_cast<Eigen::Index>(options.clock_search / kStep);
+  Eigen::Index shift = 0;
+  double best = 0.0;
+  for (Eigen::Index k = -most; k <= most; k += 2) {
+    const double alike = alikeness(pairs_at(gyro, turn, k));
+    if (alike > best) best = alike, shift = k;
+  }
+  for (Eigen::Index k = shift - 1; k <= shift + 1; k += 2) {
+    const double alike = alikeness(pairs_at(gyro, turn, k));
+    if (alike > best) best = alike, shift = k;
+  }
+  if (best < kAlike) {
+    return refused(CalibrationStatus::not_observable,
+                   "The two records show no common rotation (correlation " + number(best, 2) +
+                       "): do they belong together? Rotate by 30 deg or more about two axes while recording.");
+  }
+  const Pairs pairs = pairs_at(gyro, turn, shift);
+  Matrix3d H;
+  alikeness(pairs, &H);
+  const double ratio = std::sqrt((pairs.imu.colwise() - pairs.imu.rowwise().mean()).squaredNorm() /
+                                 (pairs.receiver.colwise() - pairs.receiver.rowwise().mean()).squaredNorm());
+  if (ratio > 0.6 * kDegrees && ratio < 1.6 * kDegrees)
+    return refused(
+        CalibrationStatus::not_consistent,
+        "The gyro turns " + number(ratio, 3) + " times as fast as the tracker: it is in deg/s and was read as rad/s.");
+  if (1.0 / ratio > 0.6 * kDegrees && 1.0 / ratio < 1.6 * kDegrees)
+    return refused(CalibrationStatus::not_consistent,
+                   "The gyro turns " + number(1.0 / ratio, 3) +
+                       " times more slowly than the tracker: it is in rad/s and was read as deg/s.");
+  const Eigen::JacobiSVD<Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Vector3d singular = svd.singularValues();
+  const bool reflected = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0;
+  const Matrix3Xd centred = pairs.receiver.colwise() - pairs.receiver.rowwise().mean();
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(centred * centred.transpose() /
+                                                     static_cast<double>(centred.cols()));
+  if (reflected && singular[2] > (1.0 - kMirrored) * 0.5 * singular[1]) {
+    return refused(CalibrationStatus::not_consistent,
+                   "Gyro and tracker agree as mirror images: one of the two records is in a left-handed frame (an axis "
+                   "with the wrong sign, or two axes swapped).");
+  }
+  if (singular[1] < 0.02 * singular[0]) {
+    return refused(CalibrationStatus::not_observable,
+                   "The motion turns about one axis only: the inertial sensor's orientation and lever arm do not show. "
+                   "Rotate by 30 deg or more about a second axis.");
+  }
+
+  InertialResult out;
+  out.rotation_rate = axes.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
+  Unknowns x;
+  x.tau = kStep * static_cast<double>(shift);
+  x.R_receiver_imu = Quaterniond(nearest_rotation(H));
+  x.gyro_bias = pairs.imu.rowwise().mean() - x.R_receiver_imu.conjugate() * Vector3d(pairs.receiver.rowwise().mean());
+  std::vector<Segment> segments = segments_of(imu, tracker, x.tau, options.segment);
+  if (segments.size() < 5)
+    return refused(CalibrationStatus::not_observable, "The records overlap for " + std::to_string(segments.size()) +
+                                                          " segments of " + number(options.segment, 3) +
+                                                          " s; 5 or more are needed: record for longer.");
+
+  Problem problem(imu, tracker);
+  Vector3d up = Vector3d::Zero();
+  for (const PoseSample& sample : tracker) {
+    std::size_t k = 0;
+    if (problem.before(sample.t - x.tau, &k)) up += sample.orientation * (x.R_receiver_imu * imu[k].accel);
+  }
+  x.gravity = -kGravity * up.normalized();
+  for (Segment& s : segments) {
+    const PoseSample &a = tracker[s.first], &b = tracker[s.last - 1];
+    s.R = a.orientation * x.R_receiver_imu;
+    s.p = a.position;
+    s.v = (b.position - a.position) / (b.t - a.t);
+  }
+
+  // Gauss and Newton; every segment's pose and speed are solved for in it and put back.
+  double position_sigma = 1e-2, rotation_sigma = 1e-2;
+  GlobalMatrix A, inverse;
+  GlobalVector prior_weight = GlobalVector::Zero();
+  prior_weight.segment<3>(kGyroBias).setConstant(std::pow(options.gyro_bias, -2));
+  prior_weight.segment<3>(kAccelBias).setConstant(std::pow(options.accel_bias, -2));
+  std::vector<Reduced> reduced(segments.size());
+  out.status = CalibrationStatus::not_converged;
+  for (out.iterations = 1; out.iterations <= options.max_iterations; ++out.iterations) {
+    A = prior_weight.asDiagonal();
+    GlobalVector b = GlobalVector::Zero();
+    b.segment<3>(kGyroBias) = -prior_weight[kGyroBias] * x.gyro_bias;
+    b.segment<3>(kAccelBias) = -prior_weight[kAccelBias] * x.accel_bias;
+    double position = 0.0, rotation = 0.0, samples = 0.0;
+    for (std::size_t n = 0; n < segments.size(); ++n) {
+      reduced[n] = problem.look(x, segments[n], std::pow(position_sigma, -2), std::pow(rotation_sigma, -2));
+      Reduced& r = reduced[n];
+      if (r.samples == 0.0) continue;
+      const auto factor = r.local.ldlt();
+      r.A -= r.cross.transpose() * factor.solve(r.cross);
+      r.b -= r.cross.transpose() * factor.solve(r.local_b);
+      A += r.A;
+      b += r.b;
+      position += r.position, rotation += r.rotation, samples += r.samples;
+    }
+    const GlobalVector step = A.ldlt().solve(b);
+    if (!step.allFinite() || samples == 0.0) break;
+    for (std::size_t n = 0; n < segments.size(); ++n) {
+      const Reduced& r = reduced[n];
+      if (r.samples == 0.0) continue;
+      const Eigen::Matrix<double, kLocal, 1> own = r.local.ldlt().solve(r.local_b - r.cross * step);
+      Segment& s = segments[n];
+      s.R = (exp_rotation(own.head<3>()) * s.R).normalized();
+      s.p += own.segment<3>(3);
+      s.v += own.tail<3>();
+    }
+    x.R_receiver_imu = (exp_rotation(step.segment<3>(kTurn)) * x.R_receiver_imu).normalized();
+    x.lever += step.segment<3>(kLever);
+    x.gyro_bias += step.segment<3>(kGyroBias);
+    x.accel_bias += step.segment<3>(kAccelBias);
+    x.gravity += step.segment<3>(kG);
+    x.tau += std::clamp(step[kTau], -0.05, 0.05);
+    out.position_rms = std::sqrt(position / (3.0 * samples));
+    out.rotation_rms = std::sqrt(rotation / (3.0 * samples));
+    const double before_p = position_sigma, before_r = rotation_sigma;
+    position_sigma = std::max(1e-8, out.position_rms);
+    rotation_sigma = std::max(1e-8, out.rotation_rms);
+    const bool settled =
+        std::abs(position_sigma / before_p - 1.0) < 1e-4 && std::abs(rotation_sigma / before_r - 1.0) < 1e-4;
+    if (out.iterations > 2 && settled && step.dot(A * step) < 1e-4) {
+      out.status = CalibrationStatus::done;
+      break;
+    }
+  }
+  const double size = x.gravity.norm();
+  if (out.status == CalibrationStatus::not_converged) {
+    out.message = "The fit did not come to an end: do the two records belong together?";
+    return out;
+  }
+  if (size < 0.9 * kGravity || size > 1.1 * kGravity) {
+    return refused(CalibrationStatus::not_consistent,
+                   "Gravity comes out as " + number(size, 4) +
+                       " m/s^2: the tracker's positions or the accelerometer have another unit than was read.");
+  }
+
+  // Sandwich (Huber 1967): segments are independent of each other, what is inside one need not be.
+  inverse = A.ldlt().solve(GlobalMatrix::Identity());
+  // Each with its own pull on the result taken out (jackknife; MacKinnon and White 1985, HC3).
+  GlobalMatrix B = prior_weight.asDiagonal();
+  for (const Reduced& r : reduced) {
+    if (r.samples == 0.0) continue;
+    const GlobalVector alone = (GlobalMatrix::Identity() - r.A * inverse).partialPivLu().solve(r.b);
+    B += alone * alone.transpose();
+  }
+  const GlobalMatrix sandwich = inverse * B * inverse;
+  // With few segments the sandwich is itself uncertain: never below what plain least squares says.
+  GlobalMatrix covariance = sandwich;
+  for (int i = 0; i < kGlobal; ++i) {
+    if (sandwich(i, i) >= inverse(i, i)) continue;
+    const double factor = std::sqrt(inverse(i, i) / sandwich(i, i));
+    covariance.row(i) *= factor;
+    covariance.col(i) *= factor;
+  }
+  out.T_receiver_imu.T.linear() = x.R_receiver_imu.toRotationMatrix();
+  out.T_receiver_imu.T.translation() = x.lever;
+  out.T_receiver_imu.covariance << covariance.block<3, 3>(kLever, kLever), covariance.block<3, 3>(kLever, kTurn),
+      covariance.block<3, 3>(kTurn, kLever), covariance.block<3, 3>(kTurn, kTurn);
+  out.gravity = x.gravity;
+  out.gravity_covariance = covariance.block<3, 3>(kG, kG);
+  out.tracker_up = axis_of(-x.gravity);
+  out.clock_offset = x.tau;
+  out.clock_offset_sigma = std::sqrt(covariance(kTau, kTau));
+  out.gyro_bias = x.gyro_bias;
+  out.accel_bias = x.accel_bias;
+  out.rich_enough = out.clock_offset_sigma <= options.clock_wanted;
+  out.message = "Clock offset " + number(1e3 * out.clock_offset, 4) + " ms, standard error " +
+                number(1e3 * out.clock_offset_sigma, 2) + " ms.";
+  double samples = 0.0;
+  for (const Reduced& r : reduced) samples += r.samples;
+  if (!out.rich_enough)
+    out.advice = advice_for(out.clock_offset_sigma, rotation_sigma, options.clock_wanted, samples, out.rotation_rate,
+                            out.rotation_rate);
+  if (out.tracker_up != "+z") out.warnings.push_back("the tracker's axis " + out.tracker_up + " points up, not +z");
+  const double steep = std::acos(std::clamp((-x.gravity).normalized().cwiseAbs().maxCoeff(), 0.0, 1.0));
+  if (steep > 5.0 / kDegrees)
+    out.warnings.push_back("gravity is " + number(steep * kDegrees, 3) +
+                           " deg from the tracker's nearest axis: the tracker is tilted, which does no harm");
+  return out;
+}
+
+bool convincing(const InertialResult& r) {
+  return r.status == CalibrationStatus::done && r.position_rms < 0.01 && r.rotation_rms < 0.02;
+}
+
+/// Other readings of the tracker's numbers.
+struct TrackerReading {
+  const char* message;
+  double scale;
+  bool mirrored;
+};
+constexpr TrackerReading kReadings[] = {
+    {"Inertial sensor and tracker agree if the tracker's positions are in mm, and were read as m.", 1e-3, false},
+    {"Inertial sensor and tracker agree if the tracker's positions are in m, and were read as mm.", 1e3, false},
+    {"Inertial sensor and tracker agree if the tracker's frame is left-handed: an axis has the wrong sign, or two axes "
+     "are swapped.",
+     1.0, true},
+};
+
+std::vector<PoseSample> read_as(const TrackerReading& reading, std::vector<PoseSample> tracker) {
+  for (PoseSample& sample : tracker) {
+    sample.position *= reading.scale;
+    if (!reading.mirrored) continue;
+    sample.position.y() *= -1.0;
+    sample.orientation =
+        Quaterniond(sample.orientation.w(), -sample.orientation.x(), sample.orientation.y(), -sample.orientation.z());
+  }
+  return tracker;
+}
+
+}  // namespace
+
+InertialResult calibrate_inertial(const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker,
+                                  const InertialOptions& options) {
+  std::string error;
+  if (!options.is_valid(&error)) throw std::invalid_argument("InertialOptions: " + error);
+  check(imu, tracker);
+  const InertialResult as_given = fit(imu, tracker, options);
+  const bool usual =
+      as_given.status == CalibrationStatus::done && as_given.position_rms < 3e-3 && as_given.rotation_rms < 5e-3;
+  if (usual || as_given.status == CalibrationStatus::not_observable) return as_given;
+  for (const TrackerReading& reading : kReadings) {
+    const InertialResult other = fit(imu, read_as(reading, tracker), options);
+    if (convincing(other) && !(convincing(as_given) && other.position_rms > 0.5 * as_given.position_rms))
+      return refused(CalibrationStatus::not_consistent, reading.message);
+  }
+  return as_given;
+}
+
+}  // namespace truing

@@ -1,0 +1,797 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// The diagnosis on simulated robots with known effects: what is named, what is not, and what is said to be untellable.
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <string>
+
+#include "support/arms.hpp"
+
+using namespace arms;
+using truing::diagnose;
+using truing::DiagnoseOptions;
+using truing::Diagnosis;
+using truing::Verdict;
+
+namespace {
+
+constexpr double kNoise = 3e-5;  // [m] of one coordinate
+
+/// An arm like a UR10, without masses: fewer candidates, and quicker.
+Robot light_arm() {
+  Robot robot = ur10();
+  for (Joint& j : robot.joints) j.mass.reset();
+  return robot;
+}
+
+void add_directions(Table* table, unsigned seed) {
+  std::mt19937_64 random(seed);
+  for (std::size_t k = 0; k < table->data.joints.size(); ++k) {
+    std::vector<double> dir(table->data.rows);
+    for (double& d : dir) d = random() & 1 ? 1.0 : -1.0;
+    table->data.direction.push_back(table->add(dir));
+  }
+}
+
+truing::AppliedEffect backlash(const std::string& joint, double size) {
+  return {"backlash", {joint}, {{"backlash." + joint, size}}};
+}
+
+/// Random poses with random approach directions of `truth`, somewhere in the measurement frame, measured.
+std::unique_ptr<Table> measured(Robot truth, std::size_t rows, unsigned seed, What what = What::position) {
+  truth.T_measurement_base = somewhere();
+  auto table = random_joints(truth, rows, seed);
+  add_directions(table.get(), seed + 1);
+  measure(table.get(), truth, what, kNoise, seed + 2);
+  return table;
+}
+
+/// The same where joint `k` is not where it was read: by `f` of row and reading.
+std::unique_ptr<Table> measured_displaced(Robot truth, std::size_t rows, unsigned seed, std::size_t k,
+                                          const std::function<double(std::size_t, double)>& f) {
+  truth.T_measurement_base = somewhere();
+  auto table = random_joints(truth, rows, seed);
+  add_directions(table.get(), seed + 1);
+  const Column read = table->data.joints[k];
+  std::vector<double> moved(rows);
+  for (std::size_t row = 0; row < rows; ++row) moved[row] = read[row] + f(row, read[row]);
+  table->data.joints[k] = table->add(moved);
+  measure(table.get(), truth, What::position, kNoise, seed + 2);
+  table->data.joints[k] = read;
+  return table;
+}
+
+const truing::FoundEffect* found(const Diagnosis& d, const std::string& effect, const std::string& joint) {
+  for (const truing::FoundEffect& e : d.effects) {
+    if (e.effect == effect && (joint.empty() || std::find(e.joints.begin(), e.joints.end(), joint) != e.joints.end()))
+      return &e;
+  }
+  return nullptr;
+}
+
+const truing::Parameter* parameter(const truing::FoundEffect& effect, const std::string& name) {
+  for (const truing::Parameter& p : effect.parameters) {
+    if (p.name == name) return &p;
+  }
+  return nullptr;
+}
+
+const truing::SanityFinding* finding(const Diagnosis& d, const std::string& kind) {
+  for (const truing::SanityFinding& f : d.sanity) {
+    if (f.kind == kind) return &f;
+  }
+  return nullptr;
+}
+
+std::string names(const Diagnosis& d) {
+  std::string out;
+  for (const truing::FoundEffect& e : d.effects) {
+    out += e.effect;
+    for (const std::string& joint : e.joints) out += " " + joint;
+    out += "; ";
+  }
+  for (const truing::UnknownEffect& u : d.unknown) {
+    out += "unknown " + u.joint;
+    for (const std::string& input : u.inputs) out += " " + input;
+    out += "; ";
+  }
+  return out;
+}
+
+double rms(const std::vector<double>& lengths) {
+  double squares = 0.0;
+  for (const double length : lengths) squares += length * length;
+  return std::sqrt(squares / static_cast<double>(lengths.size()));
+}
+
+/// Of the robot against fresh measurements of `truth`.
+double fresh_error(const Robot& robot, const Robot& truth, unsigned seed) {
+  const auto table = measured(truth, 2000, seed);
+  const truing::Residuals r = truing::residuals(robot, table->data);
+  std::vector<double> lengths;
+  for (Eigen::Index i = 0; i < 2000; ++i) lengths.push_back(r.position.row(i).norm());
+  return rms(lengths);
+}
+
+}  // namespace
+
+TEST_CASE("diagnose finds nothing in white noise, and says what would have shown") {
+  for (const unsigned seed : {100u, 110u, 120u, 130u}) {
+    const auto table = measured(light_arm(), 120, seed);
+    const Diagnosis d = diagnose(light_arm(), table->data);
+    CAPTURE(seed);
+    INFO(names(d));
+    CHECK(d.verdict == Verdict::none);
+    CHECK(d.effects.empty());
+    CHECK(d.unknown.empty());
+    CHECK(d.p_gap > 0.01);
+    CHECK(d.sentence.find("No gap") == 0);
+    CHECK(d.noise_floor == doctest::Approx(std::sqrt(3.0) * kNoise).epsilon(0.15));
+    CHECK(d.closable == 0.0);
+    REQUIRE(!d.detectable.empty());
+    for (const truing::Detectable& smallest : d.detectable) {
+      CHECK(smallest.size > 0.0);
+      CHECK(smallest.size_at_tip < 10.0 * kNoise);
+    }
+  }
+}
+
+TEST_CASE("diagnose names a backlash, its joint, its size, and by how much the error shrinks") {
+  Robot truth = light_arm();
+  truth.effects = {backlash("J3", 8e-4)};
+  const auto table = measured(truth, 160, 200);
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  INFO(names(d));
+  CHECK(d.verdict == Verdict::effects);
+  REQUIRE(d.effects.size() == 1);
+  const truing::FoundEffect& effect = d.effects[0];
+  CHECK(effect.effect == "backlash");
+  CHECK(effect.joints == std::vector<std::string>{"J3"});
+  CHECK(effect.probability > 0.9);
+  CHECK(effect.identify_as == "backlash:J3");
+  for (const truing::Alternative& other : effect.confounded_with) {  // nothing but what no column was recorded for
+    CHECK(other.probability == 0.0);
+    CHECK(other.separated_by.find("record") == 0);
+    CHECK(std::any_of(d.not_testable.begin(), d.not_testable.end(),
+                      [&](const truing::NotTestable& n) { return n.effect == other.effect; }));
+  }
+  const truing::Parameter* size = parameter(effect, "backlash.J3");
+  REQUIRE(size);
+  CHECK(size->unit == "rad");
+  CHECK(std::abs(size->value - 8e-4) < 4.0 * size->sigma);
+  CHECK(size->sigma < 4e-5);
+  CHECK(effect.share_alone > 0.5);
+  CHECK(effect.share_last > 0.5);
+  CHECK(effect.share <= 1.0);
+  CHECK(!effect.curves.empty());
+  CHECK(d.p_gap < 0.01);
+  CHECK(d.remaining_structure_p > 0.02);
+  CHECK(d.closable > 0.9);
+  CHECK(d.after.rms == doctest::Approx(std::sqrt(3.0) * kNoise).epsilon(0.3));
+  REQUIRE(!d.where_joints.empty());
+  CHECK(d.where_inputs[0].input == "dir3");
+  CHECK(d.unknown.empty());
+  CHECK(d.next_poses.empty());
+  // On poses that nobody has seen the error shrinks by as much as was said.
+  const double realised = 1.0 - fresh_error(d.robot, truth, 210) / fresh_error(d.robot_before, truth, 210);
+  CAPTURE(realised);
+  CHECK(effect.shrink.low <= realised);
+  CHECK(realised <= effect.shrink.high);
+  CHECK(d.shrink.low <= realised);
+  CHECK(realised <= d.shrink.high);
+}
+
+TEST_CASE("diagnose tells two effects apart on top of wrong geometry") {
+  Robot truth = perturbed(ur10(), 1e-3, 1e-3, 300);
+  truth.effects = {backlash("J2", 8e-4), {"joint_compliance", {"J3"}, {{"joint_compliance.J3", 3e-5}}}};
+  const auto table = measured(truth, 160, 301);
+  const Diagnosis d = diagnose(ur10(), table->data);
+  INFO(names(d));
+  const truing::FoundEffect *first = found(d, "backlash", "J2"), *second = found(d, "joint_compliance", "J3");
+  REQUIRE(first);
+  REQUIRE(second);
+  CHECK(found(d, "link_geometry", ""));
+  CHECK(d.effects.size() <= 3);
+  CHECK(d.unknown.empty());
+  const truing::Parameter *size = parameter(*first, "backlash.J2"),
+                          *softness = parameter(*second, "joint_compliance.J3");
+  REQUIRE(size);
+  REQUIRE(softness);
+  CHECK(std::abs(size->value - 8e-4) < 4.0 * size->sigma);
+  CHECK(std::abs(softness->value - 3e-5) < 4.0 * softness->sigma);
+  // What all close together is shared out, none of it twice.
+  double shares = 0.0;
+  for (const truing::FoundEffect& e : d.effects) shares += e.share;
+  CHECK(shares == doctest::Approx(1.0 - std::pow(d.after_unknown.rms / d.gap.rms, 2.0)).epsilon(1e-9));
+  CHECK(d.after.rms < 0.2 * d.gap.rms);
+}
+
+TEST_CASE("diagnose lists what the data cannot tell apart, and how to tell") {
+  for (const bool lost_motion : {false, true}) {
+    Robot truth = light_arm();
+    if (lost_motion)
+      truth.effects = {backlash("J3", 1e-3)};
+    else
+      truth.joints[2].offset += 5e-4;
+    truth.T_measurement_base = somewhere();
+    auto table = random_joints(truth, 150, 400);
+    for (int k = 0; k < 6; ++k) table->data.direction.push_back(table->add(std::vector<double>(150, 1.0)));
+    measure(table.get(), truth, What::position, kNoise, 402);
+    const Diagnosis d = diagnose(light_arm(), table->data);
+    CAPTURE(lost_motion);
+    INFO(names(d));
+    REQUIRE(d.effects.size() == 1);
+    CHECK(d.effects[0].effect == "joint_offset");
+    CHECK(d.effects[0].joints == std::vector<std::string>{"J3"});
+    const auto& others = d.effects[0].confounded_with;
+    const auto other = std::find_if(others.begin(), others.end(), [](const truing::Alternative& a) {
+      return a.effect == "backlash" && a.joints == std::vector<std::string>{"J3"};
+    });
+    REQUIRE(other != others.end());
+    CHECK(other->separated_by.find("both sides") != std::string::npos);
+    CHECK(other->probability <= d.effects[0].probability);
+    CHECK(d.sentence.find("cannot tell") != std::string::npos);
+    CHECK(std::any_of(d.not_testable.begin(), d.not_testable.end(), [](const truing::NotTestable& n) {
+      return n.effect == "backlash" && n.why.find("same side") != std::string::npos;
+    }));
+    // What to measure next: among others, from the side that was never driven from.
+    REQUIRE(!d.next_poses.empty());
+    bool other_side = false;
+    for (const truing::NextPose& pose : d.next_poses) {
+      CHECK(pose.joints.size() == 6);
+      REQUIRE(pose.direction.size() == 6);
+      CHECK(!pose.why.empty());
+      other_side |= pose.direction[2] == -1;
+    }
+    CHECK(other_side);
+  }
+}
+
+TEST_CASE("diagnose does not call absent what the data could not show") {
+  const auto table = measured(light_arm(), 120, 430);
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  const auto why = [&](const std::string& effect) {
+    for (const truing::NotTestable& n : d.not_testable) {
+      if (n.effect == effect) return n.why;
+    }
+    return std::string();
+  };
+  CHECK(why("thermal").find("temp_C") != std::string::npos);
+  CHECK(why("thermal_zero").find("temp_C") != std::string::npos);
+  CHECK(why("drift").find("t_s") != std::string::npos);
+  CHECK(why("backlash").empty());
+  CHECK(std::none_of(d.candidates.begin(), d.candidates.end(),
+                     [](const truing::Candidate& c) { return c.effect == "thermal"; }));
+}
+
+TEST_CASE("diagnose says that a joint which never moves cannot be judged") {
+  Robot truth = light_arm();
+  truth.effects = {backlash("J3", 8e-4)};
+  truth.T_measurement_base = somewhere();
+  auto table = random_joints(truth, 150, 440);
+  table->data.joints[4] = table->add(std::vector<double>(150, 0.7));
+  add_directions(table.get(), 441);
+  measure(table.get(), truth, What::position, kNoise, 442);
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  INFO(names(d));
+  const auto still = std::find_if(d.not_testable.begin(), d.not_testable.end(), [](const truing::NotTestable& n) {
+    return n.joints == std::vector<std::string>{"J5"};
+  });
+  REQUIRE(still != d.not_testable.end());
+  CHECK(still->why == "J5 does not move");
+  REQUIRE(d.effects.size() == 1);
+  CHECK(d.effects[0].effect == "backlash");
+  CHECK(d.effects[0].joints == std::vector<std::string>{"J3"});
+}
+
+TEST_CASE("diagnose calls what no effect explains unknown, with its joint, input and shape") {
+  const auto table =
+      measured_displaced(light_arm(), 200, 500, 3, [](std::size_t, double q) { return q > 0.4 ? 1.5e-3 : -1.5e-3; });
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  INFO(names(d));
+  CHECK((d.verdict == Verdict::unknown || d.verdict == Verdict::effects_and_unknown));
+  REQUIRE(!d.unknown.empty());
+  const truing::UnknownEffect& u = d.unknown[0];
+  CHECK(u.joint == "J4");
+  CHECK(u.inputs == std::vector<std::string>{"q4"});
+  CHECK(u.probability > 0.9);
+  REQUIRE(!u.curves.empty());
+  CHECK(u.curves[0].input == "q4");
+  CHECK(u.curves[0].site == "J4");
+  CHECK(u.curves[0].points.size() > 10);
+  CHECK(u.curves[0].samples.size() > 50);
+  INFO(u.looks_like);
+  REQUIRE(u.looks_like.find("a step at q4 = ") == 0);
+  CHECK(std::abs(std::stod(u.looks_like.substr(15)) - 0.4) < 0.3);
+  CHECK(d.after_unknown.rms < 0.8 * d.gap.rms);
+  // The robot holds what has a name only.
+  for (const truing::AppliedEffect& e : d.robot.effects) CHECK(e.effect.find("free") == std::string::npos);
+}
+
+TEST_CASE("diagnose finds a displacement by a column of one's own, unknown or with an own effect named") {
+  std::vector<double> humidity(160);
+  std::mt19937_64 random(510);
+  for (double& h : humidity) h = static_cast<double>(random() >> 11) * 0x1.0p-53;
+  auto table =
+      measured_displaced(light_arm(), 160, 511, 1, [&](std::size_t row, double) { return 1e-3 * humidity[row]; });
+  table->data.covariates["humidity"] = table->add(humidity);
+
+  const Diagnosis without = diagnose(light_arm(), table->data);
+  INFO(names(without));
+  REQUIRE(without.unknown.size() == 1);
+  CHECK(without.unknown[0].joint == "J2");
+  CHECK(without.unknown[0].inputs == std::vector<std::string>{"humidity"});
+  CHECK(without.unknown[0].looks_like == "linear in humidity");
+
+  truing::Effect swelling;
+  swelling.name = "swelling";
+  swelling.summary = "the joint turns as it gets damp";
+  swelling.terms = [](const Robot& robot, std::size_t joint, const Measurements& data) {
+    const Column column = data.covariates.at("humidity");
+    truing::Term term;
+    term.parameter = "swelling." + robot.joints[joint].name;
+    term.unit = "rad";
+    term.site = robot.joints[joint].name;
+    term.basis = [column](const truing::Inputs& in) { return column[in.row]; };
+    return std::vector<truing::Term>{term};
+  };
+  DiagnoseOptions options;
+  options.own_effects = {swelling};
+  const Diagnosis with = diagnose(light_arm(), table->data, options);
+  INFO(names(with));
+  CHECK(with.verdict == Verdict::effects);
+  const truing::FoundEffect* own = found(with, "swelling", "J2");
+  REQUIRE(own);
+  REQUIRE(parameter(*own, "swelling.J2"));
+  CHECK(std::abs(parameter(*own, "swelling.J2")->value - 1e-3) < 4.0 * parameter(*own, "swelling.J2")->sigma);
+  CHECK(with.unknown.empty());
+}
+
+TEST_CASE("diagnose leaves out what it is told to leave out") {
+  Robot truth = light_arm();
+  truth.effects = {backlash("J3", 8e-4)};
+  const auto table = measured(truth, 160, 200);
+  DiagnoseOptions options;
+  options.leave_out = {"backlash"};
+  const Diagnosis d = diagnose(light_arm(), table->data, options);
+  INFO(names(d));
+  CHECK(!found(d, "backlash", ""));
+  CHECK(std::none_of(d.candidates.begin(), d.candidates.end(),
+                     [](const truing::Candidate& c) { return c.effect == "backlash"; }));
+  REQUIRE(!d.unknown.empty());  // it is there all the same
+  CHECK(d.unknown[0].joint == "J3");
+  CHECK(d.unknown[0].inputs == std::vector<std::string>{"dir3"});
+}
+
+TEST_CASE("diagnose gives the same bits on one and on two threads") {
+  Robot truth = perturbed(light_arm(), 1e-3, 1e-3, 600);
+  truth.effects = {backlash("J2", 8e-4)};
+  const auto table = measured(truth, 130, 601);
+  DiagnoseOptions options;
+  options.threads = 1;
+  const Diagnosis one = diagnose(light_arm(), table->data, options);
+  options.threads = 2;
+  const Diagnosis two = diagnose(light_arm(), table->data, options);
+  CHECK(one.sentence == two.sentence);
+  CHECK(one.set == two.set);
+  CHECK(one.gap.rms == two.gap.rms);
+  CHECK(one.after.rms == two.after.rms);
+  CHECK(one.noise_floor == two.noise_floor);
+  CHECK(one.p_gap == two.p_gap);
+  CHECK(one.remaining_structure_p == two.remaining_structure_p);
+  CHECK(one.error_before == two.error_before);
+  CHECK(one.error_after == two.error_after);
+  REQUIRE(one.effects.size() == two.effects.size());
+  for (std::size_t k = 0; k < one.effects.size(); ++k) {
+    const truing::FoundEffect &a = one.effects[k], &b = two.effects[k];
+    CHECK(a.effect == b.effect);
+    CHECK(a.joints == b.joints);
+    CHECK(a.probability == b.probability);
+    CHECK(a.shrink.low == b.shrink.low);
+    CHECK(a.share == b.share);
+    REQUIRE(a.parameters.size() == b.parameters.size());
+    for (std::size_t m = 0; m < a.parameters.size(); ++m) CHECK(a.parameters[m].value == b.parameters[m].value);
+  }
+  REQUIRE(one.candidates.size() == two.candidates.size());
+  for (std::size_t k = 0; k < one.candidates.size(); ++k)
+    CHECK(one.candidates[k].evidence == two.candidates[k].evidence);
+  REQUIRE(one.detectable.size() == two.detectable.size());
+  for (std::size_t k = 0; k < one.detectable.size(); ++k) CHECK(one.detectable[k].size == two.detectable[k].size);
+  for (std::size_t k = 0; k < one.where_joints.size(); ++k)
+    CHECK(one.where_joints[k].share.value == two.where_joints[k].share.value);
+}
+
+TEST_CASE("diagnose does not depend on where the instrument stands") {
+  Robot truth = perturbed(light_arm(), 5e-4, 5e-4, 610);
+  truth.effects = {backlash("J4", 1.5e-3)};
+  auto table = measured(truth, 120, 611);
+  const Diagnosis here = diagnose(light_arm(), table->data);
+  const Eigen::Isometry3d elsewhere = truing::frame_from_xyz_rpy({-3.0, 1.5, 0.8}, {0.7, -0.4, 1.9});
+  std::array<std::vector<double>, 3> moved;
+  for (std::size_t row = 0; row < table->data.rows; ++row) {
+    const Eigen::Vector3d p = elsewhere * Eigen::Vector3d(table->data.position[0][row], table->data.position[1][row],
+                                                          table->data.position[2][row]);
+    for (int k = 0; k < 3; ++k) moved[static_cast<std::size_t>(k)].push_back(p[k]);
+  }
+  for (std::size_t k = 0; k < 3; ++k) table->data.position[k] = table->add(moved[k]);
+  const Diagnosis there = diagnose(light_arm(), table->data);
+  INFO(names(here));
+  CHECK(names(here) == names(there));
+  REQUIRE(found(here, "backlash", "J4"));
+  for (std::size_t k = 0; k < std::min(here.effects.size(), there.effects.size()); ++k) {
+    CHECK(std::abs(here.effects[k].probability - there.effects[k].probability) < 1e-6);
+    CHECK(std::abs(here.effects[k].share - there.effects[k].share) < 1e-6);
+  }
+  CHECK(here.gap.rms == doctest::Approx(there.gap.rms).epsilon(1e-6));
+  CHECK(here.after.rms == doctest::Approx(there.after.rms).epsilon(1e-6));
+}
+
+TEST_CASE("diagnose repeats itself with the same seed, and draws another split with another") {
+  Robot truth = light_arm();
+  truth.effects = {backlash("J3", 8e-4)};
+  const auto table = measured(truth, 120, 200);
+  DiagnoseOptions options;
+  options.seed = 3;
+  const Diagnosis a = diagnose(light_arm(), table->data, options), b = diagnose(light_arm(), table->data, options);
+  CHECK(a.seed == 3);
+  CHECK(a.effects[0].probability == b.effects[0].probability);
+  CHECK(a.effects[0].shrink.low == b.effects[0].shrink.low);
+  CHECK(a.set == b.set);
+  options.seed = 4;
+  const Diagnosis c = diagnose(light_arm(), table->data, options);
+  CHECK(a.set != c.set);
+  CHECK(names(a) == names(c));
+}
+
+TEST_CASE("diagnose honours the split that the data bring") {
+  Robot truth = light_arm();
+  truth.effects = {backlash("J3", 8e-4)};
+  auto table = measured(truth, 120, 200);
+  for (int row = 0; row < 120; ++row) table->data.set.push_back(row % 4 == 0 ? 1 : 0);
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  CHECK(d.set == table->data.set);
+  CHECK(d.gap.n == 30);
+  CHECK(found(d, "backlash", "J3"));
+  table->data.set.assign(120, 0);
+  CHECK_THROWS_WITH_AS(diagnose(light_arm(), table->data), doctest::Contains("held-out"), std::invalid_argument);
+}
+
+TEST_CASE("diagnose names the option that makes no sense") {
+  const auto table = measured(light_arm(), 40, 700);
+  const auto refuses = [&](const char* name, const std::function<void(DiagnoseOptions*)>& change) {
+    DiagnoseOptions options;
+    change(&options);
+    CAPTURE(name);
+    std::string error;
+    CHECK(!options.is_valid(&error));
+    CHECK(error.find(name) != std::string::npos);
+    CHECK_THROWS_WITH_AS(diagnose(light_arm(), table->data, options), doctest::Contains(name), std::invalid_argument);
+  };
+  refuses("false_alarm", [](DiagnoseOptions* o) { o->false_alarm = 0.0; });
+  refuses("false_alarm", [](DiagnoseOptions* o) { o->false_alarm = NAN; });
+  refuses("max_effects", [](DiagnoseOptions* o) { o->max_effects = 0; });
+  refuses("test_share", [](DiagnoseOptions* o) { o->test_share = 0.0; });
+  refuses("test_share", [](DiagnoseOptions* o) { o->test_share = 1.0; });
+  refuses("search_poses", [](DiagnoseOptions* o) { o->search_poses = 10; });
+  refuses("resamples", [](DiagnoseOptions* o) { o->resamples = -1; });
+  refuses("rotation_length", [](DiagnoseOptions* o) { o->rotation_length = 0.0; });
+  CHECK(DiagnoseOptions().is_valid(nullptr));
+  DiagnoseOptions misspelt;
+  misspelt.leave_out = {"backlsh"};
+  CHECK_THROWS_WITH_AS(diagnose(light_arm(), table->data, misspelt), doctest::Contains("backlsh"),
+                       std::invalid_argument);
+}
+
+TEST_CASE("diagnose refuses a handful of poses") {
+  const auto table = measured(light_arm(), 8, 710);
+  CHECK_THROWS_WITH_AS(diagnose(light_arm(), table->data), doctest::Contains("8 poses are too few"),
+                       std::invalid_argument);
+  auto repeated = measured(light_arm(), 60, 711);  // many rows, few poses
+  for (int row = 0; row < 60; ++row) repeated->data.pose.push_back(row / 6);
+  CHECK_THROWS_WITH_AS(diagnose(light_arm(), repeated->data), doctest::Contains("10 poses are too few"),
+                       std::invalid_argument);
+}
+
+TEST_CASE("diagnose finds unequal bars of a palletizer's parallelograms") {
+  const std::map<std::string, double> between = {{"linkage.J4.cos", 1.5e-3}, {"linkage.J4.sin", -8e-4}};
+  const std::map<std::string, double> fixed_to_base_and_wrist = {{"linkage.J4.sin_first", 1.5e-3},
+                                                                 {"linkage.J4.cos_sum", -1.5e-3}};
+  for (const auto& bars : {between, fixed_to_base_and_wrist}) {
+    Robot truth = palletizer();
+    truth.effects = {{"linkage", {"J4"}, bars}};
+    const auto table = measured(truth, 160, 800);
+    const Diagnosis d = diagnose(palletizer(), table->data);
+    INFO(names(d));
+    REQUIRE(!d.effects.empty());
+    CHECK(d.effects[0].effect == "linkage");
+    CHECK(d.effects[0].joints == std::vector<std::string>{"J4"});
+    CHECK(d.effects[0].identify_as == "linkage:J4");
+    CHECK(d.effects.size() == 1);
+    CHECK(d.unknown.empty());
+  }
+}
+
+TEST_CASE("diagnose takes a first axis of a DH robot that tilts, wherever its base stands") {
+  Robot truth = palletizer();
+  truth.joints[0].lower = -2.8;
+  truth.joints[0].upper = 2.8;
+  truth.effects = {{"axis_wobble", {"J1"}, {{"axis_wobble.J1.cos_x", 8e-4}, {"axis_wobble.J1.sin_y", 6e-4}}}};
+  const auto table = measured(truth, 160, 803);
+  const Diagnosis d = diagnose(palletizer(), table->data);
+  INFO(names(d));
+  REQUIRE(!d.effects.empty());
+  CHECK(d.effects[0].effect == "axis_wobble");
+  CHECK(d.effects[0].joints == std::vector<std::string>{"J1"});
+  CHECK(d.after.rms < 2.0 * d.noise_floor);
+}
+
+TEST_CASE("diagnose sees that a target has slipped on the last link") {
+  Robot truth = light_arm();
+  auto table = measured(truth, 160, 805);
+  truth.targets[0].T_last_target.translation() += Eigen::Vector3d(6e-4, -8e-4, 3e-4);
+  const auto later = measured(truth, 160, 805);
+  std::vector<double> time(160);
+  for (std::size_t row = 0; row < 160; ++row) time[row] = 20.0 * static_cast<double>(row);
+  table->data.time = table->add(time);
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::vector<double> values(160);
+    for (std::size_t row = 0; row < 160; ++row) values[row] = (row < 90 ? table : later)->data.position[k][row];
+    table->data.position[k] = table->add(values);
+  }
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  INFO(names(d));
+  const truing::FoundEffect* slipped = found(d, "tool_frame", "");
+  REQUIRE(slipped);
+  CHECK(slipped->note.find("target tool moves on the last link") != std::string::npos);
+  CHECK(slipped->identify_as.empty());
+  CHECK(d.effects.size() == 1);
+}
+
+TEST_CASE("diagnose works on the lengths of a draw-wire") {
+  Robot truth = light_arm();
+  truth.anchor = truing::Anchor{{1.2, -0.8, 0.1}, 0.25};
+  truth.effects = {backlash("J2", 1e-3)};
+  auto table = random_joints(truth, 200, 810);
+  add_directions(table.get(), 811);
+  measure(table.get(), truth, What::distance, kNoise, 812);
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  INFO(names(d));
+  CHECK(found(d, "backlash", "J2"));
+  CHECK(d.effects.size() == 1);
+  CHECK(d.unknown.empty());
+  CHECK(d.noise_floor == doctest::Approx(kNoise).epsilon(0.2));
+  CHECK(d.workspace.empty());
+}
+
+TEST_CASE("diagnose uses measured orientations") {
+  Robot truth = light_arm();
+  truth.effects = {{"axis_wobble", {"J5"}, {{"axis_wobble.J5.cos_x", 6e-4}, {"axis_wobble.J5.sin_y", -5e-4}}}};
+  const auto table = measured(truth, 150, 820, What::pose);
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  INFO(names(d));
+  REQUIRE(!d.effects.empty());
+  CHECK(d.effects[0].effect == "axis_wobble");
+  CHECK(d.effects[0].joints == std::vector<std::string>{"J5"});
+  CHECK(d.effects.size() == 1);
+  CHECK(d.residuals_before.rotation.allFinite());
+}
+
+TEST_CASE("diagnose takes several targets") {
+  Robot truth = light_arm();
+  truth.targets.push_back({"elbow", truing::frame_from_xyz_rpy({0.2, 0.1, -0.3}, {0.4, 0.5, 0.6})});
+  truth.effects = {backlash("J3", 8e-4)};
+  Robot nominal = truth;
+  nominal.effects.clear();
+  truth.T_measurement_base = somewhere();
+  auto table = random_joints(truth, 160, 830);
+  add_directions(table.get(), 831);
+  for (std::int32_t row = 0; row < 160; ++row) table->data.target.push_back(row % 2);
+  measure(table.get(), truth, What::position, kNoise, 832);
+  const Diagnosis d = diagnose(nominal, table->data);
+  INFO(names(d));
+  REQUIRE(d.effects.size() == 1);
+  CHECK(found(d, "backlash", "J3"));
+}
+
+TEST_CASE("diagnose recognises exchanged and turned joint columns") {
+  auto table = measured(light_arm(), 120, 900);
+  std::swap(table->data.joints[2], table->data.joints[4]);
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  REQUIRE(finding(d, "joint_order"));
+  CHECK(finding(d, "joint_order")->text.find("joint columns 3 and 5") != std::string::npos);
+  std::swap(table->data.joints[2], table->data.joints[4]);
+  std::vector<double> turned(120);
+  for (std::size_t row = 0; row < 120; ++row) turned[row] = -table->data.joints[1][row];
+  table->data.joints[1] = table->add(turned);
+  const Diagnosis e = diagnose(light_arm(), table->data);
+  REQUIRE(finding(e, "joint_sign"));
+  CHECK(finding(e, "joint_sign")->text.find("joint column 2") != std::string::npos);
+}
+
+TEST_CASE("diagnose goes on with the record of the joints that fits better") {
+  auto table = measured(light_arm(), 120, 910);
+  std::mt19937_64 random(911);
+  std::normal_distribution<double> normal(0.0, 1e-3);
+  for (std::size_t k = 0; k < 6; ++k) {
+    const Column actual = table->data.joints[k];
+    table->data.covariates["qr" + std::to_string(k + 1) + "_rad"] = actual;
+    std::vector<double> commanded(120);
+    for (std::size_t row = 0; row < 120; ++row) commanded[row] = actual[row] + normal(random);
+    table->data.joints[k] = table->add(commanded);
+  }
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  REQUIRE(finding(d, "joint_record"));
+  CHECK(d.joint_record == "qr");
+  CHECK(d.gap.rms < 3.0 * kNoise);
+  for (std::size_t k = 0; k < 6; ++k)
+    std::swap(table->data.joints[k], table->data.covariates["qr" + std::to_string(k + 1) + "_rad"]);
+  const Diagnosis e = diagnose(light_arm(), table->data);
+  REQUIRE(finding(e, "joint_record"));
+  CHECK(e.joint_record == "q");
+}
+
+TEST_CASE("diagnose points at copies of rows") {
+  const auto once = measured(light_arm(), 100, 920);
+  Table twice(103);
+  const auto copied = [&](const Column& from) {
+    std::vector<double> values;
+    for (std::size_t row = 0; row < 103; ++row) values.push_back(from[row < 100 ? row : row - 90]);
+    return twice.add(values);
+  };
+  for (const Column& column : once->data.joints) twice.data.joints.push_back(copied(column));
+  for (const Column& column : once->data.direction) twice.data.direction.push_back(copied(column));
+  for (std::size_t k = 0; k < 3; ++k) twice.data.position[k] = copied(once->data.position[k]);
+  const Diagnosis d = diagnose(light_arm(), twice.data);
+  REQUIRE(finding(d, "duplicates"));
+  CHECK(finding(d, "duplicates")->rows == std::vector<std::size_t>{100, 101, 102});
+}
+
+TEST_CASE("diagnose infers approach directions from the order of the poses, and says so") {
+  Robot truth = light_arm();
+  truth.effects = {backlash("J3", 8e-4)};
+  truth.T_measurement_base = somewhere();
+  auto table = random_joints(truth, 120, 930);
+  for (std::size_t k = 0; k < 6; ++k) {
+    std::vector<double> dir(120, 0.0);
+    for (std::size_t row = 1; row < 120; ++row)
+      dir[row] = table->data.joints[k][row] > table->data.joints[k][row - 1] ? 1.0 : -1.0;
+    table->data.direction.push_back(table->add(dir));
+  }
+  measure(table.get(), truth, What::position, kNoise, 931);
+  const std::vector<Column> known = table->data.direction;
+  table->data.direction.clear();
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  INFO(names(d));
+  REQUIRE(found(d, "backlash", "J3"));
+  CHECK(found(d, "backlash", "J3")->note.find("inferred") != std::string::npos);
+  CHECK(finding(d, "direction"));
+  REQUIRE(d.directions.size() == 6);
+  for (std::size_t k = 0; k < 6; ++k) {
+    for (std::size_t row = 0; row < 120; ++row) CHECK(d.directions[k][row] == known[k][row]);
+  }
+}
+
+TEST_CASE("diagnose takes the noise from repeats where there are any") {
+  Robot truth = light_arm();
+  truth.T_measurement_base = somewhere();
+  auto poses = random_joints(truth, 50, 940);
+  Table table(150);
+  for (const Column& column : poses->data.joints) {
+    std::vector<double> values;
+    for (std::size_t row = 0; row < 150; ++row) values.push_back(column[row / 3]);
+    table.data.joints.push_back(table.add(values));
+  }
+  for (int k = 0; k < 6; ++k) table.data.direction.push_back(table.add(std::vector<double>(150, 1.0)));
+  measure(&table, truth, What::position, kNoise, 941);
+  const Diagnosis d = diagnose(light_arm(), table.data);
+  INFO(names(d));
+  CHECK(d.verdict == Verdict::none);
+  CHECK(d.noise_from_repeats);
+  CHECK(d.noise_floor == doctest::Approx(std::sqrt(3.0) * kNoise).epsilon(0.15));
+}
+
+TEST_CASE("diagnose does not take for noise what repeats show to be a gap") {
+  // Displaced poses, each by something of its own: no effect and no function of the joints describes that.
+  const Robot truth = light_arm();
+  auto poses = measured(truth, 80, 942);
+  std::mt19937_64 random(943);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  Table table(240);
+  const auto repeated = [&](const Column& column, double own, double noise) {
+    std::vector<double> values;
+    for (std::size_t pose = 0; pose < 80; ++pose) {
+      const double displaced = column[pose] + own * normal(random);
+      for (int k = 0; k < 3; ++k) values.push_back(displaced + noise * normal(random));
+    }
+    return table.add(values);
+  };
+  for (const Column& column : poses->data.joints) table.data.joints.push_back(repeated(column, 0.0, 0.0));
+  for (int k = 0; k < 6; ++k) table.data.direction.push_back(table.add(std::vector<double>(240, 1.0)));
+  for (std::size_t k = 0; k < 3; ++k) table.data.position[k] = repeated(poses->data.position[k], 1.5e-4, 2e-5);
+  const Diagnosis d = diagnose(truth, table.data);
+  INFO(names(d));
+  CHECK(d.effects.empty());
+  CHECK(d.noise_from_repeats);
+  CHECK(d.noise_floor == doctest::Approx(std::sqrt(3.0) * 2e-5).epsilon(0.15));
+  CHECK(d.verdict == Verdict::unknown);
+  REQUIRE(d.unknown.size() == 1);
+  CHECK(d.unknown[0].joint.empty());
+  CHECK(d.unknown[0].inputs.empty());
+  CHECK(d.unknown[0].probability > 0.9);
+  CHECK(d.sentence.find("No gap") == std::string::npos);
+  CHECK(d.sentence.find("Repeats show a noise of") != std::string::npos);
+}
+
+TEST_CASE("diagnose says the noise in metres, whatever the rows say of theirs") {
+  Robot truth = light_arm();
+  truth.effects = {backlash("J3", 8e-4)};
+  auto table = measured(truth, 120, 945);
+  const Diagnosis plain = diagnose(light_arm(), table->data);
+  const auto same = [&](const Diagnosis& d) {
+    INFO(names(d));
+    CHECK(d.noise_floor == doctest::Approx(plain.noise_floor).epsilon(0.03));
+    CHECK(d.closable == doctest::Approx(plain.closable).epsilon(0.03));
+    REQUIRE(!d.detectable.empty());
+    REQUIRE(d.detectable.size() == plain.detectable.size());
+    CHECK(d.detectable[0].size == doctest::Approx(plain.detectable[0].size).epsilon(0.03));
+    CHECK(d.detectable[0].size_at_tip == doctest::Approx(plain.detectable[0].size_at_tip).epsilon(0.03));
+  };
+  table->data.weight = table->add(std::vector<double>(120, 4.0));
+  same(diagnose(light_arm(), table->data));
+  table->data.weight = {};
+  table->data.position_sigma = table->add(std::vector<double>(120, 2e-5));
+  same(diagnose(light_arm(), table->data));
+}
+
+TEST_CASE("diagnose is not misled by gross outliers or a wandering frame") {
+  auto table = measured(light_arm(), 120, 950);
+  std::mt19937_64 random(951);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::vector<double> values(120);
+    for (std::size_t row = 0; row < 120; ++row)
+      values[row] = table->data.position[k][row] + (row % 40 == 7 ? 5e-3 * normal(random) : 0.0);
+    table->data.position[k] = table->add(values);
+  }
+  const Diagnosis outliers = diagnose(light_arm(), table->data);
+  INFO(names(outliers));
+  CHECK(outliers.verdict == Verdict::none);
+
+  table = measured(light_arm(), 150, 960);
+  std::vector<double> time(150);
+  for (std::size_t row = 0; row < 150; ++row) time[row] = 20.0 * static_cast<double>(row);
+  table->data.time = table->add(time);
+  for (std::size_t k = 0; k < 3; ++k) {  // a random walk of the frame
+    std::vector<double> values(150);
+    double at = 0.0;
+    for (std::size_t row = 0; row < 150; ++row)
+      values[row] = table->data.position[k][row] + (at += 2e-5 * normal(random));
+    table->data.position[k] = table->add(values);
+  }
+  const Diagnosis wandering = diagnose(light_arm(), table->data);
+  INFO(names(wandering));
+  REQUIRE(wandering.effects.size() == 1);
+  CHECK(wandering.effects[0].effect == "drift");
+  CHECK(wandering.unknown.empty());
+}
+
+TEST_CASE("diagnose searches a part of many poses and judges all of them") {
+  Robot truth = light_arm();
+  truth.effects = {backlash("J3", 8e-4)};
+  const auto table = measured(truth, 300, 970);
+  DiagnoseOptions options;
+  options.search_poses = 120;
+  const Diagnosis d = diagnose(light_arm(), table->data, options);
+  INFO(names(d));
+  CHECK(names(d) == "backlash J3; ");
+  CHECK(d.error_after.size() == 300);
+  CHECK(d.gap.n == 60);
+  CHECK(std::any_of(d.warnings.begin(), d.warnings.end(),
+                    [](const std::string& w) { return w.find("120 of 300") != std::string::npos; }));
+}

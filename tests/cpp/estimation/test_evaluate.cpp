@@ -1,0 +1,279 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// The kernel and what feeds it: against the plain forward kinematics, against central differences, copy against copy.
+
+#include <doctest/doctest.h>
+
+#include <numeric>
+
+#include "estimation/evaluate.hpp"
+#include "support/arms.hpp"
+
+using namespace arms;
+using truing::kernel::Functions;
+
+namespace {
+
+std::vector<std::int32_t> all_rows(const Measurements& data) {
+  std::vector<std::int32_t> rows(data.rows);
+  std::iota(rows.begin(), rows.end(), 0);
+  return rows;
+}
+
+std::vector<int> all_parameters(const model::Model& model) {
+  std::vector<int> free(model.parameters.size());
+  std::iota(free.begin(), free.end(), 0);
+  return free;
+}
+
+/// Residual and dense Jacobian of all rows, in order of tiles.
+void dense(const estimation::Evaluator& evaluator, const Eigen::VectorXd& values, const estimation::Weighing& weighing,
+           Eigen::VectorXd* r, Eigen::MatrixXd* j) {
+  const auto p = static_cast<Eigen::Index>(evaluator.free().size());
+  r->resize(static_cast<Eigen::Index>(evaluator.components()));
+  if (j) j->resize(r->size(), p);
+  Eigen::Index at = 0;
+  for (int tile = 0; tile < evaluator.tile_count(); ++tile) {
+    const Eigen::Index n = evaluator.tile_rows(tile) * evaluator.tile_components(tile);
+    Eigen::VectorXd tile_r(n);
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> tile_j(n, p);
+    evaluator.tile(tile, values, weighing, tile_r.data(), j ? tile_j.data() : nullptr);
+    r->segment(at, n) = tile_r;
+    if (j) j->middleRows(at, n) = tile_j;
+    at += n;
+  }
+}
+
+const std::vector<truing::EffectRequest> kEffects = {{"backlash", {}}, {"harmonic", {}}, {"joint_compliance", {}}};
+
+std::vector<truing::EffectRequest> effects_for(const Robot& robot) {
+  return robot.joints[0].mass ? kEffects : std::vector<truing::EffectRequest>{{"backlash", {}}, {"harmonic", {}}};
+}
+
+void add_directions(Table* table, unsigned seed) {
+  std::mt19937_64 random(seed);
+  for (std::size_t k = 0; k < table->data.joints.size(); ++k) {
+    std::vector<double> dir(table->data.rows);
+    for (double& d : dir) d = random() & 1 ? 1.0 : -1.0;
+    table->data.direction.push_back(table->add(dir));
+  }
+}
+
+/// Columns of every parameter of `near` with `effects`, against central differences.
+void check_columns(const Robot& near, const Measurements& data, const std::vector<truing::EffectRequest>& effects) {
+  const model::Model model = model::make_model(near, data, effects);
+  const auto bases = estimation::make_bases(model, data);
+  const estimation::Evaluator evaluator(model, data, bases, estimation::make_segments(data, all_rows(data)),
+                                        all_parameters(model), 1);
+  Eigen::VectorXd values = model::initial_values(model);
+  for (Eigen::Index k = 0; k < values.size(); ++k) {  // effects and orientation corrections away from zero
+    const bool per_torque = model.parameters[static_cast<std::size_t>(k)].unit.find("Nm") != std::string::npos;
+    if (values[k] == 0.0) values[k] = (per_torque ? 1e-7 : 1e-3) * static_cast<double>(k % 7 - 3);
+  }
+  estimation::Weighing weighing;
+  Eigen::VectorXd r, plus, minus;
+  Eigen::MatrixXd j;
+  dense(evaluator, values, weighing, &r, &j);
+  for (std::size_t k = 0; k < model.parameters.size(); ++k) {
+    const bool per_torque =
+        model.parameters[k].unit.find("Nm") != std::string::npos;  // torques are up to thousands of Nm
+    const double step = per_torque ? 1e-8 : 1e-5;
+    Eigen::VectorXd moved = values;
+    moved[static_cast<Eigen::Index>(k)] += step;
+    dense(evaluator, moved, weighing, &plus, nullptr);
+    moved[static_cast<Eigen::Index>(k)] -= 2.0 * step;
+    dense(evaluator, moved, weighing, &minus, nullptr);
+    const Eigen::VectorXd difference = (plus - minus) / (2.0 * step);
+    const double size = std::max(1.0, difference.cwiseAbs().maxCoeff());
+    INFO(model.parameters[k].name);
+    CHECK((difference - j.col(static_cast<Eigen::Index>(k))).cwiseAbs().maxCoeff() < (per_torque ? 2e-7 : 2e-8) * size);
+  }
+}
+
+void check_jacobian(const Robot& robot, What what, unsigned seed) {
+  CAPTURE(robot.name);
+  CAPTURE(static_cast<int>(what));
+  Robot truth = robot;
+  truth.T_measurement_base = somewhere();
+  truth.anchor = truing::Anchor{{1.0, 2.0, -0.5}, 0.3};
+  auto table = random_joints(truth, 70, seed);  // one full tile and a part of another
+  add_directions(table.get(), seed + 1);
+  measure(table.get(), truth, what, 0.0, seed + 2);
+  check_columns(perturbed(truth, 1e-3, 1e-3, seed + 3), table->data, effects_for(robot));
+}
+
+}  // namespace
+
+TEST_CASE("predictions equal the plain forward kinematics") {
+  for (Robot robot : {ur10(), palletizer(), rail_arm(), urdf_arm()}) {
+    CAPTURE(robot.name);
+    robot.T_measurement_base = somewhere();
+    robot.joints[1].ratio = 1.001;
+    robot.joints[1].offset = 0.02;
+    robot.joints[2].beta = robot.convention == Convention::urdf ? 0.0 : 0.01;
+    const auto table = random_joints(robot, 101, 11);
+    const truing::Prediction p = truing::predict(robot, table->data);
+    for (std::size_t row = 0; row < table->data.rows; ++row) {
+      Eigen::VectorXd q(static_cast<Eigen::Index>(table->data.joints.size()));
+      for (Eigen::Index k = 0; k < q.size(); ++k) q[k] = table->data.joints[static_cast<std::size_t>(k)][row];
+      const Eigen::Isometry3d T = truing::forward_kinematics(robot, q).back();
+      const auto i = static_cast<Eigen::Index>(row);
+      CHECK((p.position.row(i).transpose() - T.translation()).norm() < 2e-15 * 20);
+      const Eigen::Quaterniond expected(T.rotation()),
+          got(p.orientation(i, 0), p.orientation(i, 1), p.orientation(i, 2), p.orientation(i, 3));
+      CHECK(expected.angularDistance(got) < 1e-7);
+    }
+  }
+}
+
+TEST_CASE("the Jacobian of every parameter and effect agrees with central differences") {
+  for (const Robot& robot : {ur10(), palletizer(), rail_arm(), urdf_arm()}) {
+    check_jacobian(robot, What::position, 21);
+    check_jacobian(robot, What::pose, 22);
+    check_jacobian(robot, What::distance, 23);
+  }
+}
+
+TEST_CASE("an effect on the targets has a column that is right for the rows of each") {
+  for (const What what : {What::position, What::pose}) {
+    Robot truth = ur10();
+    truth.targets.push_back({"elbow", truing::frame_from_xyz_rpy({0.2, 0.1, -0.3}, {0.4, 0.5, 0.6})});
+    truth.T_measurement_base = somewhere();
+    auto table = random_joints(truth, 80, 24);
+    for (std::int32_t row = 0; row < 80; ++row) table->data.target.push_back(row % 2);
+    measure(table.get(), truth, what, 0.0, 25);
+    check_columns(perturbed(truth, 1e-3, 1e-3, 26), table->data, {{"scale", {}}});
+  }
+}
+
+TEST_CASE("a passive joint inherits the corrections of its drivers") {
+  const Robot robot = palletizer();
+  const auto table = random_joints(robot, 5, 31);
+  const model::Model model = model::make_model(robot, table->data);
+  // k2 and the zero of joint 2 act through A2 and, with opposite sign, through A4.
+  for (const char* name : {"J2.ratio", "J2.offset"}) {
+    const model::ParameterInfo& info = model.parameters[model.parameter_index(name)];
+    REQUIRE(info.columns.size() == 1);
+    CHECK(info.columns[0].sites.size() == 2);
+    CHECK(info.columns[0].sites[0].second == 1.0);
+    CHECK(info.columns[0].sites[1].second == -1.0);
+  }
+}
+
+TEST_CASE("residuals are zero at the truth") {
+  for (Robot truth : {ur10(), palletizer(), rail_arm(), urdf_arm()}) {
+    truth.T_measurement_base = somewhere();
+    truth.anchor = truing::Anchor{{1.0, 2.0, -0.5}, 0.3};
+    for (const What what : {What::position, What::pose, What::distance}) {
+      auto table = random_joints(truth, 60, 41);
+      measure(table.get(), truth, what, 0.0, 1);
+      const truing::Residuals r = truing::residuals(truth, table->data);
+      if (what == What::distance) {
+        CHECK(r.distance.cwiseAbs().maxCoeff() < 1e-14);
+      } else {
+        CHECK(r.position.cwiseAbs().maxCoeff() < 1e-14);
+      }
+      if (what == What::pose) CHECK(r.rotation.cwiseAbs().maxCoeff() < 1e-14);
+    }
+  }
+}
+
+TEST_CASE("one and two threads give the same bits") {
+  Robot truth = ur10();
+  auto table = random_joints(truth, 20000, 51);
+  measure(table.get(), truth, What::position, 1e-4, 52);
+  const model::Model model = model::make_model(truth, table->data);
+  const auto bases = estimation::make_bases(model, table->data);
+  estimation::NormalEquations one, two;
+  for (const int threads : {1, 2}) {
+    const estimation::Evaluator evaluator(model, table->data, bases,
+                                          estimation::make_segments(table->data, all_rows(table->data)),
+                                          all_parameters(model), threads);
+    evaluator.normal_equations(model::initial_values(model), estimation::Weighing{}, threads == 1 ? &one : &two);
+  }
+  CHECK(one.gram == two.gram);
+  CHECK(one.gradient == two.gradient);
+  CHECK(one.cost == two.cost);
+}
+
+TEST_CASE("the streamed Gram equals the dense product") {
+  Robot truth = palletizer();
+  auto table = random_joints(truth, 500, 61);
+  add_directions(table.get(), 62);
+  measure(table.get(), truth, What::pose, 1e-4, 63);
+  const model::Model model = model::make_model(truth, table->data, kEffects);
+  const auto bases = estimation::make_bases(model, table->data);
+  const estimation::Evaluator evaluator(model, table->data, bases,
+                                        estimation::make_segments(table->data, all_rows(table->data)),
+                                        all_parameters(model), 1);
+  for (const auto loss : {truing::kernel::RowLoss::none, truing::kernel::RowLoss::huber,
+                          truing::kernel::RowLoss::cauchy, truing::kernel::RowLoss::tukey}) {
+    estimation::Weighing weighing;
+    weighing.loss = loss;
+    weighing.loss_scale = 2e-4;
+    estimation::NormalEquations normal;
+    evaluator.normal_equations(model::initial_values(model), weighing, &normal);
+    Eigen::VectorXd r;
+    Eigen::MatrixXd j;
+    dense(evaluator, model::initial_values(model), weighing, &r, &j);
+    const Eigen::MatrixXd gram = j.transpose() * j;
+    CHECK((normal.gram - gram).cwiseAbs().maxCoeff() < 1e-12 * gram.cwiseAbs().maxCoeff());
+    CHECK((normal.gradient - j.transpose() * r).cwiseAbs().maxCoeff() < 1e-12 * gram.cwiseAbs().maxCoeff());
+    CHECK(normal.squares == doctest::Approx(r.squaredNorm()).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("every copy of the kernel agrees with the scalar one") {
+  const int columns = 13, length = 96;
+  std::mt19937_64 random(71);
+  std::vector<double> c(static_cast<std::size_t>(columns * length));
+  for (double& v : c) v = static_cast<double>(random() >> 11) * 0x1.0p-53 - 0.5;
+  std::vector<double> expected(columns * columns, 0.0);
+  for (int j = 0; j < columns; ++j) {
+    for (int i = 0; i <= j; ++i) {
+      for (int k = 0; k < length; ++k) expected[j * columns + i] += c[i * length + k] * c[j * length + k];
+    }
+  }
+  for (const char* name : {"scalar", "sse2", "avx2", "avx512"}) {
+    const Functions* f = truing::kernel::functions(name);
+    if (!f) continue;
+    CAPTURE(name);
+    // Gram of an odd number of columns.
+    std::vector<double> acc(f->gram_size(columns), 0.0), out(columns * columns, 0.0);
+    f->gram_add(c.data(), length, columns, length, acc.data());
+    f->gram_reduce(acc.data(), columns, out.data());
+    for (int j = 0; j < columns; ++j) {
+      for (int i = 0; i <= j; ++i)
+        CHECK(out[j * columns + i] == doctest::Approx(expected[j * columns + i]).epsilon(1e-13));
+    }
+    // Sine and cosine, through a chain of one rotation about z and a step along x: also where the quadrant changes, and
+    // many turns away.
+    using namespace truing::kernel;
+    const Step steps[2] = {{Code::rotate, 0, 0, {0, 1, 0}, {0, 1, 0}}, {Code::translate, -1, 0, {3, 0, 0}, {3, 0, 0}}};
+    const double constants[1] = {1.0}, start[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    const int slots_at_start[4] = {0, 1, 2, 3};
+    Program program{};
+    program.kind = Kind::position;
+    program.steps = steps;
+    program.step_count = 2;
+    program.constants = constants;
+    program.start_slots = slots_at_start;
+    program.start_vectors = start;
+    program.start_count = 4;
+    std::copy(slots_at_start, slots_at_start + 4, program.tip_slots);
+    program.position_scale = program.rotation_scale = 1.0;
+    std::vector<double> values(kTilePoses), measured(3 * kTilePoses, 0.0), residual(3 * kTilePoses), slots(256);
+    for (int i = 0; i < kTilePoses; ++i) values[i] = i < 20 ? (i - 10) * M_PI / 4 : (i - 30) * 137.3;
+    Tile tile{};
+    tile.values = values.data();
+    tile.measured = measured.data();
+    tile.slots = slots.data();
+    tile.jacobian = tile.residual = residual.data();
+    f->evaluate(program, tile);
+    for (int i = 0; i < kTilePoses; ++i) {
+      CHECK(std::abs(residual[i] - std::cos(values[i])) < 3e-16);
+      CHECK(std::abs(residual[kTilePoses + i] - std::sin(values[i])) < 3e-16);
+    }
+  }
+}
