@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """truing's hand-eye calibration beside OpenCV's seven, on the same scenes in one run.
 
-    python bench/handeye.py [--quick] [--only accuracy,images,...] [--write docs/benchmarks-handeye.md]
+    python bench/handeye.py [--quick] [--only accuracy,images,...] [--write docs/benchmarks/handeye.md]
 
 Needs OpenCV 4 (`pip install "opencv-python-headless<5"`: 5.0 has no calibrateHandEye in Python). `--write`
 puts the tables between the markers of the page.

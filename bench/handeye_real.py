@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hand-eye calibration of two recorded set-ups: the section of docs/real-data.md between its markers.
+"""Hand-eye calibration of two recorded set-ups: the section of docs/benchmarks/real-robots.md between its markers.
 
     python bench/handeye_real.py [--data FOLDER]
 
@@ -128,7 +128,7 @@ def section(folder: Path) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--data", type=Path, required=True, help="folder with a subfolder for each recording")
-    parser.add_argument("--page", type=Path, default=ROOT / "docs/real-data.md")
+    parser.add_argument("--page", type=Path, default=ROOT / "docs/benchmarks/real-robots.md")
     args = parser.parse_args()
     text = args.page.read_text(encoding="utf-8")
     if BEGIN not in text:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 """Calibrates recorded measurements of real robots and writes what is left on poses that were held out:
-docs/real-data.md.
+docs/benchmarks/real-robots.md.
 
     python bench/real_data.py [--data FOLDER]
 
@@ -591,7 +591,7 @@ def main() -> None:
     parser.add_argument(
         "--data", type=Path, default=default_folder(), help="folder with a subfolder for each recording"
     )
-    parser.add_argument("--page", type=Path, default=ROOT / "docs/real-data.md")
+    parser.add_argument("--page", type=Path, default=ROOT / "docs/benchmarks/real-robots.md")
     args = parser.parse_args()
     if not args.data.is_dir():
         sys.exit(f"there is no folder {args.data}: give --data, or set TRUING_REALDATA")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Times truing and its peers in one run, and writes what came out: bench/results.json and docs/benchmarks.md.
+"""Times truing and its peers in one run, and writes what came out: bench/results.json and docs/benchmarks/identify.md.
 
     scripts/bench.sh [--quick]       # builds everything, then calls this
 
@@ -448,7 +448,7 @@ def markdown(
         (
             "The robot is a UR10: modified DH with Hayati's beta, base and tool unknown. Times are the best"
             " of several runs, ours, and those of peers that take less than a second. Files, peers and their"
-            " fairness: [bench/peers](../bench/peers/README.md)."
+            " fairness: [bench/peers](../../bench/peers/README.md)."
         ),
         "",
         "## What we set out to reach",
@@ -541,7 +541,7 @@ def main() -> None:
     parser.add_argument("--timeout", type=float, default=600, help="limit for one peer [s]")
     parser.add_argument("--rows", type=int, default=1_000_000, help="of the CSV")
     parser.add_argument("--results", type=Path, default=HERE / "results.json")
-    parser.add_argument("--page", type=Path, default=ROOT / "docs/benchmarks.md")
+    parser.add_argument("--page", type=Path, default=ROOT / "docs/benchmarks/identify.md")
     args = parser.parse_args()
     if not args.cpp.exists():
         raise SystemExit(f"{args.cpp} is missing: run scripts/bench.sh, which builds it")

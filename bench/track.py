@@ -3,7 +3,7 @@
 """Puts what `bench_track` prints into a page.
 
     (bench_track 5 100 gentle 8 101; bench_track 5 100 stop 8 101) | python bench/track.py --write
-    docs/benchmarks-track.md
+    docs/benchmarks/track.md
 
 Reads the output of one run or of several from standard input; `--write` puts the tables between the markers
 of the page, without it they are printed.

@@ -21,7 +21,7 @@
 namespace truing {
 
 /// Inverse kinematics: joint readings that bring a target of the robot, nominal or calibrated and with its effects, to
-/// where it is wanted. docs/inverse.md has the method.
+/// where it is wanted. docs/method/inverse.md has the method.
 
 /// So many driven joints a robot may have here: what is computed per solve stands on the stack.
 constexpr int kMaxDrivenJoints = 16;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Where the gap lies, which effect causes it, how far it shrinks. The procedure is that of docs/diagnose.md, section by
-// section.
+// Where the gap lies, which effect causes it, how far it shrinks. The procedure is that of docs/method/diagnose.md,
+// section by section.
 
 #include "truing/diagnose.hpp"
 

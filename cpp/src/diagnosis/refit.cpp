@@ -41,7 +41,7 @@ Share percentile_interval(std::vector<double> values, double center) {
   Share out{center, center, center};
   if (values.size() < 5) return out;
   // Folds are few and whole: their spread is a little less than that of poses (measured by the examination,
-  // docs/exam.md).
+  // docs/method/exam.md).
   constexpr double kWider = 1.25;
   const double median = quantile(&values, 0.5);
   out.low = center + kWider * (quantile(&values, 0.05) - median);

@@ -161,7 +161,7 @@ double came_back(const Work& work, const Resampled& resampled, const Sureness& s
 
 /// Stated confidence from what it rests on: the posterior of the class, how often resampled poses bring it back, and
 /// what is lost without it. Mapped so that it says how often such names were right on development sets of the
-/// examination (docs/exam.md).
+/// examination (docs/method/exam.md).
 double calibrated(double posterior, double came_back, double removal_loss) {
   const double score = 0.45 * posterior + 0.35 * came_back + 0.2 * std::min(removal_loss, 40.0) / 40.0;
   constexpr double kMap[6][2] = {{0.0, 0.05}, {0.5, 0.3}, {0.7, 0.64}, {0.9, 0.74}, {0.975, 0.8}, {0.998, 0.95}};

@@ -3,7 +3,7 @@
 """Recorded measurements of real robots: as good as the baseline on held-out poses, and not taken in by what
 is wrong with them.
 
-The recordings are not part of the repository (docs/real-data.md says where they are from). Set
+The recordings are not part of the repository (docs/benchmarks/real-robots.md says where they are from). Set
 TRUING_REALDATA to their folder.
 """
 

@@ -3,7 +3,7 @@
 """Tracking on recorded streams: clocks and frames found without being told, predictions no worse than the
 best of the simpler ways.
 
-The recordings are not part of the repository (docs/real-data.md says where they are from). Set
+The recordings are not part of the repository (docs/benchmarks/real-robots.md says where they are from). Set
 TRUING_REALDATA to their folder.
 """
 

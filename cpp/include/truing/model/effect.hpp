@@ -63,8 +63,8 @@ struct Effect {
   bool per_joint = true;  ///< false: `terms` is called once, with joint 0, and a request must not name joints
 };
 
-/// The effects that truing knows by name (docs/effects.md has their laws). gear_ratio, joint_offset, link_geometry,
-/// base_frame and tool_frame free parameters of the model itself and have no terms.
+/// The effects that truing knows by name (docs/reference/effects.md has their laws). gear_ratio, joint_offset,
+/// link_geometry, base_frame and tool_frame free parameters of the model itself and have no terms.
 const std::vector<Effect>& catalogue();
 
 /// Tooth meshing: cos and sin of `order` times the joint's angle; its name is "transmission_error@order", which

@@ -14,7 +14,7 @@ namespace truing {
 
 // What a TrackSetup is made of, from recordings. Test positions give the tracker's frame and the receiver; poses with
 // the tool tip on a point and with the tool in prescribed orientations give the tool; a recording of a motion gives
-// inertial sensor, gravity and clock. See docs/track.md.
+// inertial sensor, gravity and clock. See docs/method/track.md.
 
 // ---- Test positions -------------------------------------------------------------------------------------------------
 

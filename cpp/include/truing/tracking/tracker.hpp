@@ -16,7 +16,7 @@
 namespace truing {
 
 // Where the tool of a large, swaying arm will be: from an inertial sensor and a receiver of base-station signals on the
-// last link, encoders, and the plan. See docs/track.md.
+// last link, encoders, and the plan. See docs/method/track.md.
 
 /// What became of a sample. Refused samples leave everything as it was.
 enum class Outcome {
