@@ -27,6 +27,7 @@
 #include <string>
 #include <vector>
 
+#include "math/constants.hpp"
 #include "math/random.hpp"
 #include "truing/compensate.hpp"
 #include "truing/inverse.hpp"
@@ -37,8 +38,7 @@ namespace {
 using namespace truing;
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
-
-constexpr double kDegree = M_PI / 180;
+using math::kDegree;
 
 struct Arguments {
   std::string wanted;  ///< in the names of the tasks

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "math/constants.hpp"
 #include "support/arms.hpp"
 #include "truing/inverse.hpp"
 
@@ -20,8 +21,7 @@ using truing::Joints;
 using truing::Solution;
 using truing::Task;
 using truing::TaskKind;
-
-constexpr double kDegree = M_PI / 180;
+using truing::math::kDegree;
 
 /// An arm with a spherical wrist, axes 2 and 3 parallel, and limits beyond half a turn. DH.
 inline Robot wrist_arm() {

@@ -11,6 +11,7 @@
 #include "support/arms.hpp"
 
 using namespace arms;
+using namespace truing::estimation;
 using truing::kernel::Functions;
 
 namespace {
@@ -21,15 +22,15 @@ std::vector<std::int32_t> all_rows(const Measurements& data) {
   return rows;
 }
 
-std::vector<int> all_parameters(const model::Model& model) {
+std::vector<int> all_parameters(const Model& model) {
   std::vector<int> free(model.parameters.size());
   std::iota(free.begin(), free.end(), 0);
   return free;
 }
 
 /// Residual and dense Jacobian of all rows, in order of tiles.
-void dense(const estimation::Evaluator& evaluator, const Eigen::VectorXd& values, const estimation::Weighing& weighing,
-           Eigen::VectorXd* r, Eigen::MatrixXd* j) {
+void dense(const Evaluator& evaluator, const Eigen::VectorXd& values, const Weighing& weighing, Eigen::VectorXd* r,
+           Eigen::MatrixXd* j) {
   const auto p = static_cast<Eigen::Index>(evaluator.free().size());
   r->resize(static_cast<Eigen::Index>(evaluator.components()));
   if (j) j->resize(r->size(), p);
@@ -62,16 +63,15 @@ void add_directions(Table* table, unsigned seed) {
 
 /// Columns of every parameter of `near` with `effects`, against central differences.
 void check_columns(const Robot& near, const Measurements& data, const std::vector<truing::EffectRequest>& effects) {
-  const model::Model model = model::make_model(near, data, effects);
-  const auto bases = estimation::make_bases(model, data);
-  const estimation::Evaluator evaluator(model, data, bases, estimation::make_segments(data, all_rows(data)),
-                                        all_parameters(model), 1);
-  Eigen::VectorXd values = model::initial_values(model);
+  const Model model = make_model(near, data, effects);
+  const auto bases = make_bases(model, data);
+  const Evaluator evaluator(model, data, bases, make_segments(data, all_rows(data)), all_parameters(model), 1);
+  Eigen::VectorXd values = initial_values(model);
   for (Eigen::Index k = 0; k < values.size(); ++k) {  // effects and orientation corrections away from zero
     const bool per_torque = model.parameters[static_cast<std::size_t>(k)].unit.find("Nm") != std::string::npos;
     if (values[k] == 0.0) values[k] = (per_torque ? 1e-7 : 1e-3) * static_cast<double>(k % 7 - 3);
   }
-  estimation::Weighing weighing;
+  Weighing weighing;
   Eigen::VectorXd r, plus, minus;
   Eigen::MatrixXd j;
   dense(evaluator, values, weighing, &r, &j);
@@ -150,10 +150,10 @@ TEST_CASE("an effect on the targets has a column that is right for the rows of e
 TEST_CASE("a passive joint inherits the corrections of its drivers") {
   const Robot robot = palletizer();
   const auto table = random_joints(robot, 5, 31);
-  const model::Model model = model::make_model(robot, table->data);
+  const Model model = make_model(robot, table->data);
   // k2 and the zero of joint 2 act through A2 and, with opposite sign, through A4.
   for (const char* name : {"J2.ratio", "J2.offset"}) {
-    const model::ParameterInfo& info = model.parameters[model.parameter_index(name)];
+    const ParameterInfo& info = model.parameters[model.parameter_index(name)];
     REQUIRE(info.columns.size() == 1);
     CHECK(info.columns[0].sites.size() == 2);
     CHECK(info.columns[0].sites[0].second == 1.0);
@@ -183,14 +183,13 @@ TEST_CASE("one and two threads give the same bits") {
   Robot truth = ur10();
   auto table = random_joints(truth, 20000, 51);
   measure(table.get(), truth, What::position, 1e-4, 52);
-  const model::Model model = model::make_model(truth, table->data);
-  const auto bases = estimation::make_bases(model, table->data);
-  estimation::NormalEquations one, two;
+  const Model model = make_model(truth, table->data);
+  const auto bases = make_bases(model, table->data);
+  NormalEquations one, two;
   for (const int threads : {1, 2}) {
-    const estimation::Evaluator evaluator(model, table->data, bases,
-                                          estimation::make_segments(table->data, all_rows(table->data)),
-                                          all_parameters(model), threads);
-    evaluator.normal_equations(model::initial_values(model), estimation::Weighing{}, threads == 1 ? &one : &two);
+    const Evaluator evaluator(model, table->data, bases, make_segments(table->data, all_rows(table->data)),
+                              all_parameters(model), threads);
+    evaluator.normal_equations(initial_values(model), Weighing{}, threads == 1 ? &one : &two);
   }
   CHECK(one.gram == two.gram);
   CHECK(one.gradient == two.gradient);
@@ -202,21 +201,20 @@ TEST_CASE("the streamed Gram equals the dense product") {
   auto table = random_joints(truth, 500, 61);
   add_directions(table.get(), 62);
   measure(table.get(), truth, What::pose, 1e-4, 63);
-  const model::Model model = model::make_model(truth, table->data, kEffects);
-  const auto bases = estimation::make_bases(model, table->data);
-  const estimation::Evaluator evaluator(model, table->data, bases,
-                                        estimation::make_segments(table->data, all_rows(table->data)),
-                                        all_parameters(model), 1);
+  const Model model = make_model(truth, table->data, kEffects);
+  const auto bases = make_bases(model, table->data);
+  const Evaluator evaluator(model, table->data, bases, make_segments(table->data, all_rows(table->data)),
+                            all_parameters(model), 1);
   for (const auto loss : {truing::kernel::RowLoss::none, truing::kernel::RowLoss::huber,
                           truing::kernel::RowLoss::cauchy, truing::kernel::RowLoss::tukey}) {
-    estimation::Weighing weighing;
+    Weighing weighing;
     weighing.loss = loss;
     weighing.loss_scale = 2e-4;
-    estimation::NormalEquations normal;
-    evaluator.normal_equations(model::initial_values(model), weighing, &normal);
+    NormalEquations normal;
+    evaluator.normal_equations(initial_values(model), weighing, &normal);
     Eigen::VectorXd r;
     Eigen::MatrixXd j;
-    dense(evaluator, model::initial_values(model), weighing, &r, &j);
+    dense(evaluator, initial_values(model), weighing, &r, &j);
     const Eigen::MatrixXd gram = j.transpose() * j;
     CHECK((normal.gram - gram).cwiseAbs().maxCoeff() < 1e-12 * gram.cwiseAbs().maxCoeff());
     CHECK((normal.gradient - j.transpose() * r).cwiseAbs().maxCoeff() < 1e-12 * gram.cwiseAbs().maxCoeff());

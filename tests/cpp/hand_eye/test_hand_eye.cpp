@@ -24,8 +24,6 @@ using namespace truing::hand_eye;
 
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
-
 // Sanitizers look at memory, not at statistics, and take fifty times as long.
 #if defined(__SANITIZE_ADDRESS__)
 constexpr bool kSanitized = true;

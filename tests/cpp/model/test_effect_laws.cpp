@@ -13,6 +13,7 @@
 #include "support/arms.hpp"
 
 using namespace arms;
+using namespace truing::estimation;
 using truing::EffectRequest;
 
 namespace {
@@ -100,19 +101,19 @@ void for_every_effect_and_robot(const Law& law) {
 }
 
 /// How much the parameter must be to move its site by about `size` [rad | m].
-double value_that_moves(const model::Model& model, const std::vector<std::vector<double>>& bases,
-                        const std::string& parameter, double size) {
+double value_that_moves(const Model& model, const std::vector<std::vector<double>>& bases, const std::string& parameter,
+                        double size) {
   double most = 0.0;
-  for (const model::ColumnTerm& column : model.parameters[model.parameter_index(parameter)].columns) {
+  for (const ColumnTerm& column : model.parameters[model.parameter_index(parameter)].columns) {
     for (const double v : bases[column.term]) most = std::max(most, std::abs(v));
   }
   return most > 0.0 ? size / most : size;
 }
 
-std::vector<int> effect_parameters(const model::Model& model) {
+std::vector<int> effect_parameters(const Model& model) {
   std::vector<int> found;
   for (std::size_t k = 0; k < model.parameters.size(); ++k) {
-    if (model.parameters[k].role == model::Role::effect) found.push_back(static_cast<int>(k));
+    if (model.parameters[k].role == Role::effect) found.push_back(static_cast<int>(k));
   }
   return found;
 }
@@ -120,12 +121,12 @@ std::vector<int> effect_parameters(const model::Model& model) {
 /// The robot with these effects, every parameter such that it moves its sites by about `size`, signs alternating.
 Robot with_effects(const Robot& robot, const Measurements& data, const std::vector<EffectRequest>& requests,
                    double size) {
-  const model::Model model = model::make_model(robot, data, requests);
-  const auto bases = estimation::make_bases(model, data);
-  Eigen::VectorXd values = model::initial_values(model);
+  const Model model = make_model(robot, data, requests);
+  const auto bases = make_bases(model, data);
+  Eigen::VectorXd values = initial_values(model);
   for (const int k : effect_parameters(model))
     values[k] = (k % 2 ? 1.0 : -1.0) * value_that_moves(model, bases, model.parameters[k].name, size);
-  return model::robot_with(model, values);
+  return robot_with(model, values);
 }
 
 std::string complaint(const EffectRequest& request, const Robot& robot, const Measurements& data) {
@@ -143,15 +144,15 @@ bool contains(const std::string& text, const std::string& part) { return text.fi
 
 TEST_CASE("law: every parameter has a unit, a name that starts with its effect's, and a site that exists") {
   for_every_effect_and_robot([](const std::string& name, const Robot& robot, Table* table) {
-    const model::Model model = model::make_model(robot, table->data, {{name, {}}});
+    const Model model = make_model(robot, table->data, {{name, {}}});
     const std::vector<int> parameters = effect_parameters(model);
     CHECK(!parameters.empty());
     for (const int k : parameters) {
-      const model::ParameterInfo& info = model.parameters[k];
+      const ParameterInfo& info = model.parameters[k];
       INFO(info.name);
       CHECK(!info.unit.empty());
       CHECK((info.name == name || info.name.compare(0, name.size() + 1, name + ".") == 0));
-      for (const model::ColumnTerm& column : info.columns) CHECK(!column.sites.empty());
+      for (const ColumnTerm& column : info.columns) CHECK(!column.sites.empty());
     }
   });
 }
@@ -160,15 +161,14 @@ TEST_CASE("law: the Jacobian agrees with central differences") {
   for_every_effect_and_robot([](const std::string& name, const Robot& robot, Table* table) {
     measure(table, perturbed(robot, 1e-3, 1e-3, 6), What::pose, 0.0, 7);
     const Robot start = with_effects(robot, table->data, {{name, {}}}, 1e-3);
-    const model::Model model = model::make_model(start, table->data);
-    const auto bases = estimation::make_bases(model, table->data);
+    const Model model = make_model(start, table->data);
+    const auto bases = make_bases(model, table->data);
     std::vector<std::int32_t> rows(table->data.rows);
     std::iota(rows.begin(), rows.end(), 0);
     const std::vector<int> free = effect_parameters(model);
-    const estimation::Evaluator evaluator(model, table->data, bases, estimation::make_segments(table->data, rows), free,
-                                          1);
-    const Eigen::VectorXd values = model::initial_values(model);
-    estimation::Weighing weighing;
+    const Evaluator evaluator(model, table->data, bases, make_segments(table->data, rows), free, 1);
+    const Eigen::VectorXd values = initial_values(model);
+    Weighing weighing;
     const auto p = static_cast<Eigen::Index>(free.size());
     for (int tile = 0; tile < evaluator.tile_count(); ++tile) {
       const Eigen::Index n = evaluator.tile_rows(tile) * evaluator.tile_components(tile);
@@ -176,7 +176,7 @@ TEST_CASE("law: the Jacobian agrees with central differences") {
       Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> j(n, p);
       evaluator.tile(tile, values, weighing, r.data(), j.data());
       for (Eigen::Index k = 0; k < p; ++k) {
-        const model::ParameterInfo& info = model.parameters[free[static_cast<std::size_t>(k)]];
+        const ParameterInfo& info = model.parameters[free[static_cast<std::size_t>(k)]];
         const double step = value_that_moves(model, bases, info.name, 1e-5);
         Eigen::VectorXd moved = values;
         moved[free[static_cast<std::size_t>(k)]] += step;
@@ -389,8 +389,8 @@ TEST_CASE("the weight on a vertical axis is none, not the rounding that is left 
   const auto table = random_joints(robot, 50, 95);
   for (const char* name : {"joint_compliance", "gravity_backlash", "stiffness_zones", "gravity_moment"}) {
     CAPTURE(name);
-    const model::Model model = model::make_model(robot, table->data, {{name, {"J1"}}});
-    for (const std::vector<double>& basis : estimation::make_bases(model, table->data)) {
+    const Model model = make_model(robot, table->data, {{name, {"J1"}}});
+    for (const std::vector<double>& basis : make_bases(model, table->data)) {
       for (const double v : basis) CHECK(v == 0.0);
     }
   }

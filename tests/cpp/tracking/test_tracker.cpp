@@ -49,8 +49,6 @@ constexpr bool kSanitized = true;
 constexpr bool kSanitized = false;
 #endif
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 SimulatedStreams boom(SimulatedMotion motion, std::uint64_t seed, double seconds) {
   StreamSimulationOptions options;
   options.motion = motion;
