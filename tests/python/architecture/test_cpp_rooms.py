@@ -112,7 +112,9 @@ def test_a_room_includes_only_those_below_it(file: str) -> None:
     if file == "rooms.hpp":
         return
     room = room_of(file)
-    assert room in ROOMS, f"{file} is in no room: give its folder a line, here and in docs/method/architecture.md"
+    assert room in ROOMS, (
+        f"{file} is in no room: give its folder a line, here and in docs/method/architecture.md"
+    )
     for bracket, name in includes(sources()[file]):
         if name in {"rooms.hpp", "kernel.hpp"}:
             continue

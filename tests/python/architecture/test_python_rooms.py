@@ -121,7 +121,9 @@ def test_a_module_imports_only_rooms_below_its_own(module: str, file: str) -> No
 
 def test_every_room_has_its_place() -> None:
     there = {file.split("/")[0].removesuffix(".py") for file in FILES} - {"__init__"}
-    assert there == set(ROOMS) - {"truing"}, "a new room gets its place here and in docs/method/architecture.md"
+    assert there == set(ROOMS) - {"truing"}, (
+        "a new room gets its place here and in docs/method/architecture.md"
+    )
 
 
 def test_rooms_do_not_import_in_a_circle() -> None:
