@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The table of formulas in docs/method/architecture.md: each function stands in the file that the table names."""
+"""The table of formulas in the architecture page: each function stands in the file that the table names."""
 
 from __future__ import annotations
 
