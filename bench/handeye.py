@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import truing
+from truing.hand_eye import Camera, HandEyePoses, HandEyeResult, handeye_closed_form
 from truing.testing import scenes as simulation
 from truing.testing.scenes import Board, HandEyeScene, simulate_handeye
 
@@ -54,11 +55,10 @@ class Found:
 Method = Callable[[HandEyeScene], Found]
 
 
-# ---- truing
-# ----------------------------------------------------------------------------------------------------------
+# ---- truing --------------------------------------------------------------------------------------
 
 
-def poses_of(scene: HandEyeScene, with_pixels: bool = False) -> truing.HandEyePoses:
+def poses_of(scene: HandEyeScene, with_pixels: bool = False) -> HandEyePoses:
     images = (
         [(scene.board.points, pixels) for pixels in scene.pixels]
         if with_pixels and scene.pixels is not None
@@ -67,17 +67,17 @@ def poses_of(scene: HandEyeScene, with_pixels: bool = False) -> truing.HandEyePo
     camera = None
     if images is not None:
         c = scene.camera
-        camera = truing.Camera(
+        camera = Camera(
             width=c.width, height=c.height, fx=c.fx, fy=c.fy, cx=c.cx, cy=c.cy, distortion=c.distortion
         )
-    return truing.HandEyePoses(scene.T_base_hand, scene.T_camera_board, images=images, camera=camera)
+    return HandEyePoses(scene.T_base_hand, scene.T_camera_board, images=images, camera=camera)
 
 
 class Refused(ValueError):
     pass
 
 
-def found_of(result: truing.HandEyeResult) -> Found:
+def found_of(result: HandEyeResult) -> Found:
     if result.status not in ("done", "not converged"):
         raise Refused(
             f'{result.status}, reading "{result.readings[0].name}"' if result.readings else result.status
@@ -95,10 +95,10 @@ def found_of(result: truing.HandEyeResult) -> Found:
 
 
 def ours_closed_form(scene: HandEyeScene) -> Found:
-    """truing.handeye_closed_form on scene.T_base_hand and scene.T_camera_board: the SVD, without a look at
+    """handeye_closed_form on scene.T_base_hand and scene.T_camera_board: the SVD, without a look at
     whether the loop closes.
     """
-    found = truing.handeye_closed_form(poses_of(scene), scene.setup)
+    found = handeye_closed_form(poses_of(scene), scene.setup)
     return Found(found.T_parent_camera, found.T_parent_board)
 
 
@@ -145,8 +145,7 @@ def ours_pixels(scene: HandEyeScene) -> Found:
     )
 
 
-# ---- Peers
-# -----------------------------------------------------------------------------------------------------------
+# ---- Peers ---------------------------------------------------------------------------------------
 
 HAND_EYE = {
     "Tsai": cv2.CALIB_HAND_EYE_TSAI,
@@ -238,8 +237,7 @@ def by_pnp(scene: HandEyeScene) -> HandEyeScene:
     return replace(scene, T_camera_board=np.array(seen))
 
 
-# ---- Running
-# ---------------------------------------------------------------------------------------------------------
+# ---- Running -------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -352,8 +350,7 @@ def note(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-# ---- Tables
-# ----------------------------------------------------------------------------------------------------------
+# ---- Tables --------------------------------------------------------------------------------------
 
 
 def accuracy(quick: bool) -> Iterator[str]:

@@ -15,6 +15,7 @@ import sys
 from pathlib import Path
 
 import truing
+from truing.hand_eye import HandEyeErrors, HandEyePoses, handeye_with_kinematics
 
 ROOT = Path(__file__).resolve().parent.parent
 BEGIN, END = "<!-- hand-eye: written by bench/handeye_real.py -->", "<!-- end of hand-eye -->"
@@ -24,7 +25,7 @@ HEADER = [
 ]
 
 
-def line(what: str, e: truing.HandEyeErrors) -> str:
+def line(what: str, e: HandEyeErrors) -> str:
     mm = " | ".join(
         f"{1e3 * value:.3f}" for value in (e.position_rms, e.position_mean, e.position_p95, e.position_max)
     )
@@ -43,7 +44,7 @@ def fr3(folder: Path) -> list[str]:
         if method == "closed-form":
             lines.append("| baseline, closed form | 8.342 | 7.670 | 12.269 | 16.365 | 0.633 | 35 |")
     lines.append("| baseline, least squares | 8.762 | 7.816 | 15.386 | 19.920 | 0.951 | 35 |")
-    both = truing.handeye_with_kinematics(robot, joints, data, loss="none")
+    both = handeye_with_kinematics(robot, joints, data, loss="none")
     assert both.test_after is not None
     lines += [
         line("truing, with kinematics", both.test_after),
@@ -55,13 +56,13 @@ def fr3(folder: Path) -> list[str]:
 def images(folder: Path) -> list[str]:
     data = truing.load_handeye(folder / "poses.csv", board="circles:10x10:25.4mm")
     poses = data.poses
-    plain = truing.HandEyePoses(
+    plain = HandEyePoses(
         poses.T_base_hand, poses.T_camera_board, set=poses.set, board_symmetries=poses.board_symmetries
     )
-    everything = truing.HandEyePoses(
+    everything = HandEyePoses(
         poses.T_base_hand, poses.T_camera_board, board_symmetries=poses.board_symmetries
     )
-    with_pixels = truing.HandEyePoses(
+    with_pixels = HandEyePoses(
         poses.T_base_hand,
         poses.T_camera_board,
         images=poses.images,

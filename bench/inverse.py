@@ -79,8 +79,7 @@ class Result:
     raw: dict[str, Any] = field(default_factory=dict)  # of truing.jsonl
 
 
-# ---- Judging
-# ---------------------------------------------------------------------------------------------------------
+# ---- Judging -------------------------------------------------------------------------------------
 
 
 class Oracle:
@@ -171,8 +170,7 @@ def judge(result: Result, chain: Chain, cases: Cases, answers: Floats) -> None:
         )
 
 
-# ---- Running
-# ---------------------------------------------------------------------------------------------------------
+# ---- Running -------------------------------------------------------------------------------------
 
 
 def note(text: str) -> None:
@@ -234,7 +232,7 @@ def judge_compensation(
 def run_peer(
     name: str, environment: Path, folder: Path, quick: bool, timeout: float
 ) -> tuple[list[Result], dict[str, str]]:
-    """Results, the peer's versions. A peer that cannot run has results without figures, whose notes say why."""
+    """Results, the peer's versions. A peer that cannot run has results without figures; notes say why."""
     python, out = environment.absolute() / "bin" / "python", folder / f"{name}.npz"
     cache = environment.absolute() / "share" / "inverse"
     reason = ""
@@ -288,8 +286,7 @@ def run_peer(
     return results, versions
 
 
-# ---- Tables
-# ----------------------------------------------------------------------------------------------------------
+# ---- Tables --------------------------------------------------------------------------------------
 
 
 def number(value: float) -> str:

@@ -7,7 +7,8 @@ docs/benchmarks/real-robots.md.
 
 FOLDER (default: $TRUING_REALDATA, else shared/data beside the checkout) holds a subfolder for each recording.
 What is
-missing is left out and said. tests/python/identification/test_real_data.py holds the same sets to the figures below.
+missing is left out and said. tests/python/identification/test_real_data.py holds the same sets to the figures
+below.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from typing import Any
 import numpy as np
 
 import truing
+from truing.identification import Identification
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import handeye_real
@@ -206,8 +208,7 @@ SOURCES = """\
 """
 
 
-# ---- Reading and fitting
-# ---------------------------------------------------------------------------------------------
+# ---- Reading and fitting -------------------------------------------------------------------------
 
 
 def default_folder() -> Path:
@@ -224,15 +225,15 @@ def load(folder: Path, recording: Recording) -> tuple[truing.Robot, truing.Measu
     return robot, data
 
 
-def fit(robot: truing.Robot, data: truing.Measurements, **options: Any) -> truing.Identification:
+def fit(robot: truing.Robot, data: truing.Measurements, **options: Any) -> Identification:
     return truing.identify(robot, data, raise_if_not_converged=False, **options)
 
 
-def on_test(found: truing.Identification) -> tuple[Figures, Figures]:
+def on_test(found: Identification) -> tuple[Figures, Figures]:
     """Before and after."""
     assert found.test is not None
 
-    def of(e: truing.ErrorStatistics) -> Figures:
+    def of(e: truing.common.ErrorStatistics) -> Figures:
         return Figures(
             1e3 * e.rms,
             1e3 * e.mean,
@@ -261,8 +262,7 @@ def summary(error: np.ndarray[Any, np.dtype[np.float64]]) -> Figures:
     )
 
 
-# ---- Fewer parameters
-# ------------------------------------------------------------------------------------------------
+# ---- Fewer parameters ----------------------------------------------------------------------------
 
 
 def hold_what_is_barely_seen(
@@ -295,7 +295,7 @@ def cross_validated_rms(
     train = np.flatnonzero(np.asarray(data.set) == 0)
     q, p, d = np.asarray(data.joints)[train], data.positions, data.distances
     columns = {"positions": None if p is None else p[train], "distances": None if d is None else d[train]}
-    groups = np.asarray(truing.pose_groups(data))[train]
+    groups = np.asarray(truing.model.pose_groups(data))[train]
     order = np.random.default_rng(seed).permutation(np.unique(groups))
     squares = 0.0
     for k in range(folds):
@@ -306,8 +306,7 @@ def cross_validated_rms(
     return float(np.sqrt(squares / len(train)))
 
 
-# ---- The page
-# --------------------------------------------------------------------------------------------------------
+# ---- The page ------------------------------------------------------------------------------------
 
 
 def cell(value: float, digits: int = 3) -> str:
@@ -321,7 +320,7 @@ def line(what: str, f: Figures, more: str = "| | |") -> str:
     )
 
 
-def rejected(found: truing.Identification) -> str:
+def rejected(found: Identification) -> str:
     out = len(found.rejected_rows)
     return f"{found.train.after.n} fitted" + (f", {out} rejected" if out else "")
 

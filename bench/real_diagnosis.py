@@ -24,11 +24,11 @@ from real_data import RECORDINGS, ROOT, Recording, default_folder, fit, load
 MOST = 6  # names in a cell
 
 
-def millimetres(statistics: truing.ErrorStatistics) -> str:
+def millimetres(statistics: truing.common.ErrorStatistics) -> str:
     return f"{1e3 * statistics.rms:.3f} / {1e3 * statistics.median:.3f} / {1e3 * statistics.p95:.3f}"
 
 
-def named(found: truing.Diagnosis) -> str:
+def named(found: truing.diagnosis.Diagnosis) -> str:
     names = [
         f"{effect.effect}{' ' + '+'.join(effect.joints) if 0 < len(effect.joints) <= 2 else ''}"
         f" ({effect.probability:.2f})"
@@ -39,7 +39,7 @@ def named(found: truing.Diagnosis) -> str:
     )
 
 
-def unknown(found: truing.Diagnosis) -> str:
+def unknown(found: truing.diagnosis.Diagnosis) -> str:
     said = [
         (
             f"{one.joint} over {' and '.join(one.inputs)}"

@@ -76,8 +76,7 @@ class Row:
         return self.value <= float(limit) if sign == "<=" else self.value >= float(limit)
 
 
-# ---- Running things
-# --------------------------------------------------------------------------------------------------
+# ---- Running things ------------------------------------------------------------------------------
 
 
 def processor() -> str:
@@ -170,8 +169,7 @@ def best_seconds(runs: int, work: Callable[[], Any]) -> float:
     return min(times)
 
 
-# ---- truing from Python
-# ----------------------------------------------------------------------------------------------
+# ---- truing from Python --------------------------------------------------------------------------
 
 
 def nominal_robot(data: dict[str, Any]) -> truing.Robot:
@@ -194,7 +192,7 @@ def time_python(data: dict[str, Any]) -> dict[str, Any]:
     """The peers' own data file, from NumPy arrays to the result with rank and covariance."""
     robot, q, p = nominal_robot(data), data["q_train"], data["p_train"]
 
-    def fit() -> truing.Identification:
+    def fit() -> truing.identification.Identification:
         return truing.identify(robot, truing.Measurements(q, positions=p), test_share=0.0)
 
     seconds = best_seconds(100, fit)
@@ -235,8 +233,7 @@ def time_csv(folder: Path, rows: int) -> dict[str, float]:
     return {"megabytes": megabytes, "seconds": seconds}
 
 
-# ---- The table
-# -------------------------------------------------------------------------------------------------------
+# ---- The table -----------------------------------------------------------------------------------
 
 
 def collect(

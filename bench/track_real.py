@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 import truing
 from truing.rotations import interpolated, quaternions_from_rotations, rotation_vectors
+from truing.tracking import InertialResult, ReplayResult, TrackCalibration, calibrate_inertial
 from truing.tracking.result import BASELINES, horizon_errors
 
 Floats = NDArray[np.float64]
@@ -47,7 +48,9 @@ def cut(data: Any, keep: NDArray[np.bool_]) -> Any:
     )
 
 
-def with_tracker(folder: Path) -> tuple[truing.TrackCalibration, list[dict[str, Any]], truing.ReplayResult]:
+def with_tracker(
+    folder: Path,
+) -> tuple[TrackCalibration, list[dict[str, Any]], ReplayResult]:
     """What was found on the first part, and errors of predictions on the rest."""
     robot = truing.load_robot(folder / "robot.yaml")
     imu, tracker, joints = (
@@ -92,16 +95,16 @@ def turned_alike(gyro: Floats, rates: Floats) -> tuple[Floats, Floats]:
     return R, gyro.mean(axis=0) - rates.mean(axis=0) @ R
 
 
-def without_tracker(folder: Path) -> tuple[truing.InertialResult, float, float, float]:
+def without_tracker(folder: Path) -> tuple[InertialResult, float, float, float]:
     """The inertial sensor against the flange of the encoders, which stands in for the tracker; then by
     turning rates alone: t_imu = t_joints - offset [s], rms of the gyro's misfit on the last
     part, and of the rates [rad/s]."""
     robot = truing.load_robot(folder / "robot.yaml")
     imu, joints = truing.load_imu(folder / "imu.csv"), truing.load_joints(folder / "joints.csv", robot)
-    flange = truing.flange_poses(robot, joints.joints)
+    flange = truing.model.flange_poses(robot, joints.joints)
     middle, rate = joints.t[0] + TRAINED * (joints.t[-1] - joints.t[0]), 100.0
     early = joints.t < middle
-    found = truing.calibrate_inertial(
+    found = calibrate_inertial(
         imu.t,
         imu.gyro,
         imu.accel,

@@ -285,7 +285,7 @@ SETS = {"branches": "pose", "one": "pose", "torch": "torch", "path": "path"}
 
 
 def run_solver(solver: Solver, cases: Cases, task: str, peer: Peer) -> tuple[Floats, Floats]:
-    """Seconds of the whole process, its other threads included, best of the runs (m,); answers of the first."""
+    """Seconds of the process, its other threads included, best of the runs (m,); answers of the first."""
     best, rows = np.full(len(cases.wanted), np.inf), []
     solver.call(
         *solver.arguments(cases.wanted[0], cases.seed[0])

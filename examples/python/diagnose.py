@@ -19,7 +19,7 @@ def measured(robot: truing.Robot, poses: int, seed: int) -> truing.Measurements:
     its model.
     """
     true = robot.copy()
-    true.effects = [truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 8e-4})]
+    true.effects = [truing.model.AppliedEffect("backlash", ["J3"], {"backlash.J3": 8e-4})]
     joints = truing.simulate(robot, poses=poses, seed=seed).data.joints
     random = np.random.default_rng(seed)
     directions = random.choice([-1.0, 1.0], size=joints.shape)

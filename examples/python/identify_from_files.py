@@ -21,7 +21,7 @@ def simulate_files(folder: Path) -> None:
     truing.save_measurements(folder / "measurements.csv", simulated.data, robot)
 
 
-def calibrate(folder: Path) -> truing.Identification:
+def calibrate(folder: Path) -> truing.identification.Identification:
     robot = truing.load_robot(folder / "robot.yaml")
     data = truing.load_measurements(folder / "measurements.csv", robot)
     found = truing.identify(robot, data)

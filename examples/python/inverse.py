@@ -8,6 +8,7 @@ import numpy as np
 
 import truing
 from truing.examples import example
+from truing.inverse_kinematics import InverseSolver, Task
 
 
 def main() -> None:
@@ -18,10 +19,10 @@ def main() -> None:
         for joint in nominal.joints
     ]
     real = nominal.replace(
-        joints=links, effects=[truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 3e-4})]
+        joints=links, effects=[truing.model.AppliedEffect("backlash", ["J3"], {"backlash.J3": 3e-4})]
     )
 
-    solver = truing.InverseSolver(real)
+    solver = InverseSolver(real)
     random = np.random.default_rng(1)
     low, high = (
         0.8 * np.array([getattr(joint, end) for joint in nominal.joints]) for end in ("lower", "upper")
@@ -33,12 +34,12 @@ def main() -> None:
         f"{int(found.reached.sum())} of {len(found)} poses reached, the worst to"
         f" {found.position_error.max():.1e} m"
     )
-    branches = solver.branches(truing.Task(poses[0]))
+    branches = solver.branches(Task(poses[0]))
     print(f"the first of them in {len(branches)} ways, and {branches.beyond_limits} beyond the limits")
 
     too_far = poses[0].copy()
     too_far[:3, 3] *= 3.0 / np.linalg.norm(too_far[:3, 3])
-    print("3 m away:", solver.describe(solver.solve(truing.Task(too_far))))
+    print("3 m away:", solver.describe(solver.solve(Task(too_far))))
 
     # A weld: the roll about the torch is whatever suits the arm.
     seam = np.tile(solver.forward([0.0, 0.4, 0.1, 0.0, 0.9, 0.0]), (100, 1, 1))

@@ -11,13 +11,13 @@ from truing.tracking.result import horizon_errors
 
 
 def main() -> None:
-    streams = truing.simulate_streams(
-        truing.large_boom(), seconds=20.0, motion="stop-and-go", tip_speed=0.8, seed=4
+    streams = truing.testing.simulate_streams(
+        truing.testing.large_boom(), seconds=20.0, motion="stop-and-go", tip_speed=0.8, seed=4
     )
     imu, poses, flange, plan = streams.imu, streams.tracker, streams.flange, streams.plan
 
     # Sample by sample: whatever has arrived is pushed, every hundredth of a second the tool is predicted.
-    tracker = truing.Tracker(streams.setup)
+    tracker = truing.tracking.Tracker(streams.setup)
     predictions = []
     done = {"tracker": 0, "flange": 0, "plan": 0}
     for k, arrival in enumerate(imu["arrival"]):

@@ -21,7 +21,7 @@ ARM = """<?xml version="1.0"?>
 
 
 def main() -> None:
-    robot = truing.robot_from_urdf(ARM, "base", "flange")
+    robot = truing.model.robot_from_urdf(ARM, "base", "flange")
     print("joints:", ", ".join(f"{joint.name} ({joint.type})" for joint in robot.joints))
 
     # 1 mm and 1 mrad of error in every joint origin and in the tool; poses measured to 0.05 mm and 0.1 mrad.
@@ -35,7 +35,7 @@ def main() -> None:
     # by name.
     print(f"{found.rank} of {found.columns} parameters found")
 
-    calibrated = truing.urdf_with_calibration(ARM, found.robot, "base", "flange")
+    calibrated = truing.model.urdf_with_calibration(ARM, found.robot, "base", "flange")
     print(
         "the elbow's origin is now",
         next(line.strip() for line in calibrated.split('name="elbow"')[1].splitlines() if "<origin" in line),

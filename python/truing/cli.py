@@ -30,18 +30,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from rich.console import Console
 
-    from truing import (
-        ClockOffset,
-        HandEyeData,
-        HandEyePoses,
-        InverseSolver,
-        Joint,
-        Measurements,
-        Robot,
-        Solution,
-        TargetData,
-        Task,
-    )
+    from truing import Joint, Measurements, Robot
+    from truing.files import HandEyeData, TargetData
+    from truing.hand_eye import ClockOffset, HandEyePoses
+    from truing.inverse_kinematics import InverseSolver, Solution, Task
     from truing.inverse_kinematics.result import Solved
 
 Result = TypeVar("Result")
@@ -761,8 +753,8 @@ def _stream_options(
         if len(parts) != 2:
             raise InputError(f"--dropout: found {text!r}, expected a time and how long, such as 20s:2s")
         dropouts.append((quantity(parts[0], "time", "--dropout"), quantity(parts[1], "time", "--dropout")))
-    tracker = truing.TrackerErrors(clock_offset=quantity(clock_offset, "time", "--clock-offset"))
-    return truing.StreamSimulationOptions(
+    tracker = truing.testing.TrackerErrors(clock_offset=quantity(clock_offset, "time", "--clock-offset"))
+    return truing.testing.StreamSimulationOptions(
         seconds=quantity(seconds, "time", "--seconds"),
         motion=motion.value,
         tip_speed=speed,
@@ -784,7 +776,7 @@ def _simulate_stream(
         def work() -> Any:
             import truing
 
-            return truing.simulate_streams(model, options)
+            return truing.testing.simulate_streams(model, options)
 
         streams = _busy("simulating", work)
         with atomic_output_dir(folder) as temporary, _progress("writing"):
@@ -1275,7 +1267,7 @@ def handeye(
                 f"{poses}: has joints q1 to q{data.joints.shape[1]}, but {with_kinematics} has"
                 f" {robot.driven_count} driven joints"
             )
-        options = truing.handeye_options(data, **keywords)
+        options = truing.hand_eye.handeye_options(data, **keywords)
 
         def work() -> Any:
             from truing.hand_eye.result import Solved
@@ -1283,7 +1275,7 @@ def handeye(
             found = truing.handeye(data, **keywords, raise_if_undecided=False)
             both = None
             if robot is not None and data.joints is not None and found.status == "done":
-                both = truing.handeye_with_kinematics(
+                both = truing.hand_eye.handeye_with_kinematics(
                     robot,
                     data.joints,
                     data,
@@ -1294,7 +1286,7 @@ def handeye(
                     seed=seed,
                 )
             following = (
-                truing.handeye_plan(data, found, options=options, count=plan, seed=seed)
+                truing.hand_eye.handeye_plan(data, found, options=options, count=plan, seed=seed)
                 if plan and found.status == "done"
                 else ()
             )
@@ -1636,10 +1628,10 @@ def ik(
             raise InputError(f"{targets}: --all-branches is for full poses, but its column task holds others")
         start = _seed_joints(seed, model, data)
         of_path = data.path_conditions() if path else None
-        options = truing.InverseOptions(
-            choose=choose.value, scene=truing.Scene() if scene is None else load_scene(scene, model)
+        options = truing.inverse_kinematics.InverseOptions(
+            choose=choose.value, scene=truing.model.Scene() if scene is None else load_scene(scene, model)
         )
-        solver = truing.InverseSolver(
+        solver = truing.inverse_kinematics.InverseSolver(
             model, options, data.conditions[0] if data.conditions else None, target=index
         )
 
@@ -1648,7 +1640,7 @@ def ik(
 
             every = np.arange(data.count)
             if path:
-                steps = truing.PathOptions(longest_turn=turn, longest_slide=slide)
+                steps = truing.inverse_kinematics.PathOptions(longest_turn=turn, longest_slide=slide)
                 first = start if start is None or start.ndim == 1 else start[0]
                 found = solver.path(data.tasks, first, steps, of_path, progress=progress)
                 return Solved(data, solver, list(found.solutions), every, path=found, steps=steps)
@@ -1766,13 +1758,13 @@ def compensate(
         start = None if data.is_program else _seed_joints(seed, believed, data)
         if data.is_program and seed:
             raise InputError("--seed: a program of joint positions says itself where the robot comes from")
-        options = truing.InverseOptions(
-            choose=choose.value, scene=truing.Scene() if scene is None else load_scene(scene, believed)
+        options = truing.inverse_kinematics.InverseOptions(
+            choose=choose.value, scene=truing.model.Scene() if scene is None else load_scene(scene, believed)
         )
-        maker = truing.Compensator(
+        maker = truing.inverse_kinematics.Compensator(
             believed,
             real,
-            truing.CompensateOptions(inverse=options, in_base=in_base),
+            truing.inverse_kinematics.CompensateOptions(inverse=options, in_base=in_base),
             data.conditions[0] if data.conditions else None,
             target=index,
         )
@@ -1895,7 +1887,7 @@ def effects() -> None:
     """List the effects that truing knows."""
     import truing
 
-    _table("effects", ("name", "what it is"), truing.catalogue())
+    _table("effects", ("name", "what it is"), truing.model.catalogue())
 
 
 # ---- Reading
@@ -1921,7 +1913,7 @@ def _load_calibrated(path: Path, base_link: str, tip_link: str) -> Robot:
 
 def _task_like(task: Optional[TaskName], free_axis: Optional[FreeAxis], retreat: str) -> Task:
     """What every row of a target file wants that says nothing else."""
-    from truing import Task
+    from truing.inverse_kinematics import Task
 
     axis = None if free_axis is None or free_axis is FreeAxis.none else "xyz".index(free_axis.value)
     if task is not None and free_axis is not None and (axis is not None) != (task is TaskName.torch):
@@ -2105,7 +2097,7 @@ def _handeye_data(
             load_stream(board_poses, "board", angles=angles or None),
         )
         (hand, seen), where = ((stream.time, stream.T) for stream in streams), board_poses
-    clock = _busy("comparing clocks", lambda: truing.handeye_clock(*hand, *seen, setup=setup))  # type: ignore[arg-type]
+    clock = _busy("comparing clocks", lambda: truing.hand_eye.handeye_clock(*hand, *seen, setup=setup))  # type: ignore[arg-type]
     if not clock.found:
         return None, clock
     rows = list(clock.rows)
@@ -2124,8 +2116,8 @@ def _handeye_data(
             ),
             clock,
         )
-    aligned = truing.HandEyePoses(clock.T_base_hand, seen[1][rows])
-    return truing.HandEyeData(poses, aligned, np.asarray(rows)), clock
+    aligned = truing.hand_eye.HandEyePoses(clock.T_base_hand, seen[1][rows])
+    return truing.files.HandEyeData(poses, aligned, np.asarray(rows)), clock
 
 
 def _picked(poses: HandEyePoses, rows: list[int]) -> dict[str, Any]:

@@ -135,7 +135,7 @@ def run(out: Path, *, seed: int, busy: Busy, console: Console) -> dict[str, Any]
     return truth
 
 
-def _compared(truth: Truth, found: truing.Identification) -> Table:
+def _compared(truth: Truth, found: truing.identification.Identification) -> Table:
     """The hidden errors and what was found of them, for parameters that the data can see by themselves."""
     from rich import box
     from rich.table import Table

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truing import Board, Camera
+from truing.files import Board
+from truing.hand_eye import Camera
 
 Floats = NDArray[np.float64]
 SUPERSAMPLING = 2

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import truing
 from truing.examples import example
+from truing.model import AppliedEffect
 
 Floats = NDArray[np.float64]
 
@@ -44,9 +45,9 @@ def with_effects(robot: truing.Robot) -> truing.Robot:
         for k, joint in enumerate(robot.joints)
     ]
     effects = [
-        truing.AppliedEffect("joint_compliance", ["J2"], {"joint_compliance.J2": 3e-6}),
-        truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 4e-4}),
-        truing.AppliedEffect("harmonic", ["J1"], {"harmonic.J1.cos1": 3e-4, "harmonic.J1.sin1": -2e-4}),
+        AppliedEffect("joint_compliance", ["J2"], {"joint_compliance.J2": 3e-6}),
+        AppliedEffect("backlash", ["J3"], {"backlash.J3": 4e-4}),
+        AppliedEffect("harmonic", ["J1"], {"harmonic.J1.cos1": 3e-4, "harmonic.J1.sin1": -2e-4}),
     ]
     return robot.replace(joints=masses, effects=effects)
 
@@ -102,7 +103,7 @@ def usual_joints(count: int, seed: int = 0) -> Floats:
     return joints
 
 
-def poses_of(solver: truing.InverseSolver, joints: Floats) -> Floats:
+def poses_of(solver: truing.inverse_kinematics.InverseSolver, joints: Floats) -> Floats:
     """shape=(n, 4, 4)"""
     return np.array([solver.forward(q) for q in joints])
 

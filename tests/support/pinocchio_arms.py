@@ -100,7 +100,7 @@ class Both:
         tip = "truing_tool" if "truing_tool" in names else names[-1]
         return cls(
             text,
-            truing.robot_from_urdf(text, tip_link=tip),
+            truing.model.robot_from_urdf(text, tip_link=tip),
             model,
             model.createData(),
             model.getFrameId(tip, pin.FrameType.BODY),

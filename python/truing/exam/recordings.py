@@ -25,6 +25,7 @@ from truing.exam.kinematics import Chain, Floats, chain_of, rotations, sweep
 from truing.exam.laws import Context, Inputs
 from truing.exam.robots import Specimen
 from truing.exam.sizing import View
+from truing.model import pose_groups
 
 _FILES = {
     "development": (
@@ -76,7 +77,7 @@ def missing(which: str) -> str:
     return f"no {', '.join(sorted(set(absent)))} in TRUING_REALDATA" if absent else ""
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def recordings(which: str) -> tuple[Recording, ...]:
     place = folder()
     if place is None:
@@ -104,7 +105,7 @@ def _load(place: Path, robot_file: str, measurement_file: str) -> Recording:
 def _inputs(data: truing.Measurements, keep: NDArray[np.bool_]) -> Inputs:
     readings = np.asarray(data.joints)[keep]
     n = len(readings)
-    pose = np.asarray(truing.pose_groups(data))[keep].astype(np.int64)
+    pose = np.asarray(pose_groups(data))[keep].astype(np.int64)
     _, first = np.unique(pose, return_index=True)
     order = np.sort(first)
     came = np.vstack([readings[order[:1]], readings[order[:-1]]])

@@ -1,40 +1,66 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading and writing files: robots, measurements, tables. Every error names file, line or column, found and
-expected.
+"""Reading and writing files: robots, measurements, images, tables.
+
+Every error names the file, the line or column, what was found and what was expected.
 """
 
-from __future__ import annotations
-
-from truing.files.common import Units, atomic_output_dir, atomic_write, write_table
-from truing.files.handeye_file import HandEyeData, Stream, load_camera, load_handeye, load_stream, save_camera
-from truing.files.measurement_file import load_measurements, save_measurements
-from truing.files.robot_file import load_calibration, load_robot, load_units, robot_to_yaml, save_robot
-from truing.files.scene_file import load_scene
-from truing.files.target_file import TargetData, load_targets
-from truing.files.uncertainty_file import Uncertainty, load_uncertainty
-
-__all__ = [
-    "HandEyeData",
-    "Stream",
-    "TargetData",
-    "Uncertainty",
-    "Units",
-    "atomic_output_dir",
-    "atomic_write",
-    "load_calibration",
-    "load_camera",
-    "load_handeye",
-    "load_measurements",
-    "load_robot",
-    "load_scene",
-    "load_stream",
-    "load_targets",
-    "load_uncertainty",
-    "load_units",
-    "robot_to_yaml",
-    "save_camera",
-    "save_measurements",
-    "save_robot",
-    "write_table",
-]
+from truing.files.boards import (
+    Board as Board,
+    BoardViews as BoardViews,
+    find_board as find_board,
+    parse_board as parse_board,
+)
+from truing.files.common import (
+    Units as Units,
+    atomic_output_dir as atomic_output_dir,
+    atomic_write as atomic_write,
+    write_table as write_table,
+)
+from truing.files.handeye_file import (
+    HandEyeData as HandEyeData,
+    Stream as Stream,
+    load_camera as load_camera,
+    load_handeye as load_handeye,
+    load_stream as load_stream,
+    save_camera as save_camera,
+)
+from truing.files.measurement_file import (
+    load_measurements as load_measurements,
+    save_measurements as save_measurements,
+)
+from truing.files.robot_file import (
+    load_calibration as load_calibration,
+    load_robot as load_robot,
+    load_units as load_units,
+    robot_to_yaml as robot_to_yaml,
+    save_robot as save_robot,
+)
+from truing.files.scene_file import load_scene as load_scene
+from truing.files.stream_file import (
+    ImuData as ImuData,
+    JointData as JointData,
+    PoseData as PoseData,
+    SetupData as SetupData,
+    ToolPoses as ToolPoses,
+    TrackerData as TrackerData,
+    load_imu as load_imu,
+    load_joints as load_joints,
+    load_plan as load_plan,
+    load_setup as load_setup,
+    load_tool_poses as load_tool_poses,
+    load_tracker as load_tracker,
+    save_imu as save_imu,
+    save_joints as save_joints,
+    save_plan as save_plan,
+    save_setup as save_setup,
+    save_tracker as save_tracker,
+)
+from truing.files.target_file import (
+    TargetData as TargetData,
+    load_targets as load_targets,
+)
+from truing.files.uncertainty_file import (
+    Uncertainty as Uncertainty,
+    load_uncertainty as load_uncertainty,
+)

@@ -3,8 +3,8 @@
 """Calibration boards: what they are called, where their points are, and how they are found in images (by
 OpenCV, which is imported only then).
 
-    board = truing.parse_board("chessboard:9x6:25mm")
-    views = truing.find_board(["0.png", "1.png", ...], board)
+    board = truing.files.parse_board("chessboard:9x6:25mm")
+    views = truing.files.find_board(["0.png", "1.png", ...], board)
 
 A board's frame has its origin at the first point, x along a row, y along a column and z into the board, away
 from the camera. Pixels count from the
@@ -223,8 +223,7 @@ def plausible_camera(camera: Camera) -> tuple[str, str] | None:
     return None
 
 
-# ---- Finding
-# ---------------------------------------------------------------------------------------------------------
+# ---- Finding -------------------------------------------------------------------------------------
 
 
 def _opencv() -> Any:
@@ -619,8 +618,7 @@ def _dot_centres(cv: Any, grey: Image, centres: Floats) -> Floats:
     return out
 
 
-# ---- Another board than was said
-# -------------------------------------------------------------------------------------
+# ---- Another board than was said -----------------------------------------------------------------
 
 
 def _neighbours(board: Board) -> list[Board]:
@@ -771,8 +769,7 @@ def _larger_board(cv: Any, images: Sequence[Path | str | Image], board: Board) -
     return None
 
 
-# ---- Poses and intrinsics
-# --------------------------------------------------------------------------------------------
+# ---- Poses and intrinsics ------------------------------------------------------------------------
 
 
 def _matrix(camera: Camera) -> tuple[Floats, Floats]:

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The HTML toolkit of every report (page, charts, words), the rows that reports draw, and the text of ``result.json``."""
+"""What reports are made with: page, charts, words; the rows that they draw; the text of ``result.json``."""

@@ -1,3 +1,20 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulated measurements with known truth, for tests of everything else."""
+"""Simulated measurements with known truth: poses of a robot, hand-eye scenes, streams of a swaying arm."""
+
+from truing._core import (
+    FlexibleMode as FlexibleMode,
+    ImuErrors as ImuErrors,
+    SimulatedStreams as SimulatedStreams,
+    StreamSimulationOptions as StreamSimulationOptions,
+    TrackerErrors as TrackerErrors,
+    large_boom as large_boom,
+    large_boom_modes as large_boom_modes,
+)
+from truing.testing.simulation import (
+    Simulation as Simulation,
+    TrueEffect as TrueEffect,
+    Truth as Truth,
+    simulate as simulate,
+)
+from truing.testing.streams import simulate_streams as simulate_streams

@@ -47,8 +47,7 @@ def identified(folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
     return code, json.loads(Path("found/result.json").read_text())
 
 
-# ---- Quantities
-# --------------------------------------------------------------------------------------------------------
+# ---- Quantities ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -85,8 +84,7 @@ def test_shares() -> None:
             share(text, "--x")
 
 
-# ---- What is written
-# ---------------------------------------------------------------------------------------------------
+# ---- What is written -----------------------------------------------------------------------------
 
 
 def test_identify_writes_its_files_and_says_where_the_report_is(
@@ -183,7 +181,7 @@ def test_prediction_needs_no_measurements(capsys: pytest.CaptureFixture[str]) ->
 
 def test_distances_come_back_as_distances() -> None:
     robot = truing.load_robot(ROBOT)
-    robot.anchor = truing.Anchor([1.0, 0.2, 0.1], 0.01)
+    robot.anchor = truing.model.Anchor([1.0, 0.2, 0.1], 0.01)
     truing.save_robot("wire.yaml", robot)
     Path("wire.csv").write_text(
         "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dist_mm\n0,0,0,0,0,0,900\n10,20,30,40,50,60,\n"
@@ -285,8 +283,7 @@ def test_a_urdf_comes_back_as_urdf_too() -> None:
     assert truing.load_robot("found/robot.urdf").driven_count == 3
 
 
-# ---- Exit status, errors
-# -----------------------------------------------------------------------------------------------
+# ---- Exit status, errors -------------------------------------------------------------------------
 
 
 def test_a_fit_that_does_not_converge_exits_1_and_says_why(
@@ -411,7 +408,7 @@ def test_version_and_effects(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == f"truing {truing.__version__}\n"
     assert main(["effects"]) == 0
     listed = capsys.readouterr().out
-    assert all(name in listed for name, _ in truing.catalogue())
+    assert all(name in listed for name, _ in truing.model.catalogue())
 
 
 def test_help_is_quick_and_leaves_the_heavy_libraries_alone() -> None:

@@ -19,6 +19,7 @@ import yaml
 import truing
 from truing.cli import main
 from truing.examples import example
+from truing.model import AppliedEffect, catalogue
 from truing.testing.simulation import random_joints
 
 ROBOT = str(example("irb120"))
@@ -43,7 +44,7 @@ def measured(case: str, *, poses: int = 220, orientation: bool = False) -> truin
     true = robot.copy()
     true.T_measurement_base = truing.frame_from_xyz_rpy([0.4, -1.6, 0.3], [0.01, -0.02, 0.8])
     if case.startswith("effects"):
-        true.effects = [truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 1e-3})]
+        true.effects = [AppliedEffect("backlash", ["J3"], {"backlash.J3": 1e-3})]
     moved = joints.copy()
     if case.endswith("unknown"):
         moved[:, 1] += np.where(joints[:, 1] > 0.41, 6e-4, -6e-4)
@@ -58,13 +59,13 @@ def measured(case: str, *, poses: int = 220, orientation: bool = False) -> truin
 
 
 def in_order(poses: int = 220) -> truing.Measurements:
-    """The verdict "effects", with the approach directions of poses that were driven to one after the other."""
+    """The verdict "effects", with the approach directions of poses driven to one after the other."""
     base = measured("effects", poses=poses)
     joints = np.array(base.joints)
     directions = np.ones_like(joints)
     directions[1:] = np.sign(np.diff(joints, axis=0))
     true = truing.load_robot(ROBOT)
-    true.effects = [truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 1e-3})]
+    true.effects = [AppliedEffect("backlash", ["J3"], {"backlash.J3": 1e-3})]
     predicted = truing.predict(true, truing.Measurements(joints, directions=directions))
     positions = np.asarray(predicted.position) + np.random.default_rng(11).normal(0, NOISE, (poses, 3))
     return truing.Measurements(joints, positions=positions, directions=directions)
@@ -92,8 +93,7 @@ def columns(path: str) -> dict[str, list[str]]:
     return {name: [row[k] for row in rows[1:]] for k, name in enumerate(rows[0])}
 
 
-# ---- The contract of result.json
-# ---------------------------------------------------------------------------------------
+# ---- The contract of result.json -----------------------------------------------------------------
 
 NUMBER = (int, float)
 TEXTS, NUMBERS = [str], [NUMBER]
@@ -218,7 +218,7 @@ def test_result_json_keeps_its_contract(case: str) -> None:
     result = diagnosed(measured(case))
     check(result, CONTRACT)
     assert result["format"] == "truing-diagnosis/1"
-    known = {name for name, _ in truing.catalogue()}
+    known = {name for name, _ in catalogue()}
     for effect in result["effects"]:
         assert named(effect) in known
         assert (
@@ -257,8 +257,7 @@ def test_the_verdict_is_that_of_the_hidden_truth(case: str) -> None:
         assert found.unknown[0].joint == "J2" and "q2" in found.unknown[0].inputs
 
 
-# ---- What is written
-# ---------------------------------------------------------------------------------------------------
+# ---- What is written -----------------------------------------------------------------------------
 
 
 def test_diagnose_writes_its_files_and_says_where_the_report_is(capsys: pytest.CaptureFixture[str]) -> None:
@@ -386,8 +385,7 @@ def test_next_poses_of_an_earlier_run_do_not_stay() -> None:
     assert Path("found/next_poses.csv").exists() == bool(result["next_measurements"])
 
 
-# ---- Bad and odd input
-# -------------------------------------------------------------------------------------------------
+# ---- Bad and odd input ---------------------------------------------------------------------------
 
 BAD = [
     ["diagnose"],
@@ -468,12 +466,11 @@ def test_the_second_record_of_the_joints_can_be_used() -> None:
     assert by_second["gap"]["rms_m"] == pytest.approx(diagnosed(data)["gap"]["rms_m"], rel=1e-6)
 
 
-# ---- From Python
-# -------------------------------------------------------------------------------------------------------
+# ---- From Python ---------------------------------------------------------------------------------
 
 
 def test_the_defaults_are_those_of_the_header() -> None:
-    usual = truing.DiagnoseOptions()
+    usual = truing.diagnosis.DiagnoseOptions()
     given = inspect.signature(truing.diagnose).parameters
     for name in (
         "false_alarm",
@@ -488,7 +485,7 @@ def test_the_defaults_are_those_of_the_header() -> None:
         assert given[name].default == getattr(usual, name), name
     assert given["leave_out"].default == usual.leave_out == ()
     with pytest.raises(TypeError):
-        truing.DiagnoseOptions(false_alarms=0.1)  # type: ignore[call-arg]
+        truing.diagnosis.DiagnoseOptions(false_alarms=0.1)  # type: ignore[call-arg]
     assert usual.replace(seed=4).seed == 4 and usual.seed == 0
 
 
@@ -501,7 +498,7 @@ def test_an_effect_of_ones_own_takes_part() -> None:
     assert "jump" in {c.effect for c in found.candidates}
 
 
-def hanging(effect: truing.AppliedEffect) -> truing.Measurements:
+def hanging(effect: AppliedEffect) -> truing.Measurements:
     """Of a robot with heavy links, light and loaded, while its joint or its axis gives way."""
     rng = np.random.default_rng(23)
     true = truing.load_robot(ROBOT)
@@ -524,14 +521,14 @@ def hanging(effect: truing.AppliedEffect) -> truing.Measurements:
     ("applied", "asked"),
     [
         (
-            truing.AppliedEffect("joint_compliance", ["J2"], {"joint_compliance.J2": 6e-5}),
+            AppliedEffect("joint_compliance", ["J2"], {"joint_compliance.J2": 6e-5}),
             "gravity_moment:J2,joint_compliance:J2",
         ),
-        (truing.AppliedEffect("backlash", ["J3"], {"backlash.J3": 1e-3}), "backlash:J3"),
-        (truing.AppliedEffect("scale", [], {"scale": 1e-3}), "scale"),
+        (AppliedEffect("backlash", ["J3"], {"backlash.J3": 1e-3}), "backlash:J3"),
+        (AppliedEffect("scale", [], {"scale": 1e-3}), "scale"),
     ],
 )
-def test_identify_takes_what_was_named(applied: truing.AppliedEffect, asked: str) -> None:
+def test_identify_takes_what_was_named(applied: AppliedEffect, asked: str) -> None:
     robot, data = truing.load_robot(ROBOT), hanging(applied)  # no masses are known
     found = truing.diagnose(robot, data)
     asked_for = {e.effect: e.identify_as for e in found.effects}
@@ -584,8 +581,7 @@ def test_the_names_of_the_results_are_public() -> None:
         assert name in truing.__all__ and getattr(truing, name).__doc__
 
 
-# ---- The examination
-# ---------------------------------------------------------------------------------------------------
+# ---- The examination -----------------------------------------------------------------------------
 
 
 def test_without_mujoco_the_examination_says_what_to_install(

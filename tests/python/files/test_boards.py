@@ -17,8 +17,10 @@ import pytest
 
 import truing
 from board_images import CAMERA, Floats, board_poses, frame, render, write_images
-from truing import Board, Camera, InputError, InputWarning, find_board, parse_board
+from truing import InputError, InputWarning
+from truing.files import Board, find_board, parse_board
 from truing.files.boards import plausible_camera
+from truing.hand_eye import Camera
 
 cv2 = pytest.importorskip("cv2")
 
@@ -35,8 +37,7 @@ PRINTED = [
 ]
 
 
-# ---- Names
-# -------------------------------------------------------------------------------------------------------------
+# ---- Names ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -85,8 +86,7 @@ def test_what_is_no_board_is_refused_with_examples(text: str, why: str) -> None:
     assert repr(text) in str(error.value) and "chessboard:9x6:25mm (inner corners" in str(error.value)
 
 
-# ---- Symmetries
-# --------------------------------------------------------------------------------------------------------
+# ---- Symmetries ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -114,8 +114,7 @@ def test_symmetries_map_the_points_onto_themselves(text: str, turns: int) -> Non
         assert not np.allclose(T, np.eye(4))
 
 
-# ---- Finding
-# -----------------------------------------------------------------------------------------------------------
+# ---- Finding -------------------------------------------------------------------------------------
 
 
 def off(board: Board, found: Floats, true: Floats) -> tuple[float, float]:
@@ -151,7 +150,7 @@ def test_pixels_are_those_of_the_points_to_a_tenth_and_count_from_the_pixel_cent
         poses = board_poses(board, 3, seed=1)
         views = find_board([render(board, T, seed=k) for k, T in enumerate(poses)], board, camera=CAMERA)
         errors = [
-            views.pixels[k] - truing.project(CAMERA, views.points[k] @ T[:3, :3].T + T[:3, 3])
+            views.pixels[k] - truing.hand_eye.project(CAMERA, views.points[k] @ T[:3, :3].T + T[:3, 3])
             for k, T in enumerate(poses)
         ]
         every = np.concatenate(errors)
@@ -220,8 +219,7 @@ def test_images_without_the_board_are_listed(tmp_path: Path) -> None:
     assert done == [(k, 4) for k in range(5)]
 
 
-# ---- What is wrong is said
-# ---------------------------------------------------------------------------------------------
+# ---- What is wrong is said -----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 import truing
 from board_images import CAMERA, Floats, board_poses, rotation, write_images
@@ -26,6 +25,7 @@ from handeye_scenes import columns_of, scene, write_csv, write_scene
 from truing import InputError, InputWarning, load_camera, load_handeye, save_camera
 from truing.files import load_stream
 from truing.files.handeye_file import EULER_ORDERS, rotations_from_angles
+from truing.hand_eye import HandEyePoses
 from truing.rotations import quaternions_from_rotations, rotations_from_quaternions
 
 SCENE = scene(6)
@@ -45,8 +45,7 @@ def refused(path: Path, message: str, **options: Any) -> None:
     assert str(path) in str(error.value)
 
 
-# ---- Reading
-# -----------------------------------------------------------------------------------------------------------
+# ---- Reading -------------------------------------------------------------------------------------
 
 
 def test_poses_are_read_as_they_are_written(tmp_path: Path) -> None:
@@ -142,7 +141,7 @@ def test_rows_without_a_board_are_left_out_and_told(tmp_path: Path) -> None:
 
 def test_images_are_read_with_their_board(tmp_path: Path) -> None:
     pytest.importorskip("cv2")
-    board = truing.parse_board("circles:8x5:25mm")
+    board = truing.files.parse_board("circles:8x5:25mm")
     seen = board_poses(board, 4)
     names = write_images(tmp_path, board, seen)
     columns = {**columns_of("hand", SCENE.A[:4]), "image": names}
@@ -163,8 +162,7 @@ def test_images_are_read_with_their_board(tmp_path: Path) -> None:
     )
 
 
-# ---- What is wrong is named
-# --------------------------------------------------------------------------------------------
+# ---- What is wrong is named ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -355,21 +353,18 @@ def test_poses_given_as_arrays_are_checked_pose_by_pose() -> None:
         (SCENE.A[:, :3], r"must have shape \(n, 4, 4\)"),
     ):
         with pytest.raises(InputError, match=message):
-            truing.HandEyePoses(A, SCENE.B)
+            HandEyePoses(A, SCENE.B)
     with pytest.raises(InputError, match="T_camera_board has 5 poses, T_base_hand has 6"):
-        truing.HandEyePoses(SCENE.A, SCENE.B[:5])
+        HandEyePoses(SCENE.A, SCENE.B[:5])
     with pytest.raises(InputError, match="images need a camera"):
-        truing.HandEyePoses(SCENE.A, SCENE.B, images=[(np.zeros((4, 3)), np.zeros((4, 2)))] * 6)
+        HandEyePoses(SCENE.A, SCENE.B, images=[(np.zeros((4, 3)), np.zeros((4, 2)))] * 6)
     with pytest.raises(InputError, match="images, pose 0: 4 points, but 3 pixels"):
-        truing.HandEyePoses(
-            SCENE.A, SCENE.B, images=[(np.zeros((4, 3)), np.zeros((3, 2)))] * 6, camera=CAMERA
-        )
+        HandEyePoses(SCENE.A, SCENE.B, images=[(np.zeros((4, 3)), np.zeros((3, 2)))] * 6, camera=CAMERA)
     with pytest.raises(InputError, match="set: pose 1 holds 'trial'"):
-        truing.HandEyePoses(SCENE.A, SCENE.B, set=["train", "trial"] * 3)
+        HandEyePoses(SCENE.A, SCENE.B, set=["train", "trial"] * 3)
 
 
-# ---- Cameras
-# -----------------------------------------------------------------------------------------------------------
+# ---- Cameras -------------------------------------------------------------------------------------
 
 CAMERA_YAML = b"""\
 format: truing-camera/1
@@ -442,8 +437,7 @@ def test_what_is_wrong_in_a_camera_file_is_named(
         load_camera(tmp_path / "camera.yaml")
 
 
-# ---- Whatever is in a file
-# ---------------------------------------------------------------------------------------------
+# ---- Whatever is in a file -----------------------------------------------------------------------
 
 POSES = b"""\
 hand_x_m,hand_y_m,hand_z_m,hand_qw,hand_qx,hand_qy,hand_qz,board_x_mm,board_y_mm,board_z_mm,board_rx_deg,board_ry_deg,board_rz_deg,t_s,board_t_s,set,q1_rad
@@ -507,7 +501,7 @@ def test_cameras_with_faults(folder: Path, data: bytes) -> None:
 @example(text="circles:9x6:²5mm")
 def test_boards_of_any_name(text: str) -> None:
     try:
-        board = truing.parse_board(text)
+        board = truing.files.parse_board(text)
     except InputError:
         return
     assert len(board.points) >= 4 and np.isfinite(board.points).all()

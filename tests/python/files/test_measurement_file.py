@@ -100,8 +100,7 @@ def read(path: Path, robot: _core.Robot, **options: bool) -> Any:
     return load_measurements(path, robot, **options)
 
 
-# ---- What is read
-# ----------------------------------------------------------------------------------------------------
+# ---- What is read --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["data.csv", "data.parquet"])
@@ -258,8 +257,7 @@ def test_incomplete_joint_speeds_are_covariates(tmp_path: Path) -> None:
     assert list(data.covariates) == ["qd1_rad_s"]
 
 
-# ---- What is written
-# -------------------------------------------------------------------------------------------------
+# ---- What is written -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["data.csv", "data.parquet"])
@@ -339,8 +337,7 @@ def test_a_covariate_must_not_pass_for_something_else(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-# ---- What is refused
-# -------------------------------------------------------------------------------------------------
+# ---- What is refused -----------------------------------------------------------------------------
 
 
 def renamed(old: str, new: str) -> Callable[[Columns], Any]:
@@ -634,8 +631,7 @@ def test_parquet_columns_of_other_types_are_refused(tmp_path: Path) -> None:
         read(tmp_path / "data.parquet", rail())
 
 
-# ---- Suspicions
-# ------------------------------------------------------------------------------------------------------
+# ---- Suspicions ----------------------------------------------------------------------------------
 
 
 def scaled(factor: float, *names: str) -> Callable[[Columns], Any]:
@@ -773,8 +769,7 @@ def test_a_joint_beyond_its_limits_is_a_warning(tmp_path: Path) -> None:
     assert found[0].filename == __file__
 
 
-# ---- Recorded data
-# ---------------------------------------------------------------------------------------------------
+# ---- Recorded data -------------------------------------------------------------------------------
 
 
 @pytest.mark.realdata

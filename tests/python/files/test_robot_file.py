@@ -130,8 +130,7 @@ def assert_same(found: _core.Robot, expected: _core.Robot) -> None:
         assert found.anchor.zero == expected.anchor.zero
 
 
-# ---- What is read
-# ----------------------------------------------------------------------------------------------------
+# ---- What is read --------------------------------------------------------------------------------
 
 
 def test_every_key_arrives_in_si(tmp_path: Path) -> None:
@@ -214,8 +213,7 @@ def test_numbers_may_have_an_exponent_without_a_point(tmp_path: Path) -> None:
     assert load(tmp_path, PALLETIZER.replace("a: 0.26", "a: 26e-2")).joints[0].a == 0.26
 
 
-# ---- What is written
-# -------------------------------------------------------------------------------------------------
+# ---- What is written -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("text", [PALLETIZER, UR10, CHAIN])
@@ -330,8 +328,7 @@ def test_an_unsound_robot_is_not_written(tmp_path: Path, robot: _core.Robot, why
     assert list(tmp_path.iterdir()) == []
 
 
-# ---- What is refused
-# -------------------------------------------------------------------------------------------------
+# ---- What is refused -----------------------------------------------------------------------------
 
 WRONG: dict[str, tuple[str, str, str]] = {
     # name: (text in PALLETIZER, what it becomes, what the error says)
@@ -517,8 +514,7 @@ def test_suspicion_does_not_fall_on_the_innocent(tmp_path: Path, text: str) -> N
     load(tmp_path, text)
 
 
-# ---- Output that is whole or not there
-# -------------------------------------------------------------------------------
+# ---- Output that is whole or not there -----------------------------------------------------------
 
 
 def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:

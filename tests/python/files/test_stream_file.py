@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 from numpy.typing import NDArray
 
 import truing
@@ -26,14 +25,16 @@ from fuzzing import mutated, quick
 from truing import InputError, InputWarning
 from truing.examples import example as robot_file
 from truing.files.stream_file import SetupData, save_imu, save_joints, save_plan, save_tracker
+from truing.testing import SimulatedStreams, simulate_streams
+from truing.tracking import ModalModel, Tracker
 
 Floats = NDArray[np.float64]
 ROBOT = truing.load_robot(robot_file("large_boom"))
 
 
 @functools.lru_cache(maxsize=1)
-def recording() -> truing.SimulatedStreams:
-    return truing.simulate_streams(ROBOT, seconds=3.0, imu_rate=200.0, seed=1)
+def recording() -> SimulatedStreams:
+    return simulate_streams(ROBOT, seconds=3.0, imu_rate=200.0, seed=1)
 
 
 def write(folder: Path) -> dict[str, Path]:
@@ -67,8 +68,7 @@ def edited(path: Path, change: Callable[[list[str], list[list[str]]], None]) -> 
     return path
 
 
-# ---- Good files
-# --------------------------------------------------------------------------------------------------------
+# ---- Good files ----------------------------------------------------------------------------------
 
 
 def test_streams_are_read_as_they_are_written(tmp_path: Path) -> None:
@@ -93,7 +93,7 @@ def test_units_in_names_are_converted_and_gaps_of_the_tracker_left_out(tmp_path:
     paths = write(tmp_path)
 
     def millimetres(names: list[str], rows: list[list[str]]) -> None:
-        for k, axis in enumerate("xyz"):
+        for axis in "xyz":
             at = names.index(f"{axis}_m")
             names[at] = f"{axis}_mm"
             for row in rows:
@@ -126,8 +126,7 @@ def test_late_and_double_rows_are_read_where_arrivals_tell_their_order(tmp_path:
     assert t[3] > t[4] == t[5]
 
 
-# ---- Bad streams
-# -------------------------------------------------------------------------------------------------------
+# ---- Bad streams ---------------------------------------------------------------------------------
 
 
 def _cell(column: str, row: int, text: str) -> Callable[[list[str], list[list[str]]], None]:
@@ -257,8 +256,7 @@ def test_a_column_that_nobody_knows_is_said(tmp_path: Path) -> None:
         assert truing.load_imu(path).arrival is None
 
 
-# ---- Streams that do not belong together
-# -------------------------------------------------------------------------------
+# ---- Streams that do not belong together ---------------------------------------------------------
 
 
 def parts(tmp_path: Path) -> dict[str, Any]:
@@ -322,7 +320,7 @@ def test_inverted_quaternions_are_named(tmp_path: Path) -> None:
     setup = recording().setup.replace(
         T_tracker_base=truing.frame_from_xyz_rpy([1.0, 2.0, 3.0], [0.1, 0.2, 0.3])
     )
-    s = truing.simulate_streams(ROBOT, seconds=3.0, imu_rate=200.0, setup=setup)
+    s = simulate_streams(ROBOT, seconds=3.0, imu_rate=200.0, setup=setup)
     p = parts(tmp_path)
     tracker = _replace(
         p["tracker"],
@@ -356,14 +354,13 @@ def test_sign_flips_of_quaternions_change_nothing(tmp_path: Path) -> None:
     assert len(a["t"]) > 100 and np.allclose(a["position"], b["position"], atol=1e-12)
 
 
-# ---- Set-up files
-# ------------------------------------------------------------------------------------------------------
+# ---- Set-up files --------------------------------------------------------------------------------
 
 
 def setup_data() -> SetupData:
     rng = np.random.default_rng(3)
     A = rng.normal(size=(6, 6))
-    modes = truing.ModalModel([0.6, 1.4], [0.02, 0.015], rng.normal(size=(2, 6, 3)), [0.01, 0.02])
+    modes = ModalModel([0.6, 1.4], [0.02, 0.015], rng.normal(size=(2, 6, 3)), [0.01, 0.02])
     setup = recording().setup.replace(
         clock_offset=0.008, clock_offset_sigma=0.001, controller_clock_offset=-0.5, gravity=[0.1, 0.0, -9.80]
     )
@@ -465,8 +462,7 @@ def test_a_bad_set_up_is_named(tmp_path: Path, old: str, new: str, message: str)
     assert str(path) in str(error.value)
 
 
-# ---- Whatever is in a file
-# ---------------------------------------------------------------------------------------------
+# ---- Whatever is in a file -----------------------------------------------------------------------
 
 TRACKER = b"t_s,x_m,y_m,z_m,qw,qx,qy,qz,arrival_s\n0.00,1,2,3,1,0,0,0,0.03\n0.01,1,2,3.001,1,0,0,0,0.04\n0.03,1,2.001,3,0.8,0.6,0,0,0.05\n"
 IMU = b"t_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2\n0.00,0,0.1,0,0,0,9.81\n0.01,0,0.1,0,0.1,0,9.81\n0.02,0,0.1,-0.1,0,0,9.8\n"
@@ -520,7 +516,7 @@ def test_any_inertial_file(data: bytes) -> None:
 def test_any_set_up_file(data: bytes) -> None:
     def reader(path: Path) -> Any:
         read = truing.load_setup(path)
-        truing.Tracker(read.setup)
+        Tracker(read.setup)
         assert (
             np.isfinite(np.asarray(read.setup.T_tracker_base)).all()
             and np.isfinite(np.asarray(read.modes.gain)).all()
@@ -544,7 +540,7 @@ def test_any_set_up_file(data: bytes) -> None:
 def test_whatever_is_pushed_nothing_that_is_not_finite_comes_out(
     pushes: list[tuple[str, float, float]],
 ) -> None:
-    tracker = truing.Tracker(recording().setup)
+    tracker = Tracker(recording().setup)
     for kind, t, value in pushes:
         if kind == "imu":
             tracker.push_imu(t, [value, 0.0, 0.0], [0.0, value, 9.81])

@@ -14,8 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 import truing
 from fuzzing import mutated, quick
@@ -23,6 +22,7 @@ from inverse_arms import gantry, irb, poses_of, random_joints
 from scene_files import NAMES, SCENE
 from tables import write
 from truing.errors import InputError
+from truing.inverse_kinematics import InverseSolver, Task
 from truing.rotations import quaternions_from_rotations
 
 ROBOT = irb()
@@ -31,17 +31,16 @@ SEEDS = tuple(f"q{k}_rad" for k in range(1, 7))
 
 def poses(count: int = 4) -> dict[str, list[str]]:
     """Columns of a file of poses that the robot reaches."""
-    frames = poses_of(truing.InverseSolver(ROBOT), random_joints(ROBOT, count, seed=1, share=0.7))
+    frames = poses_of(InverseSolver(ROBOT), random_joints(ROBOT, count, seed=1, share=0.7))
     values = np.column_stack([frames[:, :3, 3], quaternions_from_rotations(frames[:, :3, :3])])
     return {name: [repr(float(value)) for value in values[:, k]] for k, name in enumerate(NAMES)}
 
 
-# ---- What is read
-# ------------------------------------------------------------------------------------------------------
+# ---- What is read --------------------------------------------------------------------------------
 
 
 def test_poses_are_read_as_they_are(tmp_path: Path) -> None:
-    frames = poses_of(truing.InverseSolver(ROBOT), random_joints(ROBOT, 4, seed=1, share=0.7))
+    frames = poses_of(InverseSolver(ROBOT), random_joints(ROBOT, 4, seed=1, share=0.7))
     data = truing.load_targets(write(tmp_path / "t.csv", poses()), ROBOT)
     assert data.count == 4 and not data.is_program and data.joints is None and data.conditions == ()
     for task, frame in zip(data.tasks, frames, strict=True):
@@ -88,7 +87,7 @@ def test_millimetres_and_degrees_are_converted(tmp_path: Path) -> None:
 
 def test_what_rows_do_not_say_the_command_says(tmp_path: Path) -> None:
     columns: dict[str, Sequence[object]] = {**poses(3), "task": ["", "pose", "point"]}
-    like = truing.Task(
+    like = Task(
         np.eye(4), kind="torch", axis=[1, 0, 0], travel=[0, 1, 0], roll=(-0.1, 0.1), longest_retreat=0.05
     )
     tasks = truing.load_targets(write(tmp_path / "t.csv", columns), ROBOT, like=like).tasks
@@ -105,7 +104,9 @@ def test_points_need_no_orientation(tmp_path: Path) -> None:
         name: values for name, values in poses(3).items() if name in NAMES[:3]
     }
     data = truing.load_targets(
-        write(tmp_path / "t.csv", columns), ROBOT, like=truing.Task(np.eye(4), kind="point")
+        write(tmp_path / "t.csv", columns),
+        ROBOT,
+        like=Task(np.eye(4), kind="point"),
     )
     assert [task.kind for task in data.tasks] == ["point"] * 3
     mixed: dict[str, Sequence[object]] = {**poses(2), "task": ["point", "pose"]}
@@ -147,8 +148,7 @@ def test_a_target_that_is_only_out_of_reach_is_read(tmp_path: Path) -> None:
     ).reasons == ("limit",)
 
 
-# ---- Bad targets
-# -------------------------------------------------------------------------------------------------------
+# ---- Bad targets ---------------------------------------------------------------------------------
 
 
 def changed(**columns: Sequence[object]) -> dict[str, Sequence[object]]:
@@ -278,8 +278,7 @@ def test_a_program_with_parts_of_poses_is_refused(tmp_path: Path) -> None:
         truing.load_targets(path, ROBOT, program=True)
 
 
-# ---- Scenes
-# ------------------------------------------------------------------------------------------------------------
+# ---- Scenes --------------------------------------------------------------------------------------
 
 
 def test_a_scene_is_read_in_si(tmp_path: Path) -> None:
@@ -345,8 +344,7 @@ def test_a_bad_scene_is_refused_with_its_line(tmp_path: Path, old: str, new: str
     assert "scene.yaml" in str(caught.value)
 
 
-# ---- Uncertainty
-# -------------------------------------------------------------------------------------------------------
+# ---- Uncertainty ---------------------------------------------------------------------------------
 
 
 def write_identification(
@@ -411,8 +409,7 @@ def test_a_result_of_something_else_is_refused(tmp_path: Path, text: str, messag
         truing.load_uncertainty(tmp_path / "result.json")
 
 
-# ---- Whatever is in a file
-# ---------------------------------------------------------------------------------------------
+# ---- Whatever is in a file -----------------------------------------------------------------------
 
 TARGETS = b"""\
 x_mm,y_mm,z_mm,qw,qx,qy,qz,task,roll_rad,roll_lower_deg,roll_upper_deg,lead_lower_rad,lead_upper_rad,q1_rad,q2_rad,q3_deg,q4_rad,q5_rad,q6_rad,dir1,dir2,dir3,dir4,dir5,dir6,payload_kg,t_s
@@ -471,8 +468,8 @@ def check_scene(folder: Path, data: bytes) -> None:
     except InputError as error:
         assert "scene.yaml" in str(error) and "\n" not in str(error)
         return
-    truing.validate_scene(scene, ROBOT)
-    truing.nearest_contact(scene, ROBOT, np.zeros(6))
+    truing.model.validate_scene(scene, ROBOT)
+    truing.model.nearest_contact(scene, ROBOT, np.zeros(6))
 
 
 @quick

@@ -21,6 +21,14 @@ from handeye_scenes import CAMERA_IN_HAND, HandEyeScene, columns_of, scene, writ
 from tables import columns
 from truing.cli import main
 from truing.examples import example
+from truing.hand_eye import (
+    HandEyeOptions,
+    HandEyePoses,
+    handeye_closed_form,
+    handeye_plan,
+    handeye_readings,
+    project,
+)
 from truing.rotations import rotations_from_quaternions
 
 FORMAT = {
@@ -74,8 +82,7 @@ def off(found: Floats, true: Floats) -> tuple[float, float]:
     return float(np.linalg.norm(D[:3, 3])), math.acos(float(np.clip((np.trace(D[:3, :3]) - 1) / 2, -1, 1)))
 
 
-# ---- What is written
-# ---------------------------------------------------------------------------------------------------
+# ---- What is written -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("setup", ["eye-in-hand", "eye-to-hand"])
@@ -168,8 +175,7 @@ def test_json_is_all_that_is_printed_and_the_same_data_give_the_same(
     assert again == first and Path("found/report.html").read_bytes() == report
 
 
-# ---- Bad poses, and what the data cannot say
-# ---------------------------------------------------------------------------
+# ---- Bad poses, and what the data cannot say -----------------------------------------------------
 
 
 def test_bad_poses_are_listed_with_their_cause(capsys: pytest.CaptureFixture[str]) -> None:
@@ -237,8 +243,7 @@ def test_poses_that_do_not_belong_together_are_no_camera() -> None:
     assert code == 1 and result["status"] == "not closing" and "camera" not in result
 
 
-# ---- Images
-# ------------------------------------------------------------------------------------------------------------
+# ---- Images --------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -246,7 +251,7 @@ def imaged(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Floats]:
     """poses.csv with images of a dot grid, which may be read from either end; and the truth."""
     pytest.importorskip("cv2")
     folder = tmp_path_factory.mktemp("imaged")
-    board = truing.parse_board("circles:8x5:25mm")
+    board = truing.files.parse_board("circles:8x5:25mm")
     seen = board_poses(board, 14, seed=9)
     Y = frame([0.6, 0.1, 0.05], [3.0, 0.2, 0.1])
     rng = np.random.default_rng(0)
@@ -302,8 +307,7 @@ def test_a_wrong_size_of_the_board_is_said(imaged: tuple[Path, Floats]) -> None:
         assert result["status"] == "not closing"
 
 
-# ---- Clocks, plan, kinematics
-# ------------------------------------------------------------------------------------------
+# ---- Clocks, plan, kinematics --------------------------------------------------------------------
 
 
 def moving(
@@ -404,8 +408,7 @@ def test_camera_and_robot_are_found_together() -> None:
     )
 
 
-# ---- Bad input
-# ---------------------------------------------------------------------------------------------------------
+# ---- Bad input -----------------------------------------------------------------------------------
 
 BAD = [
     ["handeye"],
@@ -466,13 +469,12 @@ def test_bad_input_is_one_clear_line_and_nothing_is_written(
     assert sorted(Path().iterdir()) == before
 
 
-# ---- In Python
-# ---------------------------------------------------------------------------------------------------------
+# ---- In Python -----------------------------------------------------------------------------------
 
 
 def test_python_raises_where_the_data_do_not_decide_and_hands_the_result_over() -> None:
     s = scene(20, one_axis=True)
-    poses = truing.HandEyePoses(s.A, s.B)
+    poses = HandEyePoses(s.A, s.B)
     with pytest.raises(truing.UndecidedError, match="not observable") as error:
         truing.handeye(poses)
     assert error.value.result.unobservable
@@ -481,19 +483,19 @@ def test_python_raises_where_the_data_do_not_decide_and_hands_the_result_over() 
 
 def test_the_summary_is_plain_sentences() -> None:
     s = scene(20)
-    text = truing.handeye(truing.HandEyePoses(s.A, s.B)).summary()
+    text = truing.handeye(HandEyePoses(s.A, s.B)).summary()
     assert "camera at 4" in text and "per axis" in text and "left out: rms" in text
 
 
 def test_the_parts_can_be_had_alone() -> None:
     s = scene(20, "eye-to-hand")
-    poses = truing.HandEyePoses(s.A, s.B)
-    closed = truing.handeye_closed_form(poses, "eye-to-hand")
+    poses = HandEyePoses(s.A, s.B)
+    closed = handeye_closed_form(poses, "eye-to-hand")
     assert off(np.asarray(closed.T_parent_camera), s.X)[0] < 3e-3
     found = truing.handeye(poses, setup="eye-to-hand", working_point=[0, 0, 0.4])
-    following = truing.handeye_plan(poses, found, count=2, setup="eye-to-hand")
+    following = handeye_plan(poses, found, count=2, setup="eye-to-hand")
     assert len(following) == 2 and following[0].T_base_hand.shape == (4, 4)
-    assert "hand-inverted" in {reading.name for reading in truing.handeye_readings()}
+    assert "hand-inverted" in {reading.name for reading in handeye_readings()}
     with pytest.raises(truing.InputError, match="working_point"):
         truing.handeye(poses, working_point=[0, 0])
     with pytest.raises(truing.InputError, match="set-up"):
@@ -504,13 +506,13 @@ def test_poses_and_options_can_be_copied_and_pickled() -> None:
     import pickle
 
     s = scene(5)
-    poses = truing.HandEyePoses(
+    poses = HandEyePoses(
         s.A, s.B, set=[0, 0, 0, 1, 1], board_symmetries=[frame([0.1, 0, 0], [0, 0, math.pi])]
     )
     again = pickle.loads(pickle.dumps(poses))
     assert np.array_equal(again.T_base_hand, poses.T_base_hand) and np.array_equal(again.set, poses.set)
     assert again.replace(set=None).set is None
-    options = truing.HandEyeOptions(setup="eye-to-hand", hand_position_sigma=1e-4)
+    options = HandEyeOptions(setup="eye-to-hand", hand_position_sigma=1e-4)
     assert pickle.loads(pickle.dumps(options)).hand_position_sigma == 1e-4 and options.pixel_sigma is None
     camera = pickle.loads(pickle.dumps(CAMERA))
     assert camera.distortion == CAMERA.distortion
@@ -521,4 +523,4 @@ def test_projection_is_that_of_opencv() -> None:
     points = np.random.default_rng(0).uniform([-0.3, -0.2, 0.5], [0.3, 0.2, 1.0], (50, 3))
     matrix = np.array([[CAMERA.fx, 0, CAMERA.cx], [0, CAMERA.fy, CAMERA.cy], [0, 0, 1]])
     expected, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), matrix, np.array(CAMERA.distortion))
-    assert truing.project(CAMERA, points) == pytest.approx(expected.reshape(-1, 2), abs=1e-9)
+    assert project(CAMERA, points) == pytest.approx(expected.reshape(-1, 2), abs=1e-9)

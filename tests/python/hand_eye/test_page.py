@@ -34,7 +34,7 @@ def solved(tmp_path: Path, s: HandEyeScene, **options: Any) -> tuple[dict[str, A
     keywords = {"setup": s.setup, **options}
     result = Solved(
         data,
-        truing.handeye_options(data, **keywords),
+        truing.hand_eye.handeye_options(data, **keywords),
         truing.handeye(data, **keywords, raise_if_undecided=False),
     )
     return without_nan(handeye_dict(result)), scene_of(result)

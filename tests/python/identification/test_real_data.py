@@ -52,7 +52,7 @@ BEHIND_BY_DEFAULT = {
 }
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def loaded(name: str) -> tuple[truing.Robot, truing.Measurements]:
     recording = next(r for r in real_data.RECORDINGS if r.name == name)
     if not (DATA / recording.folder).is_dir():
@@ -61,8 +61,8 @@ def loaded(name: str) -> tuple[truing.Robot, truing.Measurements]:
     return robot, data
 
 
-@functools.lru_cache(maxsize=None)
-def fitted(name: str, loss: str) -> truing.Identification:
+@functools.cache
+def fitted(name: str, loss: str) -> truing.identification.Identification:
     # By default truing raises when a fit does not converge: here none may.
     robot, data = loaded(name)
     return truing.identify(robot, data, loss=loss)  # type: ignore[arg-type]
@@ -72,12 +72,11 @@ def lengths(robot: truing.Robot, data: truing.Measurements) -> NDArray[np.float6
     return np.asarray(real_data.lengths(robot, data))
 
 
-def warned(found: truing.Identification, words: str) -> bool:
+def warned(found: truing.identification.Identification, words: str) -> bool:
     return any(words in warning for warning in found.warnings)
 
 
-# ---- Figures
-# ---------------------------------------------------------------------------------------------------------
+# ---- Figures -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("loss", ["none", "reject"])
@@ -109,8 +108,7 @@ def test_nominal_robot_with_fitted_frames_has_the_published_errors(recording: An
             assert getattr(before, key) == pytest.approx(published, rel=3e-3), key
 
 
-# ---- Traps
-# -----------------------------------------------------------------------------------------------------------
+# ---- Traps ---------------------------------------------------------------------------------------
 
 
 def test_irb120_poses_where_the_arm_was_elsewhere_are_found() -> None:

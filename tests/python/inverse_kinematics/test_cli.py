@@ -38,6 +38,7 @@ from scene_files import NAMES, SCENE
 from tables import columns, write
 from truing.cli import main
 from truing.examples import example
+from truing.inverse_kinematics import Conditions, InverseSolver
 from truing.rotations import quaternions_from_rotations, rotations_from_quaternions
 
 ROBOT = str(example("irb120"))
@@ -80,12 +81,11 @@ def frames_of(path: str) -> Floats:
     return frames
 
 
-# ---- ik
-# ----------------------------------------------------------------------------------------------------------------
+# ---- ik ------------------------------------------------------------------------------------------
 
 
 def test_a_row_per_target_in_order_and_everything_is_written(capsys: pytest.CaptureFixture[str]) -> None:
-    wanted = poses_of(truing.InverseSolver(irb()), random_joints(irb(), 20, seed=1))
+    wanted = poses_of(InverseSolver(irb()), random_joints(irb(), 20, seed=1))
     wanted[7, :3, 3] += 3.0
     code, result = run("ik", ROBOT, write_poses(wanted))
     captured = capsys.readouterr()
@@ -127,7 +127,7 @@ def test_a_row_per_target_in_order_and_everything_is_written(capsys: pytest.Capt
 
 
 def test_all_reached_is_status_zero_and_the_same_again(capsys: pytest.CaptureFixture[str]) -> None:
-    targets = write_poses(poses_of(truing.InverseSolver(irb()), random_joints(irb(), 10, seed=2)))
+    targets = write_poses(poses_of(InverseSolver(irb()), random_joints(irb(), 10, seed=2)))
     code, first = run("ik", ROBOT, targets, "--json", "--threads", "1")
     assert code == 0 and json.loads(capsys.readouterr().out) == first and first["failures"] == []
     files = {path.name: path.read_bytes() for path in Path("found").iterdir()}
@@ -139,9 +139,9 @@ def test_a_calibrated_robot_is_solved_with_its_effects() -> None:
     robot = with_effects(calibrated(irb(), 3))
     truing.save_robot("calibrated.yaml", robot)
     robot = truing.load_robot("calibrated.yaml")
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     joints, direction = random_joints(robot, 15, seed=3, share=0.8), [1] * 15
-    at = truing.Conditions(payload=1.5, direction=[1] * 6)
+    at = Conditions(payload=1.5, direction=[1] * 6)
     wanted = np.array([solver.forward(q, at) for q in joints])
     code, result = run(
         "ik",
@@ -167,7 +167,7 @@ def test_a_calibrated_robot_is_solved_with_its_effects() -> None:
     "options", [["--task", "torch"], ["--free-axis", "z"], ["--free-axis", "x"], ["--task", "point"]]
 )
 def test_less_may_be_wanted(options: list[str]) -> None:
-    wanted = poses_of(truing.InverseSolver(irb()), random_joints(irb(), 10, seed=4))
+    wanted = poses_of(InverseSolver(irb()), random_joints(irb(), 10, seed=4))
     code, result = run("ik", ROBOT, write_poses(wanted), *options)
     kind = "point" if "point" in options else "torch"
     assert (
@@ -185,7 +185,7 @@ def test_less_may_be_wanted(options: list[str]) -> None:
 
 def test_all_branches_say_which_target_they_are_for(capsys: pytest.CaptureFixture[str]) -> None:
     joints = usual_joints(6, seed=5)
-    wanted = poses_of(truing.InverseSolver(irb()), joints)
+    wanted = poses_of(InverseSolver(irb()), joints)
     wanted[2, :3, 3] += 3.0
     code, result = run("ik", ROBOT, write_poses(wanted), "--all-branches")
     assert code == 1 and result["reached"] == 5 and result["targets"] == 6
@@ -211,7 +211,7 @@ def test_all_branches_say_which_target_they_are_for(capsys: pytest.CaptureFixtur
 def test_a_path_is_continuous_or_its_gaps_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     start = np.array([0.2, 0.1, -0.2, 0.3, 0.9, -0.3])
     joints = start + np.linspace(0.0, 0.8, 60)[:, None] * np.array([1.0, 0.3, 0.4, 0.5, -0.3, 1.0])
-    wanted = poses_of(truing.InverseSolver(irb()), joints)
+    wanted = poses_of(InverseSolver(irb()), joints)
     seed = ",".join(f"{math.degrees(q):.6f}deg" for q in start)
     code, result = run("ik", ROBOT, write_poses(wanted), "--path", "--seed", seed)
     assert code == 0 and result["path"]["continuous"] and result["path"]["gaps"] == []
@@ -232,7 +232,7 @@ def test_a_path_is_continuous_or_its_gaps_are_told(capsys: pytest.CaptureFixture
 
 def test_the_seed_decides_the_configuration() -> None:
     joints = random_joints(irb(), 8, seed=6, share=0.6)
-    targets = write_poses(poses_of(truing.InverseSolver(irb()), joints))
+    targets = write_poses(poses_of(InverseSolver(irb()), joints))
     write(Path("seeds.csv"), {f"q{k + 1}_rad": [repr(float(v)) for v in joints[:, k]] for k in range(6)})
     run("ik", ROBOT, targets, "--seed", "seeds.csv")
     assert np.abs(joints_of() - joints).max() < 1e-4
@@ -240,7 +240,7 @@ def test_the_seed_decides_the_configuration() -> None:
     run("ik", ROBOT, targets, "--seed", degrees)
     assert np.abs(joints_of()[3] - joints[3]).max() < 1e-4
     with_seeds = write_poses(
-        poses_of(truing.InverseSolver(irb()), joints),
+        poses_of(InverseSolver(irb()), joints),
         {f"q{k + 1}_rad": joints[:, k] for k in range(6)},
         name="own.csv",
     )
@@ -274,7 +274,7 @@ def test_what_is_in_the_way_is_named_and_avoided_by_a_retreat(capsys: pytest.Cap
     reached = truing.forward_kinematics(irb(), joints_of()[0])[-1]
     assert reached[:3, 3] == pytest.approx(T[:3, 3] - float(table["retreat_m"][0]) * T[:3, 2], abs=2e-6)
     where = truing.load_scene("scene.yaml", irb())
-    assert truing.nearest_contact(where, irb(), joints_of()[0]).distance >= 0.005 - 1e-9
+    assert truing.model.nearest_contact(where, irb(), joints_of()[0]).distance >= 0.005 - 1e-9
 
 
 def test_rails_and_other_targets_of_the_robot() -> None:
@@ -304,14 +304,15 @@ def test_rails_and_other_targets_of_the_robot() -> None:
 
 def test_a_path_has_one_load(capsys: pytest.CaptureFixture[str]) -> None:
     targets = write_poses(
-        poses_of(truing.InverseSolver(irb()), usual_joints(3, seed=13)), {"payload_kg": [1, 1, 2]}
+        poses_of(InverseSolver(irb()), usual_joints(3, seed=13)),
+        {"payload_kg": [1, 1, 2]},
     )
     assert main(["ik", ROBOT, targets, "--path"]) == 2
     assert "row 2 (from 0) has another payload" in capsys.readouterr().err and not Path("truing-ik").exists()
 
 
 def test_the_reports_answer_first_and_open_offline() -> None:
-    wanted = poses_of(truing.InverseSolver(irb()), usual_joints(20, seed=14))
+    wanted = poses_of(InverseSolver(irb()), usual_joints(20, seed=14))
     wanted[3, :3, 3] *= 4.0
     targets = write_poses(wanted)
     run("ik", ROBOT, targets, "--path")
@@ -339,8 +340,7 @@ def test_the_reports_answer_first_and_open_offline() -> None:
         assert "http" not in body and "nan" not in body.lower().replace("finance", "") and "None" not in body
 
 
-# ---- compensate
-# ---------------------------------------------------------------------------------------------------------
+# ---- compensate ----------------------------------------------------------------------------------
 
 
 def test_compensation_from_identification_to_commands(capsys: pytest.CaptureFixture[str]) -> None:
@@ -349,7 +349,7 @@ def test_compensation_from_identification_to_commands(capsys: pytest.CaptureFixt
     capsys.readouterr()
     nominal, real = truing.load_robot(ROBOT), truing.load_robot("calibration/robot.yaml")
     joints = usual_joints(30, seed=8)
-    wanted = poses_of(truing.InverseSolver(nominal), joints)
+    wanted = poses_of(InverseSolver(nominal), joints)
     targets = write_poses(wanted, {f"q{k + 1}_rad": joints[:, k] for k in range(6)})
     code, result = run(
         "compensate", ROBOT, "calibration/robot.yaml", targets, "--uncertainty", "calibration/result.json"
@@ -361,7 +361,7 @@ def test_compensation_from_identification_to_commands(capsys: pytest.CaptureFixt
         "joints.csv",
         "poses.csv",
     }
-    commands, solver = frames_of("found/poses.csv"), truing.InverseSolver(real)
+    commands, solver = frames_of("found/poses.csv"), InverseSolver(real)
     for q, command, T in zip(joints_of(), commands, wanted, strict=True):
         assert (
             position_off(solver.forward(q), T) <= 1.001e-6 and rotation_off(solver.forward(q), T) <= 1.001e-6
@@ -410,7 +410,7 @@ def test_commands_in_the_base_frame(capsys: pytest.CaptureFixture[str]) -> None:
     truing.save_robot("real.yaml", real)
     real = truing.load_robot("real.yaml")
     joints = usual_joints(10, seed=10)
-    wanted = poses_of(truing.InverseSolver(irb()), joints)
+    wanted = poses_of(InverseSolver(irb()), joints)
     code, result = run(
         "compensate",
         ROBOT,
@@ -424,8 +424,7 @@ def test_commands_in_the_base_frame(capsys: pytest.CaptureFixture[str]) -> None:
         assert position_off(base @ truing.forward_kinematics(real, q)[-1], T) <= 1.001e-6
 
 
-# ---- Bad input
-# ---------------------------------------------------------------------------------------------------------
+# ---- Bad input -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -482,7 +481,7 @@ def test_commands_in_the_base_frame(capsys: pytest.CaptureFixture[str]) -> None:
 def test_bad_input_is_one_line_and_nothing_is_written(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    wanted = poses_of(truing.InverseSolver(irb()), random_joints(irb(), 3, seed=11, share=0.7))
+    wanted = poses_of(InverseSolver(irb()), random_joints(irb(), 3, seed=11, share=0.7))
     write_poses(wanted)
     text = Path("targets.csv").read_text().splitlines()
     Path("empty.csv").write_text("")
@@ -501,7 +500,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(
     write(Path("two.csv"), {f"q{k}_rad": [0.1, 0.2] for k in range(1, 7)})
     write(Path("program.csv"), {f"q{k}_rad": [0.1, 0.2] for k in range(1, 7)})
     truing.save_robot(
-        "lossy.yaml", irb().replace(effects=[truing.AppliedEffect("sag", ["J2"], {"sag.J2": 1e-4})])
+        "lossy.yaml", irb().replace(effects=[truing.model.AppliedEffect("sag", ["J2"], {"sag.J2": 1e-4})])
     )
     before = sorted(Path().iterdir())
     assert main(arguments) == 2
@@ -511,9 +510,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(
 
 
 def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
-    write_poses(
-        poses_of(truing.InverseSolver(gantry()), random_joints(gantry(), 100, seed=12)).repeat(1000, axis=0)
-    )
+    write_poses(poses_of(InverseSolver(gantry()), random_joints(gantry(), 100, seed=12)).repeat(1000, axis=0))
     truing.save_robot("gantry.yaml", gantry())
     before = sorted(tmp_path.iterdir())
     program = (

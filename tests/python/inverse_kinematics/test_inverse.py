@@ -32,11 +32,22 @@ from inverse_arms import (
     wrapped,
 )
 from truing.examples import example
+from truing.inverse_kinematics import (
+    Compensator,
+    Conditions,
+    InverseOptions,
+    InverseSolver,
+    PathOptions,
+    Solution,
+    Solutions,
+    Task,
+)
+from truing.model import AppliedEffect, LinkCapsule, Obstacle, Scene, nearest_contact
 
 TOLERANCE = 1e-6  # [m], [rad]
 
 
-def check(robot: truing.Robot, found: truing.Solutions, wanted: Floats, kind: str = "pose") -> None:
+def check(robot: truing.Robot, found: Solutions, wanted: Floats, kind: str = "pose") -> None:
     """Whatever is claimed to be reached is, by plain forward kinematics (of robots without effects), and
     within limits.
     """
@@ -50,8 +61,7 @@ def check(robot: truing.Robot, found: truing.Solutions, wanted: Floats, kind: st
         assert is_within_limits(robot, solution.joints)
 
 
-# ---- Every kind of chain
-# -----------------------------------------------------------------------------------------------
+# ---- Every kind of chain -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -67,7 +77,7 @@ def check(robot: truing.Robot, found: truing.Solutions, wanted: Floats, kind: st
 )
 @pytest.mark.parametrize("kind", ["pose", "torch", "point"])
 def test_every_reachable_target_is_reached(robot: truing.Robot, kind: str) -> None:
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     wanted = poses_of(solver, random_joints(robot, 60, seed=1))
     seeds = random_joints(robot, 60, seed=2)
     found = truing.inverse(robot, wanted, kind=kind, seeds=seeds)  # type: ignore[arg-type]
@@ -79,7 +89,7 @@ def test_every_reachable_target_is_reached(robot: truing.Robot, kind: str) -> No
     "robot", [truing.load_robot(example("palletizer")), scara()], ids=["palletizer", "scara"]
 )
 def test_four_axes_reach_their_own_poses(robot: truing.Robot) -> None:
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     wanted = poses_of(solver, random_joints(robot, 60, seed=1, share=0.95))
     found = truing.inverse(robot, wanted, seeds=random_joints(robot, 60, seed=2))
     assert found.reached.all()
@@ -88,7 +98,7 @@ def test_four_axes_reach_their_own_poses(robot: truing.Robot) -> None:
 
 def test_the_closed_form_is_named() -> None:
     names = [
-        truing.InverseSolver(robot).closed_form
+        InverseSolver(robot).closed_form
         for robot in (irb(), calibrated(irb()), truing.load_robot(example("ur10")), scara())
     ]
     assert names == ["spherical_wrist", "spherical_wrist", "three_parallel", "none"]
@@ -96,11 +106,14 @@ def test_the_closed_form_is_named() -> None:
 
 def test_all_branches_of_a_calibrated_arm_are_those_of_the_nominal_one() -> None:
     """Away from singularities and limits, where a calibration cannot make branches come and go."""
-    nominal, real = truing.InverseSolver(irb()), truing.InverseSolver(calibrated(irb(), 5))
+    nominal, real = (
+        InverseSolver(irb()),
+        InverseSolver(calibrated(irb(), 5)),
+    )
     low, high = limits(irb())
     compared = 0
     for q in random_joints(irb(), 60, seed=3, share=0.9):
-        task = truing.Task(nominal.forward(q))
+        task = Task(nominal.forward(q))
         there, here = nominal.branches(task, q).solutions, real.branches(task, q).solutions
         assert min(float(np.abs(s.joints - q).max()) for s in there) < 1e-5  # its own is among them
         for solution in here:
@@ -136,8 +149,7 @@ def stiffness(joints: Floats) -> float:
     return float(np.linalg.svd(np.array(columns), compute_uv=False)[-1])
 
 
-# ---- Pinocchio
-# --------------------------------------------------------------------------------------------------------
+# ---- Pinocchio -----------------------------------------------------------------------------------
 
 
 def test_what_is_reached_is_by_pinocchio() -> None:
@@ -160,8 +172,7 @@ def test_what_is_reached_is_by_pinocchio() -> None:
                 assert (rotation_off if kind == "pose" else axis_off)(there, T) <= 1.001 * TOLERANCE
 
 
-# ---- Effects
-# ----------------------------------------------------------------------------------------------------------
+# ---- Effects -------------------------------------------------------------------------------------
 
 
 def predicted(robot: truing.Robot, joints: Floats, payload: Floats, direction: Floats) -> Floats:
@@ -188,14 +199,14 @@ def test_effects_in_the_inverse_are_those_of_predict() -> None:
     joints = random_joints(robot, 40, seed=4, share=0.8)
     payload, direction = random.uniform(0.0, 3.0, 40), random.choice([-1.0, 1.0], (40, 6))
     conditions = [
-        truing.Conditions(payload=float(p), direction=d.astype(int).tolist())
+        Conditions(payload=float(p), direction=d.astype(int).tolist())
         for p, d in zip(payload, direction, strict=True)
     ]
-    solver = truing.InverseSolver(robot, conditions=conditions[0])
+    solver = InverseSolver(robot, conditions=conditions[0])
     said = predicted(robot, joints, payload, direction)
     forward = np.array([solver.forward(q, c) for q, c in zip(joints, conditions, strict=True)])
     assert np.abs(forward - said).max() < 1e-10
-    bare = truing.InverseSolver(robot.replace(effects=[]))
+    bare = InverseSolver(robot.replace(effects=[]))
     assert np.abs(poses_of(bare, joints) - said).max() > 1e-4  # and they do something
 
     found = solver.solve_batch(said, random_joints(robot, 40, seed=5), conditions)
@@ -210,26 +221,25 @@ def test_effects_in_the_inverse_are_those_of_predict() -> None:
 
 def test_without_directions_those_of_the_way_from_the_seed_are_taken() -> None:
     robot = with_effects(irb())
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     for q, seed in zip(
         random_joints(robot, 20, seed=6, share=0.7), random_joints(robot, 20, seed=7, share=0.7), strict=True
     ):
-        wanted = truing.InverseSolver(robot.replace(effects=[])).forward(q)
-        found = solver.solve(truing.Task(wanted), seed)
+        wanted = InverseSolver(robot.replace(effects=[])).forward(q)
+        found = solver.solve(Task(wanted), seed)
         if not found.reached:
             continue
-        way = truing.Conditions(direction=np.sign(found.joints - seed).astype(int).tolist())
+        way = Conditions(direction=np.sign(found.joints - seed).astype(int).tolist())
         assert position_off(solver.forward(found.joints, way), wanted) <= 1.001 * TOLERANCE
 
 
 def test_an_effect_of_ones_own_is_refused_by_name() -> None:
-    robot = irb().replace(effects=[truing.AppliedEffect("sag", ["J2"], {"sag.J2": 1e-4})])
+    robot = irb().replace(effects=[AppliedEffect("sag", ["J2"], {"sag.J2": 1e-4})])
     with pytest.raises(truing.InputError, match="sag"):
-        truing.InverseSolver(robot)
+        InverseSolver(robot)
 
 
-# ---- What other tools get wrong
-# ----------------------------------------------------------------------------------------
+# ---- What other tools get wrong ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
@@ -238,10 +248,10 @@ def test_a_free_roll_is_about_the_tools_axis_not_about_the_bases(axis: int) -> N
     in the base frame.
     """
     robot = irb()
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     unit, travel = np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
     wanted = poses_of(solver, random_joints(robot, 60, seed=8, share=0.9))
-    like = truing.Task(np.eye(4), kind="torch", axis=unit, travel=travel)
+    like = Task(np.eye(4), kind="torch", axis=unit, travel=travel)
     found = solver.solve_batch(wanted, random_joints(robot, 60, seed=9), like=like)
     assert found.reached.all()
     rolls = []
@@ -257,10 +267,10 @@ def test_a_free_roll_is_about_the_tools_axis_not_about_the_bases(axis: int) -> N
 def test_a_cone_is_kept_exactly() -> None:
     """Drake's cone constraint leaves up to 6e-4 rad."""
     robot = irb()
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     lead, work = (math.radians(-5), math.radians(10)), (math.radians(-15), math.radians(3))
     wanted = poses_of(solver, random_joints(robot, 60, seed=10, share=0.8))
-    like = truing.Task(np.eye(4), kind="torch", lead=lead, work=work, roll=(-0.4, 0.3))
+    like = Task(np.eye(4), kind="torch", lead=lead, work=work, roll=(-0.4, 0.3))
     found = solver.solve_batch(wanted, random_joints(robot, 60, seed=11), like=like)
     assert found.reached.mean() > 0.8
     for solution, T in zip(found, wanted, strict=True):
@@ -275,7 +285,7 @@ def test_a_cone_is_kept_exactly() -> None:
 def test_sliding_joints_are_not_wrapped_by_a_turn() -> None:
     """robotics-toolbox-python#406: lengths brought into (-pi, pi]."""
     robot = gantry()
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     joints = random_joints(robot, 60, seed=12)
     joints[:, 0] = np.linspace(6.5, 10.0, 60)  # beyond 2 pi
     wanted = poses_of(solver, joints)
@@ -296,7 +306,7 @@ def test_success_is_never_stale_and_limits_are_never_violated() -> None:
     narrow = wide.replace(
         joints=[joint.replace(lower=0.4 * joint.lower, upper=0.4 * joint.upper) for joint in wide.joints]
     )
-    wanted = poses_of(truing.InverseSolver(wide), random_joints(wide, 150, seed=14))
+    wanted = poses_of(InverseSolver(wide), random_joints(wide, 150, seed=14))
     for kind in ("pose", "torch"):
         found = truing.inverse(narrow, wanted, kind=kind, max_restarts=20)
         assert 0 < found.reached.sum() < 150
@@ -314,7 +324,8 @@ def test_a_sliding_joint_inside_the_arm_is_no_trouble() -> None:
     """OptIK ends the process on one."""
     robot = scara()
     found = truing.inverse(
-        robot, poses_of(truing.InverseSolver(robot), random_joints(robot, 20, seed=15, share=0.9))
+        robot,
+        poses_of(InverseSolver(robot), random_joints(robot, 20, seed=15, share=0.9)),
     )
     assert found.reached.all()
 
@@ -322,7 +333,7 @@ def test_a_sliding_joint_inside_the_arm_is_no_trouble() -> None:
 def test_an_arm_on_a_rail_does_not_flip_where_the_rail_ends() -> None:
     """roboplan#276: clamping flips an arm on a rail."""
     robot = gantry()
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     start = np.array([9.6, 2.0, 1.0, 0.2, 0.3, -0.4, 0.1, 0.8, 0.2])
     T = solver.forward(start)
     way = np.tile(T, (120, 1, 1))
@@ -335,7 +346,7 @@ def test_an_arm_on_a_rail_does_not_flip_where_the_rail_ends() -> None:
     check(robot, path.solutions, way)
     previous = start  # and by Newton from one to the next
     for k, pose in enumerate(way):
-        found = solver.follow(truing.Task(pose), previous)
+        found = solver.follow(Task(pose), previous)
         assert found.reached, (k, solver.describe(found))
         assert np.abs(found.joints - previous)[3:].max() < 0.1
         previous = np.asarray(found.joints)
@@ -344,7 +355,7 @@ def test_an_arm_on_a_rail_does_not_flip_where_the_rail_ends() -> None:
 def test_a_path_does_not_jump() -> None:
     """TRAC-IK jumped 3.14 rad twice in 1000 poses."""
     robot = irb()
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     t = np.linspace(0.0, 1.0, 200)[:, None]
     joints = np.array([0.2, 0.1, -0.2, 0.3, 0.9, -0.3]) + 0.7 * np.sin(
         2 * math.pi * t * np.array([1.0, 0.7, 0.6, 1.3, 0.4, 1.7])
@@ -362,7 +373,7 @@ def test_a_path_does_not_jump() -> None:
 
 def test_a_gap_is_told_where_no_path_is() -> None:
     robot = irb()
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     ends = np.array([[0.2, 0.1, -0.2, 0.3, 0.9, -0.3], [1.9, 0.1, -0.2, 0.3, 0.9, -0.3]])
     path = truing.inverse_path(robot, poses_of(solver, np.repeat(ends, 5, axis=0)), seed=ends[0])
     assert not path.continuous and [gap.start for gap in path.gaps] == [4]
@@ -379,14 +390,14 @@ def test_a_gap_is_told_where_no_path_is() -> None:
 def test_threads_share_a_solver() -> None:
     """tesseract#1363: wrong Jacobians under threads."""
     robot = with_effects(calibrated(irb(), 2))
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     wanted = poses_of(solver, random_joints(robot, 80, seed=16, share=0.8))
     seeds = random_joints(robot, 80, seed=17)
-    alone = [solver.solve(truing.Task(T), q) for T, q in zip(wanted, seeds, strict=True)]
-    together: dict[int, list[truing.Solution]] = {}
+    alone = [solver.solve(Task(T), q) for T, q in zip(wanted, seeds, strict=True)]
+    together: dict[int, list[Solution]] = {}
 
     def run(name: int) -> None:
-        together[name] = [solver.solve(truing.Task(T), q) for T, q in zip(wanted, seeds, strict=True)]
+        together[name] = [solver.solve(Task(T), q) for T, q in zip(wanted, seeds, strict=True)]
 
     threads = [threading.Thread(target=run, args=(k,)) for k in range(4)]
     for thread in threads:
@@ -402,7 +413,7 @@ def test_threads_share_a_solver() -> None:
     "robot", [irb(), with_effects(calibrated(irb())), gantry()], ids=["nominal", "effects", "gantry"]
 )
 def test_any_number_of_threads_gives_the_same_bits(robot: truing.Robot) -> None:
-    wanted = poses_of(truing.InverseSolver(robot), random_joints(robot, 150, seed=18))
+    wanted = poses_of(InverseSolver(robot), random_joints(robot, 150, seed=18))
     wanted[::10, :3, 3] += 0.5
     results = [
         truing.inverse(robot, wanted, kind=kind, threads=threads, max_restarts=20)
@@ -415,16 +426,15 @@ def test_any_number_of_threads_gives_the_same_bits(robot: truing.Robot) -> None:
             assert np.array_equal(first.position_error, other.position_error)
 
 
-# ---- What cannot be reached
-# --------------------------------------------------------------------------------------------
+# ---- What cannot be reached ----------------------------------------------------------------------
 
 
 def test_out_of_reach_says_how_far_and_where() -> None:
     robot = irb()
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     T = np.eye(4)
     T[:3, 3] = [3.0, 0.0, 0.29]
-    found = solver.solve(truing.Task(T, kind="point"))
+    found = solver.solve(Task(T, kind="point"))
     assert found.reason == "out_of_reach" and not found.reached
     assert found.miss == pytest.approx(found.position_error, rel=1e-6) and 2.0 < found.miss < 2.6
     assert found.direction @ np.array([1.0, 0.0, 0.0]) > 0.99
@@ -438,8 +448,8 @@ def test_a_limit_in_the_way_is_named() -> None:
     joints = list(robot.joints)
     joints[0] = joints[0].replace(lower=-0.5, upper=0.5)
     narrow = robot.replace(joints=joints)
-    solver = truing.InverseSolver(narrow)
-    found = solver.solve(truing.Task(truing.forward_kinematics(robot, [0.7, 0.2, -0.1, 0.2, 0.4, 0.1])[-1]))
+    solver = InverseSolver(narrow)
+    found = solver.solve(Task(truing.forward_kinematics(robot, [0.7, 0.2, -0.1, 0.2, 0.4, 0.1])[-1]))
     assert found.reason == "limit" and not found.reached
     assert narrow.joints[found.joint].name in solver.describe(found) and found.excess > 0
     assert is_within_limits(narrow, found.joints)
@@ -450,7 +460,7 @@ def test_a_target_at_a_limit_is_reached() -> None:
     low, high = limits(robot)
     joints = np.array([high, low, np.where(np.arange(6) % 2, low, high)])
     joints[:, 4] = [1.0, -1.0, 0.7]  # not at a singularity as well
-    wanted = poses_of(truing.InverseSolver(robot), joints)
+    wanted = poses_of(InverseSolver(robot), joints)
     found = truing.inverse(robot, wanted)
     assert found.reached.all()
     check(robot, found, wanted)
@@ -458,7 +468,7 @@ def test_a_target_at_a_limit_is_reached() -> None:
 
 def test_singular_targets_are_reached_or_labelled() -> None:
     robot = calibrated(irb(), 1)
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     joints = random_joints(robot, 60, seed=19, share=0.7)
     joints[:, 4] = np.concatenate([np.zeros(20), np.full(20, 1e-7), np.full(20, -1e-4)])
     wanted = poses_of(solver, joints)
@@ -470,9 +480,9 @@ def test_singular_targets_are_reached_or_labelled() -> None:
 def test_what_is_chosen_is_the_best_of_all_branches() -> None:
     robot = irb()
     low, high = limits(robot)
-    best = truing.InverseSolver(robot, truing.InverseOptions(choose="limits_margin"))
+    best = InverseSolver(robot, InverseOptions(choose="limits_margin"))
     for q in random_joints(robot, 20, seed=21, share=0.8):
-        task = truing.Task(best.forward(q))
+        task = Task(best.forward(q))
         margins = [
             float((np.minimum(s.joints - low, high - s.joints) / (high - low)).min())
             for s in best.branches(task, q).solutions
@@ -481,29 +491,28 @@ def test_what_is_chosen_is_the_best_of_all_branches() -> None:
         assert float((np.minimum(chosen - low, high - chosen) / (high - low)).min()) >= max(margins) - 1e-6
 
 
-# ---- What is in the way
-# ------------------------------------------------------------------------------------------------
+# ---- What is in the way --------------------------------------------------------------------------
 
 
-def scene(wall_at: float) -> truing.Scene:
-    wall = truing.Obstacle(
+def scene(wall_at: float) -> Scene:
+    wall = Obstacle(
         "wall",
         shape="box",
         T_measurement_shape=truing.frame_from_xyz_rpy([wall_at, 0, 0.5], [0, 0, 0]),
         size=[0.04, 4.0, 4.0],
     )
-    return truing.Scene(
+    return Scene(
         obstacles=[wall],
-        capsules=[truing.LinkCapsule("hand", link="tool", start=[0, 0, -0.1], end=[0, 0, 0], radius=0.02)],
+        capsules=[LinkCapsule("hand", link="tool", start=[0, 0, -0.1], end=[0, 0, 0], radius=0.02)],
     )
 
 
 def test_what_interferes_is_not_reached_and_retreats_by_the_least() -> None:
     robot = irb()
     T = truing.forward_kinematics(robot, [0.0, 0.3, 0.0, 0.0, 0.6, 0.0])[-1]
-    options = truing.InverseOptions(scene=scene(float(T[0, 3])))
-    solver = truing.InverseSolver(robot, options)
-    found = solver.solve(truing.Task(T))
+    options = InverseOptions(scene=scene(float(T[0, 3])))
+    solver = InverseSolver(robot, options)
+    found = solver.solve(Task(T))
     assert (
         found.reason == "interference"
         and not found.reached
@@ -512,24 +521,23 @@ def test_what_interferes_is_not_reached_and_retreats_by_the_least() -> None:
     )
     assert "hand and wall" in solver.describe(found)
     away = -T[:3, :3].T @ np.array([1.0, 0.0, 0.0])
-    retreating = solver.solve(truing.Task(T, retreat=away, longest_retreat=0.2))
+    retreating = solver.solve(Task(T, retreat=away, longest_retreat=0.2))
     assert retreating.reason == "retreated" and 0.0 < retreating.retreat < 0.2
     there = truing.forward_kinematics(robot, retreating.joints)[-1]
     assert there[:3, 3] == pytest.approx(T[:3, 3] - [retreating.retreat, 0, 0], abs=2e-6)
-    nearest = truing.nearest_contact(options.scene, robot, retreating.joints)
+    nearest = nearest_contact(options.scene, robot, retreating.joints)
     assert (nearest.first, nearest.second) == ("hand", "wall") and 0.0 <= nearest.distance < 1e-3
 
 
 def test_a_free_scene_changes_nothing() -> None:
     robot = irb()
-    wanted = poses_of(truing.InverseSolver(robot), random_joints(robot, 30, seed=22, share=0.7))
+    wanted = poses_of(InverseSolver(robot), random_joints(robot, 30, seed=22, share=0.7))
     assert np.array_equal(
         truing.inverse(robot, wanted).joints, truing.inverse(robot, wanted, scene=scene(50.0)).joints
     )
 
 
-# ---- Compensation
-# ------------------------------------------------------------------------------------------------------
+# ---- Compensation --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("in_base", [False, True])
@@ -539,9 +547,12 @@ def test_the_real_robot_goes_where_it_is_wanted(in_base: bool) -> None:
         T_measurement_base=truing.frame_from_xyz_rpy([0.501, -0.2, 0.1], [0.001, 0, 0.3])
     )
     base = np.asarray(real.T_measurement_base) if in_base else np.eye(4)
-    solver, believed = truing.InverseSolver(real), truing.InverseSolver(nominal)
+    solver, believed = (
+        InverseSolver(real),
+        InverseSolver(nominal),
+    )
     joints = random_joints(nominal, 60, seed=23, share=0.8)
-    wanted = np.linalg.inv(base) @ poses_of(truing.InverseSolver(real.replace(effects=[])), joints)
+    wanted = np.linalg.inv(base) @ poses_of(InverseSolver(real.replace(effects=[])), joints)
     made = truing.compensate(nominal, real, wanted, seeds=joints, in_base=in_base)
     assert made.solutions.reached.all()
     for k, one in enumerate(made):
@@ -553,7 +564,8 @@ def test_the_real_robot_goes_where_it_is_wanted(in_base: bool) -> None:
         # The backlash is on one of its two sides, or in the middle.
         errors = [
             position_off(
-                solver.forward(q, truing.Conditions(direction=[0, 0, side, 0, 0, 0])), base @ wanted[k]
+                solver.forward(q, Conditions(direction=[0, 0, side, 0, 0, 0])),
+                base @ wanted[k],
             )
             for side in (-1, 0, 1)
         ]
@@ -577,11 +589,11 @@ def test_a_program_of_joints_keeps_its_configuration() -> None:
 
 
 def test_near_the_wrist_singularity_compensation_is_right_or_labelled() -> None:
-    """Fake targets, corrected twice, leave 9.2 % of poses off by more than 1 um and never converge on 1.2 %."""
+    """Fake targets, corrected twice, leave 9.2 % of poses off by over 1 um and never converge on 1.2 %."""
     nominal, real = irb(), calibrated(irb(), 10)
     joints = random_joints(nominal, 60, seed=25, share=0.7)
     joints[:, 4] = np.random.default_rng(26).uniform(-0.01, 0.01, 60)
-    wanted = poses_of(truing.InverseSolver(nominal), joints)
+    wanted = poses_of(InverseSolver(nominal), joints)
     made = truing.compensate(nominal, real, wanted, seeds=joints)
     for T, one in zip(wanted, made, strict=True):
         if one.solution.reached:
@@ -600,8 +612,8 @@ def test_the_standard_error_is_that_of_the_parameters() -> None:
     step, sigma = 1e-7, np.array([2e-5, 3e-5, 1e-4])
     covariance = np.diag(sigma**2)
     covariance[0, 1] = covariance[1, 0] = 0.6 * sigma[0] * sigma[1]
-    wanted = poses_of(truing.InverseSolver(real), random_joints(real, 10, seed=27, share=0.7))
-    known = truing.Uncertainty(
+    wanted = poses_of(InverseSolver(real), random_joints(real, 10, seed=27, share=0.7))
+    known = truing.files.Uncertainty(
         ("J2.a", "J3.d", "J4.alpha"),
         (real.joint("J2").a, real.joint("J3").d, real.joint("J4").alpha),
         covariance,
@@ -623,20 +635,19 @@ def test_the_standard_error_is_that_of_the_parameters() -> None:
 
 def test_robots_with_other_joints_are_refused() -> None:
     with pytest.raises(truing.InputError, match="9"):
-        truing.Compensator(irb(), gantry())
+        Compensator(irb(), gantry())
     with pytest.raises(truing.InputError, match="J9"):
-        truing.Compensator(irb(), irb()).set_uncertainty(["J9.a"], [0.0], [[1e-10]])
+        Compensator(irb(), irb()).set_uncertainty(["J9.a"], [0.0], [[1e-10]])
     with pytest.raises(truing.InputError, match="covariance"):
-        truing.Compensator(irb(), irb()).set_uncertainty(["J2.a"], [0.0], np.eye(2))
+        Compensator(irb(), irb()).set_uncertainty(["J2.a"], [0.0], np.eye(2))
 
 
-# ---- In Python
-# ---------------------------------------------------------------------------------------------------------
+# ---- In Python -----------------------------------------------------------------------------------
 
 
 def test_progress_counts_up_and_what_it_raises_stops_the_work() -> None:
     robot = irb()
-    wanted = poses_of(truing.InverseSolver(robot), random_joints(robot, 500, seed=28))
+    wanted = poses_of(InverseSolver(robot), random_joints(robot, 500, seed=28))
     seen: list[int] = []
     truing.inverse(robot, wanted, threads=1, progress=seen.append)
     assert seen == sorted(seen) and seen[-1] <= 500 and len(seen) > 2
@@ -661,7 +672,7 @@ def test_ctrl_c_stops_a_batch() -> None:
     import _thread
 
     robot = gantry()
-    wanted = poses_of(truing.InverseSolver(robot), random_joints(robot, 64 * 40, seed=29))
+    wanted = poses_of(InverseSolver(robot), random_joints(robot, 64 * 40, seed=29))
     with pytest.raises(KeyboardInterrupt):
         truing.inverse(
             robot, wanted, threads=1, progress=lambda done: _thread.interrupt_main() if done == 128 else None
@@ -670,7 +681,7 @@ def test_ctrl_c_stops_a_batch() -> None:
 
 def test_a_batch_is_a_sequence_and_arrays() -> None:
     robot = irb()
-    solver = truing.InverseSolver(robot)
+    solver = InverseSolver(robot)
     found = solver.solve_batch(poses_of(solver, random_joints(robot, 5, seed=30)))
     assert (
         len(found) == 5
@@ -686,7 +697,7 @@ def test_a_batch_is_a_sequence_and_arrays() -> None:
 
 
 def test_tasks_scenes_and_options_survive_pickle_and_replace() -> None:
-    task = truing.Task(
+    task = Task(
         truing.frame_from_xyz_rpy([1, 2, 3], [0.1, 0.2, 0.3]),
         kind="torch",
         roll=(-0.1, 0.2),
@@ -704,57 +715,64 @@ def test_tasks_scenes_and_options_survive_pickle_and_replace() -> None:
     assert task.replace(kind="point").kind == "point" and task.kind == "torch"
     here = pickle.loads(pickle.dumps(scene(1.0)))
     assert [o.name for o in here.obstacles] == ["wall"] and here.capsules[0].link == "tool"
-    options = truing.InverseOptions(choose="manipulability", scene=scene(1.0))
+    options = InverseOptions(choose="manipulability", scene=scene(1.0))
     assert pickle.loads(pickle.dumps(options)).scene.obstacles[0].size.tolist() == [0.04, 4.0, 4.0]
     with pytest.raises(TypeError):
-        truing.InverseOptions(tolerance=1e-3)  # type: ignore[call-arg]
-    conditions = truing.Conditions(payload=2.0, direction=[1, 0, -1], covariates={"oil": 3.0})
+        InverseOptions(tolerance=1e-3)  # type: ignore[call-arg]
+    conditions = Conditions(payload=2.0, direction=[1, 0, -1], covariates={"oil": 3.0})
     assert dict(pickle.loads(pickle.dumps(conditions)).covariates) == {"oil": 3.0}
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda s: s.solve(truing.Task(np.eye(4)), [0.0] * 5), "5 joint readings, the robot has 6"),
-        (lambda s: s.solve(truing.Task(np.eye(4)), [0.0] * 40), "40 joint readings"),
-        (lambda s: s.solve(truing.Task(np.eye(4)), [math.nan] * 6), "not a finite number"),
-        (lambda s: s.solve(truing.Task(2 * np.eye(4))), "rigid"),
-        (lambda s: s.solve(truing.Task(np.full((4, 4), math.nan))), "finite"),
-        (lambda s: s.solve(truing.Task(np.eye(4), kind="torch", axis=[0, 0, 2])), "unit length"),
         (
-            lambda s: s.solve(truing.Task(np.eye(4), kind="torch", roll=(1.0, -1.0))),
+            lambda s: s.solve(Task(np.eye(4)), [0.0] * 5),
+            "5 joint readings, the robot has 6",
+        ),
+        (lambda s: s.solve(Task(np.eye(4)), [0.0] * 40), "40 joint readings"),
+        (lambda s: s.solve(Task(np.eye(4)), [math.nan] * 6), "not a finite number"),
+        (lambda s: s.solve(Task(2 * np.eye(4))), "rigid"),
+        (lambda s: s.solve(Task(np.full((4, 4), math.nan))), "finite"),
+        (
+            lambda s: s.solve(Task(np.eye(4), kind="torch", axis=[0, 0, 2])),
+            "unit length",
+        ),
+        (
+            lambda s: s.solve(Task(np.eye(4), kind="torch", roll=(1.0, -1.0))),
             "window of roll is empty",
         ),
         (
-            lambda s: s.solve(truing.Task(np.eye(4)).replace(kind="flat")),
+            lambda s: s.solve(Task(np.eye(4)).replace(kind="flat")),
             "choose one of 'pose', 'torch', 'point'",
         ),
-        (lambda s: s.branches(truing.Task(np.eye(4), kind="torch")), "full pose"),
+        (lambda s: s.branches(Task(np.eye(4), kind="torch")), "full pose"),
         (lambda s: s.solve_batch(np.eye(4)), "shape"),
         (lambda s: s.solve_batch([np.eye(4), np.full((4, 4), math.nan)]), "pose 1: .*NaN"),
         (lambda s: s.solve_batch(np.tile(np.eye(4), (3, 1, 1)), np.zeros((2, 6))), "2 seeds for 3"),
         (lambda s: s.solve_batch(np.tile(np.eye(4), (3, 1, 1)), np.zeros((3, 5))), r"found \(3, 5\)"),
         (
-            lambda s: s.solve_batch(np.tile(np.eye(4), (3, 1, 1)), conditions=[truing.Conditions()] * 2),
+            lambda s: s.solve_batch(np.tile(np.eye(4), (3, 1, 1)), conditions=[Conditions()] * 2),
             "2 conditions for 3",
         ),
-        (lambda s: s.path(np.tile(np.eye(4), (3, 1, 1)), options=truing.PathOptions(rolls=0)), "rolls"),
+        (
+            lambda s: s.path(np.tile(np.eye(4), (3, 1, 1)), options=PathOptions(rolls=0)),
+            "rolls",
+        ),
         (lambda s: s.forward([math.inf] * 6), "finite"),
         (
-            lambda _: truing.InverseSolver(irb(), truing.InverseOptions(position_tolerance=-1.0)),
+            lambda _: InverseSolver(irb(), InverseOptions(position_tolerance=-1.0)),
             "position_tolerance",
         ),
-        (lambda _: truing.InverseSolver(irb(), target=3), "target"),
+        (lambda _: InverseSolver(irb(), target=3), "target"),
         (lambda _: truing.inverse(irb(), "poses.csv"), "array of numbers"),
         (lambda _: truing.inverse(irb(), []), "shape"),
         (
-            lambda _: truing.InverseSolver(
+            lambda _: InverseSolver(
                 irb(),
-                truing.InverseOptions(
-                    scene=truing.Scene(
-                        capsules=[
-                            truing.LinkCapsule("c", link="J9", start=[0, 0, 0], end=[0, 0, 1], radius=0.1)
-                        ]
+                InverseOptions(
+                    scene=Scene(
+                        capsules=[LinkCapsule("c", link="J9", start=[0, 0, 0], end=[0, 0, 1], radius=0.1)]
                     )
                 ),
             ),
@@ -764,4 +782,4 @@ def test_tasks_scenes_and_options_survive_pickle_and_replace() -> None:
 )
 def test_what_cannot_be_used_is_refused(call: object, message: str) -> None:
     with pytest.raises(truing.InputError, match=message):
-        call(truing.InverseSolver(irb()))  # type: ignore[operator]
+        call(InverseSolver(irb()))  # type: ignore[operator]

@@ -28,8 +28,7 @@ def readings(both: Both, count: int, seed: int) -> Floats:
     return np.random.default_rng(seed).uniform(-3.0, 3.0, (count, both.robot.driven_count))
 
 
-# ---- Forward kinematics
-# ----------------------------------------------------------------------------------------------
+# ---- Forward kinematics --------------------------------------------------------------------------
 
 
 def test_frames_of_all_joints_and_the_tool_are_pinocchios(both: Both) -> None:
@@ -60,8 +59,7 @@ def test_mimicking_joints_have_no_reading() -> None:
     )  # 0.4 of Z, half as much of Z2
 
 
-# ---- Derivatives
-# -----------------------------------------------------------------------------------------------------
+# ---- Derivatives ---------------------------------------------------------------------------------
 
 
 def test_jacobian_by_differences_is_pinocchios(both: Both) -> None:
@@ -144,8 +142,7 @@ def test_identified_joint_zeros_are_those_put_into_pinocchio(both: Both) -> None
     assert found.test is not None and found.test.after.max < 1e-9
 
 
-# ---- Export
-# ----------------------------------------------------------------------------------------------------------
+# ---- Export --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", sorted(ROBOTS))
@@ -153,7 +150,7 @@ def test_exported_calibration_is_the_same_robot_to_pinocchio(name: str) -> None:
     both = Both.read(ROBOTS[name])
     simulated = truing.simulate(both.robot, poses=200, orientation=True, seed=8)
     found = truing.identify(both.robot, simulated.data)
-    exported = Both.read(truing.urdf_with_calibration(both.text, found.robot))
+    exported = Both.read(truing.model.urdf_with_calibration(both.text, found.robot))
     changed = 0.0
     back = np.linalg.inv(found.robot.T_measurement_base)  # a URDF knows no measurement frame
     for reading in readings(both, 50, seed=9):
@@ -173,7 +170,7 @@ def test_exported_joint_zeros_are_turned_about_oblique_axes(both: Both) -> None:
     for joint in robot.joints:
         if not joint.passive:
             joint.offset = 0.02 * rng.standard_normal()
-    text = truing.urdf_with_calibration(both.text, robot)
+    text = truing.model.urdf_with_calibration(both.text, robot)
     exported = Both.read(text)
     for reading in readings(both, 30, seed=11):
         ours = truing.forward_kinematics(robot, reading)[-1]

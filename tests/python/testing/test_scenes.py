@@ -71,8 +71,7 @@ def worst(scene: HandEyeScene) -> float:
     return float(max(np.abs(turned).max(), np.abs(shifted).max()))
 
 
-# ---- The scene
-# -------------------------------------------------------------------------------------------------------
+# ---- The scene -----------------------------------------------------------------------------------
 
 
 def test_without_noise_the_loop_closes(setup: Setup) -> None:
@@ -184,8 +183,7 @@ def test_what_cannot_be_is_refused(wrong: dict[str, object]) -> None:
         simulate_handeye(**wrong)  # type: ignore[arg-type]
 
 
-# ---- Images
-# ----------------------------------------------------------------------------------------------------------
+# ---- Images --------------------------------------------------------------------------------------
 
 
 def test_every_point_of_the_board_is_in_the_image(setup: Setup) -> None:
@@ -266,8 +264,7 @@ def test_a_board_behind_the_camera_is_refused() -> None:
         render_board(PinholeCamera(), Board(), T)
 
 
-# ---- Data that cannot tell
-# -------------------------------------------------------------------------------------------
+# ---- Data that cannot tell -----------------------------------------------------------------------
 
 
 def motions(scene: HandEyeScene) -> Floats:
@@ -306,8 +303,7 @@ def test_equal_poses_are_equal(setup: Setup) -> None:
     np.testing.assert_array_equal(scene.T_camera_board, scene.T_camera_board[[0] * 5])
 
 
-# ---- Data that are wrong
-# ---------------------------------------------------------------------------------------------
+# ---- Data that are wrong -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", MISTAKES)
@@ -371,8 +367,7 @@ def test_order_and_unit_are_no_mistakes(setup: Setup) -> None:
     assert not np.array_equal(shuffled(scene).T_base_hand, scene.T_base_hand)
 
 
-# ---- Streams
-# ---------------------------------------------------------------------------------------------------------
+# ---- Streams -------------------------------------------------------------------------------------
 
 
 def test_streams_agree_once_the_clocks_do(setup: Setup) -> None:
@@ -415,8 +410,7 @@ def test_streams_move_smoothly(setup: Setup) -> None:
     assert (np.diff(streams.t_camera) > 0).all()
 
 
-# ---- Rotations
-# -------------------------------------------------------------------------------------------------------
+# ---- Rotations -----------------------------------------------------------------------------------
 
 
 def test_rotations_there_and_back() -> None:

@@ -148,7 +148,7 @@ def test_a_urdf_robot_gets_errors_too() -> None:
         ' 1"/></joint><joint name="j2" type="continuous"><parent link="b"/><child link="c"/><origin xyz="0.4'
         ' 0 0"/><axis xyz="0 1 0"/></joint></robot>'
     )
-    truth = true_robot(truing.robot_from_urdf(text))
+    truth = true_robot(truing.model.robot_from_urdf(text))
     assert {"j1.x", "j2.rz", "j1.offset", "tool.z"} <= set(truth.parameters)
     assert len(measure(truth, poses=7).data) == 7
 

@@ -34,12 +34,14 @@ from truing.files.stream_file import (
     save_plan,
     save_tracker,
 )
+from truing.model import flange_poses
 from truing.rotations import quaternions_from_rotations, rotation_vectors, rotations_from_quaternions
+from truing.tracking import TrackCalibration, TrackSetup, calibrate_inertial, calibrate_tool
 from truing.tracking.api import white_noise
 
 Floats = NDArray[np.float64]
 ROBOT = truing.load_robot(example("ur10"))
-TRUE = truing.TrackSetup(
+TRUE = TrackSetup(
     T_tracker_base=truing.frame_from_xyz_rpy([2.0, -1.0, 0.5], [0.02, -0.03, 2.1]),
     T_flange_receiver=truing.frame_from_xyz_rpy([0.05, 0.03, 0.10], [0.3, -0.2, 1.0]),
     T_flange_imu=truing.frame_from_xyz_rpy([0.02, -0.04, 0.06], [-0.1, 0.2, -0.7]),
@@ -64,7 +66,7 @@ def smooth(x: Floats) -> Floats:
     return x**3 * (10 - 15 * x + 6 * x**2)
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def recording(seed: int = 1, positions: int = 12, rest: float = 3.4, turns: float = 0.9) -> Recording:
     """A stiff arm that goes from test position to test position. Stamps of all devices differ."""
     rng = np.random.default_rng(seed)
@@ -88,7 +90,7 @@ def recording(seed: int = 1, positions: int = 12, rest: float = 3.4, turns: floa
         return q
 
     def flange_at(t: Floats) -> Floats:
-        return np.asarray(truing.flange_poses(ROBOT, joints_at(t)))
+        return np.asarray(flange_poses(ROBOT, joints_at(t)))
 
     h = 1e-3
     t = np.arange(0.01, length, 0.005)
@@ -126,21 +128,20 @@ def tool() -> Floats:
     return np.asarray(np.linalg.inv(frames[-2]) @ frames[-1])
 
 
-@functools.lru_cache(maxsize=None)
-def calibrated(seed: int = 1) -> truing.TrackCalibration:
+@functools.cache
+def calibrated(seed: int = 1) -> TrackCalibration:
     r = recording(seed)
     return truing.track_calibrate(ROBOT, r.joints, r.tracker, r.imu, plan=r.plan)
 
 
-def errors(found: truing.TrackCalibration, name: str) -> tuple[Floats, Floats]:
+def errors(found: TrackCalibration, name: str) -> tuple[Floats, Floats]:
     """Found minus true, and the standard errors."""
     F, T = np.asarray(getattr(found.where.setup, name)), np.asarray(getattr(TRUE, name))
     e = np.concatenate([F[:3, 3] - T[:3, 3], rotation_vectors((F[:3, :3] @ T[:3, :3].T)[None])[0]])
     return e, np.sqrt(np.diag(found.where.covariance[name]))
 
 
-# ---- What is found
-# -----------------------------------------------------------------------------------------------------
+# ---- What is found -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["T_tracker_base", "T_flange_receiver", "T_flange_imu"])
@@ -196,7 +197,7 @@ def test_the_tool_is_the_robot_files_or_that_of_prescribed_poses() -> None:
     r, rng = recording(), np.random.default_rng(7)
     true = truing.frame_from_xyz_rpy([0.1, -0.05, 0.3], [0.2, 0.1, -0.4])
     joints = np.array([0.0, -1.2, 1.2, -1.0, 0.8, 0.0]) + 0.4 * rng.uniform(-1, 1, (40, 6))
-    flange = truing.flange_poses(ROBOT, joints)
+    flange = flange_poses(ROBOT, joints)
     pivots = [F for F in flange]
     tip = np.array([0.7, 0.1, 0.5])
     moved = np.array(
@@ -210,7 +211,7 @@ def test_the_tool_is_the_robot_files_or_that_of_prescribed_poses() -> None:
             for F in pivots
         ]
     )
-    found = truing.calibrate_tool(moved, flange[:4], [F[:3, :3] @ true[:3, :3] for F in flange[:4]])
+    found = calibrate_tool(moved, flange[:4], [F[:3, :3] @ true[:3, :3] for F in flange[:4]])
     assert (
         found.status == "done"
         and np.allclose(found.T_flange_tool.T, true, atol=3e-4)
@@ -255,7 +256,7 @@ def test_an_arm_that_never_stands_still_is_calibrated_from_its_motion() -> None:
 
 def test_slow_motion_is_not_rich_enough_and_advice_is_given() -> None:
     r = recording(3, 8, 3.4, 0.04)
-    imu = truing.calibrate_inertial(
+    imu = calibrate_inertial(
         r.imu.t,
         r.imu.gyro,
         r.imu.accel,
@@ -296,8 +297,7 @@ def test_a_tracker_without_orientations_is_refused() -> None:
         truing.track_calibrate(ROBOT, r.joints, dataclasses.replace(r.tracker, orientation=None))
 
 
-# ---- The command
-# -------------------------------------------------------------------------------------------------------
+# ---- The command ---------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -397,7 +397,7 @@ def test_prescribed_poses_of_the_tool_are_read(files: Path, tmp_path: Path) -> N
     table = {f"q{k + 1}_deg": np.degrees(q[:, k]) for k in range(6)} | {
         "kind": ["pivot"] * 4 + ["orientation"] * 2
     }
-    turned = quaternions_from_rotations(np.asarray(truing.flange_poses(ROBOT, q))[:, :3, :3])
+    turned = quaternions_from_rotations(np.asarray(flange_poses(ROBOT, q))[:, :3, :3])
     write_table(
         tmp_path / "tool.csv",
         table

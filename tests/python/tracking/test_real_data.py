@@ -46,7 +46,7 @@ pytestmark = [
 
 
 @functools.lru_cache(maxsize=1)
-def run0() -> tuple[truing.TrackCalibration, list[dict[str, Any]], truing.ReplayResult]:
+def run0() -> tuple[truing.tracking.TrackCalibration, list[dict[str, Any]], truing.tracking.ReplayResult]:
     found, errors, played = track_real.with_tracker(DATA / "aubo_i5_run0_60hz")
     return found, errors, played
 

@@ -17,43 +17,53 @@ import truing
 from truing import InputError
 from truing.examples import example
 from truing.rotations import interpolated, rotation_vectors
+from truing.testing import SimulatedStreams, TrackerErrors, large_boom, simulate_streams
+from truing.tracking import (
+    CorrectionLimits,
+    FilterOptions,
+    ModalModel,
+    RecordedStreams,
+    ReplayResult,
+    Tracker,
+    TrackOptions,
+    TrackSetup,
+)
 from truing.tracking.result import BASELINES, horizon_errors
 
 ROBOT = truing.load_robot(example("large_boom"))
 
 
-@functools.lru_cache(maxsize=None)
-def recording(motion: str = "gentle", seconds: float = 12.0, offset: float = 0.0) -> truing.SimulatedStreams:
-    errors = truing.TrackerErrors(clock_offset=offset, out_of_order=0.02)
-    return truing.simulate_streams(
-        ROBOT, seconds=seconds, motion=motion, imu_rate=500.0, tracker=errors, seed=5
-    )
+@functools.cache
+def recording(motion: str = "gentle", seconds: float = 12.0, offset: float = 0.0) -> SimulatedStreams:
+    errors = TrackerErrors(clock_offset=offset, out_of_order=0.02)
+    return simulate_streams(ROBOT, seconds=seconds, motion=motion, imu_rate=500.0, tracker=errors, seed=5)
 
 
-@functools.lru_cache(maxsize=None)
-def played(motion: str = "gentle", offset: float = 0.0) -> truing.ReplayResult:
+@functools.cache
+def played(motion: str = "gentle", offset: float = 0.0) -> ReplayResult:
     streams = recording(motion, offset=offset)
     setup = streams.setup if not offset else streams.setup.replace(clock_offset=0.0, clock_offset_sigma=0.01)
     return truing.replay(streams.recorded, setup)
 
 
-# ---- The simulated arm
-# -------------------------------------------------------------------------------------------------
+# ---- The simulated arm ---------------------------------------------------------------------------
 
 
 def test_the_example_file_is_the_large_boom() -> None:
-    boom = truing.large_boom()
+    boom = large_boom()
     rng = np.random.default_rng(0)
     for _ in range(20):
         q = rng.uniform(-1, 1, 4)
-        assert np.allclose(truing.flange_poses(ROBOT, [q])[0], truing.flange_poses(boom, [q])[0], atol=1e-9)
+        assert np.allclose(
+            truing.model.flange_poses(ROBOT, [q])[0], truing.model.flange_poses(boom, [q])[0], atol=1e-9
+        )
 
 
 def test_the_sway_does_not_depend_on_how_the_robot_is_described() -> None:
     t = np.linspace(0.0, 2.0, 21)
     a, b = (
-        truing.simulate_streams(robot, seconds=2.0, imu_rate=100.0, joint_noise=0.0, seed=2).tool_at(t)
-        for robot in (ROBOT, truing.large_boom())
+        simulate_streams(robot, seconds=2.0, imu_rate=100.0, joint_noise=0.0, seed=2).tool_at(t)
+        for robot in (ROBOT, large_boom())
     )
     assert np.allclose(a, b, atol=1e-6)
 
@@ -65,13 +75,12 @@ def test_encoders_do_not_see_the_sway() -> None:
     assert 2e-3 < np.linalg.norm(true[:, :3, 3] - seen[:, :3, 3], axis=1).std() < 0.1
 
 
-# ---- Sample by sample
-# --------------------------------------------------------------------------------------------------
+# ---- Sample by sample ----------------------------------------------------------------------------
 
 
 def test_faulty_samples_are_refused_by_name_and_change_nothing() -> None:
     s = recording()
-    tracker = truing.Tracker(s.setup)
+    tracker = Tracker(s.setup)
     imu, poses = s.imu, s.tracker
     for k in range(600):
         assert tracker.push_imu(imu["t"][k], imu["gyro"][k], imu["accel"][k]) == "accepted"
@@ -97,7 +106,7 @@ def test_faulty_samples_are_refused_by_name_and_change_nothing() -> None:
 
 def test_two_sensors_on_one_stamp_are_both_taken() -> None:
     s = recording()
-    tracker = truing.Tracker(s.setup)
+    tracker = Tracker(s.setup)
     t = s.imu["t"][:300]
     assert set(tracker.push_imu_rows(t, s.imu["gyro"][:300], s.imu["accel"][:300])) == {"accepted"}
     at = s.setup.T_tracker_base @ s.flange["T_base_flange"][100] @ s.setup.T_flange_receiver
@@ -109,7 +118,7 @@ def test_the_order_of_arrival_does_not_matter() -> None:
     s = recording("stop-and-go")
     answers = []
     for shuffled in (False, True):
-        tracker = truing.Tracker(s.setup)
+        tracker = Tracker(s.setup)
         n = 400  # 0.8 s
         poses = np.flatnonzero(s.tracker["t"] < 0.75)
         early, late = (poses[::2], poses[1::2][::-1]) if shuffled else (np.sort(poses), poses[:0])
@@ -139,27 +148,27 @@ def test_the_order_of_arrival_does_not_matter() -> None:
 
 def test_options_are_checked_and_a_typo_raises() -> None:
     with pytest.raises(TypeError, match="FilterOptions has no 'windwo'; choose from window"):
-        truing.FilterOptions(windwo=1.0)
+        FilterOptions(windwo=1.0)
     with pytest.raises(InputError, match="window must be above 0"):
-        truing.Tracker(truing.TrackSetup(), truing.TrackOptions(filter=truing.FilterOptions(window=-1.0)))
+        Tracker(
+            TrackSetup(),
+            TrackOptions(filter=FilterOptions(window=-1.0)),
+        )
     with pytest.raises(InputError, match="seconds must be above 0"):
-        truing.simulate_streams(ROBOT, seconds=-1.0)
+        simulate_streams(ROBOT, seconds=-1.0)
     with pytest.raises(InputError, match=r"gyro must have shape \(2, 3\)"):
-        truing.Tracker(truing.TrackSetup()).push_imu_rows([0.0, 0.01], np.zeros((2, 2)), np.zeros((2, 3)))
+        Tracker(TrackSetup()).push_imu_rows([0.0, 0.01], np.zeros((2, 2)), np.zeros((2, 3)))
 
 
 def test_options_are_values() -> None:
-    options = truing.TrackOptions(
-        modes=truing.ModalModel([0.6], [0.02]), limits=truing.CorrectionLimits(position=0.1)
-    )
+    options = TrackOptions(modes=ModalModel([0.6], [0.02]), limits=CorrectionLimits(position=0.1))
     options.filter.window = 0.4
     again = pickle.loads(pickle.dumps(options))
     assert (again.filter.window, again.limits.position, again.modes.frequency.tolist()) == (0.4, 0.1, [0.6])
     assert options.replace(coast_position=0.5).coast_position == 0.5 and options.coast_position != 0.5
 
 
-# ---- Replay
-# ------------------------------------------------------------------------------------------------------------
+# ---- Replay --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("motion", ["gentle", "stop-and-go"])
@@ -221,7 +230,7 @@ def test_nothing_is_used_before_it_arrived() -> None:
     """What comes after a time does not change what was said before it."""
     s = recording()
     whole = played().compensation
-    cut = truing.RecordedStreams()
+    cut = RecordedStreams()
     for name, take in (("imu", s.imu), ("tracker", s.tracker), ("flange", s.flange), ("plan", s.plan)):
         early = take["arrival"] < 6.0
         getattr(cut, f"set_{name}")(**{key: values[early] for key, values in take.items()})
@@ -240,7 +249,7 @@ def test_an_unknown_clock_offset_is_found() -> None:
 
 
 def test_a_dropout_coasts_and_comes_back() -> None:
-    s = truing.simulate_streams(ROBOT, seconds=10.0, imu_rate=500.0, dropouts=[(5.0, 1.5)], seed=3)
+    s = simulate_streams(ROBOT, seconds=10.0, imu_rate=500.0, dropouts=[(5.0, 1.5)], seed=3)
     p = truing.replay(s.recorded, s.setup)
     t, status = p.timeline["t"], np.array(p.timeline["status"])
     assert set(status[(t > 5.4) & (t < 6.4)]) <= {"coasting", "hold"} and set(
@@ -249,11 +258,11 @@ def test_a_dropout_coasts_and_comes_back() -> None:
     rows = p.compensation
     use = rows["made"]
     step = np.linalg.norm(np.diff(rows["correction"][use][:, :3], axis=0), axis=1)
-    assert step.max() <= 1.001 * truing.CorrectionLimits().position_rate * 0.01
+    assert step.max() <= 1.001 * CorrectionLimits().position_rate * 0.01
 
 
 def test_a_shifted_base_station_is_said() -> None:
-    s = truing.simulate_streams(
+    s = simulate_streams(
         ROBOT,
         seconds=16.0,
         imu_rate=500.0,
@@ -278,7 +287,7 @@ def test_modes_are_learnt_from_the_start_and_used_from_then_on() -> None:
         timeline["frequencies"][-1][: p.modes.model.count] > 0.3
     ).all()
     # given from the start they are taken where they predict better
-    given = truing.replay(s.recorded, s.setup, truing.TrackOptions(modes=p.modes.model))
+    given = truing.replay(s.recorded, s.setup, TrackOptions(modes=p.modes.model))
     assert "modes" in set(given.compensation["predictor"])
 
 
@@ -323,7 +332,7 @@ def test_gravity_need_not_be_along_z() -> None:
     tilt = truing.frame_from_xyz_rpy([0.0, 0.0, 0.0], [0.17, 0.0, 0.0])[:3, :3]
     robot = ROBOT.copy()
     robot.gravity = tilt @ [0.0, 0.0, -9.81]
-    s = truing.simulate_streams(robot, seconds=8.0, imu_rate=500.0, seed=1)
+    s = simulate_streams(robot, seconds=8.0, imu_rate=500.0, seed=1)
     assert np.allclose(s.setup.gravity, robot.gravity)
     row: dict[str, Any] = next(
         row for row in horizon_errors(truing.replay(s.recorded, s.setup).graded) if row["horizon_s"] == 0.04
