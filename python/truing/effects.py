@@ -218,7 +218,7 @@ Effects: TypeAlias = str | EffectRequest | Effect | Iterable[EffectLike]
 
 
 def parse_effects(text: str) -> list[EffectRequest]:
-    """Requests from "backlash,harmonic:J2+J3": effects with, after a colon, their joints. Raises InputError."""
+    """Requests from "backlash,harmonic:J2+J3": effects, after a colon their joints. Raises InputError."""
     requests = []
     for part in text.split(","):
         name, colon, joints = (piece.strip() for piece in part.partition(":"))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rotations and frames of many rows at once: quaternions (w x y z), rotation vectors, frames between frames."""
+"""Rotations and frames of many rows at once: quaternions (w x y z), rotation vectors, interpolation."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ def quaternions_from_rotations(rotations: Floats) -> Floats:
                 axis=1,
             )
         else:
-            i, j, l = k - 1, k % 3, (k + 1) % 3
-            out[rows, 0] = (m[:, l, j] - m[:, j, l]) / s
+            i, j, h = k - 1, k % 3, (k + 1) % 3
+            out[rows, 0] = (m[:, h, j] - m[:, j, h]) / s
             out[rows, 1 + i] = s / 4
             out[rows, 1 + j] = (m[:, j, i] + m[:, i, j]) / s
-            out[rows, 1 + l] = (m[:, l, i] + m[:, i, l]) / s
+            out[rows, 1 + h] = (m[:, h, i] + m[:, i, h]) / s
     return out * np.where(out[:, :1] < 0, -1.0, 1.0)
 
 

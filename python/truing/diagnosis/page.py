@@ -29,8 +29,9 @@ from truing.report.charts import (
     packed,
     points_trace,
 )
-from truing.report.page import Page, footer, table_cell, warnings_card
+from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.rows import Rows
+from truing.report.trust import GOOD, LOOK, Check, check_items
 from truing.report.words import counted, escaped, figures_text, length_text, length_unit
 
 Floats = NDArray[np.float64]
@@ -61,7 +62,7 @@ def diagnosis_report(result: Mapping[str, Any], rows: Rows) -> str:
         result: What ``result.json`` holds (format ``truing-diagnosis/1``).
         rows: Errors of every row before and after; `rejected`: rows that counted for little.
     """
-    page = Page(f"{result.get('robot') or 'Robot'}: diagnosis", _STYLE)
+    page = Page(f"{result.get('robot') or 'Robot'}: diagnosis", part_of_page("diagnosis"))
     page.add(_headline(result, rows))
     page.add(_sanity(result))
     page.add(_parts(result))
@@ -83,7 +84,7 @@ def diagnosis_report(result: Mapping[str, Any], rows: Rows) -> str:
     return page.html()
 
 
-# ---- First screen ----
+# ---- First screen --------------------------------------------------------------------------------
 def _headline(result: Mapping[str, Any], rows: Rows) -> str:
     tone, label = _VERDICTS[result["verdict"]]
     if result["verdict"] == "effects":
@@ -153,7 +154,7 @@ def _fall(result: Mapping[str, Any]) -> str:
 
 
 def _free(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The unknown that functions of the inputs describe: not what is only known to be more than repeats show."""
+    """Unknowns described by functions of the inputs; not what is only known to exceed the repeats."""
     return [unknown for unknown in result["unknown"] if unknown["inputs"]]
 
 
@@ -456,7 +457,7 @@ def _axis(axis: Sequence[float]) -> str:
     )
 
 
-# ---- What was found ----
+# ---- What was found ------------------------------------------------------------------------------
 def _effect(page: Page, effect: Mapping[str, Any], number: int) -> None:
     colour = _colour(number)
     page.add(
@@ -721,98 +722,91 @@ def _before_and_after(page: Page, result: Mapping[str, Any], rows: Rows) -> None
 
 def _left(result: Mapping[str, Any]) -> str:
     """What remains, as checks in words."""
-    after, gap, near = result["after"], result["gap"], result["nearest_neighbour"]
-    left = result["after_unknown"]["rms_m"]  # with everything that was found
-    checks: list[tuple[int, str, str]] = []
-    p = after["remaining_structure_p"]
-    if p is not None:
-        quiet = (
-            "No function of the inputs describes what is left"
-            if len(_free(result)) < len(result["unknown"])
-            else "What is left looks like noise"
-        )
-        checks.append(
-            (
-                0,
-                quiet,
-                f"no free function of the inputs explains more than chance would (p = {figures_text(p, 2)})",
-            )
-            if p > STRUCTURE
-            else (
-                1,
-                "What is left has structure",
-                f"free functions of the inputs explain more than chance would (p = {figures_text(p, 2)})",
-            )
-        )
-    share = near["share"]
-    if share is not None:
-        end = (
-            f"; 95 % of its errors are below {length_text(near['p95_m'])}"
-            if near["p95_m"] is not None
-            else ""
-        )
-        checks.append(
-            (
-                0 if share < 0.15 else 1,
-                f"Poses nearby would predict {_percent(share)} of what is left",
-                f"by the nearest neighbour, a model that knows nothing{end}",
-            )
-        )
-    floor = gap["noise_floor_m"]
-    if floor and left:
-        ratio = left / floor
-        checks.append(
-            (
-                0 if ratio < 1.5 else 1,
-                (
-                    f"{length_text(left)} rms is"
-                    f" left{' with free functions for what is unknown' if _free(result) else ''}"
-                ),
-                f"{figures_text(ratio, 2)} × the noise of {length_text(floor)}, which is "
-                + (
-                    "that of repeated poses"
-                    if gap["noise_from_repeats"]
-                    else "what a flexible fit leaves: without repeated poses it may be too low"
-                ),
-            )
-        )
-    if result["outliers"]:
-        checks.append(
-            (
-                0,
-                f"{counted(len(result['outliers']), 'row')} counted for little",
-                f"too far from all others: {_listed(result['outliers'], 15)} (from 0)",
-            )
-        )
-    if result["joint_record"] not in ("", "q"):
-        checks.append(
-            (
-                1,
-                "The second joint record fits better",
-                "the diagnosis went by it (columns qr1 …), and so does robot.yaml",
-            )
-        )
-    if result["verdict"] == "none" and gap["p"] is not None:
-        checks.insert(
-            0,
-            (
-                0,
-                "Noise alone would look like this",
-                f"a gain as large has probability {figures_text(gap['p'], 2)} without any gap",
-            ),
-        )
-    items = "".join(
-        f'<li class="g{grade}"><i'
-        f' aria-label="{("good", "look")[grade]}">{"✓!"[grade]}</i><div><b>{head}</b><span>{text}</span></div></li>'
-        for grade, head, text in sorted(checks, key=lambda check: -check[0])
-    )
+    checks = [
+        *_like_noise(result),
+        *_structure_left(result),
+        *_predictable_from_neighbours(result["nearest_neighbour"]),
+        *_above_noise(result),
+        *_rows_that_counted_little(result),
+    ]
+    worst = max([GOOD, *(check.grade for check in checks)])
     return (
-        f'<section class="card trust t{max([0, *(grade for grade, _, _ in checks)])}"><h2>What is'
-        f" left</h2><ul>{items}</ul></section>"
+        f'<section class="card trust t{worst}"><h2>What is left</h2><ul>{check_items(checks)}</ul></section>'
     )
 
 
-# ---- Could not be found ----
+def _like_noise(result: Mapping[str, Any]) -> list[Check]:
+    p = result["gap"]["p"]
+    if result["verdict"] != "none" or p is None:
+        return []
+    text = f"a gain as large has probability {figures_text(p, 2)} without any gap"
+    return [Check(GOOD, "Noise alone would look like this", text)]
+
+
+def _structure_left(result: Mapping[str, Any]) -> list[Check]:
+    p = result["after"]["remaining_structure_p"]
+    if p is None:
+        return []
+    if p <= STRUCTURE:
+        text = f"free functions of the inputs explain more than chance would (p = {figures_text(p, 2)})"
+        return [Check(LOOK, "What is left has structure", text)]
+    quiet = (
+        "No function of the inputs describes what is left"
+        if len(_free(result)) < len(result["unknown"])
+        else "What is left looks like noise"
+    )
+    text = f"no free function of the inputs explains more than chance would (p = {figures_text(p, 2)})"
+    return [Check(GOOD, quiet, text)]
+
+
+def _predictable_from_neighbours(near: Mapping[str, Any]) -> list[Check]:
+    share = near["share"]
+    if share is None:
+        return []
+    end = "" if near["p95_m"] is None else f"; 95 % of its errors are below {length_text(near['p95_m'])}"
+    return [
+        Check(
+            GOOD if share < 0.15 else LOOK,
+            f"Poses nearby would predict {_percent(share)} of what is left",
+            f"by the nearest neighbour, a model that knows nothing{end}",
+        )
+    ]
+
+
+def _above_noise(result: Mapping[str, Any]) -> list[Check]:
+    floor, left = result["gap"]["noise_floor_m"], result["after_unknown"]["rms_m"]  # with all that was found
+    if not floor or not left:
+        return []
+    ratio = left / floor
+    with_free = " with free functions for what is unknown" if _free(result) else ""
+    source = (
+        "that of repeated poses"
+        if result["gap"]["noise_from_repeats"]
+        else "what a flexible fit leaves: without repeated poses it may be too low"
+    )
+    return [
+        Check(
+            GOOD if ratio < 1.5 else LOOK,
+            f"{length_text(left)} rms is left{with_free}",
+            f"{figures_text(ratio, 2)} × the noise of {length_text(floor)}, which is {source}",
+        )
+    ]
+
+
+def _rows_that_counted_little(result: Mapping[str, Any]) -> list[Check]:
+    """Outliers, and a joint record that was not gone by."""
+    checks = []
+    if result["outliers"]:
+        head = f"{counted(len(result['outliers']), 'row')} counted for little"
+        text = f"too far from all others: {_listed(result['outliers'], 15)} (from 0)"
+        checks.append(Check(GOOD, head, text))
+    if result["joint_record"] not in ("", "q"):
+        text = "the diagnosis went by it (columns qr1 …), and so does robot.yaml"
+        checks.append(Check(LOOK, "The second joint record fits better", text))
+    return checks
+
+
+# ---- Could not be found --------------------------------------------------------------------------
 def _detectable(result: Mapping[str, Any], narrow: bool = False) -> str:
     if not result["detectable"]:
         return ""
@@ -827,7 +821,8 @@ def _detectable(result: Mapping[str, Any], narrow: bool = False) -> str:
         )
         at = escaped(easiest["joint"]) or "robot"
         body.append(
-            f"<tr><th>{_words(effect)}</th><td>{at}</td>{table_cell(easiest['size'] or 0, _quantity(easiest['size'], easiest['unit']))}"
+            f"<tr><th>{_words(effect)}</th><td>{at}</td>"
+            f"{table_cell(easiest['size'] or 0, _quantity(easiest['size'], easiest['unit']))}"
             f"{table_cell(easiest['size_at_tip_m'] or 0, length_text(easiest['size_at_tip_m']))}"
             + ("" if narrow else f'<td class="held wrap">{rest}</td>')
             + "</tr>"
@@ -854,7 +849,8 @@ def _not_testable(result: Mapping[str, Any]) -> str:
         '<section class="card"><h2>What these data could not show</h2><p class="lead">These effects may be'
         " there or not: nothing was concluded about them.</p>"
         '<div class="scroll"><table'
-        f' class="left"><thead><tr><th>effect</th><th>at</th><th>why</th></tr></thead><tbody>{body}</tbody></table></div></section>'
+        ' class="left"><thead><tr><th>effect</th><th>at</th><th>why</th></tr></thead>'
+        f"<tbody>{body}</tbody></table></div></section>"
     )
 
 
@@ -876,13 +872,11 @@ def _next(result: Mapping[str, Any], rows: Rows) -> str:
     for k, pose in enumerate(poses[:LISTED]):
         cells = [f"<th>{k + 1}</th>"]
         for value, unit in zip(pose["joints"], rows.joint_units, strict=False):
-            cells.append(
-                f"<td>{_minus(f'{math.degrees(value):.1f}°' if unit == 'rad' else f'{value * 1e3:.1f} mm')}</td>"
-            )
+            place = f"{math.degrees(value):.1f}°" if unit == "rad" else f"{value * 1e3:.1f} mm"
+            cells.append(f"<td>{_minus(place)}</td>")
         if has_direction:
-            cells.append(
-                f"<td>{' '.join('+' if d > 0 else '−' if d < 0 else '·' for d in pose['direction']) or 'any'}</td>"
-            )
+            signs = ("+" if d > 0 else "−" if d < 0 else "·" for d in pose["direction"])
+            cells.append(f"<td>{' '.join(signs) or 'any'}</td>")
         if has_payload:
             cells.append(
                 "<td>any</td>" if pose["payload_kg"] is None else f"<td>{pose['payload_kg']:g} kg</td>"
@@ -899,7 +893,8 @@ def _next(result: Mapping[str, Any], rows: Rows) -> str:
         f'<section class="card"><h2>Measure next</h2><p class="lead">{counted(len(poses), "pose")} that would'
         " settle what is open. Approach: from which side each joint comes.</p>"
         "<div"
-        f' class="scroll"><table><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table></div>{more}</section>'
+        f' class="scroll"><table><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table>'
+        f"</div>{more}</section>"
     )
 
 
@@ -935,7 +930,7 @@ def _candidates(result: Mapping[str, Any]) -> str:
     )
 
 
-# ---- Words ----
+# ---- Words ---------------------------------------------------------------------------------------
 def _colour(number: int) -> str:
     return EFFECT_COLOURS[number % len(EFFECT_COLOURS)]
 
@@ -1041,7 +1036,7 @@ def size_text(effect: Mapping[str, Any]) -> str:
 
 
 def _part(name: str, effect: Mapping[str, Any]) -> str:
-    """ "cos1" of "harmonic.J2.cos1", when the effect and its joint are named beside it; else the whole name."""
+    """ "cos1" of "harmonic.J2.cos1" if effect and joint are named beside it; else the whole name."""
     known = [str(effect["effect"]), *(effect["joints"] if len(effect["joints"]) == 1 else [])]
     parts = [part for part in name.split(".") if part not in known]
     return ".".join(parts) or name
@@ -1130,29 +1125,3 @@ def _compact(value: float | None) -> str:
 def _listed(numbers: Iterable[int], limit: int) -> str:
     every = list(numbers)
     return ", ".join(str(n) for n in every[:limit]) + (" …" if len(every) > limit else "")
-
-
-_STYLE = """
-.verdict{display:inline-block;margin-left:12px;padding:2px 12px;border-radius:20px;font-weight:600;color:#fff;background:var(--after)}
-.verdict.good{background:var(--good)} .verdict.open{background:var(--look)}
-header h1.long{font-size:clamp(21px,2vw,27px);text-wrap:pretty} header .more{font-size:18px;margin:0 0 4px} header .sub{max-width:none}
-.look{border-top:5px solid #d99a00}
-h2 .muted{font-weight:400;font-size:15px;margin-left:6px}
-.stack{display:flex;height:48px;border-radius:8px;overflow:hidden;gap:2px;margin:4px 0 8px}
-.stack div{min-width:3px;display:flex;align-items:center;justify-content:center;color:#fff;font-weight:600;overflow:hidden;white-space:nowrap;font-size:16px}
-.stack div:last-child{color:var(--ink)}
-.parts i.many{background:linear-gradient(90deg,#6f8f2d 33%,#b0558f 33% 66%,#3d5a80 66%)} .parts .names{white-space:normal;color:var(--muted);font-size:14.5px;max-width:900px}
-.parts td,.parts th{text-align:left;padding:1px 22px 1px 0;border:0} .parts i,.dot{display:inline-block;width:14px;height:14px;border-radius:4px;margin-right:9px;vertical-align:-1px}
-.parts{width:auto} .parts .share{font-weight:600;text-align:right} .maybe{color:var(--look);white-space:normal}
-.where:not(.calm) .column{align-content:stretch} .where{display:grid;grid-template-columns:minmax(0,.85fr) minmax(0,.85fr) minmax(0,1.7fr);gap:18px} .where.calm{grid-template-columns:minmax(0,1fr) minmax(0,1.2fr)}
-.column{display:grid;gap:18px;align-content:start;min-width:0} .chart.pane{height:214px} .where .card h2{margin-bottom:2px} .chart.law{height:330px} .chart.law.small{height:230px} .chart.law.row{height:270px;min-width:0} .laws{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,300px),1fr));gap:10px;margin-bottom:4px} .laws+.note{margin:0 0 10px} .maps{display:grid;grid-template-columns:minmax(0,1fr) minmax(0,1.15fr);gap:6px}
-.finding{display:grid;grid-template-columns:minmax(0,1.25fr) minmax(0,1fr);gap:26px} .finding.even{grid-template-columns:minmax(0,1fr) minmax(0,1fr)} .finding p{margin:0 0 10px}
-.shrink strong{font-size:26px} .shrink .before{font-size:20px}
-.apart{border-left:4px solid #d99a00;background:#fdf7e7;padding:9px 14px;margin:12px 0;border-radius:0 8px 8px 0} .apart p{margin:0 0 4px;font-weight:600}
-tr.missed th,tr.missed td{color:var(--bad);font-weight:600}
-td.wrap,th.wrap{white-space:normal;text-align:left} td.wrap{min-width:180px} table.left td,table.left th{text-align:left}
-table.narrow th,table.narrow td{padding-right:10px} .fold summary{font-size:16px} .finding .fold{margin-top:2px}
-summary{font-size:19px;font-weight:650;cursor:pointer} details[open] summary{margin-bottom:8px}
-@media(max-width:1050px){.where,.where.calm{grid-template-columns:minmax(0,1fr)}.finding,.finding.even{grid-template-columns:minmax(0,1fr)}}
-@media(max-width:640px){.maps{grid-template-columns:minmax(0,1fr)}.stack div{font-size:13px}}
-"""

@@ -108,8 +108,7 @@ def _rms(robot: truing.Robot, data: truing.Measurements) -> float:
     return float(np.sqrt(np.nanmean(np.sum(error**2, axis=1))))
 
 
-# ---- Simpler methods
-# -------------------------------------------------------------------------------------------------------
+# ---- Simpler methods -----------------------------------------------------------------------------
 
 
 def baseline(

@@ -326,7 +326,7 @@ def _tool_points(chain: Chain, state: Sweep) -> Floats:
 
 
 def quaternions(matrices: Floats) -> Floats:
-    """w x y z with w >= 0 of rotation matrices, by the eigenvector of largest eigenvalue (Bar-Itzhack 2000)."""
+    """w x y z with w >= 0 of rotation matrices: eigenvector of the largest eigenvalue (Bar-Itzhack 2000)."""
     r = matrices
     k = np.empty((len(r), 4, 4))
     k[:, 0, 0] = r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2]

@@ -139,8 +139,7 @@ def at_joint(joint: int, values: Callable[[Context], Floats]) -> Law:
     return law
 
 
-# ---- Joints
-# --------------------------------------------------------------------------------------------------------------
+# ---- Joints --------------------------------------------------------------------------------------
 
 
 def joint_offset(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
@@ -278,8 +277,7 @@ def time_offset(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
     return Hidden("time_offset", (), law, needs=frozenset({"speed"}))
 
 
-# ---- Links
-# ---------------------------------------------------------------------------------------------------------------
+# ---- Links ---------------------------------------------------------------------------------------
 
 
 def link_geometry(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
@@ -422,8 +420,7 @@ def linkage(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
     return Hidden("linkage", (joint,), at_joint(joint, values), detail={"lower": lower})
 
 
-# ---- Frames and instrument
-# -----------------------------------------------------------------------------------------------
+# ---- Frames and instrument -----------------------------------------------------------------------
 
 
 def drift(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:

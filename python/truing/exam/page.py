@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from truing.report.page import _STYLE, Page, footer, warnings_card
+from truing.report.page import Page, footer, part_of_page, warnings_card
 from truing.report.words import counted, escaped
 
 
@@ -17,7 +17,7 @@ def exam_report(result: Mapping[str, Any]) -> str:
     Args:
         result: What ``result.json`` holds; `scores` is a list of mappings, one per line of the table.
     """
-    page = Page("Examination of the diagnosis", _STYLE)
+    page = Page("Examination of the diagnosis", part_of_page("exam"))
     scores = result["scores"]
     judged = [s for s in scores if s.get("passed") is not None]
     passed = sum(bool(s["passed"]) for s in judged)
@@ -36,7 +36,8 @@ def exam_report(result: Mapping[str, Any]) -> str:
     heading = "".join(f"<th>{escaped(name.replace('_', ' '))}</th>" for name in names)
     page.add(
         '<section class="card"><h2>Scores</h2><div'
-        f' class="scroll"><table><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table></div></section>'
+        f' class="scroll"><table><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table>'
+        "</div></section>"
     )
     page.add(warnings_card(result))
     page.add(footer(result))

@@ -62,8 +62,7 @@ def wilson(hits: int, n: int, z: float = _Z90) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-# ---- What is right
-# -----------------------------------------------------------------------------------------------------------
+# ---- What is right -------------------------------------------------------------------------------
 
 
 def _pairs(items: Iterable[dict[str, Any]]) -> list[Effect]:
@@ -195,8 +194,7 @@ def place_right(sheet: Sheet) -> bool:
     return found.joint == sheet.label["unlisted_joint"] and inputs
 
 
-# ---- The table
-# ---------------------------------------------------------------------------------------------------------------
+# ---- The table -----------------------------------------------------------------------------------
 
 
 Test = Callable[[Sheet], bool]
@@ -572,8 +570,7 @@ def _failures(sheets: Sequence[Sheet]) -> list[dict[str, Any]]:
     return found
 
 
-# ---- Printing
-# ----------------------------------------------------------------------------------------------------------------
+# ---- Printing ------------------------------------------------------------------------------------
 
 
 def _cell(row: Row) -> str:

@@ -129,8 +129,7 @@ class Request:
         return every[int(rng.integers(len(every)))]
 
 
-# ---- A scene: robot, plan and instrument, before anything is wrong
-# ---------------------------------------------------------
+# ---- A scene: robot, plan and instrument, before anything is wrong -------------------------------
 
 
 @dataclass
@@ -259,8 +258,7 @@ def _spike_scene(request: Request, needs: frozenset[str], poses: int | None) -> 
     )
 
 
-# ---- Drawing effects
-# -------------------------------------------------------------------------------------------------------
+# ---- Drawing effects -----------------------------------------------------------------------------
 
 _WEIGHTS = {
     "joint_compliance": 15,
@@ -445,8 +443,7 @@ def _size(rng: Generator, low: float = _SMALLEST, high: float = _LARGEST) -> flo
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-# ---- Handing over
-# ----------------------------------------------------------------------------------------------------------
+# ---- Handing over --------------------------------------------------------------------------------
 
 
 def _measured(
@@ -603,8 +600,7 @@ def _acceptable(scene: Scene, view: View, hidden: Hidden, moved: Floats) -> list
     return [item for k, item in enumerate(found) if item not in found[:k]]
 
 
-# ---- Families
-# --------------------------------------------------------------------------------------------------------------
+# ---- Families ------------------------------------------------------------------------------------
 
 
 def _none(request: Request) -> Case:

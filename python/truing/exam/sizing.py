@@ -30,7 +30,7 @@ class View:
         self.frames = _orthonormal(self._frame_columns() + (self.geometry_columns() if geometry else []))
 
     def look(self, moved: Floats) -> Floats:
-        """The part of a displacement of all rows, shape=(n, 3), that no fitted frame takes away; flattened."""
+        """The part of a displacement of all rows, shape=(n, 3), that no fitted frame takes away. Flat."""
         flat = moved.ravel()
         return np.asarray(flat - self.frames @ (self.frames.T @ flat))
 

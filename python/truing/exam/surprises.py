@@ -37,8 +37,7 @@ def _relative(c: Context, joint: int) -> Floats:
     return np.asarray(2.0 * (c.motion[:, joint] - usual.min()) / max(float(np.ptp(usual)), 1e-9) - 1.0)
 
 
-# ---- Development
-# ---------------------------------------------------------------------------------------------------------
+# ---- Development ---------------------------------------------------------------------------------
 
 
 def bump(chain: Chain, joint: int, rng: Generator) -> Hidden:
@@ -115,8 +114,7 @@ def slip(chain: Chain, joint: int, rng: Generator) -> Hidden:
     )
 
 
-# ---- Examination
-# ---------------------------------------------------------------------------------------------------------
+# ---- Examination ---------------------------------------------------------------------------------
 
 
 def sawtooth(chain: Chain, joint: int, rng: Generator) -> Hidden:
@@ -193,7 +191,7 @@ def creep(chain: Chain, joint: int, rng: Generator) -> Hidden:
 
 
 def loaded_belt(chain: Chain, joint: int, rng: Generator) -> Hidden:
-    """A belt lags one way when empty and the other way when loaded: approach direction and payload together."""
+    """A belt lags one way empty and the other way loaded: approach direction and payload together."""
     column = chain.number(joint) - 1
 
     def values(c: Context) -> Floats:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The true robot: what an instrument without noise would read. Either a mechanism in MuJoCo or plain numpy."""
+"""The true robot: what an instrument without noise would read. A mechanism in MuJoCo, or plain numpy."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def listed(names: Sequence[str], limit: int = 30) -> str:
 
 
 def read_bytes(path: Path, largest: int) -> bytes:
-    """The whole file; an InputError when it is not there, cannot be read, or has more than `largest` bytes."""
+    """The whole file. InputError if it is not there, cannot be read, or has more than `largest` bytes."""
     try:
         with path.open("rb") as file:
             data = file.read(largest + 1)
@@ -103,8 +103,7 @@ def reason(error: BaseException) -> str:
     return str(error).strip().split("\n")[0] or type(error).__name__
 
 
-# ---- Output that is whole or not there
-# -------------------------------------------------------------------------------
+# ---- Output that is whole or not there -----------------------------------------------------------
 
 
 def _temporary_beside(path: Path) -> Path:
@@ -204,8 +203,7 @@ def _interrupts_held_back() -> Iterator[None]:
             raise KeyboardInterrupt
 
 
-# ---- Tables
-# ----------------------------------------------------------------------------------------------------------
+# ---- Tables --------------------------------------------------------------------------------------
 
 
 def write_table(path: PathLike, columns: Mapping[str, ArrayLike | Sequence[str | None]]) -> None:

@@ -82,8 +82,7 @@ class Stream:
     T: Floats  # shape=(n, 4, 4)
 
 
-# ---- Rotations
-# -------------------------------------------------------------------------------------------------------
+# ---- Rotations -----------------------------------------------------------------------------------
 
 
 def rotations_from_angles(angles: Floats, convention: str) -> Floats:
@@ -107,9 +106,9 @@ def rotations_from_angles(angles: Floats, convention: str) -> Floats:
         turn = angles[:, place if twice else axis]
         c, s = np.cos(turn), np.sin(turn)
         step = np.zeros((len(angles), 3, 3))
-        j, l = (axis + 1) % 3, (axis + 2) % 3
+        j, k = (axis + 1) % 3, (axis + 2) % 3
         step[:, axis, axis] = 1.0
-        step[:, j, j], step[:, j, l], step[:, l, j], step[:, l, l] = c, -s, s, c
+        step[:, j, j], step[:, j, k], step[:, k, j], step[:, k, k] = c, -s, s, c
         out = out @ step
     return out
 
@@ -140,8 +139,7 @@ def check_angles(convention: str | None, *, needed_by: str = "") -> str | None:
     raise InputError(f"--angles: found {convention!r}, expected {names}{hint}")
 
 
-# ---- Columns
-# ---------------------------------------------------------------------------------------------------------
+# ---- Columns -------------------------------------------------------------------------------------
 
 
 class _Plan:
@@ -456,8 +454,7 @@ class _Reader:
         return [names[code] for code in codes], [paths[code] for code in codes]
 
 
-# ---- Reading
-# ---------------------------------------------------------------------------------------------------------
+# ---- Reading -------------------------------------------------------------------------------------
 
 
 def load_handeye(
@@ -655,8 +652,7 @@ def _check_poses(table: Table, hand: Floats, board: Floats, images: bool) -> Non
         )
 
 
-# ---- Cameras
-# ---------------------------------------------------------------------------------------------------------
+# ---- Cameras -------------------------------------------------------------------------------------
 
 
 def _pixels(value: object) -> int:

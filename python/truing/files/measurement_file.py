@@ -427,8 +427,7 @@ def _warn_about_limits(reader: _Reader, joints: list[Floats]) -> None:
             warnings.warn(InputWarning(str(error)), stacklevel=3)
 
 
-# ---- Writing
-# ---------------------------------------------------------------------------------------------------------
+# ---- Writing -------------------------------------------------------------------------------------
 
 
 def save_measurements(

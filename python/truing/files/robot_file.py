@@ -59,8 +59,7 @@ _SI_PER_LENGTH = {"m": _SI, "mm": Decimal("0.001")}
 _SI_PER_ANGLE = {"rad": _SI, "deg": _RADIANS_PER_DEGREE}
 
 
-# ---- The file's models
-# -----------------------------------------------------------------------------------------------
+# ---- The file's models ---------------------------------------------------------------------------
 
 
 class _UnitsOfFile(Strict):
@@ -135,8 +134,7 @@ class _UrdfChain(_RobotFile):
     joints: Annotated[list[_UrdfJoint], Field(min_length=1)]
 
 
-# ---- Reading
-# ---------------------------------------------------------------------------------------------------------
+# ---- Reading -------------------------------------------------------------------------------------
 
 
 def load_robot(path: PathLike, base_link: str = "", tip_link: str = "") -> _core.Robot:
@@ -306,8 +304,7 @@ def _check_effects(document: Document, model: _LinkTable | _UrdfChain) -> None:
                 )
 
 
-# ---- Do the numbers look like the unit that the file names?
-# ----------------------------------------------------------
+# ---- Do the numbers look like the unit that the file names? --------------------------------------
 
 
 def _angles(model: _LinkTable | _UrdfChain) -> Iterator[tuple[Loc, Decimal]]:
@@ -397,8 +394,7 @@ def _check_units_look_right(document: Document, model: _LinkTable | _UrdfChain) 
             )
 
 
-# ---- File to robot
-# ---------------------------------------------------------------------------------------------------
+# ---- File to robot -------------------------------------------------------------------------------
 
 
 def _to_si(value: Decimal, si_per_unit: Decimal) -> float:
@@ -464,8 +460,7 @@ def _unit(axis: NDArray[np.float64]) -> NDArray[np.float64]:
     return axis if abs(norm - 1.0) <= 1e-12 else axis / norm
 
 
-# ---- Robot to file
-# ---------------------------------------------------------------------------------------------------
+# ---- Robot to file -------------------------------------------------------------------------------
 
 
 def save_robot(

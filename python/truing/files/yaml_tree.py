@@ -183,8 +183,7 @@ def _plain_scalar(text: str) -> Any:
     return text
 
 
-# ---- What the models are made of
-# -------------------------------------------------------------------------------------
+# ---- What the models are made of -----------------------------------------------------------------
 
 
 class Strict(BaseModel):

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, REJECTED, faded, packed, round_down, subsample
-from truing.report.page import Page, footer, table_cell, warnings_card
+from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
+from truing.report.trust import BAD, GOOD, LOOK, Check, grade_of, shortened, trust_card
 from truing.report.words import angle_text, counted, escaped, figures_text, length_text
 
 Floats = NDArray[np.float64]
@@ -70,7 +71,7 @@ def handeye_report(result: Mapping[str, Any], scene: Scene | None) -> str:
         result: What ``result.json`` holds (format ``truing-handeye/1``).
         scene: Where everything is; None where no camera was found.
     """
-    page = Page("Hand-eye calibration", _STYLE)
+    page = Page("Hand-eye calibration", part_of_page("hand_eye"))
     page.add(_headline(result))
     if result["status"] == "done":
         page.add('<div class="first">')
@@ -107,8 +108,7 @@ def handeye_report(result: Mapping[str, Any], scene: Scene | None) -> str:
     return page.html()
 
 
-# ------------------------------------------------------------------------------------------------------------------
-# first screen
+# ---- First screen --------------------------------------------------------------------------------
 
 
 def _headline(result: Mapping[str, Any]) -> str:
@@ -190,7 +190,8 @@ def _readings(result: Mapping[str, Any]) -> str:
     body = "".join(
         f"<tr><th><code>--reading {escaped(r['reading'])}</code></th><td"
         f' class="wrap">{escaped(r["explanation"])}</td>'
-        f"{table_cell(r['rms_m'] or 0, length_text(r['rms_m']))}{table_cell(r['rotation_rms_rad'] or 0, _mrad(r['rotation_rms_rad']))}</tr>"
+        f"{table_cell(r['rms_m'] or 0, length_text(r['rms_m']))}"
+        f"{table_cell(r['rotation_rms_rad'] or 0, _mrad(r['rotation_rms_rad']))}</tr>"
         for r in readings
     )
     return (
@@ -208,109 +209,8 @@ def _closures(page: Page, result: Mapping[str, Any], scene: Scene | None) -> Non
         '<section class="card"><h2>How far each pose is from'
         f" {'where the others put it' if alone else 'closing the loop'}</h2>"
     )
-    residuals = result["residuals"]
-    for key, scale, unit, predicted, size in (
-        ("position", 1e3, "mm", None if scene is None else scene.predicted_m, "close"),
-        ("rotation", 1e3, "mrad", None if scene is None else scene.predicted_rad, "close short"),
-    ):
-        suffix = "m" if key == "position" else "rad"
-        traces: list[dict[str, Any]] = []
-        if predicted is not None and len(predicted) and np.isfinite(predicted).all():
-            x = [r["pose"] for r in residuals]
-            traces.append(
-                {
-                    "type": "scatter",
-                    "mode": "lines",
-                    "x": x,
-                    "y": packed(predicted * scale),
-                    "line": {"color": MUTED, "width": 1.5, "dash": "dot", "shape": "hvh"},
-                    "name": "95 % below, by the noise",
-                    "hovertemplate": f"95 % are below %{{y:.3g}} {unit}<extra></extra>",
-                }
-            )
-        for name, colour, symbol, chosen in (
-            (
-                "left out" if alone else "fitted",
-                AFTER,
-                "circle",
-                [r for r in residuals if r["set"] == "train" and not r["rejected"]],
-            ),
-            (
-                "held out",
-                HELD_OUT,
-                "diamond",
-                [r for r in residuals if r["set"] == "test" and not r["rejected"]],
-            ),
-            ("rejected", REJECTED, "x", [r for r in residuals if r["rejected"]]),
-        ):
-            if chosen:
-                values = [
-                    (
-                        r[f"{key}_left_out_{suffix}"]
-                        if r[f"{key}_left_out_{suffix}"] is not None
-                        else r[f"{key}_{suffix}"]
-                    )
-                    for r in chosen
-                ]
-                traces.append(
-                    {
-                        "type": "scatter",
-                        "mode": "markers",
-                        "x": [r["pose"] for r in chosen],
-                        "y": [None if v is None else scale * v for v in values],
-                        "name": name,
-                        "marker": {
-                            "color": colour,
-                            "size": 8 if name != "rejected" else 9,
-                            "symbol": symbol,
-                            "opacity": 0.85,
-                        },
-                        "text": [_hover(r) for r in chosen],
-                        "hovertemplate": f"%{{text}}<br>%{{y:.3g}} {unit}<extra>{name}</extra>",
-                    }
-                )
-        every = [
-            (
-                r[f"{key}_left_out_{suffix}"]
-                if r[f"{key}_left_out_{suffix}"] is not None
-                else r[f"{key}_{suffix}"]
-            )
-            for r in residuals
-        ]
-        usual = [
-            scale * value
-            for value, r in zip(every, residuals, strict=True)
-            if not r["rejected"] and value is not None
-        ]
-        known = np.empty(0) if predicted is None else predicted[np.isfinite(predicted)]
-        most = max([1e-9, *usual, *(known * scale).tolist()])
-        top = max([scale * value for value in every if value is not None] or [most])
-        axis: dict[str, Any] = {"title": {"text": unit}, "rangemode": "tozero"}
-        if top > 6 * most:  # gross poses would press the others to the floor
-            low = max(1e-6, min([v for v in usual if v > 0] or [most]) / 1.5)
-            axis = {
-                "title": {"text": unit},
-                "type": "log",
-                "range": [math.log10(low), math.log10(1.6 * top)],
-                "dtick": 1,
-            }
-        page.chart(
-            f"closure_{key}",
-            traces,
-            {
-                "xaxis": {"title": {"text": "pose" if key == "rotation" else ""}},
-                "yaxis": axis,
-                "margin": {
-                    "l": 56,
-                    "r": 10,
-                    "t": 30 if key == "position" else 6,
-                    "b": 40 if key == "rotation" else 22,
-                },
-                "showlegend": key == "position",
-                "legend": {"orientation": "h", "y": 1.16, "x": 0},
-            },
-            size=size,
-        )
+    _closure_chart(page, result, "position", None if scene is None else scene.predicted_m)
+    _closure_chart(page, result, "rotation", None if scene is None else scene.predicted_rad)
     first = (
         "Each dot is a pose that was left out, predicted from all the others; held-out poses never took part."
         if alone
@@ -322,6 +222,104 @@ def _closures(page: Page, result: Mapping[str, Any], scene: Scene | None) -> Non
     )
 
 
+def _closure_chart(page: Page, result: Mapping[str, Any], key: str, predicted: Floats | None) -> None:
+    """Residuals of every pose. `key`: "position" or "rotation"."""
+    position = key == "position"
+    scale, unit = (1e3, "mm") if position else (1e3, "mrad")
+    traces: list[dict[str, Any]] = []
+    if predicted is not None and len(predicted) and np.isfinite(predicted).all():
+        traces.append(_expected_trace(result, predicted * scale, unit))
+    traces += _residual_traces(result, key, scale, unit)
+    page.chart(
+        f"closure_{key}",
+        traces,
+        {
+            "xaxis": {"title": {"text": "" if position else "pose"}},
+            "yaxis": _closure_axis(result["residuals"], key, predicted, scale, unit),
+            "margin": {"l": 56, "r": 10, "t": 30 if position else 6, "b": 22 if position else 40},
+            "showlegend": position,
+            "legend": {"orientation": "h", "y": 1.16, "x": 0},
+        },
+        size="close" if position else "close short",
+    )
+
+
+def _expected_trace(result: Mapping[str, Any], below: Floats, unit: str) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": [r["pose"] for r in result["residuals"]],
+        "y": packed(below),
+        "line": {"color": MUTED, "width": 1.5, "dash": "dot", "shape": "hvh"},
+        "name": "95 % below, by the noise",
+        "hovertemplate": f"95 % are below %{{y:.3g}} {unit}<extra></extra>",
+    }
+
+
+def _closure(residual: Mapping[str, Any], key: str) -> float | None:
+    """The residual with this pose left out, where there is one; else as fitted [m | rad]."""
+    unit = "m" if key == "position" else "rad"
+    left_out = residual[f"{key}_left_out_{unit}"]
+    found: float | None = left_out if left_out is not None else residual[f"{key}_{unit}"]
+    return found
+
+
+def _residual_traces(result: Mapping[str, Any], key: str, scale: float, unit: str) -> list[dict[str, Any]]:
+    kept = [r for r in result["residuals"] if not r["rejected"]]
+    groups = (
+        (
+            "fitted" if "kinematics" in result else "left out",
+            AFTER,
+            "circle",
+            [r for r in kept if r["set"] == "train"],
+        ),
+        ("held out", HELD_OUT, "diamond", [r for r in kept if r["set"] == "test"]),
+        ("rejected", REJECTED, "x", [r for r in result["residuals"] if r["rejected"]]),
+    )
+    traces = []
+    for name, colour, symbol, chosen in groups:
+        if chosen:
+            values = [_closure(r, key) for r in chosen]
+            traces.append(
+                {
+                    "type": "scatter",
+                    "mode": "markers",
+                    "x": [r["pose"] for r in chosen],
+                    "y": [None if v is None else scale * v for v in values],
+                    "name": name,
+                    "marker": {
+                        "color": colour,
+                        "size": 8 if name != "rejected" else 9,
+                        "symbol": symbol,
+                        "opacity": 0.85,
+                    },
+                    "text": [_hover(r) for r in chosen],
+                    "hovertemplate": f"%{{text}}<br>%{{y:.3g}} {unit}<extra>{name}</extra>",
+                }
+            )
+    return traces
+
+
+def _closure_axis(
+    residuals: Sequence[Mapping[str, Any]], key: str, predicted: Floats | None, scale: float, unit: str
+) -> dict[str, Any]:
+    """Linear from zero; logarithmic where gross poses would press the others to the floor."""
+    every = [(_closure(r, key), r["rejected"]) for r in residuals]
+    usual = [scale * value for value, rejected in every if not rejected and value is not None]
+    known = np.empty(0) if predicted is None else predicted[np.isfinite(predicted)]
+    most = max([1e-9, *usual, *(known * scale).tolist()])
+    top = max([scale * value for value, _ in every if value is not None] or [most])
+    if top <= 6 * most:
+        return {"title": {"text": unit}, "rangemode": "tozero"}
+    low = max(1e-6, min([v for v in usual if v > 0] or [most]) / 1.5)
+    return {
+        "title": {"text": unit},
+        "type": "log",
+        "range": [math.log10(low), math.log10(1.6 * top)],
+        "dtick": 1,
+    }
+
+
 def _hover(r: Mapping[str, Any]) -> str:
     text = f"pose {r['pose']}" + (f" · {r['image']}" if r.get("image") else "")
     return escaped(text) + (f"<br>{escaped(r['cause'])}" if r["cause"] else "")
@@ -329,137 +327,132 @@ def _hover(r: Mapping[str, Any]) -> str:
 
 def _trust(result: Mapping[str, Any]) -> str:
     """Checks in words, each good, worth a look, or bad; the worst of them is the verdict."""
-    checks: list[tuple[int, str, str]] = []
-    errors, noise, seen = result["errors"], result["noise"], result["observability"]
-    fitted = errors["train"]["n"]
-    checks.append(
-        (
-            0 if fitted >= FEW_POSES else 1 if fitted >= TOO_FEW_POSES else 2,
-            ("Enough poses", "Few poses", "Very few poses")[
-                0 if fitted >= FEW_POSES else 1 if fitted >= TOO_FEW_POSES else 2
-            ],
-            f"{fitted} of {result['poses']} in the fit",
-        )
+    checks = [
+        _enough_poses(result),
+        _different_axes(result["observability"]),
+        *_held_out(result["errors"]),
+        _noise_found(result["noise"]),
+        *_against_noise(result),
+        _rejected(result),
+        *_remarks(result),
+    ]
+    return trust_card(
+        checks, ("You can trust this", "Usable, but look at the marked points", "Do not rely on this yet")
     )
+
+
+def _enough_poses(result: Mapping[str, Any]) -> Check:
+    fitted = result["errors"]["train"]["n"]
+    grade = GOOD if fitted >= FEW_POSES else LOOK if fitted >= TOO_FEW_POSES else BAD
+    head = ("Enough poses", "Few poses", "Very few poses")[grade]
+    return Check(grade, head, f"{fitted} of {result['poses']} in the fit")
+
+
+def _different_axes(seen: Mapping[str, Any]) -> Check:
     spread = seen["axes_spread"] or 0.0
-    grade = 0 if spread > FLAT_AXES else 1 if spread > ONE_AXIS else 2
-    checks.append(
-        (
-            grade,
-            (
-                "The hand was turned about different axes",
-                "The hand was turned mostly about one axis",
-                "The hand was turned about one axis",
-            )[grade],
-            (
-                f"rotation about the second axis is {_percent(spread)} of that about the first, singular gap"
-                f" {figures_text(min(seen['gap'] or 0.0, 1e9), 2)}"
-            ),
-        )
+    grade = GOOD if spread > FLAT_AXES else LOOK if spread > ONE_AXIS else BAD
+    head = (
+        "The hand was turned about different axes",
+        "The hand was turned mostly about one axis",
+        "The hand was turned about one axis",
+    )[grade]
+    return Check(
+        grade,
+        head,
+        f"rotation about the second axis is {_percent(spread)} of that about the first, singular gap"
+        f" {figures_text(min(seen['gap'] or 0.0, 1e9), 2)}",
     )
-    if "test" in errors and errors["test"]["n"]:
-        reference = errors.get("left_out", errors["train"])
-        ratio = errors["test"]["rms_m"] / reference["rms_m"] if reference["rms_m"] else 1.0
-        grade = 0 if ratio < WORSE_THAN_NOISE else 1 if ratio < 3 else 2
-        checks.append(
-            (
-                grade,
-                (
-                    "Held-out poses are as good as fitted ones",
-                    "Held-out poses are somewhat worse",
-                    "Held-out poses are much worse",
-                )[grade],
-                (
-                    f"{length_text(errors['test']['rms_m'])} rms over"
-                    f" {counted(errors['test']['n'], 'held-out pose')}, {length_text(reference['rms_m'])}"
-                    f" {'left out' if 'left_out' in errors else 'fitted'}"
-                ),
-            )
-        )
+
+
+def _held_out(errors: Mapping[str, Any]) -> list[Check]:
+    if "test" not in errors or not errors["test"]["n"]:
+        return []
+    reference = errors.get("left_out", errors["train"])
+    ratio = errors["test"]["rms_m"] / reference["rms_m"] if reference["rms_m"] else 1.0
+    grade = grade_of(ratio, WORSE_THAN_NOISE, 3)
+    head = (
+        "Held-out poses are as good as fitted ones",
+        "Held-out poses are somewhat worse",
+        "Held-out poses are much worse",
+    )[grade]
+    text = (
+        f"{length_text(errors['test']['rms_m'])} rms over {counted(errors['test']['n'], 'held-out pose')},"
+        f" {length_text(reference['rms_m'])} {'left out' if 'left_out' in errors else 'fitted'}"
+    )
+    return [Check(grade, head, text)]
+
+
+def _noise_found(noise: Mapping[str, Any]) -> Check:
     source = "found from the data" if noise["estimated"] else "as given"
     by_both = noise["camera_rad"] is not None or noise["pixel"] is not None
     rotation = [f"{'robot ' if by_both else ''}±{_mrad(noise['hand_rad'])}"]
     rotation += [f"camera ±{_mrad(noise['camera_rad'])}"] if noise["camera_rad"] else []
     rotation += [f"images ±{_pixels_text(noise['pixel'])}"] if noise["pixel"] is not None else []
-    checks.append(
-        (
-            0,
-            (
-                f"Noise of {'the robot' if noise['pixel'] is not None else 'robot and camera'}"
-                f" ±{length_text(noise['position_m'])}"
-            ),
-            f"per component, {source}; in rotation {', '.join(rotation)}",
-        )
+    whose = "the robot" if noise["pixel"] is not None else "robot and camera"
+    return Check(
+        GOOD,
+        f"Noise of {whose} ±{length_text(noise['position_m'])}",
+        f"per component, {source}; in rotation {', '.join(rotation)}",
     )
+
+
+def _against_noise(result: Mapping[str, Any]) -> list[Check]:
     usual = [
         r["distance"]
         for r in result["residuals"]
         if not r["rejected"] and r["set"] == "train" and r["distance"] is not None
     ]
-    if usual and not noise["estimated"]:
-        rms = math.sqrt(sum(d * d for d in usual) / len(usual))
-        grade = 0 if rms < WORSE_THAN_NOISE else 1 if rms < 3 else 2
-        checks.append(
-            (
-                grade,
-                (
-                    "Residuals are what the noise predicts",
-                    "Residuals are larger than the noise predicts",
-                    "Residuals are much larger than the noise predicts",
-                )[grade],
-                f"{figures_text(rms, 2)} times",
-            )
-        )
+    if not usual or result["noise"]["estimated"]:
+        return []
+    rms = math.sqrt(sum(d * d for d in usual) / len(usual))
+    grade = grade_of(rms, WORSE_THAN_NOISE, 3)
+    head = (
+        "Residuals are what the noise predicts",
+        "Residuals are larger than the noise predicts",
+        "Residuals are much larger than the noise predicts",
+    )[grade]
+    return [Check(grade, head, f"{figures_text(rms, 2)} times")]
+
+
+def _rejected(result: Mapping[str, Any]) -> Check:
     rejected = len(result["rejected_poses"])
+    if rejected == 0:
+        return Check(GOOD, "No pose rejected", "all fit each other")
     share = rejected / max(1, result["poses"])
-    checks.append(
-        (
-            0 if rejected == 0 else 1 if share <= MANY_REJECTED else 2,
-            "No pose rejected" if rejected == 0 else f"{counted(rejected, 'pose')} rejected",
-            (
-                "all fit each other"
-                if rejected == 0
-                else "they do not fit the others: "
-                + ", ".join(str(p["pose"]) for p in result["rejected_poses"][:10])
-                + (" …" if rejected > 10 else "")
-            ),
-        )
+    which = ", ".join(str(p["pose"]) for p in result["rejected_poses"][:10])
+    return Check(
+        LOOK if share <= MANY_REJECTED else BAD,
+        f"{counted(rejected, 'pose')} rejected",
+        f"they do not fit the others: {which}" + (" …" if rejected > 10 else ""),
     )
+
+
+def _remarks(result: Mapping[str, Any]) -> list[Check]:
+    """What is worth a look without being measured."""
+    checks = []
     images = result.get("images")
     if images and images["not_found"]:
+        missing = images["not_found"]
         checks.append(
-            (
-                1,
-                f"The board was not found in {counted(len(images['not_found']), 'image')}",
-                escaped(", ".join(images["not_found"][:4])) + (" …" if len(images["not_found"]) > 4 else ""),
+            Check(
+                LOOK,
+                f"The board was not found in {counted(len(missing), 'image')}",
+                escaped(", ".join(missing[:4])) + (" …" if len(missing) > 4 else ""),
             )
         )
     if result["convention"]["reading"]:
-        checks.append((1, "Read otherwise than the file says", escaped(result["convention"]["explanation"])))
+        explanation = escaped(result["convention"]["explanation"])
+        checks.append(Check(LOOK, "Read otherwise than the file says", explanation))
     if result["method"] == "closed-form":
-        checks.append((1, "Closed form alone", "all poses count alike; the refined method is more accurate"))
+        text = "all poses count alike; the refined method is more accurate"
+        checks.append(Check(LOOK, "Closed form alone", text))
     for warning in result.get("warnings", [])[:2]:
-        short = (
-            escaped(warning)
-            if len(warning) < 150
-            else escaped(warning[:140].rsplit(" ", 1)[0]) + ' … (<a href="#warnings">in full</a>)'
-        )
         if "was not found in" not in warning:
-            checks.append((1, "Warning", short))
-    worst = max(grade for grade, _, _ in checks)
-    verdict = ("You can trust this", "Usable, but look at the marked points", "Do not rely on this yet")[
-        worst
-    ]
-    items = "".join(
-        f'<li class="g{grade}"><i'
-        f' aria-label="{("good", "look", "bad")[grade]}">{"✓!✕"[grade]}</i><div><b>{head}</b><span>{text}</span></div></li>'
-        for grade, head, text in sorted(checks, key=lambda check: -check[0])
-    )
-    return f'<section class="card trust t{worst}"><h2>{verdict}</h2><ul>{items}</ul></section>'
+            checks.append(Check(LOOK, "Warning", shortened(warning, 150, 140)))
+    return checks
 
 
-# -----------------------------------------------------------------------------------------------------------------------
-# the scene
+# ---- The scene -----------------------------------------------------------------------------------
 
 
 def _lines(pieces: Sequence[Floats]) -> dict[str, Any]:
@@ -473,22 +466,55 @@ def _lines(pieces: Sequence[Floats]) -> dict[str, Any]:
 
 def _scene(page: Page, result: Mapping[str, Any], scene: Scene) -> None:
     page.add('<section class="card"><h2>The scene</h2>')
-    rejected = np.array([r["rejected"] for r in result["residuals"]], dtype=bool)
     count = len(scene.T_base_hand)
     pick = subsample(np.arange(count), SCENE_POSES)
-    hands, cameras, seen, boards = (
-        frames[pick]
-        for frames in (scene.T_base_hand, scene.T_base_camera, scene.T_base_board_seen, scene.T_base_board)
+    drawing = _Drawing(result, scene, pick)
+    drawing.add_triads()
+    drawing.add_cameras()
+    words = drawing.add_boards()
+    axes = {
+        f"{axis}axis": {"title": {"text": f"{axis} [m]"}, "backgroundcolor": "#fff", "gridcolor": "#e6e9ed"}
+        for axis in "xyz"
+    }
+    page.chart(
+        "workspace",
+        drawing.traces,
+        {
+            "scene": {
+                **axes,
+                "aspectmode": "data",
+                "camera": {"eye": {"x": 1.25, "y": -1.25, "z": 0.75}, "center": {"x": 0, "y": 0, "z": -0.12}},
+            },
+            "fallback": drawing.flat,
+        },
+        size="cloud scene",
     )
-    everything = np.concatenate([hands[:, :3, 3], cameras[:, :3, 3], boards[:, :3, 3], np.zeros((1, 3))])
-    extent = float(np.ptp(everything, axis=0).max()) or 1.0
-    eye_in_hand = result["setup"] == "eye-in-hand"
-    traces: list[dict[str, Any]] = []
-    flat: dict[str, list[dict[str, Any]]] = {"top": [], "side": []}
+    less = f" {counted(len(pick), 'pose')} drawn of {count}." if len(pick) < count else ""
+    page.add(
+        '<p class="note">Robot base and hands as triads (x red, y green, z blue),'
+        f" {'cameras' if drawing.eye_in_hand else 'camera'} dark, boards as the camera saw them orange, and"
+        f" as they are predicted blue.{words}{less}</p></section>"
+    )
 
-    def draw(pieces: Sequence[Floats], colour: str, name: str, width: float) -> None:
+
+class _Drawing:
+    """The scene as traces of a 3-D plot, and of two flat ones for browsers without WebGL."""
+
+    def __init__(self, result: Mapping[str, Any], scene: Scene, pick: NDArray[np.integer[Any]]) -> None:
+        self.traces: list[dict[str, Any]] = []
+        self.flat: dict[str, list[dict[str, Any]]] = {"top": [], "side": []}
+        self.eye_in_hand = result["setup"] == "eye-in-hand"
+        self._residuals = [result["residuals"][k] for k in pick]
+        self._rejected = np.array([r["rejected"] for r in self._residuals], dtype=bool)
+        self._hands, self._cameras = scene.T_base_hand[pick], scene.T_base_camera[pick]
+        self._seen, self._boards = scene.T_base_board_seen[pick], scene.T_base_board[pick]
+        self._outline = _outline(scene.board_m)
+        places = [self._hands[:, :3, 3], self._cameras[:, :3, 3], self._boards[:, :3, 3], np.zeros((1, 3))]
+        self._extent = float(np.ptp(np.concatenate(places), axis=0).max()) or 1.0
+
+    def add_lines(self, pieces: Sequence[Floats], colour: str, name: str, width: float) -> None:
         xyz = _lines(pieces)
-        traces.append(
+        self.traces.append(
             {
                 "type": "scatter3d",
                 "mode": "lines",
@@ -499,7 +525,7 @@ def _scene(page: Page, result: Mapping[str, Any], scene: Scene) -> None:
             }
         )
         for view, second in (("top", "y"), ("side", "z")):
-            flat[view].append(
+            self.flat[view].append(
                 {
                     "type": "scatter",
                     "mode": "lines",
@@ -511,85 +537,56 @@ def _scene(page: Page, result: Mapping[str, Any], scene: Scene) -> None:
                 }
             )
 
-    for axis, colour in enumerate(TRIADS):
-        draw(
-            [_arm(frame, axis, 0.035 * extent) for frame in hands],
-            faded(colour, 0.75),
-            f"hand, {'xyz'[axis]}",
-            3,
+    def add_triads(self) -> None:
+        """Robot base and hands."""
+        for axis, colour in enumerate(TRIADS):
+            arms = [_arm(frame, axis, 0.035 * self._extent) for frame in self._hands]
+            self.add_lines(arms, faded(colour, 0.75), f"hand, {'xyz'[axis]}", 3)
+            base = [_arm(np.eye(4), axis, 0.13 * self._extent)]
+            self.add_lines(base, colour, f"robot base, {'xyz'[axis]}", 6)
+        path = self._hands[:, :3, 3]
+        self.traces.append(
+            {
+                "type": "scatter3d",
+                "mode": "markers",
+                **{axis: packed(path[:, k]) for k, axis in enumerate("xyz")},
+                "name": "hand",
+                "marker": {"size": 3, "color": [REJECTED if out else INK for out in self._rejected]},
+                "text": [_hover(r) for r in self._residuals],
+                "hovertemplate": "%{text}<extra>hand</extra>",
+            }
         )
-        draw([_arm(np.eye(4), axis, 0.13 * extent)], colour, f"robot base, {'xyz'[axis]}", 6)
-    path = hands[:, :3, 3]
-    traces.append(
-        {
-            "type": "scatter3d",
-            "mode": "markers",
-            **{axis: packed(path[:, k]) for k, axis in enumerate("xyz")},
-            "name": "hand",
-            "marker": {"size": 3, "color": [REJECTED if rejected[k] else INK for k in pick]},
-            "text": [_hover(result["residuals"][k]) for k in pick],
-            "hovertemplate": "%{text}<extra>hand</extra>",
-        }
-    )
-    draw(
-        [
-            _frustum(frame, 0.05 * extent if eye_in_hand else 0.1 * extent)
-            for frame in (cameras if eye_in_hand else cameras[:1])
-        ],
-        faded(INK, 0.55 if eye_in_hand else 1.0),
-        "camera",
-        2 if eye_in_hand else 4,
-    )
-    outline = _outline(scene.board_m)
-    shown = np.isfinite(seen[:, 0, 0])
-    some = np.isin(
-        np.arange(len(pick)), subsample(np.arange(len(pick)), SCENE_BOARDS)
-    )  # boards one over the other show nothing
-    words = ""
-    draw(
-        [_moved(frame, outline) for frame in (boards[:1] if eye_in_hand else boards[some])],
-        faded(AFTER, 0.95),
-        "board, predicted",
-        4,
-    )
-    if shown.any():
-        draw([_moved(frame, outline) for frame in seen[shown & some]], faded(SEEN, 0.6), "board, seen", 2)
-        off = seen[shown, :3, 3] - boards[shown, :3, 3]
-        good = ~rejected[pick][shown]
+
+    def add_cameras(self) -> None:
+        if self.eye_in_hand:
+            frusta = [_frustum(frame, 0.05 * self._extent) for frame in self._cameras]
+            self.add_lines(frusta, faded(INK, 0.55), "camera", 2)
+        else:
+            frusta = [_frustum(frame, 0.1 * self._extent) for frame in self._cameras[:1]]
+            self.add_lines(frusta, faded(INK, 1.0), "camera", 4)
+
+    def add_boards(self) -> str:
+        """Boards as predicted and as seen; in words, what strokes between them mean."""
+        shown = np.isfinite(self._seen[:, 0, 0])
+        every = np.arange(len(self._boards))
+        some = np.isin(every, subsample(every, SCENE_BOARDS))  # boards one over the other show nothing
+        predicted = self._boards[:1] if self.eye_in_hand else self._boards[some]
+        outlines = [_moved(frame, self._outline) for frame in predicted]
+        self.add_lines(outlines, faded(AFTER, 0.95), "board, predicted", 4)
+        if not shown.any():
+            return ""
+        outlines = [_moved(frame, self._outline) for frame in self._seen[shown & some]]
+        self.add_lines(outlines, faded(SEEN, 0.6), "board, seen", 2)
+        start = self._boards[shown, :3, 3]
+        off = self._seen[shown, :3, 3] - start
+        good = ~self._rejected[shown]
         longest = float(np.quantile(np.linalg.norm(off[good] if good.any() else off, axis=1), 0.9)) or 1e-9
-        factor = round_down(0.05 * extent / longest)
-        if factor > 1:
-            start = boards[shown, :3, 3]
-            draw(
-                [np.stack([start[k], start[k] + factor * off[k]]) for k in np.flatnonzero(good)],
-                REJECTED,
-                f"seen less predicted, × {factor:g}",
-                3,
-            )
-            words = f" Red strokes: from the predicted to the seen board origin, enlarged {factor:g} times."
-    axes = {
-        f"{axis}axis": {"title": {"text": f"{axis} [m]"}, "backgroundcolor": "#fff", "gridcolor": "#e6e9ed"}
-        for axis in "xyz"
-    }
-    page.chart(
-        "workspace",
-        traces,
-        {
-            "scene": {
-                **axes,
-                "aspectmode": "data",
-                "camera": {"eye": {"x": 1.25, "y": -1.25, "z": 0.75}, "center": {"x": 0, "y": 0, "z": -0.12}},
-            },
-            "fallback": flat,
-        },
-        size="cloud scene",
-    )
-    less = f" {counted(len(pick), 'pose')} drawn of {count}." if len(pick) < count else ""
-    page.add(
-        '<p class="note">Robot base and hands as triads (x red, y green, z blue),'
-        f" {'cameras' if eye_in_hand else 'camera'} dark, boards as the camera saw them orange, and as they"
-        f" are predicted blue.{words}{less}</p></section>"
-    )
+        factor = round_down(0.05 * self._extent / longest)
+        if factor <= 1:
+            return ""
+        strokes = [np.stack([start[k], start[k] + factor * off[k]]) for k in np.flatnonzero(good)]
+        self.add_lines(strokes, REJECTED, f"seen less predicted, × {factor:g}", 3)
+        return f" Red strokes: from the predicted to the seen board origin, enlarged {factor:g} times."
 
 
 def _arm(frame: Floats, axis: int, length: float) -> Floats:
@@ -684,8 +681,7 @@ def _frames(result: Mapping[str, Any]) -> str:
     )
 
 
-# --------------------------------------------------------------------------------------------------------------------
-# what it rests on
+# ---- What it rests on ----------------------------------------------------------------------------
 
 
 def _observability(page: Page, result: Mapping[str, Any]) -> None:
@@ -838,7 +834,8 @@ def _kinematics(result: Mapping[str, Any]) -> str:
         '<div class="scroll"><table class="narrow"><thead><tr><th>closure, rms</th><th>nominal'
         f" robot</th><th>calibrated</th></tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
         '<details class="fold"><summary>What changed in the robot</summary><div class="scroll"><table'
-        f' class="sortable"><thead><tr>{heading}</tr></thead><tbody>{"".join(parameters)}</tbody></table></div></details></section>'
+        f' class="sortable"><thead><tr>{heading}</tr></thead><tbody>{"".join(parameters)}</tbody></table>'
+        "</div></details></section>"
     )
 
 
@@ -917,9 +914,8 @@ def _images(result: Mapping[str, Any]) -> str:
     cells = []
     for name in ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"):
         text = f"{values[name]:.2f} px" if name[0] in "fc" else f"{values[name]:+.4f}"
-        cells.append(
-            f"<tr><th>{name}</th><td>{text}</td><td>{'' if sigma.get(name) is None else '± ' + figures_text(sigma[name], 2)}</td></tr>"
-        )
+        error = "" if sigma.get(name) is None else "± " + figures_text(sigma[name], 2)
+        cells.append(f"<tr><th>{name}</th><td>{text}</td><td>{error}</td></tr>")
     how = (
         "refined together with the camera's pose"
         if images.get("camera_refined")
@@ -931,8 +927,10 @@ def _images(result: Mapping[str, Any]) -> str:
         (r for r in result["residuals"] if r.get("pixels") is not None), key=lambda r: -r["pixels"]
     )[:WORST_IMAGES]
     body = "".join(
-        f"<tr><th>{escaped(r['image'])}</th><td>{r['pose']}</td>{table_cell(r['pixels'], _pixels_text(r['pixels']))}"
-        f"{table_cell(r['pixels_corrected'] or 0, _pixels_text(r['pixels_corrected']))}<td>{escaped(r['cause']) if r['rejected'] else ''}</td></tr>"
+        f"<tr><th>{escaped(r['image'])}</th><td>{r['pose']}</td>"
+        f"{table_cell(r['pixels'], _pixels_text(r['pixels']))}"
+        f"{table_cell(r['pixels_corrected'] or 0, _pixels_text(r['pixels_corrected']))}"
+        f"<td>{escaped(r['cause']) if r['rejected'] else ''}</td></tr>"
         for r in worst
     )
     missing = (
@@ -1019,12 +1017,12 @@ def _poses(result: Mapping[str, Any]) -> str:
     )
     return (
         '<section class="card"><h2>Every pose</h2><div class="scroll"><table'
-        f' class="sortable"><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table></div>{more}</section>'
+        f' class="sortable"><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table></div>{more}'
+        "</section>"
     )
 
 
-# -------------------------------------------------------------------------------------------------------------------------
-# words
+# ---- Words ---------------------------------------------------------------------------------------
 
 
 def _sentence(text: str, stop: bool = True) -> str:
@@ -1057,18 +1055,3 @@ def _millimetres(metres: float, decimals: int) -> str:
 
 def _percent(share: float | None) -> str:
     return "–" if share is None else f"{100 * share:.0f} %"
-
-
-_STYLE = """
-.verdict{display:inline-block;margin-left:12px;padding:2px 12px;border-radius:20px;font-weight:600;color:#fff;background:var(--after)}
-.verdict.found{background:var(--good)} .verdict.open{background:var(--look)}
-header h1{font-size:clamp(21px,2.1vw,29px);text-wrap:pretty} header .sub{max-width:none}
-.look{border-top:5px solid #d99a00}
-.chart.close{height:262px} .chart.close.short{height:208px} .chart.pane{height:236px} .chart.bars{height:176px} .column{display:grid;gap:18px;align-content:start;min-width:0} .chart.scene{height:560px}
-.pair{display:grid;grid-template-columns:minmax(0,1fr) minmax(0,1fr);gap:18px} .pair.wide{grid-template-columns:minmax(0,1.5fr) minmax(0,1fr)} .pair:empty{display:none}
-.card h3{font-size:16px;margin:14px 0 2px;font-weight:600} h2 .muted{font-weight:400;font-size:15px;margin-left:6px}
-table.left td,table.left th{text-align:left} td.wrap{white-space:normal;text-align:left;min-width:180px} table.narrow{width:auto} table.facts th{font-weight:400;color:var(--muted);text-align:left} table.facts th{white-space:normal;width:54%} table.facts td{text-align:left} table.facts td.wrap{white-space:normal}
-th.in{padding-left:18px!important} tr.missed th,tr.missed td{color:var(--bad)} code{background:#eef0f3;border-radius:5px;padding:1px 6px;font-size:14.5px}
-.fold{margin-top:10px} summary{cursor:pointer;font-weight:600}
-@media(max-width:1000px){.pair,.pair.wide{grid-template-columns:minmax(0,1fr)}}
-"""

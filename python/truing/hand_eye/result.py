@@ -44,8 +44,7 @@ class Solved:
     seed: int = 0
 
 
-# ---- result.json
-# -----------------------------------------------------------------------------------------------------
+# ---- result.json ---------------------------------------------------------------------------------
 
 
 def _uncertain(frame: _core.UncertainFrame, parent: str) -> dict[str, Any]:
@@ -327,8 +326,7 @@ def _kinematics(k: _core.HandEyeKinematics) -> dict[str, Any]:
     }
 
 
-# ---- What is drawn
-# ---------------------------------------------------------------------------------------------------
+# ---- What is drawn -------------------------------------------------------------------------------
 
 
 def scene_of(solved: Solved) -> Scene | None:
@@ -412,7 +410,7 @@ def _board_extent(data: HandEyeData) -> tuple[float, float, float, float]:
 
 
 def _pixel_errors(solved: Solved, A: Floats, X: Floats, Y: Floats) -> tuple[Floats, Floats]:
-    """Seen minus predicted pixels with robot poses as found, of poses that were fitted, and where they are."""
+    """Seen minus predicted pixels of fitted poses, with robot poses as found; and where the pixels are."""
     data, r = solved.data, solved.result
     images, given = data.poses.images, data.poses.camera
     if images is None or given is None:
@@ -437,8 +435,7 @@ def _pixel_errors(solved: Solved, A: Floats, X: Floats, Y: Floats) -> tuple[Floa
     return every[::step], where[::step]
 
 
-# ---- Files
-# -----------------------------------------------------------------------------------------------------------
+# ---- Files ---------------------------------------------------------------------------------------
 
 
 def residual_columns(solved: Solved) -> dict[str, Any]:

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The reports of ``truing identify`` and ``truing predict``.
 
-The first screen answers three questions: how accurate was the robot, how accurate is it now, can I trust that.
+The first screen answers three questions: how accurate was the robot, how accurate is it now, can this be
+trusted.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from truing.report.charts import (
 )
 from truing.report.page import Page, footer, table_cell, warnings_card
 from truing.report.rows import Rows
+from truing.report.trust import BAD, GOOD, LOOK, Check, grade_of, shortened, trust_card
 from truing.report.words import angle_text, counted, drawn_of, escaped, figures_text, length_text, length_unit
 
 Floats = NDArray[np.float64]
@@ -201,134 +203,124 @@ def _headline(result: Mapping[str, Any], errors: Mapping[str, Any], held_out: bo
 
 def _trust_box(result: Mapping[str, Any], rows: Rows) -> str:
     """Checks in words, each good, worth a look, or bad; the worst of them is the verdict."""
-    checks: list[tuple[int, str, str]] = []
-    errors, solver = result["errors"], result["solver"]
-    train = errors["train"]["after"]
-    if solver.get("converged", True):
-        checks.append(
-            (
-                0,
-                "The fit converged",
-                f"{counted(solver['iterations'], 'iteration')}, {escaped(solver['name'])}",
-            )
-        )
-    else:
-        checks.append((2, "The fit did not converge", escaped(solver["stopped_because"])))
     # Held-out rows are never rejected. A few gross outliers among them say nothing about the fit, so they are
     # judged apart.
-    usual = float(np.median(rows.magnitude_after[~rows.test & ~rows.rejected])) if train["n"] else 0.0
-    wild = rows.test & (rows.magnitude_after > GROSS * usual) if usual else np.zeros_like(rows.test)
-    if wild.sum() > 0.2 * rows.test.sum():
-        wild = np.zeros_like(wild)
-    rest = rows.magnitude_after[rows.test & ~wild]
-    if "test" in errors:
-        held_out = float(np.sqrt(np.nanmean(rest**2))) if wild.any() else errors["test"]["after"]["rms_m"]
-        ratio = held_out / train["rms_m"] if train["rms_m"] else 1.0
-        grade = 0 if ratio < 1.35 else 1 if ratio < 2 else 2
-        text = (
-            "Unseen poses are as good as fitted ones",
-            "Unseen poses are somewhat worse than fitted ones",
-            "Unseen poses are much worse than fitted ones",
-        )[grade]
-        checks.append(
-            (
-                grade,
-                text,
-                (
-                    f"rms {length_text(held_out)} held"
-                    f" out{' (without bad measurements)' if wild.any() else ''},"
-                    f" {length_text(train['rms_m'])} fitted"
-                ),
-            )
-        )
-    else:
-        checks.append(
-            (1, "Nothing was held out", "the errors are those of the rows that were fitted, and flatter")
-        )
-    rank = int(result["rank"])
-    per = train["n"] / rank if rank else math.inf
-    grade = 0 if rows.numbers_per_row * per >= 10 else 1 if rows.numbers_per_row * per >= 4 else 2
-    checks.append(
+    gross = _gross_held_out(result, rows)
+    rest = rows.magnitude_after[rows.test & ~gross]
+    checks = [
+        _converged(result["solver"]),
+        _unseen_poses(result["errors"], rest, bool(gross.any())),
+        _enough_rows(result, rows),
+        *_noise(result, rows),
+        _rejected_share(rows),
+        *_bad_measurements(gross, rest),
+        _unseen_combinations(result.get("frozen", [])),
+        *_more_warnings(result),
+    ]
+    return trust_card(
+        checks,
         (
-            grade,
-            ("Enough rows", "Few rows", "Too few rows")[grade] + " for the parameters",
-            f"{figures_text(per, 2)} rows per parameter ({train['n']} rows, {rank} parameters)",
-        )
+            "You can trust this calibration",
+            "Usable, but look at the marked points",
+            "Do not rely on this yet",
+        ),
     )
+
+
+def _converged(solver: Mapping[str, Any]) -> Check:
+    if not solver.get("converged", True):
+        return Check(BAD, "The fit did not converge", escaped(solver["stopped_because"]))
+    text = f"{counted(solver['iterations'], 'iteration')}, {escaped(solver['name'])}"
+    return Check(GOOD, "The fit converged", text)
+
+
+def _gross_held_out(result: Mapping[str, Any], rows: Rows) -> NDArray[np.bool_]:
+    """Held-out rows that are off as no noise is; none where there are too many to be outliers."""
+    none = np.zeros_like(rows.test)
+    if not result["errors"]["train"]["after"]["n"]:
+        return none
+    usual = float(np.median(rows.magnitude_after[~rows.test & ~rows.rejected]))
+    if not usual:
+        return none
+    gross = rows.test & (rows.magnitude_after > GROSS * usual)
+    return none if gross.sum() > 0.2 * rows.test.sum() else gross
+
+
+def _unseen_poses(errors: Mapping[str, Any], rest: Floats, without_gross: bool) -> Check:
+    if "test" not in errors:
+        text = "the errors are those of the rows that were fitted, and flatter"
+        return Check(LOOK, "Nothing was held out", text)
+    train = errors["train"]["after"]["rms_m"]
+    held_out = float(np.sqrt(np.nanmean(rest**2))) if without_gross else errors["test"]["after"]["rms_m"]
+    grade = grade_of(held_out / train if train else 1.0, 1.35, 2)
+    head = (
+        "Unseen poses are as good as fitted ones",
+        "Unseen poses are somewhat worse than fitted ones",
+        "Unseen poses are much worse than fitted ones",
+    )[grade]
+    without = " (without bad measurements)" if without_gross else ""
+    return Check(grade, head, f"rms {length_text(held_out)} held out{without}, {length_text(train)} fitted")
+
+
+def _enough_rows(result: Mapping[str, Any], rows: Rows) -> Check:
+    rank, n = int(result["rank"]), result["errors"]["train"]["after"]["n"]
+    per = n / rank if rank else math.inf
+    numbers = rows.numbers_per_row * per
+    grade = GOOD if numbers >= 10 else LOOK if numbers >= 4 else BAD
+    head = ("Enough rows", "Few rows", "Too few rows")[grade] + " for the parameters"
+    return Check(grade, head, f"{figures_text(per, 2)} rows per parameter ({n} rows, {rank} parameters)")
+
+
+def _noise(result: Mapping[str, Any], rows: Rows) -> list[Check]:
     noise = result.get("noise_sigma_m")
-    if noise is not None:
-        checks.append(
-            (
-                0,
-                "What the model leaves",
-                (
-                    f"{length_text(noise)} per {'reading' if rows.what == 'distance' else 'axis'}:"
-                    " measurement noise and what the robot cannot repeat"
-                ),
-            )
-        )
+    if noise is None:
+        return []
+    per = "reading" if rows.what == "distance" else "axis"
+    text = f"{length_text(noise)} per {per}: measurement noise and what the robot cannot repeat"
+    return [Check(GOOD, "What the model leaves", text)]
+
+
+def _rejected_share(rows: Rows) -> Check:
     rejected = int(rows.rejected.sum())
     share = rejected / max(1, int((~rows.test).sum()))
-    checks.append(
-        (
-            0 if share <= 0.05 else 1,
-            "No row rejected" if rejected == 0 else f"{counted(rejected, 'row')} rejected as gross outliers",
-            f"{share:.1%} of the training rows" if rejected else "no gross outliers among the training rows",
-        )
+    return Check(
+        GOOD if share <= 0.05 else LOOK,
+        "No row rejected" if rejected == 0 else f"{counted(rejected, 'row')} rejected as gross outliers",
+        f"{share:.1%} of the training rows" if rejected else "no gross outliers among the training rows",
     )
-    if wild.any():
-        checks.append(
-            (
-                1,
-                (
-                    f"{counted(int(wild.sum()), 'held-out row')}"
-                    f" {'looks like a bad measurement' if wild.sum() == 1 else 'look like bad measurements'}"
-                ),
-                (
-                    f"{GROSS} times the usual error or more, and counted above. Without: mean"
-                    f" {length_text(float(np.nanmean(rest)))}, worst {length_text(float(np.nanmax(rest)))}"
-                ),
-            )
-        )
-    frozen = result.get("frozen", [])
-    if frozen:
-        names = ", ".join(escaped(f.get("parameter") or _main(f["combination"])) for f in frozen[:4]) + (
-            " …" if len(frozen) > 4 else ""
-        )
-        checks.append(
-            (
-                0,
-                f"{counted(len(frozen), 'combination')} that these data cannot see",
-                f'kept at nominal: {names} (<a href="#frozen">in words</a>). Harmless for poses like these.',
-            )
-        )
-    else:
-        checks.append((0, "Every parameter can be seen", "nothing had to be kept at nominal"))
-    # Warnings that a check above has already said are not said twice.
+
+
+def _bad_measurements(gross: NDArray[np.bool_], rest: Floats) -> list[Check]:
+    if not gross.any():
+        return []
+    look = "looks like a bad measurement" if gross.sum() == 1 else "look like bad measurements"
+    text = (
+        f"{GROSS} times the usual error or more, and counted above. Without: mean"
+        f" {length_text(float(np.nanmean(rest)))}, worst {length_text(float(np.nanmax(rest)))}"
+    )
+    return [Check(LOOK, f"{counted(int(gross.sum()), 'held-out row')} {look}", text)]
+
+
+def _unseen_combinations(frozen: Sequence[Mapping[str, Any]]) -> Check:
+    if not frozen:
+        return Check(GOOD, "Every parameter can be seen", "nothing had to be kept at nominal")
+    names = ", ".join(escaped(f.get("parameter") or _main(f["combination"])) for f in frozen[:4])
+    more = " …" if len(frozen) > 4 else ""
+    return Check(
+        GOOD,
+        f"{counted(len(frozen), 'combination')} that these data cannot see",
+        f'kept at nominal: {names}{more} (<a href="#frozen">in words</a>). Harmless for poses like these.',
+    )
+
+
+def _more_warnings(result: Mapping[str, Any]) -> list[Check]:
+    """Warnings that no check says already."""
     other = [w for w in result.get("warnings", []) if not any(said in w for said in _SAID_BY_CHECKS)]
-    for warning in other[:3]:
-        short = (
-            escaped(warning)
-            if len(warning) < 130
-            else escaped(warning[:120].rsplit(" ", 1)[0]) + ' … (<a href="#warnings">in full</a>)'
-        )
-        checks.append((1, "Warning", short))
+    checks = [Check(LOOK, "Warning", shortened(warning, 130, 120)) for warning in other[:3]]
     if len(other) > 3:
-        checks.append(
-            (1, "More warnings", f'<a href="#warnings">{counted(len(other) - 3, "more warning")}</a>')
-        )
-    worst = max(grade for grade, _, _ in checks)
-    verdict = (
-        "You can trust this calibration",
-        "Usable, but look at the marked points",
-        "Do not rely on this yet",
-    )[worst]
-    items = "".join(
-        f'<li class="g{grade}"><i'
-        f' aria-label="{("good", "look", "bad")[grade]}">{"✓!✕"[grade]}</i><div><b>{head}</b><span>{text}</span></div></li>'
-        for grade, head, text in sorted(checks, key=lambda check: -check[0])
-    )
-    return f'<section class="card trust t{worst}"><h2>{verdict}</h2><ul>{items}</ul></section>'
+        text = f'<a href="#warnings">{counted(len(other) - 3, "more warning")}</a>'
+        checks.append(Check(LOOK, "More warnings", text))
+    return checks
 
 
 def _found(result: Mapping[str, Any]) -> str:
@@ -371,69 +363,24 @@ def _workspace(page: Page, rows: Rows) -> None:
         page.add('<p class="note">No positions to draw.</p>')
         return
     position = rows.position[pick]
-    traces: list[dict[str, Any]] = []
     extent = float(np.ptp(position, axis=0).max()) or 1.0
-    words = []
+    traces: list[dict[str, Any]] = []
     flat: dict[str, list[dict[str, Any]]] = {"top": [], "side": []}
-    for name, error, size, shown in (
-        ("after", rows.error_after[pick], rows.magnitude_after[pick], True),
-        ("before", rows.error_before[pick], rows.magnitude_before[pick], False),
+    words = []
+    for name, error, size in (
+        ("after", rows.error_after[pick], rows.magnitude_after[pick]),
+        ("before", rows.error_before[pick], rows.magnitude_before[pick]),
     ):
+        shown = name == "after"
         limit = float(np.quantile(size, 0.98)) or 1e-9
-        unit, scale = length_unit(limit)
-        marker = {
-            "size": 3.5,
-            "color": packed(size * scale),
-            "colorscale": "Viridis",
-            "reversescale": True,
-            "cmin": 0,
-            "cmax": limit * scale,
-            "colorbar": {"title": {"text": unit}, "thickness": 12, "len": 0.7},
-        }
-        traces.append(
-            {
-                "type": "scatter3d",
-                "mode": "markers",
-                "visible": shown,
-                "name": name,
-                "marker": marker,
-                **{axis: packed(position[:, i]) for i, axis in enumerate("xyz")},
-                "hovertemplate": (
-                    f"%{{marker.color:.3g}} {unit}<br>x %{{x:.3f}} y %{{y:.3f}} z %{{z:.3f}}"
-                    f" m<extra>{name}</extra>"
-                ),
-            }
-        )
+        traces.append(_cloud(name, position, size, limit, shown))
         factor = round_down(0.06 * extent / limit)
         drawn = np.isfinite(error).all(axis=1)
-        tails = np.full((3 * int(drawn.sum()), 3), np.nan)
-        tails[0::3], tails[1::3] = position[drawn], position[drawn] + factor * error[drawn]
-        traces.append(
-            {
-                "type": "scatter3d",
-                "mode": "lines",
-                "visible": shown,
-                "name": name,
-                "hoverinfo": "skip",
-                "line": {"color": faded(INK, 0.45), "width": 1.5},
-                **{axis: packed(tails[:, i]) for i, axis in enumerate("xyz")},
-            }
-        )
+        traces.append(_strokes(name, position[drawn], factor * error[drawn], shown))
         if drawn.any():
             words.append(f"{name}: {factor:g} ×")
         for view, (first, second) in {"top": (0, 1), "side": (0, 2)}.items():
-            flat[view].append(
-                {
-                    "type": "scatter",
-                    "mode": "markers",
-                    "visible": shown,
-                    "x": packed(position[:, first]),
-                    "y": packed(position[:, second]),
-                    "marker": {**marker, "size": 6},
-                    "name": name,
-                    "hovertemplate": f"%{{marker.color:.3g}} {unit}<extra>{name}</extra>",
-                }
-            )
+            flat[view].append(_flat_cloud(name, position[:, first], position[:, second], size, limit, shown))
     page.add(
         '<div class="toggle" role="group" aria-label="errors shown"><button data-show="after"'
         ' class="on">after</button><button data-show="before">before</button></div>'
@@ -458,9 +405,66 @@ def _workspace(page: Page, rows: Rows) -> None:
         else ""
     )
     page.add(
-        f'<p class="note">{drawn_of(pick.size, known.size, "row")}{strokes} Rejected rows are left out. Colours'
-        " stop at the 98 % quantile.</p>"
+        f'<p class="note">{drawn_of(pick.size, known.size, "row")}{strokes} Rejected rows are left out.'
+        " Colours stop at the 98 % quantile.</p>"
     )
+
+
+def _colours(size: Floats, limit: float) -> dict[str, Any]:
+    """Points coloured by the length of their error [m], up to `limit`."""
+    unit, scale = length_unit(limit)
+    return {
+        "size": 3.5,
+        "color": packed(size * scale),
+        "colorscale": "Viridis",
+        "reversescale": True,
+        "cmin": 0,
+        "cmax": limit * scale,
+        "colorbar": {"title": {"text": unit}, "thickness": 12, "len": 0.7},
+    }
+
+
+def _cloud(name: str, position: Floats, size: Floats, limit: float, shown: bool) -> dict[str, Any]:
+    return {
+        "type": "scatter3d",
+        "mode": "markers",
+        "visible": shown,
+        "name": name,
+        "marker": _colours(size, limit),
+        **{axis: packed(position[:, i]) for i, axis in enumerate("xyz")},
+        "hovertemplate": (
+            f"%{{marker.color:.3g}} {length_unit(limit)[0]}<br>x %{{x:.3f}} y %{{y:.3f}} z %{{z:.3f}}"
+            f" m<extra>{name}</extra>"
+        ),
+    }
+
+
+def _strokes(name: str, start: Floats, along: Floats, shown: bool) -> dict[str, Any]:
+    """Lines from `start` to `start + along`, shape=(n, 3) each."""
+    ends = np.full((3 * len(start), 3), np.nan)
+    ends[0::3], ends[1::3] = start, start + along
+    return {
+        "type": "scatter3d",
+        "mode": "lines",
+        "visible": shown,
+        "name": name,
+        "hoverinfo": "skip",
+        "line": {"color": faded(INK, 0.45), "width": 1.5},
+        **{axis: packed(ends[:, i]) for i, axis in enumerate("xyz")},
+    }
+
+
+def _flat_cloud(name: str, x: Floats, y: Floats, size: Floats, limit: float, shown: bool) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "visible": shown,
+        "x": packed(x),
+        "y": packed(y),
+        "marker": {**_colours(size, limit), "size": 6},
+        "name": name,
+        "hovertemplate": f"%{{marker.color:.3g}} {length_unit(limit)[0]}<extra>{name}</extra>",
+    }
 
 
 def _joint_charts(page: Page, rows: Rows) -> None:
@@ -691,9 +695,8 @@ def _rejected(rows: Rows) -> str:
             if np.isfinite(rows.error_after[row]).all()
             else "<td></td>" * 3
         )
-        body.append(
-            f"<tr><th>{row}</th>{table_cell(float(rows.magnitude_after[row]), length_text(float(rows.magnitude_after[row])))}{parts}</tr>"
-        )
+        size = float(rows.magnitude_after[row])
+        body.append(f"<tr><th>{row}</th>{table_cell(size, length_text(size))}{parts}</tr>")
     more = (
         f'<p class="note">The {LISTED_REJECTED} largest of {out.size}; residuals.csv has all.</p>'
         if out.size > LISTED_REJECTED
@@ -704,8 +707,8 @@ def _rejected(rows: Rows) -> str:
         " far from all others that the fit left "
         f"{'it' if out.size == 1 else 'them'} out. Rows count from 0, in the order of the data file.</p>"
         '<div class="scroll"><table'
-        ' class="sortable"><thead><tr><th><button>row</button></th><th><button>error</button></th><th><button>x</button></th>'
-        f"<th><button>y</button></th><th><button>z</button></th></tr></thead><tbody>{''.join(body)}</tbody></table></div>{more}</section>"
+        ' class="sortable"><thead><tr><th><button>row</button></th><th><button>error</button></th>'
+        f"<th><button>x</button></th><th><button>y</button></th><th><button>z</button></th></tr></thead><tbody>{''.join(body)}</tbody></table></div>{more}</section>"
     )
 
 

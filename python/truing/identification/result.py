@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""What ``truing identify`` and ``truing predict`` write: ``result.json``, ``covariance.csv``, ``residuals.csv`` and the robot."""
+"""What ``truing identify`` and ``truing predict`` write.
+
+``result.json``, ``covariance.csv``, ``residuals.csv``, the robot and the report.
+"""
 
 from __future__ import annotations
 
@@ -301,7 +304,7 @@ def write_robot(
     base_link: str,
     tip_link: str,
 ) -> None:
-    """Writes ``robot.yaml`` in the units of the file that came in, and ``robot.urdf`` too if that was URDF."""
+    """Writes ``robot.yaml`` in the units of the nominal file, and ``robot.urdf`` if that was URDF."""
     save_robot(
         folder / "robot.yaml",
         robot,

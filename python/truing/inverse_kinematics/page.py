@@ -29,7 +29,7 @@ from truing.report.charts import (
     round_down,
     subsample,
 )
-from truing.report.page import Page, footer, warnings_card
+from truing.report.page import Page, footer, part_of_page, warnings_card
 from truing.report.words import angle_text, counted, escaped, figures_text, length_text
 
 Floats = NDArray[np.float64]
@@ -75,7 +75,7 @@ def inverse_report(result: Mapping[str, Any], drawing: Drawing) -> str:
         result: What ``result.json`` holds (format ``truing-inverse/1``).
         drawing: Where targets and robot are.
     """
-    page = Page(f"{result.get('robot') or 'Robot'}: inverse kinematics", _STYLE)
+    page = Page(f"{result.get('robot') or 'Robot'}: inverse kinematics", part_of_page("inverse_kinematics"))
     page.add(_inverse_headline(result))
     page.add('<div class="first">')
     _map(page, drawing)
@@ -98,7 +98,7 @@ def compensation_report(result: Mapping[str, Any], drawing: Drawing) -> str:
         result: What ``result.json`` holds (format ``truing-compensation/1``).
         drawing: Where targets and robot are, errors and corrections.
     """
-    page = Page(f"{result.get('calibrated') or 'Robot'}: compensation", _STYLE)
+    page = Page(f"{result.get('calibrated') or 'Robot'}: compensation", part_of_page("inverse_kinematics"))
     page.add(_compensation_headline(result))
     page.add('<div class="first">')
     _errors(page, result, drawing)
@@ -118,8 +118,7 @@ def compensation_report(result: Mapping[str, Any], drawing: Drawing) -> str:
     return page.html()
 
 
-# ------------------------------------------------------------------------------------------------------------------
-# first screens
+# ---- First screens -------------------------------------------------------------------------------
 
 
 def _verdict(result: Mapping[str, Any]) -> str:
@@ -270,8 +269,7 @@ def _why(result: Mapping[str, Any]) -> str:
     )
 
 
-# -----------------------------------------------------------------------------------------------------------------------
-# the map
+# ---- The map -------------------------------------------------------------------------------------
 
 
 def _lines(pieces: Sequence[Floats]) -> Floats:
@@ -388,8 +386,7 @@ def _map(page: Page, drawing: Drawing) -> None:
     )
 
 
-# --------------------------------------------------------------------------------------------------------------------
-# the joints
+# ---- The joints ----------------------------------------------------------------------------------
 
 
 def _ranges(page: Page, result: Mapping[str, Any]) -> None:
@@ -585,8 +582,7 @@ def _step(gap: Mapping[str, Any]) -> str:
     return length_text(gap["step_m"]) if gap.get("step_m") is not None else "–"
 
 
-# --------------------------------------------------------------------------------------------------------------------
-# compensation
+# ---- Compensation --------------------------------------------------------------------------------
 
 
 def _errors(page: Page, result: Mapping[str, Any], drawing: Drawing) -> None:
@@ -706,8 +702,7 @@ def _corrections(page: Page, drawing: Drawing) -> None:
     )
 
 
-# --------------------------------------------------------------------------------------------------------------------
-# the failures
+# ---- The failures --------------------------------------------------------------------------------
 
 
 def _failures(result: Mapping[str, Any]) -> str:
@@ -765,16 +760,3 @@ def _small(value: float | None, unit: str) -> str:
         if abs(value) * factor >= 0.1:
             return f"{figures_text(value * factor, 2)}\u202f{prefix}{unit}"
     return f"&lt;\u202f0.1\u202fn{unit}"
-
-
-_STYLE = """
-.verdict{display:inline-block;margin-left:12px;padding:2px 12px;border-radius:20px;font-weight:600;color:#fff;background:var(--after)}
-.verdict.found{background:var(--good)} .verdict.open{background:var(--look)}
-.column{display:grid;gap:18px;align-content:start;min-width:0} .chart.map{height:520px}
-.pair{display:grid;grid-template-columns:minmax(0,1fr) minmax(0,1fr);gap:18px} .pair.wide{grid-template-columns:minmax(0,1.35fr) minmax(0,1fr)}
-.card h3{font-size:16px;margin:14px 0 2px;font-weight:600}
-table.left td,table.left th{text-align:left} td.wrap{white-space:normal;text-align:left;min-width:120px} table.narrow{width:auto}
-main i.dot{display:inline-block;width:11px;height:11px;border-radius:50%;margin:0 7px 0 0;vertical-align:-1px} main .legend i.dot{margin-left:8px}
-header h1.long{font-size:clamp(21px,2.1vw,29px);text-wrap:pretty} header .sub{max-width:none} table.number-table{font-size:15px} .number-table td,.number-table th{padding-right:8px}
-@media(max-width:1000px){.pair,.pair.wide{grid-template-columns:minmax(0,1fr)}}
-"""

@@ -55,8 +55,7 @@ class CompensatedProgram:
     uncertain: bool = False  # standard errors are known
 
 
-# ---- What both write
-# -------------------------------------------------------------------------------------------------
+# ---- What both write -----------------------------------------------------------------------------
 
 
 def is_commanded(solution: _core.Solution) -> bool:
@@ -214,8 +213,7 @@ def _outlines(scene: _core.Scene) -> tuple[tuple[str, Floats], ...]:
     return tuple(found)
 
 
-# ---- truing ik
-# -------------------------------------------------------------------------------------------------------
+# ---- truing ik -----------------------------------------------------------------------------------
 
 
 def first_of_each(solved: Solved) -> list[_core.Solution]:
@@ -323,8 +321,7 @@ def write_inverse(folder: Path, solved: Solved, *, warnings: Iterable[str] = ())
     return found
 
 
-# ---- truing compensate
-# -----------------------------------------------------------------------------------------------
+# ---- truing compensate ---------------------------------------------------------------------------
 
 
 def compensation_dict(
@@ -417,7 +414,7 @@ def pose_columns(made: CompensatedProgram) -> dict[str, Any]:
 def write_compensation(
     folder: Path, made: CompensatedProgram, *, warnings: Iterable[str] = ()
 ) -> dict[str, Any]:
-    """Writes everything that ``truing compensate`` found into `folder`, and returns what result.json holds."""
+    """Writes everything that ``truing compensate`` found into `folder`. Returns what result.json holds."""
     wanted = wanted_frames(made)
     found: dict[str, Any] = without_nan(compensation_dict(made, wanted, warnings=warnings))
     solver, solutions = made.compensator.calibrated, list(made.results.solutions)

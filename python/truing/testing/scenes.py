@@ -176,7 +176,7 @@ class HandEyeScene:
     board: Board
     pixels: (
         Floats | None
-        # shape=(n, points of the board, 2): what the camera sees instead of T_camera_board, with noise of its own
+        # shape=(n, points of the board, 2): what the camera sees instead of T_camera_board, with its own noise
     )
     seed: int
 
@@ -363,8 +363,7 @@ def simulate_streams(
     )
 
 
-# ---- Data that cannot tell
-# -------------------------------------------------------------------------------------------
+# ---- Data that cannot tell -----------------------------------------------------------------------
 
 
 def one_rotation_axis(setup: Setup = "eye-to-hand", poses: int = 30, **options: Any) -> HandEyeScene:
@@ -403,8 +402,7 @@ def two_poses(setup: Setup = "eye-to-hand", poses: int = 2, **options: Any) -> H
     return simulate_handeye(setup, poses, **options)
 
 
-# ---- Data that are wrong
-# ---------------------------------------------------------------------------------------------
+# ---- Data that are wrong -------------------------------------------------------------------------
 
 
 def inverted_hand(scene: HandEyeScene) -> HandEyeScene:
@@ -550,8 +548,7 @@ MISTAKES: Mapping[str, Callable[[HandEyeScene], HandEyeScene]] = MappingProxyTyp
 )
 
 
-# ---- Images
-# ----------------------------------------------------------------------------------------------------------
+# ---- Images --------------------------------------------------------------------------------------
 
 
 def render_board(
@@ -664,8 +661,7 @@ def _grey(board: Board, at: Floats) -> Floats:
     return np.where(black, 30.0, grey)
 
 
-# ---- Rotations and frames
-# --------------------------------------------------------------------------------------------
+# ---- Rotations and frames ------------------------------------------------------------------------
 
 
 def rotation(vectors: Floats) -> Floats:

@@ -228,8 +228,7 @@ def _check_orientation(tracker: TrackerData, rows: NDArray[np.intp], expected: F
     )
 
 
-# ---- Calibration
-# -----------------------------------------------------------------------------------------------------
+# ---- Calibration ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

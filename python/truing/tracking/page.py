@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, REJECTED, packed
-from truing.report.page import Page, footer, table_cell, warnings_card
+from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.words import counted, escaped, figures_text, length_text
 from truing.rotations import interpolated
 
@@ -58,7 +58,7 @@ def run_report(result: Mapping[str, Any], run: Replayed) -> str:
         result: What ``result.json`` holds (format ``truing-track-run/1``).
         run: The replay's tables.
     """
-    page = Page(f"{result['robot'] or 'Robot'}: tracking", _STYLE)
+    page = Page(f"{result['robot'] or 'Robot'}: tracking", part_of_page("tracking"))
     page.add(_headline(result))
     page.add('<div class="first">')
     _errors(page, result)
@@ -81,8 +81,7 @@ def run_report(result: Mapping[str, Any], run: Replayed) -> str:
     return page.html()
 
 
-# ---- First screen
-# ----------------------------------------------------------------------------------------------------
+# ---- First screen --------------------------------------------------------------------------------
 
 
 def at_horizon(result: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -298,8 +297,7 @@ def _ratio_check(value: float, good: str, sure: str, cautious: str, text: str) -
     return grade, good if grade == 0 else sure if value > 1 else cautious, text
 
 
-# ---- Below
-# -----------------------------------------------------------------------------------------------------------
+# ---- Below ---------------------------------------------------------------------------------------
 
 
 def _thinned(rows: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -664,15 +662,14 @@ def _samples(result: Mapping[str, Any]) -> str:
     )
 
 
-# ---- Calibration
-# -----------------------------------------------------------------------------------------------------
+# ---- Calibration ---------------------------------------------------------------------------------
 
 
 def calibration_report(result: Mapping[str, Any]) -> str:
     """The report of ``truing track calibrate``, from what ``result.json`` holds (format
     ``truing-track-calibration/1``).
     """
-    page = Page(f"{result['robot'] or 'Robot'}: tracking calibration", _STYLE)
+    page = Page(f"{result['robot'] or 'Robot'}: tracking calibration", part_of_page("tracking"))
     page.add(_calibration_headline(result))
     if result["positions"]["errors"]:
         page.add('<div class="first">')
@@ -914,14 +911,3 @@ def _found_modes(result: Mapping[str, Any]) -> str:
         f' class="lead">{escaped(modes["stopped_because"])}</p><table'
         f' class="narrow"><thead><tr><th>frequency</th><th>damping</th></tr></thead><tbody>{body}</tbody></table></section>'
     )
-
-
-_STYLE = """
-.pair{display:grid;grid-template-columns:minmax(0,1fr) minmax(0,1fr);gap:18px}
-.chart.strip{height:200px} .chart.flatbar{height:190px}
-span.truth,span[class=truth]{color:#2e8b57}
-header h1.long{text-wrap:pretty}
-.look{border-top:5px solid var(--bad)}
-table.left td:nth-child(2),table.left th:nth-child(2){text-align:left} td.wrap{white-space:normal;text-align:left} table.narrow{width:auto;min-width:320px}
-@media(max-width:900px){.pair{grid-template-columns:minmax(0,1fr)}}
-"""

@@ -51,8 +51,7 @@ class Played:
     truth: PoseData | None = None  # of the tool, the inertial sensor's clock
 
 
-# ---- Errors
-# ----------------------------------------------------------------------------------------------------------
+# ---- Errors --------------------------------------------------------------------------------------
 
 
 def error_summary(errors: Floats) -> dict[str, Any]:
@@ -134,8 +133,7 @@ def against_truth(run: Played) -> dict[str, Any] | None:
     }
 
 
-# ---- What is written
-# -------------------------------------------------------------------------------------------------
+# ---- What is written -----------------------------------------------------------------------------
 
 
 def run_dict(run: Played, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
@@ -313,8 +311,7 @@ def _replayed(run: Played) -> Replayed:
     return Replayed(p.compensation, p.graded, p.timeline, p.innovations, true_tool)
 
 
-# ---- Calibration
-# -----------------------------------------------------------------------------------------------------
+# ---- Calibration ---------------------------------------------------------------------------------
 
 
 def calibration_dict(
