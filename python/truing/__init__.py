@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 else:
 
     def __getattr__(name):
-        """Loads the public names when one is first asked for. `import truing` itself costs next to nothing."""
+        """Loads the public names when one is first asked for, so `import truing` costs next to nothing."""
         if not name.startswith("_") or name in ("__all__", "__version__"):
             public = vars(importlib.import_module("truing.public"))
             found = {key: value for key, value in public.items() if not key.startswith("_")}

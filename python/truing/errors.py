@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class InputError(ValueError):
-    """A file, value or option cannot be used. The message says where, what was found and what was expected."""
+    """A file, value or option cannot be used. The message says where, what was found, what was expected."""
 
 
 class InputWarning(UserWarning):

@@ -736,7 +736,7 @@ def _confounded(request: Request) -> Case:
     """Two effects that this way of measuring cannot tell apart."""
     rng = request.rng
     kinds = twins()
-    for attempt in range(_TRIES):
+    for _ in range(_TRIES):
         every = request.specimens()
         specimen = every[int(rng.integers(len(every)))]  # not every twin fits every robot
         kind = kinds[request.number % len(kinds)]

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, REJECTED, faded, packed, round_down, subsample
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
+from truing.report.scene import Scene3d, polyline
 from truing.report.trust import BAD, GOOD, LOOK, Check, grade_of, shortened, trust_card
 from truing.report.words import angle_text, counted, escaped, figures_text, length_text
 
@@ -455,15 +456,6 @@ def _remarks(result: Mapping[str, Any]) -> list[Check]:
 # ---- The scene -----------------------------------------------------------------------------------
 
 
-def _lines(pieces: Sequence[Floats]) -> dict[str, Any]:
-    """Polylines as one trace, gaps between them."""
-    gap = np.full((1, 3), np.nan)
-    every = (
-        np.concatenate([part for piece in pieces for part in (piece, gap)]) if pieces else np.empty((0, 3))
-    )
-    return {axis: packed(every[:, k]) for k, axis in enumerate("xyz")}
-
-
 def _scene(page: Page, result: Mapping[str, Any], scene: Scene) -> None:
     page.add('<section class="card"><h2>The scene</h2>')
     count = len(scene.T_base_hand)
@@ -472,23 +464,7 @@ def _scene(page: Page, result: Mapping[str, Any], scene: Scene) -> None:
     drawing.add_triads()
     drawing.add_cameras()
     words = drawing.add_boards()
-    axes = {
-        f"{axis}axis": {"title": {"text": f"{axis} [m]"}, "backgroundcolor": "#fff", "gridcolor": "#e6e9ed"}
-        for axis in "xyz"
-    }
-    page.chart(
-        "workspace",
-        drawing.traces,
-        {
-            "scene": {
-                **axes,
-                "aspectmode": "data",
-                "camera": {"eye": {"x": 1.25, "y": -1.25, "z": 0.75}, "center": {"x": 0, "y": 0, "z": -0.12}},
-            },
-            "fallback": drawing.flat,
-        },
-        size="cloud scene",
-    )
+    drawing.plot.draw(page, eye=(1.25, -1.25, 0.75), center=-0.12, size="cloud scene")
     less = f" {counted(len(pick), 'pose')} drawn of {count}." if len(pick) < count else ""
     page.add(
         '<p class="note">Robot base and hands as triads (x red, y green, z blue),'
@@ -498,11 +474,10 @@ def _scene(page: Page, result: Mapping[str, Any], scene: Scene) -> None:
 
 
 class _Drawing:
-    """The scene as traces of a 3-D plot, and of two flat ones for browsers without WebGL."""
+    """Robot, camera and boards, as they are added to the scene."""
 
     def __init__(self, result: Mapping[str, Any], scene: Scene, pick: NDArray[np.integer[Any]]) -> None:
-        self.traces: list[dict[str, Any]] = []
-        self.flat: dict[str, list[dict[str, Any]]] = {"top": [], "side": []}
+        self.plot = Scene3d()
         self.eye_in_hand = result["setup"] == "eye-in-hand"
         self._residuals = [result["residuals"][k] for k in pick]
         self._rejected = np.array([r["rejected"] for r in self._residuals], dtype=bool)
@@ -512,58 +487,33 @@ class _Drawing:
         places = [self._hands[:, :3, 3], self._cameras[:, :3, 3], self._boards[:, :3, 3], np.zeros((1, 3))]
         self._extent = float(np.ptp(np.concatenate(places), axis=0).max()) or 1.0
 
-    def add_lines(self, pieces: Sequence[Floats], colour: str, name: str, width: float) -> None:
-        xyz = _lines(pieces)
-        self.traces.append(
-            {
-                "type": "scatter3d",
-                "mode": "lines",
-                **xyz,
-                "line": {"color": colour, "width": width},
-                "name": name,
-                "hoverinfo": "name",
-            }
-        )
-        for view, second in (("top", "y"), ("side", "z")):
-            self.flat[view].append(
-                {
-                    "type": "scatter",
-                    "mode": "lines",
-                    "x": xyz["x"],
-                    "y": xyz[second],
-                    "line": {"color": colour, "width": max(1.0, width / 2)},
-                    "name": name,
-                    "hoverinfo": "name",
-                }
-            )
+    def _add_lines(self, pieces: Sequence[Floats], colour: str, name: str, width: float) -> None:
+        self.plot.add_line(polyline(pieces), name, colour, width, max(1.0, width / 2))
 
     def add_triads(self) -> None:
         """Robot base and hands."""
         for axis, colour in enumerate(TRIADS):
             arms = [_arm(frame, axis, 0.035 * self._extent) for frame in self._hands]
-            self.add_lines(arms, faded(colour, 0.75), f"hand, {'xyz'[axis]}", 3)
+            self._add_lines(arms, faded(colour, 0.75), f"hand, {'xyz'[axis]}", 3)
             base = [_arm(np.eye(4), axis, 0.13 * self._extent)]
-            self.add_lines(base, colour, f"robot base, {'xyz'[axis]}", 6)
-        path = self._hands[:, :3, 3]
-        self.traces.append(
+            self._add_lines(base, colour, f"robot base, {'xyz'[axis]}", 6)
+        self.plot.add_points(
+            self._hands[:, :3, 3],
+            "hand",
+            {"size": 3, "color": [REJECTED if out else INK for out in self._rejected]},
             {
-                "type": "scatter3d",
-                "mode": "markers",
-                **{axis: packed(path[:, k]) for k, axis in enumerate("xyz")},
-                "name": "hand",
-                "marker": {"size": 3, "color": [REJECTED if out else INK for out in self._rejected]},
                 "text": [_hover(r) for r in self._residuals],
                 "hovertemplate": "%{text}<extra>hand</extra>",
-            }
+            },
         )
 
     def add_cameras(self) -> None:
         if self.eye_in_hand:
             frusta = [_frustum(frame, 0.05 * self._extent) for frame in self._cameras]
-            self.add_lines(frusta, faded(INK, 0.55), "camera", 2)
+            self._add_lines(frusta, faded(INK, 0.55), "camera", 2)
         else:
             frusta = [_frustum(frame, 0.1 * self._extent) for frame in self._cameras[:1]]
-            self.add_lines(frusta, faded(INK, 1.0), "camera", 4)
+            self._add_lines(frusta, faded(INK, 1.0), "camera", 4)
 
     def add_boards(self) -> str:
         """Boards as predicted and as seen; in words, what strokes between them mean."""
@@ -572,11 +522,11 @@ class _Drawing:
         some = np.isin(every, subsample(every, SCENE_BOARDS))  # boards one over the other show nothing
         predicted = self._boards[:1] if self.eye_in_hand else self._boards[some]
         outlines = [_moved(frame, self._outline) for frame in predicted]
-        self.add_lines(outlines, faded(AFTER, 0.95), "board, predicted", 4)
+        self._add_lines(outlines, faded(AFTER, 0.95), "board, predicted", 4)
         if not shown.any():
             return ""
         outlines = [_moved(frame, self._outline) for frame in self._seen[shown & some]]
-        self.add_lines(outlines, faded(SEEN, 0.6), "board, seen", 2)
+        self._add_lines(outlines, faded(SEEN, 0.6), "board, seen", 2)
         start = self._boards[shown, :3, 3]
         off = self._seen[shown, :3, 3] - start
         good = ~self._rejected[shown]
@@ -585,7 +535,7 @@ class _Drawing:
         if factor <= 1:
             return ""
         strokes = [np.stack([start[k], start[k] + factor * off[k]]) for k in np.flatnonzero(good)]
-        self.add_lines(strokes, REJECTED, f"seen less predicted, × {factor:g}", 3)
+        self._add_lines(strokes, REJECTED, f"seen less predicted, × {factor:g}", 3)
         return f" Red strokes: from the predicted to the seen board origin, enlarged {factor:g} times."
 
 
@@ -1017,8 +967,8 @@ def _poses(result: Mapping[str, Any]) -> str:
     )
     return (
         '<section class="card"><h2>Every pose</h2><div class="scroll"><table'
-        f' class="sortable"><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table></div>{more}'
-        "</section>"
+        f' class="sortable"><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table>'
+        f"</div>{more}</section>"
     )
 
 

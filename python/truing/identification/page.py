@@ -26,6 +26,7 @@ from truing.report.charts import (
     packed,
     points_trace,
     round_down,
+    square_layout,
     subsample,
 )
 from truing.report.page import Page, footer, table_cell, warnings_card
@@ -558,24 +559,7 @@ def _correlations(page: Page, names: Sequence[str], matrix: Floats) -> None:
                 "hovertemplate": "%{y} · %{x}: %{z:.2f}<extra></extra>",
             }
         ],
-        {
-            "xaxis": {
-                "tickangle": -90,
-                "showgrid": False,
-                "dtick": 1,
-                "tickfont": {"size": 10},
-                "automargin": True,
-            },
-            "yaxis": {
-                "autorange": "reversed",
-                "showgrid": False,
-                "dtick": 1,
-                "tickfont": {"size": 10},
-                "automargin": True,
-                "zeroline": False,
-            },
-            "height": size,
-        },
+        square_layout(size),
         size="free",
     )
     page.add("</div></div></section>")

@@ -10,7 +10,8 @@ Below: joints against their limits, the path, corrections, every target that is 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +31,7 @@ from truing.report.charts import (
     subsample,
 )
 from truing.report.page import Page, footer, part_of_page, warnings_card
+from truing.report.scene import Scene3d, polyline
 from truing.report.words import angle_text, counted, escaped, figures_text, length_text
 
 Floats = NDArray[np.float64]
@@ -217,159 +219,61 @@ def _why(result: Mapping[str, Any]) -> str:
     for reason, (label, colour) in REASONS.items():
         count = result["reasons"].get(reason, 0)
         if count:
+            percent = f"{100 * count / result['targets']:.3g} %"
             rows.append(
-                '<tr><th><i class="dot"'
-                f' style="background:{colour}"></i>{label}</th><td>{count}</td><td>{100 * count / result["targets"]:.3g}'
-                " %</td></tr>"
+                f'<tr><th><i class="dot" style="background:{colour}"></i>{label}</th><td>{count}</td>'
+                f"<td>{percent}</td></tr>"
             )
-    notes = []
-    by_joint: dict[str, int] = {}
-    for failure in result["failures"]:
-        if failure["reason"] == "limit":
-            by_joint[failure["joint"]] = by_joint.get(failure["joint"], 0) + 1
-    if by_joint:
-        notes.append(
-            "Limits in the way: "
-            + ", ".join(
-                f"{escaped(name)} ({count})"
-                for name, count in sorted(by_joint.items(), key=lambda item: -item[1])
-            )
-            + "."
-        )
-    pairs: dict[str, int] = {}
-    for failure in result["failures"]:
-        if failure["reason"] == "interference":
-            pair = " and ".join(failure["pair"])
-            pairs[pair] = pairs.get(pair, 0) + 1
-    if pairs:
-        if (
-            any(f["reason"] == "interference" and f["own_parts"] for f in result["failures"])
-            and max(pairs.values()) > 0.5 * result["targets"]
-        ):
-            notes.append(
-                "Parts of the robot that touch each other nearly everywhere, and may, belong into"
-                " <code>ignored</code> of the scene."
-            )
-        notes.append(
-            "In the way: "
-            + ", ".join(
-                f"{escaped(pair)} ({count})"
-                for pair, count in sorted(pairs.items(), key=lambda item: -item[1])[:6]
-            )
-            + "."
-        )
+    notes = [*_limits_in_the_way(result), *_parts_in_the_way(result)]
     if result["failures"]:
         notes.append('<a href="#failures">Every one of them</a>, with the nearest that can be reached.')
     whole = result["reached"] == result["targets"]
     text = f'<p class="note">{" ".join(notes)}</p>' if notes else ""
+    heading = "Every target is reached" if whole else "What came of the targets"
     return (
-        '<section class="card trust'
-        f' {"t0" if whole else "t1"}"><h2>{"Every target is reached" if whole else "What came of the targets"}</h2><table'
-        f' class="narrow"><tbody>{"".join(rows)}</tbody></table>{text}</section>'
+        f'<section class="card trust {"t0" if whole else "t1"}"><h2>{heading}</h2>'
+        f'<table class="narrow"><tbody>{"".join(rows)}</tbody></table>{text}</section>'
     )
+
+
+def _most_frequent(names: Iterable[str]) -> list[tuple[str, int]]:
+    return sorted(Counter(names).items(), key=lambda item: -item[1])
+
+
+def _limits_in_the_way(result: Mapping[str, Any]) -> list[str]:
+    limits = _most_frequent(f["joint"] for f in result["failures"] if f["reason"] == "limit")
+    listed = ", ".join(f"{escaped(name)} ({count})" for name, count in limits)
+    return [f"Limits in the way: {listed}."] if limits else []
+
+
+def _parts_in_the_way(result: Mapping[str, Any]) -> list[str]:
+    met = [f for f in result["failures"] if f["reason"] == "interference"]
+    pairs = _most_frequent(" and ".join(f["pair"]) for f in met)
+    if not pairs:
+        return []
+    listed = ", ".join(f"{escaped(pair)} ({count})" for pair, count in pairs[:6])
+    notes = [f"In the way: {listed}."]
+    if any(f["own_parts"] for f in met) and pairs[0][1] > 0.5 * result["targets"]:
+        notes.insert(
+            0,
+            "Parts of the robot that touch each other nearly everywhere, and may, belong into"
+            " <code>ignored</code> of the scene.",
+        )
+    return notes
 
 
 # ---- The map -------------------------------------------------------------------------------------
 
 
-def _lines(pieces: Sequence[Floats]) -> Floats:
-    """Polylines as one, gaps between them."""
-    gap = np.full((1, 3), np.nan)
-    return np.concatenate([part for piece in pieces for part in (piece, gap)]) if pieces else np.empty((0, 3))
-
-
 def _map(page: Page, drawing: Drawing) -> None:
     """Targets by what came of them, and the robot."""
     page.add('<section class="card"><h2>Where</h2>')
-    traces: list[dict[str, Any]] = []
-    flat: dict[str, list[dict[str, Any]]] = {"top": [], "side": []}
-
-    def points(xyz: Floats, name: str, colour: str, size: float, texts: Sequence[str] | None) -> None:
-        hover = (
-            {"text": [escaped(text) for text in texts], "hovertemplate": "%{text}<extra></extra>"}
-            if texts is not None
-            else {"hoverinfo": "name"}
-        )
-        marker = {"size": size, "color": colour, "opacity": 0.85}
-        traces.append(
-            {
-                "type": "scatter3d",
-                "mode": "markers",
-                **{axis: packed(xyz[:, k]) for k, axis in enumerate("xyz")},
-                "name": name,
-                "marker": marker,
-                **hover,
-            }
-        )
-        for view, second in (("top", 1), ("side", 2)):
-            flat[view].append(
-                {
-                    "type": "scatter",
-                    "mode": "markers",
-                    "x": packed(xyz[:, 0]),
-                    "y": packed(xyz[:, second]),
-                    "name": name,
-                    "marker": {**marker, "size": 1.6 * size},
-                    **hover,
-                }
-            )
-
-    def line(xyz: Floats, name: str, colour: str, width: float) -> None:
-        traces.append(
-            {
-                "type": "scatter3d",
-                "mode": "lines",
-                **{axis: packed(xyz[:, k]) for k, axis in enumerate("xyz")},
-                "name": name,
-                "line": {"color": colour, "width": width},
-                "hoverinfo": "name",
-            }
-        )
-        for view, second in (("top", 1), ("side", 2)):
-            flat[view].append(
-                {
-                    "type": "scatter",
-                    "mode": "lines",
-                    "x": packed(xyz[:, 0]),
-                    "y": packed(xyz[:, second]),
-                    "name": name,
-                    "line": {"color": colour, "width": max(1.5, width / 2.5)},
-                    "hoverinfo": "name",
-                }
-            )
-
+    plot = Scene3d()
     for name, outline in drawing.obstacles:
-        line(outline, name, faded(MUTED, 0.7), 3)
-    for number, robot in enumerate(drawing.robots):
-        line(robot, "robot", faded(INK, 0.9 if number == 0 else 0.3), 7 if number == 0 else 4)
-    if drawing.robots:
-        points(drawing.robots[0], "its joints", INK, 4.0, None)
-    for reason, (label, colour) in REASONS.items():
-        rows = np.flatnonzero(np.array([r == reason for r in drawing.reasons]))
-        pick = subsample(rows, CLOUD_POINTS)
-        if pick.size:
-            texts = [
-                f"target {k}: {label}" if reason == "reached" else f"target {k}: {drawing.texts[k]}"
-                for k in pick
-            ]
-            points(drawing.wanted[pick], label, colour, 3.0 if reason == "reached" else 4.5, texts)
-    axes = {
-        f"{axis}axis": {"title": {"text": f"{axis} [m]"}, "backgroundcolor": "#fff", "gridcolor": "#e6e9ed"}
-        for axis in "xyz"
-    }
-    page.chart(
-        "workspace",
-        traces,
-        {
-            "scene": {
-                **axes,
-                "aspectmode": "data",
-                "camera": {"eye": {"x": 1.35, "y": -1.35, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.1}},
-            },
-            "fallback": flat,
-        },
-        size="cloud map",
-    )
+        plot.add_line(outline, name, faded(MUTED, 0.7), 3, 1.5)
+    _add_robots(plot, drawing.robots)
+    _add_targets(plot, drawing)
+    plot.draw(page, eye=(1.35, -1.35, 0.8), center=-0.1, size="cloud map")
     drawn = (
         f"The robot is drawn at {counted(len(drawing.robots), 'target')}."
         if drawing.robots
@@ -384,6 +288,32 @@ def _map(page: Page, drawing: Drawing) -> None:
         f'<p class="legend">{legend}</p><p class="note">{drawn} Its lines go from joint frame to joint frame,'
         " as the link table has them.</p></section>"
     )
+
+
+def _add_robots(plot: Scene3d, robots: Sequence[Floats]) -> None:
+    for number, robot in enumerate(robots):
+        opacity, width = (0.9, 7.0) if number == 0 else (0.3, 4.0)
+        plot.add_line(robot, "robot", faded(INK, opacity), width, max(1.5, width / 2.5))
+    if robots:
+        marker = {"size": 4.0, "color": INK, "opacity": 0.85}
+        plot.add_points(robots[0], "its joints", marker, {"hoverinfo": "name"}, 1.6 * 4.0)
+
+
+def _add_targets(plot: Scene3d, drawing: Drawing) -> None:
+    for reason, (label, colour) in REASONS.items():
+        rows = np.flatnonzero(np.array([r == reason for r in drawing.reasons]))
+        pick = subsample(rows, CLOUD_POINTS)
+        if pick.size:
+            reached = reason == "reached"
+            size = 3.0 if reached else 4.5
+            texts = [f"target {k}: {label if reached else drawing.texts[k]}" for k in pick]
+            plot.add_points(
+                drawing.wanted[pick],
+                label,
+                {"size": size, "color": colour, "opacity": 0.85},
+                {"text": [escaped(text) for text in texts], "hovertemplate": "%{text}<extra></extra>"},
+                1.6 * size,
+            )
 
 
 # ---- The joints ----------------------------------------------------------------------------------
@@ -468,88 +398,92 @@ def _ranges(page: Page, result: Mapping[str, Any]) -> None:
 
 def _path(page: Page, result: Mapping[str, Any], drawing: Drawing) -> None:
     """Joints along the path, gaps marked, and what bounds its steps."""
-    path = result["path"]
+    gaps = result["path"]["gaps"]
     page.add(
         '<section class="card"><h2>The path, joint by joint</h2><p'
         f' class="lead">{_path_words(result)}</p><div class="multiples">'
     )
     count = len(drawing.joints)
     pick = subsample(np.arange(count), PATH_POINTS)
-    bands = [
-        {
-            "type": "rect",
-            "xref": "x",
-            "yref": "paper",
-            "x0": gap["from"],
-            "x1": gap["to"],
-            "y0": 0,
-            "y1": 1,
-            "fillcolor": faded(REJECTED, 0.25),
-            "line": {"color": REJECTED, "width": 1},
-        }
-        for gap in path["gaps"][:LISTED]
-    ]
+    bands = [_gap_band(gap) for gap in gaps[:LISTED]]
     for k, joint in enumerate(result["joints"]):
         scale, unit = (180 / math.pi, "°") if joint["unit"] == "rad" else (1e3, "mm")
-        traces: list[dict[str, Any]] = [
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "x": packed(pick),
-                "y": packed(drawing.joints[pick, k] * scale),
-                "line": {"color": AFTER, "width": 2},
-                "name": joint["joint"],
-                "hovertemplate": f"target %{{x}}: %{{y:.2f}} {unit}<extra></extra>",
-            }
-        ]
-        shapes = list(bands)
-        values = drawing.joints[:, k][np.isfinite(drawing.joints[:, k])] * scale
-        for limit in joint["limits"]:
-            if (
-                limit is not None
-                and values.size
-                and values.min() - 0.3 * (np.ptp(values) + 1)
-                < limit * scale
-                < values.max() + 0.3 * (np.ptp(values) + 1)
-            ):
-                shapes.append(
-                    {
-                        "type": "line",
-                        "xref": "paper",
-                        "x0": 0,
-                        "x1": 1,
-                        "y0": limit * scale,
-                        "y1": limit * scale,
-                        "line": {"color": BEFORE, "width": 1.5, "dash": "dot"},
-                    }
-                )
         page.chart(
             f"path{k}",
-            traces,
+            [
+                {
+                    "type": "scatter",
+                    "mode": "lines",
+                    "x": packed(pick),
+                    "y": packed(drawing.joints[pick, k] * scale),
+                    "line": {"color": AFTER, "width": 2},
+                    "name": joint["joint"],
+                    "hovertemplate": f"target %{{x}}: %{{y:.2f}} {unit}<extra></extra>",
+                }
+            ],
             {
                 "xaxis": {"title": {"text": "target"}, "range": [0, max(1, count - 1)]},
                 "yaxis": {"title": {"text": f"{joint['joint']} [{unit}]"}},
-                "shapes": shapes,
+                "shapes": [*bands, *_limit_lines(joint["limits"], drawing.joints[:, k], scale)],
             },
             size="small",
         )
     page.add("</div>")
-    if path["gaps"]:
-        body = "".join(
-            f"<tr><th>{gap['from']} →"
-            f" {gap['to']}</th><td>{escaped(gap['joint']) if gap['joint'] else 'one of them is not reached'}</td><td>{_step(gap)}</td></tr>"
-            for gap in path["gaps"][:LISTED]
-        )
-        more = (
-            f'<p class="note">The first {LISTED} of {len(path["gaps"])}; result.json has all.</p>'
-            if len(path["gaps"]) > LISTED
-            else ""
-        )
-        page.add(
-            '<h3>Where no continuous path is</h3><div class="scroll"><table'
-            f' class="narrow"><thead><tr><th>targets</th><th>joint</th><th>step</th></tr></thead><tbody>{body}</tbody></table></div>{more}'
-        )
+    if gaps:
+        page.add(_gap_table(gaps))
     page.add("</section>")
+
+
+def _gap_band(gap: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "type": "rect",
+        "xref": "x",
+        "yref": "paper",
+        "x0": gap["from"],
+        "x1": gap["to"],
+        "y0": 0,
+        "y1": 1,
+        "fillcolor": faded(REJECTED, 0.25),
+        "line": {"color": REJECTED, "width": 1},
+    }
+
+
+def _limit_lines(limits: Sequence[float | None], joints: Floats, scale: float) -> list[dict[str, Any]]:
+    """Limits of a joint that are near to where it moves."""
+    values = joints[np.isfinite(joints)] * scale
+    if not values.size:
+        return []
+    margin = 0.3 * (np.ptp(values) + 1)
+    return [
+        {
+            "type": "line",
+            "xref": "paper",
+            "x0": 0,
+            "x1": 1,
+            "y0": limit * scale,
+            "y1": limit * scale,
+            "line": {"color": BEFORE, "width": 1.5, "dash": "dot"},
+        }
+        for limit in limits
+        if limit is not None and values.min() - margin < limit * scale < values.max() + margin
+    ]
+
+
+def _gap_table(gaps: Sequence[Mapping[str, Any]]) -> str:
+    rows = []
+    for gap in gaps[:LISTED]:
+        joint = escaped(gap["joint"]) if gap["joint"] else "one of them is not reached"
+        rows.append(f"<tr><th>{gap['from']} → {gap['to']}</th><td>{joint}</td><td>{_step(gap)}</td></tr>")
+    more = (
+        f'<p class="note">The first {LISTED} of {len(gaps)}; result.json has all.</p>'
+        if len(gaps) > LISTED
+        else ""
+    )
+    return (
+        '<h3>Where no continuous path is</h3><div class="scroll"><table class="narrow">'
+        "<thead><tr><th>targets</th><th>joint</th><th>step</th></tr></thead>"
+        f"<tbody>{''.join(rows)}</tbody></table></div>{more}"
+    )
 
 
 def _path_words(result: Mapping[str, Any]) -> str:
@@ -663,7 +597,7 @@ def _corrections(page: Page, drawing: Drawing) -> None:
     extent = float(np.ptp(drawing.wanted[pick], axis=0).max()) or 1.0
     factor = round_down(0.08 * extent / limit)
     start, tips = drawing.wanted[pick], drawing.wanted[pick] + factor * drawing.correction[pick]
-    lines = _lines([np.stack(pair) for pair in zip(start, tips, strict=True)])
+    lines = polyline([np.stack(pair) for pair in zip(start, tips, strict=True)])
     page.add('<section class="card"><h2>Corrections, from above</h2>')
     page.chart(
         "corrections",

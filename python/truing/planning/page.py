@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing.identification.page import frozen_card, parameter_table
-from truing.report.charts import AFTER, BEFORE, points_trace
+from truing.report.charts import AFTER, BEFORE, points_trace, square_layout
 from truing.report.page import Page, footer, table_cell, warnings_card
 from truing.report.words import angle_text, counted, escaped, figures_text, length_text
 
@@ -90,162 +90,12 @@ def size_words(value: float | None, unit: str) -> str:
 
 def _told_apart(page: Page, seen: Mapping[str, Any]) -> None:
     """What a plan tells apart: smallest sizes, a map of what is like what, what poses were added for."""
-    effects = seen["effects"]
     if seen["separated"]:
-        rows = "".join(
-            f"<tr><th>{escaped(effect_at(p['effect'], p['joint']))}</th><td>{escaped(effect_at(p['other'], p['other_joint']))}</td>"
-            + table_cell(p["r2"], f"{p['r2']:.3f}")
-            + (
-                table_cell(p["r2_after"], f"{p['r2_after']:.3f}")
-                if p["r2_after"] is not None
-                else "<td>–</td>"
-            )
-            + f"<td>{'never' if p['size'] is None else escaped(size_words(p['size'], p['unit']))}</td>"
-            + f"<td>{'–' if p['r2_after'] is None else 'never' if p['size_after'] is None else escaped(size_words(p['size_after'], p['unit']))}</td></tr>"
-            for p in seen["separated"]
-        )
-        head = "".join(
-            f'<th><button type="button">{name}</button></th>'
-            for name in ("effect", "told from", "R² before", "R² after", "from this size on, before", "after")
-        )
-        page.add(
-            f'<section class="card"><h2>To be told apart: {counted(seen["added_poses"], "pose")} added</h2><p'
-            ' class="lead">R² is the share of the first effect that the second one could pass for, once base'
-            " and tool are fitted. The added poses are the last ones of poses.csv.</p><div"
-            ' class="scroll"><table'
-            f' class="sortable"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div></section>'
-        )
-    if effects:
-        shown = sorted(effects, key=lambda e: -e["size_at_tip_m"])
-        labels = [effect_at(e["effect"], e["joint"]) for e in shown]
-        sizes = [
-            [size_words(e["size"], e["unit"]), size_words(e["size_with_geometry"], e["unit"]), e["parameter"]]
-            for e in shown
-        ]
-        tips = [
-            tip
-            for e in shown
-            for tip in (e["size_at_tip_m"], e["size_with_geometry_at_tip_m"])
-            if tip is not None
-        ]
-        page.add(
-            '<section class="card"><h2>The smallest effects that would be seen</h2><p class="lead">How far'
-            ' the tip would move (rms) by an effect that just shows: <span class="after">dark</span> with'
-            ' base and tool fitted, <span class="before">light</span> with all geometry fitted as well.'
-            " Without a light mark, geometry takes the effect up. Short is good.</p>"
-        )
-        page.chart(
-            "smallest",
-            [
-                {
-                    "type": "bar",
-                    "orientation": "h",
-                    "y": labels,
-                    "x": [1e3 * e["size_at_tip_m"] for e in shown],
-                    "marker": {"color": AFTER},
-                    "name": "base and tool fitted",
-                    "customdata": sizes,
-                    "hovertemplate": (
-                        "%{y}: %{x:.3g} mm at the tip<br>%{customdata[2]}: %{customdata[0]}<extra></extra>"
-                    ),
-                },
-                {
-                    "type": "scatter",
-                    "mode": "markers",
-                    "y": labels,
-                    "x": [
-                        (
-                            None
-                            if e["size_with_geometry_at_tip_m"] is None
-                            else 1e3 * e["size_with_geometry_at_tip_m"]
-                        )
-                        for e in shown
-                    ],
-                    "marker": {"color": BEFORE, "size": 9, "symbol": "diamond"},
-                    "name": "all geometry fitted too",
-                    "customdata": sizes,
-                    "hovertemplate": (
-                        "%{y}: %{x:.3g} mm at the tip<br>%{customdata[2]}: %{customdata[1]}<extra></extra>"
-                    ),
-                },
-            ],
-            {
-                "xaxis": {
-                    "type": "log" if max(tips) > 30 * min(tips) else "linear",
-                    "title": {"text": "rms motion of the tip [mm]"},
-                },
-                "yaxis": {
-                    "dtick": 1,
-                    "tickfont": {"size": 11},
-                    "automargin": True,
-                    "showgrid": False,
-                    "range": [-0.6, len(shown) - 0.4],
-                },
-                "height": max(300, 17 * len(shown) + 90),
-            },
-            size="free",
-        )
-        page.add("</section>")
-    if len(effects) > 1:
-        labels = [effect_at(e["effect"], e["joint"]) for e in effects]
-        size = max(440, 15 * len(labels) + 190)
-        page.add(
-            '<section class="card"><h2>Which effects look alike</h2><p class="lead">How much of the effect'
-            " on the left the effect below could pass for (R²), once base and tool are fitted. Dark pairs"
-            ' cannot be told apart by this plan.</p><div class="scroll"><div'
-            f' style="min-width:{min(size, 1180)}px">'
-        )
-        page.chart(
-            "alike",
-            [
-                {
-                    "type": "heatmap",
-                    "z": [[round(float(v), 3) for v in row] for row in seen["r2"]],
-                    "x": labels,
-                    "y": labels,
-                    "zmin": 0,
-                    "zmax": 1,
-                    "colorscale": [
-                        [0, "#ffffff"],
-                        [0.5, "#cfe0f2"],
-                        [0.9, "#5f97cf"],
-                        [0.98, "#1f5fa8"],
-                        [1, "#0d2f57"],
-                    ],
-                    "colorbar": {"thickness": 12},
-                    "hovertemplate": "%{y}, of which %{x} explains %{z:.2f}<extra></extra>",
-                }
-            ],
-            {
-                "xaxis": {
-                    "tickangle": -90,
-                    "showgrid": False,
-                    "dtick": 1,
-                    "tickfont": {"size": 10},
-                    "automargin": True,
-                },
-                "yaxis": {
-                    "autorange": "reversed",
-                    "showgrid": False,
-                    "dtick": 1,
-                    "tickfont": {"size": 10},
-                    "automargin": True,
-                    "zeroline": False,
-                },
-                "height": size,
-            },
-            size="free",
-        )
-        page.add("</div></div>")
-        if seen["alike"]:
-            items = "".join(
-                f"<li><b>{escaped(effect_at(p['effect'], p['joint']))}</b> is not told from"
-                f" <b>{escaped(effect_at(p['other'], p['other_joint']))}</b> (R² {p['r2']:.3f}). To tell:"
-                f" {escaped(p['separated_by'])}.</li>"
-                for p in seen["alike"]
-            )
-            page.add(f'<ul class="plain">{items}</ul>')
-        page.add("</section>")
+        page.add(_separated(seen))
+    if seen["effects"]:
+        _smallest(page, seen["effects"])
+    if len(seen["effects"]) > 1:
+        _alike(page, seen)
     if seen["not_testable"]:
         items = "".join(
             f"<li><b>{escaped(effect_at(n['effect'], ', '.join(n['joints'])))}</b>: {escaped(n['why'])}</li>"
@@ -255,3 +105,139 @@ def _told_apart(page: Page, seen: Mapping[str, Any]) -> None:
             '<section class="card"><h2>Not testable with such data</h2><ul'
             f' class="plain">{items}</ul></section>'
         )
+
+
+def _separated(seen: Mapping[str, Any]) -> str:
+    """The pairs that poses were added for, before and after."""
+    rows = []
+    for p in seen["separated"]:
+        after = p["r2_after"]
+        cells = [
+            f"<td>{escaped(effect_at(p['other'], p['other_joint']))}</td>",
+            table_cell(p["r2"], f"{p['r2']:.3f}"),
+            "<td>–</td>" if after is None else table_cell(after, f"{after:.3f}"),
+            f"<td>{_told_from_size(p['size'], p['unit'])}</td>",
+            f"<td>{'–' if after is None else _told_from_size(p['size_after'], p['unit'])}</td>",
+        ]
+        rows.append(f"<tr><th>{escaped(effect_at(p['effect'], p['joint']))}</th>{''.join(cells)}</tr>")
+    head = "".join(
+        f'<th><button type="button">{name}</button></th>'
+        for name in ("effect", "told from", "R² before", "R² after", "from this size on, before", "after")
+    )
+    return (
+        f'<section class="card"><h2>To be told apart: {counted(seen["added_poses"], "pose")} added</h2><p'
+        ' class="lead">R² is the share of the first effect that the second one could pass for, once base'
+        " and tool are fitted. The added poses are the last ones of poses.csv.</p><div"
+        f' class="scroll"><table class="sortable"><thead><tr>{head}</tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table></div></section>"
+    )
+
+
+def _told_from_size(size: float | None, unit: str) -> str:
+    return "never" if size is None else escaped(size_words(size, unit))
+
+
+def _smallest(page: Page, effects: Sequence[Mapping[str, Any]]) -> None:
+    """How small every effect would still be seen."""
+    shown = sorted(effects, key=lambda e: -e["size_at_tip_m"])
+    labels = [effect_at(e["effect"], e["joint"]) for e in shown]
+    sizes = [
+        [size_words(e["size"], e["unit"]), size_words(e["size_with_geometry"], e["unit"]), e["parameter"]]
+        for e in shown
+    ]
+    with_geometry = [e["size_with_geometry_at_tip_m"] for e in shown]
+    tips = [e["size_at_tip_m"] for e in shown] + [tip for tip in with_geometry if tip is not None]
+    page.add(
+        '<section class="card"><h2>The smallest effects that would be seen</h2><p class="lead">How far'
+        ' the tip would move (rms) by an effect that just shows: <span class="after">dark</span> with'
+        ' base and tool fitted, <span class="before">light</span> with all geometry fitted as well.'
+        " Without a light mark, geometry takes the effect up. Short is good.</p>"
+    )
+    hover = "%{y}: %{x:.3g} mm at the tip<br>%{customdata[2]}: %{customdata["
+    page.chart(
+        "smallest",
+        [
+            {
+                "type": "bar",
+                "orientation": "h",
+                "y": labels,
+                "x": [1e3 * e["size_at_tip_m"] for e in shown],
+                "marker": {"color": AFTER},
+                "name": "base and tool fitted",
+                "customdata": sizes,
+                "hovertemplate": hover + "0]}<extra></extra>",
+            },
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "y": labels,
+                "x": [None if tip is None else 1e3 * tip for tip in with_geometry],
+                "marker": {"color": BEFORE, "size": 9, "symbol": "diamond"},
+                "name": "all geometry fitted too",
+                "customdata": sizes,
+                "hovertemplate": hover + "1]}<extra></extra>",
+            },
+        ],
+        {
+            "xaxis": {
+                "type": "log" if max(tips) > 30 * min(tips) else "linear",
+                "title": {"text": "rms motion of the tip [mm]"},
+            },
+            "yaxis": {
+                "dtick": 1,
+                "tickfont": {"size": 11},
+                "automargin": True,
+                "showgrid": False,
+                "range": [-0.6, len(shown) - 0.4],
+            },
+            "height": max(300, 17 * len(shown) + 90),
+        },
+        size="free",
+    )
+    page.add("</section>")
+
+
+def _alike(page: Page, seen: Mapping[str, Any]) -> None:
+    """Which effects could pass for which."""
+    labels = [effect_at(e["effect"], e["joint"]) for e in seen["effects"]]
+    size = max(440, 15 * len(labels) + 190)
+    page.add(
+        '<section class="card"><h2>Which effects look alike</h2><p class="lead">How much of the effect'
+        " on the left the effect below could pass for (R²), once base and tool are fitted. Dark pairs"
+        ' cannot be told apart by this plan.</p><div class="scroll"><div'
+        f' style="min-width:{min(size, 1180)}px">'
+    )
+    page.chart(
+        "alike",
+        [
+            {
+                "type": "heatmap",
+                "z": [[round(float(v), 3) for v in row] for row in seen["r2"]],
+                "x": labels,
+                "y": labels,
+                "zmin": 0,
+                "zmax": 1,
+                "colorscale": [
+                    [0, "#ffffff"],
+                    [0.5, "#cfe0f2"],
+                    [0.9, "#5f97cf"],
+                    [0.98, "#1f5fa8"],
+                    [1, "#0d2f57"],
+                ],
+                "colorbar": {"thickness": 12},
+                "hovertemplate": "%{y}, of which %{x} explains %{z:.2f}<extra></extra>",
+            }
+        ],
+        square_layout(size),
+        size="free",
+    )
+    page.add("</div></div>")
+    if seen["alike"]:
+        items = "".join(
+            f"<li><b>{escaped(effect_at(p['effect'], p['joint']))}</b> is not told from"
+            f" <b>{escaped(effect_at(p['other'], p['other_joint']))}</b> (R² {p['r2']:.3f}). To tell:"
+            f" {escaped(p['separated_by'])}.</li>"
+            for p in seen["alike"]
+        )
+        page.add(f'<ul class="plain">{items}</ul>')
+    page.add("</section>")

@@ -208,3 +208,13 @@ def log_error_axis(errors: Floats) -> tuple[float, dict[str, Any]]:
         "ticktext": texts,
         "range": [math.log10(low), math.log10(high)],
     }
+
+
+def square_layout(height: int) -> dict[str, Any]:
+    """Of a heat map with the same names along both axes."""
+    axis = {"showgrid": False, "dtick": 1, "tickfont": {"size": 10}, "automargin": True}
+    return {
+        "xaxis": {"tickangle": -90, **axis},
+        "yaxis": {"autorange": "reversed", **axis, "zeroline": False},
+        "height": height,
+    }

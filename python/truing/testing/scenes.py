@@ -174,10 +174,8 @@ class HandEyeScene:
     pixel: float
     camera: PinholeCamera
     board: Board
-    pixels: (
-        Floats | None
-        # shape=(n, points of the board, 2): what the camera sees instead of T_camera_board, with its own noise
-    )
+    # shape=(n, points of the board, 2): what the camera sees instead of T_camera_board, with noise of its own
+    pixels: Floats | None
     seed: int
 
     @property

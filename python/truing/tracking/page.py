@@ -10,7 +10,7 @@ became of the samples.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, REJECTED, packed
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
+from truing.report.trust import BAD, GOOD, LOOK, Check, grade_of
 from truing.report.words import counted, escaped, figures_text, length_text
 from truing.rotations import interpolated
 
@@ -165,24 +166,50 @@ def _errors(page: Page, result: Mapping[str, Any]) -> None:
 
 
 def _trust(result: Mapping[str, Any]) -> str:
-    checks: list[tuple[int, str, str]] = []
+    return _trust_card(
+        [
+            *_against_simpler(result),
+            *_surety(result),
+            _there(result["status"]),
+            _jumps(result["shifts"]),
+            _clock_offset(result["clock"]),
+            _outliers(result["consistency"]),
+            *_limited(result["correction"]),
+        ]
+    )
+
+
+def _trust_card(checks: Sequence[Check]) -> str:
+    worst = max(check.grade for check in checks)
+    items = "".join(
+        f'<li class="g{check.grade}"><i>{"✓!✗"[check.grade]}</i>'
+        f"<div><b>{escaped(check.head)}</b><span>{escaped(check.text)}</span></div></li>"
+        for check in checks
+    )
+    verdict = ("Yes", "Yes, but look", "Not as it is")[worst]
+    return (
+        f'<section class="card trust t{worst}"><h2>Can I trust it? {verdict}.</h2><ul>{items}</ul></section>'
+    )
+
+
+def _against_simpler(result: Mapping[str, Any]) -> list[Check]:
     told = at_horizon(result)
-    if told is not None:
-        simpler = min(told[name]["rms_m"] for name in ("hold", "velocity", "fk", "fk_velocity"))
-        ratio = told["truing"]["rms_m"] / simpler if simpler else 1.0
-        checks.append(
-            (
-                0 if ratio < 0.9 else 1 if ratio < 1.05 else 2,
-                (
-                    "Better than the simpler ways"
-                    if ratio < 0.9
-                    else "No better than the simpler ways"
-                    if ratio < 1.05
-                    else "Worse than a simpler way"
-                ),
-                f"{figures_text(ratio, 2)} of the best one's error",
-            )
-        )
+    if told is None:
+        return []
+    simpler = min(told[name]["rms_m"] for name in ("hold", "velocity", "fk", "fk_velocity"))
+    ratio = told["truing"]["rms_m"] / simpler if simpler else 1.0
+    grade = grade_of(ratio, 0.9, 1.05)
+    head = (
+        "Better than the simpler ways",
+        "No better than the simpler ways",
+        "Worse than a simpler way",
+    )[grade]
+    return [Check(grade, head, f"{figures_text(ratio, 2)} of the best one's error")]
+
+
+def _surety(result: Mapping[str, Any]) -> list[Check]:
+    """Whether filter and predictions are as wrong as they say."""
+    checks = []
     nis = result["consistency"]["nis_per_dimension"]
     if nis is not None:
         checks.append(
@@ -195,106 +222,73 @@ def _trust(result: Mapping[str, Any]) -> str:
                 " setup.yaml",
             )
         )
+    told = at_horizon(result)
     if told is not None and told["squares_per_dimension"] is not None:
+        squares = told["squares_per_dimension"]
         checks.append(
             _ratio_check(
-                told["squares_per_dimension"],
+                squares,
                 "Predictions are as sure as they should be",
                 "Predictions are too sure of themselves",
                 "Predictions are too cautious",
-                f"errors squared are {figures_text(told['squares_per_dimension'], 2)} of what they say",
+                f"errors squared are {figures_text(squares, 2)} of what they say",
             )
         )
-    shares = result["status"]
+    return checks
+
+
+def _there(shares: Mapping[str, float]) -> Check:
     away = shares["hold"] + shares["lost"]
-    checks.append(
-        (
-            0 if away < 0.01 else 1 if away < 0.1 else 2,
-            (
-                "Tracker and inertial sensor were there"
-                if away < 0.01
-                else "Corrections stood still for a while"
-            ),
-            (
-                f"valid {100 * shares['valid']:.1f} %, coasting {100 * shares['coasting']:.1f} %, hold"
-                f" {100 * shares['hold']:.1f} %, lost {100 * shares['lost']:.1f} % of the time"
-            ),
-        )
-    )
-    if result["shifts"]:
-        checks.append(
-            (
-                2,
-                "The tracker jumped"
-                + ("" if len(result["shifts"]) == 1 else f" {len(result['shifts'])} times"),
-                "calibrate anew; see below",
-            )
-        )
-    else:
-        checks.append(
-            (
-                0,
-                "Neither base station nor receiver has moved",
-                "no jump of the tracker against inertial sensor and encoders",
-            )
-        )
-    clock = result["clock"]
-    checks.append(
-        (
-            0,
-            (
-                "Clock offset"
-                f" {figures_text(1e3 * clock['offset_s'], 3) if clock['offset_s'] >= 0 else '−' + figures_text(-1e3 * clock['offset_s'], 3)} ms"
-            ),
-            (
-                f"± {figures_text(1e3 * clock['sigma_s'], 2)} ms, drift"
-                f" {figures_text(1e6 * abs(clock['drift']), 2)} ppm"
-                if clock["estimated"]
-                else "taken as known: setup.yaml gives it no sigma"
-            ),
-        )
-    )
-    outliers = result["consistency"]["outliers"] / max(
-        1, result["consistency"]["outliers"] + result["consistency"]["innovations"]
-    )
-    checks.append(
-        (
-            0 if outliers < _MANY_OUTLIERS else 1,
-            "Few outliers" if outliers < _MANY_OUTLIERS else "Many outliers of the tracker",
-            f"{100 * outliers:.2g} % of its samples",
-        )
-    )
-    limited = result["correction"]["limited"]
-    if limited > 0.01:
-        checks.append(
-            (
-                1,
-                "Corrections were limited",
-                f"{100 * limited:.0f} % of them: limits on size, rate and jerk (`limits` of setup.yaml)",
-            )
-        )
-    worst = max(grade for grade, _, _ in checks)
-    verdict = ("Yes", "Yes, but look", "Not as it is")[worst]
-    items = "".join(
-        f'<li class="g{grade}"><i>{"✓!✗"[grade]}</i><div><b>{escaped(head)}</b><span>{escaped(text)}</span></div></li>'
-        for grade, head, text in checks
-    )
-    return (
-        f'<section class="card trust t{worst}"><h2>Can I trust it? {verdict}.</h2><ul>{items}</ul></section>'
+    return Check(
+        grade_of(away, 0.01, 0.1),
+        "Tracker and inertial sensor were there" if away < 0.01 else "Corrections stood still for a while",
+        f"valid {100 * shares['valid']:.1f} %, coasting {100 * shares['coasting']:.1f} %, hold"
+        f" {100 * shares['hold']:.1f} %, lost {100 * shares['lost']:.1f} % of the time",
     )
 
 
-def _ratio_check(value: float, good: str, sure: str, cautious: str, text: str) -> tuple[int, str, str]:
-    grade = (
-        0
-        if _CONSISTENT[0] <= value <= _CONSISTENT[1]
-        else 1
-        if _INCONSISTENT[0] <= value <= _INCONSISTENT[1]
-        else 2
-        if value > 1
-        else 1
+def _jumps(shifts: Sequence[Mapping[str, Any]]) -> Check:
+    if not shifts:
+        text = "no jump of the tracker against inertial sensor and encoders"
+        return Check(GOOD, "Neither base station nor receiver has moved", text)
+    times = "" if len(shifts) == 1 else f" {len(shifts)} times"
+    return Check(BAD, f"The tracker jumped{times}", "calibrate anew; see below")
+
+
+def _clock_offset(clock: Mapping[str, Any]) -> Check:
+    sign = "" if clock["offset_s"] >= 0 else "−"
+    text = (
+        f"± {figures_text(1e3 * clock['sigma_s'], 2)} ms,"
+        f" drift {figures_text(1e6 * abs(clock['drift']), 2)} ppm"
+        if clock["estimated"]
+        else "taken as known: setup.yaml gives it no sigma"
     )
-    return grade, good if grade == 0 else sure if value > 1 else cautious, text
+    return Check(GOOD, f"Clock offset {sign}{figures_text(1e3 * abs(clock['offset_s']), 3)} ms", text)
+
+
+def _outliers(consistency: Mapping[str, Any]) -> Check:
+    share = consistency["outliers"] / max(1, consistency["outliers"] + consistency["innovations"])
+    few = share < _MANY_OUTLIERS
+    return Check(
+        GOOD if few else LOOK,
+        "Few outliers" if few else "Many outliers of the tracker",
+        f"{100 * share:.2g} % of its samples",
+    )
+
+
+def _limited(correction: Mapping[str, Any]) -> list[Check]:
+    share = correction["limited"]
+    if share <= 0.01:
+        return []
+    text = f"{100 * share:.0f} % of them: limits on size, rate and jerk (`limits` of setup.yaml)"
+    return [Check(LOOK, "Corrections were limited", text)]
+
+
+def _ratio_check(value: float, good: str, sure: str, cautious: str, text: str) -> Check:
+    if _CONSISTENT[0] <= value <= _CONSISTENT[1]:
+        return Check(GOOD, good, text)
+    far = not _INCONSISTENT[0] <= value <= _INCONSISTENT[1]
+    return Check(BAD if far and value > 1 else LOOK, sure if value > 1 else cautious, text)
 
 
 # ---- Below ---------------------------------------------------------------------------------------
@@ -313,8 +307,8 @@ def _what_happened(page: Page, result: Mapping[str, Any], run: Replayed) -> None
     page.add(
         '<section class="card"><h2>The tool, away from its plan</h2><p class="lead">As predicted '
         f"{figures_text(1e3 * result['horizon_s'], 2)} ms before, in the base frame"
-        f"{'; <span class=truth>green</span>: what then happened' if run.true_tool is not None else ''}. Minus"
-        " this is what is sent to the arm.</p>"
+        f"{'' if run.true_tool is None else '; <span class=truth>green</span>: what then happened'}."
+        " Minus this is what is sent to the arm.</p>"
     )
     every = _thinned(made)
     t = rows["t"][every]
@@ -478,9 +472,9 @@ def _status(page: Page, result: Mapping[str, Any], run: Replayed) -> None:
         "valid: tracker and inertial sensor; coasting: inertial sensor and encoders; hold: encoders or plan,"
         " and the last static deviation; lost: nothing to go by."
     )
-    page.add(
-        f'<p class="note">{note}{" Red lines: jumps of the tracker as they were noticed." if result["shifts"] else ""}</p></section>'
-    )
+    if result["shifts"]:
+        note += " Red lines: jumps of the tracker as they were noticed."
+    page.add(f'<p class="note">{note}</p></section>')
 
 
 def _clock(page: Page, result: Mapping[str, Any], run: Replayed) -> None:
@@ -651,11 +645,12 @@ def _shifts(result: Mapping[str, Any]) -> str:
 
 
 def _samples(result: Mapping[str, Any]) -> str:
-    body = "".join(
-        f"<tr><th>{escaped(stream)}</th><td"
-        f" class='wrap'>{escaped(', '.join(f'{name.replace(chr(95), chr(32))} {count}' for name, count in counts.items() if count) or 'none')}</td></tr>"
-        for stream, counts in result["samples"].items()
-    )
+    rows = []
+    for stream, counts in result["samples"].items():
+        met = [f"{name.replace('_', ' ')} {count}" for name, count in counts.items() if count]
+        words = escaped(", ".join(met) or "none")
+        rows.append(f"<tr><th>{escaped(stream)}</th><td class='wrap'>{words}</td></tr>")
+    body = "".join(rows)
     return (
         '<section class="card"><h2>What became of the samples</h2><table class="left'
         f' narrow"><tbody>{body}</tbody></table></section>'
@@ -756,75 +751,65 @@ def _positions(page: Page, result: Mapping[str, Any]) -> None:
 
 
 def _calibration_trust(result: Mapping[str, Any]) -> str:
-    positions, clock = result["positions"], result["clock"]
-    checks: list[tuple[int, str, str]] = []
+    return _trust_card(
+        [
+            *_test_positions(result["positions"]),
+            *_rich_motion(result["clock"]),
+            *_inertial(result["inertial"]),
+        ]
+    )
+
+
+def _test_positions(positions: Mapping[str, Any]) -> list[Check]:
     n = len(positions["errors"])
-    if positions["source"] == "standstills":
-        grade = 0 if n >= 10 else 1
-        checks.append(
-            (
-                grade,
-                "Enough test positions" if grade == 0 else "Few test positions",
-                f"{n}; more of them, turned about different axes, make frames surer",
-            )
-        )
+    if positions["source"] != "standstills":
+        text = "stand still for three seconds or more at ten places, turned about different axes"
+        source = Check(LOOK, "No test positions: frames come from the motion", text)
     else:
-        checks.append(
-            (
-                1,
-                "No test positions: frames come from the motion",
-                "stand still for three seconds or more at ten places, turned about different axes",
-            )
-        )
+        text = f"{n}; more of them, turned about different axes, make frames surer"
+        enough = n >= 10
+        head = "Enough test positions" if enough else "Few test positions"
+        source = Check(GOOD if enough else LOOK, head, text)
     low = sum(e["weight"] < 0.3 for e in positions["errors"])
-    checks.append(
-        (
-            0 if not low else 1,
-            "Every position fits the others" if not low else f"{counted(low, 'position')} off",
-            "" if not low else "they count little; what moved there?",
-        )
+    fits = (
+        Check(LOOK, f"{counted(low, 'position')} off", "they count little; what moved there?")
+        if low
+        else Check(GOOD, "Every position fits the others", "")
     )
-    if clock and "rich_enough" in clock:
-        checks.append(
-            (
-                0 if clock["rich_enough"] else 1,
-                (
-                    "The motion was rich enough for the clock"
-                    if clock["rich_enough"]
-                    else "The motion was not rich enough for the clock"
-                ),
-                f"± {figures_text(1e3 * clock['sigma_s'], 2)} ms. {clock['advice']}",
-            )
+    return [source, fits]
+
+
+def _rich_motion(clock: Mapping[str, Any] | None) -> list[Check]:
+    if not clock or "rich_enough" not in clock:
+        return []
+    rich = clock["rich_enough"]
+    return [
+        Check(
+            GOOD if rich else LOOK,
+            f"The motion was {'' if rich else 'not '}rich enough for the clock",
+            f"± {figures_text(1e3 * clock['sigma_s'], 2)} ms. {clock['advice']}",
         )
-    inertial = result["inertial"]
-    if inertial is not None:
-        checks.append(
-            (
-                0,
-                f"Inertial data follow the tracker to {length_text(inertial['position_rms_m'])}",
-                (
-                    f"and {figures_text(1e3 * inertial['rotation_rms_rad'], 2)} mrad a component, integrated"
-                    " over two seconds"
-                ),
-            )
-        )
-        up = inertial["tracker_up"]
-        checks.append(
-            (
-                0 if up == "+z" else 1,
-                f"The tracker's {up} points up",
-                "" if up == "+z" else "its frame is not z-up; the set-up takes that into account",
-            )
-        )
-    worst = max(grade for grade, _, _ in checks)
-    items = "".join(
-        f'<li class="g{grade}"><i>{"✓!✗"[grade]}</i><div><b>{escaped(head)}</b><span>{escaped(text)}</span></div></li>'
-        for grade, head, text in checks
-    )
-    return (
-        f'<section class="card trust t{worst}"><h2>Can I trust it?'
-        f" {('Yes', 'Yes, but look', 'Not as it is')[worst]}.</h2><ul>{items}</ul></section>"
-    )
+    ]
+
+
+def _inertial(inertial: Mapping[str, Any] | None) -> list[Check]:
+    if inertial is None:
+        return []
+    up = inertial["tracker_up"]
+    upright = up == "+z"
+    return [
+        Check(
+            GOOD,
+            f"Inertial data follow the tracker to {length_text(inertial['position_rms_m'])}",
+            f"and {figures_text(1e3 * inertial['rotation_rms_rad'], 2)} mrad a component, integrated over two"
+            " seconds",
+        ),
+        Check(
+            GOOD if upright else LOOK,
+            f"The tracker's {up} points up",
+            "" if upright else "its frame is not z-up; the set-up takes that into account",
+        ),
+    ]
 
 
 def _frames_table(result: Mapping[str, Any]) -> str:
@@ -833,17 +818,16 @@ def _frames_table(result: Mapping[str, Any]) -> str:
     body = []
     for name, f in result["frames"].items():
         sigma = f["sigma"]
-        place = "".join(
-            f"<td>{1e3 * f[f'{axis}_m']:.2f}{'' if sigma is None else ' ± ' + figures_text(1e3 * sigma[f'{axis}_m'], 2)}</td>"
-            for axis in "xyz"
-        )
+        error = {
+            axis: "" if sigma is None else f" ± {figures_text(1e3 * sigma[f'{axis}_m'], 2)}" for axis in "xyz"
+        }
+        place = "".join(f"<td>{1e3 * f[f'{axis}_m']:.2f}{error[axis]}</td>" for axis in "xyz")
         turn = "".join(
             f"<td>{'–' if sigma is None else figures_text(1e3 * sigma[f'r{axis}_rad'], 2)}</td>"
             for axis in "xyz"
         )
-        body.append(
-            f"<tr><th>{name}</th>{place}<td>{' '.join(f'{f[part]:.5f}' for part in ('qw', 'qx', 'qy', 'qz'))}</td>{turn}</tr>"
-        )
+        quaternion = " ".join(f"{f[part]:.5f}" for part in ("qw", "qx", "qy", "qz"))
+        body.append(f"<tr><th>{name}</th>{place}<td>{quaternion}</td>{turn}</tr>")
     head = "".join(
         f"<th>{name}</th>"
         for name in (
@@ -859,7 +843,8 @@ def _frames_table(result: Mapping[str, Any]) -> str:
     )
     return (
         '<section class="card"><h2>Frames</h2><div'
-        f' class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{"".join(body)}</tbody></table></div></section>'
+        f' class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{"".join(body)}</tbody></table>'
+        "</div></section>"
     )
 
 
@@ -909,5 +894,6 @@ def _found_modes(result: Mapping[str, Any]) -> str:
     return (
         '<section class="card"><h2>Modes of the sway</h2><p'
         f' class="lead">{escaped(modes["stopped_because"])}</p><table'
-        f' class="narrow"><thead><tr><th>frequency</th><th>damping</th></tr></thead><tbody>{body}</tbody></table></section>'
+        ' class="narrow"><thead><tr><th>frequency</th><th>damping</th></tr></thead>'
+        f"<tbody>{body}</tbody></table></section>"
     )
