@@ -783,7 +783,7 @@ TEST_CASE("corrections keep their rate and jerk whatever is wanted: 300 runs of 
   double rate = 0.0, jerk = 0.0;
   for (int run = 0; run < 300; ++run) {
     tracking::CorrectionLimiter limiter(limits);
-    math::Vector6d size, phase, step = detail::Vector6d::Zero();
+    math::Vector6d size, phase, step = math::Vector6d::Zero();
     const double frequency = random.uniform(0.0, 3.0);
     for (int i = 0; i < 6; ++i) size[i] = 0.05 * random.normal(), phase[i] = random.uniform(0.0, 2.0 * M_PI);
     Eigen::Vector3d x[4] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
