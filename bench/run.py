@@ -45,7 +45,7 @@ FIT_PEERS = (
     "pybotics-trf",
     "pybotics-lm",
 )
-CPP = "build/bench/bench_identify"
+CPP = "build/release/bench/bench_identify"
 AVX2 = "TRUING_KERNEL=avx2 " + CPP
 PYTHON = "python bench/run.py"
 

@@ -17,19 +17,13 @@
 #include "hand_eye/refine.hpp"
 #include "math/frame.hpp"
 #include "math/random.hpp"
+#include "support/sanitized.hpp"
 #include "truing/handeye.hpp"
 
 using namespace truing;
 using namespace truing::hand_eye;
 
 namespace {
-
-// Sanitizers look at memory, not at statistics, and take fifty times as long.
-#if defined(__SANITIZE_ADDRESS__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 struct Noise {
   double hand_position = 0.0, hand_rotation = 0.0, camera_position = 0.0, camera_rotation = 0.0;

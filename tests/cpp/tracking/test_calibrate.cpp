@@ -11,6 +11,7 @@
 
 #include "math/random.hpp"
 #include "math/rotation.hpp"
+#include "support/sanitized.hpp"
 #include "truing/tracking/calibrate.hpp"
 #include "truing/tracking/simulation.hpp"
 
@@ -22,12 +23,6 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 namespace {
-
-#if defined(__SANITIZE_ADDRESS__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 Vector3d normal3(Random* random, double sigma) {
   const double x = random->normal(), y = random->normal(), z = random->normal();

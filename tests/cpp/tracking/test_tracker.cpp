@@ -18,6 +18,7 @@
 #include <Eigen/Cholesky>
 
 #include "math/random.hpp"
+#include "support/sanitized.hpp"
 #include "tracking/correction_limiter.hpp"
 #include "tracking/deviation.hpp"
 #include "tracking/pose_filter.hpp"
@@ -41,13 +42,6 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 namespace {
-
-// Sanitizers look at memory, not at statistics, and take fifty times as long.
-#if defined(__SANITIZE_ADDRESS__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 SimulatedStreams boom(SimulatedMotion motion, std::uint64_t seed, double seconds) {
   StreamSimulationOptions options;
