@@ -3,13 +3,16 @@
 #
 # What one types. The work is done by scripts/ and CMake. Every target sets up what it needs by itself.
 
-.PHONY: help setup demo test bench stubs docs-check clean distclean
+.PHONY: help setup demo test test-all format tidy bench stubs docs-check clean distclean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo        set up, calibrate an example robot, write the report into demo/"
 	@echo "make setup       system packages (apt), .venv, truing built and installed into it"
-	@echo "make test        every check: C++, sanitizers, consumer, Python, stubs, types, examples, docs"
+	@echo "make test        every check: format, C++, sanitizers, consumer, Python, stubs, types, examples, docs"
+	@echo "make test-all    the same with the tests that are marked slow"
+	@echo "make format      format C++ and Python in place"
+	@echo "make tidy        clang-tidy over cpp/ (some minutes)"
 	@echo "make bench       the benchmarks"
 	@echo "make stubs       write python/truing/_core.pyi from the built module"
 	@echo "make docs-check  check the links in *.md"
@@ -25,8 +28,18 @@ demo:
 	@.venv/bin/truing demo --out demo
 
 test:
-	@scripts/setup.sh --test
 	@scripts/test.sh
+
+test-all:
+	@scripts/test.sh --all
+
+format:
+	@scripts/setup.sh --test
+	@scripts/format.sh
+
+tidy:
+	@scripts/setup.sh --test
+	@scripts/tidy.sh
 
 bench:
 	@scripts/setup.sh --test

@@ -9,11 +9,10 @@
 #   scripts/bench.sh --no-peers  truing alone, nothing is downloaded
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-root=$PWD
-export CMAKE_BUILD_PARALLEL_LEVEL=${JOBS:-$(nproc)} CMAKE_GENERATOR=${CMAKE_GENERATOR:-Ninja}
+source scripts/env.sh
 
-cmake -S . -B build/bench -DTRUING_BUILD_TESTS=OFF -DTRUING_BUILD_BENCHMARKS=ON -DCMAKE_BUILD_TYPE=Release > /dev/null
-cmake --build build/bench
+configure "$release" -DTRUING_BUILD_BENCHMARKS=ON -DCMAKE_BUILD_TYPE=Release
+cmake --build "$release" --target bench/all
 
 # A peer that cannot be installed is reported by the bench and stops nothing.
 stamp=build/peers/.made

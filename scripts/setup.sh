@@ -12,7 +12,7 @@
 # TRUING_SKIP_SYSTEM=1 leaves system packages to you.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-root=$PWD
+source scripts/env.sh
 
 apt_packages=(
   g++ cmake ninja-build python3-venv python3-dev
@@ -156,7 +156,9 @@ install_truing() {
     rm -rf build/dist
     # Without isolation the build folder stays valid, and only what changed is compiled.
     local log=build/wheel.log
-    if ! CMAKE_BUILD_PARALLEL_LEVEL=${JOBS:-$(nproc)} CMAKE_GENERATOR=${CMAKE_GENERATOR:-Ninja} \
+    # With its tests, warnings are errors from the start: the flag is part of every command line, and to set it later
+    # would compile everything once more.
+    if ! SKBUILD_CMAKE_ARGS=${extras:+-DTRUING_WERROR=ON} \
       "$venv_python" -m pip wheel --disable-pip-version-check --verbose --no-build-isolation --no-deps \
       --wheel-dir build/dist . > "$log" 2>&1; then
       grep -nE 'error|Error|warning: unused' "$log" | head -n 20 >&2 || true

@@ -2,22 +2,15 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Every check of truing, in order, up to the first that fails. Run `scripts/setup.sh --test` first, or `make test`.
+# Every check of truing, in order, up to the first that fails, and how long each took.
 #
 #   scripts/test.sh              all steps
-#   scripts/test.sh cpp python   only these: cpp sanitize consumer python stubs types examples docs
+#   scripts/test.sh --all        all steps, and in them the tests marked slow
+#   scripts/test.sh cpp python   only these: setup format cpp sanitize consumer python stubs types examples docs
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-root=$PWD
+source scripts/env.sh
 python=$root/.venv/bin/python
-jobs=${JOBS:-$(nproc)}
-export CMAKE_BUILD_PARALLEL_LEVEL=$jobs CTEST_PARALLEL_LEVEL=$jobs CTEST_OUTPUT_ON_FAILURE=1
-export CMAKE_GENERATOR=${CMAKE_GENERATOR:-Ninja}
-
-[[ -x $python && -e .venv/.extras ]] || {
-  echo "scripts/test.sh: .venv is missing or has no test packages; run scripts/setup.sh --test" >&2
-  exit 1
-}
 
 # Recorded data sets, tested against where they are; none is part of the project.
 if [[ -z ${TRUING_REALDATA:-} && -d ../shared/data ]]; then
@@ -26,23 +19,36 @@ fi
 
 # ---- The steps. Each is run in a shell of its own, under set -e. -----------------------------------------------------
 
+step_setup() {
+  scripts/setup.sh --test
+}
+
+step_format() {
+  scripts/format.sh --check
+}
+
+run_ctest() {
+  local which=(-LE slow)
+  [[ -z ${TRUING_SLOW_TESTS:-} ]] || which=()
+  ctest --test-dir "$1" "${which[@]}"
+}
+
 step_cpp() {
-  cmake -S . -B build/tests -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON > build/tests.configure.log ||
-    { cat build/tests.configure.log; return 1; }
-  cmake --build build/tests
-  ctest --test-dir build/tests
+  configure "$release" -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DCMAKE_BUILD_TYPE=Release
+  cmake --build "$release"
+  run_ctest "$release"
 }
 
 step_sanitize() {
-  cmake -S . -B build/asan -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DTRUING_SANITIZE=ON -DCMAKE_BUILD_TYPE=Debug \
-    -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" > build/asan.configure.log || { cat build/asan.configure.log; return 1; }
-  cmake --build build/asan
-  ctest --test-dir build/asan
+  configure build/sanitize -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DTRUING_SANITIZE=ON \
+    -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1"
+  cmake --build build/sanitize
+  run_ctest build/sanitize
 }
 
 step_consumer() {
   rm -rf build/prefix
-  cmake --install build/tests --prefix build/prefix > build/install.log
+  cmake --install "$release" --component cpp --prefix build/prefix > build/install.log
   cmake -S tests/consumer -B build/consumer -DCMAKE_PREFIX_PATH="$root/build/prefix" -DCMAKE_BUILD_TYPE=Release \
     > build/consumer.configure.log || { cat build/consumer.configure.log; return 1; }
   cmake --build build/consumer
@@ -65,8 +71,10 @@ PYTHON
 
 step_python() {
   elsewhere python
-  "$python" -m pytest -c "$root/pyproject.toml" --rootdir "$root" "$root/tests/python" 2>&1 |
-    tee "$root/build/pytest.log"
+  local which=(-m "not slow")
+  [[ -z ${TRUING_SLOW_TESTS:-} ]] || which=()
+  "$python" -m pytest -c "$root/pyproject.toml" --rootdir "$root" -n "$jobs" --dist worksteal --durations 25 \
+    "${which[@]}" "$root/tests/python" 2>&1 | tee "$root/build/pytest.log"
 }
 
 step_stubs() {
@@ -118,6 +126,8 @@ step_docs() {
 
 title() {
   case $1 in
+    setup) echo "system packages, .venv, the wheel built and installed" ;;
+    format) echo "format, lint, length and complexity of functions" ;;
     cpp) echo "C++ tests, warnings as errors" ;;
     sanitize) echo "C++ tests under AddressSanitizer and UBSan" ;;
     consumer) echo "a project that uses the installed C++ library" ;;
@@ -130,12 +140,23 @@ title() {
   esac
 }
 
-all=(cpp sanitize consumer python stubs types examples docs)
-steps=("$@")
-[[ $# -gt 0 ]] || steps=("${all[@]}")
-for step in "${steps[@]}"; do
-  title "$step" > /dev/null || { echo "scripts/test.sh: no step '$step'; there are: ${all[*]}" >&2; exit 1; }
+duration() {
+  printf '%3d min %02d s' $(($1 / 60)) $(($1 % 60))
+}
+
+all=(setup format cpp sanitize consumer python stubs types examples docs)
+steps=()
+for argument in "$@"; do
+  case $argument in
+    --all) export TRUING_SLOW_TESTS=1 ;;
+    *)
+      title "$argument" > /dev/null ||
+        { echo "scripts/test.sh: no step '$argument'; there are: ${all[*]}" >&2; exit 1; }
+      steps+=("$argument")
+      ;;
+  esac
 done
+[[ ${#steps[@]} -gt 0 ]] || steps=("${all[@]}")
 
 # Run as "scripts/test.sh" runs itself for one step, so that set -e holds inside the step.
 if [[ ${TRUING_TEST_STEP:-} == 1 ]]; then
@@ -143,9 +164,14 @@ if [[ ${TRUING_TEST_STEP:-} == 1 ]]; then
   exit
 fi
 
+[[ ${steps[0]} == setup || (-x $python && -e .venv/.extras) ]] || {
+  echo "scripts/test.sh: .venv is missing or has no test packages; run scripts/setup.sh --test" >&2
+  exit 1
+}
+
 rm -f build/pytest.log
 number=0
-summary=""
+table=""
 for step in "${steps[@]}"; do
   number=$((number + 1))
   printf '\n==== %d/%d  %s ====\n' "$number" "${#steps[@]}" "$(title "$step")"
@@ -156,10 +182,11 @@ for step in "${steps[@]}"; do
     if [[ $step == python ]]; then tail -n 1 build/pytest.log; fi
     exit 1
   fi
-  summary+=$(printf '%5d s  %s' $((SECONDS - started)) "$(title "$step")")$'\n'
+  printf '==== %s: %s ====\n' "$step" "$(duration $((SECONDS - started)))"
+  table+="$(duration $((SECONDS - started)))  $(printf '%-9s' "$step")  $(title "$step")"$'\n'
 done
 
-printf '\n==== all %d steps passed ====\n%s' "${#steps[@]}" "$summary"
+printf '\n==== all %d steps passed ====\n%s%s  together\n' "${#steps[@]}" "$table" "$(duration $SECONDS)"
 if [[ -e build/pytest.log ]]; then
   # The tests' own closing line, once more.
   tail -n 1 build/pytest.log
