@@ -148,8 +148,9 @@ def solve(
             + (0 if exact_hand else ((own / sigma) ** 2).sum())
         )
 
-    cost, shared = cost_at(camera, board, own), np.eye(12)
-    for taken in range(1, iterations + 1):
+    cost, shared, taken = cost_at(camera, board, own), np.eye(12), 0
+    for _ in range(iterations):
+        taken += 1
         r = residuals(scene, camera, board, own, pixels)
         J, Jo = np.zeros((n, r.shape[1], 12)), np.zeros((n, r.shape[1], 6))
         for k in range(6):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hand-eye calibration of two recorded set-ups: the section of docs/benchmarks/real-robots.md between its markers.
+"""Hand-eye calibration of two recorded set-ups: the section of docs/benchmarks/real-robots.md between its \
+markers.
 
     python bench/handeye_real.py [--data FOLDER]
 

@@ -154,7 +154,12 @@ def judge(result: Result, chain: Chain, cases: Cases, answers: Floats) -> None:
     if result.task == "branches":
         result.branches = good
         result.reached = float(
-            np.mean([any(apart(q, truth) < SAME for q in found) for found, truth in zip(good, cases.truth)])
+            np.mean(
+                [
+                    any(apart(q, truth) < SAME for q in found)
+                    for found, truth in zip(good, cases.truth, strict=True)
+                ]
+            )
         )
     else:
         result.reached = float(np.mean([bool(found) for found in good]))
@@ -667,10 +672,8 @@ def main() -> None:
             found, its = run_peer(name, arguments.peers, Path(folder), arguments.quick, arguments.timeout)
             results += found
             versions.update(its)
-            note(
-                f"{name}:"
-                f" {'; '.join(f'{one.task} {one.robot} {times(one)} {share(one)} {one.note}' for one in found)}"
-            )
+            lines = [f"{one.task} {one.robot} {times(one)} {share(one)} {one.note}" for one in found]
+            note(f"{name}: {'; '.join(lines)}")
     count_branches(results)
 
     command = (

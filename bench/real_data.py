@@ -196,15 +196,33 @@ RECORDINGS = (
 SOURCES = """\
 | folder | robot and instrument | from | licence |
 | --- | --- | --- | --- |
-| `irb120_faro` | ABB IRB 120, FARO tracker, three reflectors, 1000 poses | [icelinker/Robot-Calibration-LaserTracker](https://github.com/icelinker/Robot-Calibration-LaserTracker), 188abd2 | none found |
-| `motoman_leica` | dual-arm Motoman, Leica tracker, 212 + 208 + 587 poses | [ctu-vras/multirobot-calibration](https://github.com/ctu-vras/multirobot-calibration), a20f045; Rozlivek et al., Humanoids 2021 | none found |
-| `dlr_agile_justin_vicon` | DLR Agile Justin, Vicon, 500 postures | [dlr-alr/dlr-elastic-calibration](https://github.com/dlr-alr/dlr-elastic-calibration), b74d13b and 35149b7 | none found |
-| `figaroh_talos_contact` | PAL TALOS, torso and left arm, 61 postures | [thanhndv212/figaroh-examples](https://github.com/thanhndv212/figaroh-examples), c0b5c7f | Apache-2.0, that of the URDF not stated |
-| `minimal_poe_uts` | ABB IRB 120, touched points, 36 + 40 poses | [drliaowu/Minimal_Robot_Calibration_Using_Position](https://github.com/drliaowu/Minimal_Robot_Calibration_Using_Position), 376cb83; Wu et al., IEEE T-ASE 12(2), 2015 | none found |
-| `robotcali_irb120_cable` | ABB IRB 120, draw-wire encoder, 1042 poses | [Lizhibing1490183152/RobotCali](https://github.com/Lizhibing1490183152/RobotCali), f260ca8 | none found |
-| `handeye_fr3` | Franka Research 3, RealSense D405 on the flange, 114 poses | [PhilNad/robot-arm-kinematic-calibration](https://github.com/PhilNad/robot-arm-kinematic-calibration), 6e0292a | MIT |
-| `handeye_ros_industrial` | industrial arm, Kinect-class camera, dot grid, 8 images | [ros-industrial/industrial_calibration](https://github.com/ros-industrial/industrial_calibration), fe62b7c | Apache-2.0 |
-| `ipa_ur10_leica` | UR10, Leica tracker with T-Mac, 1489 + 1495 + 2773 + 632 poses | [christianlandgraf/ipa-robot-accuracy](https://github.com/christianlandgraf/ipa-robot-accuracy), 507fba6; Landgraf et al., IEEE CASE 2021 | MIT |
+| `irb120_faro` | ABB IRB 120, FARO tracker, three reflectors, 1000 poses | \
+[icelinker/Robot-Calibration-LaserTracker](https://github.com/icelinker/Robot-Calibration-LaserTracker), \
+188abd2 | none found |
+| `motoman_leica` | dual-arm Motoman, Leica tracker, 212 + 208 + 587 poses | \
+[ctu-vras/multirobot-calibration](https://github.com/ctu-vras/multirobot-calibration), a20f045; Rozlivek et \
+al., Humanoids 2021 | none found |
+| `dlr_agile_justin_vicon` | DLR Agile Justin, Vicon, 500 postures | \
+[dlr-alr/dlr-elastic-calibration](https://github.com/dlr-alr/dlr-elastic-calibration), b74d13b and 35149b7 | \
+none found |
+| `figaroh_talos_contact` | PAL TALOS, torso and left arm, 61 postures | \
+[thanhndv212/figaroh-examples](https://github.com/thanhndv212/figaroh-examples), c0b5c7f | Apache-2.0, that \
+of the URDF not stated |
+| `minimal_poe_uts` | ABB IRB 120, touched points, 36 + 40 poses | \
+[drliaowu/Minimal_Robot_Calibration_Using_Position]\
+(https://github.com/drliaowu/Minimal_Robot_Calibration_Using_Position), 376cb83; \
+Wu et al., IEEE T-ASE 12(2), 2015 | none found |
+| `robotcali_irb120_cable` | ABB IRB 120, draw-wire encoder, 1042 poses | \
+[Lizhibing1490183152/RobotCali](https://github.com/Lizhibing1490183152/RobotCali), f260ca8 | none found |
+| `handeye_fr3` | Franka Research 3, RealSense D405 on the flange, 114 poses | \
+[PhilNad/robot-arm-kinematic-calibration](https://github.com/PhilNad/robot-arm-kinematic-calibration), \
+6e0292a | MIT |
+| `handeye_ros_industrial` | industrial arm, Kinect-class camera, dot grid, 8 images | \
+[ros-industrial/industrial_calibration](https://github.com/ros-industrial/industrial_calibration), fe62b7c | \
+Apache-2.0 |
+| `ipa_ur10_leica` | UR10, Leica tracker with T-Mac, 1489 + 1495 + 2773 + 632 poses | \
+[christianlandgraf/ipa-robot-accuracy](https://github.com/christianlandgraf/ipa-robot-accuracy), 507fba6; \
+Landgraf et al., IEEE CASE 2021 | MIT |
 """
 
 
@@ -368,11 +386,16 @@ def irb120(folder: Path) -> str:
     bad = np.isin(pose, np.unique(pose[error > 0.7]))
     rest = summary(error[test & ~bad])
     return f"""\
-**IRB 120, tracker.** Two joint columns: what was commanded, and what the controller said afterwards. The second sounds more real and explains the
-tracker twice as badly: it was read before the arm had settled. And at 19 of 1000 poses the arm was somewhere else altogether. The default finds
-{len(found.rejected_rows)} rows of {len(rejected)} poses in training (poses {", ".join(map(str, rejected))}) and leaves them out. Median and p95 of the
-held-out rows fall, rms and max rise: the test part has ten such poses of its own, and the model no longer bends towards their like. Without the poses
-beyond 0.7 mm, {len(np.unique(pose[bad & test]))} of them in the test part, the held-out errors are {cell(rest.rms)} rms, {cell(rest.mean)} mean, {cell(rest.p95)} p95."""
+**IRB 120, tracker.** Two joint columns: what was commanded, and what the controller said afterwards. The \
+second sounds more real and explains the
+tracker twice as badly: it was read before the arm had settled. And at 19 of 1000 poses the arm was \
+somewhere else altogether. The default finds
+{len(found.rejected_rows)} rows of {len(rejected)} poses in training (poses {", ".join(map(str, rejected))}) \
+and leaves them out. Median and p95 of the
+held-out rows fall, rms and max rise: the test part has ten such poses of its own, and the model no longer \
+bends towards their like. Without the poses
+beyond 0.7 mm, {len(np.unique(pose[bad & test]))} of them in the test part, the held-out errors are \
+{cell(rest.rms)} rms, {cell(rest.mean)} mean, {cell(rest.p95)} p95."""
 
 
 def motoman(folder: Path) -> str:
@@ -390,10 +413,14 @@ def motoman(folder: Path) -> str:
     error = lengths(fit(wide_robot, wide, loss="none").robot, wide)
     blocks = ", ".join(cell(float(error[k : k + 100].mean()), 1) for k in range(0, len(error), 100))
     return f"""\
-**Motoman.** The turntable never moves, so its joint ({frozen}) is one with the base and stays at nominal. The small grid leaves a valley: tool and base
-can move by centimetres together at a price below the noise. The fit walks it to the end ({found.solver.iterations} iterations; one that gives up after 60
-damped steps is 40 % worse) and then says which values mean little: *{next((w for w in found.warnings if w.startswith("barely seen")), "nothing")}*.
-In the wide set 2 mm stay whatever is fitted, in blocks along the order of measuring (mean of each 100 poses: {blocks} mm). No link parameter does that; the
+**Motoman.** The turntable never moves, so its joint ({frozen}) is one with the base and stays at nominal. \
+The small grid leaves a valley: tool and base
+can move by centimetres together at a price below the noise. The fit walks it to the end \
+({found.solver.iterations} iterations; one that gives up after 60
+damped steps is 40 % worse) and then says which values mean little: \
+*{next((w for w in found.warnings if w.startswith("barely seen")), "nothing")}*.
+In the wide set 2 mm stay whatever is fitted, in blocks along the order of measuring (mean of each 100 \
+poses: {blocks} mm). No link parameter does that; the
 cause is not in the data."""
 
 
@@ -424,17 +451,22 @@ def talos(folder: Path) -> str:
         )
     )
     return f"""\
-**TALOS.** 42 training postures for 39 observable parameters, 19 to test on. truing says so: *{next((w for w in everything.warnings if "cannot support" in w), "nothing")}*.
-The baseline is better in the third digit because it stopped after 60 damped steps, which is a weak pull to nominal. The honest way to fewer
-parameters uses training rows alone: as long as a link parameter has a standard error above 10 mm or 10 mrad, hold the worst one at nominal. Whether
-to do that at all is decided by cross-validation within the training rows (five folds, the choice of parameters made anew in each).
+**TALOS.** 42 training postures for 39 observable parameters, 19 to test on. truing says so: \
+*{next((w for w in everything.warnings if "cannot support" in w), "nothing")}*.
+The baseline is better in the third digit because it stopped after 60 damped steps, which is a weak pull to \
+nominal. The honest way to fewer
+parameters uses training rows alone: as long as a link parameter has a standard error above 10 mm or 10 \
+mrad, hold the worst one at nominal. Whether
+to do that at all is decided by cross-validation within the training rows (five folds, the choice of \
+parameters made anew in each).
 
 | TALOS | parameters | cross-validated rms | training rms | held-out rms | mean | p95 |
 | --- | --- | --- | --- | --- | --- | --- |
 {rows}
 
 Held: {", ".join(held)}.
-The same choice on other weakly seen sets, cross-validated rms of everything and of fewer parameters: {"; ".join(others)}. Where fewer are not
+The same choice on other weakly seen sets, cross-validated rms of everything and of fewer parameters: \
+{"; ".join(others)}. Where fewer are not
 clearly better, everything stays."""
 
 
@@ -450,10 +482,14 @@ def cable(folder: Path) -> str:
         for name, found in (("none", plain), ("default", robust))
     }
     return f"""\
-**Draw-wire.** Rows 140 to 220 are 2 to 3 mm off as a block: somebody moved the set-up. The default rejects {len(robust.rejected_rows)} rows, {inside} of the
-{int((block & ~test).sum())} training rows of that block among them. The held-out rows of the block then show what they are, which makes rms, p95 and max of the
-whole test part worse than without a loss, and the median less than half. Outside the block the held-out errors are, without a loss, {cell(off["none"].rms)} rms and
-{cell(off["none"].mean)} mean; with the default {cell(off["default"].rms)} and {cell(off["default"].mean)}. Anchor, zero of the wire and tool are weakly seen, as q5 moves by 17 degrees
+**Draw-wire.** Rows 140 to 220 are 2 to 3 mm off as a block: somebody moved the set-up. The default rejects \
+{len(robust.rejected_rows)} rows, {inside} of the
+{int((block & ~test).sum())} training rows of that block among them. The held-out rows of the block then \
+show what they are, which makes rms, p95 and max of the
+whole test part worse than without a loss, and the median less than half. Outside the block the held-out \
+errors are, without a loss, {cell(off["none"].rms)} rms and
+{cell(off["none"].mean)} mean; with the default {cell(off["default"].rms)} and {cell(off["default"].mean)}. \
+Anchor, zero of the wire and tool are weakly seen, as q5 moves by 17 degrees
 only; joints are rounded to 0.1 degree, up to 0.4 mm each."""
 
 
@@ -466,7 +502,8 @@ def touched(folder: Path) -> str:
         if p.name.endswith(".theta") and not p.frozen
     )
     return f"""\
-**IRB 120, touched points.** Joint zeros are off by degrees (found: {zeros}): one linear step from nominal does not do, {found.solver.iterations} iterations do.
+**IRB 120, touched points.** Joint zeros are off by degrees (found: {zeros}): one linear step from nominal \
+does not do, {found.solver.iterations} iterations do.
 The two test points have one training row each, so their places on the tool carry its error."""
 
 
@@ -474,9 +511,12 @@ def justin(folder: Path) -> str:
     robot, data = load(folder, next(r for r in RECORDINGS if r.folder == "dlr_agile_justin_vicon"))
     found = fit(robot, data)
     return f"""\
-**Agile Justin.** A passive joint (T4 = -(T2 + T3)) carries the arm, and {found.rank} of {found.columns} columns are seen. The centimetre that stays is the
-arm bending under its weight and that of the other arm: no length or angle describes it, and the fit does not pretend to
-(median {cell(on_test(found)[1].median, 1)} mm held out, {cell(1e3 * found.train.after.median, 1)} in training). Joint compliance needs the masses, which are not published."""
+**Agile Justin.** A passive joint (T4 = -(T2 + T3)) carries the arm, and {found.rank} of {found.columns} \
+columns are seen. The centimetre that stays is the
+arm bending under its weight and that of the other arm: no length or angle describes it, and the fit does \
+not pretend to
+(median {cell(on_test(found)[1].median, 1)} mm held out, {cell(1e3 * found.train.after.median, 1)} in \
+training). Joint compliance needs the masses, which are not published."""
 
 
 def at_the_board(robot: truing.Robot, data: truing.Measurements) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -508,10 +548,14 @@ def fr3(folder: Path) -> str:
     test = np.asarray(data.set) == 1
     board = summary(at_the_board(found.robot, data)[test])
     return f"""\
-**FR3.** A camera on the flange looks at a board. Hand-eye calibration alone leaves 8.8 mm, which is not the camera but the arm's link table: identified
-together, in one problem, a millimetre. The figure depends on where one looks: the table above has the error at the camera; seen at the board it is
-{cell(board.rms)} rms, {cell(board.mean)} mean, {cell(board.p95)} p95, {cell(board.max)} max. The published baseline there, 1.341, 1.075, 2.506 and 3.951, is of a fit that minimises the
-error at the board itself, ours does so at the camera. The held-out error is twice the training error, and the fit warns of it:
+**FR3.** A camera on the flange looks at a board. Hand-eye calibration alone leaves 8.8 mm, which is not the \
+camera but the arm's link table: identified
+together, in one problem, a millimetre. The figure depends on where one looks: the table above has the error \
+at the camera; seen at the board it is
+{cell(board.rms)} rms, {cell(board.mean)} mean, {cell(board.p95)} p95, {cell(board.max)} max. The published \
+baseline there, 1.341, 1.075, 2.506 and 3.951, is of a fit that minimises the
+error at the board itself, ours does so at the camera. The held-out error is twice the training error, and \
+the fit warns of it:
 *{next((w for w in found.warnings if "cannot support" in w), "nothing")}*."""
 
 
@@ -522,8 +566,10 @@ def ur10(folder: Path) -> str:
             found = fit(*load(folder, recording))
             lines.append(f"{recording.measurements[-5]} {cell(1e3 * found.noise_sigma, 2)}")
     return f"""\
-**UR10.** The tracker stood elsewhere each time, so each series finds its own base; joints go beyond half a turn and are never wrapped. What a link table
-leaves (per axis, mm: {", ".join(lines)}) is some 25 times the scatter of a measurement, 0.01 mm: the link table is not all that this arm lacks."""
+**UR10.** The tracker stood elsewhere each time, so each series finds its own base; joints go beyond half a \
+turn and are never wrapped. What a link table
+leaves (per axis, mm: {", ".join(lines)}) is some 25 times the scatter of a measurement, 0.01 mm: the link \
+table is not all that this arm lacks."""
 
 
 NOTES = {

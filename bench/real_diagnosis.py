@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Diagnoses recorded measurements of real robots and writes what was named: docs/benchmarks/real-diagnosis.md.
+"""Diagnoses recorded measurements of real robots and writes what was named: \
+docs/benchmarks/real-diagnosis.md.
 
     python bench/real_diagnosis.py [--data FOLDER]
 

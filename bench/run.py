@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Times truing and its peers in one run, and writes what came out: bench/results.json and docs/benchmarks/identify.md.
+"""Times truing and its peers in one run, and writes what came out: bench/results.json and \
+docs/benchmarks/identify.md.
 
     scripts/bench.sh [--quick]       # builds everything, then calls this
 

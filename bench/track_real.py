@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tracking on a recorded arm with three clocks: the section of docs/benchmarks/real-robots.md between its markers.
+"""Tracking on a recorded arm with three clocks: the section of docs/benchmarks/real-robots.md between its \
+markers.
 
     python bench/track_real.py --data FOLDER
 
@@ -145,7 +146,7 @@ def section(data: Path) -> str:
             np.sqrt(np.diag(frames.T_tracker_base.covariance)),
             np.sqrt(np.diag(frames.T_flange_receiver.covariance)),
         )
-        setup = found.where.setup
+        setup, covariance = found.where.setup, found.where.covariance["T_flange_imu"]
         lines += [
             (
                 "**Aubo i5 with inertial sensor and Polaris tracker, three clocks.** Clocks and frames from"
@@ -185,7 +186,7 @@ def section(data: Path) -> str:
             (
                 "| inertial sensor on the flange |"
                 f" {', '.join(f'{1e3 * v:.1f}' for v in np.asarray(setup.T_flange_imu)[:3, 3])} mm |"
-                f" {', '.join(f'{1e3 * v:.1f}' for v in np.sqrt(np.diag(found.where.covariance['T_flange_imu']))[:3])}"
+                f" {', '.join(f'{1e3 * v:.1f}' for v in np.sqrt(np.diag(covariance))[:3])}"
                 " mm | |"
             ),
             (

@@ -116,7 +116,9 @@ def write_chain(chain: Chain, path: Path) -> None:
     """For pinocchio_clik."""
     rows = [
         np.concatenate([[slides, low, high], T.ravel()])
-        for slides, low, high, T in zip(chain.prismatic, chain.lower, chain.upper, chain.placements)
+        for slides, low, high, T in zip(
+            chain.prismatic, chain.lower, chain.upper, chain.placements, strict=True
+        )
     ]
     np.concatenate([*rows, chain.tool.ravel()]).tofile(path)
 

@@ -73,7 +73,7 @@ def eaik(chain: Chain, task: str) -> Solver:
 
     return Solver(
         robot.IK,
-        lambda found: [(not bad, q) for q, bad in zip(found.Q, found.is_LS)],
+        lambda found: [(not bad, q) for q, bad in zip(found.Q, found.is_LS, strict=False)],
         lambda wanted, seed: (wanted,),
     )
 
@@ -121,7 +121,9 @@ def robotics_toolbox(chain: Chain, task: str) -> Solver:
     from roboticstoolbox import ET
 
     parts = []
-    for placement, slides, low, high in zip(chain.placements, chain.prismatic, chain.lower, chain.upper):
+    for placement, slides, low, high in zip(
+        chain.placements, chain.prismatic, chain.lower, chain.upper, strict=True
+    ):
         parts += [ET.SE3(placement), (ET.tz if slides else ET.Rz)(qlim=np.array([low, high]))]
     ets = rtb.ETS([*parts, ET.SE3(chain.tool)])
     # Its residual is half the squared error. Roll free by the mask that its manual names.
@@ -292,7 +294,7 @@ def run_solver(solver: Solver, cases: Cases, task: str, peer: Peer) -> tuple[Flo
     )  # what is prepared at the first call is not counted
     for run in range(peer.runs):
         previous = cases.truth[0]
-        for k, (wanted, seed) in enumerate(zip(cases.wanted, cases.seed)):
+        for k, (wanted, seed) in enumerate(zip(cases.wanted, cases.seed, strict=True)):
             if task == "path":
                 seed = previous
             given = solver.arguments(wanted, seed)

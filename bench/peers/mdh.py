@@ -104,7 +104,7 @@ def rotation(w):
     return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
 
 
-def urdf(dh, tool=np.zeros(3)):
+def urdf(dh, tool=(0.0, 0.0, 0.0)):
     """URDF of the arm: the fixed part of each link as xyz and rpy, then q about z; the tool is a fixed joint.
 
     Numbers are written in full, so that the URDF is the same arm to 1e-15.

@@ -20,7 +20,9 @@ def fit(dh, tool, q, p, max_iterations=20):
     """
     dh, tool = dh.copy(), tool.copy()
     base = align(positions(dh, np.eye(4), tool, q), p)
-    for iteration in range(1, max_iterations + 1):
+    iteration = 0
+    for _ in range(max_iterations):
+        iteration += 1
         predicted, J = positions_and_jacobian(dh, base, tool, q)
         r = (p - predicted).ravel()
         J = J.reshape(len(r), -1)

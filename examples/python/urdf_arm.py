@@ -6,16 +6,22 @@ import truing
 
 ARM = """<?xml version="1.0"?>
 <robot name="arm">
-  <link name="base"/> <link name="shoulder"/> <link name="upper"/> <link name="fore"/> <link name="wrist"/> <link name="flange"/>
+  <link name="base"/> <link name="shoulder"/> <link name="upper"/> <link name="fore"/> <link name="wrist"/>
+  <link name="flange"/>
   <joint name="pan" type="revolute"> <parent link="base"/> <child link="shoulder"/>
-    <origin xyz="0 0 0.4" rpy="0 0 0"/> <axis xyz="0 0 1"/> <limit lower="-3" upper="3" effort="1" velocity="1"/> </joint>
+    <origin xyz="0 0 0.4" rpy="0 0 0"/> <axis xyz="0 0 1"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/> </joint>
   <joint name="lift" type="revolute"> <parent link="shoulder"/> <child link="upper"/>
-    <origin xyz="0.1 0 0" rpy="0 0 0"/> <axis xyz="0 1 0"/> <limit lower="-1.5" upper="1.5" effort="1" velocity="1"/> </joint>
+    <origin xyz="0.1 0 0" rpy="0 0 0"/> <axis xyz="0 1 0"/>
+    <limit lower="-1.5" upper="1.5" effort="1" velocity="1"/> </joint>
   <joint name="elbow" type="revolute"> <parent link="upper"/> <child link="fore"/>
-    <origin xyz="0 0 0.5" rpy="0 0 0"/> <axis xyz="0 1 0"/> <limit lower="-2" upper="2" effort="1" velocity="1"/> </joint>
+    <origin xyz="0 0 0.5" rpy="0 0 0"/> <axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/> </joint>
   <joint name="roll" type="revolute"> <parent link="fore"/> <child link="wrist"/>
-    <origin xyz="0.3 0 0.05" rpy="0 0 0"/> <axis xyz="1 0 0"/> <limit lower="-3" upper="3" effort="1" velocity="1"/> </joint>
-  <joint name="mount" type="fixed"> <parent link="wrist"/> <child link="flange"/> <origin xyz="0.1 0 0.03" rpy="0 1.5708 0"/> </joint>
+    <origin xyz="0.3 0 0.05" rpy="0 0 0"/> <axis xyz="1 0 0"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/> </joint>
+  <joint name="mount" type="fixed"> <parent link="wrist"/> <child link="flange"/>
+    <origin xyz="0.1 0 0.03" rpy="0 1.5708 0"/> </joint>
 </robot>
 """
 

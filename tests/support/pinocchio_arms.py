@@ -39,16 +39,26 @@ LIMITS = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
 ARM = urdf(
     "arm",
     f"""
-  <joint name="mount" type="fixed"><parent link="world"/><child link="foot"/><origin xyz="0.3 -0.2 0.5" rpy="0.3 -0.7 1.9"/></joint>
-  <joint name="A1" type="revolute"><parent link="foot"/><child link="l1"/><origin xyz="0 0.01 0.4" rpy="0.1 0.2 -0.3"/><axis xyz="0 0 1"/>{LIMITS}</joint>
-  <joint name="A2" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz="0.15 0 0.1" rpy="-1.57 0 0.4"/><axis xyz="0 1 0"/>{LIMITS}</joint>
-  <joint name="spacer" type="fixed"><parent link="l2"/><child link="l2b"/><origin xyz="0.05 0.02 -0.01" rpy="0.7 1.1 -2.0"/></joint>
-  <joint name="spacer2" type="fixed"><parent link="l2b"/><child link="l2c"/><origin xyz="0 0.02 0.3" rpy="0 0 3.1"/></joint>
-  <joint name="A3" type="revolute"><parent link="l2c"/><child link="l3"/><origin xyz="0.6 0 0" rpy="0 1.5 0"/><axis xyz="1 0 0"/>{LIMITS}</joint>
-  <joint name="A4" type="continuous"><parent link="l3"/><child link="l4"/><origin xyz="0.1 0.6 0" rpy="2.9 -1.2 0.5"/><axis xyz="0 0 -1"/></joint>
-  <joint name="A5" type="revolute"><parent link="l4"/><child link="l5"/><origin xyz="0 0 0.12" rpy="1.57 0 0"/><axis xyz="0 0 1"/>{LIMITS}</joint>
-  <joint name="A6" type="revolute"><parent link="l5"/><child link="l6"/><origin xyz="0 0.1 0.02" rpy="-1.5 0.1 0"/><axis xyz="0 0 1"/>{LIMITS}</joint>
-  <joint name="flange" type="fixed"><parent link="l6"/><child link="tcp"/><origin xyz="0.04 -0.03 0.2" rpy="0.5 -0.4 0.3"/></joint>
+  <joint name="mount" type="fixed"><parent link="world"/><child link="foot"/>
+    <origin xyz="0.3 -0.2 0.5" rpy="0.3 -0.7 1.9"/></joint>
+  <joint name="A1" type="revolute"><parent link="foot"/><child link="l1"/>
+    <origin xyz="0 0.01 0.4" rpy="0.1 0.2 -0.3"/><axis xyz="0 0 1"/>{LIMITS}</joint>
+  <joint name="A2" type="revolute"><parent link="l1"/><child link="l2"/>
+    <origin xyz="0.15 0 0.1" rpy="-1.57 0 0.4"/><axis xyz="0 1 0"/>{LIMITS}</joint>
+  <joint name="spacer" type="fixed"><parent link="l2"/><child link="l2b"/>
+    <origin xyz="0.05 0.02 -0.01" rpy="0.7 1.1 -2.0"/></joint>
+  <joint name="spacer2" type="fixed"><parent link="l2b"/><child link="l2c"/>
+    <origin xyz="0 0.02 0.3" rpy="0 0 3.1"/></joint>
+  <joint name="A3" type="revolute"><parent link="l2c"/><child link="l3"/><origin xyz="0.6 0 0" rpy="0 1.5 0"/>
+    <axis xyz="1 0 0"/>{LIMITS}</joint>
+  <joint name="A4" type="continuous"><parent link="l3"/><child link="l4"/>
+    <origin xyz="0.1 0.6 0" rpy="2.9 -1.2 0.5"/><axis xyz="0 0 -1"/></joint>
+  <joint name="A5" type="revolute"><parent link="l4"/><child link="l5"/>
+    <origin xyz="0 0 0.12" rpy="1.57 0 0"/><axis xyz="0 0 1"/>{LIMITS}</joint>
+  <joint name="A6" type="revolute"><parent link="l5"/><child link="l6"/>
+    <origin xyz="0 0.1 0.02" rpy="-1.5 0.1 0"/><axis xyz="0 0 1"/>{LIMITS}</joint>
+  <joint name="flange" type="fixed"><parent link="l6"/><child link="tcp"/>
+    <origin xyz="0.04 -0.03 0.2" rpy="0.5 -0.4 0.3"/></joint>
 """,
 )
 
@@ -56,11 +66,15 @@ ARM = urdf(
 OBLIQUE = urdf(
     "oblique",
     f"""
-  <joint name="B1" type="revolute"><parent link="base"/><child link="l1"/><origin xyz="0.1 0.2 0.3" rpy="0 0 0"/><axis xyz="0.48 -0.6 0.64"/>{LIMITS}</joint>
-  <joint name="B2" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz="-0.2 0.1 0.5" rpy="1 2 3"/><axis xyz="1 2 -3"/>{LIMITS}</joint>
-  <joint name="B3" type="continuous"><parent link="l2"/><child link="l3"/><origin xyz="0.4 0 0" rpy="-2 0.3 1"/><axis xyz="0 0.6 0.8"/></joint>
+  <joint name="B1" type="revolute"><parent link="base"/><child link="l1"/>
+    <origin xyz="0.1 0.2 0.3" rpy="0 0 0"/><axis xyz="0.48 -0.6 0.64"/>{LIMITS}</joint>
+  <joint name="B2" type="revolute"><parent link="l1"/><child link="l2"/>
+    <origin xyz="-0.2 0.1 0.5" rpy="1 2 3"/><axis xyz="1 2 -3"/>{LIMITS}</joint>
+  <joint name="B3" type="continuous"><parent link="l2"/><child link="l3"/>
+    <origin xyz="0.4 0 0" rpy="-2 0.3 1"/><axis xyz="0 0.6 0.8"/></joint>
   <joint name="tip" type="fixed"><parent link="l3"/><child link="l3b"/><origin xyz="0 0.1 0"/></joint>
-  <joint name="B4" type="revolute"><parent link="l3b"/><child link="l4"/><origin xyz="0 0 0.35" rpy="0.2 -0.9 2.2"/><axis xyz="-0.8 0 0.6"/>{LIMITS}</joint>
+  <joint name="B4" type="revolute"><parent link="l3b"/><child link="l4"/>
+    <origin xyz="0 0 0.35" rpy="0.2 -0.9 2.2"/><axis xyz="-0.8 0 0.6"/>{LIMITS}</joint>
 """,
 )
 
@@ -68,15 +82,23 @@ OBLIQUE = urdf(
 GANTRY = urdf(
     "gantry",
     f"""
-  <joint name="X" type="prismatic"><parent link="floor"/><child link="bridge"/><origin xyz="0 0 2" rpy="0.01 -0.02 0.03"/><axis xyz="1 0 0"/>{LIMITS}</joint>
-  <joint name="Y" type="prismatic"><parent link="bridge"/><child link="trolley"/><origin xyz="0.1 0 0" rpy="0 0 0.5"/><axis xyz="0 0.6 -0.8"/>{LIMITS}</joint>
-  <joint name="foot" type="fixed"><parent link="trolley"/><child link="trolley2"/><origin xyz="0.02 0.01 -0.3" rpy="3.1 0 0"/></joint>
-  <joint name="Z" type="prismatic"><parent link="trolley2"/><child link="mast"/><origin xyz="0 0 0" rpy="0.1 0 0"/><axis xyz="0 0 1"/>{LIMITS}</joint>
-  <joint name="Z2" type="prismatic"><parent link="mast"/><child link="mast2"/><origin xyz="0 0.1 0"/><axis xyz="0 0 1"/>{LIMITS}
+  <joint name="X" type="prismatic"><parent link="floor"/><child link="bridge"/>
+    <origin xyz="0 0 2" rpy="0.01 -0.02 0.03"/><axis xyz="1 0 0"/>{LIMITS}</joint>
+  <joint name="Y" type="prismatic"><parent link="bridge"/><child link="trolley"/>
+    <origin xyz="0.1 0 0" rpy="0 0 0.5"/><axis xyz="0 0.6 -0.8"/>{LIMITS}</joint>
+  <joint name="foot" type="fixed"><parent link="trolley"/><child link="trolley2"/>
+    <origin xyz="0.02 0.01 -0.3" rpy="3.1 0 0"/></joint>
+  <joint name="Z" type="prismatic"><parent link="trolley2"/><child link="mast"/>
+    <origin xyz="0 0 0" rpy="0.1 0 0"/><axis xyz="0 0 1"/>{LIMITS}</joint>
+  <joint name="Z2" type="prismatic"><parent link="mast"/><child link="mast2"/><origin xyz="0 0.1 0"/>
+    <axis xyz="0 0 1"/>{LIMITS}
     <mimic joint="Z" multiplier="0.5"/></joint>
-  <joint name="C" type="revolute"><parent link="mast2"/><child link="wrist"/><origin xyz="0.05 0 0.3" rpy="0.4 0.2 -1"/><axis xyz="0 0 1"/>{LIMITS}</joint>
-  <joint name="D" type="revolute"><parent link="wrist"/><child link="hand"/><origin xyz="0 0 0.2" rpy="1.57 0 0"/><axis xyz="0.28 0 0.96"/>{LIMITS}</joint>
-  <joint name="grip" type="fixed"><parent link="hand"/><child link="tcp"/><origin xyz="0.1 0.2 0.05" rpy="0 0.3 0"/></joint>
+  <joint name="C" type="revolute"><parent link="mast2"/><child link="wrist"/>
+    <origin xyz="0.05 0 0.3" rpy="0.4 0.2 -1"/><axis xyz="0 0 1"/>{LIMITS}</joint>
+  <joint name="D" type="revolute"><parent link="wrist"/><child link="hand"/>
+    <origin xyz="0 0 0.2" rpy="1.57 0 0"/><axis xyz="0.28 0 0.96"/>{LIMITS}</joint>
+  <joint name="grip" type="fixed"><parent link="hand"/><child link="tcp"/>
+    <origin xyz="0.1 0.2 0.05" rpy="0 0.3 0"/></joint>
 """,
 )
 

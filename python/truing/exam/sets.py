@@ -308,8 +308,6 @@ def _draw_name(rng: Generator, source: str, *, without: frozenset[str] = frozens
 def _places(name: str, scene: Scene) -> list[int]:
     """Joints at which an effect can sit on this robot."""
     chain = scene.chain
-    revolute = [j for j in chain.driven if not chain.prismatic[j]]
-    travel = {j: float(np.ptp(scene.context.motion[:, j])) for j in chain.driven}
     loop = scene.specimen.rod_arm > 0.0
     if name == "linkage":
         return [j for j in range(chain.joints) if j not in chain.driven] if loop else []
@@ -319,21 +317,28 @@ def _places(name: str, scene: Scene) -> list[int]:
         return [0]
     if name == "link_compliance":
         return [] if loop else _long_links(scene)
-    if name in ("thermal", "link_geometry"):
-        return [
-            j
-            for j in range(chain.joints)
-            if j in chain.driven and (name != "thermal" or np.abs(chain.links[j, :2]).max() > 0.1)
-        ]
+    if name == "link_geometry":
+        return [j for j in range(chain.joints) if j in chain.driven]
+    if name == "thermal":
+        long = np.abs(chain.links[:, :2]).max(axis=1) > 0.1
+        return [j for j in range(chain.joints) if j in chain.driven and long[j]]
     if name in ("harmonic", "axis_wobble", "transmission_error"):
-        return [
-            j for j in revolute if travel[j] > _TURN and not (loop and name == "axis_wobble" and j in (1, 2))
-        ]
+        closed = (1, 2) if loop and name == "axis_wobble" else ()
+        return [j for j in _turning(scene) if j not in closed]
     if name in ("gear_ratio", "backlash"):
         return list(chain.driven)
     if name in ("joint_compliance", "gravity_backlash", "windup"):
         return _loaded(scene, both_sides=name == "gravity_backlash")
-    return revolute
+    return _revolute(chain)
+
+
+def _revolute(chain: Chain) -> list[int]:
+    return [j for j in chain.driven if not chain.prismatic[j]]
+
+
+def _turning(scene: Scene) -> list[int]:
+    """Revolute joints that turn far enough for what changes with the angle."""
+    return [j for j in _revolute(scene.chain) if float(np.ptp(scene.context.motion[:, j])) > _TURN]
 
 
 def _loaded(scene: Scene, both_sides: bool) -> list[int]:

@@ -19,7 +19,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,51 +139,70 @@ def parse_board(text: str) -> Board:
 
     Raises InputError that says what was expected.
     """
+    try:
+        return _parsed_board(text)
+    except _NoBoard as error:
+        raise InputError(f"--board: found {text!r}: {error}; expected {_EXPECTED}") from None
 
-    def refuse(message: str) -> InputError:
-        return InputError(f"--board: found {text!r}: {message}; expected {_EXPECTED}")
 
+class _NoBoard(Exception):
+    """What is wrong with the name of a board."""
+
+
+def _parsed_board(text: str) -> Board:
     kind, *parts = (part.strip() for part in text.split(":"))
-    lengths = 2 if kind == "charuco" else 1
-    if kind not in ("chessboard", "charuco", "circles", "acircles"):
-        raise refuse(f"no kind of board is called {kind!r}")
+    if kind not in get_args(Kind):
+        raise _NoBoard(f"no kind of board is called {kind!r}")
+    charuco = kind == "charuco"
+    lengths = 2 if charuco else 1
     if len(parts) < 1 + lengths:
-        raise refuse("something is missing")
-    counts = re.fullmatch(r"([0-9]{1,4})\s*[xX×]\s*([0-9]{1,4})", parts[0])
-    if not counts:
-        raise refuse(f"{parts[0]!r} is no pair of numbers such as 9x6")
-    columns, rows = int(counts[1]), int(counts[2])
-    least = 2 if kind == "circles" else 3 if kind != "acircles" else 2
-    if min(columns, rows) < least or columns * rows > 20_000:
-        raise refuse(
-            f"a board of {columns} x {rows} {'squares' if kind == 'charuco' else 'points'}"
-            f" {'is too small' if min(columns, rows) < least else 'is too large'}"
-        )
-    sizes = []
-    for part in parts[1 : 1 + lengths]:
-        match = re.fullmatch(r"([0-9]+\.?[0-9]*|\.[0-9]+)\s*([a-z]*)", part)
-        if not match or match[2] not in _LENGTHS:
-            raise refuse(f"{part!r} is no length with its unit (m, cm, mm)")
-        sizes.append(float(match[1]) * _LENGTHS[match[2]])
-        if not 1e-4 <= sizes[-1] <= 10:
-            raise refuse(f"a distance of {sizes[-1]:g} m is not that of a board")
+        raise _NoBoard("something is missing")
+    columns, rows = _board_counts(kind, parts[0])
+    sizes = [_board_length(part) for part in parts[1 : 1 + lengths]]
     rest = parts[1 + lengths :]
-    dictionary = ""
-    if rest and kind == "charuco":
-        dictionary = rest.pop(0).upper().removeprefix("DICT_")
-        dictionary = next((name for name in _dictionaries() if name.upper() == dictionary), "")
-        if not dictionary:
-            raise refuse(f"there is no dictionary {parts[3]!r}; there are {', '.join(_dictionaries())}")
+    dictionary = _dictionary_name(rest.pop(0)) if rest and charuco else ""
     if rest:
-        raise refuse(f"{':'.join(rest)!r} is too much")
+        raise _NoBoard(f"{':'.join(rest)!r} is too much")
     if kind == "acircles" and rows % 2 == 0:
-        raise refuse(
+        raise _NoBoard(
             f"of a shifted grid with {rows} rows, an even number, OpenCV finds no order; use an odd number of"
             " rows"
         )
-    if kind == "charuco" and sizes[1] >= sizes[0]:
-        raise refuse("the marker is not smaller than its square")
-    return Board(kind, columns, rows, sizes[0], sizes[1] if kind == "charuco" else 0.0, dictionary)  # type: ignore[arg-type]
+    if charuco and sizes[1] >= sizes[0]:
+        raise _NoBoard("the marker is not smaller than its square")
+    return Board(cast(Kind, kind), columns, rows, sizes[0], sizes[1] if charuco else 0.0, dictionary)
+
+
+def _board_counts(kind: str, text: str) -> tuple[int, int]:
+    counts = re.fullmatch(r"([0-9]{1,4})\s*[xX×]\s*([0-9]{1,4})", text)
+    if not counts:
+        raise _NoBoard(f"{text!r} is no pair of numbers such as 9x6")
+    columns, rows = int(counts[1]), int(counts[2])
+    too_small = min(columns, rows) < (2 if kind in ("circles", "acircles") else 3)
+    if too_small or columns * rows > 20_000:
+        raise _NoBoard(
+            f"a board of {columns} x {rows} {'squares' if kind == 'charuco' else 'points'}"
+            f" {'is too small' if too_small else 'is too large'}"
+        )
+    return columns, rows
+
+
+def _board_length(text: str) -> float:
+    match = re.fullmatch(r"([0-9]+\.?[0-9]*|\.[0-9]+)\s*([a-z]*)", text)
+    if not match or match[2] not in _LENGTHS:
+        raise _NoBoard(f"{text!r} is no length with its unit (m, cm, mm)")
+    length = float(match[1]) * _LENGTHS[match[2]]
+    if not 1e-4 <= length <= 10:
+        raise _NoBoard(f"a distance of {length:g} m is not that of a board")
+    return length
+
+
+def _dictionary_name(text: str) -> str:
+    wanted = text.upper().removeprefix("DICT_")
+    for name in _dictionaries():
+        if name.upper() == wanted:
+            return name
+    raise _NoBoard(f"there is no dictionary {text!r}; there are {', '.join(_dictionaries())}")
 
 
 def _dictionaries() -> list[str]:
@@ -260,7 +279,6 @@ def find_board(
     when images differ in size, when the camera is not theirs, or OpenCV is not there.
     """
     cv = _opencv()
-    board = parse_board(board) if isinstance(board, str) else board
     called = (
         [str(name) for name in names]
         if names is not None
@@ -268,46 +286,20 @@ def find_board(
             str(image) if isinstance(image, (str, Path)) else f"image {k}" for k, image in enumerate(images)
         ]
     )
-    total = len(images)
-    size: tuple[int, int] | None = None
-    finder: _Finder | None = None if board.kind == "charuco" else _Finder(cv, board)
-    undecided: list[int] = []
-    seen: dict[int, tuple[Floats, Floats]] = {}
+    search = _Search(cv, parse_board(board) if isinstance(board, str) else board, called, camera, where)
     if progress is not None:
-        progress(0, total)
+        progress(0, len(images))
     for number, image in enumerate(images):
-        grey = _grey(cv, image, called[number])
-        shape = (grey.shape[1], grey.shape[0])
-        if size is None:
-            size = shape
-            _check_size(camera, size, called[number], where)
-        elif size != shape:
-            raise InputError(
-                f"{called[number]}: has {shape[0]} x {shape[1]} pixels, but {called[0]} has {size[0]} x"
-                f" {size[1]}: expected images of one camera, all of one size"
-            )
-        if finder is None:
-            finder = _charuco_finder(cv, board, grey)
-            if finder is None:
-                undecided.append(number)
-        if finder is not None:
-            hit = finder(grey)
-            if hit is not None:
-                seen[number] = hit
+        search.look(number, image)
         if progress is not None:
-            progress(number + 1, total)
-    if finder is not None:
-        board = finder.board
-        for number in undecided:  # before it was known which dictionary this is
-            hit = finder(_grey(cv, images[number], called[number]))
-            if hit is not None:
-                seen[number] = hit
-    assert size is not None or total == 0
+            progress(number + 1, len(images))
+    search.look_again(images)
+    board, seen = search.board, search.seen
     found = sorted(seen)
-    missing = [number for number in range(total) if number not in seen]
+    missing = [number for number in range(len(images)) if number not in seen]
     if len(found) < _FEWEST_VIEWS:
         _refuse_too_few(cv, images, called, board, found, missing)
-    assert size is not None
+    assert search.size is not None
     points, pixels = [seen[number][0] for number in found], [seen[number][1] for number in found]
     larger = _larger_board(cv, [images[number] for number in found[:2]], board)
     if larger is not None:
@@ -315,7 +307,56 @@ def find_board(
             f"the board in the images is larger than {board}: {larger} is found as well, and of {board}"
             f" nobody knows which part; say --board {larger}"
         )
-    return _with_poses(cv, board, images, called, found, missing, points, pixels, size, camera, where)
+    return _with_poses(cv, board, images, called, found, missing, points, pixels, search.size, camera, where)
+
+
+class _Search:
+    """Looks for a board in one image after the other. The first that shows a ChArUco board settles which
+    dictionary it has.
+    """
+
+    def __init__(
+        self, cv: Any, board: Board, called: Sequence[str], camera: Camera | None, where: str
+    ) -> None:
+        self.board = board
+        self.size: tuple[int, int] | None = None  # of every image [px]
+        self.seen: dict[int, tuple[Floats, Floats]] = {}  # points and pixels, by the image's number
+        self._cv, self._called, self._camera, self._where = cv, called, camera, where
+        self._finder: _Finder | None = None if board.kind == "charuco" else _Finder(cv, board)
+        self._undecided: list[int] = []  # images that were looked at before the dictionary was known
+
+    def look(self, number: int, image: Path | str | Image) -> None:
+        grey = _grey(self._cv, image, self._called[number])
+        self._check_size(number, (grey.shape[1], grey.shape[0]))
+        if self._finder is None:
+            self._finder = _charuco_finder(self._cv, self.board, grey)
+            if self._finder is None:
+                self._undecided.append(number)
+                return
+            self.board = self._finder.board
+        self._find(number, grey)
+
+    def look_again(self, images: Sequence[Path | str | Image]) -> None:
+        """At the images that were seen before the dictionary was known."""
+        if self._finder is not None:
+            for number in self._undecided:
+                self._find(number, _grey(self._cv, images[number], self._called[number]))
+
+    def _find(self, number: int, grey: Image) -> None:
+        assert self._finder is not None
+        hit = self._finder(grey)
+        if hit is not None:
+            self.seen[number] = hit
+
+    def _check_size(self, number: int, size: tuple[int, int]) -> None:
+        if self.size is None:
+            self.size = size
+            _check_size(self._camera, size, self._called[number], self._where)
+        elif self.size != size:
+            raise InputError(
+                f"{self._called[number]}: has {size[0]} x {size[1]} pixels, but {self._called[0]} has"
+                f" {self.size[0]} x {self.size[1]}: expected images of one camera, all of one size"
+            )
 
 
 def _grey(cv: Any, image: Path | str | Image, name: str) -> Image:

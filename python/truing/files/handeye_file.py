@@ -490,84 +490,29 @@ def load_handeye(
     parsed = parse_board(board) if isinstance(board, str) else board
     kind = plan.require_whole("hand")
     use_images = "image" in plan.labels and (parsed is not None or not plan.has("board"))
-    if not use_images and not plan.has("board"):
-        table.refuse(
-            "there is nothing that the camera saw: expected the columns board_x_m … board_qz (board in the"
-            f" camera), or image; the columns are {listed(table.names)}"
-        )
-    if use_images and parsed is None:
-        table.refuse(
-            "the column image needs to know what is in the images: say it with --board (in Python: board=…),"
-            " such as chessboard:9x6:25mm (inner corners), charuco:5x7:40mm:30mm or circles:10x10:25.4mm",
-            column="image",
-        )
-    if not use_images and parsed is not None:
-        table.refuse("a board was named, but there is no column image; the board poses of the file need none")
+    _require_a_board(table, plan, parsed, use_images)
     board_kind = "" if use_images else plan.require_whole("board")
     table.read(plan.numbers, plan.labels)
     _check_count(table, table.rows)
     reader = _Reader(table, plan, angles)
     hand = reader.frames("hand", kind)
     sets, joints = reader.sets(), reader.joints()
-    streams = "board_t_s" in plan.times
-    if streams and "t_s" not in plan.times:
-        table.refuse(
-            "there is no column t_s: board_t_s is the camera's time, and needs the robot's beside it",
-            column="board_t_s",
-        )
-    time, board_time = reader.times("t_s", increasing=streams), reader.times("board_t_s", increasing=True)
-    views: BoardViews | None = None
-    symmetries: Sequence[Floats] = ()
-    images: list[str] = []
-    unused: list[str] = []
-    if use_images:
-        images, paths = reader.images(table.path.parent)
-        assert parsed is not None
-        given = load_camera(camera) if camera is not None and not isinstance(camera, _core.Camera) else camera
-        views = find_board(
-            paths,
-            parsed,
-            camera=given,
-            names=images,
-            progress=progress,
-            where=str(camera) if camera is not None and given is not camera else "",
-        )
-        rows = np.asarray(views.found, dtype=np.intp)
-        unused = [f"the board was not found in {images[row]}" for row in views.missing]
-        if unused:
-            which = listed([images[row] for row in views.missing], 12)
-            warnings.warn(
-                InputWarning(
-                    f"{table.path}: the board was not found in {len(unused)} of {len(images)} images, which"
-                    f" are left out: {which}"
-                ),
-                stacklevel=2,
-            )
-        seen = views.T_camera_board
-        symmetries = parsed.symmetries()
-    else:
-        seen = reader.frames("board", board_kind, gaps=True)
-        rows = np.flatnonzero(np.isfinite(seen[:, 0, 0]))
-        seen = seen[rows]
-        absent = np.setdiff1d(np.arange(table.rows), rows)
-        if absent.size:
-            unused = [f"row {row} (from 0) has no board pose" for row in absent]
-            warnings.warn(
-                InputWarning(
-                    f"{table.path}: {absent.size} of {table.rows} rows have no board pose and are left out:"
-                    f" {listed([str(r) for r in absent], 12)} (from 0)"
-                ),
-                stacklevel=2,
-            )
+    time, board_time = _two_times(table, plan, reader)
+    seen = (
+        _seen_in_images(table, reader, parsed, camera, progress)
+        if use_images and parsed is not None
+        else _seen_in_file(table, reader, board_kind)
+    )
+    rows, views = seen.rows, seen.views
     _check_count(table, len(rows), "with a board")
-    _check_poses(table, hand[rows], seen, views is not None)
+    _check_poses(table, hand[rows], seen.T_camera_board, views is not None)
     poses = _core.HandEyePoses(
         hand[rows],
-        seen,
+        seen.T_camera_board,
         images=None if views is None else list(zip(views.points, views.pixels, strict=True)),
         camera=None if views is None else views.camera,
         set=None if sets is None else sets[rows],
-        board_symmetries=list(symmetries),
+        board_symmetries=[] if views is None or parsed is None else list(parsed.symmetries()),
     )
     return HandEyeData(
         path=table.path,
@@ -576,13 +521,97 @@ def load_handeye(
         time=None if time is None else time[rows],
         board_time=None if board_time is None else board_time[rows],
         joints=None if joints is None else joints[rows],
-        images=tuple(images[row] for row in rows) if views is not None else (),
+        images=tuple(seen.images[row] for row in rows) if views is not None else (),
         views=views,
         board=parsed if views is not None else None,
         camera_given=views is None or camera is not None,
-        unused=tuple(unused),
+        unused=tuple(seen.unused),
         convention=(angles or "") if "angles" in (kind, board_kind) else "quaternion",
     )
+
+
+def _require_a_board(table: Table, plan: _Plan, board: Board | None, use_images: bool) -> None:
+    """The camera saw something, and what it saw is known."""
+    if not use_images and not plan.has("board"):
+        table.refuse(
+            "there is nothing that the camera saw: expected the columns board_x_m … board_qz (board in the"
+            f" camera), or image; the columns are {listed(table.names)}"
+        )
+    if use_images and board is None:
+        table.refuse(
+            "the column image needs to know what is in the images: say it with --board (in Python: board=…),"
+            " such as chessboard:9x6:25mm (inner corners), charuco:5x7:40mm:30mm or circles:10x10:25.4mm",
+            column="image",
+        )
+    if not use_images and board is not None:
+        table.refuse("a board was named, but there is no column image; the board poses of the file need none")
+
+
+def _two_times(table: Table, plan: _Plan, reader: _Reader) -> tuple[Floats | None, Floats | None]:
+    """Times of hand and board."""
+    streams = "board_t_s" in plan.times
+    if streams and "t_s" not in plan.times:
+        table.refuse(
+            "there is no column t_s: board_t_s is the camera's time, and needs the robot's beside it",
+            column="board_t_s",
+        )
+    return reader.times("t_s", increasing=streams), reader.times("board_t_s", increasing=True)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What the camera saw."""
+
+    rows: NDArray[np.intp]  # with a board, shape=(m,)
+    T_camera_board: Floats  # shape=(m, 4, 4)
+    unused: list[str]  # rows without one, in words
+    images: Sequence[str] = ()  # one per row of the file
+    views: BoardViews | None = None
+
+
+def _seen_in_images(
+    table: Table,
+    reader: _Reader,
+    board: Board,
+    camera: PathLike | _core.Camera | None,
+    progress: Callable[[int, int], None] | None,
+) -> _Seen:
+    images, paths = reader.images(table.path.parent)
+    given = load_camera(camera) if camera is not None and not isinstance(camera, _core.Camera) else camera
+    views = find_board(
+        paths,
+        board,
+        camera=given,
+        names=images,
+        progress=progress,
+        where=str(camera) if camera is not None and given is not camera else "",
+    )
+    if views.missing:
+        which = listed([images[row] for row in views.missing], 12)
+        warnings.warn(
+            InputWarning(
+                f"{table.path}: the board was not found in {len(views.missing)} of {len(images)} images,"
+                f" which are left out: {which}"
+            ),
+            stacklevel=3,
+        )
+    unused = [f"the board was not found in {images[row]}" for row in views.missing]
+    return _Seen(np.asarray(views.found, dtype=np.intp), views.T_camera_board, unused, images, views)
+
+
+def _seen_in_file(table: Table, reader: _Reader, kind: str) -> _Seen:
+    seen = reader.frames("board", kind, gaps=True)
+    rows = np.flatnonzero(np.isfinite(seen[:, 0, 0]))
+    absent = np.setdiff1d(np.arange(table.rows), rows)
+    if absent.size:
+        warnings.warn(
+            InputWarning(
+                f"{table.path}: {absent.size} of {table.rows} rows have no board pose and are left out:"
+                f" {listed([str(r) for r in absent], 12)} (from 0)"
+            ),
+            stacklevel=3,
+        )
+    return _Seen(rows, seen[rows], [f"row {row} (from 0) has no board pose" for row in absent])
 
 
 def load_stream(path: PathLike, side: Literal["hand", "board"], *, angles: str | None = None) -> Stream:

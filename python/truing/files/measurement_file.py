@@ -61,6 +61,9 @@ class _Source:
     unit: str = ""
 
 
+_MEASURED = ("x", "dist", "fixed_point")  # roles of which a row needs one
+
+
 class _Plan:
     """Which column of the file is what. Refuses names that are almost right."""
 
@@ -207,70 +210,22 @@ def load_measurements(
     """
     table = Table(Path(path))
     plan = _Plan(table, robot)
-    reader = _Reader(table, plan)
-    positions, orientations, distance, fixed_points = ("x",), ("qw",), ("dist",), ("fixed_point",)
-    if not joints_only and not any(plan.has(roles) for roles in (positions, distance, fixed_points)):
+    if not joints_only and not any(plan.has([role]) for role in _MEASURED):
         table.refuse(
             "nothing is measured: expected the columns x_m y_m z_m, or dist_m, or fixed_point; "
             f"the columns are {listed(table.names)}"
         )
     table.read(plan.numbers, plan.labels)
-
-    numbers = range(1, len(plan.joints) + 1)
-    joints = [reader.values(f"q{number}") for number in numbers]
+    reader = _Reader(table, plan)
+    joints = [reader.values(f"q{number}") for number in range(1, len(plan.joints) + 1)]
     columns: dict[str, Any] = {"joints": joints}
-    if plan.has(positions):
-        columns["positions"] = reader.positions()
-    if plan.has(orientations):
-        columns["orientations"] = reader.orientations(columns["positions"])
-    if plan.has(distance):
-        columns["distances"] = reader.values("dist", gaps=True)
-    if plan.has(fixed_points):
-        codes, names = table.labels("fixed_point")
-        if names:
-            columns["fixed_points"], columns["fixed_point_names"] = codes, names
+    columns |= reader.measured()
     if not joints_only:
         reader.require_a_measurement_in_every_row(columns)
-
-    targets = reader.targets(robot)
-    if targets is not None:
-        columns["targets"] = targets
-    if plan.has(["dir1"]):
-        columns["directions"] = [reader.directions(number) for number in numbers]
-    for role, keyword in (("payload", "payload"), ("temp", "temperature"), ("t", "time")):
-        if plan.has([role]):
-            columns[keyword] = reader.values(role)
-    if "payload" in columns:
-        reader.require("payload", columns["payload"] >= 0.0, "a mass of zero or more")
-    for role, keyword in (
-        ("sigma m", "position_sigma"),
-        ("sigma rad", "rotation_sigma"),
-        ("weight", "weight"),
-    ):
-        if plan.has([role]):
-            columns[keyword] = reader.values(role)
-    for role, keyword in (("sigma m", "position_sigma"), ("sigma rad", "rotation_sigma")):
-        if keyword in columns:
-            reader.require(role, columns[keyword] > 0.0, "a standard deviation above zero")
-    if "weight" in columns:
-        reader.require("weight", columns["weight"] >= 0.0, "a weight of zero or more")
-    if plan.has(["pose"]):
-        columns["pose"] = reader.poses()
-    if set_column and plan.has(["set"]):
-        columns["set"] = reader.sets()
-
-    speeds = [
-        f"qd{number}_{'rad_s' if joint.type == 'revolute' else 'm_s'}"
-        for number, joint in enumerate(plan.joints, 1)
-    ]
-    speeds_known = all(speed in plan.covariates for speed in speeds)
-    covariates = {
-        name: reader.column(source, any_value=not (speeds_known and name in speeds))
-        for name, source in plan.covariates.items()
-    }
-    columns["covariates"] = covariates
-    if speeds_known:
-        columns["joint_speeds"] = [covariates[speed] for speed in speeds]
+    columns |= reader.circumstances(robot)
+    columns |= reader.reliability()
+    columns |= reader.groups(set_column)
+    columns |= reader.other_columns()
 
     units = {role: source.unit for role, source in plan.known.items()}
     check_units_look_right(table, robot, plan.joints, units, columns)
@@ -287,6 +242,74 @@ class _Reader:
     def __init__(self, table: Table, plan: _Plan) -> None:
         self.table = table
         self.plan = plan
+
+    def measured(self) -> dict[str, Any]:
+        """Positions, orientations, distances, fixed points, as far as the file has them."""
+        columns: dict[str, Any] = {}
+        if self.plan.has(["x"]):
+            columns["positions"] = self.positions()
+        if self.plan.has(["qw"]):
+            columns["orientations"] = self.orientations(columns["positions"])
+        if self.plan.has(["dist"]):
+            columns["distances"] = self.values("dist", gaps=True)
+        if self.plan.has(["fixed_point"]):
+            codes, names = self.table.labels("fixed_point")
+            if names:
+                columns |= {"fixed_points": codes, "fixed_point_names": names}
+        return columns
+
+    def circumstances(self, robot: _core.Robot) -> dict[str, Any]:
+        """Targets, approach directions, payload, temperature, time."""
+        columns: dict[str, Any] = {}
+        targets = self.targets(robot)
+        if targets is not None:
+            columns["targets"] = targets
+        if self.plan.has(["dir1"]):
+            columns["directions"] = [self.directions(k) for k in range(1, len(self.plan.joints) + 1)]
+        for role, keyword in (("payload", "payload"), ("temp", "temperature"), ("t", "time")):
+            if self.plan.has([role]):
+                columns[keyword] = self.values(role)
+        if "payload" in columns:
+            self.require("payload", columns["payload"] >= 0.0, "a mass of zero or more")
+        return columns
+
+    def reliability(self) -> dict[str, Any]:
+        """Standard deviations and weights of rows."""
+        roles = {"sigma m": "position_sigma", "sigma rad": "rotation_sigma", "weight": "weight"}
+        columns = {keyword: self.values(role) for role, keyword in roles.items() if self.plan.has([role])}
+        for role, keyword in roles.items():
+            if keyword not in columns:
+                continue
+            if role == "weight":
+                self.require(role, columns[keyword] >= 0.0, "a weight of zero or more")
+            else:
+                self.require(role, columns[keyword] > 0.0, "a standard deviation above zero")
+        return columns
+
+    def groups(self, set_column: bool) -> dict[str, Any]:
+        """Which rows are one pose, and which are held out."""
+        columns: dict[str, Any] = {}
+        if self.plan.has(["pose"]):
+            columns["pose"] = self.poses()
+        if set_column and self.plan.has(["set"]):
+            columns["set"] = self.sets()
+        return columns
+
+    def other_columns(self) -> dict[str, Any]:
+        """Covariates, and the joint speeds if all of them are there."""
+        speeds = [
+            f"qd{number}_{'rad_s' if joint.type == 'revolute' else 'm_s'}"
+            for number, joint in enumerate(self.plan.joints, 1)
+        ]
+        known = all(speed in self.plan.covariates for speed in speeds)
+        covariates = {
+            name: self.column(source, any_value=not (known and name in speeds))
+            for name, source in self.plan.covariates.items()
+        }
+        columns: dict[str, Any] = {"covariates": covariates}
+        if known:
+            columns["joint_speeds"] = [covariates[speed] for speed in speeds]
+        return columns
 
     def name(self, role: str) -> str:
         return self.plan.known[role].column
@@ -441,41 +464,15 @@ def save_measurements(
     units = units or Units()
     joints = [robot.joints[index] for index in robot.driven_joints()]
     columns: dict[str, Any] = {}
-
-    def add(stem: str, values: Any, unit: str = "") -> None:
-        columns[f"{stem}_{unit}" if unit else stem] = _from_si(np.asarray(values), unit)
-
     if data.pose is not None:
         columns["pose"] = data.pose
     for number, (joint, values) in enumerate(zip(joints, data.joints.T, strict=True), 1):
-        add(f"q{number}", values, units.angle if joint.type == "revolute" else units.length)
-    if data.targets is not None:
-        names = [target.name for target in robot.targets]
-        columns["target"] = [names[index] for index in data.targets]
-    if data.positions is not None:
-        for role, values in zip(_POSITION, data.positions.T, strict=True):
-            add(role, values, units.length)
-    if data.orientations is not None:
-        for role, values in zip(_ORIENTATION, data.orientations.T, strict=True):
-            add(role, values)
-    if data.distances is not None:
-        add("dist", data.distances, units.length)
-    if data.fixed_points is not None:
-        points = [*data.fixed_point_names, None]  # -1: none
-        columns["fixed_point"] = [points[index] for index in data.fixed_points]
-    if data.directions is not None:
-        for number, values in enumerate(data.directions.T, 1):
-            columns[f"dir{number}"] = values.astype(np.int8)
-    for stem, values, unit in (
-        ("payload", data.payload, "kg"),
-        ("temp", data.temperature, "C"),
-        ("t", data.time, "s"),
-        ("sigma", data.position_sigma, units.length),
-        ("sigma", data.rotation_sigma, units.angle),
-        ("weight", data.weight, ""),
-    ):
-        if values is not None:
-            add(stem, values, unit)
+        name, column = _with_unit(
+            f"q{number}", values, units.angle if joint.type == "revolute" else units.length
+        )
+        columns[name] = column
+    columns |= _measured_columns(data, robot, units)
+    columns |= _circumstance_columns(data, units)
     if data.joint_speeds is not None:
         for number, (joint, values) in enumerate(zip(joints, data.joint_speeds.T, strict=True), 1):
             columns[f"qd{number}_{'rad_s' if joint.type == 'revolute' else 'm_s'}"] = values
@@ -488,6 +485,50 @@ def save_measurements(
     if data.set is not None:
         columns["set"] = [_SETS[index] for index in data.set]
     write_table(path, columns)
+
+
+def _with_unit(stem: str, values: Any, unit: str = "") -> tuple[str, Any]:
+    """Name and values of a column in this unit, from SI."""
+    return f"{stem}_{unit}" if unit else stem, _from_si(np.asarray(values), unit)
+
+
+def _measured_columns(data: _core.Measurements, robot: _core.Robot, units: Units) -> dict[str, Any]:
+    columns: dict[str, Any] = {}
+    if data.targets is not None:
+        names = [target.name for target in robot.targets]
+        columns["target"] = [names[index] for index in data.targets]
+    if data.positions is not None:
+        columns.update(
+            _with_unit(role, values, units.length)
+            for role, values in zip(_POSITION, data.positions.T, strict=True)
+        )
+    if data.orientations is not None:
+        columns.update(
+            _with_unit(role, values) for role, values in zip(_ORIENTATION, data.orientations.T, strict=True)
+        )
+    if data.distances is not None:
+        columns.update([_with_unit("dist", data.distances, units.length)])
+    if data.fixed_points is not None:
+        points = [*data.fixed_point_names, None]  # -1: none
+        columns["fixed_point"] = [points[index] for index in data.fixed_points]
+    return columns
+
+
+def _circumstance_columns(data: _core.Measurements, units: Units) -> dict[str, Any]:
+    columns: dict[str, Any] = {}
+    if data.directions is not None:
+        for number, values in enumerate(data.directions.T, 1):
+            columns[f"dir{number}"] = values.astype(np.int8)
+    known = (
+        ("payload", data.payload, "kg"),
+        ("temp", data.temperature, "C"),
+        ("t", data.time, "s"),
+        ("sigma", data.position_sigma, units.length),
+        ("sigma", data.rotation_sigma, units.angle),
+        ("weight", data.weight, ""),
+    )
+    columns.update(_with_unit(stem, values, unit) for stem, values, unit in known if values is not None)
+    return columns
 
 
 def _from_si(values: Any, unit: str) -> Any:

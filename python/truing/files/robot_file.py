@@ -341,57 +341,70 @@ def _frames(model: _LinkTable | _UrdfChain) -> Iterator[tuple[Loc, _Frame]]:
 
 
 def _check_units_look_right(document: Document, model: _LinkTable | _UrdfChain) -> None:
-    angles = [(loc, float(value)) for loc, value in _angles(model)]
-    lengths = [(loc, float(value)) for loc, value in _lengths(model)]
-
     if model.units.angle == "rad":
-        for loc, value in angles:
-            if abs(value) > 2 * math.pi + 0.1:
-                document.refuse(
-                    loc,
-                    f"{value:g} looks like degrees, but units says `angle: rad` and a link angle stays within"
-                    " one turn: change units to `angle: deg`, or this value",
-                )
-        for i, joint in enumerate(model.joints):
-            for limit in (joint.limits or ()) if joint.type == "revolute" else ():
-                if limit is not None and abs(limit) > 100:
-                    document.refuse(
-                        ("joints", i, "limits"),
-                        f"{float(limit):g} looks like degrees, but units says `angle: rad`: "
-                        "change units to `angle: deg`, or these limits",
-                    )
+        _refuse_degrees(document, model)
     else:
-        # Twists are multiples of a quarter turn on nearly every robot: 1.5708 and 3.1416 give radians away.
-        twists = [
-            (loc, value)
-            for loc, value in angles
-            if loc[-1] in ("alpha", "rpy") and loc[0] == "joints" and value != 0.0
-        ]
-        quarters = [abs(value) / (math.pi / 2) for _, value in twists]
-        if quarters and all(quarter < 2.002 and abs(quarter - round(quarter)) < 1e-3 for quarter in quarters):
-            loc, value = twists[0]
+        _refuse_radians(document, model)
+    if model.units.length == "m":
+        _refuse_millimetres(document, model)
+    else:
+        _refuse_metres(document, model)
+
+
+def _refuse_degrees(document: Document, model: _LinkTable | _UrdfChain) -> None:
+    for loc, value in _angles(model):
+        if abs(float(value)) > 2 * math.pi + 0.1:
             document.refuse(
                 loc,
-                f"{value:g} looks like radians (every {loc[-1]} of the file is 0 or a multiple of pi/2), but"
-                " units says `angle: deg`: change units to `angle: rad`, or the angles",
+                f"{float(value):g} looks like degrees, but units says `angle: rad` and a link angle stays"
+                " within one turn: change units to `angle: deg`, or this value",
+            )
+    for i, joint in enumerate(model.joints):
+        limits = (joint.limits or ()) if joint.type == "revolute" else ()
+        for limit in limits:
+            if limit is not None and abs(limit) > 100:
+                document.refuse(
+                    ("joints", i, "limits"),
+                    f"{float(limit):g} looks like degrees, but units says `angle: rad`: "
+                    "change units to `angle: deg`, or these limits",
+                )
+
+
+def _refuse_radians(document: Document, model: _LinkTable | _UrdfChain) -> None:
+    # Twists are multiples of a quarter turn on nearly every robot: 1.5708 and 3.1416 give radians away.
+    twists = [
+        (loc, float(value))
+        for loc, value in _angles(model)
+        if loc[-1] in ("alpha", "rpy") and loc[0] == "joints" and float(value) != 0.0
+    ]
+    quarters = [abs(value) / (math.pi / 2) for _, value in twists]
+    if quarters and all(quarter < 2.002 and abs(quarter - round(quarter)) < 1e-3 for quarter in quarters):
+        loc, value = twists[0]
+        document.refuse(
+            loc,
+            f"{value:g} looks like radians (every {loc[-1]} of the file is 0 or a multiple of pi/2), but"
+            " units says `angle: deg`: change units to `angle: rad`, or the angles",
+        )
+
+
+def _refuse_millimetres(document: Document, model: _LinkTable | _UrdfChain) -> None:
+    for loc, value in _lengths(model):
+        if abs(float(value)) > 50:
+            document.refuse(
+                loc,
+                f"{float(value):g} looks like millimetres, but units says `length: m` and no link is that"
+                " long: change units to `length: mm`, or this value",
             )
 
-    if model.units.length == "m":
-        for loc, value in lengths:
-            if abs(value) > 50:
-                document.refuse(
-                    loc,
-                    f"{value:g} looks like millimetres, but units says `length: m` and no link is that long: "
-                    "change units to `length: mm`, or this value",
-                )
-    else:
-        reach = sum(abs(value) for loc, value in lengths)
-        if 0.0 < reach < 8.0 and len(model.joints) > 2:
-            document.refuse(
-                ("units",),
-                f"all lengths of the robot add up to {reach:g} mm, which looks like metres: change units to "
-                "`length: m`, or the lengths",
-            )
+
+def _refuse_metres(document: Document, model: _LinkTable | _UrdfChain) -> None:
+    reach = sum(abs(float(value)) for _, value in _lengths(model))
+    if 0.0 < reach < 8.0 and len(model.joints) > 2:
+        document.refuse(
+            ("units",),
+            f"all lengths of the robot add up to {reach:g} mm, which looks like metres: change units to "
+            "`length: m`, or the lengths",
+        )
 
 
 # ---- File to robot -------------------------------------------------------------------------------

@@ -85,9 +85,8 @@ def camera_model_dict(camera: _core.Camera, sigma: Sequence[float] = ()) -> dict
 
 def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
     """What ``result.json`` of ``truing handeye`` holds. Without status "done" there is no camera in it."""
-    data, options, r = solved.data, solved.options, solved.result
-    eye_in_hand = options.setup == "eye-in-hand"
-    parents = ("hand", "base") if eye_in_hand else ("base", "hand")
+    data, options, r, k = solved.data, solved.options, solved.result, solved.kinematics
+    residuals = list(r.residuals if k is None else k.residuals)
     found: dict[str, Any] = {
         "format": HANDEYE_FORMAT,
         "version": _core.version(),
@@ -97,25 +96,65 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
         "message": r.message,
         "poses": data.count,
     }
-    camera, board = (
-        (r.camera, r.board)
-        if solved.kinematics is None
-        else (solved.kinematics.camera, solved.kinematics.board)
-    )
     if r.status == "done":
-        found["camera"] = _uncertain(camera, parents[0])
-        found["board"] = _uncertain(board, parents[1])
-        found["covariance"] = {"of": list(MOTIONS), "camera": camera.covariance, "board": board.covariance}
-        found["working_point"] = _working_point(solved)
-    k = solved.kinematics
-    residuals = list(r.residuals if k is None else k.residuals)
+        found |= _frames(solved)
     found["residuals"] = [_residual(solved, row, residual) for row, residual in enumerate(residuals)]
     found["rejected_poses"] = [
         {"pose": int(data.rows[row]), **_image(data, row), "cause": residual.cause}
         for row, residual in enumerate(residuals)
         if residual.rejected
     ]
-    found["observability"] = {
+    found["observability"] = _observability(r)
+    found["convention"] = _convention(solved)
+    if residuals or k is not None:
+        found |= _noise_and_errors(solved)
+    if r.status == "done" and k is None:
+        found["board_scale"] = {"value": r.board_scale, "sigma": r.board_scale_sigma}
+    if r.symmetry and any(r.symmetry):
+        turned = [int(data.rows[row]) for row, turn in enumerate(r.symmetry) if turn]
+        found["board_turned"] = {"poses": turned}
+    if data.views is not None:
+        found["images"] = _images(solved)
+    found["next_poses"] = [
+        {**frame_dict(p.T_base_hand), "working_point_sigma_m": p.working_point_sigma}
+        for p in solved.next_poses
+    ]
+    if solved.clock is not None:
+        found["clock"] = _clock(solved.clock)
+    if k is not None:
+        found["kinematics"] = _kinematics(k)
+    if r.solver.name:
+        found["solver"] = {
+            "name": r.solver.name,
+            "iterations": r.solver.iterations,
+            "converged": r.solver.converged,
+            "stopped_because": r.solver.stopped_because,
+        }
+    found["seed"] = solved.seed
+    found["warnings"] = [*warnings, *(r.warnings if k is None else k.identification.warnings)]
+    return found
+
+
+def _frames(solved: Solved) -> dict[str, Any]:
+    """Camera and board with their covariances, and the error at the working point."""
+    both: _core.HandEyeResult | _core.HandEyeKinematics = (
+        solved.result if solved.kinematics is None else solved.kinematics
+    )
+    camera_in, board_in = ("hand", "base") if solved.options.setup == "eye-in-hand" else ("base", "hand")
+    return {
+        "camera": _uncertain(both.camera, camera_in),
+        "board": _uncertain(both.board, board_in),
+        "covariance": {
+            "of": list(MOTIONS),
+            "camera": both.camera.covariance,
+            "board": both.board.covariance,
+        },
+        "working_point": _working_point(solved),
+    }
+
+
+def _observability(r: _core.HandEyeResult) -> dict[str, Any]:
+    return {
         "singular_values": r.singular_values,
         "gap": r.singular_gap,
         "axes_spread": r.axes_spread,
@@ -130,50 +169,27 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
             for u in r.unobservable
         ],
     }
-    found["convention"] = _convention(solved)
+
+
+def _noise_and_errors(solved: Solved) -> dict[str, Any]:
+    r, k = solved.result, solved.kinematics
     if k is not None:  # what belongs to the robot as it was is left out
-        n = {
+        noise: dict[str, Any] = {
             "position_m": k.identification.noise_sigma,
             "hand_rad": k.identification.rotation_noise_sigma,
             "camera_rad": None,
             "pixel": None,
             "estimated": True,
         }
-        found["noise"] = n
-        found["errors"] = _known({"train": k.train_after, "test": k.test_after})
-    elif residuals:
-        found["noise"] = {
-            "position_m": r.noise.position,
-            "hand_rad": r.noise.hand_rotation,
-            "camera_rad": r.noise.camera_rotation,
-            "pixel": r.noise.pixel,
-            "estimated": r.noise.estimated or not _noise_is_given(options),
-        }
-        found["errors"] = _known({"train": r.train, "left_out": r.left_out, "test": r.test})
-    if r.status == "done" and k is None:
-        found["board_scale"] = {"value": r.board_scale, "sigma": r.board_scale_sigma}
-    if r.symmetry and any(r.symmetry):
-        found["board_turned"] = {"poses": [int(data.rows[k]) for k, turn in enumerate(r.symmetry) if turn]}
-    if data.views is not None:
-        found["images"] = _images(solved)
-    found["next_poses"] = [
-        {**frame_dict(p.T_base_hand), "working_point_sigma_m": p.working_point_sigma}
-        for p in solved.next_poses
-    ]
-    if solved.clock is not None:
-        found["clock"] = _clock(solved.clock)
-    if solved.kinematics is not None:
-        found["kinematics"] = _kinematics(solved.kinematics)
-    if r.solver.name:
-        found["solver"] = {
-            "name": r.solver.name,
-            "iterations": r.solver.iterations,
-            "converged": r.solver.converged,
-            "stopped_because": r.solver.stopped_because,
-        }
-    found["seed"] = solved.seed
-    found["warnings"] = [*warnings, *(r.warnings if k is None else k.identification.warnings)]
-    return found
+        return {"noise": noise, "errors": _known({"train": k.train_after, "test": k.test_after})}
+    noise = {
+        "position_m": r.noise.position,
+        "hand_rad": r.noise.hand_rotation,
+        "camera_rad": r.noise.camera_rotation,
+        "pixel": r.noise.pixel,
+        "estimated": r.noise.estimated or not _noise_is_given(solved.options),
+    }
+    return {"noise": noise, "errors": _known({"train": r.train, "left_out": r.left_out, "test": r.test})}
 
 
 def _clock(c: _core.ClockOffset) -> dict[str, Any]:

@@ -27,7 +27,7 @@ that cannot tell.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Literal
@@ -245,36 +245,17 @@ def simulate_handeye(
         hand's z.
         seed: The same seed gives the same scene, and a longer one begins with the shorter one.
     """
-    if setup not in SETUPS:
-        raise InputError(f"setup: found {setup!r}, expected one of {', '.join(SETUPS)}")
-    if poses < 1:
-        raise InputError(f"poses: found {poses}, expected at least 1")
-    if not 0 <= outliers < 1:
-        raise InputError(f"share of outliers: found {outliers:g}, expected 0 to 1")
-    if min(hand_m, hand_rad, camera_m, camera_rad, pixel, outlier_m, outlier_rad) < 0:
-        raise InputError("noise and the size of outliers must not be negative")
+    _check_scene(
+        setup, poses, outliers, (hand_m, hand_rad, camera_m, camera_rad, pixel, outlier_m, outlier_rad)
+    )
     layout = layout or LAYOUTS[setup]
     lens, pattern = camera or PinholeCamera(), board or Board()
     T_parent_camera, T_parent_board = _mounts(setup, layout, pattern, camera_looks_down, seed)
     seen = _visible_boards(poses, layout, lens, pattern, seed)
     hand = _hand_of(setup, T_parent_camera, T_parent_board, seen)
 
-    rng = np.random.default_rng([seed, 3])
-    rows = np.sort(rng.choice(poses, size=round(outliers * poses), replace=False))
-    directions, axes = (_directions(rng, rows.size) for _ in range(2))
-    seen = seen.copy()
-    seen[rows, :3, 3] += outlier_m * directions
-    seen[rows, :3, :3] = seen[rows, :3, :3] @ rotation(outlier_rad * axes)
-
-    draws = np.random.default_rng([seed, 4]).normal(
-        size=(poses, 4, 3)
-    )  # pose by pose, so that longer scenes begin with shorter ones
-    reported = hand.copy()
-    reported[:, :3, :3] = hand[:, :3, :3] @ rotation(-hand_rad * draws[:, 0])
-    reported[:, :3, 3] = hand[:, :3, 3] - hand_m * draws[:, 1]
-    noisy = seen.copy()
-    noisy[:, :3, :3] = seen[:, :3, :3] @ rotation(camera_rad * draws[:, 2])
-    noisy[:, :3, 3] = seen[:, :3, 3] + camera_m * draws[:, 3]
+    rows, seen = _with_outliers(seen, outliers, outlier_m, outlier_rad, seed)
+    reported, noisy = _with_noise(hand, seen, (hand_m, hand_rad), (camera_m, camera_rad), seed)
     pixels = None
     if board is not None:
         exact = lens.project(_apply(seen, board.points))
@@ -298,6 +279,45 @@ def simulate_handeye(
         pixels,
         seed,
     )
+
+
+def _check_scene(setup: str, poses: int, outliers: float, sizes: Sequence[float]) -> None:
+    if setup not in SETUPS:
+        raise InputError(f"setup: found {setup!r}, expected one of {', '.join(SETUPS)}")
+    if poses < 1:
+        raise InputError(f"poses: found {poses}, expected at least 1")
+    if not 0 <= outliers < 1:
+        raise InputError(f"share of outliers: found {outliers:g}, expected 0 to 1")
+    if min(sizes) < 0:
+        raise InputError("noise and the size of outliers must not be negative")
+
+
+def _with_outliers(
+    boards: Floats, share: float, metres: float, radians: float, seed: int
+) -> tuple[NDArray[np.intp], Floats]:
+    """Rows that are seen wrongly, and the boards as they are seen."""
+    rng = np.random.default_rng([seed, 3])
+    rows = np.sort(rng.choice(len(boards), size=round(share * len(boards)), replace=False))
+    directions, axes = (_directions(rng, rows.size) for _ in range(2))
+    seen = boards.copy()
+    seen[rows, :3, 3] += metres * directions
+    seen[rows, :3, :3] = seen[rows, :3, :3] @ rotation(radians * axes)
+    return rows, seen
+
+
+def _with_noise(
+    hand: Floats, seen: Floats, of_hand: tuple[float, float], of_camera: tuple[float, float], seed: int
+) -> tuple[Floats, Floats]:
+    """Hand and board as robot and camera report them. Noise per axis: [m], [rad]."""
+    # Pose by pose, so that longer scenes begin with shorter ones.
+    draws = np.random.default_rng([seed, 4]).normal(size=(len(hand), 4, 3))
+    reported = hand.copy()
+    reported[:, :3, :3] = hand[:, :3, :3] @ rotation(-of_hand[1] * draws[:, 0])
+    reported[:, :3, 3] = hand[:, :3, 3] - of_hand[0] * draws[:, 1]
+    noisy = seen.copy()
+    noisy[:, :3, :3] = seen[:, :3, :3] @ rotation(of_camera[1] * draws[:, 2])
+    noisy[:, :3, 3] = seen[:, :3, 3] + of_camera[0] * draws[:, 3]
+    return reported, noisy
 
 
 def simulate_streams(

@@ -14,6 +14,7 @@ played = truing.replay(streams, where.setup, where.options())
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 
@@ -279,66 +280,28 @@ def track_calibrate(
             f"{tracker.path}: there are no columns qw qx qy qz: frames are calibrated from poses of the"
             " receiver; position alone is enough for `track run`"
         )
-    stamps, first = np.unique(tracker.t, return_index=True)
-    position, orientation = tracker.position[first], tracker.orientation[first]
-    seen = np.tile(np.eye(4), (len(stamps), 1, 1))
-    seen[:, :3, :3], seen[:, :3, 3] = rotations_from_quaternions(orientation), position
-    flange = _core.flange_poses(robot, joints.joints)
-    clock, drift, reference = _joints_clock(joints.t, flange, stamps, seen)
-    stamps = stamps + drift * (stamps - reference)
-    offset = clock.offset if clock.found else 0.0  # t_controller = t_tracker + offset
-    notes = [] if clock.found else [f"joints and tracker are taken to have one clock: {clock.message}"]
-    notes += (
-        [
-            f"joints and tracker: t_controller = t_tracker {offset:+.4f} s, standard error"
-            f" {1e3 * clock.sigma:.2g} ms"
-        ]
-        if clock.found
-        else []
-    )
-    if drift:
-        rate = 1.0 / float(np.median(np.diff(tracker.t[first])))
-        notes.append(
-            f"the tracker's clock drifts by {1e6 * drift:+.0f} ppm: its stamps say {rate:.2f} Hz, by the"
-            f" controller's clock it ran at {rate / (1.0 + drift):.2f} Hz. setup.yaml has the drift; live,"
-            " take it off the stamps"
-        )
-
-    rests = _core.find_rests(joints.t, flange, stamps, position, orientation, clock_offset=-offset)
-    if len(rests) >= _FEWEST_RESTS:
-        times, hand, board = (
-            np.array([(rest.start + rest.end) / 2 for rest in rests]),
-            np.array([rest.T_base_flange for rest in rests]),
-            np.array([rest.T_tracker_receiver for rest in rests]),
-        )
-    else:
-        notes.append(
-            f"the arm stood still {len(rests)} times (for three seconds or more), fewer than {_FEWEST_RESTS}:"
-            " frames come from the motion, with its sway and the clocks' offset in them"
-        )
-        rests = ()
-        inside = np.flatnonzero((stamps + offset > joints.t[0]) & (stamps + offset < joints.t[-1]))
-        if inside.size < _FEWEST_RESTS:
-            raise InputError(
-                f"{tracker.path}: {inside.size} samples lie within the time of {joints.path}, expected"
-                " streams of the same time"
-            )
-        chosen = inside[np.linspace(0, inside.size - 1, min(_FROM_MOTION, inside.size)).astype(np.intp)]
-        times = stamps[chosen] + offset
-        hand, board = interpolated(joints.t, flange, times), seen[chosen]
-    frames = _core.calibrate_frames(hand, board)
-    status, message = frames.status, re.sub(r': reading "[^"]*"', "", frames.message)
+    paired = _paired(robot, joints, tracker)
+    notes = list(paired.notes)
+    places, more = _positions(joints, tracker, paired)
+    notes += more
+    frames = _core.calibrate_frames(places.hand, places.board)
     notes += list(frames.warnings)
+    status, message = frames.status, re.sub(r': reading "[^"]*"', "", frames.message)
 
-    inertial = None
+    inertial, found_tool = None, None
     if imu is not None and status == "done":
         inertial = _core.calibrate_inertial(
-            imu.t, imu.gyro, imu.accel, stamps + offset, position, orientation, clock_wanted=clock_wanted
+            imu.t,
+            imu.gyro,
+            imu.accel,
+            paired.stamps + paired.offset,
+            paired.position,
+            paired.orientation,
+            clock_wanted=clock_wanted,
         )
         notes += list(inertial.warnings)
         if inertial.status != "done":
             status, message = inertial.status, inertial.message
-    found_tool = None
     if tool is not None and status == "done":
         found_tool = _core.calibrate_tool(
             _core.flange_poses(robot, tool.pivot),
@@ -347,30 +310,129 @@ def track_calibrate(
         )
         if found_tool.status != "done":
             status, message = found_tool.status, found_tool.message
-    if status != "done":
-        empty = SetupData(_core.TrackSetup())
-        return TrackCalibration(
-            empty,
-            status,
-            message,
-            frames,
-            tuple(rests),
-            times,
-            inertial,
-            found_tool,
-            clock if clock.found else None,
-            True,
-            None,
-            None,
-            tuple(dict.fromkeys(notes)),
-        )
 
-    where, same_clock, more = _assembled(robot, frames, inertial, found_tool, clock)
-    where = replace(where, clock_drift=-drift, clock_reference=reference)
-    notes += more
+    found = TrackCalibration(
+        where=SetupData(_core.TrackSetup()),
+        status=status,
+        message=message,
+        frames=frames,
+        positions=tuple(places.rests),
+        times=places.times,
+        inertial=inertial,
+        tool=found_tool,
+        joints_clock=paired.clock if paired.clock.found else None,
+        same_clock=True,
+        actuator_lag=None,
+        modes=None,
+        notes=tuple(dict.fromkeys(notes)),
+    )
+    if status != "done":
+        return found
+    return _completed(found, robot, joints, tracker, imu, plan, paired)
+
+
+@dataclass(frozen=True)
+class _Paired:
+    """Joints and tracker of one recording, by one clock."""
+
+    flange: Floats  # shape=(rows of the joints, 4, 4)
+    stamps: Floats  # shape=(n,) [s] of the tracker, its drift taken off
+    position: Floats  # shape=(n, 3) [m]
+    orientation: Floats  # shape=(n, 4)
+    clock: _core.ClockOffset
+    drift: float
+    reference: float  # [s] where the drift counts from
+    notes: tuple[str, ...]
+
+    @property
+    def offset(self) -> float:
+        """[s] t_controller = t_tracker + offset"""
+        return self.clock.offset if self.clock.found else 0.0
+
+
+def _paired(robot: _core.Robot, joints: JointData, tracker: TrackerData) -> _Paired:
+    assert tracker.orientation is not None
+    stamps, first = np.unique(tracker.t, return_index=True)
+    position, orientation = tracker.position[first], tracker.orientation[first]
+    flange = _core.flange_poses(robot, joints.joints)
+    clock, drift, reference = _joints_clock(joints.t, flange, stamps, _frames_of(position, orientation))
+    notes = [
+        f"joints and tracker: t_controller = t_tracker {clock.offset:+.4f} s, standard error"
+        f" {1e3 * clock.sigma:.2g} ms"
+        if clock.found
+        else f"joints and tracker are taken to have one clock: {clock.message}"
+    ]
+    if drift:
+        rate = 1.0 / float(np.median(np.diff(stamps)))
+        notes.append(
+            f"the tracker's clock drifts by {1e6 * drift:+.0f} ppm: its stamps say {rate:.2f} Hz, by the"
+            f" controller's clock it ran at {rate / (1.0 + drift):.2f} Hz. setup.yaml has the drift; live,"
+            " take it off the stamps"
+        )
+    stamps = stamps + drift * (stamps - reference)
+    return _Paired(flange, stamps, position, orientation, clock, drift, reference, tuple(notes))
+
+
+def _frames_of(position: Floats, orientation: Floats) -> Floats:
+    """shape=(n, 4, 4)"""
+    frames = np.tile(np.eye(4), (len(position), 1, 1))
+    frames[:, :3, :3], frames[:, :3, 3] = rotations_from_quaternions(orientation), position
+    return frames
+
+
+@dataclass(frozen=True)
+class _Positions:
+    """Flange and receiver at the same instants."""
+
+    times: Floats  # shape=(n,) [s] the controller's clock
+    hand: Floats  # shape=(n, 4, 4) T_base_flange
+    board: Floats  # shape=(n, 4, 4) T_tracker_receiver
+    rests: Sequence[_core.RestPose] = ()
+
+
+def _positions(joints: JointData, tracker: TrackerData, paired: _Paired) -> tuple[_Positions, list[str]]:
+    """Where the arm stood still; of an arm that hardly ever did, samples of its motion."""
+    offset = paired.offset
+    rests = _core.find_rests(
+        joints.t, paired.flange, paired.stamps, paired.position, paired.orientation, clock_offset=-offset
+    )
+    if len(rests) >= _FEWEST_RESTS:
+        times = np.array([(rest.start + rest.end) / 2 for rest in rests])
+        hand = np.array([rest.T_base_flange for rest in rests])
+        board = np.array([rest.T_tracker_receiver for rest in rests])
+        return _Positions(times, hand, board, rests), []
+    note = (
+        f"the arm stood still {len(rests)} times (for three seconds or more), fewer than {_FEWEST_RESTS}:"
+        " frames come from the motion, with its sway and the clocks' offset in them"
+    )
+    at = paired.stamps + offset
+    inside = np.flatnonzero((at > joints.t[0]) & (at < joints.t[-1]))
+    if inside.size < _FEWEST_RESTS:
+        raise InputError(
+            f"{tracker.path}: {inside.size} samples lie within the time of {joints.path}, expected"
+            " streams of the same time"
+        )
+    chosen = inside[np.linspace(0, inside.size - 1, min(_FROM_MOTION, inside.size)).astype(np.intp)]
+    times = at[chosen]
+    seen = _frames_of(paired.position, paired.orientation)[chosen]
+    return _Positions(times, interpolated(joints.t, paired.flange, times), seen), [note]
+
+
+def _completed(
+    found: TrackCalibration,
+    robot: _core.Robot,
+    joints: JointData,
+    tracker: TrackerData,
+    imu: ImuData | None,
+    plan: PoseData | None,
+    paired: _Paired,
+) -> TrackCalibration:
+    """The set-up put together; the filter's noise, actuators' lag and modes of the sway."""
+    where, same_clock, notes = _assembled(robot, found.frames, found.inertial, found.tool, paired.clock)
+    where = replace(where, clock_drift=-paired.drift, clock_reference=paired.reference)
     lag, modes = None, None
     if plan is not None:
-        lag = actuator_lag(joints.t, flange @ np.asarray(where.setup.T_flange_tool), plan)
+        lag = actuator_lag(joints.t, paired.flange @ np.asarray(where.setup.T_flange_tool), plan)
         where = replace(where, setup=where.setup.replace(actuator_lag=lag))
     if imu is not None:
         streams = recorded_streams(robot, where, imu=imu, joints=joints, tracker=tracker, plan=plan)
@@ -380,20 +442,13 @@ def track_calibrate(
                 streams, where.setup, where.options(), horizons=[], learn_modes=0.97 * float(np.ptp(imu.t))
             ).modes
             where = replace(where, modes=modes.model)
-    return TrackCalibration(
-        where,
-        status,
-        message,
-        frames,
-        tuple(rests),
-        times,
-        inertial,
-        found_tool,
-        clock if clock.found else None,
-        same_clock,
-        lag,
-        modes,
-        tuple(dict.fromkeys(notes)),
+    return replace(
+        found,
+        where=where,
+        same_clock=same_clock,
+        actuator_lag=lag,
+        modes=modes,
+        notes=tuple(dict.fromkeys([*found.notes, *notes])),
     )
 
 

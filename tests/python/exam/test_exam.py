@@ -163,10 +163,14 @@ def test_a_gap_comes_to_rest_where_stepping_through_time_brings_it() -> None:
     """MuJoCo's own limits and friction, moving in from both sides: slow, softened, and the same."""
     import mujoco
 
-    text = """<mujoco><compiler angle="radian" autolimits="true"/><option timestep="0.0005" gravity="0 0 -9.81" integrator="implicitfast"/>
-      <worldbody><body><inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/><joint name="motor" axis="0 -1 0" armature="1000"/>
-      <body><inertial mass="2" pos="0.3 0 0" diaginertia="0.1 0.1 0.1"/><joint name="play" axis="0 -1 0" range="-0.01 0.01"
-        solreflimit="0.001 1" solimplimit="0.9999 0.9999 0.001" frictionloss="0" damping="0.5"/></body></body></worldbody></mujoco>"""
+    text = """<mujoco><compiler angle="radian" autolimits="true"/>
+      <option timestep="0.0005" gravity="0 0 -9.81" integrator="implicitfast"/>
+      <worldbody><body><inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/>
+        <joint name="motor" axis="0 -1 0" armature="1000"/>
+      <body><inertial mass="2" pos="0.3 0 0" diaginertia="0.1 0.1 0.1"/>
+        <joint name="play" axis="0 -1 0" range="-0.01 0.01" solreflimit="0.001 1"
+          solimplimit="0.9999 0.9999 0.001" frictionloss="0" damping="0.5"/>
+      </body></body></worldbody></mujoco>"""
     model: Any = mujoco.MjModel.from_xml_string(text)
     for friction, sides in ((40.0, {-1.0: 0.01, 1.0: -0.01}), (0.0, {-1.0: -0.01, 1.0: -0.01})):
         for direction, expected in sides.items():

@@ -36,7 +36,8 @@ convention: dh
 gravity: [0, 0, -9.81]
 base: {xyz: [1, 2, 3], rpy: [0, 0, 30]}
 joints:
-  - {name: J1, type: revolute, theta: 0, d: 290, a: 0, alpha: -90, limits: [-165, 165], mass: 5, com: [0, 0, 1]}
+  - \
+{name: J1, type: revolute, theta: 0, d: 290, a: 0, alpha: -90, limits: [-165, 165], mass: 5, com: [0, 0, 1]}
   - {name: J2, type: revolute, theta: -90, d: 0, a: 270, alpha: 0, beta: 0.1, ratio: 1.001, offset: 0.2}
   - {name: P, type: revolute, theta: 0, d: 0, a: 70, alpha: -90, driven_by: {J2: -1}}
   - {name: S, type: prismatic, theta: 0, d: 302, a: 0, alpha: 90}
@@ -61,8 +62,10 @@ URDF = b"""\
 <robot name="arm"><link name="base"/><link name="upper"/><link name="hand"/>
 <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.3" rpy="0 0 0"/>
 <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="j2" type="prismatic"><parent link="upper"/><child link="hand"/><origin xyz="0.2 0 0" rpy="1.5 0 0"/>
-<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="j1" multiplier="0.5"/></joint></robot>
+<joint name="j2" type="prismatic"><parent link="upper"/><child link="hand"/><origin xyz="0.2 0 0" rpy="1.5 0 \
+0"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="j1" \
+multiplier="0.5"/></joint></robot>
 """
 
 MODEL = _core.Robot(

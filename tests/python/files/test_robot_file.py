@@ -35,7 +35,8 @@ base: {xyz: [0.1, -2, 0], rpy: [0, 0, 0.3]}
 joints:
   - {name: J1, type: revolute, theta: 0, d: 0.7425, a: 0.26, alpha: -1.5708, beta: 0, limits: [-2.6, 2.6],
      mass: 220, com: [-0.1, 0.1, 0]}
-  - {name: J2, type: revolute, theta: -1.5708, d: 0, a: 1.15, alpha: 0, beta: 1e-4, ratio: 1.0002, offset: 1e-3}
+  - \
+{name: J2, type: revolute, theta: -1.5708, d: 0, a: 1.15, alpha: 0, beta: 1e-4, ratio: 1.0002, offset: 1e-3}
   - {name: J3, type: revolute, theta: 0, d: 0, a: 1.2, alpha: 0}
   - {name: J4, type: revolute, theta: 0, d: 0, a: 0.22, alpha: 1.5708, driven_by: {J2: -1, J3: -1}}
   - {name: J5, type: prismatic, theta: 0, d: 0.1, a: 0, alpha: 0, limits: [null, 0.5]}
@@ -65,7 +66,8 @@ units: {length: m, angle: rad, mass: kg}
 convention: urdf
 joints:
   - {name: lift, type: prismatic, xyz: [0, 0, 0.4], axis: [0, 0, 1], limits: [0, 0.8]}
-  - {name: elbow, type: revolute, xyz: [0.3, 0, 0], rpy: [1.5708, 0, -0.2], axis: [0, 0.6, 0.8], mass: 2.5, com: [0, 0, 0.1]}
+  - {name: elbow, type: revolute, xyz: [0.3, 0, 0], rpy: [1.5708, 0, -0.2], axis: [0, 0.6, 0.8], mass: 2.5, \
+com: [0, 0, 0.1]}
 tool: {xyz: [0, 0, 0.1]}
 anchor: {xyz: [1, 0.5, 0.2], zero: -0.03}
 effects:

@@ -464,8 +464,18 @@ def test_a_bad_set_up_is_named(tmp_path: Path, old: str, new: str, message: str)
 
 # ---- Whatever is in a file -----------------------------------------------------------------------
 
-TRACKER = b"t_s,x_m,y_m,z_m,qw,qx,qy,qz,arrival_s\n0.00,1,2,3,1,0,0,0,0.03\n0.01,1,2,3.001,1,0,0,0,0.04\n0.03,1,2.001,3,0.8,0.6,0,0,0.05\n"
-IMU = b"t_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2\n0.00,0,0.1,0,0,0,9.81\n0.01,0,0.1,0,0.1,0,9.81\n0.02,0,0.1,-0.1,0,0,9.8\n"
+TRACKER = b"""\
+t_s,x_m,y_m,z_m,qw,qx,qy,qz,arrival_s
+0.00,1,2,3,1,0,0,0,0.03
+0.01,1,2,3.001,1,0,0,0,0.04
+0.03,1,2.001,3,0.8,0.6,0,0,0.05
+"""
+IMU = b"""\
+t_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2
+0.00,0,0.1,0,0,0,9.81
+0.01,0,0.1,0,0.1,0,9.81
+0.02,0,0.1,-0.1,0,0,9.8
+"""
 SETUP = b"""\
 format: truing-track/1
 units: {length: m, angle: rad}
@@ -475,7 +485,8 @@ T_flange_tool: {xyz: [0, 0, 0.3], qw: 1, qx: 0, qy: 0, qz: 0}
 T_flange_imu: {xyz: [0, 0.05, 0], qw: 1, qx: 0, qy: 0, qz: 0}
 clock_offset_s: 0.008
 modes:
-  - {frequency_hz: 0.6, damping: 0.02, gain: [[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]}
+  - \
+{frequency_hz: 0.6, damping: 0.02, gain: [[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]}
 filter: {position_sigma: 0.002}
 """
 
