@@ -20,7 +20,7 @@ from truing import _core
 from truing.errors import InputError
 from truing.files import load_units, save_robot, write_table
 from truing.identification.api import predict, residuals
-from truing.identification.page import identification_report
+from truing.identification.page import identification_report, prediction_report
 from truing.report.json_text import to_json, without_nan
 from truing.report.rows import Rows, statistics
 
@@ -355,3 +355,20 @@ def prediction_dict(robot: _core.Robot, rows: Rows, warnings: Iterable[str] = ()
     if np.isfinite(rows.magnitude_after).any():
         result["errors"] = statistics(rows.magnitude_after, rows.rotation_after)
     return result
+
+
+def write_prediction(
+    folder: Path,
+    robot: _core.Robot,
+    data: _core.Measurements,
+    predicted: _core.Prediction,
+    *,
+    warnings: Iterable[str] = (),
+) -> dict[str, Any]:
+    """Writes everything that ``truing predict`` found into `folder`, and returns what result.json holds."""
+    rows = predicted_rows(robot, data, predicted)
+    found: dict[str, Any] = without_nan(prediction_dict(robot, rows, warnings))
+    write_table(folder / "predicted.csv", prediction_columns(robot, data, predicted))
+    (folder / "result.json").write_text(to_json(found), encoding="utf-8")
+    (folder / "report.html").write_text(prediction_report(found, rows), encoding="utf-8")
+    return found

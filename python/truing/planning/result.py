@@ -5,14 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.files.common import joint_columns
+from truing.files.common import joint_columns, write_table
 from truing.identification.result import frozen_dict, parameter_dict
+from truing.planning.page import plan_report
+from truing.report.json_text import to_json, without_nan
 
 PLAN_FORMAT = "truing-plan/1"
 Floats = NDArray[np.float64]
@@ -111,3 +114,31 @@ def plan_columns(robot: _core.Robot, joints: Floats, seen: _core.Distinction | N
         if values is not None:
             columns[name] = values
     return columns
+
+
+def write_plan(
+    folder: Path,
+    robot: _core.Robot,
+    planned: _core.PlanResult,
+    seen: _core.Distinction | None = None,
+    *,
+    index: str,
+    noise: float,
+    seed: int,
+    warnings: Iterable[str] = (),
+) -> dict[str, Any]:
+    """Writes everything that ``truing plan`` found into `folder`, and returns what result.json holds."""
+    found: dict[str, Any] = without_nan(
+        plan_dict(robot, planned, index=index, noise=noise, seed=seed, seen=seen, warnings=warnings)
+    )
+    write_table(folder / "poses.csv", plan_columns(robot, planned.joints, seen))
+    (folder / "result.json").write_text(to_json(found), encoding="utf-8")
+    driven = [robot.joints[k] for k in robot.driven_joints()]
+    page = plan_report(
+        found,
+        [joint.name for joint in driven],
+        planned.joints if seen is None else seen.joints,
+        ["rad" if joint.type == "revolute" else "m" for joint in driven],
+    )
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    return found
