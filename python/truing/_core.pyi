@@ -3315,7 +3315,7 @@ class PathOptions:
     """
     How `InverseSolver.path` works; see the attributes.
     """
-    def __init__(self, *, longest_turn: typing.SupportsFloat | typing.SupportsIndex = 0.35, longest_slide: typing.SupportsFloat | typing.SupportsIndex = 0.25, rolls: typing.SupportsInt | typing.SupportsIndex = 24, rail_places: typing.SupportsInt | typing.SupportsIndex = 5, smoothing: typing.SupportsInt | typing.SupportsIndex = 20) -> None:
+    def __init__(self, *, longest_turn: typing.SupportsFloat | typing.SupportsIndex = 0.3490658503988659, longest_slide: typing.SupportsFloat | typing.SupportsIndex = 0.25, rolls: typing.SupportsInt | typing.SupportsIndex = 24, rail_places: typing.SupportsInt | typing.SupportsIndex = 5, smoothing: typing.SupportsInt | typing.SupportsIndex = 20) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...

@@ -138,7 +138,8 @@ struct Branches {
 };
 
 struct PathOptions {
-  double longest_turn = 0.35;   ///< of a turning joint between neighbouring targets; more is a gap [rad]
+  double longest_turn =
+      0.3490658503988659;       ///< of a turning joint between neighbouring targets; more is a gap [rad] (20 deg)
   double longest_slide = 0.25;  ///< of a sliding joint [m]
   int rolls = 24;               ///< samples of a torch's roll, where it is free
   int rail_places = 5;          ///< samples of each rail before the arm, over what it can be reached from
