@@ -37,11 +37,11 @@ ROOMS: dict[str, set[str]] = {
     "tracking": BASIC | {"hand_eye"},
     "testing": BASIC - {"effects"},
     "exam": {"truing", "model", "report"},  # of both only what test_exam.py allows
-    "demo": BASIC | {"truing", "examples", "identification", "testing"},
 }
-ROOMS["public"] = set(ROOMS) - {"demo", "exam"}
+ROOMS["public"] = set(ROOMS) - {"exam"}
 ROOMS["truing"] = {"public"}
 ROOMS["cli"] = set(ROOMS) - {"public"}
+ROOMS["__main__"] = {"cli"}
 
 # Rooms in which every module has its place, from the ground up: each may import those before it.
 FLOORS = {
@@ -74,7 +74,7 @@ ONLY_IN = {
     "pyarrow": {"files"},
     "plotly": {"report"},
     "typer": {"cli"},
-    "rich": {"cli", "demo"},
+    "rich": {"cli"},
     "mujoco": {"exam"},
     "cv2": {"files"},
 }

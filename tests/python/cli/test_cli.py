@@ -21,7 +21,7 @@ import pytest
 
 import truing
 from tables import columns
-from truing.cli import main, quantity, share
+from truing.cli import main
 from truing.examples import example
 
 ROBOT = str(example("irb120"))
@@ -45,43 +45,6 @@ def identified(folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
         ["identify", str(folder / "robot.yaml"), str(folder / "measurements.csv"), "--out", "found", *options]
     )
     return code, json.loads(Path("found/result.json").read_text())
-
-
-# ---- Quantities ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("text", "kind", "value"),
-    [
-        ("0.03mm", "length", 3e-5),
-        ("1 m", "length", 1.0),
-        ("5µm", "length", 5e-6),
-        ("15deg", "angle", math.radians(15)),
-        ("1mrad", "angle", 1e-3),
-        ("-2e-3rad", "angle", -2e-3),
-        ("40ms", "time", 0.04),
-        ("0", "length", 0.0),
-        (".5 s", "time", 0.5),
-    ],
-)
-def test_a_quantity_is_read_in_si(text: str, kind: str, value: float) -> None:
-    assert quantity(text, kind, "--x") == pytest.approx(value, rel=1e-15)
-
-
-@pytest.mark.parametrize("text", ["3", "", "mm", "3 furlongs", "3deg", "1e999mm", "nanmm", "3 mm 4", "0x3mm"])
-def test_a_length_without_a_proper_unit_is_refused_by_name(text: str) -> None:
-    with pytest.raises(
-        truing.InputError, match=r"--noise: found .* expected a length with its unit .* such as 0\.03mm"
-    ):
-        quantity(text, "length", "--noise")
-
-
-def test_shares() -> None:
-    assert share("2%", "--x") == pytest.approx(0.02)
-    assert share("0.2", "--x") == 0.2
-    for text in ("2", "-1%", "100%", "two", "nan"):
-        with pytest.raises(truing.InputError, match="such as 2%"):
-            share(text, "--x")
 
 
 # ---- What is written -----------------------------------------------------------------------------
@@ -409,17 +372,6 @@ def test_version_and_effects(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["effects"]) == 0
     listed = capsys.readouterr().out
     assert all(name in listed for name, _ in truing.model.catalogue())
-
-
-def test_help_is_quick_and_leaves_the_heavy_libraries_alone() -> None:
-    program = (
-        "import sys; from truing.cli import main; main(['--help']); sys.exit(any(m in sys.modules for m in"
-        " ('plotly', 'pandas', 'scipy')))"
-    )
-    assert (
-        subprocess.run([sys.executable, "-c", program], stdout=subprocess.DEVNULL, check=False).returncode
-        == 0
-    )
 
 
 def test_the_demo_finds_the_truth_and_ends_with_the_report(capsys: pytest.CaptureFixture[str]) -> None:

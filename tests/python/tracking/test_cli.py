@@ -283,7 +283,7 @@ def test_without_a_plan_predictions_are_graded_all_the_same(
     ("option", "message"),
     [
         (["--horizon", "40"], "--horizon: found '40', expected a time with its unit"),
-        (["--horizon", "2s"], "--horizon: found '2s', expected at most 1s"),
+        (["--horizon", "2s"], "--horizon: found '2s', expected a time of at most 1s"),
         (["--learn-modes", "-1s"], "--learn-modes: found '-1s'"),
     ],
 )
@@ -299,7 +299,7 @@ def test_options_are_checked(
     [
         (["--dropout", "20s"], "--dropout: found '20s', expected a time and how long, such as 20s:2s"),
         (["--station-shift", "5mm"], "--station-shift: found '5mm', expected a time, a length and an angle"),
-        (["--seconds", "-3s"], "seconds must be above 0"),
+        (["--seconds", "-3s"], "--seconds: found '-3s', expected a time above 0"),
     ],
 )
 def test_options_of_the_simulation_are_checked(

@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a command says on the terminal: tables and lines on stdout, warnings and errors on stderr."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+AXES = "xyz"
+
+
+def console() -> Console:
+    from rich.console import Console
+
+    return Console(highlight=False)
+
+
+def error_console() -> Console:
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def say(text: str) -> None:
+    """A line that is never wrapped: a path stays a path."""
+    console().print(text, soft_wrap=True, markup=False)
+
+
+def say_first(lines: Sequence[str], most: int, rest: str) -> None:
+    """The first lines, and how many there are more: `rest` is "more gaps: see the report"."""
+    for line in lines[:most]:
+        say(line)
+    if len(lines) > most:
+        say(f"and {len(lines) - most} {rest}")
+
+
+def joined(words: Sequence[str], most: int) -> str:
+    """ "a; b; and 3 more"."""
+    more = f"; and {len(words) - most} more" if len(words) > most else ""
+    return "; ".join(words[:most]) + more
+
+
+def warn(messages: Sequence[str]) -> None:
+    for message in messages:
+        error_console().print(f"warning: {message}", style="yellow", markup=False)
+
+
+def fail(message: str) -> None:
+    """Why a command ends with exit status 1."""
+    error_console().print(f"truing: {message}", style="bold red", markup=False, highlight=False)
+
+
+def table(title: str, head: Sequence[str], lines: Sequence[Sequence[str]], words: bool = False) -> None:
+    """A table on stdout. `words`: its cells are no numbers."""
+    from rich import box
+    from rich.table import Table
+
+    drawn = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, show_header=any(head))
+    for k, name in enumerate(head):
+        left = k == 0 or len(head) == 2 or words
+        drawn.add_column(name, justify="left" if left else "right", overflow="fold")
+    for line in lines:
+        drawn.add_row(*line)
+    console().print(drawn)
+
+
+def mm(metres: float | None) -> str:
+    return "-" if metres is None else f"{metres * 1e3:.4f} mm"
+
+
+def mrad(radians: float | None) -> str:
+    return "-" if radians is None else f"{radians * 1e3:.4f} mrad"
+
+
+def ms(seconds: float) -> str:
+    return f"{1e3 * seconds:.3f} ms"
+
+
+def statistics(e: Mapping[str, Any]) -> list[str]:
+    """Mean, 95 % and maximum of an error."""
+    return [mm(e[key]) for key in ("mean_m", "p95_m", "max_m")]
