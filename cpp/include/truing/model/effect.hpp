@@ -53,14 +53,134 @@ class Unsuited : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
+/// Thrown by Effect::terms when the data lack a column that the effect needs.
+class MissingColumn : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
+// What diagnosis, planning, simulation and the documents know of an effect. They read these traits and no name.
+
+/// The input that an effect's basis is a function of.
+enum class Driver {
+  several,         ///< more than one, or not said
+  constant,        ///< none: a constant
+  angle,           ///< the joint's own motion, as read
+  other_angles,    ///< motions of other joints
+  speed,           ///< of the joint
+  direction,       ///< that the joint came from
+  gravity_torque,  ///< on the joint
+  motor_torque,    ///< of the joint's motor
+  temperature,
+  time,
+};
+
+/// What an effect moves: the joint itself, its axis, its link, the base in the measurement frame, or the targets.
+enum class Moves { joint, axis, link, base, target };
+
+/// The parameters of the model itself that an effect stands for. `terms`: none, it has terms of its own.
+enum class StandsFor { terms, gear_ratio, joint_offset, link_geometry, base_frame, tool_frame };
+
+/// What one law of one input an effect's motion of a joint follows. Effects of the same law at a joint are tested, and
+/// corrected, together.
+enum class Law { none = -1, of_torque, of_direction, of_angle, of_lengths_in_warmth, of_warmth };
+
+/// The free function that a law is tested against, once the effect is named.
+enum class LawTest {
+  none,
+  of_driver,          ///< of the driver, at the joint
+  times_direction,    ///< direction times a function of the gravity torque, or of the angle where no mass is known
+  times_the_lengths,  ///< the link's lengths times a function of time, or of temperature where none was recorded
+};
+
+/// When an effect takes part in a diagnosis or a plan.
+enum class Search {
+  always,
+  if_asked,              ///< when it is asked for by name
+  by_order,              ///< its order is found by trying many
+  with_unknown_weights,  ///< beside the effects whose EffectTraits::weights_found_by it is
+  never,                 ///< it is fitted in any case
+};
+
+/// How a larger effect contains this one.
+enum class Containment {
+  part,          ///< it is a part of the larger one at the same joint
+  special_case,  ///< its law is one case of the larger one's at the same joint
+  look_alike,    ///< the larger one, at all joints together, makes the same motion
+};
+
+struct ContainedIn {
+  std::string effect;
+  Containment how = Containment::part;
+  std::string why;  ///< in words; of a look-alike: none
+};
+
+/// What tells two effects apart, the most telling first.
+enum class Experiment {
+  own_words,        ///< SeparatedBy::words
+  both_directions,  ///< needed only while every pose is approached from the same side
+  scale_bar,
+  warm_up_and_cool_down,
+  more_temperatures,
+  fixed_points_again,
+  target_on_elbow,
+  another_payload,
+  full_range,
+  orientations,       ///< needed only while no orientation is measured
+  where_they_differ,  ///< poses where the two differ
+};
+
+struct SeparatedBy {
+  Experiment experiment = Experiment::where_they_differ;
+  std::string from{};   ///< name of the other effect; empty: any
+  std::string words{};  ///< of Experiment::own_words: what to measure
+};
+
+/// How a parameter is shown: values in `of` times `factor` are in `unit`. Parameters in other units are shown as they
+/// are.
+struct ReportUnit {
+  std::string of = "rad", unit = "mrad";
+  double factor = 1e3;
+};
+
+/// Its line in docs/reference/effects.md.
+struct EffectDocumentation {
+  std::string law;         ///< what is added, where
+  std::string parameters;  ///< names and units
+  std::string needs;
+};
+
+struct EffectTraits {
+  Driver driver = Driver::several;
+  Moves moves = Moves::joint;
+  StandsFor stands_for = StandsFor::terms;
+  Law law = Law::none;
+  LawTest law_test = LawTest::none;
+  Search search = Search::always;
+  bool of_instrument = false;      ///< not a motion of the robot: instrument, frames, clocks
+  bool wanders = false;            ///< what it moves may also wander: it is tried as a free function of time
+  bool needs_masses = false;       ///< to be searched it needs the links' masses: the payload alone is not enough
+  std::string weights_found_by{};  ///< the effect that finds the weights where no mass is known
+  std::vector<std::string> mimicked_by{};  ///< effects that may do the same, and show only with a column of their own
+  std::vector<ContainedIn> contained_in{};
+  std::vector<SeparatedBy> separated_by{};
+  double prior = 1e-2;      ///< motion [rad | m] of its site that it may well make
+  double usual = 0.0;       ///< size of its parameters, in their unit: what a simulation draws; 0: unknown
+  double plausible = 0.0;   ///< no machine in working order has more, in the same unit; 0: unknown
+  std::string main_part{};  ///< which of several parameters is meant by the effect's name alone, "cos1"
+  ReportUnit reported{};
+  EffectDocumentation documentation{};
+};
+
 /// A named effect: the terms that it puts on one joint, or (per_joint = false) on the robot as a whole.
 struct Effect {
   std::string name;
   std::string summary;
   /// Terms on joint `joint` of `robot`; throws std::invalid_argument when the robot or the data lack what it needs
-  /// (names the missing column).
+  /// (MissingColumn names the column).
   std::function<std::vector<Term>(const Robot& robot, std::size_t joint, const Measurements& data)> terms;
   bool per_joint = true;  ///< false: `terms` is called once, with joint 0, and a request must not name joints
+  EffectTraits traits{};
 };
 
 /// The effects that truing knows by name (docs/reference/effects.md has their laws). gear_ratio, joint_offset,
