@@ -27,9 +27,10 @@ struct DiagnoseOptions {
   std::size_t search_poses = 6000;     ///< of more pose groups, so many are searched; errors are those of all rows
   int resamples =
       60;  ///< draws of folds for the intervals, what was chosen fitted again; at most 10 more repeat the selection
-  double rotation_length = 0.1;  ///< [m]: a rotation error of 1 rad counts as this length in reported errors
-  std::uint64_t seed = 0;        ///< of the split and of every simulation
-  int threads = 0;               ///< 0: as many as the machine has
+  double rotation_length = 0.1;   ///< [m]: a rotation error of 1 rad counts as this length in reported errors
+  std::uint64_t seed = 0;         ///< of the split and of every simulation
+  int threads = 0;                ///< 0: as many as the machine has
+  std::vector<std::string> also;  ///< effects that are considered only when they are asked for, by name
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;

@@ -7,10 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "diagnosis/free_search.hpp"
 #include "math/text.hpp"
+#include "model/effects/traits.hpp"
 
 namespace truing::diagnosis {
 
@@ -47,33 +47,37 @@ static void append(Work* work, Explanation what, const Design::Rows& columns, do
   design.candidates.named.push_back(std::move(what));
 }
 
+/// The effect of an order at a joint, as a candidate.
+static Explanation mesh_of(const Effect& effect, const MeshGain& mesh, const Robot& robot, const Measurements& data) {
+  const std::string& joint = robot.joints[mesh.joint].name;
+  Explanation e;
+  e.effect = effect.name;
+  e.joints = {joint};
+  e.requests = {{e.effect, {joint}}};
+  for (const Term& term : effect.terms(robot, mesh.joint, data)) e.parameters.push_back(term.parameter);
+  e.driver = input_name(effect.traits.driver, mesh.joint);
+  e.note = "the order " + number(mesh.order) + " per turn was found by trying " + std::to_string(mesh.tried);
+  return e;
+}
+
 /// Mesh orders that win on what is left become candidates. True: there were some.
 static bool add_meshes(Work* work, const Evidence& evidence, const Evidence::State& state, const Robot& robot,
                        double threshold) {
-  const auto& left_out = work->options.leave_out;
-  if (std::find(left_out.begin(), left_out.end(), "transmission_error") != left_out.end()) return false;
+  static const Effect& family =
+      effect_that([](const EffectTraits& traits) { return traits.search == Search::by_order; });
+  if (is_left_out(work->options, family.name)) return false;
   bool any = false;
   for (const MeshGain& mesh : scan_mesh(work->design, evidence, state, work->inputs, robot, work->deff)) {
     if (mesh.score < threshold) continue;
-    Explanation e;
-    const std::string& joint = robot.joints[mesh.joint].name;
-    e.effect = "transmission_error@" + exact_number(mesh.order);
-    const bool known = std::any_of(work->design.candidates.named.begin(), work->design.candidates.named.end(),
-                                   [&](const Explanation& other) {
-                                     return other.effect == e.effect && other.joints == std::vector<std::string>{joint};
-                                   });
-    if (known) continue;
-    e.joints = {joint};
-    e.requests = {{e.effect, {joint}}};
-    e.parameters = {e.effect + "." + joint + ".cos", e.effect + "." + joint + ".sin"};
-    e.driver = "q" + std::to_string(mesh.joint + 1);
-    e.note = "the order " + number(mesh.order) + " per turn was found by trying " + std::to_string(mesh.tried);
+    const Explanation e = mesh_of(transmission_error(mesh.order), mesh, robot, work->data);
+    const std::vector<Explanation>& named = work->design.candidates.named;
+    if (std::any_of(named.begin(), named.end(), [&](const Explanation& other) { return same_name(other, e); }))
+      continue;
     const Eigen::Index n = work->design.x.rows();
     Design::Rows columns(n, 2);
-    const auto input = std::find_if(work->inputs.begin(), work->inputs.end(),
-                                    [&](const InputColumn& c) { return c.name == e.driver; });
+    const InputColumn& input = work->inputs[static_cast<std::size_t>(input_named(*work, e.driver))];
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double q = input->values[static_cast<std::size_t>(work->design.row[static_cast<std::size_t>(i)])];
+      const double q = input.values[static_cast<std::size_t>(work->design.row[static_cast<std::size_t>(i)])];
       const double d = work->design.x(i, work->design.joint_column[mesh.joint][0]);
       columns(i, 0) = d * std::cos(mesh.order * q);
       columns(i, 1) = d * std::sin(mesh.order * q);
@@ -181,18 +185,7 @@ Shortlist shortlist(const Work& work, const std::vector<int>& also) {
 
 /// Of the motion that a law and its correction make together, the part that the plain law must make to keep its name.
 /// What a joint does with its own angle can be anything: there the bar is higher.
-static double least_share_of_law(const std::string& effect) {
-  const bool own_motion = effect == "harmonic" || effect == "gear_ratio" || effect == "joint_offset" ||
-                          effect == "axis_wobble" || effect == "link_geometry";
-  return own_motion ? 0.92 : 0.65;
-}
-
-/// Effects that are functions of where the joints stand, and of nothing else that is recorded.
-static bool follows_configuration(const std::string& effect) {
-  static const std::set<std::string> names = {"harmonic",         "gear_ratio",      "joint_offset",    "axis_wobble",
-                                              "joint_compliance", "stiffness_zones", "gravity_backlash"};
-  return names.count(effect) > 0;
-}
+static double least_share_of_law(const EffectTraits& traits) { return follows_own_angle(traits) ? 0.92 : 0.65; }
 
 static std::vector<int> columns_of(const Work& work, const std::vector<int>& groups) {
   std::vector<int> out;
@@ -240,197 +233,248 @@ static int add_fine_function(Work* work, const Robot& robot, std::size_t joint, 
   return static_cast<int>(work->design.candidates.groups.size()) - 1;
 }
 
-static void drop_contained(Work* work, Decision* decision) {
-  // All links contain each link.
+static const EffectTraits& traits_of(const Work& work, const Explanation& e) {
+  return model::traits_of(e.effect, work.options.own_effects);
+}
+
+static Evidence evidence_now(const Work& work) {
+  return Evidence(work.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
+}
+
+/// All links contain each link, and what is a part of one.
+static void drop_parts_of_all_links(const Work& work, Decision* decision) {
+  const std::string& links = effect_that_stands_for(StandsFor::link_geometry).name;
   std::vector<int> single;
   bool all_links = false;
   for (const int g : decision->state.choice.groups) {
-    const Explanation& e = work->design.candidates.named[static_cast<std::size_t>(g)];
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     all_links |= e.kind == Kind::all_geometry;
-    if (e.kind == Kind::catalogue && (e.effect == "link_geometry" || e.effect == "joint_offset")) single.push_back(g);
+    const bool is_part = e.effect == links || is_contained(traits_of(work, e), links, Containment::part);
+    if (e.kind == Kind::catalogue && is_part) single.push_back(g);
   }
-  if (all_links && !single.empty()) {
-    const Evidence evidence(work->train, work->design.candidates.groups, work->design.nuisance, work->design.prior);
-    decision->state = evidence.evaluate(without_these(decision->state.choice, single));
-  }
-  // Three zones contain the plain spring.
-  for (const int zones : Choice(decision->state.choice).groups) {
-    const Explanation& e = work->design.candidates.named[static_cast<std::size_t>(zones)];
-    if (e.effect != "stiffness_zones") continue;
-    std::vector<int> springs;
+  if (all_links && !single.empty())
+    decision->state = evidence_now(work).evaluate(without_these(decision->state.choice, single));
+}
+
+/// Three zones contain the plain spring: what corrects the plain law then corrects the larger one.
+static void drop_special_cases(const Work& work, Decision* decision) {
+  for (const int larger : Choice(decision->state.choice).groups) {
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(larger)];
+    std::vector<int> smaller;
     for (const int g : decision->state.choice.groups) {
-      const Explanation& other = work->design.candidates.named[static_cast<std::size_t>(g)];
-      if (other.effect == "joint_compliance" && other.joints == e.joints) springs.push_back(g);
+      const Explanation& other = work.design.candidates.named[static_cast<std::size_t>(g)];
+      if (other.joints == e.joints && is_contained(traits_of(work, other), e.effect, Containment::special_case))
+        smaller.push_back(g);
     }
-    if (springs.empty()) continue;
-    const Evidence evidence(work->train, work->design.candidates.groups, work->design.nuisance, work->design.prior);
-    decision->state = evidence.evaluate(without_these(decision->state.choice, springs));
+    if (smaller.empty()) continue;
+    decision->state = evidence_now(work).evaluate(without_these(decision->state.choice, smaller));
     for (auto& [correction, corrected] : decision->corrects) {
-      if (std::find(springs.begin(), springs.end(), corrected) != springs.end()) corrected = zones;
+      if (std::find(smaller.begin(), smaller.end(), corrected) != smaller.end()) corrected = larger;
     }
   }
+}
+
+static void drop_contained(const Work& work, Decision* decision) {
+  drop_parts_of_all_links(work, decision);
+  drop_special_cases(work, decision);
+}
+
+/// A function at a joint, and the laws there that it questions.
+struct Question {
+  int function = -1;  ///< its group
+  Explanation what;
+  std::size_t joint = 0;
+  std::vector<int> here;  ///< the function, and the chosen laws at its joint
+};
+
+/// An effect whose law at the joint may be another one.
+static bool has_law_at(const Work& work, const Explanation& e, const std::string& joint) {
+  const EffectTraits& traits = traits_of(work, e);
+  return e.joints == std::vector<std::string>{joint} && traits.stands_for != StandsFor::link_geometry &&
+         traits.search != Search::by_order;
+}
+
+static Question question_of(const Work& work, const Robot& robot, const Choice& choice, int function) {
+  const auto& named = work.design.candidates.named;
+  Question q;
+  q.function = function;
+  q.what = named[static_cast<std::size_t>(function)];
+  q.joint = robot.joint_index(q.what.site);
+  q.here = {function};
+  for (const int g : choice.groups) {
+    const Explanation& e = named[static_cast<std::size_t>(g)];
+    if (g != function && (e.kind == Kind::catalogue || e.kind == Kind::law) && has_law_at(work, e, q.what.site))
+      q.here.push_back(g);
+  }
+  return q;
+}
+
+/// The law that makes most of what the function and the laws at its joint make together; no group: none makes enough.
+static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence, const Choice& choice,
+                                      const Question& q) {
+  const auto& groups = work.design.candidates.groups;
+  const auto& named = work.design.candidates.named;
+  const Evidence::State rest = evidence.evaluate(without_these(choice, q.here));
+  const double together = rest.rss - evidence.evaluate(choice).rss;
+  Evidence::Gain best;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const Explanation& e = named[g];
+    if (e.kind != Kind::catalogue || groups[g].shadow || !has_law_at(work, e, q.what.site)) continue;
+    if (q.what.kind == Kind::law && e.effect != q.what.effect &&
+        groups[g].law_at != groups[static_cast<std::size_t>(q.function)].corrects_law_at)
+      continue;
+    const Evidence::Gain gain = evidence.gain(rest, groups[g].columns, groups[g].cost);
+    const double share = gain.squares / std::max(together, 1e-300);
+    if (share > least_share_of_law(traits_of(work, e)) && gain.score > best.score) {
+      best = gain;
+      best.group = static_cast<int>(g);
+    }
+  }
+  return best;
+}
+
+/// The function, and the laws at its joint that are functions of the same inputs.
+static std::vector<int> replaced_by_function(const Work& work, const Question& q, const std::vector<int>& inputs) {
+  const auto name_of = [&](int i) -> const std::string& { return work.inputs[static_cast<std::size_t>(i)].name; };
+  const bool by_configuration = std::all_of(
+      inputs.begin(), inputs.end(), [&](int i) { return name_of(i)[0] == 'q' || name_of(i).rfind("torque", 0) == 0; });
+  std::vector<int> gone = {q.function};
+  for (const int g : q.here) {
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
+    const bool of_these = std::any_of(inputs.begin(), inputs.end(), [&](int i) { return name_of(i) == e.driver; });
+    if (g != q.function && (of_these || (by_configuration && follows_configuration(traits_of(work, e)))))
+      gone.push_back(g);
+  }
+  return gone;
+}
+
+/// Not this law: the function alone, with more knots, for it and all laws of its inputs at its joint. True: it was
+/// taken.
+static bool replace_laws(Work* work, const Robot& robot, const Question& q, Decision* decision) {
+  std::vector<int> inputs = q.what.inputs;
+  if (q.what.law_test == LawTest::times_direction) {
+    const int direction = input_named(*work, input_name(Driver::direction, q.joint));
+    if (direction >= 0) inputs.insert(inputs.begin(), direction);
+  }
+  const Choice& choice = decision->state.choice;
+  const std::vector<int> gone = replaced_by_function(*work, q, inputs);
+  if (gone.size() == 1 && q.what.kind == Kind::free) return false;
+  const Choice remaining = without_these(choice, gone);
+  const double before = cross_validated(*work, choice);
+  const int fine = add_fine_function(work, robot, q.joint, inputs);
+  extend_grams(work);
+  const Evidence again = evidence_now(*work);
+  const Evidence::Gain gain = again.gain(again.evaluate(remaining), columns_of(*work, {fine}), 0.0);
+  Choice alone = remaining;
+  alone.groups.push_back(fine);
+  alone.scales.push_back(gain.scale);
+  if (cross_validated(*work, alone) < 1.06 * before) {
+    decision->state = again.evaluate(alone);
+    return true;
+  }
+  decision->corrects[q.function] = -1;  // both stay
+  return false;
+}
+
+/// One function against the laws at its joint. True: the choice has changed.
+static bool question_law(Work* work, const Robot& robot, const Evidence& evidence, int function, Decision* decision) {
+  const Choice& choice = decision->state.choice;
+  const Question q = question_of(*work, robot, choice, function);
+  const Evidence::Gain best = law_that_stands(*work, evidence, choice, q);
+  if (best.group >= 0) {  // the law stands; the function corrects it
+    const bool is_in = std::find(choice.groups.begin(), choice.groups.end(), best.group) != choice.groups.end();
+    if (!is_in) {
+      Choice with = choice;
+      with.groups.push_back(best.group);
+      with.scales.push_back(best.scale);
+      decision->state = evidence.evaluate(with);
+    }
+    decision->corrects[function] = best.group;
+    return !is_in;
+  }
+  const bool nothing_else_is_named = q.here.size() == 1 && q.what.kind == Kind::free;
+  if (nothing_else_is_named || q.what.law_test == LawTest::times_the_lengths) return false;
+  return replace_laws(work, robot, q, decision);
 }
 
 /// A law and a free function at one joint: either the law is right but for a correction, or it is not this law and its
 /// name would be wrong. Decided by how much of the motion the plain law makes.
 static void question_laws(Work* work, const Robot& robot, Decision* decision) {
-  drop_contained(work, decision);
+  drop_contained(*work, decision);
   for (int round = 0; round < 6; ++round) {
-    const auto& groups = work->design.candidates.groups;
-    const auto& named = work->design.candidates.named;
-    const Evidence evidence(work->train, groups, work->design.nuisance, work->design.prior);
-    const Choice& choice = decision->state.choice;
+    const Evidence evidence = evidence_now(*work);
     bool changed = false;
-    for (const int f : choice.groups) {
-      const Explanation& free = named[static_cast<std::size_t>(f)];
-      if ((free.kind != Kind::free && free.kind != Kind::law) || free.site == "base" || decision->corrects.count(f))
-        continue;
-      const std::size_t joint = robot.joint_index(free.site);
-      // Laws at this joint, in or out, against the function and them together.
-      std::vector<int> here = {f};
-      for (const int g : choice.groups) {
-        const Explanation& e = named[static_cast<std::size_t>(g)];
-        if (g != f && (e.kind == Kind::catalogue || e.kind == Kind::law) &&
-            e.joints == std::vector<std::string>{free.site} && e.effect != "link_geometry" &&
-            e.effect.rfind("transmission", 0) != 0)
-          here.push_back(g);
-      }
-      const Evidence::State rest = evidence.evaluate(without_these(choice, here));
-      const double together = rest.rss - evidence.evaluate(choice).rss;
-      Evidence::Gain best;
-      for (std::size_t g = 0; g < groups.size(); ++g) {
-        const Explanation& e = named[g];
-        if (e.kind != Kind::catalogue || groups[g].shadow || e.joints != std::vector<std::string>{free.site} ||
-            e.effect == "link_geometry" || e.effect.rfind("transmission", 0) == 0)
-          continue;
-        if (free.kind == Kind::law && e.effect != free.effect &&
-            groups[g].law_at != groups[static_cast<std::size_t>(f)].corrects_law_at)
-          continue;
-        Evidence::Gain gain = evidence.gain(rest, groups[g].columns, groups[g].cost);
-        const double share = gain.squares / std::max(together, 1e-300);
-        if (share > least_share_of_law(e.effect) && gain.score > best.score) {
-          best = gain;
-          best.group = static_cast<int>(g);
-        }
-      }
-      if (best.group >= 0) {
-        // The law stands; the function corrects it.
-        if (std::find(choice.groups.begin(), choice.groups.end(), best.group) == choice.groups.end()) {
-          Choice with = choice;
-          with.groups.push_back(best.group);
-          with.scales.push_back(best.scale);
-          decision->state = evidence.evaluate(with);
-          changed = true;
-        }
-        decision->corrects[f] = best.group;
-        if (changed) break;
-        continue;
-      }
-      if (here.size() == 1 && free.kind == Kind::free) continue;  // nothing else is named here
-      if (free.law_form == 2) continue;
-      // Not this law: the function alone, with more knots, for it and all laws of its inputs here.
-      std::vector<int> inputs = free.inputs;
-      if (free.law_form == 1) {
-        const int direction = input_named(*work, "dir" + std::to_string(joint + 1));
-        if (direction >= 0) inputs.insert(inputs.begin(), direction);
-      }
-      const bool by_configuration = std::all_of(inputs.begin(), inputs.end(), [&](int i) {
-        const std::string& name = work->inputs[static_cast<std::size_t>(i)].name;
-        return name[0] == 'q' || name.rfind("torque", 0) == 0;
-      });
-      std::vector<int> gone = {f};
-      for (const int g : here) {
-        const std::string& driver = named[static_cast<std::size_t>(g)].driver;
-        const bool of_these = std::any_of(inputs.begin(), inputs.end(), [&](int i) {
-          return work->inputs[static_cast<std::size_t>(i)].name == driver;
-        });
-        if (g != f &&
-            (of_these || (by_configuration && follows_configuration(named[static_cast<std::size_t>(g)].effect))))
-          gone.push_back(g);
-      }
-      if (gone.size() == 1 && free.kind == Kind::free) continue;
-      const Choice remaining = without_these(choice, gone);
-      const double before = cross_validated(*work, choice);
-      const int fine = add_fine_function(work, robot, joint, inputs);
-      extend_grams(work);
-      const Evidence again(work->train, work->design.candidates.groups, work->design.nuisance, work->design.prior);
-      const Evidence::Gain gain = again.gain(again.evaluate(remaining), columns_of(*work, {fine}), 0.0);
-      Choice alone = remaining;
-      alone.groups.push_back(fine);
-      alone.scales.push_back(gain.scale);
-      if (cross_validated(*work, alone) < 1.06 * before) {
-        decision->state = again.evaluate(alone);
-        changed = true;
-        break;
-      }
-      decision->corrects[f] = -1;  // both stay
+    for (const int f : Choice(decision->state.choice).groups) {
+      const Explanation& e = work->design.candidates.named[static_cast<std::size_t>(f)];
+      const bool is_function = e.kind == Kind::free || e.kind == Kind::law;
+      if (!is_function || e.site == "base" || decision->corrects.count(f)) continue;
+      changed = question_law(work, robot, evidence, f, decision);
+      if (changed) break;
     }
     if (!changed) break;
   }
-  drop_contained(work, decision);
+  drop_contained(*work, decision);
+}
+
+/// Is there a gap at all? Sets what noise alone reaches, and the threshold that it passes as often as is allowed.
+static void find_gap(const Work& work, Decision* out) {
+  const DiagnoseOptions& options = work.options;
+  const Evidence evidence = evidence_now(work);
+  out->first = evidence.gains(evidence.evaluate({}));
+  const Shortlist list = shortlist(work, {});
+  double best = -1e300;  // of the groups that the null is drawn over, and no others
+  for (const int g : list.which) best = std::max(best, out->first[static_cast<std::size_t>(g)].score);
+  const Gram gram = work.train.of(list.columns);
+  const Evidence few(gram, list.groups, list.nuisance, list.prior);
+  std::vector<double> null = few.null_scores(few.evaluate({}), kNullDraws, options.seed + 11);
+  int above = 1;
+  for (const double score : null) above += score >= best ? 1 : 0;
+  out->p_gap = static_cast<double>(above) / (static_cast<double>(null.size()) + 1.0);
+  std::sort(null.begin(), null.end());
+  if (null.empty()) return;
+  const double at = null[static_cast<std::size_t>(std::min<double>(
+      static_cast<double>(null.size()) - 1.0, (1.0 - options.false_alarm) * static_cast<double>(null.size())))];
+  out->search.threshold = std::max(out->search.threshold, at);
+}
+
+/// A free function on what is left, if it wins, and what it makes needless goes. True: it was taken.
+static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
+  const SearchOptions& search = out->search;
+  const bool room = static_cast<int>(out->state.choice.groups.size()) < search.most_groups;
+  if (!room || scan.best.empty() || scan.p > 0.02) return false;
+  const FreeGain& best = scan.best.front();
+  if (!(best.gain.score > search.threshold + 4.0 && best.gain.share > kFreeShare)) return false;
+  append_free(work, best, scan.tried);
+  extend_grams(work);
+  const Evidence with = evidence_now(*work);
+  Choice grown = out->state.choice;
+  grown.groups.push_back(static_cast<int>(work->design.candidates.groups.size()) - 1);
+  grown.scales.push_back(best.gain.scale);
+  Evidence::State next = with.improve(with.evaluate(grown), search);
+  next = keep_what_predicts(*work, with.search(search, next.choice));
+  if (!(next.score > out->state.score + search.threshold)) return false;
+  out->state = std::move(next);
+  return true;
 }
 
 Decision decide(Work* work, const Robot& robot) {
   const DiagnoseOptions& options = work->options;
   Decision out;
-  SearchOptions& search = out.search;
-  search.most_groups = options.max_effects;
-  const auto evidence_now = [&] {
-    return Evidence(work->train, work->design.candidates.groups, work->design.nuisance, work->design.prior);
-  };
-
-  // Is there a gap at all?
-  {
-    const Evidence evidence = evidence_now();
-    const Evidence::State nothing = evidence.evaluate({});
-    out.first = evidence.gains(nothing);
-    const Shortlist list = shortlist(*work, {});
-    double best = -1e300;  // of the groups that the null is drawn over, and no others
-    for (const int g : list.which) best = std::max(best, out.first[static_cast<std::size_t>(g)].score);
-    const Gram gram = work->train.of(list.columns);
-    const Evidence few(gram, list.groups, list.nuisance, list.prior);
-    std::vector<double> null = few.null_scores(few.evaluate({}), kNullDraws, options.seed + 11);
-    int above = 1;
-    for (const double score : null) above += score >= best ? 1 : 0;
-    out.p_gap = static_cast<double>(above) / (static_cast<double>(null.size()) + 1.0);
-    std::sort(null.begin(), null.end());
-    // The threshold that noise alone passes as often as is allowed.
-    if (!null.empty()) {
-      const double at = null[static_cast<std::size_t>(std::min<double>(
-          static_cast<double>(null.size()) - 1.0, (1.0 - options.false_alarm) * static_cast<double>(null.size())))];
-      search.threshold = std::max(search.threshold, at);
-    }
-  }
-
-  // Named effects; then free functions on what they leave, and what these make needless goes; then mesh orders.
-  out.state = keep_what_predicts(*work, evidence_now().search(search));
+  out.search.most_groups = options.max_effects;
+  find_gap(*work, &out);
+  // Named effects; then free functions on what they leave; then mesh orders.
+  out.state = keep_what_predicts(*work, evidence_now(*work).search(out.search));
   for (int round = 0; round < 6; ++round) {
-    const Evidence evidence = evidence_now();
+    const Evidence evidence = evidence_now(*work);
     FreeScanOptions scan_options;
     scan_options.seed = options.seed + 101 + static_cast<std::uint64_t>(round);
     const FreeScan scan = scan_free(work->design, evidence, out.state, work->inputs, robot, work->deff, scan_options);
     out.p_left = scan.p;
-    const bool room = static_cast<int>(out.state.choice.groups.size()) < search.most_groups;
-    if (room && !scan.best.empty() && scan.p <= 0.02 && scan.best.front().gain.score > search.threshold + 4.0 &&
-        scan.best.front().gain.share > kFreeShare) {
-      const FreeGain& best = scan.best.front();
-      append_free(work, best, scan.tried);
-      extend_grams(work);
-      const Evidence with = evidence_now();
-      Choice grown = out.state.choice;
-      grown.groups.push_back(static_cast<int>(work->design.candidates.groups.size()) - 1);
-      grown.scales.push_back(best.gain.scale);
-      Evidence::State next = with.improve(with.evaluate(grown), search);
-      next = keep_what_predicts(*work, with.search(search, next.choice));
-      if (next.score > out.state.score + search.threshold) {
-        out.state = std::move(next);
-        continue;
-      }
-    }
-    if (!add_meshes(work, evidence, out.state, robot, search.threshold + kMeshNats)) break;
+    if (add_free_function(work, scan, &out)) continue;
+    if (!add_meshes(work, evidence, out.state, robot, out.search.threshold + kMeshNats)) break;
     extend_grams(work);
-    Evidence::State next = keep_what_predicts(*work, evidence_now().search(search, out.state.choice));
-    if (next.score < out.state.score + search.threshold) break;
+    Evidence::State next = keep_what_predicts(*work, evidence_now(*work).search(out.search, out.state.choice));
+    if (next.score < out.state.score + out.search.threshold) break;
     out.state = std::move(next);
   }
   question_laws(work, robot, &out);
@@ -438,7 +482,7 @@ Decision decide(Work* work, const Robot& robot) {
     const bool only_named = std::all_of(out.state.choice.groups.begin(), out.state.choice.groups.end(), [&](int g) {
       return is_named(work->design.candidates.named[static_cast<std::size_t>(g)]);
     });
-    if (only_named && !out.state.choice.groups.empty()) out.state = evidence_now().evaluate({});
+    if (only_named && !out.state.choice.groups.empty()) out.state = evidence_now(*work).evaluate({});
   }
   return out;
 }

@@ -6,6 +6,7 @@
 #include "diagnosis/diagnosis.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -14,97 +15,133 @@
 #include "diagnosis/next_poses.hpp"
 #include "math/statistics.hpp"
 #include "math/text.hpp"
+#include "model/effects/traits.hpp"
 
 namespace truing::diagnosis {
 
 using Kind = Explanation::Kind;
 
-/// Motion of a site, pose by pose, as the measurements say it, and the fitted function through it.
-static Curve curve_of(const Work& work, const Evidence::State& state, const std::map<int, int>& corrects, int group,
-                      int input, int site_column, double second_low, double second_high, int second) {
-  const Design& design = work.design;
-  Curve out;
-  const InputColumn& along = work.inputs[static_cast<std::size_t>(input)];
-  out.input = along.name;
-  out.input_unit = along.unit;
-  out.unit = design.column_units[static_cast<std::size_t>(site_column)];
-  out.site = design.column_names[static_cast<std::size_t>(site_column)];
-  if (out.site.size() > 7 && out.site.compare(out.site.size() - 7, 7, ".offset") == 0)
-    out.site.resize(out.site.size() - 7);
-  if (second >= 0) {
-    out.second_input = work.inputs[static_cast<std::size_t>(second)].name;
-    out.second_low = second_low;
-    out.second_high = second_high;
-  }
-  const ColumnGroup& g = design.candidates.groups[static_cast<std::size_t>(group)];
+/// What a curve is drawn of: motion of a site against an input, for a range of a second one if there is one.
+struct Along {
+  int input = -1;
+  int site_column = -1;
+  int second = -1;
+  double low = 0.0, high = 0.0;
+};
+
+static bool is_among(const std::vector<int>& values, int value) {
+  return std::find(values.begin(), values.end(), value) != values.end();
+}
+
+/// Places, among the state's columns, of a group's own and of what corrects its law.
+static std::vector<std::size_t> columns_of_law(const Work& work, const Decision& decision, int group) {
+  const auto& groups = work.design.candidates.groups;
   std::vector<std::size_t> own;
-  for (std::size_t c = 0; c < state.columns.size(); ++c) {
-    const bool of_group = std::find(g.columns.begin(), g.columns.end(), state.columns[c]) != g.columns.end();
-    bool of_law = false;
-    for (const auto& [other, corrected] : corrects) {
-      const ColumnGroup& o = design.candidates.groups[static_cast<std::size_t>(other)];
-      of_law |=
-          corrected == group && std::find(o.columns.begin(), o.columns.end(), state.columns[c]) != o.columns.end();
-    }
-    if (of_group || of_law) own.push_back(c);
+  for (std::size_t c = 0; c < decision.state.columns.size(); ++c) {
+    const int column = decision.state.columns[c];
+    bool mine = is_among(groups[static_cast<std::size_t>(group)].columns, column);
+    for (const auto& [other, corrected] : decision.corrects)
+      mine |= corrected == group && is_among(groups[static_cast<std::size_t>(other)].columns, column);
+    if (mine) own.push_back(c);
   }
-  struct Sum {
-    double de = 0.0, dd = 0.0, df = 0.0;
-  };
-  std::map<std::int32_t, Sum> poses;  // by row
+  return own;
+}
+
+/// Of one row: the site's motion that its values show (de / dd) and that the law has (df / dd).
+struct RowSum {
+  double de = 0.0, dd = 0.0, df = 0.0;
+};
+
+static std::map<std::int32_t, RowSum> sums_by_row(const Work& work, const Evidence::State& state,
+                                                  const std::vector<std::size_t>& own, const Along& along) {
+  const Design& design = work.design;
+  std::map<std::int32_t, RowSum> sums;
   for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
     const std::int32_t row = design.row[static_cast<std::size_t>(i)];
-    if (second >= 0) {
-      const double value = work.inputs[static_cast<std::size_t>(second)].values[static_cast<std::size_t>(row)];
-      if (value < second_low || value > second_high) continue;
+    if (along.second >= 0) {
+      const double value = work.inputs[static_cast<std::size_t>(along.second)].values[static_cast<std::size_t>(row)];
+      if (value < along.low || value > along.high) continue;
     }
     double e = design.y[i], f = 0.0;
     for (std::size_t c = 0; c < state.columns.size(); ++c)
       e -= design.x(i, state.columns[c]) * state.solution[static_cast<Eigen::Index>(c)];
     for (const std::size_t c : own) f += design.x(i, state.columns[c]) * state.solution[static_cast<Eigen::Index>(c)];
-    const double w = design.weight[i], d = w * design.x(i, site_column);
-    Sum& sum = poses[row];
+    const double w = design.weight[i], d = w * design.x(i, along.site_column);
+    RowSum& sum = sums[row];
     sum.de += d * w * e;
     sum.df += d * w * f;
     sum.dd += d * d;
   }
-  if (poses.empty()) return out;
+  return sums;
+}
+
+/// What one pose says.
+struct Sample {
+  double x, value, fitted, lever;
+};
+
+/// Of the poses at which the site moves the tip well, by input.
+static std::vector<Sample> samples_of(const std::map<std::int32_t, RowSum>& sums, const InputColumn& input) {
   std::vector<double> levers;
-  for (const auto& [row, sum] : poses) levers.push_back(sum.dd);
-  const double least = 0.3 * median_of(levers);
-  struct Sample {
-    double x, value, fitted, lever;
-  };
+  for (const auto& [row, sum] : sums) levers.push_back(sum.dd);
+  const double least = sums.empty() ? 0.0 : 0.3 * median_of(levers);
   std::vector<Sample> samples;
-  for (const auto& [row, sum] : poses) {
+  for (const auto& [row, sum] : sums) {
     if (!(sum.dd > least) || !(sum.dd > 0.0)) continue;
     samples.push_back(
-        {along.values[static_cast<std::size_t>(row)], (sum.de + sum.df) / sum.dd, sum.df / sum.dd, sum.dd});
+        {input.values[static_cast<std::size_t>(row)], (sum.de + sum.df) / sum.dd, sum.df / sum.dd, sum.dd});
   }
-  if (samples.empty()) return out;
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.x < b.x; });
-  const std::size_t step = std::max<std::size_t>(1, samples.size() / 600);
-  for (std::size_t k = 0; k < samples.size(); k += step) out.samples.push_back({samples[k].x, samples[k].value});
-  // The fitted function: its mean over the poses near each place (exact when it depends on this input alone).
+  return samples;
+}
+
+/// The fitted function: its mean over the poses near each place (exact when it depends on this input alone).
+static std::vector<std::array<double, 3>> points_of(const std::vector<Sample>& samples, double sigma) {
+  constexpr std::size_t kBins = 24;
   std::vector<double> distinct;
   for (const Sample& s : samples) {
     if (distinct.empty() || s.x > distinct.back() + 1e-9) distinct.push_back(s.x);
   }
-  const std::size_t bins = std::min<std::size_t>(distinct.size(), 24);
-  const double sigma = std::sqrt(state.sigma2);
+  const bool few = distinct.size() <= kBins;
+  const std::size_t bins = std::min(distinct.size(), kBins);
+  std::vector<std::array<double, 3>> points;
   for (std::size_t b = 0; b < bins; ++b) {
-    const std::size_t from = distinct.size() <= 24 ? 0 : b * samples.size() / bins,
-                      to = distinct.size() <= 24 ? samples.size() : (b + 1) * samples.size() / bins;
+    const std::size_t from = few ? 0 : b * samples.size() / bins,
+                      to = few ? samples.size() : (b + 1) * samples.size() / bins;
     double x = 0.0, f = 0.0, weight = 0.0, lever = 0.0;
     for (std::size_t k = from; k < to; ++k) {
-      if (distinct.size() <= 24 && std::abs(samples[k].x - distinct[b]) > 1e-9) continue;
+      if (few && std::abs(samples[k].x - distinct[b]) > 1e-9) continue;
       x += samples[k].x;
       f += samples[k].fitted;
       lever += samples[k].lever;
       weight += 1.0;
     }
-    if (weight > 0.0) out.points.push_back({x / weight, f / weight, sigma / std::sqrt(lever)});
+    if (weight > 0.0) points.push_back({x / weight, f / weight, sigma / std::sqrt(lever)});
   }
+  return points;
+}
+
+/// Motion of a site, pose by pose, as the measurements say it, and the fitted function through it.
+static Curve curve_of(const Work& work, const Decision& decision, int group, const Along& along) {
+  const Design& design = work.design;
+  const InputColumn& input = work.inputs[static_cast<std::size_t>(along.input)];
+  Curve out;
+  out.input = input.name;
+  out.input_unit = input.unit;
+  out.unit = design.column_units[static_cast<std::size_t>(along.site_column)];
+  out.site = design.column_names[static_cast<std::size_t>(along.site_column)];
+  if (out.site.size() > 7 && out.site.compare(out.site.size() - 7, 7, ".offset") == 0)
+    out.site.resize(out.site.size() - 7);
+  if (along.second >= 0) {
+    out.second_input = work.inputs[static_cast<std::size_t>(along.second)].name;
+    out.second_low = along.low;
+    out.second_high = along.high;
+  }
+  const std::vector<std::size_t> own = columns_of_law(work, decision, group);
+  const std::vector<Sample> samples = samples_of(sums_by_row(work, decision.state, own, along), input);
+  const std::size_t step = std::max<std::size_t>(1, samples.size() / 600);
+  for (std::size_t k = 0; k < samples.size(); k += step) out.samples.push_back({samples[k].x, samples[k].value});
+  out.points = points_of(samples, std::sqrt(decision.state.sigma2));
   return out;
 }
 
@@ -114,22 +151,32 @@ static std::string at_joints(const std::vector<std::string>& joints) {
   return " at " + listed(joints);
 }
 
-static std::string separated_by(const std::string& a, const std::string& b) {
-  const auto pair_is = [&](const char* x, const char* y) { return (a == x && b == y) || (a == y && b == x); };
-  const auto one_is = [&](const char* x) { return a == x || b == x; };
-  if (one_is("backlash")) return "approach the same poses from both sides";
-  if (pair_is("thermal", "drift") || pair_is("thermal_zero", "drift"))
-    return "measure during warm-up and cool-down, or touch a fixed nest again and again";
-  if (one_is("thermal") || one_is("thermal_zero")) return "measure at two temperatures";
-  if (one_is("scale")) return "measure a scale bar of known length";
-  if (one_is("drift")) return "measure fixed points again and again";
-  if (pair_is("joint_compliance", "link_compliance")) return "put a target on the elbow, or measure orientations";
-  if (one_is("joint_compliance") || one_is("link_compliance") || one_is("stiffness_zones") ||
-      one_is("gravity_backlash"))
-    return "repeat the same poses with another payload";
-  if (one_is("gear_ratio") || one_is("harmonic")) return "use the joint's full range, both turns";
-  if (one_is("axis_wobble")) return "measure orientations as well";
-  return "measure poses where the two differ: see the next poses";
+static const EffectTraits& traits_of(const Work& work, const Explanation& e) {
+  return model::traits_of(e.effect, work.options.own_effects);
+}
+
+/// What the data vary, as far as it tells effects apart.
+static Recorded recorded(const Work& work) {
+  Recorded out;
+  for (const InputColumn& input : work.inputs) {
+    if (input.constant) continue;
+    out.direction |= input.joint >= 0 && !work.inferred_direction &&
+                     input.name == input_name(Driver::direction, static_cast<std::size_t>(input.joint));
+    out.payload |= input.name == "payload";
+    out.temperature |= input.name == input_name(Driver::temperature, 0);
+    out.time |= input.name == input_name(Driver::time, 0);
+  }
+  out.orientation = std::any_of(work.design.component.begin(), work.design.component.end(),
+                                [](std::int8_t component) { return kind_of(component) == 1; });
+  return out;
+}
+
+static std::string separated_by(const Work& work, const Explanation& a, const Explanation& b) {
+  const std::vector<Effect>& own = work.options.own_effects;
+  const std::string where_they_differ = "measure poses where the two differ: see the next poses";
+  const Effect *first = effect_or_null(a.effect, own), *second = effect_or_null(b.effect, own);
+  if (!first || !second) return where_they_differ;
+  return model::separated_by({first, a.joints}, {second, b.joints}, recorded(work), where_they_differ);
 }
 
 /// The effects that `identify` is to be asked for. None: a frame that wanders freely is no effect of its catalogue.
@@ -145,169 +192,202 @@ static std::string identify_as(const Explanation& e) {
   return out;
 }
 
+/// Values of the parameters of what was found by the search and is not refitted.
+static std::vector<Parameter> parameters_of_search(const Work& work, const Evidence::State& state,
+                                                   const Explanation& e) {
+  std::vector<Parameter> out;
+  for (const std::string& name : e.parameters) {
+    const int column = work.design.column(name);
+    const auto k = std::find(state.columns.begin(), state.columns.end(), column) - state.columns.begin();
+    if (column < 0 || k >= static_cast<std::ptrdiff_t>(state.columns.size())) continue;
+    const Eigen::VectorXd unit = Eigen::VectorXd::Unit(state.solution.size(), static_cast<Eigen::Index>(k));
+    const double variance = state.sigma2 * unit.dot(state.factor.solve(unit));
+    out.push_back({name, 0.0, state.solution[static_cast<Eigen::Index>(k)], std::sqrt(std::max(variance, 0.0)),
+                   work.design.column_units[static_cast<std::size_t>(column)], false});
+  }
+  return out;
+}
+
+static std::vector<Parameter> parameters_of(const Work& work, const Evidence::State& state, const Explanation& e,
+                                            const Identification& refitted) {
+  std::vector<Parameter> out;
+  for (const Parameter& parameter : refitted.parameters) {
+    if (std::find(e.parameters.begin(), e.parameters.end(), parameter.name) == e.parameters.end()) continue;
+    if (e.kind == Kind::drift) continue;  // a curve, not numbers
+    out.push_back(parameter);
+  }
+  if (out.empty() && e.kind == Kind::catalogue) return parameters_of_search(work, state, e);
+  return out;
+}
+
+/// How far the held-out error shrinks by one group, the last one in.
+struct Shrinkage {
+  ErrorStatistics before, after;
+  Share shrink;
+  double gap = 0.0;       ///< held-out sum of squares with no group
+  double closed_by_last;  ///< and what the group closes of it
+};
+
+static Shrinkage shrinkage_by(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
+                              const Resampled& resampled) {
+  const Evidence::State& state = decision.state;
+  const auto squares = [&](const Evidence::State& s) { return held_out_squares(work.test, s.columns, s.solution); };
+  const Evidence::State less = evidence.evaluate(without(state.choice, work.design.candidates.groups, at));
+  Shrinkage out;
+  out.before = error_statistics(held_out_lengths(work.design, less));
+  out.after = error_statistics(held_out_lengths(work.design, state));
+  const double shrink = out.before.rms > 0.0 ? 1.0 - out.after.rms / out.before.rms : 0.0;
+  const auto spread = resampled.shrink_of.find(state.choice.groups[at]);
+  out.shrink =
+      percentile_interval(spread == resampled.shrink_of.end() ? std::vector<double>{} : spread->second, shrink);
+  out.gap = squares(evidence.evaluate({}));
+  out.closed_by_last = squares(less) - squares(state);
+  return out;
+}
+
+/// Share of the gap that a group closes when it is the only one.
+static double share_alone(const Work& work, const Evidence& evidence, const Choice& choice, std::size_t at,
+                          double gap) {
+  Choice only;
+  only.groups = {choice.groups[at]};
+  only.scales = {choice.scales[at]};
+  const Evidence::State alone = evidence.evaluate(only);
+  return std::max(0.0, 1.0 - held_out_squares(work.test, alone.columns, alone.solution) / gap);
+}
+
+/// What could stand in its place by these data.
+static std::vector<Alternative> class_of(const Work& work, const Explanation& e, const Sureness& sure,
+                                         double probability) {
+  constexpr std::size_t kMost = 8;
+  std::vector<Alternative> out;
+  std::set<std::pair<std::string, std::vector<std::string>>> listed_already;
+  double rest = 0.0;
+  for (const Rival& rival : sure.rivals) rest += rival.in_class ? std::exp(-0.5 * std::max(0.0, rival.loss)) : 0.0;
+  for (const Rival& rival : sure.rivals) {
+    const Explanation& other = work.design.candidates.named[static_cast<std::size_t>(rival.group)];
+    if (!rival.in_class || !listed_already.insert({other.effect, other.joints}).second) continue;
+    out.push_back({other.effect, other.joints, probability * std::exp(-0.5 * std::max(0.0, rival.loss)) / (1.0 + rest),
+                   separated_by(work, e, other)});
+    if (out.size() >= kMost) break;
+  }
+  return out;
+}
+
+/// What was not recorded may do the same.
+static std::vector<Alternative> untested_mimics(const Work& work, const Explanation& e) {
+  std::vector<Alternative> out;
+  const std::vector<NotTestable>& untested = work.design.candidates.not_testable;
+  for (const std::string& name : traits_of(work, e).mimicked_by) {
+    const auto lacking = std::find_if(untested.begin(), untested.end(), [&](const NotTestable& n) {
+      return n.effect == name && n.reason == Untestable::column_missing;
+    });
+    if (lacking == untested.end()) continue;
+    const bool whole_robot = !find_effect(name, work.options.own_effects).per_joint;
+    out.push_back(
+        {name, whole_robot ? std::vector<std::string>{} : e.joints, 0.0, "record what it needs: " + lacking->why});
+  }
+  return out;
+}
+
+/// The law, drawn: over what corrects it, over its own input, or, of a wandering base, over time.
+static void draw_law(const Work& work, const Decision& decision, int g, FoundEffect* out) {
+  const auto& named = work.design.candidates.named;
+  const Explanation& e = named[static_cast<std::size_t>(g)];
+  const EffectTraits& traits = traits_of(work, e);
+  const auto at_joint = [&](int input) {
+    const std::size_t joint = work.frames.robot.joint_index(e.joints[0]);
+    return Along{input, work.design.joint_column[joint][0]};
+  };
+  for (const int other : decision.state.choice.groups) {
+    const auto corrected = decision.corrects.find(other);
+    if (corrected == decision.corrects.end() || corrected->second != g) continue;
+    const Explanation& correction = named[static_cast<std::size_t>(other)];
+    const std::string driver = work.inputs[static_cast<std::size_t>(correction.inputs[0])].name;
+    out->note +=
+        (out->note.empty() ? "" : "; ") + std::string("its law is not the simple one: see the curve over ") + driver;
+    const int input = input_named(work, driver);
+    if (input >= 0 && !e.joints.empty()) out->curves.push_back(curve_of(work, decision, g, at_joint(input)));
+  }
+  const int driver = input_named(work, e.driver);
+  if (driver < 0) return;
+  if (e.kind == Kind::catalogue && e.joints.size() == 1 && traits.moves == Moves::joint) {
+    const bool drawn =
+        std::any_of(out->curves.begin(), out->curves.end(), [&](const Curve& c) { return c.input == e.driver; });
+    if (!drawn) out->curves.push_back(curve_of(work, decision, g, at_joint(driver)));
+  }
+  if (traits.moves == Moves::base) {
+    for (std::size_t c = 0; c < 3 && c < work.design.base_columns.size(); ++c)
+      out->curves.push_back(curve_of(work, decision, g, {driver, work.design.base_columns[c]}));
+  }
+}
+
 /// What the user reads of one group.
 FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
                      const Sureness& sure, double probability, const Identification& refitted,
                      const Resampled& resampled) {
-  const auto& groups = work.design.candidates.groups;
-  const auto& named = work.design.candidates.named;
   const int g = decision.state.choice.groups[at];
-  const Explanation& e = named[static_cast<std::size_t>(g)];
+  const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
   FoundEffect out;
   out.effect = e.effect;
   out.joints = e.joints;
   out.note = e.note;
   out.identify_as = identify_as(e);
   out.probability = probability;
-  for (const Parameter& parameter : refitted.parameters) {
-    if (std::find(e.parameters.begin(), e.parameters.end(), parameter.name) == e.parameters.end()) continue;
-    if (e.kind == Kind::drift) continue;  // a curve, not numbers
-    out.parameters.push_back(parameter);
+  out.parameters = parameters_of(work, decision.state, e, refitted);
+  const Shrinkage shrinkage = shrinkage_by(work, evidence, decision, at, resampled);
+  out.held_out_before = shrinkage.before;
+  out.held_out_after = shrinkage.after;
+  out.shrink = shrinkage.shrink;
+  if (shrinkage.gap > 0.0) {
+    out.share_alone = share_alone(work, evidence, decision.state.choice, at, shrinkage.gap);
+    out.share_last = std::max(0.0, shrinkage.closed_by_last / shrinkage.gap);
   }
-  if (out.parameters.empty() && e.kind == Kind::catalogue) {  // found by the search
-    for (const std::string& name : e.parameters) {
-      const int column = work.design.column(name);
-      const auto k = std::find(decision.state.columns.begin(), decision.state.columns.end(), column) -
-                     decision.state.columns.begin();
-      if (column < 0 || k >= static_cast<std::ptrdiff_t>(decision.state.columns.size())) continue;
-      const Eigen::VectorXd unit = Eigen::VectorXd::Unit(decision.state.solution.size(), static_cast<Eigen::Index>(k));
-      const double variance = decision.state.sigma2 * unit.dot(decision.state.factor.solve(unit));
-      out.parameters.push_back({name, 0.0, decision.state.solution[static_cast<Eigen::Index>(k)],
-                                std::sqrt(std::max(variance, 0.0)),
-                                work.design.column_units[static_cast<std::size_t>(column)], false});
-    }
-  }
-  const Evidence::State less = evidence.evaluate(without(decision.state.choice, groups, at));
-  out.held_out_before = error_statistics(held_out_lengths(work.design, less));
-  out.held_out_after = error_statistics(held_out_lengths(work.design, decision.state));
-  const double shrink = out.held_out_before.rms > 0.0 ? 1.0 - out.held_out_after.rms / out.held_out_before.rms : 0.0;
-  const auto spread = resampled.shrink_of.find(g);
-  out.shrink =
-      percentile_interval(spread == resampled.shrink_of.end() ? std::vector<double>{} : spread->second, shrink);
-  const Evidence::State nothing = evidence.evaluate({});
-  Choice only;
-  only.groups = {g};
-  only.scales = {decision.state.choice.scales[at]};
-  const double gap = held_out_squares(work.test, nothing.columns, nothing.solution);
-  if (gap > 0.0) {
-    const Evidence::State alone = evidence.evaluate(only);
-    out.share_alone = std::max(0.0, 1.0 - held_out_squares(work.test, alone.columns, alone.solution) / gap);
-    out.share_last = std::max(0.0, (held_out_squares(work.test, less.columns, less.solution) -
-                                    held_out_squares(work.test, decision.state.columns, decision.state.solution)) /
-                                       gap);
-  }
-  std::set<std::pair<std::string, std::vector<std::string>>> listed_already;
-  double rest = 0.0;
-  for (const Rival& rival : sure.rivals) rest += rival.in_class ? std::exp(-0.5 * std::max(0.0, rival.loss)) : 0.0;
-  for (const Rival& rival : sure.rivals) {
-    const Explanation& other = named[static_cast<std::size_t>(rival.group)];
-    if (!rival.in_class || !listed_already.insert({other.effect, other.joints}).second) continue;
-    out.confounded_with.push_back({other.effect, other.joints,
-                                   probability * std::exp(-0.5 * std::max(0.0, rival.loss)) / (1.0 + rest),
-                                   separated_by(e.effect, other.effect)});
-    if (out.confounded_with.size() >= 8) break;
-  }
-  // What was not recorded may do the same.
-  static const std::map<std::string, std::vector<std::string>> mimics = {{"backlash", {"windup", "time_offset"}},
-                                                                         {"drift", {"thermal", "thermal_zero"}},
-                                                                         {"thermal", {"drift"}},
-                                                                         {"thermal_zero", {"drift"}},
-                                                                         {"joint_compliance", {"windup"}},
-                                                                         {"stiffness_zones", {"windup"}},
-                                                                         {"gravity_backlash", {"windup"}}};
-  const auto mimic = mimics.find(e.effect);
-  for (std::size_t k = 0; mimic != mimics.end() && k < mimic->second.size(); ++k) {
-    const auto untested =
-        std::find_if(work.design.candidates.not_testable.begin(), work.design.candidates.not_testable.end(),
-                     [&](const NotTestable& n) {
-                       return n.effect == mimic->second[k] && n.why.find("column") != std::string::npos;
-                     });
-    if (untested == work.design.candidates.not_testable.end()) continue;
-    const bool whole_robot = mimic->second[k] == "time_offset" || mimic->second[k] == "drift";
-    out.confounded_with.push_back({mimic->second[k], whole_robot ? std::vector<std::string>{} : e.joints, 0.0,
-                                   "record what it needs: " + untested->why});
-  }
-  // The law, drawn.
-  for (const int other : decision.state.choice.groups) {
-    const auto corrected = decision.corrects.find(other);
-    if (corrected == decision.corrects.end() || corrected->second != g) continue;
-    const Explanation& correction = named[static_cast<std::size_t>(other)];
-    const std::string driver = work.inputs[static_cast<std::size_t>(correction.inputs[0])].name;
-    out.note +=
-        (out.note.empty() ? "" : "; ") + std::string("its law is not the simple one: see the curve over ") + driver;
-    const int input = input_named(work, driver);
-    if (input >= 0 && !e.joints.empty()) {
-      const std::size_t joint = work.frames.robot.joint_index(e.joints[0]);
-      out.curves.push_back(
-          curve_of(work, decision.state, decision.corrects, g, input, work.design.joint_column[joint][0], 0, 0, -1));
-    }
-  }
-  const int driver = input_named(work, e.driver);
-  if (driver >= 0 && e.kind == Kind::catalogue && e.joints.size() == 1 && e.effect != "axis_wobble" &&
-      e.effect != "thermal" && e.effect != "link_compliance") {
-    const std::size_t joint = work.frames.robot.joint_index(e.joints[0]);
-    const bool drawn =
-        std::any_of(out.curves.begin(), out.curves.end(), [&](const Curve& c) { return c.input == e.driver; });
-    if (!drawn)
-      out.curves.push_back(
-          curve_of(work, decision.state, decision.corrects, g, driver, work.design.joint_column[joint][0], 0, 0, -1));
-  }
-  if (e.effect == "drift" && driver >= 0) {
-    for (std::size_t c = 0; c < 3 && c < work.design.base_columns.size(); ++c) {
-      Curve curve = curve_of(work, decision.state, decision.corrects, g, driver, work.design.base_columns[c], 0, 0, -1);
-      out.curves.push_back(std::move(curve));
-    }
+  out.confounded_with = class_of(work, e, sure, probability);
+  for (Alternative& mimic : untested_mimics(work, e)) out.confounded_with.push_back(std::move(mimic));
+  draw_law(work, decision, g, &out);
+  return out;
+}
+
+/// A free function of one input, or three slices along the second one.
+static std::vector<Curve> curves_of_function(const Work& work, const Decision& decision, int g, int site) {
+  const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
+  if (e.inputs.size() == 1) return {curve_of(work, decision, g, {e.inputs[0], site})};
+  std::vector<double> values = work.inputs[static_cast<std::size_t>(e.inputs[1])].values;
+  double edges[4];
+  edges[0] = *std::min_element(values.begin(), values.end());
+  edges[3] = *std::max_element(values.begin(), values.end());
+  edges[1] = quantile(&values, 1.0 / 3.0);
+  edges[2] = quantile(&values, 2.0 / 3.0);
+  std::vector<Curve> out;
+  for (int k = 0; k < 3; ++k) {
+    Curve curve = curve_of(work, decision, g, {e.inputs[0], site, e.inputs[1], edges[k], edges[k + 1]});
+    if (!curve.points.empty()) out.push_back(std::move(curve));
   }
   return out;
 }
 
 UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
                                const Resampled& resampled) {
-  const auto& groups = work.design.candidates.groups;
   const int g = decision.state.choice.groups[at];
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
   UnknownEffect out;
   out.joint = e.site;
   for (const int input : e.inputs) out.inputs.push_back(work.inputs[static_cast<std::size_t>(input)].name);
-  const Evidence::State less = evidence.evaluate(without(decision.state.choice, groups, at));
-  out.held_out_before = error_statistics(held_out_lengths(work.design, less));
-  out.held_out_after = error_statistics(held_out_lengths(work.design, decision.state));
-  const double shrink = out.held_out_before.rms > 0.0 ? 1.0 - out.held_out_after.rms / out.held_out_before.rms : 0.0;
-  const auto spread = resampled.shrink_of.find(g);
-  out.shrink =
-      percentile_interval(spread == resampled.shrink_of.end() ? std::vector<double>{} : spread->second, shrink);
-  const double gap = held_out_squares(work.test, evidence.evaluate({}).columns, evidence.evaluate({}).solution);
-  if (gap > 0.0) {
-    out.share = std::max(0.0, held_out_squares(work.test, less.columns, less.solution) -
-                                  held_out_squares(work.test, decision.state.columns, decision.state.solution)) /
-                gap;
-  }
+  const Shrinkage shrinkage = shrinkage_by(work, evidence, decision, at, resampled);
+  out.held_out_before = shrinkage.before;
+  out.held_out_after = shrinkage.after;
+  out.shrink = shrinkage.shrink;
+  if (shrinkage.gap > 0.0) out.share = std::max(0.0, shrinkage.closed_by_last) / shrinkage.gap;
+  const Evidence::State less = evidence.evaluate(without(decision.state.choice, work.design.candidates.groups, at));
   const double loss = decision.state.score - less.score;
   out.probability = std::clamp(0.5 + 0.49 * std::min(1.0, loss / 30.0), 0.0, 0.99);
   std::vector<int> sites = work.design.base_columns;
-  if (e.site != "base") {
-    const std::size_t joint = work.frames.robot.joint_index(e.site);
-    sites = work.design.joint_column[joint];
-  } else if (sites.size() > 3) {
+  if (e.site != "base")
+    sites = work.design.joint_column[work.frames.robot.joint_index(e.site)];
+  else if (sites.size() > 3)
     sites.resize(3);
-  }
   for (const int site : sites) {
-    if (e.inputs.size() == 1) {
-      out.curves.push_back(curve_of(work, decision.state, decision.corrects, g, e.inputs[0], site, 0, 0, -1));
-      continue;
-    }
-    // Three slices along the second input.
-    std::vector<double> values = work.inputs[static_cast<std::size_t>(e.inputs[1])].values;
-    double edges[4];
-    edges[0] = *std::min_element(values.begin(), values.end());
-    edges[3] = *std::max_element(values.begin(), values.end());
-    edges[1] = quantile(&values, 1.0 / 3.0);
-    edges[2] = quantile(&values, 2.0 / 3.0);
-    for (int k = 0; k < 3; ++k) {
-      Curve curve =
-          curve_of(work, decision.state, decision.corrects, g, e.inputs[0], site, edges[k], edges[k + 1], e.inputs[1]);
-      if (!curve.points.empty()) out.curves.push_back(std::move(curve));
-    }
+    for (Curve& curve : curves_of_function(work, decision, g, site)) out.curves.push_back(std::move(curve));
   }
   if (!out.curves.empty() && e.inputs.size() == 1 && e.site != "base") out.looks_like = shape_of(out.curves[0]);
   if (e.inputs.size() == 2) out.looks_like = "depends on both " + out.inputs[0] + " and " + out.inputs[1];
@@ -376,7 +456,7 @@ std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidenc
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const Explanation& e = named[g];
     if (e.kind != Kind::catalogue || groups[g].columns.empty() || groups[g].shadow ||
-        e.effect.rfind("transmission_error", 0) == 0)
+        traits_of(work, e).search == Search::by_order)
       continue;
     const std::vector<int>& chosen = state.choice.groups;
     if (std::find(chosen.begin(), chosen.end(), static_cast<int>(g)) != chosen.end()) continue;
@@ -440,54 +520,60 @@ void add_next_poses(const Work& work, const Measurements& data, const DiagnoseOp
   }
 }
 
+/// The smallest effect that would have shown: play if there is one, of which everybody has an idea.
+static std::string would_have_shown(const std::vector<Detectable>& detectable) {
+  if (detectable.empty()) return "";
+  const auto rank = [](const Detectable& d) {
+    return (model::traits_of(d.effect, {}).driver == Driver::direction ? 0.0 : 1.0) + d.size_at_tip;
+  };
+  const Detectable& easiest =
+      *std::min_element(detectable.begin(), detectable.end(),
+                        [&](const Detectable& a, const Detectable& b) { return rank(a) < rank(b); });
+  const ReportUnit& shown = model::traits_of(easiest.effect, {}).reported;
+  const bool converted = easiest.unit == shown.of;
+  return " A " + easiest.effect + (easiest.joint.empty() ? "" : " at " + easiest.joint) + " above " +
+         number(converted ? shown.factor * easiest.size : easiest.size, 2) + " " +
+         (converted ? shown.unit : easiest.unit) + " would have shown.";
+}
+
+static std::string causes_in_words(const Diagnosis& d) {
+  constexpr std::size_t kMost = 4;
+  if (d.effects.empty())
+    return "There is a gap of " + millimetres(d.gap.rms) + " that no effect of the catalogue explains.";
+  std::string text = "The gap of " + millimetres(d.gap.rms) + " shrinks to " + millimetres(d.after.rms) + ": ";
+  const std::size_t shown = std::min(d.effects.size(), kMost);
+  for (std::size_t k = 0; k < shown; ++k) {
+    const FoundEffect& effect = d.effects[k];
+    text += (k == 0 ? "" : k + 1 == shown ? " and " : ", ") + effect.effect + at_joints(effect.joints);
+    if (effect.confounded_with.empty() || !(effect.confounded_with[0].probability > 0.0)) continue;
+    const Alternative& other = effect.confounded_with[0];
+    text += " (or " + other.effect + at_joints(other.joints) + ": these data cannot tell)";
+  }
+  if (d.effects.size() > kMost) text += " and " + std::to_string(d.effects.size() - kMost) + " more";
+  return text + ".";
+}
+
+static std::string unknown_in_words(const Diagnosis& d) {
+  if (d.unknown.empty()) return "";
+  const UnknownEffect& u = d.unknown[0];
+  if (u.inputs.empty()) {
+    return " Repeats show a noise of " + millimetres(d.noise_floor) +
+           ": something is there that no function of what was recorded describes.";
+  }
+  const bool of_two = u.inputs.size() == 2;
+  return " Unknown: " + (u.joint.empty() ? std::string("something") : u.joint) + " moves as a function of " +
+         (of_two                   ? u.inputs[0] + " and " + u.inputs[1]
+          : u.inputs[0] == "order" ? std::string("the order of the rows")
+                                   : listed(u.inputs)) +
+         (u.looks_like.empty() || of_two || u.joint == "base" ? "" : " (" + u.looks_like + ")") + ".";
+}
+
 std::string sentence_of(const Diagnosis& d) {
-  const std::string gap = millimetres(d.gap.rms);
-  std::string text;
   if (d.verdict == Verdict::none) {
-    text =
-        "No gap beyond noise: " + gap + " rms on held-out poses, of which noise is " + millimetres(d.noise_floor) + ".";
-    if (!d.detectable.empty()) {
-      const auto easiest =
-          std::min_element(d.detectable.begin(), d.detectable.end(), [](const Detectable& a, const Detectable& b) {
-            return (a.effect == "backlash" ? 0.0 : 1.0) + a.size_at_tip <
-                   (b.effect == "backlash" ? 0.0 : 1.0) + b.size_at_tip;
-          });
-      const bool angle = easiest->unit == "rad";
-      text += " A " + easiest->effect + (easiest->joint.empty() ? "" : " at " + easiest->joint) + " above " +
-              number(angle ? 1e3 * easiest->size : easiest->size, 2) + (angle ? " mrad" : " " + easiest->unit) +
-              " would have shown.";
-    }
-    return text;
+    return "No gap beyond noise: " + millimetres(d.gap.rms) + " rms on held-out poses, of which noise is " +
+           millimetres(d.noise_floor) + "." + would_have_shown(d.detectable);
   }
-  if (!d.effects.empty()) {
-    text = "The gap of " + gap + " shrinks to " + millimetres(d.after.rms) + ": ";
-    for (std::size_t k = 0; k < d.effects.size() && k < 4; ++k) {
-      text += (k == 0                                                ? ""
-               : k + 1 == std::min<std::size_t>(d.effects.size(), 4) ? " and "
-                                                                     : ", ") +
-              d.effects[k].effect + at_joints(d.effects[k].joints);
-      if (!d.effects[k].confounded_with.empty() && d.effects[k].confounded_with[0].probability > 0.0) {
-        text += " (or " + d.effects[k].confounded_with[0].effect + at_joints(d.effects[k].confounded_with[0].joints) +
-                ": these data cannot tell)";
-      }
-    }
-    if (d.effects.size() > 4) text += " and " + std::to_string(d.effects.size() - 4) + " more";
-    text += ".";
-  } else {
-    text = "There is a gap of " + gap + " that no effect of the catalogue explains.";
-  }
-  if (!d.unknown.empty() && d.unknown[0].inputs.empty()) {
-    text += " Repeats show a noise of " + millimetres(d.noise_floor) +
-            ": something is there that no function of what was recorded describes.";
-  } else if (!d.unknown.empty()) {
-    const UnknownEffect& u = d.unknown[0];
-    text += " Unknown: " + (u.joint.empty() ? std::string("something") : u.joint) + " moves as a function of " +
-            (u.inputs.size() == 2     ? u.inputs[0] + " and " + u.inputs[1]
-             : u.inputs[0] == "order" ? std::string("the order of the rows")
-                                      : listed(u.inputs)) +
-            (u.looks_like.empty() || u.inputs.size() == 2 || u.joint == "base" ? "" : " (" + u.looks_like + ")") + ".";
-  }
-  return text;
+  return causes_in_words(d) + unknown_in_words(d);
 }
 
 }  // namespace truing::diagnosis

@@ -131,7 +131,7 @@ std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evide
       const int g = decision->state.choice.groups[at];
       if (!is_named(work.design.candidates.named[static_cast<std::size_t>(g)])) continue;
       const Sureness sure = how_sure(work, evidence, decision->state, at);
-      out[g] = {sure, calibrated(sure.raw, came_back(work, resampled, sure, g), sure.removal_loss)};
+      out[g] = {sure, calibrated(sure.raw, selection_frequency(work, resampled, sure, g), sure.removal_loss)};
     }
     const auto least = std::min_element(out.begin(), out.end(), [](const auto& a, const auto& b) {
       return a.second.probability < b.second.probability;

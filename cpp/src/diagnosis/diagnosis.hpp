@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/candidates.hpp"
+#include "diagnosis/design.hpp"
 #include "diagnosis/linearise.hpp"
 #include "estimation/evidence.hpp"
 #include "rooms.hpp"
@@ -121,8 +121,8 @@ bool same_name(const Explanation& a, const Explanation& b);
 bool contains(const Explanation& large, const Explanation& small);
 Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at);
 Resampled resample(const Work& work, const Decision& decision);
-double came_back(const Work& work, const Resampled& resampled, const Sureness& sure, int group);
-double calibrated(double posterior, double came_back, double removal_loss);
+double selection_frequency(const Work& work, const Resampled& resampled, const Sureness& sure, int group);
+double calibrated(double posterior, double selection_frequency, double removal_loss);
 
 // --- refit.cpp: how far the error shrinks ----------------------------------------------------------------------------
 

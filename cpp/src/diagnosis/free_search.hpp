@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "diagnosis/candidates.hpp"
+#include "diagnosis/design.hpp"
 #include "estimation/evidence.hpp"
 #include "rooms.hpp"
 

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "math/random.hpp"
+#include "model/effects/traits.hpp"
 
 namespace truing::diagnosis {
 
@@ -19,56 +20,104 @@ constexpr double kClassNats = 3.0;
 
 bool same_name(const Explanation& a, const Explanation& b) { return a.effect == b.effect && a.joints == b.joints; }
 
-/// link_geometry contains the same link's zero: a name for more of the same.
+/// All links contain each link, a link the joint's zero: a name for more of the same.
 bool contains(const Explanation& large, const Explanation& small) {
-  if (large.effect != "link_geometry") return false;
-  if (small.effect != "joint_offset" && small.effect != "link_geometry") return false;
-  return large.joints.size() > small.joints.size() || (small.effect == "joint_offset" && large.joints == small.joints);
+  const bool same_effect = large.effect == small.effect;
+  const bool is_part = is_contained(model::traits_of(small.effect, {}), large.effect, Containment::part);
+  if (!same_effect && !is_part) return false;
+  return large.joints.size() > small.joints.size() || (is_part && large.joints == small.joints);
 }
 
-Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at) {
-  constexpr double kTempered = 0.5;  // no model is exact: half a nat counts for one
-  const auto& groups = work.design.candidates.groups;
-  const auto& named = work.design.candidates.named;
-  const int g = state.choice.groups[at];
-  const Evidence::State less = evidence.evaluate(without(state.choice, groups, at));
-  Eigen::VectorXd theta(static_cast<Eigen::Index>(groups[static_cast<std::size_t>(g)].columns.size()));
+/// What all links together could do as well, though it is no geometry.
+static bool looks_like_geometry(const Work& work, const Explanation& e) {
+  const std::string& links = effect_that_stands_for(StandsFor::link_geometry).name;
+  return is_contained(model::traits_of(e.effect, work.options.own_effects), links, Containment::look_alike);
+}
+
+/// Fitted values of a chosen group's columns.
+static Eigen::VectorXd solution_of(const Evidence::State& state, const ColumnGroup& group) {
+  Eigen::VectorXd theta(static_cast<Eigen::Index>(group.columns.size()));
   for (Eigen::Index k = 0; k < theta.size(); ++k) {
-    const int column = groups[static_cast<std::size_t>(g)].columns[static_cast<std::size_t>(k)];
+    const int column = group.columns[static_cast<std::size_t>(k)];
     const auto found = std::find(state.columns.begin(), state.columns.end(), column) - state.columns.begin();
     theta[k] = state.solution[static_cast<Eigen::Index>(found)];
   }
-  Sureness out;
-  out.removal_loss = state.score - less.score;
-  double all = 1.0 + std::exp(-kTempered * std::max(0.0, out.removal_loss)), of_class = 1.0;
-  const double gained = less.rss - state.rss;
-  for (const Evidence::Gain& gain : evidence.gains(less)) {
-    const Explanation& e = named[static_cast<std::size_t>(gain.group)];
-    const ColumnGroup& group = groups[static_cast<std::size_t>(gain.group)];
-    if (gain.group == g || group.corrects_law_at >= 0 || group.columns.empty() || e.kind == Kind::free) continue;
-    if (same_name(e, named[static_cast<std::size_t>(g)]) || contains(e, named[static_cast<std::size_t>(g)]) ||
-        e.kind == Kind::drift)
-      continue;
-    if (std::find(less.choice.groups.begin(), less.choice.groups.end(), gain.group) != less.choice.groups.end())
-      continue;
-    Rival rival;
-    rival.group = gain.group;
-    rival.loss = state.score - less.score - gain.score;
-    const std::string& mine = named[static_cast<std::size_t>(g)].effect;
-    const bool any_geometry = e.kind == Kind::all_geometry;
-    if (gain.squares > 0.5 * gained || (any_geometry && (mine == "scale" || mine == "thermal"))) {
-      rival.r2 = evidence.explained(less, groups[static_cast<std::size_t>(g)].columns, theta, group.columns);
-      // Or the other way round: a plainer one that this one contains, and that closes nearly as much.
-      if (group.columns.size() == 1 && gain.squares > 0.8 * gained) {
-        rival.r2 = std::max(rival.r2, evidence.explained(less, group.columns, Eigen::VectorXd::Ones(1),
-                                                         groups[static_cast<std::size_t>(g)].columns));
-      }
-    }
+  return theta;
+}
+
+/// The choice without one of its groups, and what may stand in that one's place.
+class Contest {
+ public:
+  Contest(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at)
+      : groups_(work.design.candidates.groups),
+        named_(work.design.candidates.named),
+        evidence_(evidence),
+        group_(state.choice.groups[at]),
+        less_(evidence.evaluate(without(state.choice, groups_, at))),
+        theta_(solution_of(state, mine())),
+        loss_(state.score - less_.score),
+        gained_(less_.rss - state.rss),
+        like_geometry_(looks_like_geometry(work, name())) {}
+
+  double removal_loss() const { return loss_; }
+  std::vector<Evidence::Gain> gains() const { return evidence_.gains(less_); }
+
+  bool is_rival(int group) const {
+    const Explanation& e = named_[static_cast<std::size_t>(group)];
+    const ColumnGroup& columns = groups_[static_cast<std::size_t>(group)];
+    const std::vector<int>& in = less_.choice.groups;
+    return group != group_ && columns.corrects_law_at < 0 && !columns.columns.empty() && e.kind != Kind::free &&
+           e.kind != Kind::drift && !same_name(e, name()) && !contains(e, name()) &&
+           std::find(in.begin(), in.end(), group) == in.end();
+  }
+
+  Rival rival(const Evidence::Gain& gain) const {
+    Rival out;
+    out.group = gain.group;
+    out.loss = loss_ - gain.score;
+    const bool any_geometry = named_[static_cast<std::size_t>(gain.group)].kind == Kind::all_geometry;
+    if (gain.squares > 0.5 * gained_ || (any_geometry && like_geometry_)) out.r2 = explained(gain);
     // What can make the same motion is named with it, even where the last per cents speak for one of them: no law is
     // that exact.
-    const bool comparable = any_geometry ? mine == "scale" || mine == "thermal" : gain.rank <= 8;
-    rival.in_class = rival.loss < kClassNats || (rival.r2 > kClassR2 && comparable);
-    const double weight = group.shadow ? 0.0 : std::exp(-kTempered * std::max(0.0, rival.loss));
+    const bool comparable = any_geometry ? like_geometry_ : gain.rank <= 8;
+    out.in_class = out.loss < kClassNats || (out.r2 > kClassR2 && comparable);
+    return out;
+  }
+
+ private:
+  const ColumnGroup& mine() const { return groups_[static_cast<std::size_t>(group_)]; }
+  const Explanation& name() const { return named_[static_cast<std::size_t>(group_)]; }
+
+  double explained(const Evidence::Gain& gain) const {
+    const ColumnGroup& other = groups_[static_cast<std::size_t>(gain.group)];
+    const double r2 = evidence_.explained(less_, mine().columns, theta_, other.columns);
+    // Or the other way round: a plainer one that this one contains, and that closes nearly as much.
+    if (other.columns.size() != 1 || !(gain.squares > 0.8 * gained_)) return r2;
+    return std::max(r2, evidence_.explained(less_, other.columns, Eigen::VectorXd::Ones(1), mine().columns));
+  }
+
+  const std::vector<ColumnGroup>& groups_;
+  const std::vector<Explanation>& named_;
+  const Evidence& evidence_;
+  int group_;
+  Evidence::State less_;
+  Eigen::VectorXd theta_;
+  double loss_;    ///< of score, without the group [nats]
+  double gained_;  ///< fall of the sum of squares with it
+  bool like_geometry_;
+};
+
+Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at) {
+  constexpr double kTempered = 0.5;  // no model is exact: half a nat counts for one
+  const Contest contest(work, evidence, state, at);
+  Sureness out;
+  out.removal_loss = contest.removal_loss();
+  double all = 1.0 + std::exp(-kTempered * std::max(0.0, out.removal_loss)), of_class = 1.0;
+  for (const Evidence::Gain& gain : contest.gains()) {
+    if (!contest.is_rival(gain.group)) continue;
+    const Rival rival = contest.rival(gain);
+    const bool shadow = work.design.candidates.groups[static_cast<std::size_t>(gain.group)].shadow;
+    const double weight = shadow ? 0.0 : std::exp(-kTempered * std::max(0.0, rival.loss));
     all += weight;
     if (rival.in_class) of_class += weight;
     if (rival.in_class || weight > 1e-3) out.rivals.push_back(rival);
@@ -79,61 +128,84 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
   return out;
 }
 
-Resampled resample(const Work& work, const Decision& decision) {
+/// A bootstrap draw of the folds.
+static Gram drawn(const std::vector<Gram>& folds, Random* random) {
+  std::vector<double> times(folds.size(), 0.0);
+  for (std::size_t k = 0; k < folds.size(); ++k) times[random->below(folds.size())] += 1.0;
+  Gram sum;
+  for (std::size_t k = 0; k < folds.size(); ++k) {
+    if (times[k] > 0.0) sum.add(folds[k], times[k]);
+  }
+  return sum;
+}
+
+static std::vector<Gram> of_columns(const std::vector<Gram>& folds, const std::vector<int>& columns) {
+  std::vector<Gram> out;
+  for (const Gram& fold : folds) out.push_back(fold.of(columns));
+  return out;
+}
+
+/// The selection repeated on draws of the training folds.
+static std::vector<std::vector<int>> select_again(const Work& work, const Decision& decision, Random* random) {
   constexpr int kSelections = 10;
-  Resampled out;
-  Random random(work.options.seed + 7);
-  const auto& groups = work.design.candidates.groups;
-  const auto drawn = [&](const std::vector<Gram>& folds) {
-    std::vector<double> times(folds.size(), 0.0);
-    for (std::size_t k = 0; k < folds.size(); ++k) times[random.below(folds.size())] += 1.0;
-    Gram sum;
-    for (std::size_t k = 0; k < folds.size(); ++k) {
-      if (times[k] > 0.0) sum.add(folds[k], times[k]);
-    }
-    return sum;
-  };
   SearchOptions quick = decision.search;
   quick.beam = 1;
   const Shortlist list = shortlist(work, decision.state.choice.groups);
-  std::vector<Gram> short_folds;
-  for (const Gram& fold : work.fold) short_folds.push_back(fold.of(list.columns));
+  const std::vector<Gram> folds = of_columns(work.fold, list.columns);
+  std::vector<std::vector<int>> chosen;
   for (int r = 0; r < std::min(kSelections, work.options.resamples); ++r) {
-    const Gram train = drawn(short_folds);
-    out.chosen.emplace_back();
-    for (const int g : Evidence(train, list.groups, list.nuisance, list.prior).search(quick).choice.groups) {
-      out.chosen.back().push_back(list.which[static_cast<std::size_t>(g)]);
-    }
+    const Gram train = drawn(folds, random);
+    chosen.emplace_back();
+    for (const int g : Evidence(train, list.groups, list.nuisance, list.prior).search(quick).choice.groups)
+      chosen.back().push_back(list.which[static_cast<std::size_t>(g)]);
   }
-  // How far the error shrinks takes the chosen columns only.
-  const std::vector<int>& columns = decision.state.columns;
-  std::vector<ColumnGroup> few;
-  std::vector<int> nuisance(work.design.nuisance.size());
-  std::iota(nuisance.begin(), nuisance.end(), 0);
+  return chosen;
+}
+
+/// The chosen groups alone, on a Gram of the nuisance columns and theirs.
+struct ChosenOnly {
+  std::vector<ColumnGroup> groups;
+  std::vector<int> nuisance;
   Choice choice;
-  int next = static_cast<int>(nuisance.size());
-  for (std::size_t k = 0; k < decision.state.choice.groups.size(); ++k) {
-    ColumnGroup group = groups[static_cast<std::size_t>(decision.state.choice.groups[k])];
+  Eigen::VectorXd prior;
+};
+
+static ChosenOnly chosen_only(const Work& work, const Evidence::State& state) {
+  ChosenOnly out;
+  out.nuisance.resize(work.design.nuisance.size());
+  std::iota(out.nuisance.begin(), out.nuisance.end(), 0);
+  int next = static_cast<int>(out.nuisance.size());
+  for (std::size_t k = 0; k < state.choice.groups.size(); ++k) {
+    ColumnGroup group = work.design.candidates.groups[static_cast<std::size_t>(state.choice.groups[k])];
     for (int& column : group.columns) column = next++;
-    few.push_back(group);
-    choice.groups.push_back(static_cast<int>(k));
-    choice.scales.push_back(decision.state.choice.scales[k]);
+    out.groups.push_back(group);
+    out.choice.groups.push_back(static_cast<int>(k));
+    out.choice.scales.push_back(state.choice.scales[k]);
   }
-  std::vector<Gram> train_folds, test_folds;
-  for (const Gram& fold : work.fold) train_folds.push_back(fold.of(columns));
-  for (const Gram& fold : work.test_fold) test_folds.push_back(fold.of(columns));
-  Eigen::VectorXd prior(static_cast<Eigen::Index>(columns.size()));
-  for (Eigen::Index k = 0; k < prior.size(); ++k) prior[k] = work.design.prior[columns[static_cast<std::size_t>(k)]];
+  out.prior.resize(static_cast<Eigen::Index>(state.columns.size()));
+  for (Eigen::Index k = 0; k < out.prior.size(); ++k)
+    out.prior[k] = work.design.prior[state.columns[static_cast<std::size_t>(k)]];
+  return out;
+}
+
+Resampled resample(const Work& work, const Decision& decision) {
+  Random random(work.options.seed + 7);
+  Resampled out;
+  out.chosen = select_again(work, decision, &random);
+  // How far the error shrinks takes the chosen columns only.
+  const ChosenOnly few = chosen_only(work, decision.state);
+  const std::vector<Gram> train_folds = of_columns(work.fold, decision.state.columns),
+                          test_folds = of_columns(work.test_fold, decision.state.columns);
   for (int r = 0; r < work.options.resamples; ++r) {
-    const Gram train = drawn(train_folds), test = drawn(test_folds);
+    const Gram train = drawn(train_folds, &random), test = drawn(test_folds, &random);
     if (!(test.n > 0.0)) break;
-    const Evidence evidence(train, few, nuisance, prior);
-    const Evidence::State refitted = evidence.evaluate(choice), nothing = evidence.evaluate({});
+    const Evidence evidence(train, few.groups, few.nuisance, few.prior);
+    const Evidence::State refitted = evidence.evaluate(few.choice), nothing = evidence.evaluate({});
     const double before = std::max(held_out_squares(test, nothing.columns, nothing.solution), 1e-300);
     const double after = std::max(0.0, held_out_squares(test, refitted.columns, refitted.solution));
     out.shrink.push_back(1.0 - std::sqrt(after / before));
-    for (std::size_t at = 0; at < choice.groups.size(); ++at) {
-      const Evidence::State less = evidence.evaluate(without(choice, few, at));
+    for (std::size_t at = 0; at < few.choice.groups.size(); ++at) {
+      const Evidence::State less = evidence.evaluate(without(few.choice, few.groups, at));
       const double lesser = std::max(held_out_squares(test, less.columns, less.solution), 1e-300);
       out.shrink_of[decision.state.choice.groups[at]].push_back(1.0 - std::sqrt(after / lesser));
     }
@@ -141,9 +213,9 @@ Resampled resample(const Work& work, const Decision& decision) {
   return out;
 }
 
-/// How often the resampled selections hold the group or one of its class; one more success and one more trial stand for
-/// the data's own.
-double came_back(const Work& work, const Resampled& resampled, const Sureness& sure, int group) {
+/// Share of the resampled selections that hold the group or one of its class; one more success and one more trial stand
+/// for the data's own.
+double selection_frequency(const Work& work, const Resampled& resampled, const Sureness& sure, int group) {
   const auto& named = work.design.candidates.named;
   double back = 1.0, draws = 1.0;
   for (const std::vector<int>& chosen : resampled.chosen) {
@@ -162,8 +234,8 @@ double came_back(const Work& work, const Resampled& resampled, const Sureness& s
 /// Stated confidence from what it rests on: the posterior of the class, how often resampled poses bring it back, and
 /// what is lost without it. Mapped so that it says how often such names were right on development sets of the
 /// examination (docs/method/exam.md).
-double calibrated(double posterior, double came_back, double removal_loss) {
-  const double score = 0.45 * posterior + 0.35 * came_back + 0.2 * std::min(removal_loss, 40.0) / 40.0;
+double calibrated(double posterior, double selection_frequency, double removal_loss) {
+  const double score = 0.45 * posterior + 0.35 * selection_frequency + 0.2 * std::min(removal_loss, 40.0) / 40.0;
   constexpr double kMap[6][2] = {{0.0, 0.05}, {0.5, 0.3}, {0.7, 0.64}, {0.9, 0.74}, {0.975, 0.8}, {0.998, 0.95}};
   for (int k = 1; k < 6; ++k) {
     if (score <= kMap[k][0])

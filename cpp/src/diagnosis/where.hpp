@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "diagnosis/candidates.hpp"
+#include "diagnosis/design.hpp"
 #include "rooms.hpp"
 #include "truing/diagnose.hpp"
 

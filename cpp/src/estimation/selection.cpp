@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <string>
 
+#include "model/effects/traits.hpp"
+
 namespace truing::estimation {
 
 Content content_of(const Model& model, const std::vector<Segment>& segments) {
@@ -27,65 +29,116 @@ Content content_of(const Model& model, const std::vector<Segment>& segments) {
   return content;
 }
 
-std::vector<int> select_free(const Model& model, const Content& content, const ParameterSelection& selection) {
-  const std::vector<bool> parallel = near_parallel(model.robot, selection.hayati_angle);
-  std::vector<bool> wanted(model.parameters.size(), false);
-  const auto suffix_is = [](const ParameterInfo& info, const char* name) {
-    return info.name.size() > std::string(name).size() && info.name.substr(info.name.rfind('.') + 1) == name;
-  };
-  if (!selection.free.empty()) {
-    for (const int k : find_parameters(model, selection.free)) wanted[k] = true;
+namespace {
+
+bool is_beta(const ParameterInfo& info) {
+  return info.role == Role::geometry && info.name.substr(info.name.rfind('.') + 1) == "beta";
+}
+
+bool is_among(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+bool is_measured_target(const ParameterInfo& info, const Content& content) {
+  return info.rotation ? content.target_rotation[info.owner] : content.target[info.owner];
+}
+
+/// What nobody has to ask for, and what is found when nothing in particular is asked for.
+bool is_usual(const ParameterInfo& info, const Content& content, const std::vector<bool>& parallel, const Robot& robot,
+              bool nothing_asked, bool asked) {
+  switch (info.role) {
+    case Role::base:
+      return asked || content.frame;
+    case Role::anchor:
+      return asked || content.distance;
+    case Role::point:
+      return content.point[info.owner];
+    case Role::target:
+      return nothing_asked ? is_measured_target(info, content) : asked;
+    case Role::geometry:
+      return nothing_asked ? is_fitted_geometry(info, parallel, robot) : asked;
+    default:
+      return asked;
   }
-  for (std::size_t k = 0; k < model.parameters.size(); ++k) {
-    const ParameterInfo& info = model.parameters[k];
-    const bool by_default = selection.free.empty();
+}
+
+/// The parameters that effects asked for stand for: their own terms, or parameters of the model.
+class Requested {
+ public:
+  Requested(const Model& model, const Content& content, const std::vector<bool>& parallel, const EffectRequest& request)
+      : model_(model),
+        content_(content),
+        parallel_(parallel),
+        request_(request),
+        stands_for_(traits_of(request.effect, {}).stands_for) {}
+
+  /// Changes `wanted` where the request means this parameter.
+  void ask(const ParameterInfo& info, std::vector<bool>::reference wanted) const {
     switch (info.role) {
-      case Role::base:
-        wanted[k] = wanted[k] || content.frame;
+      case Role::ratio:
+        if (stands_for_ == StandsFor::gear_ratio && is_on_joint(info.owner)) wanted = true;
         break;
-      case Role::anchor:
-        wanted[k] = wanted[k] || content.distance;
-        break;
-      case Role::point:
-        wanted[k] = content.point[info.owner];
-        break;
-      case Role::target:
-        if (by_default) wanted[k] = info.rotation ? content.target_rotation[info.owner] : content.target[info.owner];
+      case Role::offset:
+        if (stands_for_ == StandsFor::joint_offset && is_on_joint(info.owner)) wanted = true;
         break;
       case Role::geometry:
-        if (by_default)
-          wanted[k] = !suffix_is(info, "beta") || parallel[info.owner] || model.robot.joints[info.owner].beta != 0.0;
+        if (stands_for_ == StandsFor::link_geometry && is_on_joint(info.owner))
+          wanted = !is_beta(info) || parallel_[info.owner];
+        break;
+      case Role::base:
+        if (stands_for_ == StandsFor::base_frame) wanted = content_.frame;
+        break;
+      case Role::target:
+        if (stands_for_ == StandsFor::tool_frame) wanted = is_measured_target(info, content_);
+        break;
+      case Role::effect:
+        if (is_own_term(info)) wanted = true;
         break;
       default:
         break;
     }
   }
-  // Effects asked for: their own terms, or the model parameters that they stand for.
-  for (const EffectRequest& request : selection.effects) {
-    const auto on_joint = [&](int joint) {
-      const Joint& j = model.robot.joints[joint];
-      return request.joints.empty()
-                 ? !j.passive() || request.effect == "link_geometry"
-                 : std::find(request.joints.begin(), request.joints.end(), j.name) != request.joints.end();
-    };
-    for (std::size_t k = 0; k < model.parameters.size(); ++k) {
-      const ParameterInfo& info = model.parameters[k];
-      if (request.effect == "gear_ratio" && info.role == Role::ratio && on_joint(info.owner)) wanted[k] = true;
-      if (request.effect == "joint_offset" && info.role == Role::offset && on_joint(info.owner)) wanted[k] = true;
-      if (request.effect == "link_geometry" && info.role == Role::geometry && on_joint(info.owner))
-        wanted[k] = !suffix_is(info, "beta") || parallel[info.owner];
-      if (request.effect == "base_frame" && info.role == Role::base) wanted[k] = content.frame;
-      if (request.effect == "tool_frame" && info.role == Role::target) {
-        wanted[k] = info.rotation ? content.target_rotation[info.owner] : content.target[info.owner];
-      }
-      if (info.role == Role::effect) {
-        const EffectRequest& from = model.requests[info.owner];
-        const std::string& joint = model.terms[info.columns[0].term].joint;
-        const bool named = request.joints.empty() ||
-                           std::find(request.joints.begin(), request.joints.end(), joint) != request.joints.end();
-        if (from.effect == request.effect && named) wanted[k] = true;
-      }
-    }
+
+ private:
+  /// Without joints named: the driven ones; links are all of them.
+  bool is_on_joint(int joint) const {
+    const Joint& j = model_.robot.joints[joint];
+    if (!request_.joints.empty()) return is_among(request_.joints, j.name);
+    return !j.passive() || stands_for_ == StandsFor::link_geometry;
+  }
+
+  bool is_own_term(const ParameterInfo& info) const {
+    const std::string& joint = model_.terms[info.columns[0].term].joint;
+    return model_.requests[info.owner].effect == request_.effect &&
+           (request_.joints.empty() || is_among(request_.joints, joint));
+  }
+
+  const Model& model_;
+  const Content& content_;
+  const std::vector<bool>& parallel_;
+  const EffectRequest& request_;
+  StandsFor stands_for_;
+};
+
+}  // namespace
+
+bool is_fitted_geometry(const ParameterInfo& info, const std::vector<bool>& parallel, const Robot& robot) {
+  if (info.role != Role::geometry) return false;
+  return !is_beta(info) || parallel[info.owner] || robot.joints[info.owner].beta != 0.0;
+}
+
+std::vector<int> select_free(const Model& model, const Content& content, const ParameterSelection& selection) {
+  const std::vector<bool> parallel = near_parallel(model.robot, selection.hayati_angle);
+  std::vector<bool> wanted(model.parameters.size(), false);
+  if (!selection.free.empty()) {
+    for (const int k : find_parameters(model, selection.free)) wanted[k] = true;
+  }
+  for (std::size_t k = 0; k < wanted.size(); ++k) {
+    wanted[k] = is_usual(model.parameters[k], content, parallel, model.robot, selection.free.empty(), wanted[k]);
+  }
+  for (const EffectRequest& effect : selection.effects) {
+    const Requested request(model, content, parallel, effect);
+    for (std::size_t k = 0; k < wanted.size(); ++k) request.ask(model.parameters[k], wanted[k]);
   }
   if (!selection.hold.empty()) {
     for (const int k : find_parameters(model, selection.hold)) wanted[k] = false;

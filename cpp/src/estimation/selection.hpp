@@ -29,6 +29,10 @@ inline bool belongs_to_instrument(Role role) {
   return role == Role::base || role == Role::anchor || role == Role::point;
 }
 
+/// A value of a link that makes sense to fit: beta only between axes that are near parallel, or where the robot has one
+/// already. `parallel`: of near_parallel.
+bool is_fitted_geometry(const ParameterInfo& info, const std::vector<bool>& parallel, const Robot& robot);
+
 /// Indices of the parameters to fit, before anything is known about what can be seen.
 std::vector<int> select_free(const Model& model, const Content& content, const ParameterSelection& selection);
 

@@ -1,0 +1,454 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include "diagnosis/design.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "estimation/evaluate.hpp"
+#include "estimation/selection.hpp"
+#include "math/random.hpp"
+#include "model/effects/traits.hpp"
+#include "model/model.hpp"
+
+namespace truing::diagnosis {
+namespace {
+
+using Kind = Explanation::Kind;
+constexpr int kFolds = 12;
+constexpr int kTestFolds = 8;
+const char* const kFrame[6] = {"x", "y", "z", "rx", "ry", "rz"};
+
+double root_mean_square(const std::vector<double>& values, const std::vector<std::int32_t>& rows) {
+  double sum = 0.0;
+  for (const std::int32_t row : rows)
+    sum += values[static_cast<std::size_t>(row)] * values[static_cast<std::size_t>(row)];
+  return std::sqrt(sum / std::max<double>(1.0, static_cast<double>(rows.size())));
+}
+
+/// Lengths of a link that its convention has, and the sites that they are values of.
+std::vector<std::pair<std::string, double>> lengths_of_link(const Robot& robot, const std::string& joint) {
+  const Joint& link = robot.joints[robot.joint_index(joint)];
+  const Eigen::Vector3d origin = link.T_parent_joint.translation();
+  const std::pair<const char*, double> lengths[5] = {
+      {"a", link.a}, {"d", link.d}, {"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
+  std::vector<std::pair<std::string, double>> out;
+  for (const auto& [value, length] : lengths) {
+    if ((value[0] >= 'x') == (robot.convention == Convention::urdf) && length != 0.0)
+      out.push_back({joint + "." + value, length});
+  }
+  return out;
+}
+
+/// Approach directions of the joint that an input belongs to; absent: they were not recorded.
+Column direction_beside(const Robot& robot, const Measurements& data, const InputColumn& input) {
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  const auto number = static_cast<std::size_t>(
+      std::find(driven.begin(), driven.end(), static_cast<std::size_t>(input.joint)) - driven.begin());
+  return number < data.direction.size() ? data.direction[number] : Column{};
+}
+
+/// Effects that the candidates ask for, each once.
+std::vector<EffectRequest> requests_of(const Candidates& candidates) {
+  std::vector<EffectRequest> requests;
+  std::set<std::pair<std::string, std::string>> asked;
+  for (const Explanation& e : candidates.named) {
+    for (const EffectRequest& request : e.requests) {
+      if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second)
+        requests.push_back(request);
+    }
+  }
+  return requests;
+}
+
+/// A parameter that is unknown in any case: base, anchor, targets, fixed points.
+bool is_nuisance(const ParameterInfo& info, const Content& content) {
+  switch (info.role) {
+    case Role::base:
+      return content.frame;
+    case Role::anchor:
+      return content.distance;
+    case Role::point:
+      return content.point[static_cast<std::size_t>(info.owner)];
+    case Role::target:
+      return (info.rotation ? content.target_rotation : content.target)[static_cast<std::size_t>(info.owner)];
+    default:
+      return false;
+  }
+}
+
+/// Fills a design, step by step.
+class Designer {
+ public:
+  Designer(const DesignTask& task, Design* out)
+      : task_(task),
+        out_(*out),
+        model_(make_model(task.at, task.data, requests_of(out->candidates), task.options.own_effects)),
+        bases_(make_bases(model_, task.data)),
+        segments_(make_segments(task.data, task.rows)),
+        content_(content_of(model_, segments_)) {}
+
+  void fill() {
+    choose_core();
+    linearise_core();
+    name_core();
+    add_products();
+    draw_folds();
+    out_.weight = Eigen::VectorXd::Ones(out_.x.rows());
+  }
+
+ private:
+  bool is_product(const Explanation& e) const { return e.kind == Kind::drift || e.kind == Kind::law; }
+  bool is_without_frame(const Explanation& e) const { return e.kind == Kind::drift && !content_.frame; }
+
+  /// Core columns: what is always unknown, joint motions, and every parameter of a candidate.
+  void choose_core() {
+    std::vector<int> free;
+    const auto want = [&](int parameter) {
+      const auto found = std::find(free.begin(), free.end(), parameter);
+      if (found != free.end()) return static_cast<int>(found - free.begin());
+      free.push_back(parameter);
+      return static_cast<int>(free.size()) - 1;
+    };
+    for (std::size_t k = 0; k < model_.parameters.size(); ++k) {
+      if (is_nuisance(model_.parameters[k], content_)) out_.nuisance.push_back(want(static_cast<int>(k)));
+    }
+    for (int k = 0; k < 6 && content_.frame; ++k)
+      out_.base_columns.push_back(want(model_.parameter_index(std::string("base.") + kFrame[k])));
+    for (const Joint& joint : task_.at.joints)
+      out_.joint_column.push_back({want(model_.parameter_index(parameter_of(StandsFor::joint_offset, joint.name)))});
+    for (std::size_t g = 0; g < out_.candidates.named.size(); ++g) {
+      const Explanation& e = out_.candidates.named[g];
+      if (e.kind != Kind::catalogue && e.kind != Kind::all_geometry) continue;
+      for (const std::string& name : e.parameters)
+        out_.candidates.groups[g].columns.push_back(want(model_.parameter_index(name)));
+    }
+    put_in_order(free);
+  }
+
+  /// The evaluator wants its parameters in order.
+  void put_in_order(const std::vector<int>& free) {
+    core_ = free;
+    std::sort(core_.begin(), core_.end());
+    std::vector<int> place(free.size());
+    for (std::size_t k = 0; k < free.size(); ++k)
+      place[k] = static_cast<int>(std::lower_bound(core_.begin(), core_.end(), free[k]) - core_.begin());
+    const auto moved = [&](std::vector<int>* columns) {
+      for (int& column : *columns) column = place[static_cast<std::size_t>(column)];
+    };
+    moved(&out_.nuisance);
+    moved(&out_.base_columns);
+    for (std::vector<int>& column : out_.joint_column) moved(&column);
+    for (ColumnGroup& group : out_.candidates.groups) moved(&group.columns);
+  }
+
+  Eigen::Index core() const { return static_cast<Eigen::Index>(core_.size()); }
+
+  Eigen::Index count_products() const {
+    Eigen::Index count = 0;
+    for (const Explanation& e : out_.candidates.named) {
+      if (is_product(e) && !is_without_frame(e)) count += static_cast<Eigen::Index>(e.parameters.size());
+    }
+    return count;
+  }
+
+  void linearise_core() {
+    const Evaluator evaluator(model_, task_.data, bases_, segments_, core_, task_.options.threads);
+    const Eigen::VectorXd values = initial_values(model_);
+    out_.x.resize(static_cast<Eigen::Index>(evaluator.components()), core() + count_products());
+    out_.y.resize(out_.x.rows());
+    Weighing weighing;
+    weighing.rotation_scale = 1.0;
+    weighing.row_weights = false;
+    Eigen::Index at = 0;
+    int tile = 0;
+    Design::Rows jacobian;
+    Eigen::VectorXd residual;
+    for (const Segment& segment : segments_) {
+      const int components = segment.kind == kernel::Kind::distance ? 1 : segment.kind == kernel::Kind::pose ? 6 : 3;
+      std::size_t next = 0;
+      while (next < segment.rows.size()) {
+        const int poses = evaluator.tile_rows(tile);
+        const Eigen::Index values_here = static_cast<Eigen::Index>(poses) * components;
+        jacobian.resize(values_here, core());
+        residual.resize(values_here);
+        evaluator.tile(tile++, values, weighing, residual.data(), jacobian.data());
+        out_.x.block(at, 0, values_here, core()) = jacobian;
+        out_.y.segment(at, values_here) = -residual;
+        for (int i = 0; i < poses; ++i) {
+          for (int c = 0; c < components; ++c) {
+            out_.row.push_back(segment.rows[next + static_cast<std::size_t>(i)]);
+            out_.component.push_back(static_cast<std::int8_t>(components == 1 ? 6 : c));
+          }
+        }
+        next += static_cast<std::size_t>(poses);
+        at += values_here;
+      }
+    }
+  }
+
+  /// Rms of what multiplies a parameter on its way to the site.
+  double size_of_basis(const ParameterInfo& info) const {
+    double size = 0.0;
+    for (const ColumnTerm& column : info.columns) {
+      if (column.term >= 0)
+        size = std::max(size, root_mean_square(bases_[static_cast<std::size_t>(column.term)], task_.rows));
+      if (column.reading >= 0) {
+        std::vector<double> reading(task_.data.rows);
+        for (std::size_t row = 0; row < reading.size(); ++row)
+          reading[row] = task_.data.joints[static_cast<std::size_t>(column.reading)][row];
+        size = std::max(size, root_mean_square(reading, task_.rows));
+      }
+    }
+    return size;
+  }
+
+  /// How far the effect that a parameter belongs to may well move its site.
+  double largest_motion(const ParameterInfo& info) const {
+    if (info.role != Role::effect) return kLargest;
+    const std::string& effect = model_.requests[static_cast<std::size_t>(info.owner)].effect;
+    return traits_of(effect, task_.options.own_effects).prior;
+  }
+
+  /// Names, units and the sizes that parameters may have.
+  void name_core() {
+    out_.prior = Eigen::VectorXd::Constant(out_.x.cols(), kLargest);
+    for (Eigen::Index k = 0; k < core(); ++k) {
+      const ParameterInfo& info = model_.parameters[static_cast<std::size_t>(core_[static_cast<std::size_t>(k)])];
+      out_.column_names.push_back(info.name);
+      out_.column_units.push_back(info.unit);
+      const double size = size_of_basis(info);
+      if (size > 0.0) out_.prior[k] = largest_motion(info) / size;
+      const auto shift = task_.shift.find(info.name);
+      if (shift != task_.shift.end()) out_.y += shift->second * out_.x.col(k);
+    }
+  }
+
+  /// Drifts and corrections of laws: products of columns that are there with hats of inputs.
+  void add_products() {
+    Eigen::Index next = core();
+    for (std::size_t g = 0; g < out_.candidates.named.size(); ++g) {
+      const Explanation& e = out_.candidates.named[g];
+      ColumnGroup& group = out_.candidates.groups[g];
+      if (!is_product(e)) continue;
+      if (is_without_frame(e)) {
+        group.shadow = true;
+        continue;
+      }
+      const auto count = static_cast<Eigen::Index>(e.parameters.size());
+      const Design::Rows columns = products(e);
+      group.shadow = group.shadow || columns.size() == 0;
+      for (Eigen::Index k = 0; k < count; ++k) {
+        if (columns.size() != 0) group.columns.push_back(static_cast<int>(next + k));
+        out_.column_names.push_back(e.parameters[static_cast<std::size_t>(k)]);
+        out_.column_units.push_back("rad");
+      }
+      if (columns.size() == 0)
+        out_.x.middleCols(next, count).setZero();
+      else
+        out_.x.middleCols(next, count) = columns;
+      next += count;
+    }
+  }
+
+  /// Columns of one drift or correction; none: of a target that no row measures.
+  Design::Rows products(const Explanation& e) const {
+    if (e.kind == Kind::drift) {
+      std::vector<int> sites;
+      for (const std::string& site : frame_coordinates(e.site)) sites.push_back(out_.column(site));
+      if (std::find(sites.begin(), sites.end(), -1) != sites.end()) return {};
+      return free_columns(out_, sites, task_.inputs, e.inputs, e.knots);
+    }
+    if (e.law_test == LawTest::times_the_lengths) return times_the_lengths(e);
+    Design::Rows columns =
+        free_columns(out_, out_.joint_column[task_.at.joint_index(e.site)], task_.inputs, e.inputs, e.knots);
+    if (e.law_test == LawTest::times_direction) multiply_by_direction(e, &columns);
+    return columns;
+  }
+
+  Design::Rows times_the_lengths(const Explanation& e) const {
+    Design::Rows columns = Design::Rows::Zero(out_.x.rows(), static_cast<Eigen::Index>(e.parameters.size()));
+    bool first = true;
+    for (const auto& [site, length] : lengths_of_link(task_.at, e.site)) {
+      const int column = out_.column(site);
+      if (column < 0) continue;
+      const Design::Rows one = length * free_columns(out_, {column}, task_.inputs, e.inputs, e.knots);
+      if (first)
+        columns = one;
+      else
+        columns += one;
+      first = false;
+    }
+    return columns;
+  }
+
+  void multiply_by_direction(const Explanation& e, Design::Rows* columns) const {
+    const Column direction =
+        direction_beside(task_.at, task_.data, task_.inputs[static_cast<std::size_t>(e.inputs[0])]);
+    for (Eigen::Index i = 0; i < columns->rows(); ++i) {
+      const auto row = static_cast<std::size_t>(out_.row[static_cast<std::size_t>(i)]);
+      columns->row(i) *= direction ? 0.5 * direction[row] : 0.0;
+    }
+  }
+
+  /// Folds of whole pose groups, drawn with the seed.
+  void draw_folds() {
+    out_.folds = kFolds;
+    out_.test_folds = kTestFolds;
+    std::map<std::int32_t, std::int32_t> fold_of;
+    std::vector<std::int32_t> groups_of[2];
+    for (const std::int32_t row : out_.row) {
+      const std::int32_t cluster = task_.cluster[static_cast<std::size_t>(row)];
+      if (fold_of.emplace(cluster, -1).second)
+        groups_of[task_.set[static_cast<std::size_t>(row)] ? 1 : 0].push_back(cluster);
+    }
+    Random random(task_.options.seed + 0x7f4a7c15u);
+    for (int part = 0; part < 2; ++part) {
+      std::vector<std::int32_t>& clusters = groups_of[part];
+      for (std::size_t k = clusters.size(); k > 1; --k) std::swap(clusters[k - 1], clusters[random.below(k)]);
+      for (std::size_t k = 0; k < clusters.size(); ++k) {
+        fold_of[clusters[k]] =
+            part == 0 ? static_cast<std::int32_t>(k % kFolds) : kFolds + static_cast<std::int32_t>(k % kTestFolds);
+      }
+    }
+    for (const std::int32_t row : out_.row) {
+      out_.cluster.push_back(task_.cluster[static_cast<std::size_t>(row)]);
+      out_.fold.push_back(fold_of[out_.cluster.back()]);
+    }
+  }
+
+  const DesignTask& task_;
+  Design& out_;
+  const Model model_;  ///< with every effect at once
+  const std::vector<std::vector<double>> bases_;
+  const std::vector<Segment> segments_;
+  const Content content_;
+  std::vector<int> core_;  ///< parameters of the model, in order
+};
+
+/// Sites that a free function acts at, and what each is multiplied by.
+std::vector<std::pair<std::string, double>> places_of(const Explanation& candidate, const Robot& robot) {
+  if (candidate.kind == Kind::law && candidate.law_test == LawTest::times_the_lengths)
+    return lengths_of_link(robot, candidate.site);
+  std::vector<std::pair<std::string, double>> places;
+  for (const std::string& site : frame_coordinates(candidate.site)) places.push_back({site, 1.0});
+  if (places.empty()) places.push_back({candidate.site, 1.0});
+  return places;
+}
+
+/// Its function, from the hats' coefficients `from` on.
+std::function<double(const Inputs&)> function_of(const Explanation& candidate, const Eigen::VectorXd& coefficients,
+                                                 const std::vector<InputColumn>& inputs, std::size_t from, double times,
+                                                 const Column& direction) {
+  const std::vector<double>* first = &inputs[static_cast<std::size_t>(candidate.inputs[0])].values;
+  const std::vector<double>* second =
+      candidate.inputs.size() > 1 ? &inputs[static_cast<std::size_t>(candidate.inputs[1])].values : nullptr;
+  const auto k1 = candidate.knots[0].size(), k2 = candidate.knots.size() > 1 ? candidate.knots[1].size() : 1;
+  return [=, knots = candidate.knots](const Inputs& in) {
+    std::vector<double> a(k1), b(k2, 1.0);
+    hats_at(knots[0], (*first)[in.row], a.data());
+    if (second) hats_at(knots[1], (*second)[in.row], b.data());
+    double value = 0.0;
+    for (std::size_t m = 0; m < k1; ++m) {
+      for (std::size_t n = 0; n < k2 && a[m] != 0.0; ++n)
+        value += a[m] * b[n] * coefficients[static_cast<Eigen::Index>(from + m * k2 + n)];
+    }
+    return times * value * (direction ? 0.5 * direction[in.row] : 1.0);
+  };
+}
+
+}  // namespace
+
+int Design::column(const std::string& name) const {
+  for (std::size_t k = 0; k < column_names.size(); ++k) {
+    if (column_names[k] == name) return static_cast<int>(k);
+  }
+  return -1;
+}
+
+Gram Design::gram_of_fold(int wanted) const {
+  const Eigen::Index p = x.cols();
+  GramSum sum(p);
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    if (fold[static_cast<std::size_t>(i)] != wanted || weight[i] == 0.0) continue;
+    double* out = sum.row();
+    for (Eigen::Index k = 0; k < p; ++k) out[k * GramSum::stride()] = weight[i] * x(i, k);
+    out[p * GramSum::stride()] = weight[i] * y[i];
+    sum.push();
+  }
+  return sum.finish();
+}
+
+Design::Rows free_columns(const Design& design, const std::vector<int>& site_columns,
+                          const std::vector<InputColumn>& inputs, const std::vector<int>& which,
+                          const std::vector<std::vector<double>>& knots) {
+  Eigen::Index k1 = static_cast<Eigen::Index>(knots[0].size()),
+               k2 = which.size() > 1 ? static_cast<Eigen::Index>(knots[1].size()) : 1;
+  Design::Rows out(design.x.rows(), static_cast<Eigen::Index>(site_columns.size()) * k1 * k2);
+  std::vector<double> first(static_cast<std::size_t>(k1)), second(static_cast<std::size_t>(k2), 1.0);
+  std::int32_t last = -1;
+  for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
+    const std::int32_t row = design.row[static_cast<std::size_t>(i)];
+    if (row != last) {
+      hats_at(knots[0], inputs[static_cast<std::size_t>(which[0])].values[static_cast<std::size_t>(row)], first.data());
+      if (which.size() > 1)
+        hats_at(knots[1], inputs[static_cast<std::size_t>(which[1])].values[static_cast<std::size_t>(row)],
+                second.data());
+      last = row;
+    }
+    Eigen::Index at = 0;
+    for (const int site : site_columns) {
+      const double d = design.x(i, site);
+      for (Eigen::Index a = 0; a < k1; ++a) {
+        const double value = d * first[static_cast<std::size_t>(a)];
+        for (Eigen::Index b = 0; b < k2; ++b)
+          out(i, at++) = value == 0.0 ? 0.0 : value * second[static_cast<std::size_t>(b)];
+      }
+    }
+  }
+  return out;
+}
+
+Effect free_effect(const Explanation& candidate, const Eigen::VectorXd& coefficients,
+                   const std::vector<InputColumn>& inputs) {
+  Effect effect;
+  const std::string& first_name = candidate.parameters.front();
+  effect.name = first_name.substr(0, first_name.rfind('.')) + "!";  // no name of the catalogue
+  effect.summary = "a free function of inputs";
+  effect.per_joint = false;
+  const std::string parameter = effect.name;
+  effect.terms = [candidate, coefficients, &inputs, parameter](const Robot& of, std::size_t, const Measurements& data) {
+    Column direction;
+    const bool of_law = candidate.kind == Kind::law;
+    if (of_law && candidate.law_test == LawTest::times_direction)
+      direction = direction_beside(of, data, inputs[static_cast<std::size_t>(candidate.inputs[0])]);
+    std::size_t hats = 1;
+    for (const std::vector<double>& knots : candidate.knots) hats *= knots.size();
+    std::vector<Term> terms;
+    for (const auto& [site, times] : places_of(candidate, of)) {
+      // One function for all lengths of a link.
+      const bool shared = of_law && candidate.law_test == LawTest::times_the_lengths;
+      Term term;
+      term.parameter = parameter;
+      term.unit = "-";
+      term.site = site;
+      term.basis = function_of(candidate, coefficients, inputs, shared ? 0 : terms.size() * hats, times, direction);
+      terms.push_back(std::move(term));
+    }
+    return terms;
+  };
+  return effect;
+}
+
+Design make_design(const DesignTask& task) {
+  Design out;
+  out.candidates = make_candidates(task);
+  Designer(task, &out).fill();
+  return out;
+}
+
+}  // namespace truing::diagnosis
