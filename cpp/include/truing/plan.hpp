@@ -72,6 +72,7 @@ struct DistinguishOptions {
   double min_step = 0.2617993877991494;  ///< [rad] as in PlanOptions, for added poses
   double min_step_prismatic = 0.0;       ///< [m]
   std::uint64_t seed = 0;                ///< of directions, payloads and proposals
+  std::vector<Effect> own_effects;       ///< take part beside the catalogue
 
   bool is_valid(std::string* error) const;
 };

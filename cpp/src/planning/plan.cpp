@@ -173,6 +173,139 @@ double index_of(const Eigen::MatrixXd& information, Observability kind) {
   }
 }
 
+/// A plan on its way: what it shall see, its poses, and their information matrix.
+class Planner {
+ public:
+  Planner(const Robot& robot, const PlanOptions& options)
+      : robot_(robot),
+        options_(options),
+        ranges_(joint_ranges(robot, options.min_step, options.min_step_prismatic, "plan")),
+        random_(options.seed) {}
+
+  /// Random poses tell what any plan can see.
+  void find_what_can_be_seen() {
+    ParameterSelection wanted;
+    wanted.free = options_.free;
+    wanted.effects = options_.effects;
+    const Poses measured(robot_, draw_sample(), options_.orientation);
+    model_ = make_model(robot_, measured.data, options_.effects);
+    const std::vector<Segment> segments = make_segments(measured.data, measured.rows());
+    const std::vector<int> free = select_free(model_, content_of(model_, segments), wanted);
+    if (free.empty()) throw std::invalid_argument("plan: nothing is free");
+    const std::vector<std::vector<double>> bases = make_bases(model_, measured.data);
+    const Evaluator evaluator(model_, measured.data, bases, segments, free, 1);
+    NormalEquations normal;
+    evaluator.normal_equations(initial_values(model_), weighing_of(options_), &normal);
+    std::vector<int> priority;
+    for (const int k : free) priority.push_back(priority_of(model_.parameters[k].role));
+    selection_ = observable(model_, free, find_rank(normal.gram, priority, IdentifyOptions().rank_tolerance));
+    const int values = options_.poses * (options_.orientation ? 6 : 3);
+    if (values <= parameters()) {
+      throw std::invalid_argument("plan: " + std::to_string(options_.poses) + " poses give " + std::to_string(values) +
+                                  " values for " + std::to_string(parameters()) + " parameters: ask for more poses");
+    }
+  }
+
+  /// A random plan that keeps the rule between neighbours.
+  void draw_plan() {
+    for (int k = 0; k < options_.poses; ++k) {
+      Pose pose(joints());
+      if (!draw_pose(robot_, model_, ranges_, k ? &poses_.back() : nullptr, nullptr, &random_, &pose)) {
+        throw std::invalid_argument(
+            "plan: no pose is further than min_step from its neighbour in every joint: lower min_step");
+      }
+      poses_.push_back(pose);
+    }
+    rows_ = jacobians(model_, selection_.fitted, poses_, options_);
+    information_ = Eigen::MatrixXd::Zero(parameters(), parameters());
+    for (const Eigen::MatrixXd& j : rows_) information_.noalias() += j.transpose() * j;
+    unit_ = information_.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  }
+
+  /// Exchange (Fedorov 1972): each pose in turn gives way to the proposal that raises the index most.
+  void exchange(PlanResult* result) {
+    result->index_start = index_of(scaled(information_), options_.index);
+    double best = result->index_start;
+    for (int sweep = 0; sweep < options_.sweeps; ++sweep) {
+      const int exchanged_before = result->exchanges;
+      for (int k = 0; k < options_.poses; ++k) result->exchanges += exchange_pose(k, &best) ? 1 : 0;
+      if (result->exchanges == exchanged_before) break;
+    }
+    result->index_end = best;
+  }
+
+  void hand_out(PlanResult* result) const {
+    result->joints.resize(options_.poses, joints());
+    for (int k = 0; k < options_.poses; ++k) result->joints.row(k) = poses_[k];
+    const Eigen::MatrixXd covariance = inverse_of(information_);
+    const Eigen::VectorXd values = initial_values(model_);
+    for (Eigen::Index k = 0; k < parameters(); ++k) {
+      const int parameter = selection_.fitted[static_cast<std::size_t>(k)];
+      const ParameterInfo& info = model_.parameters[parameter];
+      result->parameters.push_back(
+          {info.name, values[parameter], values[parameter], std::sqrt(covariance(k, k)), info.unit, false});
+    }
+    result->frozen = selection_.frozen;
+  }
+
+ private:
+  Eigen::Index joints() const { return static_cast<Eigen::Index>(ranges_.size()); }
+  Eigen::Index parameters() const { return static_cast<Eigen::Index>(selection_.fitted.size()); }
+
+  /// In units of what the random plan sees of each parameter.
+  Eigen::MatrixXd scaled(const Eigen::MatrixXd& m) const { return unit_.asDiagonal() * m * unit_.asDiagonal(); }
+
+  std::vector<Pose> draw_sample() {
+    std::vector<Pose> sample;
+    const Model bare = make_model(robot_, Measurements{});
+    while (static_cast<int>(sample.size()) < kRankPoses) {
+      Pose pose(joints());
+      if (!draw_pose(robot_, bare, ranges_, nullptr, nullptr, &random_, &pose))
+        throw std::invalid_argument("plan: no pose is within the limits of the passive joints");
+      sample.push_back(pose);
+    }
+    return sample;
+  }
+
+  /// True: the pose gave way to a better one.
+  bool exchange_pose(int k, double* best) {
+    std::vector<Pose> proposals;
+    for (int c = 0; c < options_.proposals; ++c) {
+      Pose pose(joints());
+      if (draw_pose(robot_, model_, ranges_, k ? &poses_[k - 1] : nullptr,
+                    k + 1 < options_.poses ? &poses_[k + 1] : nullptr, &random_, &pose))
+        proposals.push_back(pose);
+    }
+    if (proposals.empty()) return false;
+    const std::vector<Eigen::MatrixXd> candidates = jacobians(model_, selection_.fitted, proposals, options_);
+    const Eigen::MatrixXd others = information_ - rows_[k].transpose() * rows_[k];
+    int chosen = -1;
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      const double index = index_of(scaled(others + candidates[c].transpose() * candidates[c]), options_.index);
+      if (index > *best) {
+        *best = index;
+        chosen = static_cast<int>(c);
+      }
+    }
+    if (chosen < 0) return false;
+    poses_[k] = proposals[chosen];
+    rows_[k] = candidates[chosen];
+    information_ = others + rows_[k].transpose() * rows_[k];
+    return true;
+  }
+
+  const Robot& robot_;
+  const PlanOptions& options_;
+  const std::vector<Range> ranges_;
+  Random random_;
+  Model model_;
+  Selection selection_;
+  std::vector<Pose> poses_;
+  std::vector<Eigen::MatrixXd> rows_;  ///< Jacobian of every pose
+  Eigen::MatrixXd information_;
+  Eigen::VectorXd unit_;
+};
+
 }  // namespace
 }  // namespace planning
 
@@ -193,108 +326,12 @@ PlanResult plan(const Robot& robot, const PlanOptions& options) {
   std::string error;
   if (!options.is_valid(&error)) throw std::invalid_argument("plan: " + error);
   validate(robot);
-  const std::vector<Range> ranges = joint_ranges(robot, options.min_step, options.min_step_prismatic, "plan");
-  Random random(options.seed);
-  const auto n_joints = static_cast<Eigen::Index>(ranges.size());
-
-  // Random poses tell what any plan can see.
-  ParameterSelection wanted;
-  wanted.free = options.free;
-  wanted.effects = options.effects;
-  std::vector<Pose> sample;
-  const Model bare = make_model(robot, Measurements{});
-  while (static_cast<int>(sample.size()) < kRankPoses) {
-    Pose pose(n_joints);
-    if (!draw_pose(robot, bare, ranges, nullptr, nullptr, &random, &pose))
-      throw std::invalid_argument("plan: no pose is within the limits of the passive joints");
-    sample.push_back(pose);
-  }
-  const Poses measured(robot, sample, options.orientation);
-  const Model model = make_model(robot, measured.data, options.effects);
-  const std::vector<Segment> segments = make_segments(measured.data, measured.rows());
-  const std::vector<int> free = select_free(model, content_of(model, segments), wanted);
-  if (free.empty()) throw std::invalid_argument("plan: nothing is free");
-  const std::vector<std::vector<double>> bases = make_bases(model, measured.data);
-  const Evaluator evaluator(model, measured.data, bases, segments, free, 1);
-  NormalEquations normal;
-  evaluator.normal_equations(initial_values(model), weighing_of(options), &normal);
-  std::vector<int> priority;
-  for (const int k : free) priority.push_back(priority_of(model.parameters[k].role));
-  const Selection selection =
-      observable(model, free, find_rank(normal.gram, priority, IdentifyOptions().rank_tolerance));
-  const auto p = static_cast<Eigen::Index>(selection.fitted.size());
-  const int rows_per_pose = options.orientation ? 6 : 3;
-  if (options.poses * rows_per_pose <= p) {
-    throw std::invalid_argument("plan: " + std::to_string(options.poses) + " poses give " +
-                                std::to_string(options.poses * rows_per_pose) + " values for " + std::to_string(p) +
-                                " parameters: ask for more poses");
-  }
-
-  // A random plan that keeps the rule between neighbours.
-  std::vector<Pose> poses;
-  for (int k = 0; k < options.poses; ++k) {
-    Pose pose(n_joints);
-    if (!draw_pose(robot, model, ranges, k ? &poses.back() : nullptr, nullptr, &random, &pose)) {
-      throw std::invalid_argument(
-          "plan: no pose is further than min_step from its neighbour in every joint: lower min_step");
-    }
-    poses.push_back(pose);
-  }
-  std::vector<Eigen::MatrixXd> rows = jacobians(model, selection.fitted, poses, options);
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(p, p);
-  for (const Eigen::MatrixXd& j : rows) information.noalias() += j.transpose() * j;
-  const Eigen::VectorXd unit =
-      information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();  // parameters in units of what one plan sees
-  const auto scaled = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
-    return unit.asDiagonal() * m * unit.asDiagonal();
-  };
-
-  // Exchange (Fedorov 1972): each pose in turn gives way to the proposal that raises the index most.
+  Planner planner(robot, options);
+  planner.find_what_can_be_seen();
+  planner.draw_plan();
   PlanResult result;
-  result.index_start = index_of(scaled(information), options.index);
-  double best = result.index_start;
-  for (int sweep = 0; sweep < options.sweeps; ++sweep) {
-    const int exchanged_before = result.exchanges;
-    for (int k = 0; k < options.poses; ++k) {
-      std::vector<Pose> proposals;
-      for (int c = 0; c < options.proposals; ++c) {
-        Pose pose(n_joints);
-        if (draw_pose(robot, model, ranges, k ? &poses[k - 1] : nullptr,
-                      k + 1 < options.poses ? &poses[k + 1] : nullptr, &random, &pose))
-          proposals.push_back(pose);
-      }
-      if (proposals.empty()) continue;
-      const std::vector<Eigen::MatrixXd> candidates = jacobians(model, selection.fitted, proposals, options);
-      const Eigen::MatrixXd others = information - rows[k].transpose() * rows[k];
-      int chosen = -1;
-      for (std::size_t c = 0; c < candidates.size(); ++c) {
-        const double index = index_of(scaled(others + candidates[c].transpose() * candidates[c]), options.index);
-        if (index > best) {
-          best = index;
-          chosen = static_cast<int>(c);
-        }
-      }
-      if (chosen < 0) continue;
-      poses[k] = proposals[chosen];
-      rows[k] = candidates[chosen];
-      information = others + rows[k].transpose() * rows[k];
-      ++result.exchanges;
-    }
-    if (result.exchanges == exchanged_before) break;
-  }
-  result.index_end = best;
-
-  result.joints.resize(options.poses, n_joints);
-  for (int k = 0; k < options.poses; ++k) result.joints.row(k) = poses[k];
-  const Eigen::MatrixXd covariance = inverse_of(information);
-  const Eigen::VectorXd values = initial_values(model);
-  for (Eigen::Index k = 0; k < p; ++k) {
-    const int parameter = selection.fitted[static_cast<std::size_t>(k)];
-    const ParameterInfo& info = model.parameters[parameter];
-    result.parameters.push_back(
-        {info.name, values[parameter], values[parameter], std::sqrt(covariance(k, k)), info.unit, false});
-  }
-  result.frozen = selection.frozen;
+  planner.exchange(&result);
+  planner.hand_out(&result);
   return result;
 }
 
