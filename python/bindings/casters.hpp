@@ -294,6 +294,7 @@ std::string joined(const std::vector<std::string>& words);
 
 void bind_robot(py::module_& m);
 void bind_measurements(py::module_& m);
+void bind_effect_traits(py::module_& m);
 void bind_effects(py::module_& m);
 void bind_identify(py::module_& m);
 void bind_plan(py::module_& m);
@@ -321,9 +322,12 @@ struct OwnEffect {
   };
   std::string name, summary;
   std::vector<Part> parts;
+  EffectTraits traits{};
 };
 
 std::vector<Effect> effects_from(const std::vector<OwnEffect>& own);
+/// Effects whose basis Python evaluates whenever rows are asked for: `truing.Effect` objects. Takes the GIL to do so.
+std::vector<Effect> effects_evaluated_when_asked(const std::vector<py::object>& own);
 
 }  // namespace truing::python
 

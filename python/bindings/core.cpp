@@ -21,6 +21,7 @@ PYBIND11_MODULE(_core, m) {
 
   truing::python::bind_robot(m);
   truing::python::bind_measurements(m);
+  truing::python::bind_effect_traits(m);
   truing::python::bind_effects(m);
   truing::python::bind_identify(m);
   truing::python::bind_plan(m);

@@ -69,7 +69,8 @@ void bind_options(py::module_& m) {
                      proposals,
                      min_step,
                      min_step_prismatic,
-                     seed};
+                     seed,
+                     {}};
           }),
           py::kw_only(), py::arg("columns") = usual.columns, py::arg("separate") = usual.separate,
           py::arg("payload") = usual.payload, py::arg("temperature_low") = usual.temperature_low,
@@ -147,13 +148,15 @@ void bind_distinguish(py::module_& m) {
   m.def(
       "distinguish",
       [](const Robot& given_robot, const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>& joints,
-         const std::optional<DistinguishOptions>& given) {
-        const DistinguishOptions options = given.value_or(DistinguishOptions{});
+         const std::optional<DistinguishOptions>& given, const std::vector<py::object>& own) {
+        DistinguishOptions options = given.value_or(DistinguishOptions{});
+        options.own_effects = effects_evaluated_when_asked(own);
         const Robot robot = given_robot;
         const py::gil_scoped_release unlocked;
         return distinguish(robot, joints, options);
       },
       py::arg("robot"), py::arg("joints"), py::arg("options") = py::none(),
+      py::arg("own_effects") = std::vector<py::object>{},
       R"(Before any data: which effects a plan can tell apart, how small it would still see them, and the poses to add.
 
 Raises InputError: unknown effects, joints or columns.)");

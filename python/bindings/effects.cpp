@@ -4,26 +4,60 @@
 
 namespace truing::python {
 
+namespace {
+
+/// Terms of an own effect at a joint: the numbers are already there, so no Python runs, and no GIL is needed, in the
+/// loop over the rows.
+std::vector<Term> terms_of(const OwnEffect& effect, const Robot& robot, std::size_t joint, const Measurements& data) {
+  std::vector<Term> terms;
+  for (const OwnEffect::Part& part : effect.parts) {
+    if (part.joint != robot.joints.at(joint).name) continue;
+    if (part.rows != data.rows)
+      throw std::invalid_argument("effect '" + effect.name + "' was evaluated for " + std::to_string(part.rows) +
+                                  " rows, the data has " + std::to_string(data.rows));
+    terms.push_back({part.parameter, part.unit, part.site,
+                     [values = part.values, owner = part.owner](const Inputs& in) { return values[in.row]; }, false});
+  }
+  return terms;
+}
+
+/// What `truing.Effect.evaluate` returns for these rows. Holds the GIL meanwhile.
+OwnEffect evaluate(py::handle effect, const Robot& robot, const Measurements& data) {
+  try {
+    return effect
+        .attr("evaluate")(py::cast(&robot, py::return_value_policy::reference),
+                          py::cast(&data, py::return_value_policy::reference))
+        .cast<OwnEffect>();
+  } catch (py::error_already_set& error) {
+    if (!error.matches(py::module_::import("truing.errors").attr("InputError"))) throw;
+    throw MissingColumn(py::str(error.value()).cast<std::string>());
+  }
+}
+
+}  // namespace
+
 std::vector<Effect> effects_from(const std::vector<OwnEffect>& own) {
   std::vector<Effect> effects;
   for (const OwnEffect& effect : own) {
-    effects.push_back(
-        {effect.name, effect.summary, [effect](const Robot& robot, std::size_t joint, const Measurements& data) {
-           std::vector<Term> terms;
-           for (const OwnEffect::Part& part : effect.parts) {
-             if (part.joint != robot.joints.at(joint).name) continue;
-             if (part.rows != data.rows)
-               throw std::invalid_argument("effect '" + effect.name + "' was evaluated for " +
-                                           std::to_string(part.rows) + " rows, the data has " +
-                                           std::to_string(data.rows));
-             // The numbers are already there: no Python runs, and no GIL is needed, in the loop
-             // over the rows.
-             terms.push_back({part.parameter, part.unit, part.site,
-                              [values = part.values, owner = part.owner](const Inputs& in) { return values[in.row]; },
-                              false});
-           }
-           return terms;
-         }});
+    effects.push_back({effect.name, effect.summary,
+                       [effect](const Robot& robot, std::size_t joint, const Measurements& data) {
+                         return terms_of(effect, robot, joint, data);
+                       },
+                       true, effect.traits});
+  }
+  return effects;
+}
+
+std::vector<Effect> effects_evaluated_when_asked(const std::vector<py::object>& own) {
+  std::vector<Effect> effects;
+  for (const py::object& effect : own) {
+    effects.push_back({effect.attr("name").cast<std::string>(), effect.attr("summary").cast<std::string>(),
+                       [object = effect.ptr(), kept = keep_alive({effect})](const Robot& robot, std::size_t joint,
+                                                                            const Measurements& data) {
+                         const py::gil_scoped_acquire locked;
+                         return terms_of(evaluate(object, robot, data), robot, joint, data);
+                       },
+                       true, effect.attr("traits").cast<EffectTraits>()});
   }
   return effects;
 }
@@ -95,10 +129,12 @@ void bind_effects(py::module_& m) {
 
   py::class_<OwnEffect> own(m, "OwnEffect",
                             "The values of a user's effect for the rows of some data; `truing.Effect` makes these.");
-  own.def(py::init(
-              [](std::string name, std::string summary) { return OwnEffect{std::move(name), std::move(summary), {}}; }),
-          py::arg("name"), py::arg("summary") = "");
+  own.def(py::init([](std::string name, std::string summary, EffectTraits traits) {
+            return OwnEffect{std::move(name), std::move(summary), {}, std::move(traits)};
+          }),
+          py::arg("name"), py::arg("summary") = "", py::arg("traits") = EffectTraits{});
   own.def_readonly("name", &OwnEffect::name, "Name of the effect.");
+  own.def_readonly("traits", &OwnEffect::traits, "What it says of itself.");
   own.def(
       "add",
       [](OwnEffect& self, std::string joint, std::string parameter, std::string unit, std::string site,

@@ -12,7 +12,7 @@ itself.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -20,10 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from truing._core import (
     EffectRequest,
+    EffectTraits,
     Measurements,
     OwnEffect,
     Robot,
     catalogue,
+    catalogue_effects,
     gravity_torque_rows,
     joint_motion,
     validate_robot,
@@ -123,6 +125,7 @@ class Effect:
     basis: takes `Inputs` (with "*" also the joint's name) and returns an array of shape=(n,), or a mapping
         {suffix: array} for several parameters, `name.site.suffix`.
     unit: of the parameter, so that parameter * basis is in rad (or m, where the site is a length).
+    traits: what diagnosis, planning and simulation may know of it: `EffectTraits(driver="temperature", ...)`.
     """
 
     name: str
@@ -130,6 +133,7 @@ class Effect:
     basis: Callable[[Inputs], BasisValues] | Callable[[Inputs, str], BasisValues]
     unit: str = "rad"
     summary: str = ""
+    traits: EffectTraits = field(default_factory=EffectTraits)
 
     def __post_init__(self) -> None:
         if not self.name or any(character in self.name for character in ".:,+* "):
@@ -145,7 +149,7 @@ class Effect:
 
     def request(self, robot: Robot) -> EffectRequest:
         """The request that asks `identify` for this effect."""
-        return EffectRequest(self.name, [joint for joint, _ in self._places(robot)])
+        return EffectRequest(self.name, [joint for joint, _ in self.places(robot)])
 
     def evaluate(self, robot: Robot, data: Measurements) -> OwnEffect:
         """The basis values for the rows of `data`. Raises InputError when the basis returns what cannot be
@@ -153,8 +157,8 @@ class Effect:
         """
         validate_robot(robot)
         inputs = Inputs(robot, data)
-        evaluated = OwnEffect(self.name, self.summary)
-        for joint, site in self._places(robot):
+        evaluated = OwnEffect(self.name, self.summary, self.traits)
+        for joint, site in self.places(robot):
             values = self.basis(inputs, joint) if self.site == EVERY_JOINT else self.basis(inputs)  # type: ignore[call-arg]
             parts = values if isinstance(values, Mapping) else {"": values}
             if not parts:
@@ -172,8 +176,8 @@ class Effect:
                 )
         return evaluated
 
-    def _places(self, robot: Robot) -> list[tuple[str, str]]:
-        """Joint that the term is listed under, and its site."""
+    def places(self, robot: Robot) -> list[tuple[str, str]]:
+        """Joint that a term is listed under, and its site."""
         driven = [robot.joints[index].name for index in robot.driven_joints()]
         if self.site == EVERY_JOINT:
             return [(name, name) for name in driven]
@@ -263,3 +267,13 @@ def own_effects(effects: Effect | Iterable[Effect]) -> list[Effect]:
                 " catalogue are known"
             )
     return own
+
+
+def markdown_table() -> str:
+    """The table of docs/reference/effects.md: what every effect of the catalogue is, from its traits."""
+    lines = ["| name | law: what is added, where | parameters | needs |", "| --- | --- | --- | --- |"]
+    for effect in catalogue_effects():
+        name = effect.name + ("@96" if effect.traits.search == "by_order" else "")
+        law, parameters, needs = effect.traits.documentation
+        lines.append(f"| `{name}` | {law} | {parameters} | {needs} |".replace("|  |", "| |"))
+    return "\n".join(lines) + "\n"

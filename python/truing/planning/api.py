@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from truing import _core
 from truing._core import Distinction, PlanResult, Robot
-from truing.effects import Effect, Effects, name_list, split_effects
+from truing.effects import Effect, Effects, name_list, own_effects, split_effects
 from truing.errors import InputError
 
 _USUAL_DISTINCTION = _core.DistinguishOptions()  # in plan.hpp
@@ -75,6 +75,7 @@ def distinguish(
     *,
     columns: str | Sequence[str] = (),
     separate: Effects = (),
+    effects: Effect | Iterable[Effect] = (),
     payload: float = _USUAL_DISTINCTION.payload,
     temperature_low: float = _USUAL_DISTINCTION.temperature_low,
     temperature_high: float = _USUAL_DISTINCTION.temperature_high,
@@ -101,6 +102,7 @@ def distinguish(
     separate: effects to be told apart, "backlash,joint_offset:J2" or a list; a single one from everything
     else. Poses are added if it takes
     any, `add` at most, each chosen from `proposals`. Empty: the whole catalogue is looked at.
+    effects: own effects that take part beside the catalogue's; those in `separate` need not be named again.
     payload: [kg] a pose is measured with this or with nothing. temperature_low, temperature_high: [deg C] the
     plan warms up, and cools down.
     seconds_per_pose: [s]. orientation, position_sigma, rotation_sigma, min_step, min_step_prismatic: as in
@@ -111,14 +113,9 @@ def distinguish(
     Raises InputError: unknown effects, joints or columns.
     """
     asked, own = split_effects(separate)
-    if own:
-        raise InputError(
-            f"distinguish cannot use own effects ({', '.join(effect.name for effect in own)}): their basis is"
-            " known only for rows that were recorded; name effects of the catalogue"
-        )
     options = _core.DistinguishOptions(
         columns=name_list(columns),
-        separate=[item for item in asked if not isinstance(item, Effect)],
+        separate=[item.request(robot) if isinstance(item, Effect) else item for item in asked],
         payload=payload,
         temperature_low=temperature_low,
         temperature_high=temperature_high,
@@ -136,4 +133,5 @@ def distinguish(
     table = np.asarray(joints, dtype=np.float64)
     if table.ndim != 2:
         raise InputError(f"joints has shape {table.shape}; expected (poses, {robot.driven_count})")
-    return _core.distinguish(robot, table, options)
+    taking_part = {effect.name: effect for effect in [*own, *own_effects(effects)]}
+    return _core.distinguish(robot, table, options, list(taking_part.values()))

@@ -11,6 +11,7 @@ either.
 from __future__ import annotations
 
 import fnmatch
+import functools
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.effects import Effect, evaluated, own_effects as as_list
 from truing.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -29,14 +31,8 @@ FORMAT = "truing-truth/1"
 COLUMNS = ("dir", "payload", "temp", "t")
 SECONDS_PER_POSE = 20.0
 LARGEST_PAYLOAD = 10.0  # [kg]
-# An effect with several parameters, asked for by one value: which of them is meant.
-_MAIN_PART = {"harmonic": ".cos1"}
-# Effects of the robot as a whole: their parameters name no joint.
-_WHOLE_ROBOT = ("drift", "joint_coupling", "scale", "time_offset")
-# What --geometry-error and --base-unknown make.
-_NOT_EFFECTS = ("link_geometry", "base_frame", "tool_frame")
-# Effects that are parameters of the model itself, and the attribute that holds them.
-_MODEL_EFFECTS = {"gear_ratio": "ratio", "joint_offset": "offset"}
+# The inputs that effects are functions of, as far as they can be simulated: an effect brings its own along.
+_COLUMN_OF_DRIVER = {"direction": "dir", "temperature": "temp", "time": "t"}
 _NEAR_PARALLEL = math.sin(math.radians(5.0))
 
 
@@ -59,6 +55,7 @@ class Truth:
         str, tuple[float, float, str]
     ]  # name: (nominal, true, unit) of every value that differs
     effects: Sequence[TrueEffect] = ()
+    own_effects: Sequence[Effect] = ()  # definitions of those that are not in the catalogue
 
 
 @dataclass(frozen=True)
@@ -106,7 +103,8 @@ def simulate(
     *,
     joints: Floats | None = None,
     poses: int = 200,
-    effects: Mapping[str, float] | None = None,
+    effects: Mapping[str, float | None] | None = None,
+    own_effects: Effect | Iterable[Effect] = (),
     noise: float = 3e-5,
     lengths: float = 1e-3,
     angles: float = 1e-3,
@@ -134,12 +132,14 @@ def simulate(
         ratios=ratios,
         only=only,
         effects=effects,
+        own_effects=own_effects,
         base_unknown=base_unknown,
         seed=seed,
     )
-    wanted = list(columns)
-    if any(effect.effect == "backlash" for effect in truth.effects):
-        wanted.append("dir")  # without approach directions there is no backlash
+    known = _known(truth.own_effects)
+    # Without approach directions there is no backlash.
+    drivers = [known[effect.effect.partition("@")[0]].traits.driver for effect in truth.effects]
+    wanted = [*columns, *(_COLUMN_OF_DRIVER[driver] for driver in drivers if driver in _COLUMN_OF_DRIVER)]
     return measure(
         truth,
         joints=joints,
@@ -161,7 +161,8 @@ def true_robot(
     angles: float = 1e-3,
     ratios: float = 0.0,
     only: Iterable[str] = (),
-    effects: Mapping[str, float] | None = None,
+    effects: Mapping[str, float | None] | None = None,
+    own_effects: Effect | Iterable[Effect] = (),
     base_unknown: bool = False,
     seed: int = 0,
 ) -> Truth:
@@ -174,7 +175,9 @@ def true_robot(
         only: Names and globs of the values that get errors ("J2.*", "*.offset"); empty: all.
         effects: Effects that the true robot has as well, by parameter and in SI: {"backlash.J2": 2e-4,
         "harmonic.J3.cos1": 1e-4,
-            "gear_ratio.J1": 1e-4}.
+            "gear_ratio.J1": 1e-4}. None: a size is drawn, about as large as the effect usually is.
+        own_effects: Definitions of effects that are not in the catalogue; `effects` asks for them by their
+            parameters.
         base_unknown: Put the robot somewhere else in the measurement frame: within 2 m, turned about z,
         tilted by up to 2 degrees.
         seed: The same seed gives the same robot, whatever is measured on it.
@@ -220,8 +223,11 @@ def true_robot(
             raise InputError(
                 f"{pattern!r} means no value of robot {robot.name!r} that an error can be put on"
             )
-    hidden = tuple(_true_effect(robot, name, value) for name, value in (effects or {}).items())
-    _add_effects(robot, hidden, changed)
+    own = as_list(own_effects)
+    known = _known(own)
+    draw = np.random.default_rng([seed, 6])
+    hidden = tuple(_true_effect(robot, name, value, known, draw) for name, value in (effects or {}).items())
+    _add_effects(robot, hidden, changed, known)
     if base_unknown:
         place = np.eye(4)
         place[:3, 3] = rng.uniform(-2, 2, 3)
@@ -229,7 +235,7 @@ def true_robot(
             rng.uniform([-0.035, -0.035, -math.pi], [0.035, 0.035, math.pi])
         )
         robot.T_measurement_base = place
-    return Truth(robot, changed, hidden)
+    return Truth(robot, changed, hidden, tuple(own))
 
 
 def measure(
@@ -270,7 +276,8 @@ def measure(
         joints = random_joints(robot, poses, seed)
     n = len(joints)
     inputs = _inputs(robot, n, wanted, seed)
-    predicted = _core.predict(robot, _core.Measurements(joints, **inputs))
+    recorded = _core.Measurements(joints, **inputs)
+    predicted = _core.predict(robot, recorded, evaluated(truth.own_effects, robot, recorded))
 
     rng = np.random.default_rng([seed, 3])
     positions = predicted.position + noise * rng.normal(size=(n, 3))
@@ -318,27 +325,70 @@ def random_joints(robot: _core.Robot, count: int, seed: int = 0) -> Floats:
     return np.random.default_rng([seed, 2]).uniform(low, high, (count, len(bounds)))
 
 
-def _true_effect(robot: _core.Robot, name: str, value: float) -> TrueEffect:
+@dataclass(frozen=True)
+class _Known:
+    """An effect that can be hidden."""
+
+    name: str
+    traits: _core.EffectTraits
+    per_joint: bool
+    own: Effect | None = None
+
+
+@functools.lru_cache(maxsize=1)
+def _catalogue() -> tuple[_Known, ...]:
+    return tuple(_Known(e.name, e.traits, e.per_joint) for e in _core.catalogue_effects())
+
+
+def _known(own: Iterable[Effect]) -> dict[str, _Known]:
+    """Every effect by name. Not in it: geometry and frames, which have options of their own."""
+    effects = [*_catalogue(), *(_Known(e.name, e.traits, True, e) for e in own)]
+    return {e.name: e for e in effects if e.traits.stands_for in ("", "ratio", "offset")}
+
+
+def _true_effect(
+    robot: _core.Robot, name: str, value: float | None, known: Mapping[str, _Known], draw: np.random.Generator
+) -> TrueEffect:
     """The effect that a parameter name stands for. Raises InputError that lists the effects there are."""
     found = re.fullmatch(r"([a-z_]+(?:@\d+(?:\.\d+)?)?)(?:\.(.*))?", name)
-    effect, rest = (found[1], found[2] or "") if found else (name, "")
-    known = [word for word, _ in _core.catalogue() if word not in _NOT_EFFECTS]
-    if effect.partition("@")[0] not in known:
+    effect, rest = (found[1], found[2] or "") if found else (name.partition(".")[0], name.partition(".")[2])
+    which = known.get(effect.partition("@")[0])
+    if which is None:
         raise InputError(
             f"effect {effect!r} cannot be simulated; there are {', '.join(known)} (link geometry, base and"
             " tool come from options of their own)"
         )
-    if effect in _WHOLE_ROBOT:
-        return TrueEffect(effect, "", name, value)
+    size = _drawn_size(which, draw) if value is None else value
+    if which.own is not None:
+        return TrueEffect(effect, _joint_of_own(which.own, robot, rest), name, size)
+    if not which.per_joint:
+        return TrueEffect(effect, "", name, size)
     joint, _, part = rest.partition(".")
     robot.joint_index(joint)  # raises, and lists the joints
-    attribute = _MODEL_EFFECTS.get(effect)
+    attribute = which.traits.stands_for
     if attribute:
         if part:
             raise InputError(f"{effect} has one parameter only, found {name!r}")
-        return TrueEffect(effect, joint, f"{joint}.{attribute}", value)
-    return TrueEffect(
-        effect, joint, f"{effect}.{joint}" + (f".{part}" if part else _MAIN_PART.get(effect, "")), value
+        return TrueEffect(effect, joint, f"{joint}.{attribute}", size)
+    suffix = part or which.traits.main_part
+    return TrueEffect(effect, joint, f"{effect}.{joint}" + (f".{suffix}" if suffix else ""), size)
+
+
+def _drawn_size(effect: _Known, draw: np.random.Generator) -> float:
+    """Of either sign, half to one and a half times the usual size."""
+    if not effect.traits.usual > 0:
+        raise InputError(f"effect {effect.name!r} does not say how large it usually is: give a size")
+    return float(effect.traits.usual * draw.uniform(0.5, 1.5) * draw.choice([-1.0, 1.0]))
+
+
+def _joint_of_own(effect: Effect, robot: _core.Robot, parameter: str) -> str:
+    """The joint that a parameter of an own effect, less the effect's name, is listed under."""
+    places = effect.places(robot)
+    for joint, site in places:
+        if parameter == site or parameter.startswith(site + "."):
+            return joint
+    raise InputError(
+        f"effect {effect.name!r} has no parameter {parameter!r}; it acts at {', '.join(s for _, s in places)}"
     )
 
 
@@ -374,11 +424,14 @@ def _frames(robot: _core.Robot) -> Iterator[tuple[str, Any, Any]]:
 
 
 def _add_effects(
-    robot: _core.Robot, effects: Sequence[TrueEffect], changed: dict[str, tuple[float, float, str]]
+    robot: _core.Robot,
+    effects: Sequence[TrueEffect],
+    changed: dict[str, tuple[float, float, str]],
+    known: Mapping[str, _Known],
 ) -> None:
     applied: dict[tuple[str, str], dict[str, float]] = {}
     for effect in effects:
-        attribute = _MODEL_EFFECTS.get(effect.effect)
+        attribute = known[effect.effect.partition("@")[0]].traits.stands_for
         if attribute:
             joint = robot.joint(effect.joint)
             before = float(getattr(joint, attribute))

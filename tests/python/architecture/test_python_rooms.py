@@ -35,7 +35,7 @@ ROOMS: dict[str, set[str]] = {
     "hand_eye": BASIC | {"identification"},
     "inverse_kinematics": BASIC,
     "tracking": BASIC | {"hand_eye"},
-    "testing": BASIC - {"effects"},
+    "testing": BASIC,
     "exam": {"truing", "model", "report"},  # of both only what test_exam.py allows
 }
 ROOMS["public"] = set(ROOMS) - {"exam"}
