@@ -31,25 +31,22 @@ def diagnose(
     """Find where the gap between robot and model lies, which effect causes it, and how far it shrinks.
 
     Base and targets are fitted first. Then every effect of the catalogue at every joint, the geometry, and
-    free functions of the
-    recorded inputs compete; what is named is fitted without linearisation and judged on rows that were held
-    out. What cannot be
-    told apart is listed together, what could not be tested is listed with the reason, and what no effect
-    explains is called
-    unknown.
+    free functions of the recorded inputs compete. What is named is fitted without linearisation and judged on
+    held-out rows. Effects that the data do not tell apart are listed together. What could not be tested is
+    listed with the reason. What no effect explains is called unknown.
 
     robot: nominal, or calibrated. data: measurements, see `Measurements`.
     effects: definitions of own effects that take part beside the catalogue's.
     leave_out: effects that are not to be considered, "drift,scale" or a list.
-    false_alarm: chance that a robot without any gap is said to have one. max_effects: at most so many are
-    named.
-    test_share: of the pose groups, held out when the data has no `set`.
-    search_poses: of more pose groups, so many are searched; errors are those of all rows.
-    resamples: draws of folds of pose groups for the intervals, with what was chosen fitted again; at most 10
-    more repeat the selection.
+    false_alarm: false-positive rate, the probability that a robot without a gap is said to have one.
+    max_effects: no more than this are named.
+    test_share: fraction of the pose groups that is held out when the data has no `set`.
+    search_poses: the search uses no more pose groups than this. Errors are those of all rows.
+    resamples: bootstrap draws of pose groups for the intervals, with the named effects fitted again. At most
+    10 more repeat the selection.
     rotation_length: [m] a rotation error of 1 rad counts as this length in reported errors.
-    seed: of the split and of every simulation; the same seed gives the same result. threads: 0: as many as
-    the machine has.
+    seed: of the split and of every simulation. The same seed gives the same result.
+    threads: 0: as many as the machine has.
 
     Raises InputError on data or options that cannot be used.
     """

@@ -3,9 +3,8 @@
 """The HTML report of ``truing diagnose``, in the order in which people ask.
 
 The first screen: the verdict in a sentence, what the gap is made of, and where it shows. Below: every effect
-with the law drawn
-through what single poses say; what is unknown; what could not be told apart, tested or seen; what to measure
-next.
+with the law drawn through what single poses say; what is unknown; what could not be told apart, tested or
+seen; what to measure next.
 """
 
 from __future__ import annotations
@@ -281,7 +280,7 @@ def _parts(result: Mapping[str, Any]) -> str:
     said = "; ".join(f"{name} {_percent(share)}" for share, _, name, _ in pieces)
     return (
         f'<section class="card"><h2>What the gap of {length_text(result["gap"]["rms_m"])} is made of <span'
-        ' class="muted">shares of the mean square</span></h2><div class="stack" role="img"'
+        ' class="muted">fractions of the mean square</span></h2><div class="stack" role="img"'
         f' aria-label="{said}">{"".join(bar)}</div><div class="scroll"><table'
         f' class="parts"><tbody>{"".join(lines)}</tbody></table></div></section>'
     )
@@ -308,7 +307,7 @@ def _where(page: Page, result: Mapping[str, Any]) -> None:
             size="pane",
         )
         page.add(
-            '<p class="note">Share of the gap that motion of this joint alone could close, 90 % interval.'
+            '<p class="note">Fraction of the gap that motion of this joint alone could close, 90 % interval.'
             " What joints do alike counts for each of them.</p></section>"
         )
         page.add('<section class="card"><h2>What it goes with</h2>')
@@ -320,7 +319,7 @@ def _where(page: Page, result: Mapping[str, Any]) -> None:
             _bar_layout(shares, None),
             size="pane",
         )
-        page.add('<p class="note">Share of the gap that goes with what was recorded.</p></section>')
+        page.add('<p class="note">Fraction of the gap that goes with what was recorded.</p></section>')
     page.add('<div class="column"><section class="card"><h2>Where in the workspace</h2>')
     _workspace(page, where)
     page.add(f"</section>{_not_testable(result) if calm else ''}</div></div>")

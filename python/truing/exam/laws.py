@@ -60,8 +60,7 @@ class Context:
     """The nominal robot at the inputs: what laws look at.
 
     What a law scales itself by (the largest torque, the range of a joint, the hours) is taken from the
-    context `of` the measurement, so that
-    the same robot is met again at fresh poses.
+    context `of` the measurement, so that the same robot is met again at fresh poses.
     """
 
     def __init__(self, chain: Chain, inputs: Inputs, of: Context | None = None) -> None:
@@ -373,9 +372,8 @@ def link_compliance(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
     """A uniform beam under what hangs at and beyond its end.
 
     The moment M runs straight from start to end. What a slice turns, as seen at the tip, is the same as if
-    the beam turned about its start by
-    (2 M_start + M_end) / 6 and about its end by (M_start + 2 M_end) / 6 of its compliance (conjugate beam).
-    Its own weight is left out.
+    the beam turned about its start by (2 M_start + M_end) / 6 and about its end by (M_start + 2 M_end) / 6 of
+    its compliance (conjugate beam). Its own weight is left out.
     """
 
     def law(context: Context) -> Changes:

@@ -3,17 +3,14 @@
 """The examiner's robots as mechanisms in MuJoCo, and where they come to rest.
 
 Per joint stand, one behind the other on the same axis: a motor hinge, held where it is commanded; a play
-hinge between two
-stops; an elastic hinge. Links that bend are beams of three elastic hinge pairs. A palletizer has its plate,
-its wrist and two
+hinge between two stops; an elastic hinge. Links that bend are beams of three elastic hinge pairs. A
+palletizer has its plate, its wrist and two
 rods: a closed loop. Wrong geometry is wrong body frames.
 
 Rest is found by Newton's method on MuJoCo's own generalised forces (`mj_rne` at zero speed), not by stepping
-through time:
-stops and friction are softened in time stepping, so a gap creeps, and a pose would take thousands of steps.
-At rest each
-spring holds the weight, each gap lies at the stop that weight and friction push it to, and the rods have
-their lengths.
+through time: stops and friction are softened in time stepping, so a gap creeps, and a pose would take
+thousands of steps. At rest each spring holds the weight, each gap lies at the stop that weight and friction
+push it to, and the rods have their lengths.
 """
 
 from __future__ import annotations

@@ -3,11 +3,9 @@
 """Real recordings as a source of real noise.
 
 What an instrument and a real arm leave after a flexible fit is neither white nor Gaussian, and wanders and
-jumps in its own way. It
-is put on top of a robot with one sealed effect, at the poses where it was recorded. The flexible fit takes
-what is systematic
-(link values, functions of each joint, approach direction, frames that wander), so that the sealed effect is
-what there is to find.
+jumps in its own way. It is put on top of a robot with one sealed effect, at the poses where it was recorded.
+The flexible fit takes what is systematic (link values, functions of each joint, approach direction, frames
+that wander), so that the sealed effect is what there is to find.
 """
 
 from __future__ import annotations

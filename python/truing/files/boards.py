@@ -60,8 +60,7 @@ class Board:
     chessboard: `columns` x `rows` inner corners, `size` of a square. charuco: `columns` x `rows` squares,
     `size` of a square, `marker` of a marker.
     circles: `columns` x `rows` dots, `size` from dot to dot. acircles: `columns` dots in a row, `rows` rows
-    (an odd number), each shifted by half; `size` from row to
-    row (half the distance of dots in a row).
+    (an odd number), each shifted by half; `size` from row to row (half the distance of dots in a row).
     """
 
     kind: Kind
@@ -275,8 +274,8 @@ def find_board(
     images done, and images in all.
 
     Images without the board are listed in the result. Raises InputError when fewer than three show it (and
-    says which board they do show),
-    when images differ in size, when the camera is not theirs, or OpenCV is not there.
+    says which board they do show), when images differ in size, when the camera is not theirs, or OpenCV is
+    not there.
     """
     cv = _opencv()
     called = (

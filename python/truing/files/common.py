@@ -115,9 +115,8 @@ def atomic_write(path: PathLike) -> Iterator[Path]:
     """Write a file so that it is there as a whole or not at all.
 
     Yields the path of an empty temporary file in the same folder (with the same suffix) to write to; it is
-    renamed to `path`
-    when the block ends well and removed when it raises, Ctrl-C included. Raises InputError when `path` cannot
-    be written.
+    renamed to `path` when the block ends well and removed when it raises, Ctrl-C included. Raises InputError
+    when `path` cannot be written.
     """
     path = Path(path)
     if path.is_dir():
@@ -142,10 +141,8 @@ def atomic_output_dir(path: PathLike) -> Iterator[Path]:
     """Write several files so that all of them appear, or none.
 
     Yields a temporary folder on the same disk. When the block ends well its content moves to `path` (made if
-    needed; files of
-    the same names are replaced, others stay); when it raises, Ctrl-C included, nothing is left behind. Raises
-    InputError
-    when `path` cannot be written.
+    needed; files of the same names are replaced, others stay); when it raises, Ctrl-C included, nothing is
+    left behind. Raises InputError when `path` cannot be written.
     """
     path = Path(path)
     if path.exists() and not path.is_dir():

@@ -89,9 +89,8 @@ def rotations_from_angles(angles: Floats, convention: str) -> Floats:
     """shape=(n, 3, 3) of three angles a row [rad].
 
     convention: "rotation-vector" (axis times angle, as Universal Robots), or the order in which rotations
-    about turned axes are multiplied:
-    "zyx" is Rz(rz) Ry(ry) Rx(rx). Where an axis comes twice ("zyz"), the columns rx, ry, rz hold first,
-    second and third angle.
+    about turned axes are multiplied: "zyx" is Rz(rz) Ry(ry) Rx(rx). Where an axis comes twice ("zyz"), the
+    columns rx, ry, rz hold first, second and third angle.
     """
     if convention == "rotation-vector":
         angle = np.linalg.norm(angles, axis=1)
@@ -468,11 +467,9 @@ def load_handeye(
     """Read robot poses, and what the camera saw of the board at each, from CSV or Parquet.
 
     Columns, with their unit in the name: hand_x_m hand_y_m hand_z_m (or _mm) and hand_qw hand_qx hand_qy
-    hand_qz, the flange in the robot base as
-    the controller reports it; then board_x_m … board_qz, the board in the camera, or `image`, a path relative
-    to the file. Instead of a quaternion
-    hand_rx_deg hand_ry_deg hand_rz_deg (or _rad; board likewise). Optional: t_s, board_t_s, set (train,
-    test), q1_rad … (for
+    hand_qz, the flange in the robot base as the controller reports it; then board_x_m … board_qz, the board
+    in the camera, or `image`, a path relative to the file. Instead of a quaternion hand_rx_deg hand_ry_deg
+    hand_rz_deg (or _rad; board likewise). Optional: t_s, board_t_s, set (train, test), q1_rad … (for
     `handeye_with_kinematics`). Rows whose board cells are all empty are left out, with a warning.
 
     board: what is in the images, "chessboard:9x6:25mm" (inner corners), "charuco:5x7:40mm:30mm",

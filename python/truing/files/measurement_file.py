@@ -196,17 +196,14 @@ def load_measurements(
     """Read measurements of `robot` from CSV or Parquet.
 
     Columns, with their unit in the name: q1_rad ... (the driven joints, in chain order), then x_m y_m z_m
-    with or without
-    qw qx qy qz, or dist_m, or fixed_point; optional dir1 ..., payload_kg, temp_C, t_s, target, pose, set,
-    sigma_m and
-    sigma_rad (standard deviation of the row), weight. Any other column of numbers becomes a covariate of its
-    own name;
-    qr1_..., u1_..., qd1_..., tau1_... do so in SI units and under their SI name (qr1_deg as qr1_rad).
+    with or without qw qx qy qz, or dist_m, or fixed_point; optional dir1 ..., payload_kg, temp_C, t_s,
+    target, pose, set, sigma_m and sigma_rad (standard deviation of the row), weight. Any other column of
+    numbers becomes a covariate of its own name; qr1_..., u1_..., qd1_..., tau1_... do so in SI units and
+    under their SI name (qr1_deg as qr1_rad).
 
     set_column: False passes over the column `set`. joints_only: rows need no measurement (for predictions).
     Raises InputError that names the line, the column, what was found and what was expected. Warns
-    (InputWarning) about joints
-    beyond their limits.
+    (InputWarning) about joints beyond their limits.
     """
     table = Table(Path(path))
     plan = _Plan(table, robot)

@@ -3,10 +3,8 @@
 """Do measured values look like the units that their columns name?
 
 A wrong unit is caught only where the data leave no doubt: small motions, odd robots and gross outliers must
-not be refused.
-Where the size of the numbers alone could mislead, the robot's own forward kinematics is asked: positions that
-follow the
-model's at a scale of 1000 are in millimetres.
+not be refused. Where the size of the numbers alone could mislead, the robot's own forward kinematics is
+asked: positions that follow the model's at a scale of 1000 are in millimetres.
 """
 
 from __future__ import annotations

@@ -3,10 +3,8 @@
 """Robot files: robot.yaml (format truing-robot/1) and URDF.
 
 A number in a file is read with all its digits, converted once and rounded once; it is written with as few
-digits as lead
-back to the same double. So a saved robot loads bit for bit, in any unit. Frames are written as xyz and rpy:
-their rotation
-comes back bit for bit if it was made from rpy, else to 1e-15.
+digits as lead back to the same double. So a saved robot loads bit for bit, in any unit. Frames are written as
+xyz and rpy: their rotation comes back bit for bit if it was made from rpy, else to 1e-15.
 """
 
 from __future__ import annotations

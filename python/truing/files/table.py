@@ -93,8 +93,7 @@ class Table:
         """The column as contiguous doubles, without a copy where Arrow has them so.
 
         Empty cells become NaN if `gaps`, else they are refused; NaN and infinity in the file are refused.
-        With `any_value`
-        everything is taken.
+        With `any_value` everything is taken.
         """
         column = self._columns[name]
         if column.type != pa.float64():

@@ -343,11 +343,9 @@ def load_targets(
     """Read what `robot` shall reach from CSV or Parquet, one row per target.
 
     Columns, with their unit in the name: x_m y_m z_m (or _mm) and qw qx qy qz, the target in the measurement
-    frame (points need no orientation);
-    optional task (pose, torch, point), of a torch roll_rad (preferred), roll_lower_rad roll_upper_rad, lead_…
-    and work_lower_rad … (or _deg),
-    q1_rad … (where the robot comes from), dir1 …, payload_kg, temp_C, t_s. An empty cell of these means what
-    `like` says.
+    frame (points need no orientation); optional task (pose, torch, point), of a torch roll_rad (preferred),
+    roll_lower_rad roll_upper_rad, lead_… and work_lower_rad … (or _deg), q1_rad … (where the robot comes
+    from), dir1 …, payload_kg, temp_C, t_s. An empty cell of these means what `like` says.
 
     like: task of rows that say no other; None: a full pose. program: joints q1_rad … without x_m … are a
     program of joint positions.

@@ -4,8 +4,7 @@
 lines.
 
 Numbers are read as Decimal, with every digit that the file has: a unit conversion then rounds once, and what
-is written
-in degrees or millimetres comes back bit for bit.
+is written in degrees or millimetres comes back bit for bit.
 """
 
 from __future__ import annotations

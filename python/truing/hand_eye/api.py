@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the camera is: handeye, and what belongs to it. Each function hands its keywords to the C++ core.
+"""Hand-eye calibration: handeye, and what belongs to it. Each function hands its keywords to the C++ core.
 
 data = truing.load_handeye("poses.csv", board="chessboard:9x6:25mm")
 found = truing.handeye(data, setup="eye-to-hand")
@@ -58,36 +58,34 @@ def handeye(
     max_iterations: int = _USUAL.max_iterations,
     raise_if_undecided: bool = True,
 ) -> HandEyeResult:
-    """Find where the camera is, from poses of the hand and of a board that the camera sees.
+    """Find the camera's pose from poses of the hand and of a board that the camera sees.
 
-    Dual quaternions of the motions and one SVD start it; poses that do not fit the others are found and left
-    out; then maximum likelihood with
-    the noise of robot and camera. What the motions cannot show is refused, with what to do.
+    The closed form (dual quaternions, one SVD) gives a start. Poses that do not fit the others are rejected.
+    Then the likelihood is maximised, with the noise of robot and camera. What the motions do not determine is
+    refused, with advice.
 
     poses: `HandEyePoses`, or what `load_handeye` read.
     setup: "eye-in-hand" (camera on the hand, board in the cell) or "eye-to-hand" (camera in the cell, board
     on the hand).
     method: "refined", or "closed-form" for the SVD alone.
-    hand_m, hand_rad: [m], [rad] standard deviation of one component of the robot's reported poses; None:
-    found from the data.
+    hand_m, hand_rad: [m], [rad] standard deviation of one component of the robot's reported poses. None:
+    estimated from the data.
     camera_m, camera_rad: [m], [rad] of the board's poses, without images. pixel: [px] with images. None:
-    found from the data.
-    refine_camera: with images, find focal lengths, centre and distortion as well; None: unless a camera was
-    given.
-    working_point: shape=(3,) [m] in the camera frame, where accuracy is asked for; None: the mean of the
-    board's positions.
+    estimated from the data.
+    refine_camera: with images, estimate focal lengths, centre and distortion as well. None: unless a camera
+    was given.
+    working_point: shape=(3,) [m] in the camera frame, where accuracy matters. None: the mean of the board's
+    positions.
     known_height: [m] where all rotation axes are parallel: the camera's coordinate along that axis, in the
     frame that carries the camera;
     known_height_sigma: [m].
-    reject: leave poses out that do not fit the others, those whose standardised residual (rms of six) exceeds
-    reject_beyond.
-    recognise: where the loop does not close, try other readings of the numbers (inverted, scalar last, mm …),
-    and name the one that closes.
+    reject: leave out poses whose standardised residual (rms of six components) exceeds reject_beyond.
+    recognise: where the loop does not close, try other readings of the numbers (inverted, scalar last, mm …)
+    and name the one that closes it.
     reading: use the poses in such a reading, a name of `handeye_readings`.
 
     Raises InputError on data or options that cannot be used, and UndecidedError (it carries the result) where
-    `status` is not "done", unless
-    `raise_if_undecided` is False.
+    `status` is not "done", unless `raise_if_undecided` is False.
     """
     options = handeye_options(
         poses,
@@ -175,7 +173,7 @@ def handeye_plan(
     reach: float | None = None,
     seed: int = 0,
 ) -> tuple[NextHandPose, ...]:
-    """Robot poses, one after the other, that shrink the covariance of the working point most.
+    """Robot poses to measure next, each the one that reduces the covariance at the working point most.
 
     poses, result: what was measured, and what `handeye` made of it. options: those of `handeye`; None: the
     usual ones with `setup`.
@@ -239,8 +237,9 @@ def handeye_with_kinematics(
     seed: int = _USUAL_FIT.seed,
     threads: int = 0,
 ) -> HandEyeKinematics:
-    """Find camera, board mount and the robot's own parameters in one problem: an arm that is off its model
-    puts its error into the camera else.
+    """Find camera, board mount and the robot's own parameters in one problem.
+
+    Solved apart, the errors of the arm's model would go into the camera's pose.
 
     robot: nominal. joints: shape=(n, driven joints) [rad | m], one row per pose, `HandEyeData.joints`.
     poses, options, setup: as in `handeye`. free, hold, effects, loss, test_share, seed, threads: as in

@@ -42,31 +42,29 @@ def identify(
 ) -> Identification:
     """Find the robot's parameters from measurements.
 
-    Base, targets (anchor, fixed points) are found first; what the data cannot see is frozen at nominal and
-    named in the
-    result; then the fit runs on the training rows.
+    Base and targets (anchor, fixed points) are found first. Parameters that the data do not determine are
+    frozen at nominal and named in the result. Then the fit runs on the training rows.
 
     robot: nominal. data: measurements, see `Measurements`.
-    free: names and globs, "J2.*,*.ratio" or a list; empty: every geometric value, base and targets.
-    hold: names and globs that stay at nominal whatever else is asked for, "base.*" for a frame that is known.
-    effects: effects to fit as well: "backlash,harmonic:J2+J3", or a list of such words, `EffectRequest` and
+    free: names and globs, "J2.*,*.ratio" or a list. Empty: every geometric value, base and targets.
+    hold: names and globs that stay at nominal in any case, "base.*" for a frame that is known.
+    effects: to be fitted as well: "backlash,harmonic:J2+J3", or a list of such words, `EffectRequest` and
     `Effect`.
     solver: "lm" (Levenberg-Marquardt) or "ceres" (takes bounds).
-    loss: "reject" finds gross outliers, lists them and fits without; or "none", "huber", "cauchy", "tukey".
-    frame_by: the measurement frame as six "parameters", or registered after every step ("svd"; positions
+    loss: "reject" finds gross outliers, lists them and leaves them out; "none", "huber", "cauchy", "tukey".
+    frame_by: the measurement frame as six "parameters", or registered after every step ("svd", positions
     only).
     rotation_length: [m] a rotation error of 1 rad counts as this length, where rows give no sigma.
-    test_share: of the pose groups, held out when the data has no `set`. seed: of that split.
+    test_share: fraction of the pose groups that is held out when the data has no `set`. seed: of that split.
     max_iterations, initial_damping, rms_fall [m], gradient, undamped: of the iteration, see
     `IdentifyOptions`.
-    rank_tolerance: a unit column that the others explain but for this share is not observable.
-    hayati_angle: [rad] neighbouring axes nearer to parallel get beta.
-    reject_beyond: loss "reject": rows whose residual is longer than this many medians.
+    rank_tolerance: a unit column is not observable if the others leave no larger fraction of it unexplained.
+    hayati_angle: [rad] neighbouring axes that are closer to parallel get a beta.
+    reject_beyond: with loss "reject", rows are rejected whose residual is longer than this many medians.
     bounds: {parameter: (lowest, highest)}, solver "ceres" only. threads: 0: as many as the machine has.
 
     Raises InputError on data or options that cannot be used, and NotConvergedError (it carries the result),
-    unless
-    `raise_if_not_converged` is False.
+    unless `raise_if_not_converged` is False.
     """
     asked, own = split_effects(effects)
     options = _core.IdentifyOptions(
@@ -101,7 +99,7 @@ def predict(
 ) -> Prediction:
     """What the robot, with its fitted effects, predicts for the rows of `data`.
 
-    effects: definitions of one's own effects that the robot carries; those of the catalogue are known.
+    effects: definitions of own effects that the robot carries. Those of the catalogue are known.
     Raises InputError on unknown effects or columns that they need.
     """
     return _core.predict(robot, data, evaluated(own_effects(effects), robot, data), threads)

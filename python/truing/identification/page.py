@@ -530,17 +530,17 @@ def _correlations(page: Page, names: Sequence[str], matrix: Floats) -> None:
         for i, j in zip(*np.unravel_index(np.argsort(-np.triu(off), axis=None)[:6], off.shape), strict=True)
         if off[i, j] > 0.9
     ]
-    page.add('<section class="card"><h2>Which parameters lean on each other</h2>')
+    page.add('<section class="card"><h2>Correlations between parameters</h2>')
     if pairs:
         page.add(
-            '<p class="lead">Strongly tied (their sum or difference is known better than each alone): '
+            '<p class="lead">Strongly correlated (their sum or difference is known better than each alone): '
             + "; ".join(
                 f"{escaped(names[i])} and {escaped(names[j])} ({matrix[i, j]:+.2f})" for i, j in pairs
             )
             + ".</p>"
         )
     else:
-        page.add('<p class="lead">No two parameters are tied more strongly than 0.9.</p>')
+        page.add('<p class="lead">No two parameters are correlated by more than 0.9.</p>')
     labels = list(names)
     size = max(420, 15 * len(labels) + 140)
     page.add(f'<div class="scroll"><div style="min-width:{min(size, 980)}px">')

@@ -59,8 +59,8 @@ def inverse(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Solutions:
-    """Joint readings that bring the robot's tool to each target, effects included. What cannot be reached is
-    told in the result.
+    """Joint readings that bring the robot's tool to each target, effects included. The result says which
+    targets are not reached, and why.
 
     robot: nominal or calibrated. targets: shape=(n, 4, 4) [m] poses in the measurement frame, a sequence of
     `Task`, or what `load_targets` read.
@@ -68,14 +68,14 @@ def inverse(
     alone).
     seeds: shape=(driven joints,) or (n, driven joints) [rad | m], where the robot comes from; None: those of
     the file, or the middle of the joints' ranges.
-    choose: which of several answers: "nearest" to the seed, "limits_margin", "manipulability" or
+    choose: which of several solutions: "nearest" to the seed, "limits_margin", "manipulability" or
     "rail_travel".
-    scene: what the robot must not touch. conditions: payload, approach direction …, one or one per target;
-    None: those of the file.
+    scene: obstacles, and capsules around links, that must not collide.
+    conditions: payload, approach direction …, one or one per target; None: those of the file.
     target: which of the robot's targets is brought there, its index.
-    position_tolerance: [m], rotation_tolerance: [rad] an answer misses the task by no more. max_restarts:
-    descents before a target is given up.
-    threads: 0: as many as the machine has; the answers are the same for any number. progress: called with
+    position_tolerance: [m], rotation_tolerance: [rad] largest error of a solution. max_restarts: descents
+    before a target counts as not reached.
+    threads: 0: as many as the machine has; the solutions are the same for any number. progress: called with
     targets done, now and then.
 
     For many calls with one robot make an `InverseSolver` once. Raises InputError on robots, targets or
@@ -117,15 +117,14 @@ def inverse_path(
     smoothing: int = _USUAL_PATH.smoothing,
     progress: Progress | None = None,
 ) -> JointPath:
-    """Joints along a chain of targets, in steps as short as can be; where none keeps within the bounds, the
-    gap is told.
+    """Joints along a sequence of targets, in the shortest steps. Where no step keeps within the bounds, the
+    result lists a gap.
 
     robot, targets, kind, scene, target, progress: as in `inverse`. seed: shape=(driven joints,) [rad | m],
     where the robot comes from.
     conditions: of the whole path; None: those of the file, whose rows must agree.
-    longest_turn: [rad], longest_slide: [m] of a joint between neighbouring targets; more is a gap.
-    rolls: samples of a torch's free roll. rail_places: of each rail. smoothing: rounds that even the path
-    out.
+    longest_turn: [rad], longest_slide: [m] of a joint between neighbouring targets. A larger step is a gap.
+    rolls: samples of a torch's free roll. rail_places: samples of each rail. smoothing: rounds of smoothing.
 
     Raises InputError as `inverse` does.
     """
@@ -163,12 +162,11 @@ def compensate(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Compensations:
-    """What to command to a controller that believes in the nominal robot, so that the calibrated one goes
-    where it is wanted.
+    """Commands for a controller that has the nominal model, so that the calibrated robot reaches the targets.
 
-    nominal: what the controller believes. calibrated: what `identify` found. targets: as in `inverse`; or,
-    with `program`, joint positions, shape=(n, driven joints)
-    [rad | m]: the nominal robot's pose there is what is wanted. A file with joints and no poses is a program.
+    nominal: the controller's model. calibrated: what `identify` found. targets: as in `inverse`; or, with
+    `program`, joint positions, shape=(n, driven joints) [rad | m], at which the nominal robot's poses are the
+    targets. A file with joints and no poses is a program.
     kind, seeds, choose, scene, conditions, target, threads, progress: as in `inverse`. The seed decides the
     configuration.
     in_base: poses and commands are in each robot's own base frame, as programs have them; else in the

@@ -38,9 +38,8 @@ def plan(
 ) -> PlanResult:
     """Measurement poses by exchange on an observability index.
 
-    poses: how many. min_step: [rad], min_step_prismatic: [m]: joints move by more between neighbours.
-    index: what the plan makes large, see `PlanOptions`. orientation: full poses are measured, not only
-    positions.
+    poses: how many. min_step: [rad], min_step_prismatic: [m]: least motion of a joint between neighbours.
+    index: what the plan maximises, see `PlanOptions`. orientation: poses are measured, not only positions.
     position_sigma: [m], rotation_sigma: [rad] of one component, for the standard errors promised.
     sweeps, proposals, seed: of the exchange. free, effects: as in `identify`; effects of the catalogue only.
 
@@ -90,25 +89,24 @@ def distinguish(
     min_step_prismatic: float = _USUAL_DISTINCTION.min_step_prismatic,
     seed: int = _USUAL_DISTINCTION.seed,
 ) -> Distinction:
-    """Before any data: which effects a plan can tell apart, how small it would still see them, and the poses
-    to add.
+    """Which effects a plan tells apart, the smallest sizes it would detect, and poses to add. Needs no data.
 
         planned = truing.plan(robot, poses=60)
-        seen = truing.distinguish(robot, planned.joints, columns="dir,payload",
-        separate="backlash,joint_offset")
+        seen = truing.distinguish(
+            robot, planned.joints, columns="dir,payload", separate="backlash,joint_offset"
+        )
 
     robot: nominal. joints: shape=(poses, driven joints) [rad | m], as of `plan`.
     columns: what will be recorded and varied, of "dir" (approached from both sides), "payload", "temp", "t".
-    separate: effects to be told apart, "backlash,joint_offset:J2" or a list; a single one from everything
-    else. Poses are added if it takes
-    any, `add` at most, each chosen from `proposals`. Empty: the whole catalogue is looked at.
+    separate: effects to be told apart, "backlash,joint_offset:J2" or a list; a single one from all others.
+    Poses are added if needed, at most `add`, each chosen from `proposals`. Empty: the whole catalogue.
     effects: own effects that take part beside the catalogue's; those in `separate` need not be named again.
-    payload: [kg] a pose is measured with this or with nothing. temperature_low, temperature_high: [deg C] the
-    plan warms up, and cools down.
+    payload: [kg] a pose is measured with this or with nothing.
+    temperature_low, temperature_high: [deg C] between which the plan warms up and cools down.
     seconds_per_pose: [s]. orientation, position_sigma, rotation_sigma, min_step, min_step_prismatic: as in
     `plan`.
-    alike: an effect of which another explains a larger share is not told from it. seed: of directions,
-    payloads and proposals.
+    alike: effects are not told apart if R² between them is larger than this. seed: of directions, payloads
+    and proposals.
 
     Raises InputError: unknown effects, joints or columns.
     """

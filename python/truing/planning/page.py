@@ -89,7 +89,7 @@ def size_words(value: float | None, unit: str) -> str:
 
 
 def _told_apart(page: Page, seen: Mapping[str, Any]) -> None:
-    """What a plan tells apart: smallest sizes, a map of what is like what, what poses were added for."""
+    """What a plan tells apart: smallest sizes, R² of every pair of effects, what poses were added for."""
     if seen["separated"]:
         page.add(_separated(seen))
     if seen["effects"]:
@@ -126,7 +126,7 @@ def _separated(seen: Mapping[str, Any]) -> str:
     )
     return (
         f'<section class="card"><h2>To be told apart: {counted(seen["added_poses"], "pose")} added</h2><p'
-        ' class="lead">R² is the share of the first effect that the second one could pass for, once base'
+        ' class="lead">R² is the fraction of the first effect that the second one explains, once base'
         " and tool are fitted. The added poses are the last ones of poses.csv.</p><div"
         f' class="scroll"><table class="sortable"><thead><tr>{head}</tr></thead>'
         f"<tbody>{''.join(rows)}</tbody></table></div></section>"
@@ -203,7 +203,7 @@ def _alike(page: Page, seen: Mapping[str, Any]) -> None:
     size = max(440, 15 * len(labels) + 190)
     page.add(
         '<section class="card"><h2>Which effects look alike</h2><p class="lead">How much of the effect'
-        " on the left the effect below could pass for (R²), once base and tool are fitted. Dark pairs"
+        " on the left the effect below explains (R²), once base and tool are fitted. Dark pairs"
         ' cannot be told apart by this plan.</p><div class="scroll"><div'
         f' style="min-width:{min(size, 1180)}px">'
     )

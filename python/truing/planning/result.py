@@ -57,8 +57,8 @@ def plan_dict(
 
 
 def distinction_dict(seen: _core.Distinction) -> dict[str, Any]:
-    """The part of ``result.json`` of ``truing plan`` on effects: their smallest sizes, which are alike, and
-    what poses were added for.
+    """The part of ``result.json`` of ``truing plan`` on effects: smallest sizes, pairs that are not told
+    apart, pairs that poses were added for.
     """
     return {
         "added_poses": seen.added,

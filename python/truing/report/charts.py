@@ -26,7 +26,7 @@ ROW_POINTS = 1500  # shown over the row order
 def distribution_chart(
     series: Sequence[tuple[Floats, str, str]],
 ) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-    """Share of rows over the error, on a logarithmic axis: steps, filled, named where they peak."""
+    """Fraction of rows over the error, on a logarithmic axis: steps, filled, named where they peak."""
     finite = [(values[np.isfinite(values)], colour, name) for values, colour, name in series]
     everything = np.concatenate([values for values, _, _ in finite]) if finite else np.empty(0)
     if everything.size == 0 or everything.max() <= 0:
@@ -91,7 +91,7 @@ def distribution_chart(
             "ticktext": tick_texts,
             "range": [math.log10(edges[0] * scale), math.log10(edges[-1] * scale)],
         },
-        "yaxis": {"title": {"text": "share of rows [%]"}, "range": [0, top * 1.18]},
+        "yaxis": {"title": {"text": "fraction of rows [%]"}, "range": [0, top * 1.18]},
         "annotations": annotations,
     }
     return traces, layout

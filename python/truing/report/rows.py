@@ -19,8 +19,7 @@ class Rows:
     """What is known of every row of the data, in the order of the data.
 
     Errors are predicted minus measured and NaN where a row does not measure them; a row has either a position
-    error or a
-    distance error. `position` is where the target was measured, or else predicted.
+    error or a distance error. `position` is where the target was measured, or else predicted.
     """
 
     joint_names: tuple[str, ...]

@@ -16,9 +16,8 @@ In every scene and pose, with the true frames,
 Noise acts on a frame by a rotation vector about the frame's own axes, in its origin, and by a translation,
 each component independent
 and normal: `R_true = R_reported @ exp(w)`, `t_true = t_reported + n` for the hand; `R_seen = R_true @
-exp(w)`, `t_seen = t_true + n` for the board in
-the camera. So a rotation error of the hand moves a board that is mounted a lever away; a rotation error of
-the seen board does not move its origin.
+exp(w)`, `t_seen = t_true + n` for the board in the camera. So a rotation error of the hand moves a board that
+is mounted a lever away; a rotation error of the seen board does not move its origin.
 
 Nothing here knows a solver. `MISTAKES` and `DEGENERATE` are what users hand in: data that are wrong, and data
 that cannot tell.
@@ -234,15 +233,13 @@ def simulate_handeye(
     Args:
         hand_m: Noise of the reported hand, per axis [m]; hand_rad: about each axis [rad].
         camera_m: Noise of the seen board, per axis [m]; camera_rad: about each axis [rad].
-        board: Make images too: the points of this board in pixels, with noise `pixel` per axis. Their noise
-        has nothing to do with that of
-            T_camera_board; a calibration uses one or the other.
-        outliers: This share of the boards, rounded, is seen off by `outlier_m` [m] in a random direction,
-        turned by `outlier_rad` [rad] about a random axis
-            of its own; their pixels too.
+        board: Make images too: the points of this board in pixels, with noise `pixel` per axis. It is
+            independent of the noise of T_camera_board; a calibration uses one or the other.
+        outliers: Fraction of the boards, rounded, that is seen off by `outlier_m` [m] in a random direction
+            and turned by `outlier_rad` [rad] about a random axis; their pixels too.
         layout: Where things are; by default LAYOUTS[setup].
         camera_looks_down: Eye-to-hand: the optical axis is the base's -z. Eye-in-hand: it is parallel to the
-        hand's z.
+            hand's z.
         seed: The same seed gives the same scene, and a longer one begins with the shorter one.
     """
     _check_scene(
@@ -582,9 +579,8 @@ def render_board(
     """A grey image of the board through the lens, shape=(height, width).
 
     Every pixel is the mean of samples x samples rays, each followed through the distortion to the board's
-    plane, so corners and circles are
-    where `camera.project` says. `blur` is the lens's standard deviation [px], `noise` the sensor's [grey
-    levels of 255].
+    plane, so corners and circles are where `camera.project` says. `blur` is the lens's standard deviation
+    [px], `noise` the sensor's [grey levels of 255].
     """
     outline = _outline(board)
     across = np.linspace(0, 1, 50)[:, None]

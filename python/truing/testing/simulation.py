@@ -3,9 +3,8 @@
 """Simulated measurements: a hidden true robot, and what an instrument would read from it.
 
 The truth is a copy of the nominal robot with errors drawn on its parameters; where its target is,
-`truing.predict` says. So
-these data test estimation and bookkeeping, not the model itself: what no model here knows is not in them
-either.
+`truing.predict` says. So these data test estimation and bookkeeping, not the model itself: what no model here
+knows is not in them either.
 """
 
 from __future__ import annotations
@@ -174,12 +173,12 @@ def true_robot(
         ratios: Of gear ratios [-].
         only: Names and globs of the values that get errors ("J2.*", "*.offset"); empty: all.
         effects: Effects that the true robot has as well, by parameter and in SI: {"backlash.J2": 2e-4,
-        "harmonic.J3.cos1": 1e-4,
-            "gear_ratio.J1": 1e-4}. None: a size is drawn, about as large as the effect usually is.
+            "harmonic.J3.cos1": 1e-4, "gear_ratio.J1": 1e-4}. None: a size is drawn, about as large as the
+            effect usually is.
         own_effects: Definitions of effects that are not in the catalogue; `effects` asks for them by their
             parameters.
         base_unknown: Put the robot somewhere else in the measurement frame: within 2 m, turned about z,
-        tilted by up to 2 degrees.
+            tilted by up to 2 degrees.
         seed: The same seed gives the same robot, whatever is measured on it.
     """
     robot = nominal.copy()
@@ -257,9 +256,9 @@ def measure(
         joints: shape=(n, driven joints) [rad | m].
         noise: Standard deviation of each measured coordinate [m].
         orientation: Measure orientations too, with `rotation_noise` [rad] about each axis.
-        outlier_share: This share of the rows is off by `outlier_length` [m] in a random direction.
-        columns: More recorded inputs, of "dir" (approach directions), "payload", "temp", "t"; they are there
-        for effects to act on.
+        outlier_share: Fraction of the rows that is off by `outlier_length` [m] in a random direction.
+        columns: More recorded inputs, of "dir" (approach directions), "payload", "temp", "t", for effects
+            to act on.
     """
     robot = truth.robot
     wanted = tuple(dict.fromkeys(columns))

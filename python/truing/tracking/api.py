@@ -3,12 +3,16 @@
 """Tracking a swaying arm: recordings, their replay, and what is wrong with them. The work is done by
 `Tracker` in the C++ core.
 
-robot, where = truing.load_robot("robot.yaml"), truing.load_setup("setup.yaml")
-streams = truing.recorded_streams(robot, where, imu=truing.load_imu("imu.csv"),
-tracker=truing.load_tracker("tracker.csv"),
-                                  joints=truing.load_joints("joints.csv", robot),
-                                  plan=truing.load_plan("plan.csv"))
-played = truing.replay(streams, where.setup, where.options())
+    robot, where = truing.load_robot("robot.yaml"), truing.load_setup("setup.yaml")
+    streams = truing.recorded_streams(
+        robot,
+        where,
+        imu=truing.load_imu("imu.csv"),
+        tracker=truing.load_tracker("tracker.csv"),
+        joints=truing.load_joints("joints.csv", robot),
+        plan=truing.load_plan("plan.csv"),
+    )
+    played = truing.replay(streams, where.setup, where.options())
 """
 
 from __future__ import annotations
@@ -30,9 +34,8 @@ Floats = NDArray[np.float64]
 
 PLAN_AHEAD = 1.0  # [s] a plan without arrival_s is known so long before its time
 _FEW = 4000  # samples that checks look at
-_FAR_OFF = (
-    0.25  # of the tracker's spread (or of 1 m, if that is more): a set-up that is off by more is another one
-)
+# Of the tracker's spread (or of 1 m, if that is more): a set-up that is off by more is another one.
+_FAR_OFF = 0.25
 _FEWEST_RESTS = 6
 _FROM_MOTION = 300  # poses that stand in for test positions
 _SAME_CLOCK = 0.02  # [s]
@@ -59,8 +62,7 @@ def recorded_streams(
     arrived. The drift of the tracker's clock that `where` knows is taken off.
 
     A stream without arrivals is taken to have arrived at its stamps, a plan one second before. Arrivals are
-    of the computer's clock: where the inertial
-    stream has them, its fastest sample ties stamps to arrivals.
+    of the computer's clock: where the inertial stream has them, its fastest sample ties stamps to arrivals.
 
     Raises InputError where streams do not overlap in time, or where the tracker, the gyro or the set-up
     cannot be right: see `check_streams`.
@@ -98,11 +100,11 @@ def check_streams(
     joints: JointData,
     tracker: TrackerData | None = None,
 ) -> None:
-    """Raises InputError where streams do not overlap in time, and where numbers are read wrongly: gyro in
-    deg/s, tracker in other axes, left-handed, mm …
+    """Raises InputError where streams do not overlap in time, and where numbers are misread: gyro in deg/s,
+    tracker in other axes, left-handed, in mm …
 
-    What encoders and the set-up say is compared with what was measured; sway and calibration errors are far
-    below what is looked for.
+    Predictions from encoders and set-up are compared with measurements. Sway and calibration errors are far
+    below the limits.
     """
     flange = _core.flange_poses(robot, joints.joints)
     t = joints.t - setup.controller_clock_offset
@@ -261,12 +263,12 @@ def track_calibrate(
     tool: ToolPoses | None = None,
     clock_wanted: float = 1e-3,
 ) -> TrackCalibration:
-    """Find a tracking set-up from one recording: the arm goes from test position to test position, and stands
-    still at each for three seconds or more.
+    """Find a tracking set-up from one recording, in which the arm stands still at test positions for three
+    seconds or more each.
 
-    Joints and tracker give the offset of their clocks, the tracker frame and the receiver on the flange; the
-    inertial sensor, gravity and its clock come from
-    the motion between. Where the arm never stood still, frames come from the motion as well.
+    Joints and tracker give the offset of their clocks, the tracker frame and the receiver on the flange. The
+    inertial sensor, gravity and its clock come from the motion between. Where the arm never stood still,
+    frames come from the motion as well.
 
     plan: planned tool; gives the actuators' lag and the modes of the sway. tool: prescribed poses of the
     tool; None: the robot file's tool.
@@ -614,8 +616,9 @@ def _tuned(streams: _core.RecordedStreams, where: SetupData) -> SetupData:
 
 
 def actuator_lag(t: Floats, T_base_tool: Floats, plan: PoseData) -> float:
-    """[s] joints are where the plan was so long ago, from 0 to 0.5: the lag with the smallest difference of
-    positions. Tool by forward kinematics, shape=(n, 4, 4).
+    """[s] Delay of the joints behind the plan, from 0 to 0.5: that of the smallest difference of positions.
+
+    T_base_tool: by forward kinematics, shape=(n, 4, 4), at t, shape=(n,) [s].
     """
     inside = (t > plan.t[0] + _LONGEST_LAG) & (t < plan.t[-1])
     if inside.sum() < 10:
