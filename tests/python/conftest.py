@@ -4,6 +4,6 @@
 
 import signal
 
-# A shell starts what it puts into the background with Ctrl-C ignored, and whatever that starts inherits it. The
-# tests of Ctrl-C are to hold there too.
+# A shell starts what it puts into the background with Ctrl-C ignored, and whatever that starts inherits it.
+# The tests of Ctrl-C are to hold there too.
 signal.signal(signal.SIGINT, signal.default_int_handler)
