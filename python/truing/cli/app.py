@@ -235,7 +235,12 @@ def typer_info(one: Bound) -> Any:
         if len(metavar) > _WIDEST:  # would leave no room for the help
             help, metavar = f"{help} One of {', '.join(kind.values)}.", "WORD"
     return typer.Option(
-        one.flag, help=help, metavar=metavar, rich_help_panel=kind.panel, autocompletion=complete
+        one.flag,
+        help=help,
+        metavar=metavar,
+        rich_help_panel=kind.panel,
+        show_default=one.shown_default is not None,
+        autocompletion=complete,
     )
 
 

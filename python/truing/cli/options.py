@@ -193,9 +193,15 @@ class Number(Kind):
 
 
 class Fraction(Kind):
-    """A part of a whole, "2%" or "0.02": from 0 to below 1."""
+    """A part of a whole, "2%" or "0.02": from 0, or `above` something, to `below` something."""
 
     metavar = "FRACTION"
+
+    def __init__(
+        self, help: str = "", *, above: float | None = None, below: float = 1.0, **common: Any
+    ) -> None:
+        super().__init__(help, **common)
+        self.above, self.below = above, below
 
     def read(self, text: str, option: str) -> float:
         percent = text.strip().endswith("%")
@@ -203,8 +209,10 @@ class Fraction(Kind):
             value = float(text.strip().removesuffix("%")) * (0.01 if percent else 1.0)
         except ValueError:
             value = math.nan
-        if not 0 <= value < 1:
-            raise refused(option, text, "a fraction below 1, such as 2% or 0.02")
+        lowest = 0.0 if self.above is None else self.above
+        if not lowest <= value < self.below or value == self.above:
+            above = "" if self.above is None else f"above {self.above:g} and "
+            raise refused(option, text, f"a fraction {above}below {self.below:g}, such as 2% or 0.02")
         return value
 
     def show(self, value: float) -> str:
@@ -348,12 +356,23 @@ class Parts(Kind):
 
 
 class Words(Kind):
-    """Words between commas; the field holds a list."""
+    """Words between commas; the field holds a list. `known`: no others."""
 
     metavar = "NAMES"
 
+    def __init__(self, help: str, *, known: Sequence[str] = (), **common: Any) -> None:
+        super().__init__(help, **common)
+        self.known = known
+
     def read(self, text: str, option: str) -> list[str]:
-        return words_of(text)
+        words = words_of(text)
+        for word in words:
+            if self.known and word not in self.known:
+                raise refused(option, word, f"words of {', '.join(self.known)}")
+        return words
+
+    def complete(self, incomplete: str) -> list[str]:
+        return continued(incomplete, self.known)
 
 
 class Names(Kind):
@@ -368,8 +387,13 @@ class EffectNames(Names):
     def complete(self, incomplete: str) -> list[str]:
         from truing.model import catalogue
 
-        before, comma, begun = incomplete.rpartition(",")
-        return [before + comma + name for name, _ in catalogue() if name.startswith(begun)]
+        return continued(incomplete, [name for name, _ in catalogue()])
+
+
+def continued(incomplete: str, names: Sequence[str]) -> list[str]:
+    """The last word of "a,b" completed."""
+    before, comma, begun = incomplete.rpartition(",")
+    return [before + comma + name for name in names if name.startswith(begun)]
 
 
 def words_of(text: str) -> list[str]:
@@ -422,4 +446,4 @@ Effects = Annotated[
     str,
     EffectNames("Effects to find as well: 'backlash,harmonic:J2+J3'. `truing effects` lists them."),
 ]
-Noise = Annotated[float, Length("Standard deviation of each measured coordinate.")]
+INPUTS = ("dir", "payload", "temp", "t")  # of measurements, which --columns asks for

@@ -84,6 +84,8 @@ def test_a_length_without_a_proper_unit_is_refused_by_name(text: str) -> None:
         (Fraction(), "-1%", "a fraction below 1, such as 2% or 0.02"),
         (Fraction(), "two", "a fraction below 1, such as 2% or 0.02"),
         (Fraction(), "nan", "a fraction below 1, such as 2% or 0.02"),
+        (Fraction(above=0, below=0.5), "0%", "a fraction above 0 and below 0.5, such as 2% or 0.02"),
+        (Words("", known=("dir", "t")), "dir,humidity", "words of dir, t"),
         (Count(least=1), "none", "a whole number, 1 or more"),
         (Count(least=1), "0", "a whole number, 1 or more"),
         (Count(most=100), "101", "a whole number, 0 to 100"),

@@ -47,7 +47,10 @@ class Command(run.Command["tuple[Robot, Measurements]", "Diagnosis"]):
         str, EffectNames("Effects that are not considered: 'drift,scale'. `truing effects` lists them.")
     ] = ""
     false_alarm: Annotated[
-        float, Fraction("False-positive rate: how often a robot without any gap is said to have one.")
+        float,
+        Fraction(
+            "False-positive rate: how often a robot without any gap is said to have one.", above=0, below=0.5
+        ),
     ] = core("DiagnoseOptions", "false_alarm")
     record: Annotated[
         Literal["q", "qr"],

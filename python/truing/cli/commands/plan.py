@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from truing.cli import run
 from truing.cli.options import (
+    INPUTS,
     Angle,
     BaseLink,
     Choice,
@@ -89,7 +90,7 @@ class Command(run.Command["Robot", "tuple[PlanResult, Distinction | None]"]):
         ),
     ] = core("PlanOptions", "index")
     orientation: Annotated[bool, Flag("Orientations will be measured as well.")] = False
-    noise: Annotated[float, Length("Standard deviation of each measured coordinate.")] = core(
+    noise: Annotated[float, Length("Standard deviation of each measured coordinate.", above=0)] = core(
         "PlanOptions", "position_sigma"
     )
     seed: Seed = core("PlanOptions", "seed")
@@ -98,7 +99,10 @@ class Command(run.Command["Robot", "tuple[PlanResult, Distinction | None]"]):
     columns: Annotated[
         list[str],
         Words(
-            "What will be recorded and varied as well, of dir,payload,temp,t.", metavar="COLUMNS", panel=APART
+            f"What will be recorded and varied as well, of {','.join(INPUTS)}.",
+            known=INPUTS,
+            metavar="COLUMNS",
+            panel=APART,
         ),
     ] = ()  # type: ignore[assignment]
     separate: Annotated[

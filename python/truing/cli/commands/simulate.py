@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from truing.cli import run
 from truing.cli.options import (
+    INPUTS,
     Angle,
     BaseLink,
     Choice,
@@ -123,7 +124,8 @@ class Command(run.Command["tuple[Robot, Floats | None]", "Simulation | Simulated
         ),
     ] = ()  # type: ignore[assignment]
     columns: Annotated[
-        list[str], Words("More recorded inputs, of dir,payload,temp,t.", metavar="COLUMNS")
+        list[str],
+        Words(f"More recorded inputs, of {','.join(INPUTS)}.", known=INPUTS, metavar="COLUMNS"),
     ] = ()  # type: ignore[assignment]
     base_unknown: Annotated[bool, Flag("Put the robot somewhere unknown in the measurement frame.")] = False
     stream: Annotated[
