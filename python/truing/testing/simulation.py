@@ -183,50 +183,15 @@ def true_robot(
     """
     robot = nominal.copy()
     rng = np.random.default_rng([seed, 1])
-    chosen = tuple(only)
-    changed: dict[str, tuple[float, float, str]] = {}
-    sigma = {"m": lengths, "rad": angles, "-": ratios}
-    met: set[str] = set()
-    for owner, attribute, name, unit in _values(robot):
-        error = (
-            float(rng.normal()) * sigma[unit]
-        )  # drawn for every value, so that `only` does not change the others
-        matching = {pattern for pattern in chosen if fnmatch.fnmatchcase(name, pattern)}
-        met |= matching
-        if error and (matching or not chosen):
-            before = float(getattr(owner, attribute))
-            setattr(owner, attribute, before + error)
-            changed[name] = (before, before + error, unit)
-    for name, frame_of, apply in _frames(robot):
-        draws = rng.normal(size=6) * np.repeat([lengths, angles], 3)
-        wanted = np.zeros(6, dtype=bool)
-        for k, axis in enumerate(("x", "y", "z", "rx", "ry", "rz")):
-            matching = {pattern for pattern in chosen if fnmatch.fnmatchcase(f"{name}.{axis}", pattern)}
-            met |= matching
-            wanted[k] = bool(matching) or not chosen
-        draws[~wanted] = 0.0
-        if draws.any():
-            frame = np.array(frame_of)
-            moved = frame.copy()
-            moved[:3, 3] += draws[:3]
-            moved[:3, :3] = _core.rotation_from_rpy(draws[3:]) @ frame[:3, :3]
-            apply(moved)
-            for k, axis in enumerate("xyz"):
-                if draws[k]:
-                    changed[f"{name}.{axis}"] = (float(frame[k, 3]), float(moved[k, 3]), "m")
-            for k, axis in enumerate(("rx", "ry", "rz")):
-                if draws[3 + k]:
-                    changed[f"{name}.{axis}"] = (0.0, float(draws[3 + k]), "rad")
-    for pattern in chosen:
-        if pattern not in met and not pattern.startswith("base."):
-            raise InputError(
-                f"{pattern!r} means no value of robot {robot.name!r} that an error can be put on"
-            )
+    errors = _Errors(tuple(only))
+    errors.add_to_values(robot, {"m": lengths, "rad": angles, "-": ratios}, rng)
+    errors.add_to_frames(robot, lengths, angles, rng)
+    errors.require_all_met(robot)
     own = as_list(own_effects)
     known = _known(own)
     draw = np.random.default_rng([seed, 6])
     hidden = tuple(_true_effect(robot, name, value, known, draw) for name, value in (effects or {}).items())
-    _add_effects(robot, hidden, changed, known)
+    _add_effects(robot, hidden, errors.changed, known)
     if base_unknown:
         place = np.eye(4)
         place[:3, 3] = rng.uniform(-2, 2, 3)
@@ -234,7 +199,61 @@ def true_robot(
             rng.uniform([-0.035, -0.035, -math.pi], [0.035, 0.035, math.pi])
         )
         robot.T_measurement_base = place
-    return Truth(robot, changed, hidden, tuple(own))
+    return Truth(robot, errors.changed, hidden, tuple(own))
+
+
+@dataclass
+class _Errors:
+    """Errors that are put on a robot's parameters. One is drawn for every value: `only` does not change the
+    others.
+    """
+
+    only: tuple[str, ...]  # names and globs; empty: all
+    changed: dict[str, tuple[float, float, str]] = field(default_factory=dict)  # nominal, true, unit
+    met: set[str] = field(default_factory=set)  # patterns that mean something
+
+    def _wanted(self, name: str) -> bool:
+        matching = {pattern for pattern in self.only if fnmatch.fnmatchcase(name, pattern)}
+        self.met |= matching
+        return bool(matching) or not self.only
+
+    def add_to_values(self, robot: _core.Robot, sigma: Mapping[str, float], rng: np.random.Generator) -> None:
+        """sigma: standard deviations by unit."""
+        for owner, attribute, name, unit in _values(robot):
+            error = float(rng.normal()) * sigma[unit]
+            if self._wanted(name) and error:
+                before = float(getattr(owner, attribute))
+                setattr(owner, attribute, before + error)
+                self.changed[name] = (before, before + error, unit)
+
+    def add_to_frames(
+        self, robot: _core.Robot, lengths: float, angles: float, rng: np.random.Generator
+    ) -> None:
+        """lengths, angles: standard deviations [m], [rad]."""
+        for name, frame_of, apply in _frames(robot):
+            draws = rng.normal(size=6) * np.repeat([lengths, angles], 3)
+            wanted = [self._wanted(f"{name}.{axis}") for axis in ("x", "y", "z", "rx", "ry", "rz")]
+            draws[~np.array(wanted)] = 0.0
+            if not draws.any():
+                continue
+            frame = np.array(frame_of)
+            moved = frame.copy()
+            moved[:3, 3] += draws[:3]
+            moved[:3, :3] = _core.rotation_from_rpy(draws[3:]) @ frame[:3, :3]
+            apply(moved)
+            for k, axis in enumerate("xyz"):
+                if draws[k]:
+                    self.changed[f"{name}.{axis}"] = (float(frame[k, 3]), float(moved[k, 3]), "m")
+            for k, axis in enumerate(("rx", "ry", "rz")):
+                if draws[3 + k]:
+                    self.changed[f"{name}.{axis}"] = (0.0, float(draws[3 + k]), "rad")
+
+    def require_all_met(self, robot: _core.Robot) -> None:
+        for pattern in self.only:
+            if pattern not in self.met and not pattern.startswith("base."):
+                raise InputError(
+                    f"{pattern!r} means no value of robot {robot.name!r} that an error can be put on"
+                )
 
 
 def measure(

@@ -460,7 +460,10 @@ def test_commands_in_the_base_frame(capsys: pytest.CaptureFixture[str]) -> None:
             ["ik", ROBOT, "targets.csv", "--retreat", "50"],
             "--retreat: found '50', expected a length with its unit",
         ),
-        (["ik", ROBOT, "targets.csv", "--retreat", "0mm"], "--retreat: found '0mm', expected a length above 0"),
+        (
+            ["ik", ROBOT, "targets.csv", "--retreat", "0mm"],
+            "--retreat: found '0mm', expected a length above 0",
+        ),
         (["ik", ROBOT, "targets.csv", "--longest-turn", "-3deg"], "--longest-turn: found '-3deg'"),
         (
             ["ik", ROBOT, "targets.csv", "--target", "probe"],
