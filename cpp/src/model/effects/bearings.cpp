@@ -13,12 +13,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Bearing run-out: the axis tilts about the two directions across it, once per turn. DH turns before its
+// Bearing run-out: the axis tilts about the two directions across it, `order` times per turn. DH turns before its
 // link, so what tilts the axis is the link before (alpha, beta), or the base; modified DH has alpha and beta
 // before the joint; URDF the origin's rotations.
-std::vector<Term> axis_wobble(const Robot& robot, std::size_t joint, const Measurements&) {
+std::vector<Term> wobble(const std::string& name, int order, const Robot& robot, std::size_t joint) {
   const Joint& at = robot.joints.at(joint);
-  require_revolute("axis_wobble", at, " and does not turn");
+  require_revolute(name.c_str(), at, " and does not turn");
   // Elementary rotations there are, and what each of the two tilts is in these.
   std::vector<std::string> sites;
   Eigen::Matrix<double, 3, 2> tilts = Eigen::Matrix<double, 3, 2>::Identity();
@@ -45,20 +45,29 @@ std::vector<Term> axis_wobble(const Robot& robot, std::size_t joint, const Measu
   std::vector<Term> terms;
   for (int tilt = 0; tilt < 2; ++tilt) {
     for (const bool cosine : {true, false}) {
-      const std::string parameter = "axis_wobble." + at.name + (cosine ? ".cos_" : ".sin_") + "xy"[tilt];
+      const std::string parameter = name + "." + at.name + (cosine ? ".cos_" : ".sin_") + "xy"[tilt];
       for (std::size_t k = 0; k < sites.size(); ++k) {
         const double share = tilts(static_cast<Eigen::Index>(k), tilt);
         if (share == 0.0 && sites.size() < 3) continue;  // of three, none stays zero when the frame turns
         terms.push_back(make_term(
             parameter, "rad", sites[k],
-            [index, cosine, share](const Inputs& in) {
-              return share * (cosine ? std::cos(in.joints[index]) : std::sin(in.joints[index]));
+            [index, cosine, share, order](const Inputs& in) {
+              const double angle = order * in.joints[index];
+              return share * (cosine ? std::cos(angle) : std::sin(angle));
             },
             sites.size() == 3));  // the shares come from the robot's frames
       }
     }
   }
   return terms;
+}
+
+std::vector<Term> axis_wobble(const Robot& robot, std::size_t joint, const Measurements&) {
+  return wobble("axis_wobble", 1, robot, joint);
+}
+
+std::vector<Term> axis_wobble_twice(const Robot& robot, std::size_t joint, const Measurements&) {
+  return wobble("axis_wobble_twice", 2, robot, joint);
 }
 
 Effect axis_wobble_effect() {
@@ -75,8 +84,24 @@ Effect axis_wobble_effect() {
   return effect;
 }
 
+// Rolling bearings that are not round run out twice per turn.
+Effect axis_wobble_twice_effect() {
+  Effect effect{"axis_wobble_twice", "the joint's axis tilts twice per turn: bearings out of round", axis_wobble_twice};
+  EffectTraits& traits = effect.traits;
+  traits.driver = Driver::angle;
+  traits.moves = Moves::axis;
+  traits.search = Search::if_asked;
+  traits.separated_by = {{Experiment::orientations}};
+  traits.usual = 1e-4;
+  traits.plausible = 2e-3;
+  traits.main_part = "cos_x";
+  traits.documentation = {"a tilt about x and about y before the joint: c cos 2q + s sin 2q each",
+                          "`axis_wobble_twice.J2.cos_x` … [rad]", "a revolute joint"};
+  return effect;
+}
+
 }  // namespace
 
-std::vector<Effect> bearing_effects() { return {axis_wobble_effect()}; }
+std::vector<Effect> bearing_effects() { return {axis_wobble_effect(), axis_wobble_twice_effect()}; }
 
 }  // namespace truing::model

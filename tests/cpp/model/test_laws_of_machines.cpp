@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Laws of single effects, at one configuration. What all effects have in common is in test_effect_laws.cpp.
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "support/arms.hpp"
+
+namespace {
+
+using truing::Inputs;
+using truing::Search;
+using truing::Term;
+
+/// What the terms of an effect at a joint add to their sites, by parameter, at these motions.
+std::map<std::string, double> values_at(const std::string& effect, const std::vector<std::string>& joints,
+                                        const truing::Robot& robot, Inputs in) {
+  std::map<std::string, double> out;
+  for (const Term& term : truing::effect_terms({{effect, joints}}, robot, *in.data))
+    out[term.parameter] = term.basis(in);
+  return out;
+}
+
+TEST_CASE("an axis that wobbles twice per turn does at q what one that wobbles once does at 2q") {
+  const truing::Robot robot = arms::ur10();
+  const truing::Measurements data;
+  Inputs in;
+  in.data = &data;
+  in.joints = Eigen::VectorXd::Constant(6, 0.3);
+  const auto twice = values_at("axis_wobble_twice", {"J2"}, robot, in);
+  in.joints *= 2.0;
+  const auto once = values_at("axis_wobble", {"J2"}, robot, in);
+  REQUIRE(twice.size() == 4);
+  for (const char* part : {"cos_x", "sin_x", "cos_y", "sin_y"}) {
+    CHECK(twice.at(std::string("axis_wobble_twice.J2.") + part) ==
+          doctest::Approx(once.at(std::string("axis_wobble.J2.") + part)));
+  }
+  CHECK(truing::find_effect("axis_wobble_twice").traits.search == Search::if_asked);
+}
+
+}  // namespace
