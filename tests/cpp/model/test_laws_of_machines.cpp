@@ -41,4 +41,18 @@ TEST_CASE("an axis that wobbles twice per turn does at q what one that wobbles o
   CHECK(truing::find_effect("axis_wobble_twice").traits.search == Search::if_asked);
 }
 
+TEST_CASE("a joint is turned by the joints on both sides of it in the chain, each by its own ratio") {
+  const truing::Measurements data;
+  Inputs in;
+  in.data = &data;
+  in.joints = Eigen::VectorXd::LinSpaced(6, 0.1, 0.6);
+  const auto inner = values_at("neighbour_coupling", {"J3"}, arms::ur10(), in);
+  REQUIRE(inner.size() == 2);
+  CHECK(inner.at("neighbour_coupling.J3.J2") == doctest::Approx(0.2));
+  CHECK(inner.at("neighbour_coupling.J3.J4") == doctest::Approx(0.4));
+  CHECK(values_at("neighbour_coupling", {"J1"}, arms::ur10(), in).size() == 1);
+  // Of the palletizer's fifth joint the neighbour is passive: its motion is that of others.
+  CHECK_THROWS_AS(truing::effect_terms({{"neighbour_coupling", {"J5"}}}, arms::palletizer(), data), truing::Unsuited);
+}
+
 }  // namespace

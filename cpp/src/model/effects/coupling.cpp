@@ -57,6 +57,26 @@ std::vector<Term> linkage(const Robot& robot, std::size_t joint, const Measureme
   return terms;
 }
 
+// The motor of one joint is carried by the one beside it, or a belt runs over it: turning that one turns this one a
+// little. dq_k = c q_(k-1) + c' q_(k+1), each ratio on its own.
+std::vector<Term> neighbour_coupling(const Robot& robot, std::size_t joint, const Measurements&) {
+  const Joint& at = robot.joints.at(joint);
+  require_driven("neighbour_coupling", at);
+  std::vector<Term> terms;
+  for (const int step : {-1, 1}) {
+    const auto beside = static_cast<std::size_t>(static_cast<int>(joint) + step);  // of the first: past the end
+    if (beside >= robot.joints.size() || robot.joints[beside].passive()) continue;
+    const Joint& mover = robot.joints[beside];
+    const bool same_kind = mover.type == at.type;
+    const std::string unit = same_kind ? "-" : std::string(motion_unit(at)) + "/" + motion_unit(mover);
+    terms.push_back(
+        make_term("neighbour_coupling." + at.name + "." + mover.name, unit, at.name,
+                  [index = static_cast<Eigen::Index>(beside)](const Inputs& in) { return in.joints[index]; }));
+  }
+  if (terms.empty()) unsuited("neighbour_coupling", at, "needs a joint with a reading beside it");
+  return terms;
+}
+
 Effect joint_coupling_effect() {
   Effect effect{"joint_coupling", "wrist joints turn each other", joint_coupling, false};
   EffectTraits& traits = effect.traits;
@@ -82,8 +102,22 @@ Effect linkage_effect() {
   return effect;
 }
 
+Effect neighbour_coupling_effect() {
+  Effect effect{"neighbour_coupling", "the joints beside it in the chain turn the joint", neighbour_coupling};
+  EffectTraits& traits = effect.traits;
+  traits.driver = Driver::other_angles;
+  traits.search = Search::if_asked;
+  traits.usual = 2e-4;
+  traits.plausible = 5e-2;
+  traits.documentation = {"c · motion of the joint before, c′ · motion of the joint after",
+                          "`neighbour_coupling.J3.J2` [-, rad/m, m/rad]", "a joint with a reading beside another"};
+  return effect;
+}
+
 }  // namespace
 
-std::vector<Effect> coupling_effects() { return {joint_coupling_effect(), linkage_effect()}; }
+std::vector<Effect> coupling_effects() {
+  return {joint_coupling_effect(), linkage_effect(), neighbour_coupling_effect()};
+}
 
 }  // namespace truing::model
