@@ -55,4 +55,19 @@ TEST_CASE("a joint is turned by the joints on both sides of it in the chain, eac
   CHECK_THROWS_AS(truing::effect_terms({{"neighbour_coupling", {"J5"}}}, arms::palletizer(), data), truing::Unsuited);
 }
 
+TEST_CASE("loaded play changes side with the direction and grows with the torque") {
+  const truing::Robot robot = arms::ur10();
+  const std::vector<double> directions = {1.0, -1.0};
+  truing::Measurements data;
+  data.rows = 2;
+  data.direction.assign(6, {directions.data(), 1});
+  Inputs in;
+  in.data = &data;
+  in.gravity_torque = Eigen::VectorXd::Constant(6, 30.0);
+  CHECK(values_at("loaded_play", {"J2"}, robot, in).at("loaded_play.J2") == doctest::Approx(30.0));
+  in.row = 1;
+  in.gravity_torque *= 2.0;
+  CHECK(values_at("loaded_play", {"J2"}, robot, in).at("loaded_play.J2") == doctest::Approx(-60.0));
+}
+
 }  // namespace

@@ -94,6 +94,24 @@ std::vector<Term> windup(const Robot& robot, std::size_t joint, const Measuremen
                     [name](const Inputs& in) { return in.data->covariates.at(name)[in.row]; })};
 }
 
+// A belt, or a gear with friction, gives way by the direction that the joint came from and the load that it carries:
+// c * direction * torque.
+std::vector<Term> loaded_play(const Robot& robot, std::size_t joint, const Measurements& data) {
+  const Joint& at = robot.joints.at(joint);
+  require_driven("loaded_play", at);
+  require_weight("loaded_play", robot, at, data);
+  const std::size_t k = driven_number(robot, joint);
+  if (k >= data.direction.size() || !data.direction[k]) {
+    refuse("loaded_play", at, "needs the column dir" + std::to_string(k + 1) + " (approach direction -1, 0, 1)");
+  }
+  return {make_term(
+      "loaded_play." + at.name, is_revolute(at) ? "rad/Nm" : "m/N", at.name,
+      [k, index = static_cast<Eigen::Index>(joint)](const Inputs& in) {
+        return in.data->direction[k][in.row] * in.gravity_torque[index];
+      },
+      true)};
+}
+
 Effect harmonic_effect() {
   Effect effect{"harmonic", "error once and twice per turn: eccentric gear or encoder disc", harmonic};
   EffectTraits& traits = effect.traits;
@@ -165,11 +183,24 @@ Effect windup_effect() {
   return effect;
 }
 
+Effect loaded_play_effect() {
+  Effect effect{"loaded_play", "play that grows with the load: belts, gears with friction", loaded_play};
+  EffectTraits& traits = effect.traits;
+  traits.search = Search::if_asked;
+  traits.mimicked_by = {"windup"};
+  traits.separated_by = {{Experiment::both_directions}, {Experiment::another_payload}};
+  traits.usual = 2e-6;
+  traits.plausible = 1e-4;
+  traits.documentation = {"c · direction · τ", "`loaded_play.J2` [rad/Nm, m/N]",
+                          "`dir1 … dirn`; masses or `payload_kg`"};
+  return effect;
+}
+
 }  // namespace
 
 std::vector<Effect> transmission_effects() {
   return {harmonic_effect(), transmission_error_family(), backlash_effect(), gravity_backlash_effect(),
-          windup_effect()};
+          windup_effect(),   loaded_play_effect()};
 }
 
 // "transmission_error@96" -> its effect; nullptr when the name is of another form. Made once and kept:
