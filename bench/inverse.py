@@ -3,9 +3,8 @@
 """truing's inverse kinematics beside others', on the same robots, targets and seeds in one run.
 
     bench/peers/setup_inverse.sh PEERS                # once: the peers, in an environment of their own
-    python bench/inverse.py --bench build/release/bench/bench_inverse --peers PEERS
-                            [--quick] [--only branches,one,...]
-    [--write docs/benchmarks/inverse.md]
+    python bench/inverse.py --peers PEERS [--quick] [--only branches,one,...]
+                            [--write docs/benchmarks/inverse.md]
 
 Robots and targets are those of bench/inverse.cpp (seeds 7 and 13; errors of the calibrated robots 11, 12,
 14), which writes them and truing's answers
