@@ -158,7 +158,9 @@ install_truing() {
     local log=build/wheel.log
     # With its tests, warnings are errors from the start: the flag is part of every command line, and to set it later
     # would compile everything once more.
-    if ! SKBUILD_CMAKE_ARGS=${extras:+-DTRUING_WERROR=ON} \
+    local environment=()
+    [[ -z $extras ]] || environment+=(SKBUILD_CMAKE_ARGS=-DTRUING_WERROR=ON)
+    if ! env "${environment[@]}" \
       "$venv_python" -m pip wheel --disable-pip-version-check --verbose --no-build-isolation --no-deps \
       --wheel-dir build/dist . > "$log" 2>&1; then
       grep -nE 'error|Error|warning: unused' "$log" | head -n 20 >&2 || true
