@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include "kernel/kernel.hpp"
+#include "math/gauss_newton.hpp"
 #include "model/model.hpp"
 #include "rooms.hpp"
 #include "truing/model/measurement.hpp"
@@ -44,10 +45,8 @@ struct Weighing {
   bool row_weights = true;  ///< rows count by their own sigma and weight
 };
 
-struct NormalEquations {
-  Eigen::MatrixXd gram;        ///< J^T W J of the free parameters
-  Eigen::VectorXd gradient;    ///< J^T W r
-  double cost = 0.0;           ///< sum of the loss of squared residuals
+/// Of the free parameters; the cost is the sum of the loss of squared residuals.
+struct NormalEquations : NormalSystem<> {
   double squares = 0.0;        ///< r^T W r
   std::size_t components = 0;  ///< residual components that went in
   double rms() const;          ///< sqrt(cost / components)

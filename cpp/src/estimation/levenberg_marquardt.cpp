@@ -9,94 +9,99 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-
-#include <Eigen/Cholesky>
+#include <utility>
 
 #include "estimation/solvers.hpp"
+#include "math/gauss_newton.hpp"
 
 namespace truing::estimation {
 namespace {
 
-constexpr double kLeastDamping = 1e-15;
-constexpr double kMostDamping = 1e12;
-constexpr double kRounding =
-    1e-13;  // a smaller predicted fall of the cost, relative to it, is lost in the sum's rounding
+/// Where the fit stands, and where the step that is tried would lead.
+class Fit {
+ public:
+  Fit(const Evaluator& problem, const Weighing& weighing, const Refit& refit, Eigen::VectorXd* values)
+      : problem_(problem), weighing_(weighing), refit_(refit), values_(*values) {
+    problem_.normal_equations(values_, weighing_, &now_);
+  }
 
-struct Step {
-  Eigen::VectorXd delta;
-  double predicted_fall = 0.0;   ///< of the cost r^T r
-  double scaled_gradient = 0.0;  ///< largest entry, columns of unit length
+  const NormalEquations& system() const { return now_; }
+
+  double attempt(const Eigen::VectorXd& step) {
+    trial_ = moved(step);
+    problem_.normal_equations(trial_, weighing_, &next_);
+    return next_.cost;
+  }
+
+  void accept() {
+    values_ = trial_;
+    std::swap(now_, next_);
+  }
+
+  void move(const Eigen::VectorXd& step) { values_ = moved(step); }
+
+  /// Of residuals with this cost.
+  double rms(double cost) const { return std::sqrt(cost / static_cast<double>(now_.components)); }
+
+ private:
+  Eigen::VectorXd moved(const Eigen::VectorXd& step) const {
+    Eigen::VectorXd out = values_;
+    for (std::size_t k = 0; k < problem_.free().size(); ++k)
+      out[problem_.free()[k]] += step[static_cast<Eigen::Index>(k)];
+    if (refit_) refit_(&out);
+    return out;
+  }
+
+  const Evaluator& problem_;
+  const Weighing& weighing_;
+  const Refit& refit_;
+  Eigen::VectorXd& values_;
+  Eigen::VectorXd trial_;
+  NormalEquations now_, next_;
 };
 
-Step solve_step(const NormalEquations& normal, double mu) {
-  Eigen::VectorXd scale = normal.gram.diagonal();
-  for (double& s : scale) s = s > 0.0 ? 1.0 / std::sqrt(s) : 1.0;
-  Eigen::MatrixXd h = scale.asDiagonal() * normal.gram * scale.asDiagonal();
-  const Eigen::VectorXd g = scale.cwiseProduct(normal.gradient);
-  h.diagonal().array() += mu;
-  const Eigen::VectorXd step = -h.llt().solve(g);
-  Step out;
-  out.delta = scale.cwiseProduct(step);
-  out.predicted_fall = -step.dot(g) + mu * step.squaredNorm();  // |r|^2 - |r + J step|^2 for the damped step
-  out.scaled_gradient = g.size() ? g.cwiseAbs().maxCoeff() : 0.0;
-  return out;
-}
-
-Eigen::VectorXd moved(const Eigen::VectorXd& values, const std::vector<int>& free, const Eigen::VectorXd& delta) {
-  Eigen::VectorXd out = values;
-  for (std::size_t k = 0; k < free.size(); ++k) out[free[k]] += delta[static_cast<Eigen::Index>(k)];
-  return out;
+const char* text_of(StopReason reason) {
+  switch (reason) {
+    case StopReason::settled:
+      break;
+    case StopReason::nothing_to_fit:
+      return "nothing to fit";
+    case StopReason::gradient:
+      return "gradient below its bound";
+    case StopReason::rounding:
+      return "predicted fall of the cost below rounding";
+    case StopReason::small_fall:
+      return "fall of the rms below its bound";
+    case StopReason::small_promise:
+      return "predicted fall of the rms below its bound";
+    case StopReason::iteration_limit:
+      return "iteration limit";
+    case StopReason::singular:
+      return "the normal equations are singular";
+    case StopReason::no_descent:
+      return "no step lowers the rms";
+  }
+  return "settled";
 }
 
 }  // namespace
 
 SolverSummary levenberg_marquardt(const Evaluator& problem, const Weighing& weighing, const SolverOptions& options,
                                   const Refit& refit, Eigen::VectorXd* values) {
-  SolverSummary summary;
-  summary.name = "lm";
-  NormalEquations now, next;
-  problem.normal_equations(*values, weighing, &now);
-  double mu = options.undamped ? 0.0 : options.initial_damping;
-  const auto stop = [&](const std::string& why, bool converged) {
-    summary.stopped_because = why;
-    summary.converged = converged;
-    return summary;
+  Fit fit(problem, weighing, refit, values);
+  LevenbergMarquardtOptions rules;
+  rules.max_steps = options.max_iterations;
+  rules.damping = options.initial_damping;
+  rules.least_damping = rules.first_damping = 1e-15;
+  rules.undamped = options.undamped;
+  rules.gradient = options.gradient;
+  rules.small_fall = [&](double from, double to) {
+    const double fall = fit.rms(from) - fit.rms(to);
+    return fall >= 0.0 && fall <= options.rms_fall;
   };
-  if (problem.free().empty()) return stop("nothing to fit", true);
-
-  while (summary.iterations < options.max_iterations) {
-    const Step step = solve_step(now, mu);
-    if (!step.delta.allFinite()) {
-      if (mu >= kMostDamping || options.undamped) return stop("the normal equations are singular", false);
-      mu = std::max(10.0 * mu, kLeastDamping);
-      continue;
-    }
-    if (step.scaled_gradient <= options.gradient * std::sqrt(now.cost)) return stop("gradient below its bound", true);
-    ++summary.iterations;
-    const bool within_rounding = step.predicted_fall <= kRounding * now.cost;
-    Eigen::VectorXd trial = moved(*values, problem.free(), step.delta);
-    if (refit) refit(&trial);
-    if (within_rounding) {
-      if (mu <= 1e-6) *values = trial;  // as good as a Gauss-Newton step, too small for the cost to judge
-      return stop("predicted fall of the cost below rounding", true);
-    }
-    problem.normal_equations(trial, weighing, &next);
-    if (std::isfinite(next.cost) && (next.cost < now.cost || options.undamped)) {
-      const double fall = now.rms() - next.rms();
-      *values = trial;
-      std::swap(now, next);
-      mu = options.undamped ? 0.0 : std::max(mu / 10.0, kLeastDamping);
-      if (fall >= 0.0 && fall <= options.rms_fall) return stop("fall of the rms below its bound", true);
-    } else {
-      // The step was taken back; nothing is lost when it promised no more than the bound.
-      const double promised =
-          now.rms() - std::sqrt(std::max(0.0, now.cost - step.predicted_fall) / static_cast<double>(now.components));
-      if (promised <= options.rms_fall) return stop("predicted fall of the rms below its bound", true);
-      if (options.undamped || mu >= kMostDamping) return stop("no step lowers the rms", false);
-      mu *= 10.0;
-    }
-  }
-  return stop("iteration limit", false);
+  rules.small_promise = [&](double from, double to) { return fit.rms(from) - fit.rms(to) <= options.rms_fall; };
+  const Iterations iterations = math::levenberg_marquardt(&fit, rules);
+  return {"lm", iterations.steps, converged(iterations.reason), text_of(iterations.reason)};
 }
 
 }  // namespace truing::estimation
