@@ -13,6 +13,7 @@
 #include <thread>
 #include <tuple>
 
+#include "estimation/program.hpp"
 #include "model/gravity.hpp"
 #include "model/motion.hpp"
 #include "truing/model/effect.hpp"
@@ -20,7 +21,6 @@
 namespace truing::estimation {
 namespace {
 
-using kernel::Code;
 using kernel::Kind;
 using kernel::kMaxComponents;
 using kernel::kTilePoses;
@@ -45,209 +45,7 @@ class Buffer {
   double* begin_;
 };
 
-struct DynamicSite {
-  int parameter;                     ///< holds the part that is the same for all poses; -1: none
-  std::vector<SiteWeight> moved_by;  ///< coordinate, weight
-};
-
-struct ConstantSource {
-  int parameter;
-  bool rotation;
-  int at;
-};
-
-/// A segment's program, but for the numbers that change with the parameters.
-struct Compiled {
-  std::vector<kernel::Step> prefix;  ///< the same for all poses: base, and what stands before the first joint
-  std::vector<kernel::Step> steps;
-  std::vector<int> fixed_slots,
-      start_slots;  ///< what the prefix leaves behind for good, and for the steps to write over
-  int tip_slots[4];
-  std::vector<double> constants;  ///< fixed rotations are in place already
-  std::vector<ConstantSource> sources;
-  std::vector<DynamicSite> dynamic;
-  std::vector<kernel::Part> parts;
-  std::vector<kernel::ColumnPlan> columns;
-  std::vector<int> column_free;            ///< which free parameter each column belongs to
-  std::vector<std::pair<int, int>> bases;  ///< (reading, term) of each basis row, one of them -1
-  std::vector<int> left_out;  ///< parameters whose sites move nothing because they are zero, and must stay so
-  int slot_count = 0;
-};
-
-int axis_of(Motion motion) { return static_cast<int>(motion) % 3; }
-
-/// Does a free parameter have a column in this segment?
-bool is_seen(const ParameterInfo& info, const Segment& segment) {
-  switch (info.role) {
-    case Role::anchor:
-      return segment.kind == Kind::distance;
-    case Role::point:
-      return info.owner == segment.point;
-    case Role::target:
-      return info.owner == segment.target && (!info.rotation || segment.kind == Kind::pose);
-    default:
-      return true;
-  }
-}
-
-Compiled compile(const Model& model, const Segment& segment, const std::vector<int>& free,
-                 const Eigen::VectorXd& values) {
-  Compiled out;
-  std::vector<std::vector<SiteWeight>> moved_by(model.sites.size());
-  std::vector<bool> dynamic(model.sites.size(), false), wanted(model.sites.size(), false),
-      is_free(model.sites.size(), false);
-  for (std::size_t k = 0; k < model.coordinates.size(); ++k) {
-    const Coordinate& coordinate = model.coordinates[k];
-    for (const auto& [site, weight] : coordinate.sites) {
-      moved_by[site].push_back({static_cast<int>(k), weight});
-      if (coordinate.reading >= 0 || !coordinate.terms.empty()) dynamic[site] = true;
-    }
-  }
-  for (const int parameter : free) {
-    const ParameterInfo& info = model.parameters[parameter];
-    for (const ColumnTerm& column : info.columns) {
-      for (const auto& part : column.sites) {
-        is_free[part.first] = true;
-        if (is_seen(info, segment)) wanted[part.first] = true;
-      }
-    }
-  }
-
-  std::vector<int> axis_slot(model.sites.size(), -1), origin_slot(model.sites.size(), -1);
-  int current[4] = {0, 1, 2, 3};  // slots of x y z p
-  bool wanted_as_is[4] = {false, false, false, false};
-  out.slot_count = 4;
-  const auto keep = [&](int vector) {
-    wanted_as_is[vector] = true;
-    return current[vector];
-  };
-  const auto next_slot = [&](int vector) {  // where the vector's new value goes
-    if (wanted_as_is[vector]) current[vector] = out.slot_count++;
-    wanted_as_is[vector] = false;
-    return current[vector];
-  };
-  bool in_prefix = true;
-  const auto end_prefix = [&] {
-    in_prefix = false;
-    for (int k = 0; k < 4; ++k) {
-      if (!wanted_as_is[k]) out.start_slots.push_back(current[k]);
-    }
-    out.prefix.swap(out.steps);
-  };
-  const auto add_site = [&](int index) {
-    const Site& site = model.sites[index];
-    if (dynamic[index] && in_prefix) end_prefix();
-    if (wanted[index]) {
-      axis_slot[index] = keep(axis_of(site.motion));
-      if (is_rotation(site.motion)) origin_slot[index] = keep(3);
-      if (in_prefix) {
-        for (const int slot : {axis_slot[index], origin_slot[index]}) {
-          if (slot >= 0 && std::find(out.fixed_slots.begin(), out.fixed_slots.end(), slot) == out.fixed_slots.end())
-            out.fixed_slots.push_back(slot);
-        }
-      }
-    }
-    // A value that is zero and stays zero moves nothing.
-    if (!dynamic[index] && !is_free[index] && site.motion != Motion::fixed &&
-        (site.parameter < 0 || values[site.parameter] == 0.0)) {
-      if (site.parameter >= 0) out.left_out.push_back(site.parameter);
-      return;
-    }
-
-    kernel::Step step{Code::fixed, -1, static_cast<int>(out.constants.size()), {0, 0, 0}, {0, 0, 0}};
-    if (site.motion == Motion::fixed) {
-      for (int k = 0; k < 9; ++k) out.constants.push_back(site.fixed(k % 3, k / 3));
-      for (int k = 0; k < 3; ++k) step.in[k] = current[k];
-      for (int k = 0; k < 3; ++k) step.out[k] = next_slot(k);
-    } else {
-      const bool rotation = is_rotation(site.motion);
-      const int axis = axis_of(site.motion);
-      if (dynamic[index]) {
-        step.dynamic = static_cast<int>(out.dynamic.size());
-        out.dynamic.push_back({site.parameter, moved_by[index]});
-      } else {
-        out.sources.push_back({site.parameter, rotation, step.constant});
-        out.constants.resize(out.constants.size() + (rotation ? 2 : 1));
-      }
-      if (rotation) {
-        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-        step.code = Code::rotate;
-        step.in[0] = current[u];
-        step.in[1] = current[v];
-        step.out[0] = next_slot(u);
-        step.out[1] = next_slot(v);
-      } else {
-        step.code = Code::translate;
-        step.in[0] = current[3];
-        step.in[1] = current[axis];
-        step.out[0] = next_slot(3);
-      }
-    }
-    out.steps.push_back(step);
-  };
-  for (int s = 0; s < model.common_sites; ++s) add_site(s);
-  for (int s = model.target_first[segment.target]; s < model.target_first[segment.target + 1]; ++s) add_site(s);
-
-  if (in_prefix) end_prefix();
-  std::copy(current, current + 4, out.tip_slots);
-
-  for (std::size_t f = 0; f < free.size(); ++f) {
-    const ParameterInfo& info = model.parameters[free[f]];
-    if (!is_seen(info, segment)) continue;
-    if (info.axis >= 0) {  // anchor or fixed point: no sites
-      out.columns.push_back({0, 0, -1, info.axis});
-      out.column_free.push_back(static_cast<int>(f));
-    }
-    for (const ColumnTerm& column : info.columns) {
-      kernel::ColumnPlan plan{static_cast<int>(out.parts.size()), 0, -1, -1};
-      for (const auto& [site, weight] : column.sites) {
-        if (axis_slot[site] < 0) continue;  // on another target
-        out.parts.push_back({axis_slot[site], origin_slot[site], weight});
-        ++plan.part_count;
-      }
-      if (plan.part_count == 0) continue;
-      if (column.reading >= 0 || column.term >= 0) {
-        plan.basis = static_cast<int>(out.bases.size());
-        out.bases.push_back({column.reading, column.term});
-      }
-      out.columns.push_back(plan);
-      out.column_free.push_back(static_cast<int>(f));
-    }
-  }
-  return out;
-}
-
 }  // namespace
-
-/// The prefix, once for all poses: what it leaves in its slots.
-static void sweep_prefix(const Compiled& program, const std::vector<double>& constants,
-                         std::vector<double>* start_vectors, std::vector<double>* fixed_vectors) {
-  Eigen::Matrix3Xd slots = Eigen::Matrix3Xd::Zero(3, program.slot_count);
-  slots.leftCols<3>().setIdentity();
-  for (const kernel::Step& step : program.prefix) {
-    const double* constant = constants.data() + step.constant;
-    const Eigen::Vector3d a = slots.col(step.in[0]), b = slots.col(step.in[1]), c = slots.col(step.in[2]);
-    switch (step.code) {
-      case Code::rotate:
-        slots.col(step.out[0]) = constant[0] * a + constant[1] * b;
-        slots.col(step.out[1]) = constant[0] * b - constant[1] * a;
-        break;
-      case Code::translate:
-        slots.col(step.out[0]) = a + constant[0] * b;
-        break;
-      case Code::fixed:
-        for (int k = 0; k < 3; ++k)
-          slots.col(step.out[k]) = constant[3 * k] * a + constant[3 * k + 1] * b + constant[3 * k + 2] * c;
-        break;
-    }
-  }
-  const auto collect = [&slots](const std::vector<int>& wanted, std::vector<double>* out) {
-    out->clear();
-    for (const int slot : wanted) out->insert(out->end(), slots.col(slot).data(), slots.col(slot).data() + 3);
-  };
-  collect(program.start_slots, start_vectors);
-  collect(program.fixed_slots, fixed_vectors);
-}
 
 std::vector<Segment> make_segments(const Measurements& data, const std::vector<std::int32_t>& rows, bool as_positions) {
   std::map<std::tuple<int, int, int>, Segment> sorted;
@@ -274,6 +72,24 @@ std::vector<Segment> make_segments(const Measurements& data, const std::vector<s
   return segments;
 }
 
+/// Motion of every joint from the readings. Joints of a passive chain may stand before or after their drivers: go by
+/// what each reading moves.
+static void set_joints(const Model& model, const Eigen::VectorXd& reading, Eigen::VectorXd* joints) {
+  joints->setZero();
+  for (std::size_t k = 0; k < model.robot.joints.size(); ++k) {
+    const Coordinate& coordinate = model.coordinates[k];
+    if (coordinate.reading < 0) continue;
+    (*joints)[static_cast<Eigen::Index>(k)] = reading[coordinate.reading];
+    for (std::size_t m = 0; m < model.robot.joints.size(); ++m) {
+      if (m == k || !model.robot.joints[m].passive()) continue;
+      const int own_site = model.coordinates[m].sites.front().first;
+      for (const auto& [site, weight] : coordinate.sites) {
+        if (site == own_site) (*joints)[static_cast<Eigen::Index>(m)] += weight * reading[coordinate.reading];
+      }
+    }
+  }
+}
+
 std::vector<std::vector<double>> make_bases(const Model& model, const Measurements& data) {
   std::vector<std::vector<double>> bases(model.terms.size(), std::vector<double>(data.rows));
   if (model.terms.empty()) return bases;
@@ -288,20 +104,7 @@ std::vector<std::vector<double>> make_bases(const Model& model, const Measuremen
   for (std::size_t row = 0; row < data.rows; ++row) {
     inputs.row = row;
     for (std::size_t k = 0; k < data.joints.size(); ++k) reading[static_cast<Eigen::Index>(k)] = data.joints[k][row];
-    inputs.joints.setZero();
-    // Joints of a passive chain may stand before or after their drivers: go by what each reading moves.
-    for (std::size_t k = 0; k < model.robot.joints.size(); ++k) {
-      const Coordinate& coordinate = model.coordinates[k];
-      if (coordinate.reading < 0) continue;
-      inputs.joints[static_cast<Eigen::Index>(k)] = reading[coordinate.reading];
-      for (std::size_t m = 0; m < model.robot.joints.size(); ++m) {
-        if (m == k || !model.robot.joints[m].passive()) continue;
-        const int own_site = model.coordinates[m].sites.front().first;
-        for (const auto& [site, weight] : coordinate.sites) {
-          if (site == own_site) inputs.joints[static_cast<Eigen::Index>(m)] += weight * reading[coordinate.reading];
-        }
-      }
-    }
+    set_joints(model, reading, &inputs.joints);
     if (gravity) {
       inputs.frames = forward_kinematics(model.robot, reading, 0);
       const auto target = data.target.empty() ? 0 : static_cast<std::size_t>(data.target[row]);
@@ -332,7 +135,7 @@ struct Evaluator::Impl {
   std::vector<int> free;
   int threads;
   const kernel::Functions& run;
-  std::vector<Compiled> compiled;
+  std::vector<Program> programs;
   struct TileRange {
     int segment;
     std::int32_t first;
@@ -360,8 +163,8 @@ struct Evaluator::Impl {
     const Eigen::VectorXd values = initial_values(model);
     std::size_t most_columns = 0, most_dynamic = 0, most_bases = 0, most_slots = 0;
     for (std::size_t k = 0; k < segments.size(); ++k) {
-      compiled.push_back(compile(model, segments[k], free, values));
-      const Compiled& c = compiled.back();
+      programs.push_back(compile(model, segments[k], free, values));
+      const Program& c = programs.back();
       most_columns = std::max(most_columns, c.columns.size());
       most_dynamic = std::max(most_dynamic, c.dynamic.size());
       most_bases = std::max(most_bases, c.bases.size());
@@ -389,7 +192,7 @@ struct Evaluator::Impl {
       w.tip = Buffer(12 * kTilePoses);
       w.accumulator = Buffer(run.gram_size(static_cast<int>(gram_columns)));
       w.local.resize(gram_columns * gram_columns);
-      for (const Compiled& c : compiled) {
+      for (const Program& c : programs) {
         w.constants.push_back(c.constants);
         w.starts.emplace_back(3 * c.start_slots.size());
         w.fixed_vectors.emplace_back(3 * c.fixed_slots.size());
@@ -402,12 +205,12 @@ struct Evaluator::Impl {
 
   /// The numbers of the programs that depend on the parameters.
   void set_values(const Eigen::VectorXd& values, Workspace* w) const {
-    for (std::size_t k = 0; k < compiled.size(); ++k) {
-      for (const int parameter : compiled[k].left_out) {
+    for (std::size_t k = 0; k < programs.size(); ++k) {
+      for (const int parameter : programs[k].left_out) {
         if (values[parameter] != 0.0)
           throw std::logic_error("parameter " + model.parameters[parameter].name + " was compiled as zero and is not");
       }
-      for (const ConstantSource& source : compiled[k].sources) {
+      for (const ConstantSource& source : programs[k].sources) {
         const double value = source.parameter < 0 ? 0.0 : values[source.parameter];
         double* at = w->constants[k].data() + source.at;
         if (source.rotation) {
@@ -417,7 +220,7 @@ struct Evaluator::Impl {
           at[0] = value;
         }
       }
-      sweep_prefix(compiled[k], w->constants[k], &w->starts[k], &w->fixed_vectors[k]);
+      sweep_prefix(programs[k], w->constants[k], &w->starts[k], &w->fixed_vectors[k]);
     }
     for (std::size_t i = 0; i < model.parameters.size(); ++i) {
       if (model.parameters[i].role == Role::anchor)
@@ -425,33 +228,41 @@ struct Evaluator::Impl {
     }
   }
 
-  /// Inputs and measurements of a tile, pose by pose into lanes; the last pose fills what is left over, with weight
-  /// zero.
-  void gather(const TileRange& range, const Eigen::VectorXd& values, bool with_measurements, Workspace* w) const {
-    const Segment& segment = segments[range.segment];
-    const Compiled& program = compiled[range.segment];
-    const std::int32_t* rows = segment.rows.data() + range.first;
-    // Rows are in increasing order: when first and last are as far apart as their places, all lie side by side.
-    const bool side_by_side = rows[range.count - 1] - rows[0] == range.count - 1;
-    const auto fill = [&](double* out, Column column, double scale, double offset) {
-      if (side_by_side && column.stride == 1) {
-        const double* in = column.data + rows[0];
-        if (scale == 1.0 && offset == 0.0) {
-          std::copy(in, in + range.count, out);
-        } else {
-          for (int i = 0; i < range.count; ++i) out[i] = scale * in[i] + offset;
-        }
+  /// The rows of a tile.
+  struct TileRows {
+    const std::int32_t* rows;
+    int count;
+    bool side_by_side;  ///< rows are in increasing order: first and last are as far apart as their places
+  };
+
+  TileRows rows_of(const TileRange& range) const {
+    const std::int32_t* rows = segments[range.segment].rows.data() + range.first;
+    return {rows, range.count, rows[range.count - 1] - rows[0] == range.count - 1};
+  }
+
+  /// scale * column + offset, pose by pose into lanes; the last pose fills what is left over.
+  static void fill(const TileRows& tile, Column column, double scale, double offset, double* out) {
+    if (tile.side_by_side && column.stride == 1) {
+      const double* in = column.data + tile.rows[0];
+      if (scale == 1.0 && offset == 0.0) {
+        std::copy(in, in + tile.count, out);
       } else {
-        for (int i = 0; i < range.count; ++i) out[i] = scale * column[static_cast<std::size_t>(rows[i])] + offset;
+        for (int i = 0; i < tile.count; ++i) out[i] = scale * in[i] + offset;
       }
-      for (int i = range.count; i < kTilePoses; ++i) out[i] = out[range.count - 1];
-    };
+    } else {
+      for (int i = 0; i < tile.count; ++i) out[i] = scale * column[static_cast<std::size_t>(tile.rows[i])] + offset;
+    }
+    for (int i = tile.count; i < kTilePoses; ++i) out[i] = out[tile.count - 1];
+  }
+
+  /// Every coordinate's reading, its zero and gear ratio corrected, plus what effects do to it.
+  void gather_coordinates(const TileRows& tile, const Eigen::VectorXd& values, Workspace* w) const {
     for (std::size_t k = 0; k < model.coordinates.size(); ++k) {
       const Coordinate& coordinate = model.coordinates[k];
       double* out = w->coordinates.get() + k * kTilePoses;
       const double offset = coordinate.offset < 0 ? 0.0 : values[coordinate.offset];
       if (coordinate.reading >= 0) {
-        fill(out, data.joints[coordinate.reading], values[coordinate.ratio], offset);
+        fill(tile, data.joints[coordinate.reading], values[coordinate.ratio], offset, out);
       } else {
         std::fill(out, out + kTilePoses, offset);
       }
@@ -459,9 +270,13 @@ struct Evaluator::Impl {
         const double theta = values[model.term_parameter[term]];
         if (theta == 0.0) continue;
         const std::vector<double>& basis = bases[term];
-        for (int i = 0; i < range.count; ++i) out[i] += theta * basis[rows[i]];
+        for (int i = 0; i < tile.count; ++i) out[i] += theta * basis[tile.rows[i]];
       }
     }
+  }
+
+  /// Values of the sites that differ from pose to pose: v = v0 + C (K q + o).
+  static void gather_sites(const Program& program, const Eigen::VectorXd& values, Workspace* w) {
     for (std::size_t s = 0; s < program.dynamic.size(); ++s) {
       double* out = w->values.get() + s * kTilePoses;
       const double constant = program.dynamic[s].parameter < 0 ? 0.0 : values[program.dynamic[s].parameter];
@@ -474,33 +289,52 @@ struct Evaluator::Impl {
         }
       }
     }
+  }
+
+  void gather_bases(const TileRows& tile, const Program& program, Workspace* w) const {
     for (std::size_t b = 0; b < program.bases.size(); ++b) {
-      double* out = w->bases.get() + b * kTilePoses;
       const auto [reading, term] = program.bases[b];
-      fill(out, reading >= 0 ? data.joints[reading] : Column{bases[term].data(), 1}, 1.0, 0.0);
+      fill(tile, reading >= 0 ? data.joints[reading] : Column{bases[term].data(), 1}, 1.0, 0.0,
+           w->bases.get() + b * kTilePoses);
     }
-    double* measured = w->measured.get();
-    if (!with_measurements) {
-      std::fill(measured, measured + 12 * kTilePoses, 0.0);
-    } else if (segment.point >= 0) {
+  }
+
+  void gather_orientations(const TileRows& tile, double* out) const {
+    for (int i = 0; i < kTilePoses; ++i) {
+      const auto row = static_cast<std::size_t>(tile.rows[std::min(i, tile.count - 1)]);
+      const Eigen::Quaterniond q(data.orientation[0][row], data.orientation[1][row], data.orientation[2][row],
+                                 data.orientation[3][row]);
+      const Eigen::Matrix3d R = q.normalized().toRotationMatrix();
+      for (int k = 0; k < 9; ++k) out[k * kTilePoses + i] = R(k % 3, k / 3);
+    }
+  }
+
+  void gather_measurements(const TileRows& tile, const Segment& segment, const Eigen::VectorXd& values,
+                           double* measured) const {
+    if (segment.point >= 0) {
       for (int k = 0; k < 3; ++k) {
         std::fill(measured + k * kTilePoses, measured + (k + 1) * kTilePoses,
                   values[point_parameter(segment.point, k)]);
       }
     } else if (segment.kind == Kind::distance) {
-      fill(measured, data.distance, 1.0, 0.0);
+      fill(tile, data.distance, 1.0, 0.0, measured);
     } else {
-      for (int k = 0; k < 3; ++k) fill(measured + k * kTilePoses, data.position[k], 1.0, 0.0);
-      if (segment.kind == Kind::pose) {
-        for (int i = 0; i < kTilePoses; ++i) {
-          const auto row = static_cast<std::size_t>(rows[std::min(i, range.count - 1)]);
-          const Eigen::Quaterniond q(data.orientation[0][row], data.orientation[1][row], data.orientation[2][row],
-                                     data.orientation[3][row]);
-          const Eigen::Matrix3d R = q.normalized().toRotationMatrix();
-          for (int k = 0; k < 9; ++k) measured[(3 + k) * kTilePoses + i] = R(k % 3, k / 3);
-        }
-      }
+      for (int k = 0; k < 3; ++k) fill(tile, data.position[k], 1.0, 0.0, measured + k * kTilePoses);
+      if (segment.kind == Kind::pose) gather_orientations(tile, measured + 3 * kTilePoses);
     }
+  }
+
+  /// Inputs and measurements of a tile.
+  void gather(const TileRange& range, const Eigen::VectorXd& values, bool with_measurements, Workspace* w) const {
+    const Program& program = programs[range.segment];
+    const TileRows tile = rows_of(range);
+    gather_coordinates(tile, values, w);
+    gather_sites(program, values, w);
+    gather_bases(tile, program, w);
+    if (with_measurements)
+      gather_measurements(tile, segments[range.segment], values, w->measured.get());
+    else
+      std::fill(w->measured.get(), w->measured.get() + 12 * kTilePoses, 0.0);
   }
 
   /// Square roots of the rows' own weights; false: all one and the tile is full.
@@ -524,7 +358,7 @@ struct Evaluator::Impl {
   void evaluate_tile(const TileRange& range, const Eigen::VectorXd& values, const Weighing& weighing,
                      bool with_jacobian, bool with_measurements, Workspace* w) const {
     const Segment& segment = segments[range.segment];
-    const Compiled& program = compiled[range.segment];
+    const Program& program = programs[range.segment];
     gather(range, values, with_measurements, w);
     const bool weights = weighing.row_weights && gather_weights(range, weighing.rotation_scale, w);
     kernel::Program p{};
@@ -613,7 +447,7 @@ struct Evaluator::Impl {
 
   /// Adds the accumulator to the slot's sums, local columns to global parameters.
   void flush(int segment, std::vector<double>* sums, Workspace* w) const {
-    const std::vector<int>& map = compiled[segment].column_free;
+    const std::vector<int>& map = programs[segment].column_free;
     const int local = static_cast<int>(map.size()) + 1;
     const int p = static_cast<int>(free.size()) + 1;
     std::fill(w->local.begin(), w->local.begin() + local * local, 0.0);
@@ -638,7 +472,7 @@ struct Evaluator::Impl {
       const TileRange& range = tiles[k];
       evaluate_tile(range, values, weighing, true, true, w);
       const int rows_per_pose = components_of(segments[range.segment].kind);
-      const int columns = static_cast<int>(compiled[range.segment].columns.size()) + 1;
+      const int columns = static_cast<int>(programs[range.segment].columns.size()) + 1;
       run.gram_add(w->jacobian.get(), rows_per_pose * kTilePoses, columns, rows_per_pose * kTilePoses,
                    w->accumulator.get());
       if (weighing.loss != kernel::RowLoss::none) {
@@ -758,7 +592,7 @@ void Evaluator::jacobian_tiles(const Eigen::VectorXd& values, const Weighing& we
     for (std::size_t k = begin; k < end; ++k) {
       impl.evaluate_tile(impl.tiles[k], values, weighing, true, true, w);
       const int segment = impl.tiles[k].segment;
-      sink(w->jacobian.get(), static_cast<int>(impl.compiled[segment].columns.size()),
+      sink(w->jacobian.get(), static_cast<int>(impl.programs[segment].columns.size()),
            components_of(impl.segments[segment].kind));
     }
   });
@@ -779,7 +613,7 @@ void Evaluator::tile(int tile, const Eigen::VectorXd& values, const Weighing& we
   impl.set_values(values, w);
   impl.evaluate_tile(range, values, weighing, true, true, w);
   const int components = tile_components(tile);
-  const std::vector<int>& map = impl.compiled[range.segment].column_free;
+  const std::vector<int>& map = impl.programs[range.segment].column_free;
   const auto p = static_cast<std::ptrdiff_t>(impl.free.size());
   if (jacobian) std::fill(jacobian, jacobian + p * components * range.count, 0.0);
   for (int i = 0; i < range.count; ++i) {
