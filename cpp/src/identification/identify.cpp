@@ -18,6 +18,7 @@
 #include "math/observability.hpp"
 #include "math/random.hpp"
 #include "math/registration.hpp"
+#include "math/rotation.hpp"
 #include "math/statistics.hpp"
 #include "rooms.hpp"
 
@@ -52,6 +53,62 @@ std::vector<std::int8_t> split(const Measurements& data, const IdentifyOptions& 
   std::vector<std::int8_t> set(data.rows);
   for (std::size_t row = 0; row < data.rows; ++row) set[row] = of_group[group[row]];
   return set;
+}
+
+struct SplitRows {
+  std::vector<std::int8_t> set;  ///< 0 train, 1 test, for every row
+  std::vector<std::int32_t> train, test;
+};
+
+SplitRows split_rows(const Measurements& data, const IdentifyOptions& options) {
+  SplitRows out;
+  out.set = split(data, options);
+  for (std::size_t row = 0; row < data.rows; ++row) {
+    if (data.weight && data.weight[row] == 0.0) continue;  // counts for nothing
+    (out.set[row] ? out.test : out.train).push_back(static_cast<std::int32_t>(row));
+  }
+  return out;
+}
+
+/// What is to be fitted, and what measures it.
+struct Asked {
+  Content content;         ///< of the training rows
+  std::size_t values = 0;  ///< that they measure
+  std::vector<int> free;
+  std::vector<std::string> instrument;  ///< of these: base, targets, anchor and fixed points, which are always unknown
+  bool base_free = false;
+};
+
+std::size_t measured_values(const std::vector<Segment>& segments) {
+  std::size_t out = 0;
+  for (const Segment& segment : segments) {
+    out += segment.rows.size() * (segment.kind == kernel::Kind::distance ? 1u
+                                  : segment.kind == kernel::Kind::pose   ? 6u
+                                                                         : 3u);
+  }
+  return out;
+}
+
+Asked what_is_asked(const Model& model, const Measurements& data, const std::vector<std::int32_t>& train,
+                    const IdentifyOptions& options) {
+  const std::vector<Segment> segments = make_segments(data, train);
+  Asked out;
+  out.content = content_of(model, segments);
+  out.values = measured_values(segments);
+  out.free = select_free(model, out.content, options);
+  if (out.free.empty()) throw std::invalid_argument("nothing is free: name parameters to fit, or hold fewer");
+  for (const auto& [name, bound] : options.bounds) find_parameters(model, {name});
+  if (options.frame_by == FrameBy::svd &&
+      (out.content.distance || out.content.poses || !out.content.frame || !model.point_names.empty())) {
+    throw std::invalid_argument(
+        "frame_by = svd needs measured positions only, no orientations, distances or fixed points");
+  }
+  for (const int k : out.free) {
+    const Role role = model.parameters[k].role;
+    if (belongs_to_instrument(role) || role == Role::target) out.instrument.push_back(model.parameters[k].name);
+    if (role == Role::base) out.base_free = true;
+  }
+  return out;
 }
 
 /// Touching fixed points shows shapes, not sizes: with every length free the robot could shrink to nothing. The longest
@@ -229,6 +286,56 @@ Selection select_observable(const Job& job, const std::vector<int>& free, const 
   std::vector<int> priority;
   for (const int k : free) priority.push_back(priority_of(job.model.parameters[k].role));
   return observable(job.model, free, find_rank(normal.gram, priority, job.options.rank_tolerance));
+}
+
+/// What is fitted of what was asked for.
+struct Seen {
+  std::vector<int> free;
+  int scale_carrier = -1;  ///< a length that is held, since nothing shows the scale; -1: none
+  Selection selection;
+};
+
+Seen what_is_seen(const Job& job, const Asked& asked, const Eigen::VectorXd& values) {
+  Seen out;
+  out.free = asked.free;
+  if (!asked.content.frame && !asked.content.distance) {
+    out.scale_carrier = length_that_carries_scale(job.model, values, out.free);
+    out.free.erase(std::remove(out.free.begin(), out.free.end(), out.scale_carrier), out.free.end());
+  }
+  out.selection = select_observable(job, out.free, values);
+  if (asked.values <= out.selection.fitted.size()) {
+    throw std::invalid_argument(count_of(asked.values, "measured value") + " in " +
+                                count_of(job.rows.size(), "training row") + " cannot determine " +
+                                count_of(out.selection.fitted.size(), "parameter") +
+                                ": measure more poses, or free fewer parameters");
+  }
+  if (out.scale_carrier >= 0) {
+    const std::string& name = job.model.parameters[out.scale_carrier].name;
+    out.selection.frozen.push_back(
+        {name, {{name, 1.0}}, "touching fixed points shows no scale: this length, held at nominal, carries it"});
+  }
+  return out;
+}
+
+/// The fit; gravity torques are taken from the robot as found until they no longer change. `bases` are the job's.
+Fit fit_with_gravity(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start,
+                     std::vector<std::vector<double>>* bases) {
+  constexpr int kRounds = 5;
+  constexpr double kUnchanged = 1e-11;
+  const auto needs_gravity = [](const Term& term) { return term.needs_gravity; };
+  Fit found = fit(job, fitted, start);
+  if (!std::any_of(job.model.terms.begin(), job.model.terms.end(), needs_gravity)) return found;
+  for (int round = 0; round < kRounds; ++round) {
+    const Robot robot = robot_with(job.model, found.values);
+    const Model found_model = make_model(robot, job.data, job.options.effects, job.options.own_effects);
+    if (found_model.terms.size() != job.model.terms.size())
+      break;  // a length that was none: the law stays with the drawing's
+    *bases = make_bases(found_model, job.data);
+    const Eigen::VectorXd before = found.values;
+    found = fit(job, fitted, before);
+    if ((found.values - before).cwiseAbs().maxCoeff() < kUnchanged) break;
+  }
+  return found;
 }
 
 // --- where to start --------------------------------------------------------------------------------------------------
@@ -499,10 +606,10 @@ Uncertainty uncertainty(const Job& job, const Fit& found, bool poses) {
       if (poses && std::isfinite(errors.rotation[row]))
         rotation += static_cast<double>(errors.rotation[row]) * static_cast<double>(errors.rotation[row]);
     }
-    const double freedom =
+    const double per_degree_of_freedom =
         (position_components + rotation_components) / std::max(1.0, position_components + rotation_components - p);
-    out.noise = std::sqrt(position / position_components * freedom);
-    if (poses) out.rotation_noise = std::sqrt(rotation / rotation_components * freedom);
+    out.noise = std::sqrt(position / position_components * per_degree_of_freedom);
+    if (poses) out.rotation_noise = std::sqrt(rotation / rotation_components * per_degree_of_freedom);
   }
   return out;
 }
@@ -515,8 +622,7 @@ Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
 /// d(rotation vector) / d(small rotation about the parent's axes): inverse left Jacobian of SO(3), Sola et al. 2018,
 /// eq. (146).
 Eigen::Matrix3d inverse_left_jacobian(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d cross;
-  cross << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  const Eigen::Matrix3d cross = skew(v);
   const double angle = v.norm();
   const double factor = angle < 1e-4 ? 1.0 / 12.0 : (1.0 - 0.5 * angle / std::tan(0.5 * angle)) / (angle * angle);
   return Eigen::Matrix3d::Identity() - 0.5 * cross + factor * cross * cross;
@@ -569,42 +675,99 @@ void report_orientations(const Robot& nominal, const Robot& found, const Model& 
   }
 }
 
-std::vector<std::string> make_warnings(const Identification& result, std::size_t train_components, double spread) {
+std::string three_digits(double v) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.3g", v);
+  return buffer;
+}
+
+/// "a (1.2 mm), b (3 mrad)": fitted, and known to more than 10 mm or mrad only.
+std::string barely_seen(const std::vector<Parameter>& parameters) {
+  std::string out;
+  for (const Parameter& parameter : parameters) {
+    const bool length = parameter.unit == "m";
+    if (parameter.frozen || !(length || parameter.unit == "rad") || !(parameter.sigma > 0.01)) continue;
+    out += (out.empty() ? "" : ", ") + parameter.name + " (" + three_digits(1e3 * parameter.sigma) +
+           (length ? " mm)" : " mrad)");
+  }
+  return out;
+}
+
+std::vector<std::string> make_warnings(const Identification& result, std::size_t train_values, double spread) {
   std::vector<std::string> warnings;
-  const auto text = [](double v) {
-    char buffer[32];
-    std::snprintf(buffer, sizeof buffer, "%.3g", v);
-    return std::string(buffer);
-  };
-  if (spread > 0.0 && result.train.after.median > 0.02 * spread) {
-    warnings.push_back("what is left, " + text(1e3 * result.train.after.median) + " mm in the median, is " +
-                       text(100.0 * result.train.after.median / spread) +
+  const ErrorStatistics& train = result.train.after;
+  if (spread > 0.0 && train.median > 0.02 * spread) {
+    warnings.push_back("what is left, " + three_digits(1e3 * train.median) + " mm in the median, is " +
+                       three_digits(100.0 * train.median / spread) +
                        " % of the measured range: is a joint column wrong (unit, sign, order), or the robot file?");
   }
-  if (train_components < 3 * static_cast<std::size_t>(result.rank)) {
-    warnings.push_back("only " + count_of(train_components, "measured value") + " for " +
+  if (train_values < 3 * static_cast<std::size_t>(result.rank)) {
+    warnings.push_back("only " + count_of(train_values, "measured value") + " for " +
                        count_of(static_cast<std::size_t>(result.rank), "parameter") +
                        ": measure more poses or free fewer parameters");
   }
   if (!result.test) {
     warnings.push_back("no rows are held out: nothing says how good the result is on other poses");
-  } else if (result.test->after.rms > 1.5 * result.train.after.rms &&
-             result.test->after.median > 1.3 * result.train.after.median) {
-    warnings.push_back("held-out error " + text(1e3 * result.test->after.rms) + " mm against " +
-                       text(1e3 * result.train.after.rms) +
-                       " mm in training: the data cannot support this many parameters");
+  } else if (result.test->after.rms > 1.5 * train.rms && result.test->after.median > 1.3 * train.median) {
+    warnings.push_back("held-out error " + three_digits(1e3 * result.test->after.rms) + " mm against " +
+                       three_digits(1e3 * train.rms) + " mm in training: the data cannot support this many parameters");
   }
-  std::string weak;
-  for (const Parameter& parameter : result.parameters) {
-    if (!parameter.frozen && (parameter.unit == "m" || parameter.unit == "rad") && parameter.sigma > 0.01) {
-      weak += (weak.empty() ? "" : ", ") + parameter.name + " (" + text(1e3 * parameter.sigma) +
-              (parameter.unit == "m" ? " mm)" : " mrad)");
-    }
-  }
+  const std::string weak = barely_seen(result.parameters);
   if (!weak.empty()) warnings.push_back("barely seen, standard error in brackets: " + weak);
   if (!result.rejected_rows.empty())
     warnings.push_back(count_of(result.rejected_rows.size(), "training row") + " left out as gross outliers");
   return warnings;
+}
+
+void report_uncertainty(const Uncertainty& known, Identification* result) {
+  result->covariance = known.covariance;
+  result->noise_sigma = known.noise;
+  result->rotation_noise_sigma = known.rotation_noise;
+}
+
+/// Every parameter that was asked for, with its standard error if it was fitted.
+void report_parameters(const Model& nominal_model, const Model& model, const Seen& seen, const Fit& found,
+                       Identification* result) {
+  const std::vector<int>& fitted = seen.selection.fitted;
+  Eigen::VectorXd nominal_values = initial_values(nominal_model), values = found.values;
+  report_orientations(nominal_model.robot, result->robot, model, &nominal_values, &values);
+  report_orientation_covariance(model, fitted, values, &result->covariance);
+  std::vector<int> asked = seen.free;
+  if (seen.scale_carrier >= 0) asked.push_back(seen.scale_carrier);
+  std::sort(asked.begin(), asked.end());
+  Eigen::Index at = 0;
+  for (const int k : asked) {
+    Parameter parameter;
+    parameter.name = model.parameters[k].name;
+    parameter.unit = model.parameters[k].unit;
+    parameter.nominal = nominal_values[k];
+    parameter.value = values[k];
+    parameter.frozen = std::find(fitted.begin(), fitted.end(), k) == fitted.end();
+    parameter.sigma = parameter.frozen ? kNaN : std::sqrt(result->covariance(at, at));
+    if (!parameter.frozen) ++at;
+    result->parameters.push_back(parameter);
+  }
+}
+
+/// Errors before and after, on the rows fitted and on those held out.
+void report_errors(const Job& job, const Content& content, const std::vector<std::int32_t>& test,
+                   const Eigen::VectorXd& before, const Fit& found, Identification* result) {
+  std::vector<std::int32_t> seen_test;
+  for (const std::int32_t row : test) {  // a fixed point that no training row touches has no place to compare with
+    if (!job.data.has_fixed_point(row) || content.point[job.data.fixed_point[row]]) seen_test.push_back(row);
+  }
+  std::vector<std::int32_t> all = job.rows;
+  all.insert(all.end(), seen_test.begin(), seen_test.end());
+  std::sort(all.begin(), all.end());
+  const Evaluator everything(job.model, job.data, job.bases, make_segments(job.data, all), found.fitted,
+                             job.options.threads);
+  const std::vector<std::int32_t> kept = without(job.rows, found.rejected);
+  if (!seen_test.empty()) result->test.emplace();
+  for (const bool after : {false, true}) {
+    const ErrorLengths errors = error_lengths(job, everything, after ? found.values : before, content.poses);
+    (after ? result->train.after : result->train.before) = statistics(errors, kept);
+    if (result->test) (after ? result->test->after : result->test->before) = statistics(errors, seen_test);
+  }
 }
 
 }  // namespace
@@ -635,132 +798,35 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   if (!options.is_valid(&error)) throw std::invalid_argument("identify: " + error);
   validate(nominal);
   validate(data, nominal);
-
-  Identification result;
-  result.set = split(data, options);
-  std::vector<std::int32_t> train, test;
-  for (std::size_t row = 0; row < data.rows; ++row) {
-    if (data.weight && data.weight[row] == 0.0) continue;  // counts for nothing
-    (result.set[row] ? test : train).push_back(static_cast<std::int32_t>(row));
-  }
-
-  // What is asked for.
+  const SplitRows rows = split_rows(data, options);
   const Model nominal_model = make_model(nominal, data, options.effects, options.own_effects);
-  const std::vector<Segment> train_segments = make_segments(data, train);
-  const Content content = content_of(nominal_model, train_segments);
-  std::vector<int> free = select_free(nominal_model, content, options);
-  if (free.empty()) throw std::invalid_argument("nothing is free: name parameters to fit, or hold fewer");
-  for (const auto& [name, bound] : options.bounds) find_parameters(nominal_model, {name});
-  if (options.frame_by == FrameBy::svd &&
-      (content.distance || content.poses || !content.frame || !nominal_model.point_names.empty())) {
-    throw std::invalid_argument(
-        "frame_by = svd needs measured positions only, no orientations, distances or fixed points");
-  }
-  std::size_t train_components = 0;
-  for (const Segment& segment : train_segments) {
-    train_components += segment.rows.size() * (segment.kind == kernel::Kind::distance ? 1u
-                                               : segment.kind == kernel::Kind::pose   ? 6u
-                                                                                      : 3u);
-  }
+  const Asked asked = what_is_asked(nominal_model, data, rows.train, options);
 
   // Base, targets, anchor and fixed points first: they are always unknown.
   std::vector<std::vector<double>> bases = make_bases(nominal_model, data);
-  std::vector<std::string> instrument;
-  bool base_free = false;
-  for (const int k : free) {
-    const Role role = nominal_model.parameters[k].role;
-    if (belongs_to_instrument(role) || role == Role::target) instrument.push_back(nominal_model.parameters[k].name);
-    if (role == Role::base) base_free = true;
-  }
-  const Job nominal_job{nominal_model, data, bases, options, train};
-  const Start start = find_start(nominal_job, instrument, content, base_free);
-  result.before = start.robot;
+  const Job nominal_job{nominal_model, data, bases, options, rows.train};
+  const Start start = find_start(nominal_job, asked.instrument, asked.content, asked.base_free);
 
-  // What can be seen of it.
+  // What can be seen of the rest, and the fit.
   const Model model = make_model(start.robot, data, options.effects, options.own_effects);
   if (model.terms.size() != nominal_model.terms.size()) bases = make_bases(model, data);
-  const Job job{model, data, bases, options, train};
-  int scale_carrier = -1;
-  if (!content.frame && !content.distance) {
-    scale_carrier = length_that_carries_scale(model, start.values, free);
-    free.erase(std::remove(free.begin(), free.end(), scale_carrier), free.end());
-  }
-  Selection selection = select_observable(job, free, start.values);
-  if (train_components <= selection.fitted.size()) {
-    throw std::invalid_argument(count_of(train_components, "measured value") + " in " +
-                                count_of(train.size(), "training row") + " cannot determine " +
-                                count_of(selection.fitted.size(), "parameter") +
-                                ": measure more poses, or free fewer parameters");
-  }
-  if (scale_carrier >= 0) {
-    const std::string& name = model.parameters[scale_carrier].name;
-    selection.frozen.push_back(
-        {name, {{name, 1.0}}, "touching fixed points shows no scale: this length, held at nominal, carries it"});
-  }
+  const Job job{model, data, bases, options, rows.train};
+  const Seen seen = what_is_seen(job, asked, start.values);
+  const Fit found = fit_with_gravity(job, seen.selection.fitted, start.values, &bases);
 
-  // The fit; gravity torques are taken from the robot as found until they no longer change.
-  Fit found = fit(job, selection.fitted, start.values);
-  const bool gravity =
-      std::any_of(model.terms.begin(), model.terms.end(), [](const Term& t) { return t.needs_gravity; });
-  for (int round = 0; gravity && round < 5; ++round) {
-    const Robot robot = robot_with(model, found.values);
-    const Model found_model = make_model(robot, data, options.effects, options.own_effects);
-    if (found_model.terms.size() != model.terms.size())
-      break;  // a length that was none: the law stays with the drawing's
-    bases = make_bases(found_model, data);
-    const Eigen::VectorXd before = found.values;
-    found = fit(job, selection.fitted, before);
-    if ((found.values - before).cwiseAbs().maxCoeff() < 1e-11) break;
-  }
-
-  // Result.
+  Identification result;
+  result.set = rows.set;
+  result.before = start.robot;
   result.robot = robot_with(model, found.values);
   result.solver = found.solver;
-  result.frozen = selection.frozen;
-  result.rank = static_cast<int>(selection.fitted.size());
-  result.columns = static_cast<int>(free.size()) + (scale_carrier >= 0 ? 1 : 0);
+  result.frozen = seen.selection.frozen;
+  result.rank = static_cast<int>(seen.selection.fitted.size());
+  result.columns = static_cast<int>(seen.free.size()) + (seen.scale_carrier >= 0 ? 1 : 0);
   for (const std::int32_t row : found.rejected) result.rejected_rows.push_back(static_cast<std::size_t>(row));
-  const Uncertainty known = uncertainty(job, found, content.poses);
-  result.covariance = known.covariance;
-  result.noise_sigma = known.noise;
-  result.rotation_noise_sigma = known.rotation_noise;
-
-  Eigen::VectorXd nominal_values = initial_values(nominal_model), values = found.values;
-  report_orientations(nominal_model.robot, result.robot, model, &nominal_values, &values);
-  report_orientation_covariance(model, selection.fitted, values, &result.covariance);
-  std::vector<int> asked = free;
-  if (scale_carrier >= 0) asked.push_back(scale_carrier);
-  std::sort(asked.begin(), asked.end());
-  Eigen::Index at = 0;
-  for (const int k : asked) {
-    Parameter parameter;
-    parameter.name = model.parameters[k].name;
-    parameter.unit = model.parameters[k].unit;
-    parameter.nominal = nominal_values[k];
-    parameter.value = values[k];
-    parameter.frozen = std::find(selection.fitted.begin(), selection.fitted.end(), k) == selection.fitted.end();
-    parameter.sigma = parameter.frozen ? kNaN : std::sqrt(result.covariance(at, at));
-    if (!parameter.frozen) ++at;
-    result.parameters.push_back(parameter);
-  }
-
-  // Errors before and after, on the rows fitted and on those held out.
-  std::vector<std::int32_t> seen_test;
-  for (const std::int32_t row : test) {  // a fixed point that no training row touches has no place to compare with
-    if (!data.has_fixed_point(row) || content.point[data.fixed_point[row]]) seen_test.push_back(row);
-  }
-  std::vector<std::int32_t> all = train;
-  all.insert(all.end(), seen_test.begin(), seen_test.end());
-  std::sort(all.begin(), all.end());
-  const Evaluator everything(model, data, bases, make_segments(data, all), selection.fitted, options.threads);
-  const std::vector<std::int32_t> kept = without(train, found.rejected);
-  if (!seen_test.empty()) result.test.emplace();
-  for (const bool after : {false, true}) {
-    const ErrorLengths errors = error_lengths(job, everything, after ? found.values : start.values, content.poses);
-    (after ? result.train.after : result.train.before) = statistics(errors, kept);
-    if (result.test) (after ? result.test->after : result.test->before) = statistics(errors, seen_test);
-  }
-  result.warnings = make_warnings(result, train_components, spread_of(job));
+  report_uncertainty(uncertainty(job, found, asked.content.poses), &result);
+  report_parameters(nominal_model, model, seen, found, &result);
+  report_errors(job, asked.content, rows.test, start.values, found, &result);
+  result.warnings = make_warnings(result, asked.values, spread_of(job));
   return result;
 }
 
