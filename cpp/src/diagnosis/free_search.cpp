@@ -5,9 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <numeric>
 
+#include "math/constants.hpp"
 #include "math/random.hpp"
 #include "math/text.hpp"
 
@@ -25,16 +24,9 @@ struct Left {
 
 Left what_is_left(const Design& design, const Evidence::State& state, std::size_t most) {
   Left out;
-  std::size_t training = 0;
-  for (const std::int32_t fold : design.fold) training += fold < design.folds ? 1 : 0;
-  int folds = design.folds;
-  while (folds > 2 && training * static_cast<std::size_t>(folds) / static_cast<std::size_t>(design.folds) > most)
-    --folds;
-  for (std::size_t i = 0; i < design.fold.size(); ++i) {
-    if (design.fold[i] < folds && design.weight[static_cast<Eigen::Index>(i)] > 0.0)
-      out.at.push_back(static_cast<Eigen::Index>(i));
-  }
-  out.share = static_cast<double>(out.at.size()) / static_cast<double>(std::max<std::size_t>(1, training));
+  const SomeRows some = some_training_rows(design, most);
+  out.at = some.at;
+  out.share = static_cast<double>(some.at.size()) / static_cast<double>(std::max<std::size_t>(1, some.of));
   const auto p = static_cast<Eigen::Index>(state.columns.size());
   out.columns.resize(static_cast<Eigen::Index>(out.at.size()), p);
   out.residual.resize(out.columns.rows());
@@ -57,21 +49,80 @@ struct Trial {
   std::vector<int> sites;
 };
 
-std::vector<Trial> make_trials(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot,
-                               std::size_t clusters) {
-  std::vector<Trial> out;
+bool is_torque(const InputColumn& input) { return input.name.rfind("torque", 0) == 0; }
+bool is_direction(const InputColumn& input) { return input.name.rfind("dir", 0) == 0; }
+bool is_difference(const InputColumn& input) { return input.name.find('-') != std::string::npos; }
+bool is_motion(const InputColumn& input) { return input.name[0] == 'q' && !is_difference(input); }
+bool is_time(const InputColumn& input) { return input.name == "time" || input.name == "order"; }
+
+/// Training rows, each once.
+std::vector<std::int32_t> training_rows(const Design& design) {
   std::vector<std::int32_t> rows;
   for (std::size_t i = 0; i < design.row.size(); ++i) {
     if (design.fold[i] < design.folds && (i == 0 || design.row[i] != design.row[i - 1])) rows.push_back(design.row[i]);
   }
-  const int one = clusters >= 150 ? 10 : clusters >= 60 ? 7 : 4;
-  const int two = clusters >= 150 ? 5 : clusters >= 60 ? 4 : 3;
-  std::vector<std::vector<double>> fine, coarse;
-  for (const InputColumn& input : inputs) {
-    fine.push_back(knots_of(input, rows, one));
-    coarse.push_back(knots_of(input, rows, two));
+  return rows;
+}
+
+/// Every free function that is tried: so many knots along its inputs as the poses bear.
+class TrialMaker {
+ public:
+  TrialMaker(const Design& design, const std::vector<InputColumn>& inputs, std::size_t clusters)
+      : design_(design), inputs_(inputs), rows_(training_rows(design)) {
+    knots_of_one_ = clusters >= 150 ? 10 : clusters >= 60 ? 7 : 4;
+    const int of_two = clusters >= 150 ? 5 : clusters >= 60 ? 4 : 3;
+    for (const InputColumn& input : inputs) {
+      fine_.push_back(knots_of(input, rows_, knots_of_one_));
+      coarse_.push_back(knots_of(input, rows_, of_two));
+    }
   }
-  const auto add = [&](const std::string& site, const std::vector<int>& columns, const std::vector<int>& which) {
+
+  std::vector<Trial> run(const Robot& robot) {
+    for (std::size_t joint = 0; joint < robot.joints.size(); ++joint) {
+      add_one_input(robot.joints[joint].name, joint);
+      add_two_inputs(robot.joints[joint].name, joint);
+    }
+    if (!design_.base_columns.empty()) add_base();
+    return std::move(out_);
+  }
+
+ private:
+  const InputColumn& input(int k) const { return inputs_[static_cast<std::size_t>(k)]; }
+  int count() const { return static_cast<int>(inputs_.size()); }
+
+  void add_one_input(const std::string& site, std::size_t joint) {
+    for (int a = 0; a < count(); ++a) {
+      if (!input(a).constant) add(site, design_.joint_column[joint], {a});
+    }
+  }
+
+  /// Any two joints; this joint's own motion, direction or torque with anything else.
+  void add_two_inputs(const std::string& site, std::size_t joint) {
+    for (int a = 0; a < count(); ++a) {
+      if (input(a).constant || !is_motion(input(a))) continue;
+      for (int b = 0; b < count(); ++b) {
+        if (b != a && goes_with(a, b, static_cast<int>(joint))) add(site, design_.joint_column[joint], {a, b});
+      }
+    }
+  }
+
+  bool goes_with(int a, int b, int joint) const {
+    const InputColumn &first = input(a), &second = input(b);
+    if (second.constant || is_torque(second) || is_difference(second) || is_time(second)) return false;
+    if (is_motion(second)) return b > a;
+    return is_direction(second) ? second.joint == joint : first.joint == joint;
+  }
+
+  /// The base: functions of one input, that are not slow drifts.
+  void add_base() {
+    for (int a = 0; a < count(); ++a) {
+      if (input(a).constant || is_torque(input(a)) || is_time(input(a))) continue;
+      fine_[static_cast<std::size_t>(a)] = knots_of(input(a), rows_, std::min(knots_of_one_, 5));
+      add("base", design_.base_columns, {a});
+    }
+  }
+
+  void add(const std::string& site, const std::vector<int>& columns, const std::vector<int>& which) {
     Trial trial;
     trial.what.kind = Explanation::Kind::free;
     trial.what.effect = "free";
@@ -80,55 +131,24 @@ std::vector<Trial> make_trials(const Design& design, const std::vector<InputColu
     trial.what.inputs = which;
     std::string name = "free." + site;
     for (const int k : which) {
-      trial.what.knots.push_back((which.size() > 1 ? coarse : fine)[static_cast<std::size_t>(k)]);
+      trial.what.knots.push_back((which.size() > 1 ? coarse_ : fine_)[static_cast<std::size_t>(k)]);
       if (trial.what.knots.back().size() < 2) return;
-      name += "." + inputs[static_cast<std::size_t>(k)].name;
+      name += "." + input(k).name;
     }
-    std::size_t count = columns.size();
-    for (const std::vector<double>& knots : trial.what.knots) count *= knots.size();
-    for (std::size_t k = 0; k < count; ++k) trial.what.parameters.push_back(name + "." + std::to_string(k + 1));
+    std::size_t parameters = columns.size();
+    for (const std::vector<double>& knots : trial.what.knots) parameters *= knots.size();
+    for (std::size_t k = 0; k < parameters; ++k) trial.what.parameters.push_back(name + "." + std::to_string(k + 1));
     trial.sites = columns;
-    out.push_back(std::move(trial));
-  };
-  const auto number_of_inputs = static_cast<int>(inputs.size());
-  for (std::size_t joint = 0; joint < robot.joints.size(); ++joint) {
-    const std::string& site = robot.joints[joint].name;
-    for (int a = 0; a < number_of_inputs; ++a) {
-      const InputColumn& first = inputs[static_cast<std::size_t>(a)];
-      if (first.constant) continue;
-      add(site, design.joint_column[joint], {a});
-    }
-    // Two inputs: any two joints; this joint's own motion, direction or torque with anything else.
-    for (int a = 0; a < number_of_inputs; ++a) {
-      const InputColumn& first = inputs[static_cast<std::size_t>(a)];
-      if (first.constant || first.name[0] != 'q' || first.name.find('-') != std::string::npos) continue;
-      for (int b = 0; b < number_of_inputs; ++b) {
-        const InputColumn& second = inputs[static_cast<std::size_t>(b)];
-        if (second.constant || b == a) continue;
-        const bool motion = second.name[0] == 'q' && second.name.find('-') == std::string::npos;
-        if (motion && b < a) continue;
-        if (second.name.rfind("torque", 0) == 0 || second.name.find('-') != std::string::npos ||
-            second.name == "time" || second.name == "order")
-          continue;
-        const bool own = first.joint == static_cast<int>(joint);
-        const bool direction = second.name.rfind("dir", 0) == 0;
-        if (!motion && direction && second.joint != static_cast<int>(joint)) continue;
-        if (!motion && !direction && !own) continue;
-        add(site, design.joint_column[joint], {a, b});
-      }
-    }
+    out_.push_back(std::move(trial));
   }
-  if (!design.base_columns.empty()) {
-    for (int a = 0; a < number_of_inputs; ++a) {
-      const InputColumn& first = inputs[static_cast<std::size_t>(a)];
-      if (first.constant || first.name.rfind("torque", 0) == 0 || first.name == "order" || first.name == "time")
-        continue;
-      fine[static_cast<std::size_t>(a)] = knots_of(first, rows, std::min(one, 5));
-      add("base", design.base_columns, {a});
-    }
-  }
-  return out;
-}
+
+  const Design& design_;
+  const std::vector<InputColumn>& inputs_;
+  const std::vector<std::int32_t> rows_;
+  int knots_of_one_;
+  std::vector<std::vector<double>> fine_, coarse_;  // knots of functions of one input, and of two
+  std::vector<Trial> out_;
+};
 
 /// X^T v of a trial's columns for every column v of `right`, and X^T X, without ever storing X.
 struct Sums {
@@ -182,6 +202,19 @@ Sums sums_of(const Trial& trial, const Design& design, const std::vector<InputCo
   return out;
 }
 
+std::vector<std::int32_t> clusters_of(const Design& design, const std::vector<Eigen::Index>& at) {
+  std::vector<std::int32_t> out;
+  for (const Eigen::Index i : at) out.push_back(design.cluster[static_cast<std::size_t>(i)]);
+  return out;
+}
+
+/// In increasing order.
+std::vector<std::int32_t> distinct(std::vector<std::int32_t> values) {
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  return values;
+}
+
 /// Slots of the right-hand sides: state's columns, the residual, then sign-flipped residuals.
 Design::Rows right_sides(const Design& design, const Left& left, int flips, std::uint64_t seed) {
   const Eigen::Index p = left.columns.cols();
@@ -189,11 +222,7 @@ Design::Rows right_sides(const Design& design, const Left& left, int flips, std:
   out.leftCols(p) = left.columns;
   out.col(p) = left.residual;
   Random random(seed);
-  std::vector<std::int32_t> clusters;
-  for (const Eigen::Index i : left.at) clusters.push_back(design.cluster[static_cast<std::size_t>(i)]);
-  std::vector<std::int32_t> known(clusters);
-  std::sort(known.begin(), known.end());
-  known.erase(std::unique(known.begin(), known.end()), known.end());
+  const std::vector<std::int32_t> clusters = clusters_of(design, left.at), known = distinct(clusters);
   for (int f = 0; f < flips; ++f) {
     std::vector<double> sign(known.size());
     for (double& s : sign) s = random.next() & 1u ? 1.0 : -1.0;
@@ -210,28 +239,165 @@ Design::Rows right_sides(const Design& design, const Left& left, int flips, std:
   return out;
 }
 
+/// The state as it stands on the rows that are looked at: as if all rows were seen, and each counted for as much as it
+/// does (`times`).
+Evidence::State seen_on(const Left& left, const Evidence& evidence, const Evidence::State& state, double times) {
+  Evidence::State out = state;
+  out.rss = std::max(left.residual.squaredNorm() * times, 1e-300);
+  out.sigma2 = out.rss / evidence.degrees_of_freedom();
+  return out;
+}
+
+/// Scores of sign-flipped residuals, each the largest of those so far. `flipped`: X^T v of each; `a`: X^T X beyond the
+/// state.
+void raise_scores(const Evidence& evidence, const Evidence::State& state, const Eigen::MatrixXd& a,
+                  const Eigen::MatrixXd& flipped, double scale, double cost, std::vector<double>* largest) {
+  Eigen::MatrixXd m = a;
+  const double ridge = state.sigma2 / std::pow(scale * kLargest, 2.0);
+  m.diagonal().array() += ridge;
+  const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(m));
+  const double determinants =
+      static_cast<double>(a.rows()) * std::log(ridge) - 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+  Eigen::MatrixXd half = flipped;
+  factor.matrixL().solveInPlace(half);
+  for (std::size_t f = 0; f < largest->size(); ++f) {
+    const double fall = std::min(half.col(static_cast<Eigen::Index>(f)).squaredNorm(), 0.999 * state.rss);
+    const double score =
+        -0.5 * evidence.degrees_of_freedom() * std::log1p(-fall / state.rss) + 0.5 * determinants - cost;
+    (*largest)[f] = std::max((*largest)[f], score);
+  }
+}
+
+/// How often random signs reach the best score, the data's own signs counted in.
+double chance_of(const std::vector<double>& largest, double best) {
+  int above = 1;
+  for (const double score : largest) above += score >= best ? 1 : 0;
+  return static_cast<double>(above) / (static_cast<double>(largest.size()) + 1.0);
+}
+
+// --- mesh orders -----------------------------------------------------------------------------------------------------
+
+constexpr double kLowestOrder = 20.0, kHighestOrder = 240.0;  // per turn
+constexpr std::size_t kOrdersAtATime = 16;
+constexpr double kOneAngle = 0.01;  // angles that lie closer are one [rad]
+
+/// What is left, seen through one joint: so that an order costs two products.
+struct JointView {
+  std::vector<double> angle;  ///< of every row
+  Design::Rows right;         ///< the state's columns and the residual, times the joint's column
+  Eigen::VectorXd dd;         ///< the joint's column squared
+};
+
+std::vector<double> angles_of(const Design& design, const std::vector<Eigen::Index>& at, const InputColumn& input) {
+  std::vector<double> out;
+  for (const Eigen::Index i : at)
+    out.push_back(input.values[static_cast<std::size_t>(design.row[static_cast<std::size_t>(i)])]);
+  return out;
+}
+
+/// Angles that crowd at a few places cannot show a short wave: any order would do.
+bool are_crowded(const Design& design, const std::vector<Eigen::Index>& at, std::vector<double> angles) {
+  std::sort(angles.begin(), angles.end());
+  angles.erase(std::unique(angles.begin(), angles.end(), [](double a, double b) { return b - a < kOneAngle; }),
+               angles.end());
+  std::size_t poses = 0;
+  for (std::size_t n = 0; n < at.size(); ++n) {
+    const bool first = n == 0 || design.cluster[static_cast<std::size_t>(at[n])] !=
+                                     design.cluster[static_cast<std::size_t>(at[n - 1])];
+    poses += first ? 1 : 0;
+  }
+  return static_cast<double>(angles.size()) < std::min(0.3 * static_cast<double>(poses), 100.0);
+}
+
+JointView view_of(const Design& design, const Left& left, std::size_t joint, std::vector<double> angles) {
+  Eigen::VectorXd d(static_cast<Eigen::Index>(left.at.size()));
+  for (Eigen::Index n = 0; n < d.size(); ++n) {
+    const Eigen::Index i = left.at[static_cast<std::size_t>(n)];
+    d[n] = design.weight[i] * design.x(i, design.joint_column[joint][0]);
+  }
+  JointView out;
+  out.angle = std::move(angles);
+  out.right.resize(left.columns.rows(), left.columns.cols() + 1);
+  out.right.leftCols(left.columns.cols()) = d.asDiagonal() * left.columns;
+  out.right.col(left.columns.cols()) = d.cwiseProduct(left.residual);
+  out.dd = d.cwiseAbs2();
+  return out;
+}
+
+/// Cosine and sine of every order, a column each.
+Eigen::MatrixXd waves_of(const std::vector<double>& angle, const double* orders, std::size_t count) {
+  Eigen::MatrixXd out(static_cast<Eigen::Index>(angle.size()), static_cast<Eigen::Index>(2 * count));
+  for (std::size_t k = 0; k < count; ++k) {
+    double last = kNaN, c = 0.0, s = 0.0;
+    for (std::size_t n = 0; n < angle.size(); ++n) {
+      if (angle[n] != last) {
+        last = angle[n];
+        c = std::cos(orders[k] * last);
+        s = std::sin(orders[k] * last);
+      }
+      out(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(2 * k)) = c;
+      out(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(2 * k + 1)) = s;
+    }
+  }
+  return out;
+}
+
+std::vector<double> orders_of(const std::vector<double>& angles) {
+  const auto [low, high] = std::minmax_element(angles.begin(), angles.end());
+  const double step = *high - *low > 6.6 ? 0.5 : 1.0;
+  std::vector<double> out;
+  for (double order = kLowestOrder; order <= kHighestOrder; order += step) out.push_back(order);
+  return out;
+}
+
+MeshGain best_order(const Left& left, const JointView& view, const Evidence& evidence, const Evidence::State& state,
+                    double times, std::size_t joints) {
+  const Eigen::Index p = left.columns.cols();
+  const std::vector<double> orders = orders_of(view.angle);
+  const double cost = std::log(static_cast<double>(orders.size()) * static_cast<double>(joints));
+  MeshGain best;
+  best.score = -1e300;
+  best.tried = static_cast<int>(orders.size());
+  for (std::size_t first = 0; first < orders.size(); first += kOrdersAtATime) {
+    const std::size_t count = std::min(kOrdersAtATime, orders.size() - first);
+    const Eigen::MatrixXd waves = waves_of(view.angle, &orders[first], count);
+    const Eigen::MatrixXd sums = waves.transpose() * view.right;
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto at = static_cast<Eigen::Index>(2 * k);
+      Eigen::Matrix2d xx;
+      const auto c = waves.col(at).array(), s = waves.col(at + 1).array();
+      xx(0, 0) = (c.square() * view.dd.array()).sum();
+      xx(1, 1) = (s.square() * view.dd.array()).sum();
+      xx(0, 1) = xx(1, 0) = (c * s * view.dd.array()).sum();
+      const Eigen::MatrixXd half = left.factor.matrixL().solve(sums.block(at, 0, 2, p).transpose());
+      const Eigen::MatrixXd a = (xx - half.transpose() * half) * times;
+      const Eigen::VectorXd b = sums.block(at, p, 2, 1) * times;
+      const Evidence::Gain gain = evidence.gain_of(state, a, b, Eigen::VectorXd::Constant(2, kLargest), cost);
+      if (gain.score > best.score) {
+        best.score = gain.score;
+        best.order = orders[first + k];
+      }
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidence::State& state,
-                   const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                   const std::vector<InputColumn>& inputs, const Robot& robot, double design_effect,
                    const FreeScanOptions& options) {
   const Left left = what_is_left(design, state, options.most_values);
-  std::vector<std::int32_t> clusters;
-  for (const Eigen::Index i : left.at) clusters.push_back(design.cluster[static_cast<std::size_t>(i)]);
-  std::sort(clusters.begin(), clusters.end());
-  clusters.erase(std::unique(clusters.begin(), clusters.end()), clusters.end());
-  const std::vector<Trial> trials = make_trials(design, inputs, robot, clusters.size());
+  const std::vector<Trial> trials =
+      TrialMaker(design, inputs, distinct(clusters_of(design, left.at)).size()).run(robot);
   const Eigen::Index p = left.columns.cols();
   const Design::Rows right = right_sides(design, left, options.flips, options.seed);
-  Evidence::State scaled = state;
-  const double times = 1.0 / (left.share * deff);  // as if all rows were seen, and each counted for as much as it does
+  const double times = 1.0 / (left.share * design_effect);
+  const Evidence::State seen = seen_on(left, evidence, state, times);
   FreeScan out;
   out.tried = trials.size();
   std::vector<double> largest(static_cast<std::size_t>(options.flips), -1e300);
   const double cost = std::log(static_cast<double>(std::max<std::size_t>(1, out.tried)));
-  double observed_residual = left.residual.squaredNorm() * times;
-  scaled.rss = std::max(observed_residual, 1e-300);
-  scaled.sigma2 = scaled.rss / evidence.freedom();
   for (const Trial& trial : trials) {
     const Sums sums = sums_of(trial, design, inputs, left.at, right);
     const Eigen::Index k = sums.xx.rows();
@@ -239,26 +405,13 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
     const Eigen::MatrixXd half = left.factor.matrixL().solve(c.transpose());
     Eigen::MatrixXd a = (sums.xx - half.transpose() * half) * times;
     for (Eigen::Index i = 0; i < k; ++i) a(i, i) += 1e-9 * sums.xx(i, i) * times;
-    const Eigen::VectorXd prior = Eigen::VectorXd::Constant(k, kLargest);
     FreeGain found;
-    found.gain = evidence.gain_of(scaled, a, sums.right.col(p) * times, prior, cost);
+    found.gain = evidence.gain_of(seen, a, sums.right.col(p) * times, Eigen::VectorXd::Constant(k, kLargest), cost);
     if (options.flips > 0) {
       // At the scale that the data chose, or noise's own: the smallest.
-      for (const double scale : {found.gain.scale, 0.001}) {
-        Eigen::MatrixXd m = a;
-        const double ridge = scaled.sigma2 / std::pow(scale * kLargest, 2.0);
-        m.diagonal().array() += ridge;
-        const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(m));
-        const double determinants =
-            static_cast<double>(k) * std::log(ridge) - 2.0 * factor.matrixLLT().diagonal().array().log().sum();
-        Eigen::MatrixXd flipped = sums.right.rightCols(options.flips) * times;
-        factor.matrixL().solveInPlace(flipped);
-        for (int f = 0; f < options.flips; ++f) {
-          const double fall = std::min(flipped.col(f).squaredNorm(), 0.999 * scaled.rss);
-          const double score = -0.5 * evidence.freedom() * std::log1p(-fall / scaled.rss) + 0.5 * determinants - cost;
-          largest[static_cast<std::size_t>(f)] = std::max(largest[static_cast<std::size_t>(f)], score);
-        }
-      }
+      const Eigen::MatrixXd flipped = sums.right.rightCols(options.flips) * times;
+      for (const double scale : {found.gain.scale, 0.001})
+        raise_scores(evidence, seen, a, flipped, scale, cost, &largest);
     }
     found.what = trial.what;
     found.site_columns = trial.sites;
@@ -266,97 +419,41 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
   }
   std::sort(out.best.begin(), out.best.end(),
             [](const FreeGain& a, const FreeGain& b) { return a.gain.score > b.gain.score; });
-  if (!out.best.empty() && options.flips > 0) {
-    int above = 1;
-    for (const double score : largest) above += score >= out.best[0].gain.score ? 1 : 0;
-    out.p = static_cast<double>(above) / (options.flips + 1.0);
-  }
+  if (!out.best.empty() && options.flips > 0) out.p = chance_of(largest, out.best[0].gain.score);
   if (out.best.size() > 200) out.best.resize(200);
   return out;
 }
 
 std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, const Evidence::State& state,
-                                const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                                const std::vector<InputColumn>& inputs, const Robot& robot, double design_effect,
                                 std::size_t most_values) {
   const Left left = what_is_left(design, state, most_values);
-  const double times = 1.0 / (left.share * deff);
-  Evidence::State scaled = state;
-  scaled.rss = std::max(left.residual.squaredNorm() * times, 1e-300);
-  scaled.sigma2 = scaled.rss / evidence.freedom();
+  const double times = 1.0 / (left.share * design_effect);
+  const Evidence::State seen = seen_on(left, evidence, state, times);
   std::vector<MeshGain> out;
+  if (left.at.empty()) return out;
   for (const InputColumn& input : inputs) {
     if (input.joint < 0 || input.constant || input.name != "q" + std::to_string(input.joint + 1)) continue;
     const auto joint = static_cast<std::size_t>(input.joint);
     if (robot.joints[joint].type != JointType::revolute || robot.joints[joint].passive()) continue;
-    Eigen::VectorXd d(static_cast<Eigen::Index>(left.at.size()));
-    std::vector<double> q(left.at.size());
-    for (std::size_t n = 0; n < left.at.size(); ++n) {
-      const Eigen::Index i = left.at[n];
-      d[static_cast<Eigen::Index>(n)] = design.weight[i] * design.x(i, design.joint_column[joint][0]);
-      q[n] = input.values[static_cast<std::size_t>(design.row[static_cast<std::size_t>(i)])];
-    }
-    if (q.empty()) return {};
-    // Angles that crowd at a few places cannot show a short wave: any order would do.
-    std::vector<double> sorted(q);
-    std::sort(sorted.begin(), sorted.end());
-    sorted.erase(std::unique(sorted.begin(), sorted.end(), [](double a, double b) { return b - a < 0.01; }),
-                 sorted.end());
-    std::size_t poses = 0;
-    for (std::size_t n = 0; n < left.at.size(); ++n)
-      poses += n == 0 || design.cluster[static_cast<std::size_t>(left.at[n])] !=
-                             design.cluster[static_cast<std::size_t>(left.at[n - 1])]
-                   ? 1
-                   : 0;
-    if (static_cast<double>(sorted.size()) < std::min(0.3 * static_cast<double>(poses), 100.0)) continue;
-    const auto [low, high] = std::minmax_element(q.begin(), q.end());
-    const double step = *high - *low > 6.6 ? 0.5 : 1.0;
-    MeshGain best;
+    std::vector<double> angles = angles_of(design, left.at, input);
+    if (are_crowded(design, left.at, angles)) continue;
+    const JointView view = view_of(design, left, joint, std::move(angles));
+    MeshGain best = best_order(left, view, evidence, seen, times, robot.joints.size());
     best.joint = joint;
-    best.score = -1e300;
-    // Row by row the residual and the state's columns seen through this joint, so that an order costs two products.
-    Design::Rows right(left.columns.rows(), left.columns.cols() + 1);
-    right.leftCols(left.columns.cols()) = d.asDiagonal() * left.columns;
-    right.col(left.columns.cols()) = d.cwiseProduct(left.residual);
-    const Eigen::VectorXd dd = d.cwiseAbs2();
-    std::vector<double> orders;
-    for (double order = 20.0; order <= 240.0; order += step) orders.push_back(order);
-    constexpr std::size_t kBlock = 16;  // orders at a time
-    const double cost = std::log(static_cast<double>(orders.size()) * static_cast<double>(robot.joints.size()));
-    for (std::size_t first = 0; first < orders.size(); first += kBlock) {
-      const std::size_t count = std::min(kBlock, orders.size() - first);
-      Eigen::MatrixXd waves(left.columns.rows(), static_cast<Eigen::Index>(2 * count));
-      for (std::size_t k = 0; k < count; ++k) {
-        double last_q = NAN, c = 0.0, s = 0.0;
-        for (std::size_t n = 0; n < q.size(); ++n) {
-          if (q[n] != last_q) {
-            last_q = q[n];
-            c = std::cos(orders[first + k] * last_q);
-            s = std::sin(orders[first + k] * last_q);
-          }
-          waves(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(2 * k)) = c;
-          waves(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(2 * k + 1)) = s;
-        }
-      }
-      const Eigen::MatrixXd sums = waves.transpose() * right;
-      for (std::size_t k = 0; k < count; ++k) {
-        const auto at = static_cast<Eigen::Index>(2 * k);
-        Eigen::Matrix2d xx;
-        const auto c = waves.col(at).array(), s = waves.col(at + 1).array();
-        xx(0, 0) = (c.square() * dd.array()).sum();
-        xx(1, 1) = (s.square() * dd.array()).sum();
-        xx(0, 1) = xx(1, 0) = (c * s * dd.array()).sum();
-        const Eigen::MatrixXd half = left.factor.matrixL().solve(sums.block(at, 0, 2, left.columns.cols()).transpose());
-        const Eigen::MatrixXd a = (xx - half.transpose() * half) * times;
-        const Eigen::VectorXd b = sums.block(at, left.columns.cols(), 2, 1) * times;
-        const Evidence::Gain gain = evidence.gain_of(scaled, a, b, Eigen::VectorXd::Constant(2, kLargest), cost);
-        if (gain.score > best.score) {
-          best.score = gain.score;
-          best.order = orders[first + k];
-        }
-      }
-    }
-    best.tried = static_cast<int>(orders.size());
     if (best.score > 0.0) out.push_back(best);
+  }
+  return out;
+}
+
+SomeRows some_training_rows(const Design& design, std::size_t most) {
+  SomeRows out;
+  for (const std::int32_t fold : design.fold) out.of += fold < design.folds ? 1 : 0;
+  int folds = design.folds;
+  while (folds > 2 && out.of * static_cast<std::size_t>(folds) / static_cast<std::size_t>(design.folds) > most) --folds;
+  for (std::size_t i = 0; i < design.fold.size(); ++i) {
+    if (design.fold[i] < folds && design.weight[static_cast<Eigen::Index>(i)] > 0.0)
+      out.at.push_back(static_cast<Eigen::Index>(i));
   }
   return out;
 }

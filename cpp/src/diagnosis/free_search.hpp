@@ -13,6 +13,15 @@
 
 namespace truing::diagnosis {
 
+/// Some training values, of whole folds.
+struct SomeRows {
+  std::vector<Eigen::Index> at;  ///< rows of the design, of weight above zero
+  std::size_t of = 0;            ///< training values in all
+};
+
+/// Of more than `most` values, whole folds are left out.
+SomeRows some_training_rows(const Design& design, std::size_t most);
+
 /// One free function tried.
 struct FreeGain {
   Explanation what;
@@ -32,9 +41,9 @@ struct FreeScanOptions {
   std::size_t most_values = 20000;  ///< measured values looked at: of more, whole folds are left out
 };
 
-/// Scores free functions on what `state` leaves of the training rows. `deff`: rows that count as one.
+/// Scores free functions on what `state` leaves of the training rows. `design_effect`: values that count as one.
 FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidence::State& state,
-                   const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                   const std::vector<InputColumn>& inputs, const Robot& robot, double design_effect,
                    const FreeScanOptions& options);
 
 /// Mesh orders of every revolute joint scanned on what is left: the best order of each joint [per turn], if any wins.
@@ -45,7 +54,7 @@ struct MeshGain {
   int tried = 0;
 };
 std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, const Evidence::State& state,
-                                const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+                                const std::vector<InputColumn>& inputs, const Robot& robot, double design_effect,
                                 std::size_t most_values = 20000);
 
 /// "a step at q4 = 0.41 rad", "linear in temp", … from points (input, value, standard error).

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 #include <Eigen/Eigenvalues>
 
+#include "diagnosis/free_search.hpp"
 #include "estimation/evidence.hpp"
 #include "math/random.hpp"
 #include "math/statistics.hpp"
@@ -22,7 +22,7 @@ constexpr std::size_t kMostValues = 6000;
 
 /// Gram of the nuisance columns and some free functions, fold by fold.
 std::vector<Gram> fold_grams(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at,
-                             double deff) {
+                             double design_effect) {
   const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size()), p = nuisance + more.cols();
   std::vector<GramSum> sums(static_cast<std::size_t>(design.folds), GramSum(p));
   for (std::size_t n = 0; n < at.size(); ++n) {
@@ -39,9 +39,42 @@ std::vector<Gram> fold_grams(const Design& design, const Design::Rows& more, con
   std::vector<Gram> out;
   for (GramSum& sum : sums) {
     out.emplace_back();
-    out.back().add(sum.finish(), 1.0 / deff);
+    out.back().add(sum.finish(), 1.0 / design_effect);
   }
   return out;
+}
+
+/// Columns of free functions of each of some inputs at each of some sites, on the rows `at` of the design.
+Design::Rows functions_of(const Design& design, const std::vector<InputColumn>& inputs,
+                          const std::vector<Eigen::Index>& at, const std::vector<int>& sites,
+                          const std::vector<int>& which, int most_knots) {
+  std::vector<std::int32_t> rows;
+  for (const Eigen::Index i : at) rows.push_back(design.row[static_cast<std::size_t>(i)]);
+  std::vector<Design::Rows> parts;
+  Eigen::Index columns = 0;
+  for (const int input : which) {
+    const std::vector<double>& values = inputs[static_cast<std::size_t>(input)].values;
+    const std::vector<double> knots = knots_of(inputs[static_cast<std::size_t>(input)], rows, most_knots);
+    if (knots.size() < 2) continue;
+    Design::Rows part(static_cast<Eigen::Index>(at.size()), static_cast<Eigen::Index>(sites.size() * knots.size()));
+    std::vector<double> hats(knots.size());
+    for (std::size_t n = 0; n < at.size(); ++n) {
+      hats_at(knots, values[static_cast<std::size_t>(rows[n])], hats.data());
+      Eigen::Index c = 0;
+      for (const int site : sites) {
+        for (const double hat : hats) part(static_cast<Eigen::Index>(n), c++) = hat * design.x(at[n], site);
+      }
+    }
+    columns += part.cols();
+    parts.push_back(std::move(part));
+  }
+  Design::Rows all(static_cast<Eigen::Index>(at.size()), columns);
+  Eigen::Index c = 0;
+  for (const Design::Rows& part : parts) {
+    all.middleCols(c, part.cols()) = part;
+    c += part.cols();
+  }
+  return all;
 }
 
 /// Sum of squares that the nuisance alone leaves, less what is left with the free functions, and what those cost in
@@ -56,15 +89,14 @@ double explained(const Gram& gram, Eigen::Index nuisance, double* closable) {
   const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(d));
   const double after = gram.yy - gram.xy.dot(factor.solve(gram.xy));
   const double used = factor.solve(gram.xx).trace() - static_cast<double>(nuisance);
-  const double freedom = std::max(1.0, gram.n - static_cast<double>(nuisance) - used);
-  const double noise = after / freedom;
+  const double noise = after / std::max(1.0, gram.n - static_cast<double>(nuisance) - used);
   *closable = std::max(before - noise * std::max(1.0, gram.n - static_cast<double>(nuisance)), 1e-300);
   return std::max(0.0, before - after - used * noise);
 }
 
-Share share_of(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at, double deff,
-               double closable, std::uint64_t seed) {
-  const std::vector<Gram> folds = fold_grams(design, more, at, deff);
+Share share_of(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at,
+               double design_effect, double closable, std::uint64_t seed) {
+  const std::vector<Gram> folds = fold_grams(design, more, at, design_effect);
   const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size());
   Gram all;
   for (const Gram& fold : folds) all.add(fold);
@@ -90,75 +122,36 @@ Share share_of(const Design& design, const Design::Rows& more, const std::vector
 
 }  // namespace
 
-void share_out(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot, double deff,
+void share_out(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot, double design_effect,
                std::uint64_t seed, Diagnosis* out) {
-  std::vector<Eigen::Index> at;
-  int folds = design.folds;
-  std::size_t training = 0;
-  for (const std::int32_t fold : design.fold) training += fold < design.folds ? 1 : 0;
-  while (folds > 2 && training * static_cast<std::size_t>(folds) / static_cast<std::size_t>(design.folds) > kMostValues)
-    --folds;
-  for (std::size_t i = 0; i < design.fold.size(); ++i) {
-    if (design.fold[i] < folds && design.weight[static_cast<Eigen::Index>(i)] > 0.0)
-      at.push_back(static_cast<Eigen::Index>(i));
-  }
-  std::vector<std::int32_t> rows;
-  for (const Eigen::Index i : at) rows.push_back(design.row[static_cast<std::size_t>(i)]);
-  const auto some = [&](const std::vector<int>& sites, const std::vector<int>& which, int most) {
-    std::vector<Design::Rows> parts;
-    Eigen::Index columns = 0;
-    for (const int input : which) {
-      const std::vector<double> knots = knots_of(inputs[static_cast<std::size_t>(input)], rows, most);
-      if (knots.size() < 2) continue;
-      // Only the rows that count: a design of those.
-      Design::Rows part(static_cast<Eigen::Index>(at.size()), static_cast<Eigen::Index>(sites.size() * knots.size()));
-      std::vector<double> hats(knots.size());
-      for (std::size_t n = 0; n < at.size(); ++n) {
-        hats_at(knots,
-                inputs[static_cast<std::size_t>(input)]
-                    .values[static_cast<std::size_t>(design.row[static_cast<std::size_t>(at[n])])],
-                hats.data());
-        Eigen::Index c = 0;
-        for (const int site : sites) {
-          for (const double hat : hats) part(static_cast<Eigen::Index>(n), c++) = hat * design.x(at[n], site);
-        }
-      }
-      columns += part.cols();
-      parts.push_back(std::move(part));
-    }
-    Design::Rows all(static_cast<Eigen::Index>(at.size()), columns);
-    Eigen::Index c = 0;
-    for (const Design::Rows& part : parts) {
-      all.middleCols(c, part.cols()) = part;
-      c += part.cols();
-    }
-    return all;
-  };
+  constexpr std::size_t kMostInputs = 20;
+  const std::vector<Eigen::Index> at = some_training_rows(design, kMostValues).at;
+  const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size());
   std::vector<int> moving;
   for (std::size_t k = 0; k < inputs.size(); ++k) {
-    if (!inputs[k].constant && inputs[k].name.rfind("torque", 0) != 0 && moving.size() < 20)
+    if (!inputs[k].constant && inputs[k].name.rfind("torque", 0) != 0 && moving.size() < kMostInputs)
       moving.push_back(static_cast<int>(k));
   }
-  // What is closable at all: every joint by its own motion and direction, and by torque, together.
   std::vector<int> every_site;
   for (const std::vector<int>& columns : design.joint_column)
     every_site.insert(every_site.end(), columns.begin(), columns.end());
-  double closable = 0.0;
-  {
-    const Design::Rows all = some(every_site, moving, 3);
+  const auto gram_at_every_site = [&](const std::vector<int>& which, int most_knots) {
     Gram gram;
-    for (const Gram& fold : fold_grams(design, all, at, deff)) gram.add(fold);
-    explained(gram, static_cast<Eigen::Index>(design.nuisance.size()), &closable);
-  }
+    for (const Gram& fold :
+         fold_grams(design, functions_of(design, inputs, at, every_site, which, most_knots), at, design_effect))
+      gram.add(fold);
+    return gram;
+  };
+  // What is closable at all: every joint by its own motion and direction, and by torque, together.
+  double closable = 0.0, own = 0.0;
+  explained(gram_at_every_site(moving, 3), nuisance, &closable);
   for (std::size_t joint = 0; joint < robot.joints.size(); ++joint) {
-    out->where_joints.push_back({robot.joints[joint].name, share_of(design, some(design.joint_column[joint], moving, 5),
-                                                                    at, deff, closable, seed + joint)});
+    const Design::Rows functions = functions_of(design, inputs, at, design.joint_column[joint], moving, 5);
+    out->where_joints.push_back(
+        {robot.joints[joint].name, share_of(design, functions, at, design_effect, closable, seed + joint)});
   }
   for (const int input : moving) {
-    Gram gram;
-    for (const Gram& fold : fold_grams(design, some(every_site, {input}, 5), at, deff)) gram.add(fold);
-    double own = 0.0;
-    const double share = explained(gram, static_cast<Eigen::Index>(design.nuisance.size()), &own) / closable;
+    const double share = explained(gram_at_every_site({input}, 5), nuisance, &own) / closable;
     out->where_inputs.push_back({inputs[static_cast<std::size_t>(input)].name, std::min(1.0, share)});
   }
   std::stable_sort(out->where_joints.begin(), out->where_joints.end(),

@@ -97,7 +97,7 @@ Gram Gram::of(const std::vector<int>& columns) const { return {block(xx, columns
 Evidence::Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance,
                    const Eigen::VectorXd& prior)
     : gram_(gram), groups_(groups), nuisance_(std::move(nuisance)), prior_(prior) {
-  freedom_ = std::max(1.0, gram.n - static_cast<double>(nuisance_.size()));
+  degrees_of_freedom_ = std::max(1.0, gram.n - static_cast<double>(nuisance_.size()));
 }
 
 // log p(y) = -nu/2 log(y^T y - m^T X^T y) - 1/2 log|X^T X + s^2 P| + 1/2 log|s^2 P| (MacKay 1992, eq. 4.10, with the
@@ -136,12 +136,12 @@ Evidence::State Evidence::evaluate(const Choice& choice) const {
     out.factor = factorised(std::move(d));
     out.solution = out.factor.solve(xy);
     out.rss = std::max(gram_.yy - xy.dot(out.solution), 1e-12 * gram_.yy + 1e-300);
-    const double sigma2 = out.rss / freedom_;
+    const double sigma2 = out.rss / degrees_of_freedom_;
     const bool settled = std::abs(sigma2 / out.sigma2 - 1.0) < 1e-3;
     out.sigma2 = sigma2;
     if (settled) break;
   }
-  out.evidence = -0.5 * freedom_ * std::log(out.rss) - 0.5 * log_determinant(out.factor) + 0.5 * log_prior;
+  out.evidence = -0.5 * degrees_of_freedom_ * std::log(out.rss) - 0.5 * log_determinant(out.factor) + 0.5 * log_prior;
   out.score = out.evidence - cost;
   return out;
 }
@@ -186,12 +186,12 @@ Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, c
         determinants = ridge.array().log().sum() - log_determinant(factor);
       }
       fall = std::min(fall, state.rss * (1.0 - 1e-9));
-      const double next = (state.rss - fall) / freedom_;
+      const double next = (state.rss - fall) / degrees_of_freedom_;
       if (std::abs(next / sigma2 - 1.0) < 0.05) break;
       sigma2 = next;
     }
     if (!good) continue;
-    const double evidence = -0.5 * freedom_ * std::log1p(-fall / state.rss) + 0.5 * determinants;
+    const double evidence = -0.5 * degrees_of_freedom_ * std::log1p(-fall / state.rss) + 0.5 * determinants;
     if (evidence > best.evidence) {
       best.evidence = evidence;
       best.scale = scale;
@@ -399,7 +399,7 @@ std::vector<double> Evidence::null_scores(const State& state, int count, std::ui
   }
   Random random(seed);
   std::vector<double> out;
-  const double rss = state.sigma2 * freedom_;
+  const double rss = state.sigma2 * degrees_of_freedom_;
   for (int k = 0; k < count; ++k) {
     Eigen::VectorXd z(p);
     for (Eigen::Index i = 0; i < p; ++i) z[i] = random.normal();
@@ -411,8 +411,8 @@ std::vector<double> Evidence::null_scores(const State& state, int count, std::ui
       const Eigen::VectorXd b = part(xy, one.group->columns) - one.v.transpose() * u;
       for (std::size_t s = 0; s < kScales.size(); ++s) {
         const double fall = std::min(one.factor[s].matrixL().solve(b).squaredNorm(), 0.99 * rss);
-        largest =
-            std::max(largest, -0.5 * freedom_ * std::log1p(-fall / rss) + 0.5 * one.determinants[s] - one.group->cost);
+        largest = std::max(largest, -0.5 * degrees_of_freedom_ * std::log1p(-fall / rss) + 0.5 * one.determinants[s] -
+                                        one.group->cost);
       }
     }
     out.push_back(largest);

@@ -135,7 +135,7 @@ class Evidence {
   const std::vector<ColumnGroup>& groups() const { return groups_; }
   const std::vector<int>& nuisance() const { return nuisance_; }
   const Eigen::VectorXd& prior() const { return prior_; }
-  double freedom() const { return freedom_; }
+  double degrees_of_freedom() const { return degrees_of_freedom_; }
 
  private:
   struct Projected;
@@ -146,7 +146,7 @@ class Evidence {
   const std::vector<ColumnGroup>& groups_;
   std::vector<int> nuisance_;
   Eigen::VectorXd prior_;
-  double freedom_ = 0.0;
+  double degrees_of_freedom_ = 0.0;  ///< values less nuisance columns
 };
 
 /// Nats that a group of so many columns has to win from so many values before the search takes it: the threshold, what
