@@ -65,11 +65,12 @@ static bool add_meshes(Work* work, const Evidence& evidence, const Evidence::Sta
                        double threshold) {
   static const Effect& family =
       effect_that([](const EffectTraits& traits) { return traits.search == Search::by_order; });
-  if (is_left_out(work->options, family.name)) return false;
+  if (is_left_out(work->given.options, family.name)) return false;
   bool any = false;
-  for (const MeshGain& mesh : scan_mesh(work->design, evidence, state, work->inputs, robot, work->deff)) {
+  for (const MeshGain& mesh :
+       scan_mesh(work->design, evidence, state, work->inputs, robot, work->noise.design_effect)) {
     if (mesh.score < threshold) continue;
-    const Explanation e = mesh_of(transmission_error(mesh.order), mesh, robot, work->data);
+    const Explanation e = mesh_of(transmission_error(mesh.order), mesh, robot, work->given.data);
     const std::vector<Explanation>& named = work->design.candidates.named;
     if (std::any_of(named.begin(), named.end(), [&](const Explanation& other) { return same_name(other, e); }))
       continue;
@@ -115,11 +116,11 @@ double cross_validated(const Work& work, const Choice& choice) {
   for (const int g : choice.groups)
     columns.insert(columns.end(), groups[static_cast<std::size_t>(g)].columns.begin(),
                    groups[static_cast<std::size_t>(g)].columns.end());
-  const Evidence whole(work.train, groups, work.design.nuisance, work.design.prior);
+  const Evidence whole(work.grams.train, groups, work.design.nuisance, work.design.prior);
   const Evidence::State state = whole.evaluate(choice);
-  const Gram all = work.train.of(columns);
+  const Gram all = work.grams.train.of(columns);
   double sum = 0.0;
-  for (const Gram& fold : work.fold) {
+  for (const Gram& fold : work.grams.train_folds) {
     const Gram held = fold.of(columns);
     Eigen::MatrixXd d = all.xx - held.xx;
     d.diagonal() += state.precision;
@@ -132,7 +133,7 @@ double cross_validated(const Work& work, const Choice& choice) {
 /// Groups that do not help on poses they were not fitted to go, however well they fit.
 static Evidence::State keep_what_predicts(const Work& work, Evidence::State state) {
   const auto& groups = work.design.candidates.groups;
-  const Evidence evidence(work.train, groups, work.design.nuisance, work.design.prior);
+  const Evidence evidence(work.grams.train, groups, work.design.nuisance, work.design.prior);
   for (;;) {
     const double with = cross_validated(work, state.choice);
     double best = 1e300;
@@ -234,11 +235,11 @@ static int add_fine_function(Work* work, const Robot& robot, std::size_t joint, 
 }
 
 static const EffectTraits& traits_of(const Work& work, const Explanation& e) {
-  return model::traits_of(e.effect, work.options.own_effects);
+  return model::traits_of(e.effect, work.given.options.own_effects);
 }
 
 static Evidence evidence_now(const Work& work) {
-  return Evidence(work.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
+  return Evidence(work.grams.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
 }
 
 /// All links contain each link, and what is a part of one.
@@ -362,7 +363,7 @@ static bool replace_laws(Work* work, const Robot& robot, const Question& q, Deci
   const Choice remaining = without_these(choice, gone);
   const double before = cross_validated(*work, choice);
   const int fine = add_fine_function(work, robot, q.joint, inputs);
-  extend_grams(work);
+  extend_grams(work->design, work->noise.design_effect, &work->grams);
   const Evidence again = evidence_now(*work);
   const Evidence::Gain gain = again.gain(again.evaluate(remaining), columns_of(*work, {fine}), 0.0);
   Choice alone = remaining;
@@ -418,13 +419,13 @@ static void question_laws(Work* work, const Robot& robot, Decision* decision) {
 
 /// Is there a gap at all? Sets what noise alone reaches, and the threshold that it passes as often as is allowed.
 static void find_gap(const Work& work, Decision* out) {
-  const DiagnoseOptions& options = work.options;
+  const DiagnoseOptions& options = work.given.options;
   const Evidence evidence = evidence_now(work);
   out->first = evidence.gains(evidence.evaluate({}));
   const Shortlist list = shortlist(work, {});
   double best = -1e300;  // of the groups that the null is drawn over, and no others
   for (const int g : list.which) best = std::max(best, out->first[static_cast<std::size_t>(g)].score);
-  const Gram gram = work.train.of(list.columns);
+  const Gram gram = work.grams.train.of(list.columns);
   const Evidence few(gram, list.groups, list.nuisance, list.prior);
   std::vector<double> null = few.null_scores(few.evaluate({}), kNullDraws, options.seed + 11);
   int above = 1;
@@ -445,7 +446,7 @@ static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
   const FreeGain& best = scan.best.front();
   if (!(best.gain.score > search.threshold + 4.0 && best.gain.share > kFreeShare)) return false;
   append_free(work, best, scan.tried);
-  extend_grams(work);
+  extend_grams(work->design, work->noise.design_effect, &work->grams);
   const Evidence with = evidence_now(*work);
   Choice grown = out->state.choice;
   grown.groups.push_back(static_cast<int>(work->design.candidates.groups.size()) - 1);
@@ -458,7 +459,7 @@ static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
 }
 
 Decision decide(Work* work, const Robot& robot) {
-  const DiagnoseOptions& options = work->options;
+  const DiagnoseOptions& options = work->given.options;
   Decision out;
   out.search.most_groups = options.max_effects;
   find_gap(*work, &out);
@@ -468,11 +469,12 @@ Decision decide(Work* work, const Robot& robot) {
     const Evidence evidence = evidence_now(*work);
     FreeScanOptions scan_options;
     scan_options.seed = options.seed + 101 + static_cast<std::uint64_t>(round);
-    const FreeScan scan = scan_free(work->design, evidence, out.state, work->inputs, robot, work->deff, scan_options);
+    const FreeScan scan =
+        scan_free(work->design, evidence, out.state, work->inputs, robot, work->noise.design_effect, scan_options);
     out.p_left = scan.p;
     if (add_free_function(work, scan, &out)) continue;
     if (!add_meshes(work, evidence, out.state, robot, out.search.threshold + kMeshNats)) break;
-    extend_grams(work);
+    extend_grams(work->design, work->noise.design_effect, &work->grams);
     Evidence::State next = keep_what_predicts(*work, evidence_now(*work).search(out.search, out.state.choice));
     if (next.score < out.state.score + out.search.threshold) break;
     out.state = std::move(next);

@@ -152,7 +152,7 @@ static std::string at_joints(const std::vector<std::string>& joints) {
 }
 
 static const EffectTraits& traits_of(const Work& work, const Explanation& e) {
-  return model::traits_of(e.effect, work.options.own_effects);
+  return model::traits_of(e.effect, work.given.options.own_effects);
 }
 
 /// What the data vary, as far as it tells effects apart.
@@ -160,7 +160,7 @@ static Recorded recorded(const Work& work) {
   Recorded out;
   for (const InputColumn& input : work.inputs) {
     if (input.constant) continue;
-    out.direction |= input.joint >= 0 && !work.inferred_direction &&
+    out.direction |= input.joint >= 0 && !work.given.inferred_direction &&
                      input.name == input_name(Driver::direction, static_cast<std::size_t>(input.joint));
     out.payload |= input.name == "payload";
     out.temperature |= input.name == input_name(Driver::temperature, 0);
@@ -172,7 +172,7 @@ static Recorded recorded(const Work& work) {
 }
 
 static std::string separated_by(const Work& work, const Explanation& a, const Explanation& b) {
-  const std::vector<Effect>& own = work.options.own_effects;
+  const std::vector<Effect>& own = work.given.options.own_effects;
   const std::string where_they_differ = "measure poses where the two differ: see the next poses";
   const Effect *first = effect_or_null(a.effect, own), *second = effect_or_null(b.effect, own);
   if (!first || !second) return where_they_differ;
@@ -231,7 +231,9 @@ struct Shrinkage {
 static Shrinkage shrinkage_by(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
                               const Resampled& resampled) {
   const Evidence::State& state = decision.state;
-  const auto squares = [&](const Evidence::State& s) { return held_out_squares(work.test, s.columns, s.solution); };
+  const auto squares = [&](const Evidence::State& s) {
+    return held_out_squares(work.grams.test, s.columns, s.solution);
+  };
   const Evidence::State less = evidence.evaluate(without(state.choice, work.design.candidates.groups, at));
   Shrinkage out;
   out.before = error_statistics(held_out_lengths(work.design, less));
@@ -252,7 +254,7 @@ static double share_alone(const Work& work, const Evidence& evidence, const Choi
   only.groups = {choice.groups[at]};
   only.scales = {choice.scales[at]};
   const Evidence::State alone = evidence.evaluate(only);
-  return std::max(0.0, 1.0 - held_out_squares(work.test, alone.columns, alone.solution) / gap);
+  return std::max(0.0, 1.0 - held_out_squares(work.grams.test, alone.columns, alone.solution) / gap);
 }
 
 /// What could stand in its place by these data.
@@ -282,7 +284,7 @@ static std::vector<Alternative> untested_mimics(const Work& work, const Explanat
       return n.effect == name && n.reason == Untestable::column_missing;
     });
     if (lacking == untested.end()) continue;
-    const bool whole_robot = !find_effect(name, work.options.own_effects).per_joint;
+    const bool whole_robot = !find_effect(name, work.given.options.own_effects).per_joint;
     out.push_back(
         {name, whole_robot ? std::vector<std::string>{} : e.joints, 0.0, "record what it needs: " + lacking->why});
   }
@@ -295,7 +297,7 @@ static void draw_law(const Work& work, const Decision& decision, int g, FoundEff
   const Explanation& e = named[static_cast<std::size_t>(g)];
   const EffectTraits& traits = traits_of(work, e);
   const auto at_joint = [&](int input) {
-    const std::size_t joint = work.frames.robot.joint_index(e.joints[0]);
+    const std::size_t joint = work.given.frames.robot.joint_index(e.joints[0]);
     return Along{input, work.design.joint_column[joint][0]};
   };
   for (const int other : decision.state.choice.groups) {
@@ -383,7 +385,7 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   out.probability = std::clamp(0.5 + 0.49 * std::min(1.0, loss / 30.0), 0.0, 0.99);
   std::vector<int> sites = work.design.base_columns;
   if (e.site != "base")
-    sites = work.design.joint_column[work.frames.robot.joint_index(e.site)];
+    sites = work.design.joint_column[work.given.frames.robot.joint_index(e.site)];
   else if (sites.size() > 3)
     sites.resize(3);
   for (const int site : sites) {
@@ -483,7 +485,7 @@ std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidenc
         detection_nats(decision.search.threshold, groups[g].cost, groups[g].columns.size(), evidence.gram().n);
     out.back().size = std::sqrt(2.0 * nats * state.sigma2 / a);
     out.back().size_at_tip =
-        out.back().size * std::sqrt(3.0 * a / std::max(1.0, evidence.gram().n)) * work.position_sigma;
+        out.back().size * std::sqrt(3.0 * a / std::max(1.0, evidence.gram().n)) * work.noise.position_sigma;
   }
   std::stable_sort(out.begin(), out.end(), [](const Detectable& a, const Detectable& b) {
     return a.effect != b.effect ? a.effect < b.effect : a.size_at_tip < b.size_at_tip;
@@ -513,8 +515,8 @@ void add_next_poses(const Work& work, const Measurements& data, const DiagnoseOp
       rivals.other = {second->parameters, second->requests};
       for (const Parameter& parameter : effect.parameters)
         rivals.parameters[parameter.name] = parameter.value - parameter.nominal;
-      out->next_poses =
-          next_poses(work.linear.at, data, rivals, options, 6, work.position_sigma * std::sqrt(decision.state.sigma2));
+      out->next_poses = next_poses(work.linear.at, data, rivals, options, 6,
+                                   work.noise.position_sigma * std::sqrt(decision.state.sigma2));
       if (!out->next_poses.empty()) return;
     }
   }

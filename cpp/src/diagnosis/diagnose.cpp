@@ -28,6 +28,7 @@ namespace {
 using Kind = Explanation::Kind;
 constexpr double kCorrectionShare = 0.05;  ///< of the gap, from which on a law's correction is something unknown
 constexpr double kLackOfFit = 4.0;         ///< standard errors beyond repeats, from which on what is left is no noise
+constexpr double kEnoughRepeats = 20.0;    ///< degrees of freedom, for the noise to be taken from repeats
 constexpr double kNamed = 0.5;             ///< a name is given to what is more likely right than wrong
 
 void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
@@ -53,17 +54,28 @@ Identification fit_frames(const Robot& robot, const Measurements& data, const Di
   frames_only.threads = options.threads;
   frames_only.rotation_length = options.rotation_length;
   frames_only.own_effects = options.own_effects;
-  for (const Target& target : robot.targets) frames_only.free.push_back(target.name + ".*");
-  if (frames_only.free.empty()) frames_only.free = {"tool.*"};
+  frames_only.free = targets_of(robot);
   Identification frames = identify(robot, data, frames_only);
   if (!frames.test) throw std::invalid_argument("diagnose needs held-out poses: no row is in the set 'test'");
   return frames;
 }
 
+/// Section 1: base and targets fitted, and what was held out for it.
+Registered register_data(const Robot& robot, const Checked& checked, const DiagnoseOptions& options) {
+  Registered out;
+  out.options = options;
+  out.data = checked.data;
+  out.inferred_direction = checked.inferred_direction;
+  out.cluster = pose_groups(out.data);
+  out.frames = fit_frames(robot, out.data, options);
+  out.set = out.frames.set;
+  return out;
+}
+
 /// `rows` of the whole, as a diagnosis of their own. Own effects keep looking into the whole, which must outlive this.
-Work part_of(const Work& whole, const std::vector<std::int32_t>& rows) {
-  Work part = whole;
-  if (rows.size() == whole.data.rows) return part;
+Registered part_of(const Registered& whole, const std::vector<std::int32_t>& rows) {
+  if (rows.size() == whole.data.rows) return whole;
+  Registered part = whole;
   part.data = subset_of(whole.data, rows);
   part.options.own_effects = mapped(whole.options.own_effects, whole.data, rows);
   part.cluster.clear();
@@ -75,20 +87,27 @@ Work part_of(const Work& whole, const std::vector<std::int32_t>& rows) {
   return part;
 }
 
-/// Linearised once, where the geometry is about right; weighed; Gram matrices by fold.
-void prepare(Work* work) {
-  std::vector<std::int32_t> every_row(work->data.rows), train_rows;
+/// Sections 1 and 2: linearised once, where the geometry is about right; weighed; Gram matrices by fold.
+Work prepare(Registered given) {
+  Work work;
+  work.given = std::move(given);
+  const DiagnoseOptions& options = work.given.options;
+  const Measurements& data = work.given.data;
+  const Robot& robot = work.given.frames.robot;
+  std::vector<std::int32_t> every_row(data.rows), train_rows;
   std::iota(every_row.begin(), every_row.end(), 0);
   for (const std::int32_t row : every_row) {
-    if (!work->set[static_cast<std::size_t>(row)]) train_rows.push_back(row);
+    if (!work.given.set[static_cast<std::size_t>(row)]) train_rows.push_back(row);
   }
-  const Robot& robot = work->frames.robot;
-  work->linear = linearise(robot, work->data, train_rows, work->options.rotation_length, work->options.threads);
-  work->inputs = make_inputs(work->linear.at, work->data);
-  work->design = make_design({robot, work->linear.at, work->linear.shift, work->data, work->inputs, every_row,
-                              work->set, work->cluster, work->options, work->inferred_direction});
-  weigh(work);
-  make_grams(work);
+  work.linear = linearise(robot, data, train_rows, options.rotation_length, options.threads);
+  work.inputs = make_inputs(work.linear.at, data);
+  work.design = make_design({robot, work.linear.at, work.linear.shift, data, work.inputs, every_row, work.given.set,
+                             work.given.cluster, options, work.given.inferred_direction});
+  Weighted weighted = weigh(work.design, data);
+  work.design.weight = std::move(weighted.weight);
+  work.noise = std::move(weighted.noise);
+  work.grams = make_grams(work.design, work.noise.design_effect, options.threads);
+  return work;
 }
 
 void say_what_is_not_testable(const Work& work, Diagnosis* out) {
@@ -98,7 +117,7 @@ void say_what_is_not_testable(const Work& work, Diagnosis* out) {
     });
     if (!twice) out->not_testable.push_back(n);
   }
-  if (work.inferred_direction) {
+  if (work.given.inferred_direction) {
     out->not_testable.push_back(
         {"backlash", {}, "no columns dir1 …: only a direction inferred from the order of the rows could be tried"});
   }
@@ -106,7 +125,7 @@ void say_what_is_not_testable(const Work& work, Diagnosis* out) {
 
 void say_outliers(const Work& work, const std::vector<std::int32_t>& rows, Diagnosis* out) {
   std::set<std::size_t> outliers;
-  for (const std::int32_t row : work.outliers)
+  for (const std::int32_t row : work.noise.outliers)
     outliers.insert(static_cast<std::size_t>(rows[static_cast<std::size_t>(row)]));
   out->outliers.assign(outliers.begin(), outliers.end());
   if (outliers.empty()) return;
@@ -168,21 +187,22 @@ struct Fitted {
   Residuals after_all;
 };
 
-Fitted fit_exactly(const Work& whole, const Robot& robot, const Decision& decision, const Resampled& resampled,
-                   Diagnosis* out) {
+Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs,
+                   const Robot& robot, const Decision& decision, const Resampled& resampled, Diagnosis* out) {
   const std::vector<int>& every_group = decision.state.choice.groups;
   std::vector<int> named_groups, catalogue_groups;
   for (const int g : every_group) {
-    const Explanation& e = whole.design.candidates.named[static_cast<std::size_t>(g)];
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     if (e.kind != Kind::free || corrects_a_law(decision, g)) named_groups.push_back(g);
     if (is_in_catalogue(e)) catalogue_groups.push_back(g);
   }
+  const auto refitted = [&](const std::vector<int>& groups) {
+    return refit(whole, work.design, inputs, robot, decision.state, groups);
+  };
   Fitted fitted;
-  fitted.by_catalogue = refit(whole, robot, decision.state, catalogue_groups);
-  fitted.by_named = named_groups.size() > catalogue_groups.size() ? refit(whole, robot, decision.state, named_groups)
-                                                                  : fitted.by_catalogue;
-  fitted.by_all =
-      every_group.size() > named_groups.size() ? refit(whole, robot, decision.state, every_group) : fitted.by_named;
+  fitted.by_catalogue = refitted(catalogue_groups);
+  fitted.by_named = named_groups.size() > catalogue_groups.size() ? refitted(named_groups) : fitted.by_catalogue;
+  fitted.by_all = every_group.size() > named_groups.size() ? refitted(every_group) : fitted.by_named;
 
   const auto left_by = [&](const Robot& of, const std::vector<Effect>& own) {
     return residuals(of, whole.data, own, whole.options.threads);
@@ -207,10 +227,11 @@ Fitted fit_exactly(const Work& whole, const Robot& robot, const Decision& decisi
 /// Noise from repeats where there are enough, else what the chosen model leaves; and how much of the gap beyond it is
 /// closed.
 void judge_noise(const Repeats& repeats, const Work& work, const Decision& decision, Diagnosis* out) {
-  const double components = work.data.distance ? 1.0 : 3.0;
-  out->noise_from_repeats = repeats.freedom >= 20.0;
-  out->noise_floor = std::sqrt(components) *
-                     (out->noise_from_repeats ? repeats.sigma : work.position_sigma * std::sqrt(decision.state.sigma2));
+  const double components = work.given.data.distance ? 1.0 : 3.0;
+  out->noise_from_repeats = repeats.degrees_of_freedom >= kEnoughRepeats;
+  out->noise_floor =
+      std::sqrt(components) *
+      (out->noise_from_repeats ? repeats.sigma : work.noise.position_sigma * std::sqrt(decision.state.sigma2));
   const double gap2 = std::pow(out->gap.rms, 2.0), floor2 = std::pow(out->noise_floor, 2.0),
                after2 = std::pow(out->after.rms, 2.0);
   out->closable = gap2 > floor2 ? std::clamp((gap2 - after2) / (gap2 - floor2), 0.0, 1.0) : 0.0;
@@ -321,13 +342,7 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   result.joint_record = checked.joint_record;
 
   // 1. Registration: the gap.
-  Work whole;
-  whole.options = options;
-  whole.data = checked.data;
-  whole.inferred_direction = checked.inferred_direction;
-  whole.cluster = pose_groups(whole.data);
-  whole.frames = fit_frames(robot, whole.data, options);
-  whole.set = whole.frames.set;
+  const Registered whole = register_data(robot, checked, options);
   result.set = whole.set;
   result.robot_before = whole.frames.robot;
   if (checked.inferred_direction) result.directions = copied(whole.data.direction, whole.data.rows);
@@ -338,24 +353,23 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   if (thinned)
     result.warnings.push_back("searched on " + std::to_string(rows.size()) + " of " + std::to_string(whole.data.rows) +
                               " rows; fitted and judged on all");
-  Work work = part_of(whole, rows);
-  prepare(&work);
+  Work work = prepare(part_of(whole, rows));
   say_what_is_not_testable(work, &result);
   say_outliers(work, rows, &result);
 
   // 3. to 6. What explains it, and 7. how sure that is.
   Decision decision = decide(&work, robot);
-  const Evidence evidence(work.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
+  const Evidence evidence(work.grams.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
   const Resampled resampled = resample(work, decision);
   const std::map<int, Named> names = keep_what_is_likely(work, evidence, resampled, &decision);
   result.p_gap = decision.p_gap;
   result.remaining_structure_p = decision.p_left;
 
   // 8. How far: the exact refit, on all rows.
-  whole.design.candidates = work.design.candidates;
-  whole.design.column_names = work.design.column_names;
-  if (has_functions(work, decision)) whole.inputs = thinned ? make_inputs(work.linear.at, whole.data) : work.inputs;
-  const Fitted fitted = fit_exactly(whole, robot, decision, resampled, &result);
+  std::vector<InputColumn> of_all_rows;
+  if (thinned && has_functions(work, decision)) of_all_rows = make_inputs(work.linear.at, whole.data);
+  const std::vector<InputColumn>& inputs = thinned ? of_all_rows : work.inputs;
+  const Fitted fitted = fit_exactly(whole, work, inputs, robot, decision, resampled, &result);
   const Repeats repeats = noise_of_repeats(whole.data);
   judge_noise(repeats, work, decision, &result);
   describe_all(work, evidence, decision, resampled, names, fitted.by_all.found, &result);
@@ -365,7 +379,7 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   result.verdict = verdict_of(result);
   result.candidates = list_candidates(work, evidence, decision.first);
   result.detectable = smallest_sizes(work, evidence, decision);
-  share_out(work.design, work.inputs, robot, work.deff, options.seed + 17, &result);
+  share_out(work.design, work.inputs, robot, work.noise.design_effect, options.seed + 17, &result);
   map_workspace(whole.frames.robot, whole.data, result.residuals_before, &result);
   result.neighbour_share = neighbour_share(whole.data, result.set, fitted.after_all, &result.neighbour_p95);
 

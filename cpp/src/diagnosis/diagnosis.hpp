@@ -11,28 +11,44 @@
 
 #include "diagnosis/design.hpp"
 #include "diagnosis/linearise.hpp"
+#include "diagnosis/rows.hpp"
 #include "estimation/evidence.hpp"
 #include "rooms.hpp"
 #include "truing/diagnose.hpp"
 
 namespace truing::diagnosis {
 
-struct Work {
+/// What is diagnosed, from the registration on.
+struct Registered {
   DiagnoseOptions options;
   Measurements data;  ///< with the better joint record, and approach directions where they could be inferred
+  bool inferred_direction = false;
   std::vector<std::int32_t> cluster;  ///< pose group of every row
   std::vector<std::int8_t> set;       ///< 0 train, 1 test, for every row
-  std::vector<InputColumn> inputs;
-  Identification frames;  ///< base and targets found, everything else nominal
-  Linearisation linear;
-  Design design;
-  double deff = 1.0;                   ///< values that count as one
-  std::vector<std::int32_t> outliers;  ///< rows that count for little
+  Identification frames;              ///< base and targets found, everything else nominal
+};
+
+/// What noise is.
+struct Noise {
+  double design_effect = 1.0;          ///< values of a pose that count as one (Kish 1965)
   double position_sigma = 0.0;         ///< [m] of a component (or a distance), from the flexible fit
-  std::vector<Gram> fold;              ///< training folds
+  std::vector<std::int32_t> outliers;  ///< rows that count for little
+};
+
+/// Sums of the weighted rows, fold by fold and of all.
+struct Grams {
+  std::vector<Gram> train_folds, test_folds;
   Gram train, test;
-  std::vector<Gram> test_fold;
-  bool inferred_direction = false;
+};
+
+/// What the search works on. It appends columns of functions that it finds to the design, and nothing else.
+struct Work {
+  Registered given;  ///< of the rows that are searched
+  Linearisation linear;
+  std::vector<InputColumn> inputs;
+  Design design;
+  Noise noise;
+  Grams grams;
 };
 
 /// Everything that was decided.
@@ -53,7 +69,7 @@ struct Refit {
 /// Noise of one value [m], as rows measured again at the same pose show it.
 struct Repeats {
   double sigma = 0.0;
-  double freedom = 0.0;  ///< degrees of freedom that it rests on
+  double degrees_of_freedom = 0.0;  ///< that it rests on
 };
 
 /// What may stand in a named group's place.
@@ -82,10 +98,16 @@ struct Resampled {
 /// 0 position, 1 rotation, 2 distance.
 inline int kind_of(std::int8_t component) { return component < 3 ? 0 : component < 6 ? 1 : 2; }
 
-void weigh(Work* work);
-void make_grams(Work* work);
+struct Weighted {
+  Eigen::VectorXd weight;  ///< of the design's rows, which then have unit noise
+  Noise noise;
+};
+
+/// Each kind of value by its own noise, what stands far out by less. The noise is what the flexible model leaves.
+Weighted weigh(const Design& design, const Measurements& data);
+Grams make_grams(const Design& design, double design_effect, int threads);
 /// After columns were appended: their part of every Gram, nothing else.
-void extend_grams(Work* work);
+void extend_grams(const Design& design, double design_effect, Grams* grams);
 
 // --- decide.cpp: what explains the gap -------------------------------------------------------------------------------
 
@@ -121,6 +143,7 @@ bool same_name(const Explanation& a, const Explanation& b);
 bool contains(const Explanation& large, const Explanation& small);
 Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at);
 Resampled resample(const Work& work, const Decision& decision);
+/// How often the selection on resampled folds finds the group's class again.
 double selection_frequency(const Work& work, const Resampled& resampled, const Sureness& sure, int group);
 double calibrated(double posterior, double selection_frequency, double removal_loss);
 
@@ -128,17 +151,13 @@ double calibrated(double posterior, double selection_frequency, double removal_l
 
 std::vector<double> held_out_lengths(const Design& design, const Evidence::State& state);
 Share percentile_interval(std::vector<double> values, double center);
-Refit refit(const Work& work, const Robot& robot, const Evidence::State& state, const std::vector<int>& groups);
-std::vector<double> lengths_of(const Residuals& residuals, std::size_t rows);
-std::vector<double> held_out(const std::vector<double>& lengths, const std::vector<std::int8_t>& set);
+/// The chosen `groups` fitted without linearisation on the training rows of `whole`. `design` is that of the search,
+/// `inputs` those of the whole.
+Refit refit(const Registered& whole, const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot,
+            const Evidence::State& state, const std::vector<int>& groups);
 Repeats noise_of_repeats(const Measurements& data);
 double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set,
                    const Repeats& repeats);
-std::vector<std::int32_t> thinned_rows(const Measurements& data, const std::vector<std::int32_t>& cluster,
-                                       std::size_t most);
-Measurements subset_of(const Measurements& data, const std::vector<std::int32_t>& rows);
-std::vector<Effect> mapped(const std::vector<Effect>& own, const Measurements& whole,
-                           const std::vector<std::int32_t>& rows);
 
 // --- describe.cpp: what the user reads -------------------------------------------------------------------------------
 

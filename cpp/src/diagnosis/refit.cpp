@@ -7,8 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <memory>
 #include <set>
 
 #include "math/statistics.hpp"
@@ -49,107 +47,102 @@ Share percentile_interval(std::vector<double> values, double center) {
   return out;
 }
 
-/// A column's parameter in the linear model.
-static double solution_of(const Work& work, const Evidence::State& state, const std::string& name) {
-  const int column = work.design.column(name);
+/// A column's parameter in the linear model; 0: the column is not in it.
+static double solution_of(const Evidence::State& state, int column) {
   const auto at = std::find(state.columns.begin(), state.columns.end(), column) - state.columns.begin();
-  return column >= 0 && at < static_cast<std::ptrdiff_t>(state.columns.size())
-             ? state.solution[static_cast<Eigen::Index>(at)]
-             : 0.0;
+  return at < static_cast<std::ptrdiff_t>(state.columns.size()) ? state.solution[static_cast<Eigen::Index>(at)] : 0.0;
 }
 
-/// The chosen groups fitted without linearisation on the training rows.
-static Refit refit_with(const Work& work, const Robot& robot, const Evidence::State& state,
-                        const std::vector<int>& groups, bool hold_moments) {
-  Refit out;
-  Robot start = robot;
+static Eigen::VectorXd solutions_of(const Evidence::State& state, const std::vector<int>& columns) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(columns.size()));
+  for (Eigen::Index k = 0; k < out.size(); ++k) out[k] = solution_of(state, columns[static_cast<std::size_t>(k)]);
+  return out;
+}
+
+/// What `identify` is asked for.
+struct RefitTask {
+  Robot start;
   IdentifyOptions options;
-  options.threads = work.options.threads;
-  options.seed = work.options.seed;
-  options.own_effects = work.options.own_effects;
-  std::vector<std::string> targets;
-  for (const Target& target : robot.targets) targets.push_back(target.name + ".*");
-  if (targets.empty()) targets.push_back("tool.*");
-  options.free = targets;
+};
+
+static bool asks_for_moments(const Explanation& e) {
+  return std::any_of(e.requests.begin(), e.requests.end(),
+                     [](const EffectRequest& request) { return request.effect == "gravity_moment"; });
+}
+
+/// The explanation's effects as part of the robot, with the parameters that the search found under its prior.
+static void hold(const Explanation& e, const Design& design, const Evidence::State& state, Robot* robot) {
+  for (const EffectRequest& request : e.requests) {
+    AppliedEffect applied{request.effect, request.joints, {}};
+    for (const std::string& name : e.parameters) {
+      if (name.compare(0, request.effect.size() + 1, request.effect + ".") == 0)
+        applied.parameters[name] = solution_of(state, design.column(name));
+    }
+    robot->effects.push_back(std::move(applied));
+  }
+}
+
+/// One request an effect, with all of its joints.
+static std::vector<EffectRequest> merged(const std::vector<EffectRequest>& requests) {
+  std::vector<EffectRequest> out;
+  for (const EffectRequest& request : requests) {
+    const auto same = std::find_if(out.begin(), out.end(), [&](const EffectRequest& other) {
+      return other.effect == request.effect && !other.joints.empty();
+    });
+    if (same != out.end() && !request.joints.empty())
+      same->joints.insert(same->joints.end(), request.joints.begin(), request.joints.end());
+    else
+      out.push_back(request);
+  }
+  return out;
+}
+
+/// `hold_moments`: first moments of unknown weights are many and hardly told apart; they stay as the search found them,
+/// under its prior.
+static RefitTask refit_task(const DiagnoseOptions& options, const Design& design,
+                            const std::vector<InputColumn>& inputs, const Robot& robot, const Evidence::State& state,
+                            const std::vector<int>& groups, bool hold_moments) {
+  RefitTask out;
+  out.start = robot;
+  out.options.threads = options.threads;
+  out.options.seed = options.seed;
+  out.options.own_effects = options.own_effects;
+  out.options.free = targets_of(robot);
   std::set<std::pair<std::string, std::string>> asked;
   for (const int g : groups) {
-    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
-    options.free.insert(options.free.end(), e.model_free.begin(), e.model_free.end());
-    const bool many = std::any_of(e.requests.begin(), e.requests.end(),
-                                  [](const EffectRequest& request) { return request.effect == "gravity_moment"; });
-    if (many && hold_moments) {
-      // First moments of unknown weights are many and hardly told apart: they stay as the search found them, under its
-      // prior.
-      for (const EffectRequest& request : e.requests) {
-        AppliedEffect applied{request.effect, request.joints, {}};
-        for (const std::string& name : e.parameters) {
-          if (name.compare(0, request.effect.size() + 1, request.effect + ".") == 0)
-            applied.parameters[name] = solution_of(work, state, name);
-        }
-        start.effects.push_back(std::move(applied));
-      }
+    const Explanation& e = design.candidates.named[static_cast<std::size_t>(g)];
+    out.options.free.insert(out.options.free.end(), e.model_free.begin(), e.model_free.end());
+    if (hold_moments && asks_for_moments(e)) {
+      hold(e, design, state, &out.start);
       continue;
     }
     for (const EffectRequest& request : e.requests) {
       if (request.effect == "gear_ratio" || request.effect == "joint_offset" || request.effect == "link_geometry")
         continue;
       if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second)
-        options.effects.push_back(request);
+        out.options.effects.push_back(request);
     }
     if (e.kind == Kind::law || e.kind == Kind::free || e.kind == Kind::drift) {
-      const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(g)].columns;
-      Eigen::VectorXd coefficients(static_cast<Eigen::Index>(columns.size()));
-      for (Eigen::Index k = 0; k < coefficients.size(); ++k) {
-        const auto at = std::find(state.columns.begin(), state.columns.end(), columns[static_cast<std::size_t>(k)]) -
-                        state.columns.begin();
-        coefficients[k] = state.solution[static_cast<Eigen::Index>(at)];
-      }
-      options.own_effects.push_back(free_effect(e, coefficients, work.inputs));
-      options.effects.push_back({options.own_effects.back().name, {}});
+      const std::vector<int>& columns = design.candidates.groups[static_cast<std::size_t>(g)].columns;
+      out.options.own_effects.push_back(free_effect(e, solutions_of(state, columns), inputs));
+      out.options.effects.push_back({out.options.own_effects.back().name, {}});
     }
   }
-  // One request an effect, with all of its joints.
-  std::vector<EffectRequest> merged;
-  for (const EffectRequest& request : options.effects) {
-    auto same = std::find_if(merged.begin(), merged.end(), [&](const EffectRequest& other) {
-      return other.effect == request.effect && !other.joints.empty();
-    });
-    if (same != merged.end() && !request.joints.empty())
-      same->joints.insert(same->joints.end(), request.joints.begin(), request.joints.end());
-    else
-      merged.push_back(request);
-  }
-  options.effects = merged;
-  out.own = options.own_effects;
-  Measurements data = work.data;
-  data.set = work.set;
-  out.found = identify(start, data, options);
+  out.options.effects = merged(out.options.effects);
   return out;
 }
 
-Refit refit(const Work& work, const Robot& robot, const Evidence::State& state, const std::vector<int>& groups) {
-  Refit out = refit_with(work, robot, state, groups, true);
+Refit refit(const Registered& whole, const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot,
+            const Evidence::State& state, const std::vector<int>& groups) {
+  Measurements data = whole.data;
+  data.set = whole.set;
+  const auto fit = [&](bool hold_moments) {
+    const RefitTask task = refit_task(whole.options, design, inputs, robot, state, groups, hold_moments);
+    return Refit{identify(task.start, data, task.options), task.options.own_effects};
+  };
+  Refit out = fit(true);
   // Moments that lean on geometry which the fit holds elsewhere do not fit there: then they are fitted with it.
-  if (out.found.train.after.median > work.frames.train.after.median)
-    out = refit_with(work, robot, state, groups, false);
-  return out;
-}
-
-std::vector<double> lengths_of(const Residuals& residuals, std::size_t rows) {
-  std::vector<double> out(rows, std::numeric_limits<double>::quiet_NaN());
-  for (std::size_t row = 0; row < rows; ++row) {
-    const auto i = static_cast<Eigen::Index>(row);
-    const double d = residuals.distance[i];
-    out[row] = d == d ? std::abs(d) : residuals.position.row(i).norm();
-  }
-  return out;
-}
-
-std::vector<double> held_out(const std::vector<double>& lengths, const std::vector<std::int8_t>& set) {
-  std::vector<double> out;
-  for (std::size_t row = 0; row < lengths.size(); ++row) {
-    if (set[row] && std::isfinite(lengths[row])) out.push_back(lengths[row]);
-  }
+  if (out.found.train.after.median > whole.frames.train.after.median) out = fit(false);
   return out;
 }
 
@@ -179,10 +172,10 @@ Repeats noise_of_repeats(const Measurements& data) {
       double mean = 0.0;
       for (const Measured& one : repeats) mean += one[c] / count;
       for (const Measured& one : repeats) sum += (one[c] - mean) * (one[c] - mean);
-      out.freedom += count - 1.0;
+      out.degrees_of_freedom += count - 1.0;
     }
   }
-  if (out.freedom > 0.0) out.sigma = std::sqrt(sum / out.freedom);
+  if (out.degrees_of_freedom > 0.0) out.sigma = std::sqrt(sum / out.degrees_of_freedom);
   return out;
 }
 
@@ -202,88 +195,9 @@ double lack_of_fit(const Measurements& data, const std::vector<double>& lengths,
   }
   if (sigmas.empty() || !(repeats.sigma > 0.0)) return 0.0;
   const double spread = kSpread[distances ? 1 : 0];
-  const double error = std::sqrt(spread * spread / static_cast<double>(sigmas.size()) + 0.5 / repeats.freedom);
+  const double error =
+      std::sqrt(spread * spread / static_cast<double>(sigmas.size()) + 0.5 / repeats.degrees_of_freedom);
   return (std::log(std::max(median_of(sigmas), 1e-300) / repeats.sigma) - kFitted) / error;
-}
-
-std::vector<std::int32_t> thinned_rows(const Measurements& data, const std::vector<std::int32_t>& cluster,
-                                       std::size_t most) {
-  const std::size_t clusters =
-      cluster.empty() ? 0 : static_cast<std::size_t>(*std::max_element(cluster.begin(), cluster.end())) + 1;
-  std::vector<std::int32_t> rows;
-  for (std::size_t row = 0; row < data.rows; ++row) {
-    if (data.weight && data.weight[row] == 0.0) continue;
-    // Evenly in order of appearance: of n clusters, `most`.
-    const auto c = static_cast<std::size_t>(cluster[row]);
-    if (clusters > most && c * most / clusters == (c + 1) * most / clusters) continue;
-    rows.push_back(static_cast<std::int32_t>(row));
-  }
-  return rows;
-}
-
-/// The rows as data of their own, so that nothing is computed for the others.
-struct SubsetColumns {
-  std::vector<std::vector<double>> columns;
-};
-
-Measurements subset_of(const Measurements& data, const std::vector<std::int32_t>& rows) {
-  auto owned = std::make_shared<SubsetColumns>();
-  Measurements out;
-  out.rows = rows.size();
-  const auto take = [&](const Column& from, Column* to) {
-    if (!from) return;
-    std::vector<double> values(rows.size());
-    for (std::size_t k = 0; k < rows.size(); ++k) values[k] = from[static_cast<std::size_t>(rows[k])];
-    owned->columns.push_back(std::move(values));
-    *to = {owned->columns.back().data(), 1};  // a vector keeps its memory when it is moved
-  };
-  const auto take_all = [&](const std::vector<Column>& from, std::vector<Column>* to) {
-    to->resize(from.size());
-    for (std::size_t k = 0; k < from.size(); ++k) take(from[k], &(*to)[k]);
-  };
-  take_all(data.joints, &out.joints);
-  take_all(data.direction, &out.direction);
-  take_all(data.joint_speed, &out.joint_speed);
-  for (std::size_t k = 0; k < 3; ++k) take(data.position[k], &out.position[k]);
-  for (std::size_t k = 0; k < 4; ++k) take(data.orientation[k], &out.orientation[k]);
-  take(data.distance, &out.distance);
-  take(data.payload, &out.payload);
-  take(data.temperature, &out.temperature);
-  take(data.time, &out.time);
-  take(data.position_sigma, &out.position_sigma);
-  take(data.rotation_sigma, &out.rotation_sigma);
-  take(data.weight, &out.weight);
-  for (const auto& [name, column] : data.covariates) take(column, &out.covariates[name]);
-  out.fixed_point_names = data.fixed_point_names;
-  for (const std::int32_t row : rows) {
-    const auto r = static_cast<std::size_t>(row);
-    if (!data.fixed_point.empty()) out.fixed_point.push_back(data.fixed_point[r]);
-    if (!data.target.empty()) out.target.push_back(data.target[r]);
-    if (!data.set.empty()) out.set.push_back(data.set[r]);
-  }
-  out.owner = owned;
-  return out;
-}
-
-/// Own effects may look values up by row: of the whole data, not of the subset.
-std::vector<Effect> mapped(const std::vector<Effect>& own, const Measurements& whole,
-                           const std::vector<std::int32_t>& rows) {
-  std::vector<Effect> out = own;
-  for (Effect& effect : out) {
-    effect.terms = [terms = effect.terms, &whole, &rows](const Robot& robot, std::size_t joint, const Measurements&) {
-      std::vector<Term> made = terms(robot, joint, whole);
-      for (Term& term : made) {
-        term.basis = [basis = term.basis, &whole, &rows](const Inputs& in) {
-          Inputs of_whole = in;
-          of_whole.data = &whole;
-          of_whole.row = static_cast<std::size_t>(rows[in.row]);
-          return basis(of_whole);
-        };
-      }
-      return made;
-    };
-  }
-  return out;
 }
 
 }  // namespace truing::diagnosis

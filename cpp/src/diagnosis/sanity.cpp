@@ -10,6 +10,8 @@
 #include <stdexcept>
 
 #include "diagnosis/linearise.hpp"
+#include "diagnosis/rows.hpp"
+#include "math/constants.hpp"
 #include "math/statistics.hpp"
 #include "math/text.hpp"
 
@@ -41,39 +43,44 @@ std::vector<std::vector<double>> joint_columns(const Measurements& data) {
   return out;
 }
 
+/// Every so many rows, the others with weight zero. The weights must outlive it.
+struct Sample {
+  std::vector<std::int32_t> rows;
+  std::vector<double> weights;
+};
+
+Sample sample_of(const Measurements& data) {
+  Sample out;
+  out.weights.assign(data.rows, 0.0);
+  const std::size_t step = data.rows / (3 * kPoses) + 1;
+  for (std::size_t row = 0; row < data.rows; row += step) {
+    out.weights[row] = data.weight ? data.weight[row] : 1.0;
+    if (out.weights[row] > 0.0) out.rows.push_back(static_cast<std::int32_t>(row));
+  }
+  return out;
+}
+
 /// Median error with base and targets fitted and, if wanted, the geometry under its prior: a few hundred rows will do.
 double median_error(const Robot& robot, const Measurements& data, const DiagnoseOptions& options, bool geometry) {
-  std::vector<std::int32_t> rows;
-  const std::size_t step = data.rows / (3 * kPoses) + 1;
-  std::vector<double> weights(data.rows, 0.0);
-  for (std::size_t row = 0; row < data.rows; row += step) {
-    const double own = data.weight ? data.weight[row] : 1.0;
-    weights[row] = own;
-    if (own > 0.0) rows.push_back(static_cast<std::int32_t>(row));
-  }
+  const Sample sample = sample_of(data);
   Measurements some = data;
-  some.weight = {weights.data(), 1};
+  some.weight = {sample.weights.data(), 1};
+  some.set.assign(data.rows, 0);
   IdentifyOptions fit;
   fit.test_share = 0.0;
   fit.own_effects = options.own_effects;
   fit.threads = options.threads;
   fit.max_iterations = 60;
-  some.set.assign(data.rows, 0);
-  for (const Target& target : robot.targets) fit.free.push_back(target.name + ".*");
-  if (fit.free.empty()) fit.free = {"tool.*"};
+  fit.free = targets_of(robot);
   const Identification frames = identify(robot, some, fit);
   if (!geometry) return frames.train.after.median;
-  const Linearisation found = linearise(frames.robot, some, rows, options.rotation_length, options.threads);
+  const Linearisation found = linearise(frames.robot, some, sample.rows, options.rotation_length, options.threads);
   const Residuals left = residuals(found.at, some, options.own_effects, options.threads);
+  const std::vector<double> errors = lengths_of(left, data.rows);
   std::vector<double> lengths;
-  for (const std::int32_t row : rows) {
-    const double d = left.distance[row];
-    lengths.push_back(d == d ? std::abs(d) : left.position.row(row).norm());
-  }
+  for (const std::int32_t row : sample.rows) lengths.push_back(errors[static_cast<std::size_t>(row)]);
   return median_of(lengths);
 }
-
-std::string in_millimetres(double metres) { return number(1e3 * metres, 3) + " mm"; }
 
 void find_duplicates(const Measurements& data, std::vector<SanityFinding>* findings) {
   std::map<std::vector<double>, std::size_t> seen;
@@ -125,13 +132,13 @@ void choose_record(const Robot& robot, const DiagnoseOptions& options, Checked* 
   const double ratio = first / std::max(second, 1e-12);
   if (ratio > 1.1) {
     finding.text = "the second record of the joints (qr) explains the measurements better than the first (q): median " +
-                   in_millimetres(second) + " against " + in_millimetres(first) +
+                   millimetres(second) + " against " + millimetres(first) +
                    " after geometry. The diagnosis goes on with qr.";
     out->data = alternative;
     out->joint_record = "qr";
   } else if (ratio < 1.0 / 1.1) {
     finding.text = "the two records of the joints differ, and the first (q) explains the measurements better: median " +
-                   in_millimetres(first) + " against " + in_millimetres(second) +
+                   millimetres(first) + " against " + millimetres(second) +
                    " after geometry. The diagnosis goes on with q; was the other read before the arm had settled?";
   } else {
     finding.text =
@@ -153,8 +160,8 @@ void try_orders(const Robot& robot, const DiagnoseOptions& options, double sprea
     if (error >= best) return;
     best = error;
     finding.kind = kind;
-    finding.text = text + " explains the measurements far better: median " + in_millimetres(error) + " against " +
-                   in_millimetres(as_is) + " with base and tool fitted. Correct the columns and run again.";
+    finding.text = text + " explains the measurements far better: median " + millimetres(error) + " against " +
+                   millimetres(as_is) + " with base and tool fitted. Correct the columns and run again.";
   };
   for (std::size_t k = 0; k < n; ++k) {
     std::vector<std::vector<double>> changed = columns;
@@ -167,7 +174,7 @@ void try_orders(const Robot& robot, const DiagnoseOptions& options, double sprea
               "swapping joint columns " + std::to_string(k + 1) + " and " + std::to_string(m + 1));
     }
   }
-  for (const double factor : {57.29577951308232, 0.017453292519943295}) {
+  for (const double factor : {180.0 / kPi, kDegree}) {
     std::vector<std::vector<double>> changed = columns;
     for (std::vector<double>& column : changed) {
       for (double& q : column) q *= factor;
@@ -177,7 +184,7 @@ void try_orders(const Robot& robot, const DiagnoseOptions& options, double sprea
   }
   if (finding.text.empty()) {
     finding.kind = "joint_order";
-    finding.text = "with base and tool fitted the median error is " + in_millimetres(as_is) + ", " +
+    finding.text = "with base and tool fitted the median error is " + millimetres(as_is) + ", " +
                    number(100.0 * as_is / spread, 2) +
                    " % of the measured range, and no swap, sign or unit of a joint column explains it: is it the right "
                    "robot file?";
@@ -192,7 +199,7 @@ void infer_directions(const Robot& robot, Checked* out) {
   const std::vector<std::int32_t> group = pose_groups(data);
   const std::size_t driven = robot.driven_count();
   std::vector<std::vector<double>> columns(driven, std::vector<double>(data.rows, 0.0));
-  std::vector<double> last(driven, std::numeric_limits<double>::quiet_NaN()), now(driven, 0.0);
+  std::vector<double> last(driven, kNaN), now(driven, 0.0);
   std::int32_t current = -1;
   std::vector<double> direction(driven, 0.0);
   for (std::size_t row = 0; row < data.rows; ++row) {
@@ -221,19 +228,9 @@ void infer_directions(const Robot& robot, Checked* out) {
                            {}});
 }
 
-}  // namespace
-
-Checked check(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
-  Checked out;
-  out.data = data;
-  const std::vector<std::int32_t> group = pose_groups(data);
-  const std::size_t poses =
-      group.empty() ? 0 : static_cast<std::size_t>(*std::max_element(group.begin(), group.end())) + 1;
-  if (poses < 12)
-    throw std::invalid_argument(std::to_string(poses) +
-                                " poses are too few to diagnose anything: measure at least 12, better 100");
-  find_duplicates(data, &out.findings);
-  // A long path of the measured points tells how large an error is large.
+/// Size of what was measured, which tells how large an error is large: the diagonal of the box around all points, or
+/// the range of distances.
+double spread_of(const Measurements& data) {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e300), high = -low;
   double least = 1e300, most = -1e300;
   for (std::size_t row = 0; row < data.rows; ++row) {
@@ -246,7 +243,22 @@ Checked check(const Robot& robot, const Measurements& data, const DiagnoseOption
       most = std::max(most, data.distance[row]);
     }
   }
-  const double spread = high[0] >= low[0] ? (high - low).norm() : most > least ? most - least : 1.0;
+  return high[0] >= low[0] ? (high - low).norm() : most > least ? most - least : 1.0;
+}
+
+}  // namespace
+
+Checked check(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
+  Checked out;
+  out.data = data;
+  const std::vector<std::int32_t> group = pose_groups(data);
+  const std::size_t poses =
+      group.empty() ? 0 : static_cast<std::size_t>(*std::max_element(group.begin(), group.end())) + 1;
+  if (poses < 12)
+    throw std::invalid_argument(std::to_string(poses) +
+                                " poses are too few to diagnose anything: measure at least 12, better 100");
+  find_duplicates(data, &out.findings);
+  const double spread = spread_of(data);
   choose_record(robot, options, &out);
   try_orders(robot, options, spread, &out);
   infer_directions(robot, &out);

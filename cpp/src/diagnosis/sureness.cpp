@@ -31,7 +31,7 @@ bool contains(const Explanation& large, const Explanation& small) {
 /// What all links together could do as well, though it is no geometry.
 static bool looks_like_geometry(const Work& work, const Explanation& e) {
   const std::string& links = effect_that_stands_for(StandsFor::link_geometry).name;
-  return is_contained(model::traits_of(e.effect, work.options.own_effects), links, Containment::look_alike);
+  return is_contained(model::traits_of(e.effect, work.given.options.own_effects), links, Containment::look_alike);
 }
 
 /// Fitted values of a chosen group's columns.
@@ -151,9 +151,9 @@ static std::vector<std::vector<int>> select_again(const Work& work, const Decisi
   SearchOptions quick = decision.search;
   quick.beam = 1;
   const Shortlist list = shortlist(work, decision.state.choice.groups);
-  const std::vector<Gram> folds = of_columns(work.fold, list.columns);
+  const std::vector<Gram> folds = of_columns(work.grams.train_folds, list.columns);
   std::vector<std::vector<int>> chosen;
-  for (int r = 0; r < std::min(kSelections, work.options.resamples); ++r) {
+  for (int r = 0; r < std::min(kSelections, work.given.options.resamples); ++r) {
     const Gram train = drawn(folds, random);
     chosen.emplace_back();
     for (const int g : Evidence(train, list.groups, list.nuisance, list.prior).search(quick).choice.groups)
@@ -189,14 +189,14 @@ static ChosenOnly chosen_only(const Work& work, const Evidence::State& state) {
 }
 
 Resampled resample(const Work& work, const Decision& decision) {
-  Random random(work.options.seed + 7);
+  Random random(work.given.options.seed + 7);
   Resampled out;
   out.chosen = select_again(work, decision, &random);
   // How far the error shrinks takes the chosen columns only.
   const ChosenOnly few = chosen_only(work, decision.state);
-  const std::vector<Gram> train_folds = of_columns(work.fold, decision.state.columns),
-                          test_folds = of_columns(work.test_fold, decision.state.columns);
-  for (int r = 0; r < work.options.resamples; ++r) {
+  const std::vector<Gram> train_folds = of_columns(work.grams.train_folds, decision.state.columns),
+                          test_folds = of_columns(work.grams.test_folds, decision.state.columns);
+  for (int r = 0; r < work.given.options.resamples; ++r) {
     const Gram train = drawn(train_folds, &random), test = drawn(test_folds, &random);
     if (!(test.n > 0.0)) break;
     const Evidence evidence(train, few.groups, few.nuisance, few.prior);

@@ -19,16 +19,16 @@ namespace truing::diagnosis {
 using Kind = Explanation::Kind;
 
 /// Sums over the training rows, of some columns.
-static Gram sum_flexible(const Design& design, const std::vector<int>& columns) {
+static Gram sum_of(const Design& design, const Eigen::VectorXd& weight, const std::vector<int>& columns) {
   GramSum sum(static_cast<Eigen::Index>(columns.size()));
   for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
     if (design.fold[static_cast<std::size_t>(i)] >= design.folds) continue;
     double* out = sum.row();
     for (const int column : columns) {
-      *out = design.weight[i] * design.x(i, column);
+      *out = weight[i] * design.x(i, column);
       out += GramSum::stride();
     }
-    *out = design.weight[i] * design.y[i];
+    *out = weight[i] * design.y[i];
     sum.push();
   }
   return sum.finish();
@@ -74,133 +74,189 @@ static std::array<double, 3> sigma_of(const std::vector<Block>& blocks, const Ei
   return sigma;
 }
 
-/// Unit-weight rows: each kind of value by its own noise, what stands far out by less (Huber 1964; the power makes
-/// gross outliers count for nothing). The noise is what the flexible model leaves: everything at once under a ridge
-/// prior, so that an effect is not taken for noise.
-void weigh(Work* work) {
-  Design& design = work->design;
-  const Eigen::Index n = design.x.rows();
-  const Measurements& data = work->data;
-  Eigen::VectorXd own = Eigen::VectorXd::Ones(n);  // what the rows say of themselves
-  for (Eigen::Index i = 0; i < n; ++i) {
+/// What the rows say of themselves: their own weight over their own sigma.
+static Eigen::VectorXd own_weights(const Design& design, const Measurements& data) {
+  Eigen::VectorXd out = Eigen::VectorXd::Ones(design.x.rows());
+  for (Eigen::Index i = 0; i < out.size(); ++i) {
     const auto row = static_cast<std::size_t>(design.row[static_cast<std::size_t>(i)]);
     const int kind = kind_of(design.component[static_cast<std::size_t>(i)]);
-    if (data.weight) own[i] = std::sqrt(data.weight[row]);
-    if (kind != 1 && data.position_sigma) own[i] /= data.position_sigma[row];
-    if (kind == 1 && data.rotation_sigma) own[i] /= data.rotation_sigma[row];
+    if (data.weight) out[i] = std::sqrt(data.weight[row]);
+    if (kind != 1 && data.position_sigma) out[i] /= data.position_sigma[row];
+    if (kind == 1 && data.rotation_sigma) out[i] /= data.rotation_sigma[row];
   }
-  std::vector<int> flexible = design.nuisance;
+  return out;
+}
+
+/// Columns of the flexible model: the nuisance first, then everything but frames that wander as fast as noise does.
+static std::vector<int> flexible_columns(const Design& design) {
+  std::vector<int> out = design.nuisance;
   std::vector<bool> in(static_cast<std::size_t>(design.x.cols()), false);
-  for (const int k : flexible) in[static_cast<std::size_t>(k)] = true;
+  for (const int k : out) in[static_cast<std::size_t>(k)] = true;
   for (std::size_t g = 0; g < design.candidates.groups.size(); ++g) {
     const Explanation& e = design.candidates.named[g];
     const bool coarse_drift =
         e.kind == Kind::drift && e.effect == "drift" && e.site != "base.xyz" && e.knots[0].size() <= 12;
     if (e.kind == Kind::drift && !coarse_drift) continue;
     for (const int k : design.candidates.groups[g].columns) {
-      if (!in[static_cast<std::size_t>(k)]) flexible.push_back(k);
+      if (!in[static_cast<std::size_t>(k)]) out.push_back(k);
       in[static_cast<std::size_t>(k)] = true;
     }
   }
-  const std::vector<Block> blocks = blocks_of(design);
-  std::array<double, 3> sigma{};
-  Eigen::VectorXd residual = design.y;
-  double used = 0.0;
-  const auto p = static_cast<Eigen::Index>(flexible.size());
-  Eigen::MatrixXd xx(p, p);
-  Eigen::VectorXd xy(p);
-  double summed_at = 0.0;  // noise that xx and xy were weighted with; 0: weights differ from row to row
-  for (int round = 0; round < 4; ++round) {
-    // Noise of each kind, and the rows that stand out.
-    sigma = sigma_of(blocks, own.cwiseProduct(residual), used);
-    std::size_t far = 0, very_far = 0;
-    std::vector<double> distance2(blocks.size());
-    for (std::size_t b = 0; b < blocks.size(); ++b) {
-      const auto [first, count, kind, training] = blocks[b];
-      const double noise = sigma[static_cast<std::size_t>(kind)];
-      distance2[b] =
-          own.segment(first, count).cwiseProduct(residual.segment(first, count)).squaredNorm() / (noise * noise);
-      const double bound = count == 1 ? 9.0 : 14.2;  // one in 370 of normal noise
-      far += distance2[b] > bound ? 1 : 0;
-      very_far += distance2[b] > 3.0 * bound ? 1 : 0;
-    }
-    const bool tails =
-        round > 0 && (very_far > 0 || static_cast<double>(far) > 4.0 + 0.01 * static_cast<double>(blocks.size()));
-    for (std::size_t b = 0; b < blocks.size(); ++b) {
-      const auto [first, count, kind, training] = blocks[b];
-      const double bound = count == 1 ? 5.0 : 9.0;
-      const double root = tails && distance2[b] > bound ? std::pow(bound / distance2[b], 0.75) : 1.0;
-      if (round == 3 && root < 0.2) work->outliers.push_back(design.row[static_cast<std::size_t>(first)]);
-      design.weight.segment(first, count) = own.segment(first, count) * root / sigma[static_cast<std::size_t>(kind)];
-    }
-    if (round == 3) break;
-    // The flexible fit, at noise variance one. As long as all weights are equal, the sums only change their scale.
-    const auto kinds = std::count_if(sigma.begin(), sigma.end(), [](double noise) { return noise > 0.0; });
-    const double uniform = kinds == 1 && !tails ? *std::max_element(sigma.begin(), sigma.end()) : 0.0;
-    if (uniform > 0.0 && summed_at > 0.0) {
-      const double times = std::pow(summed_at / uniform, 2.0);
-      xx *= times;
-      xy *= times;
-    } else {
-      const Gram sums = sum_flexible(design, flexible);
-      xx = sums.xx;
-      xy = sums.xy;
-    }
-    summed_at = uniform;
-    Eigen::MatrixXd d = xx;
-    for (Eigen::Index c = 0; c < p; ++c) {
-      const bool flat = c < static_cast<Eigen::Index>(design.nuisance.size());
-      d(c, c) +=
-          flat ? 1e-9 * xx(c, c) + 1e-30 : std::pow(0.05 * design.prior[flexible[static_cast<std::size_t>(c)]], -2.0);
-    }
-    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(d));
-    const Eigen::VectorXd solution = factor.solve(xy);
-    used = factor.solve(xx).trace();  // effective number of parameters
-    for (Eigen::Index i = 0; i < n; ++i) {
-      double fitted = 0.0;
-      for (Eigen::Index c = 0; c < p; ++c) fitted += design.x(i, flexible[static_cast<std::size_t>(c)]) * solution[c];
-      residual[i] = design.y[i] - fitted;
-    }
-  }
-  // In metres, whatever the rows say of themselves: `sigma` has no unit where they bring a sigma of their own.
-  const std::array<double, 3> in_metres = sigma_of(blocks, residual, used);
-  work->position_sigma = in_metres[0] > 0.0 ? in_metres[0] : in_metres[2];
-
-  // Rows of one pose that err together count for less than their number.
-  double together = 0.0, pairs = 0.0, alone = 0.0, values = 0.0;
-  std::map<std::pair<std::int32_t, int>, std::array<double, 3>>
-      sums;  // by pose and component: sum, sum of squares, count
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (design.fold[static_cast<std::size_t>(i)] >= design.folds) continue;
-    const double e = design.weight[i] * residual[i];
-    auto& s = sums[{design.cluster[static_cast<std::size_t>(i)], design.component[static_cast<std::size_t>(i)]}];
-    s[0] += e;
-    s[1] += e * e;
-    s[2] += 1.0;
-  }
-  double squares_of_counts = 0.0;
-  for (const auto& [key, s] : sums) {
-    together += s[0] * s[0] - s[1];
-    pairs += s[2] * (s[2] - 1.0);
-    alone += s[1];
-    values += s[2];
-    squares_of_counts += s[2] * s[2];
-  }
-  if (pairs > 0.0 && alone > 0.0) {
-    const double correlation = std::clamp((together / pairs) / (alone / values), 0.0, 1.0);
-    work->deff = 1.0 + (squares_of_counts / values - 1.0) * correlation;
-  }
+  return out;
 }
 
-void make_grams(Work* work) {
-  const Design& design = work->design;
+/// Squared length of what every block leaves, in units of its noise.
+static std::vector<double> standardised_squares(const std::vector<Block>& blocks, const Eigen::VectorXd& own,
+                                                const Eigen::VectorXd& residual, const std::array<double, 3>& sigma) {
+  std::vector<double> out(blocks.size());
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const auto [first, count, kind, training] = blocks[b];
+    const double noise = sigma[static_cast<std::size_t>(kind)];
+    out[b] = own.segment(first, count).cwiseProduct(residual.segment(first, count)).squaredNorm() / (noise * noise);
+  }
+  return out;
+}
+
+/// Do more rows stand far out than normal noise has?
+static bool has_tails(const std::vector<Block>& blocks, const std::vector<double>& squares) {
+  std::size_t far = 0, very_far = 0;
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const double bound = blocks[b].count == 1 ? 9.0 : 14.2;  // one in 370 of normal noise
+    far += squares[b] > bound ? 1 : 0;
+    very_far += squares[b] > 3.0 * bound ? 1 : 0;
+  }
+  return very_far > 0 || static_cast<double>(far) > 4.0 + 0.01 * static_cast<double>(blocks.size());
+}
+
+/// Root of a block's robust weight: (c^2 / s^2)^1.5 beyond c. Huber (1964); the power makes gross outliers count for
+/// nothing.
+static double root_weight(const Block& block, double square) {
+  const double bound = block.count == 1 ? 5.0 : 9.0;
+  return square > bound ? std::pow(bound / square, 0.75) : 1.0;
+}
+
+namespace {
+
+/// The flexible fit: everything at once under a ridge prior, at noise variance one, so that an effect is not taken for
+/// noise.
+class FlexibleFit {
+ public:
+  explicit FlexibleFit(const Design& design)
+      : design_(design), columns_(flexible_columns(design)), residual_(design.y) {}
+
+  /// `uniform`: the one noise that all rows are weighted with; 0: weights differ from row to row.
+  void fit(const Eigen::VectorXd& weight, double uniform) {
+    sum(weight, uniform);
+    const auto p = static_cast<Eigen::Index>(columns_.size());
+    Eigen::MatrixXd d = xx_;
+    for (Eigen::Index c = 0; c < p; ++c) {
+      const bool flat = c < static_cast<Eigen::Index>(design_.nuisance.size());
+      d(c, c) +=
+          flat ? 1e-9 * xx_(c, c) + 1e-30 : std::pow(0.05 * design_.prior[columns_[static_cast<std::size_t>(c)]], -2.0);
+    }
+    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(d));
+    const Eigen::VectorXd solution = factor.solve(xy_);
+    used_ = factor.solve(xx_).trace();
+    for (Eigen::Index i = 0; i < residual_.size(); ++i) {
+      double fitted = 0.0;
+      for (Eigen::Index c = 0; c < p; ++c) fitted += design_.x(i, columns_[static_cast<std::size_t>(c)]) * solution[c];
+      residual_[i] = design_.y[i] - fitted;
+    }
+  }
+
+  const Eigen::VectorXd& residual() const { return residual_; }
+  double used() const { return used_; }  ///< effective number of parameters
+
+ private:
+  /// As long as all weights are equal, the sums only change their scale.
+  void sum(const Eigen::VectorXd& weight, double uniform) {
+    if (uniform > 0.0 && summed_at_ > 0.0) {
+      const double times = std::pow(summed_at_ / uniform, 2.0);
+      xx_ *= times;
+      xy_ *= times;
+    } else {
+      const Gram sums = sum_of(design_, weight, columns_);
+      xx_ = sums.xx;
+      xy_ = sums.xy;
+    }
+    summed_at_ = uniform;
+  }
+
+  const Design& design_;
+  const std::vector<int> columns_;
+  Eigen::MatrixXd xx_;
+  Eigen::VectorXd xy_, residual_;
+  double used_ = 0.0;
+  double summed_at_ = 0.0;  // noise that the sums were weighted with
+};
+
+}  // namespace
+
+/// Of cluster sampling (Kish 1965): rows of one pose that err together count for less than their number.
+static double design_effect_of(const Design& design, const Eigen::VectorXd& weight, const Eigen::VectorXd& residual) {
+  struct Sums {
+    double errors = 0.0, squares = 0.0, count = 0.0;
+  };
+  std::map<std::pair<std::int32_t, int>, Sums> of_pose;  // and component
+  for (Eigen::Index i = 0; i < residual.size(); ++i) {
+    if (design.fold[static_cast<std::size_t>(i)] >= design.folds) continue;
+    const double e = weight[i] * residual[i];
+    Sums& s = of_pose[{design.cluster[static_cast<std::size_t>(i)], design.component[static_cast<std::size_t>(i)]}];
+    s.errors += e;
+    s.squares += e * e;
+    s.count += 1.0;
+  }
+  double together = 0.0, pairs = 0.0, alone = 0.0, values = 0.0, squares_of_counts = 0.0;
+  for (const auto& [key, s] : of_pose) {
+    together += s.errors * s.errors - s.squares;
+    pairs += s.count * (s.count - 1.0);
+    alone += s.squares;
+    values += s.count;
+    squares_of_counts += s.count * s.count;
+  }
+  if (!(pairs > 0.0 && alone > 0.0)) return 1.0;
+  const double correlation = std::clamp((together / pairs) / (alone / values), 0.0, 1.0);
+  return 1.0 + (squares_of_counts / values - 1.0) * correlation;
+}
+
+Weighted weigh(const Design& design, const Measurements& data) {
+  constexpr int kRounds = 3;             // fits
+  constexpr double kCountsLittle = 0.2;  // root of the weight of a row that is said to be an outlier
+  const std::vector<Block> blocks = blocks_of(design);
+  const Eigen::VectorXd own = own_weights(design, data);
+  FlexibleFit flexible(design);
+  Weighted out;
+  out.weight = Eigen::VectorXd::Zero(design.x.rows());
+  for (int round = 0;; ++round) {
+    const std::array<double, 3> sigma = sigma_of(blocks, own.cwiseProduct(flexible.residual()), flexible.used());
+    const std::vector<double> squares = standardised_squares(blocks, own, flexible.residual(), sigma);
+    const bool tails = round > 0 && has_tails(blocks, squares);
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      const auto [first, count, kind, training] = blocks[b];
+      const double root = tails ? root_weight(blocks[b], squares[b]) : 1.0;
+      if (round == kRounds && root < kCountsLittle)
+        out.noise.outliers.push_back(design.row[static_cast<std::size_t>(first)]);
+      out.weight.segment(first, count) = own.segment(first, count) * root / sigma[static_cast<std::size_t>(kind)];
+    }
+    if (round == kRounds) break;
+    const auto kinds = std::count_if(sigma.begin(), sigma.end(), [](double noise) { return noise > 0.0; });
+    flexible.fit(out.weight, kinds == 1 && !tails ? *std::max_element(sigma.begin(), sigma.end()) : 0.0);
+  }
+  // In metres, whatever the rows say of themselves: their own sigmas have taken the unit away.
+  const std::array<double, 3> in_metres = sigma_of(blocks, flexible.residual(), flexible.used());
+  out.noise.position_sigma = in_metres[0] > 0.0 ? in_metres[0] : in_metres[2];
+  out.noise.design_effect = design_effect_of(design, out.weight, flexible.residual());
+  return out;
+}
+
+Grams make_grams(const Design& design, double design_effect, int threads) {
   const int folds = design.folds + design.test_folds;
   std::vector<Gram> grams(static_cast<std::size_t>(folds));
   const auto some = [&](int first) {
     for (int f = first; f < folds; f += 2)
-      grams[static_cast<std::size_t>(f)].add(design.gram_of_fold(f), 1.0 / work->deff);
+      grams[static_cast<std::size_t>(f)].add(design.gram_of_fold(f), 1.0 / design_effect);
   };
-  if (work->options.threads == 1) {
+  if (threads == 1) {
     some(0);
     some(1);
   } else {
@@ -208,23 +264,23 @@ void make_grams(Work* work) {
     some(0);
     other.join();
   }
-  work->fold.assign(std::make_move_iterator(grams.begin()), std::make_move_iterator(grams.begin() + design.folds));
-  work->test_fold.assign(std::make_move_iterator(grams.begin() + design.folds), std::make_move_iterator(grams.end()));
-  work->train = work->test = Gram();
-  for (const Gram& gram : work->fold) work->train.add(gram);
-  for (const Gram& gram : work->test_fold) work->test.add(gram);
+  Grams out;
+  out.train_folds.assign(std::make_move_iterator(grams.begin()), std::make_move_iterator(grams.begin() + design.folds));
+  out.test_folds.assign(std::make_move_iterator(grams.begin() + design.folds), std::make_move_iterator(grams.end()));
+  for (const Gram& gram : out.train_folds) out.train.add(gram);
+  for (const Gram& gram : out.test_folds) out.test.add(gram);
+  return out;
 }
 
 /// After columns were appended: their part of every Gram, nothing else.
-void extend_grams(Work* work) {
-  const Design& design = work->design;
-  const Eigen::Index p = design.x.cols(), before = work->train.xx.cols(), more = p - before;
+void extend_grams(const Design& design, double design_effect, Grams* grams) {
+  const Eigen::Index p = design.x.cols(), before = grams->train.xx.cols(), more = p - before;
   if (more <= 0) return;
   const auto folds = static_cast<std::size_t>(design.folds + design.test_folds);
   std::vector<Eigen::MatrixXd> cross(folds, Eigen::MatrixXd::Zero(p, more));
   std::vector<Eigen::VectorXd> right(folds, Eigen::VectorXd::Zero(more));
   for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
-    const double w2 = design.weight[i] * design.weight[i] / work->deff;
+    const double w2 = design.weight[i] * design.weight[i] / design_effect;
     if (w2 == 0.0) continue;
     const auto f = static_cast<std::size_t>(design.fold[static_cast<std::size_t>(i)]);
     for (Eigen::Index k = 0; k < more; ++k) {
@@ -245,12 +301,13 @@ void extend_grams(Work* work) {
   Eigen::VectorXd all_right[2] = {Eigen::VectorXd::Zero(more), Eigen::VectorXd::Zero(more)};
   for (std::size_t f = 0; f < folds; ++f) {
     const bool test = f >= static_cast<std::size_t>(design.folds);
-    extend(test ? &work->test_fold[f - static_cast<std::size_t>(design.folds)] : &work->fold[f], cross[f], right[f]);
+    extend(test ? &grams->test_folds[f - static_cast<std::size_t>(design.folds)] : &grams->train_folds[f], cross[f],
+           right[f]);
     all[test ? 1 : 0] += cross[f];
     all_right[test ? 1 : 0] += right[f];
   }
-  extend(&work->train, all[0], all_right[0]);
-  extend(&work->test, all[1], all_right[1]);
+  extend(&grams->train, all[0], all_right[0]);
+  extend(&grams->test, all[1], all_right[1]);
 }
 
 }  // namespace truing::diagnosis

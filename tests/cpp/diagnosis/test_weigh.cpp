@@ -1,0 +1,100 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// What noise is: its size, rows far out, rows that err together; and the sums of weighted rows.
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "diagnosis/diagnosis.hpp"
+#include "math/random.hpp"
+
+using namespace truing;
+using namespace truing::diagnosis;
+
+namespace {
+
+/// Positions of `poses` poses, measured `repeats` times each; errors of `sigma`, and of `common` for all of a pose.
+struct Scene {
+  Design design;
+  Measurements data;
+
+  Scene(int poses, int repeats, double sigma, double common) {
+    constexpr Eigen::Index kColumns = 4;
+    Random random(11);
+    const Eigen::Index n = 3 * poses * repeats;
+    design.x.resize(n, kColumns);
+    design.y.resize(n);
+    design.folds = 4, design.test_folds = 2;
+    design.nuisance = {0, 1};
+    design.prior = Eigen::VectorXd::Constant(kColumns, kLargest);
+    Eigen::Index i = 0;
+    for (int pose = 0; pose < poses; ++pose) {
+      const Eigen::Vector3d of_pose = common * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+      for (int repeat = 0; repeat < repeats; ++repeat) {
+        for (int k = 0; k < 3; ++k, ++i) {
+          for (Eigen::Index c = 0; c < kColumns; ++c) design.x(i, c) = random.normal();
+          design.y[i] = 0.3 * design.x(i, 0) + of_pose[k] + sigma * random.normal();
+          design.row.push_back(pose * repeats + repeat);
+          design.component.push_back(static_cast<std::int8_t>(k));
+          design.fold.push_back(pose % (design.folds + design.test_folds));
+          design.cluster.push_back(pose);
+        }
+      }
+    }
+    data.rows = static_cast<std::size_t>(poses * repeats);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("noise is found, and weights are its inverse") {
+  const Scene scene(400, 1, 2e-4, 0.0);
+  const Weighted weighted = weigh(scene.design, scene.data);
+  CHECK(weighted.noise.position_sigma == doctest::Approx(2e-4).epsilon(0.06));
+  CHECK(weighted.noise.design_effect == doctest::Approx(1.0));  // nothing is repeated
+  CHECK(weighted.noise.outliers.empty());
+  CHECK(weighted.weight.minCoeff() == doctest::Approx(weighted.weight.maxCoeff()));
+  CHECK(weighted.weight[0] * weighted.noise.position_sigma == doctest::Approx(1.0).epsilon(1e-3));
+}
+
+TEST_CASE("a row far out counts for nothing, and is named") {
+  Scene scene(400, 1, 2e-4, 0.0);
+  scene.design.y[3 * 70 + 1] += 0.05;
+  const Weighted weighted = weigh(scene.design, scene.data);
+  CHECK(weighted.noise.outliers == std::vector<std::int32_t>{70});
+  CHECK(weighted.weight[3 * 70] < 0.01 * weighted.weight[0]);
+}
+
+TEST_CASE("rows of a pose that err together count by the design effect 1 + (m - 1) rho") {
+  for (const double rho : {0.0, 0.5, 0.9}) {
+    CAPTURE(rho);
+    const Scene scene(600, 4, 2e-4 * std::sqrt(1.0 - rho), 2e-4 * std::sqrt(rho));
+    CHECK(weigh(scene.design, scene.data).noise.design_effect == doctest::Approx(1.0 + 3.0 * rho).epsilon(0.08));
+  }
+}
+
+TEST_CASE("sums of appended columns are those of all columns made afresh") {
+  Scene scene(60, 2, 2e-4, 1e-4);
+  Design& design = scene.design;
+  design.weight = weigh(design, scene.data).weight;
+  const Design::Rows all = design.x;
+  design.x = all.leftCols(2);
+  Grams grown = make_grams(design, 1.7, 1);
+  design.x = all;
+  extend_grams(design, 1.7, &grown);
+  const Grams afresh = make_grams(design, 1.7, 2);
+  REQUIRE(grown.train_folds.size() == 4);
+  REQUIRE(grown.test_folds.size() == 2);
+  const auto same = [](const Gram& a, const Gram& b) {
+    CHECK((a.xx - b.xx).norm() < 1e-12 * b.xx.norm());
+    CHECK((a.xy - b.xy).norm() < 1e-12 * b.xy.norm());
+    CHECK(a.yy == doctest::Approx(b.yy));
+    CHECK(a.n == doctest::Approx(b.n));
+  };
+  same(grown.train, afresh.train);
+  same(grown.test, afresh.test);
+  for (std::size_t f = 0; f < 4; ++f) same(grown.train_folds[f], afresh.train_folds[f]);
+  for (std::size_t f = 0; f < 2; ++f) same(grown.test_folds[f], afresh.test_folds[f]);
+}
