@@ -88,70 +88,95 @@ struct Problem {
   EffectScratch* scratch;
 };
 
-void evaluate(const Problem& problem, const double* q, Rows* rows) {
-  const Goal& goal = problem.goal;
-  const int n = problem.arm.driven();
-  Columns columns;
-  const Tip tip = problem.arm.tip(q, problem.scratch, &columns);
+void add_position(const Problem& problem, const Tip& tip, const Columns& columns, Rows* rows) {
   const double per_metre = 1.0 / problem.scales.length;
-  const double per_radian = problem.options.rotation_weight;
-
-  const Vector3d way = goal.position - tip.position;
+  const Vector3d way = problem.goal.position - tip.position;
   for (int i = 0; i < 3; ++i) rows->error[i] = per_metre * way[i];
-  for (int j = 0; j < n; ++j) {
+  for (int j = 0; j < problem.arm.driven(); ++j) {
     for (int i = 0; i < 3; ++i) rows->column[j][i] = per_metre * columns.linear[j][i];
   }
   rows->count = 3;
-  bool small = way.squaredNorm() <= problem.options.tolerance * problem.options.tolerance;
-  const auto add_angular = [&](double error, const Vector3d& direction) {
+  rows->small = way.squaredNorm() <= problem.options.tolerance * problem.options.tolerance;
+}
+
+/// All three of a pose.
+void add_rotation(const Problem& problem, const Tip& tip, const Columns& columns, Rows* rows) {
+  const double per_radian = problem.options.rotation_weight;
+  const Vector3d turn = rotation_between(tip.rotation, problem.goal.rotation);
+  for (int i = 0; i < 3; ++i) rows->error[3 + i] = per_radian * turn[i];
+  for (int j = 0; j < problem.arm.driven(); ++j) {
+    for (int i = 0; i < 3; ++i) rows->column[j][3 + i] = per_radian * columns.angular[j][i];
+  }
+  rows->count = 6;
+  rows->small = rows->small && turn.squaredNorm() <= problem.options.tolerance * problem.options.tolerance;
+}
+
+/// One equation of the orientation: `error` is to go about `direction`.
+void add_angular(const Problem& problem, const Columns& columns, double error, const Vector3d& direction, Rows* rows) {
+  const double per_radian = problem.options.rotation_weight;
+  const int row = rows->count++;
+  rows->error[row] = per_radian * error;
+  for (int j = 0; j < problem.arm.driven(); ++j) {
+    rows->column[j][row] = per_radian * direction.dot(columns.angular[j]);
+  }
+  rows->small = rows->small && std::abs(error) <= problem.options.tolerance;
+}
+
+/// The direction of the torch's axis.
+void add_lean(const Problem& problem, const Tip& tip, const Columns& columns, Rows* rows) {
+  const Goal& goal = problem.goal;
+  if (!goal.leans) {
+    // I - n n^T of the angular part: its two rows, along the tool frame's other axes.
+    const Vector3d swing = swing_between(tip.rotation * goal.axis, goal.rotation * goal.axis);
+    for (const Vector3d& side : {Vector3d(tip.rotation * goal.travel), Vector3d(tip.rotation * goal.across)}) {
+      add_angular(problem, columns, side.dot(swing), side, rows);
+    }
+    return;
+  }
+  const Lean lean = lean_of(goal, tip.rotation);
+  const double lead = way_into(goal.lead, lean.lead, kInside), work = way_into(goal.work, lean.work, kInside);
+  if (lead != 0.0 || goal.lead.lower == goal.lead.upper) add_angular(problem, columns, lead, lean.lead_row, rows);
+  if (work != 0.0 || goal.work.lower == goal.work.upper) add_angular(problem, columns, work, lean.work_row, rows);
+}
+
+/// The turn about the torch's axis, where it is not free.
+void add_roll(const Problem& problem, const Tip& tip, const Columns& columns, Rows* rows) {
+  const Goal& goal = problem.goal;
+  if (goal.prefers_roll()) {
+    const double error = wrapped(goal.wanted_roll - roll_of(goal, tip.rotation));
+    add_angular(problem, columns, error, roll_row(goal, tip.rotation), rows);
+  } else if (goal.rolls) {
+    const double into = way_into(goal.roll, roll_near(goal.roll, roll_of(goal, tip.rotation)), kInside);
+    if (into != 0.0) add_angular(problem, columns, into, roll_row(goal, tip.rotation), rows);
+  }
+}
+
+/// Passive joints that are beyond their limits.
+void add_passive_limits(const Problem& problem, const double* q, Rows* rows) {
+  const int n = problem.arm.driven();
+  for (const PassiveLimit& limit : problem.limits.passive) {
+    double motion = limit.constant;
+    for (int j = 0; j < n; ++j) motion += limit.weight[j] * q[j];
+    const double into = way_into({limit.lower, limit.upper}, motion, kInside);
+    if (into == 0.0 || rows->count == kMostRows) continue;
     const int row = rows->count++;
-    rows->error[row] = per_radian * error;
-    for (int j = 0; j < n; ++j) rows->column[j][row] = per_radian * direction.dot(columns.angular[j]);
-    small = small && std::abs(error) <= problem.options.tolerance;
-  };
-
-  if (goal.kind == TaskKind::pose) {
-    const Vector3d turn = rotation_between(tip.rotation, goal.rotation);
-    for (int i = 0; i < 3; ++i) rows->error[3 + i] = per_radian * turn[i];
-    for (int j = 0; j < n; ++j) {
-      for (int i = 0; i < 3; ++i) rows->column[j][3 + i] = per_radian * columns.angular[j][i];
-    }
-    rows->count = 6;
-    small = small && turn.squaredNorm() <= problem.options.tolerance * problem.options.tolerance;
-  } else if (goal.kind == TaskKind::torch) {
-    if (goal.leans) {
-      const Lean lean = lean_of(goal, tip.rotation);
-      const double lead = way_into(goal.lead, lean.lead, kInside), work = way_into(goal.work, lean.work, kInside);
-      if (lead != 0.0 || goal.lead.lower == goal.lead.upper) add_angular(lead, lean.lead_row);
-      if (work != 0.0 || goal.work.lower == goal.work.upper) add_angular(work, lean.work_row);
-    } else {
-      // I - n n^T of the angular part: its two rows, along the tool frame's other axes.
-      const Vector3d swing = swing_between(tip.rotation * goal.axis, goal.rotation * goal.axis);
-      for (const Vector3d& side : {Vector3d(tip.rotation * goal.travel), Vector3d(tip.rotation * goal.across)}) {
-        add_angular(side.dot(swing), side);
-      }
-    }
-    if (goal.wanted_roll == goal.wanted_roll) {
-      add_angular(wrapped(goal.wanted_roll - roll_of(goal, tip.rotation)), roll_row(goal, tip.rotation));
-    } else if (goal.rolls) {
-      const double into = way_into(goal.roll, roll_near(goal.roll, roll_of(goal, tip.rotation)), kInside);
-      if (into != 0.0) add_angular(into, roll_row(goal, tip.rotation));
-    }
+    rows->error[row] = into;
+    for (int j = 0; j < n; ++j) rows->column[j][row] = limit.weight[j];
+    rows->small = false;
   }
+}
 
-  if (!problem.options.ignore_limits) {
-    for (const PassiveLimit& limit : problem.limits.passive) {
-      double motion = limit.constant;
-      for (int j = 0; j < n; ++j) motion += limit.weight[j] * q[j];
-      const double into = way_into({limit.lower, limit.upper}, motion, kInside);
-      if (into == 0.0 || rows->count == kMostRows) continue;
-      const int row = rows->count++;
-      rows->error[row] = into;
-      for (int j = 0; j < n; ++j) rows->column[j][row] = limit.weight[j];
-      small = false;
-    }
+void evaluate(const Problem& problem, const double* q, Rows* rows) {
+  Columns columns;
+  const Tip tip = problem.arm.tip(q, problem.scratch, &columns);
+  add_position(problem, tip, columns, rows);
+  if (problem.goal.kind == TaskKind::pose) {
+    add_rotation(problem, tip, columns, rows);
+  } else if (problem.goal.kind == TaskKind::torch) {
+    add_lean(problem, tip, columns, rows);
+    add_roll(problem, tip, columns, rows);
   }
-  rows->small = small;
+  if (!problem.options.ignore_limits) add_passive_limits(problem, q, rows);
   rows->cost = 0.0;
   for (int i = 0; i < rows->count; ++i) rows->cost += rows->error[i] * rows->error[i];
 }
@@ -183,71 +208,96 @@ bool solve_positive(int n, double (*A)[kMostRows], double* b) {
   return true;
 }
 
+/// The joints that are free to move, and what they are to do.
+struct ActiveSet {
+  bool free[kMaxDrivenJoints];
+  double sum[kMostRows][kMostRows] = {};  ///< J W J^T of the free ones, lower triangle
+  double error[kMostRows];                ///< less what the joints that stopped at a limit have done
+};
+
+/// A joint into the sum, or with sign -1 out of it.
+void add_joint(const Problem& problem, const Rows& rows, int j, double sign, ActiveSet* set) {
+  const double* column = rows.column[j];
+  const double scale = problem.scales.joint[j];
+  const double weight = sign * scale * scale;
+  for (int r = 0; r < rows.count; ++r) {
+    const double scaled = weight * column[r];
+    for (int c = 0; c <= r; ++c) set->sum[r][c] += scaled * column[c];
+  }
+}
+
+/// All but the fixed joints, and those that stand at a limit and would be driven beyond it.
+void free_joints(const Problem& problem, const Rows& rows, const double* q, ActiveSet* set) {
+  std::copy(rows.error, rows.error + rows.count, set->error);
+  for (int j = 0; j < problem.arm.driven(); ++j) {
+    set->free[j] = j >= problem.options.fixed_joints;
+    if (!set->free[j]) continue;
+    double downhill = 0.0;
+    for (int r = 0; r < rows.count; ++r) downhill += rows.column[j][r] * set->error[r];
+    const bool at_limit = !problem.options.ignore_limits && ((q[j] >= problem.limits.upper[j] && downhill > 0.0) ||
+                                                             (q[j] <= problem.limits.lower[j] && downhill < 0.0));
+    set->free[j] = !at_limit;
+    if (set->free[j]) add_joint(problem, rows, j, 1.0, set);
+  }
+}
+
+/// The step of the free joints, and how long its longest is in radians' worth. False: the damping is too small.
+bool step_free(const Problem& problem, const Rows& rows, const ActiveSet& set, double damping, double* step,
+               double* longest) {
+  const int m = rows.count;
+  const double* scale = problem.scales.joint;
+  double A[kMostRows][kMostRows], y[kMostRows];
+  for (int r = 0; r < m; ++r) {
+    std::copy(set.sum[r], set.sum[r] + r + 1, A[r]);
+    A[r][r] += damping;
+    y[r] = set.error[r];
+  }
+  if (!solve_positive(m, A, y)) return false;
+  *longest = 0.0;
+  for (int j = 0; j < problem.arm.driven(); ++j) {
+    if (!set.free[j]) continue;
+    double move = 0.0;
+    for (int r = 0; r < m; ++r) move += rows.column[j][r] * y[r];
+    step[j] = scale[j] * scale[j] * move;
+    *longest = std::max(*longest, std::abs(step[j]) / scale[j]);
+  }
+  return true;
+}
+
+/// Joints that the shortened step would take past a limit go to the limit, and are free no more. True: there are none.
+bool stop_at_limits(const Problem& problem, const Rows& rows, const double* q, double shorten, double* step,
+                    ActiveSet* set) {
+  const double *lower = problem.limits.lower, *upper = problem.limits.upper;
+  bool within = true;
+  for (int j = 0; j < problem.arm.driven(); ++j) {
+    if (!set->free[j]) continue;
+    const double at = q[j] + shorten * step[j];
+    if (at <= upper[j] && at >= lower[j]) continue;
+    within = false;
+    set->free[j] = false;
+    step[j] = (at > upper[j] ? upper[j] : lower[j]) - q[j];
+    for (int r = 0; r < rows.count; ++r) set->error[r] -= rows.column[j][r] * step[j];
+    add_joint(problem, rows, j, -1.0, set);
+  }
+  return within;
+}
+
 /// dq = W J^T (J W J^T + damping I)^-1 error over the joints that are free to move: the damped pseudo-inverse with
 /// joint scales W. A joint that would pass its limit goes to the limit and no further, and the others are solved for
 /// again with what is then left of the error: an active set, so that the error is redistributed and not cut off.
 bool solve_step(const Problem& problem, const Rows& rows, const double* q, double damping, double* step) {
-  const int n = problem.arm.driven(), m = rows.count;
-  const double* scale = problem.scales.joint;
-  const double* lower = problem.limits.lower;
-  const double* upper = problem.limits.upper;
-  bool free[kMaxDrivenJoints];
-  double sum[kMostRows][kMostRows] = {};
-  double error[kMostRows];
-  std::copy(rows.error, rows.error + m, error);
-  const auto add_joint = [&](int j, double sign) {
-    const double* column = rows.column[j];
-    const double weight = sign * scale[j] * scale[j];
-    for (int r = 0; r < m; ++r) {
-      const double scaled = weight * column[r];
-      for (int c = 0; c <= r; ++c) sum[r][c] += scaled * column[c];
-    }
-  };
-  for (int j = 0; j < n; ++j) {
-    step[j] = 0.0;
-    free[j] = j >= problem.options.fixed_joints;
-    if (!free[j]) continue;
-    double downhill = 0.0;
-    for (int r = 0; r < m; ++r) downhill += rows.column[j][r] * error[r];
-    const bool at_limit = !problem.options.ignore_limits &&
-                          ((q[j] >= upper[j] && downhill > 0.0) || (q[j] <= lower[j] && downhill < 0.0));
-    free[j] = !at_limit;
-    if (free[j]) add_joint(j, 1.0);
-  }
+  const int n = problem.arm.driven();
+  std::fill(step, step + n, 0.0);
+  ActiveSet set;
+  free_joints(problem, rows, q, &set);
   for (int round = 0; round <= n; ++round) {
-    double A[kMostRows][kMostRows], y[kMostRows];
-    for (int r = 0; r < m; ++r) {
-      std::copy(sum[r], sum[r] + r + 1, A[r]);
-      A[r][r] += damping;
-      y[r] = error[r];
-    }
-    if (!solve_positive(m, A, y)) return false;
-    bool within = true;
     double longest = 0.0;
-    for (int j = 0; j < n; ++j) {
-      if (!free[j]) continue;
-      double move = 0.0;
-      for (int r = 0; r < m; ++r) move += rows.column[j][r] * y[r];
-      step[j] = scale[j] * scale[j] * move;
-      longest = std::max(longest, std::abs(step[j]) / scale[j]);
-    }
+    if (!step_free(problem, rows, set, damping, step, &longest)) return false;
     // What is too long is shortened first: a joint stops at its limit only where the shortened step would pass it.
     const double shorten = longest > problem.options.longest_step ? problem.options.longest_step / longest : 1.0;
-    if (!problem.options.ignore_limits) {
-      for (int j = 0; j < n; ++j) {
-        if (!free[j]) continue;
-        const double at = q[j] + shorten * step[j];
-        if (at <= upper[j] && at >= lower[j]) continue;
-        within = false;
-        free[j] = false;
-        step[j] = (at > upper[j] ? upper[j] : lower[j]) - q[j];
-        for (int r = 0; r < m; ++r) error[r] -= rows.column[j][r] * step[j];
-        add_joint(j, -1.0);
-      }
-    }
-    if (!within) continue;
+    if (!problem.options.ignore_limits && !stop_at_limits(problem, rows, q, shorten, step, &set)) continue;
     for (int j = 0; j < n; ++j) {
-      if (free[j]) step[j] *= shorten;
+      if (set.free[j]) step[j] *= shorten;
     }
     return true;
   }
@@ -271,6 +321,17 @@ Goal::Goal(const Task& task)
   across = axis.cross(travel);
   leans = lead.lower != 0.0 || lead.upper != 0.0 || work.lower != 0.0 || work.upper != 0.0;
   rolls = roll.upper - roll.lower < 2.0 * kPi;
+}
+
+Goal pose_at_roll(const Goal& goal, double roll) {
+  const auto nearest_to_zero = [](const Window& window) { return std::clamp(0.0, window.lower, window.upper); };
+  const Vector3d leant = std::tan(nearest_to_zero(goal.lead)) * goal.travel +
+                         std::tan(nearest_to_zero(goal.work)) * goal.across + goal.axis;
+  Goal pose = goal;
+  pose.kind = TaskKind::pose;
+  pose.rotation =
+      goal.rotation * Eigen::Quaterniond::FromTwoVectors(goal.axis, leant) * Eigen::AngleAxisd(roll, goal.axis);
+  return pose;
 }
 
 Vector3d rotation_between(const Matrix3d& from, const Matrix3d& to) {

@@ -30,7 +30,11 @@ struct Goal {
   double longest_retreat = 0.0;
 
   explicit Goal(const Task& task);
+  bool prefers_roll() const { return wanted_roll == wanted_roll; }
 };
+
+/// The wanted frame of a torch turned about its axis, and leant as little as its windows ask for.
+Goal pose_at_roll(const Goal& goal, double roll);
 
 /// How far a tip misses its goal, as tolerances count it.
 struct Miss {

@@ -6,7 +6,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "inverse_kinematics/reach.hpp"
+#include "inverse_kinematics/path.hpp"
+#include "inverse_kinematics/solve.hpp"
 #include "math/batch.hpp"
 #include "math/text.hpp"
 #include "rooms.hpp"
@@ -51,6 +52,9 @@ void require_readings(const Joints& seed, int driven) {
   for (Eigen::Index j = 0; j < seed.size(); ++j) require_finite("a joint reading", seed[j]);
 }
 
+/// Effects ask for approach directions, and nobody said which: those of the way from the seed.
+bool by_way(const Borrowed& scratch, const Conditions& given) { return scratch.get() && given.direction.empty(); }
+
 Eigen::Isometry3d isometry(const Tip& tip) {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.linear() = tip.rotation;
@@ -86,8 +90,16 @@ bool PathOptions::is_valid(std::string* error) const {
   return true;
 }
 
-struct InverseSolver::Impl : Reach {
-  using Reach::Reach;
+struct InverseSolver::Impl {
+  Impl(const Robot& r, const InverseOptions& options, const Conditions& available, std::size_t target,
+       const std::vector<Effect>& own)
+      : robot(r, options, available, target, own), conditions(available), pool(robot.arm) {
+    Borrowed(robot.arm, &pool, conditions);  // complains about inputs that are missing
+  }
+
+  const PreparedRobot robot;
+  const Conditions conditions;
+  mutable ScratchPool pool;
 };
 
 InverseSolver::InverseSolver(const Robot& robot, const InverseOptions& options, const Conditions& conditions,
@@ -97,15 +109,15 @@ InverseSolver::~InverseSolver() = default;
 InverseSolver::InverseSolver(InverseSolver&&) noexcept = default;
 InverseSolver& InverseSolver::operator=(InverseSolver&&) noexcept = default;
 
-const Robot& InverseSolver::robot() const { return impl_->arm.robot(); }
-const InverseOptions& InverseSolver::options() const { return impl_->options; }
-int InverseSolver::driven_count() const { return impl_->driven(); }
-ClosedFormKind InverseSolver::closed_form() const { return impl_->closed.kind(); }
+const Robot& InverseSolver::robot() const { return impl_->robot.arm.robot(); }
+const InverseOptions& InverseSolver::options() const { return impl_->robot.options; }
+int InverseSolver::driven_count() const { return impl_->robot.driven(); }
+ClosedFormKind InverseSolver::closed_form() const { return impl_->robot.closed.kind(); }
 
 Joints InverseSolver::middle() const {
   Joints q(driven_count());
   for (int j = 0; j < driven_count(); ++j) {
-    const double low = impl_->limits.lower[j], high = impl_->limits.upper[j];
+    const double low = impl_->robot.limits.lower[j], high = impl_->robot.limits.upper[j];
     q[j] = std::isfinite(low) && std::isfinite(high) ? 0.5 * (low + high) : std::clamp(0.0, low, high);
   }
   return q;
@@ -113,16 +125,16 @@ Joints InverseSolver::middle() const {
 
 Eigen::Isometry3d InverseSolver::forward(const Joints& joints, const Conditions* conditions) const {
   require_readings(joints, driven_count());
-  const Borrowed scratch(impl_->arm, &impl_->pool, conditions ? *conditions : impl_->conditions);
-  return isometry(impl_->arm.tip(joints.data(), scratch.get()));
+  const Borrowed scratch(impl_->robot.arm, &impl_->pool, conditions ? *conditions : impl_->conditions);
+  return isometry(impl_->robot.arm.tip(joints.data(), scratch.get()));
 }
 
 Eigen::Isometry3d InverseSolver::forward(const Joints& joints, TipJacobian* jacobian,
                                          const Conditions* conditions) const {
   require_readings(joints, driven_count());
-  const Borrowed scratch(impl_->arm, &impl_->pool, conditions ? *conditions : impl_->conditions);
+  const Borrowed scratch(impl_->robot.arm, &impl_->pool, conditions ? *conditions : impl_->conditions);
   Columns columns;
-  const Tip tip = impl_->arm.tip(joints.data(), scratch.get(), &columns);
+  const Tip tip = impl_->robot.arm.tip(joints.data(), scratch.get(), &columns);
   jacobian->resize(6, driven_count());
   for (int j = 0; j < driven_count(); ++j) jacobian->col(j) << columns.linear[j], columns.angular[j];
   return isometry(tip);
@@ -132,12 +144,10 @@ Solution InverseSolver::solve(const Task& task, const Joints& seed, const Condit
   require_task(task);
   require_readings(seed, driven_count());
   const Conditions& given = conditions ? *conditions : impl_->conditions;
-  const Borrowed scratch(impl_->arm, &impl_->pool, given);
+  const Borrowed scratch(impl_->robot.arm, &impl_->pool, given);
   const Goal goal(task);
-  Search search{goal, seed.data(), scratch.get(), scratch.get() && given.direction.empty()};
-  Solution solution = impl_->solve(&search);
-  if (search.by_way) impl_->settle_directions(&search, &solution);
-  return solution;
+  Trace trace;
+  return inverse_kinematics::solve({impl_->robot, goal, seed.data(), scratch.get()}, by_way(scratch, given), &trace);
 }
 
 void InverseSolver::branches(const Task& task, const Joints& seed, Branches* found,
@@ -148,22 +158,18 @@ void InverseSolver::branches(const Task& task, const Joints& seed, Branches* fou
     throw std::invalid_argument(
         "branches are those of a full pose: a task that leaves something free has endlessly many");
   const Conditions& given = conditions ? *conditions : impl_->conditions;
-  const Borrowed scratch(impl_->arm, &impl_->pool, given);
+  const Borrowed scratch(impl_->robot.arm, &impl_->pool, given);
   const Goal goal(task);
-  Search search{goal, seed.data(), scratch.get(), scratch.get() && given.direction.empty()};
-  impl_->branches(&search, found);
+  find_branches({impl_->robot, goal, seed.data(), scratch.get()}, by_way(scratch, given), found);
 }
 
 Solution InverseSolver::follow(const Task& task, const Joints& previous, const Conditions* conditions) const {
   require_task(task);
   require_readings(previous, driven_count());
   const Conditions& given = conditions ? *conditions : impl_->conditions;
-  const Borrowed scratch(impl_->arm, &impl_->pool, given);
+  const Borrowed scratch(impl_->robot.arm, &impl_->pool, given);
   const Goal goal(task);
-  Search search{goal, previous.data(), scratch.get(), scratch.get() && given.direction.empty()};
-  Solution solution = impl_->follow(&search);
-  if (search.by_way) impl_->settle_directions(&search, &solution);
-  return solution;
+  return inverse_kinematics::follow({impl_->robot, goal, previous.data(), scratch.get()}, by_way(scratch, given));
 }
 
 Path InverseSolver::path(const std::vector<Task>& tasks, const Joints& seed, const PathOptions& options,
@@ -177,8 +183,8 @@ Path InverseSolver::path(const std::vector<Task>& tasks, const Joints& seed, con
     goals.emplace_back(task);
   }
   const Conditions& given = conditions ? *conditions : impl_->conditions;
-  const Borrowed scratch(impl_->arm, &impl_->pool, given);
-  return impl_->path(goals, seed.data(), options, scratch.get(), scratch.get() && given.direction.empty(), progress);
+  const Borrowed scratch(impl_->robot.arm, &impl_->pool, given);
+  return find_path(impl_->robot, goals, seed.data(), options, scratch.get(), by_way(scratch, given), progress);
 }
 
 std::vector<Solution> InverseSolver::solve_batch(const std::vector<Task>& tasks, const std::vector<Joints>& seeds,
@@ -210,13 +216,13 @@ std::string InverseSolver::describe(const Solution& solution) const {
            number(solution.direction.z(), 3) + ")";
   };
   const auto contact = [&] {
-    const Scene& scene = impl_->options.scene;
+    const Scene& scene = impl_->robot.options.scene;
     const auto second = static_cast<std::size_t>(solution.contact[1]);
     return scene.capsules[static_cast<std::size_t>(solution.contact[0])].name + " and " +
            (second < scene.capsules.size() ? scene.capsules[second].name
                                            : scene.obstacles[second - scene.capsules.size()].name);
   };
-  const bool turned = solution.position_error <= impl_->options.position_tolerance;
+  const bool turned = solution.position_error <= impl_->robot.options.position_tolerance;
   const std::string miss = turned ? number(solution.miss, 3) + " rad about " + direction()
                                   : number(1e3 * solution.miss, 4) + " mm in direction " + direction();
   switch (solution.reason) {
