@@ -338,7 +338,7 @@ void bind_parts(py::module_& m) {
   reading.def("__repr__", [](const Reading& r) { return "Reading('" + r.name + "': " + r.explanation + ")"; });
 
   py::class_<HandEyeNoise> noise(m, "HandEyeNoise",
-                                 "Standard deviations of one component, as told or as found. Position noise of hand "
+                                 "Standard deviations of one component, as given or as found. Position noise of hand "
                                  "and board poses adds up: data see the sum alone.");
   noise.def_readonly("position", &HandEyeNoise::position,
                      "[m] of hand and board pose together; with images of the hand alone.");
@@ -463,7 +463,7 @@ void bind_result(py::module_& m) {
   cls.def_readonly("axes_spread", &HandEyeResult::axes_spread,
                    "Second over first principal rotation of the motions: 0 one axis, 1 two alike.");
   cls.def_readonly("board_scale", &HandEyeResult::board_scale,
-                   "Factor on the board's lengths that would fit best; 1: as told.");
+                   "Factor on the board's lengths that would fit best; 1: as given.");
   cls.def_readonly("board_scale_sigma", &HandEyeResult::board_scale_sigma, "Of it; NaN: not known.");
   cls.def_property_readonly(
       "readings", [](const HandEyeResult& r) { return tuple_of(r.readings); },

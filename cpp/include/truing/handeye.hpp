@@ -110,8 +110,17 @@ struct HandEyeErrors {
   std::size_t n = 0;
 };
 
+/// Why the motions cannot show it.
+enum class UnobservableReason {
+  no_rotation,  ///< the hand moved without turning
+  one_axis,     ///< all rotations are about one axis: the camera's coordinate along it
+  large_error,  ///< the standard error is too large to be an answer
+  singular,     ///< camera and board can move together without opening the loop
+};
+
 /// What the motions cannot show.
 struct Unobservable {
+  UnobservableReason reason = UnobservableReason::singular;
   std::string what;                                     ///< "the camera's position along base z"
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< unit vector in the frame that carries the camera
   bool rotation = false;                                ///< about the direction, not along it
@@ -121,10 +130,24 @@ struct Unobservable {
 
 /// Another reading of the numbers: what it would mean, and how well the loop then closes.
 struct Reading {
-  std::string name;           ///< to be given as HandEyeOptions::reading
+  std::string name;           ///< to be given as HandEyeOptions::reading; empty: as given
   std::string explanation;    ///< "hand poses are base in hand (inverted)"
   double position_rms = 0.0;  ///< [m] median closure
   double rotation_rms = 0.0;  ///< [rad]
+};
+
+/// What a warning is about.
+enum class HandEyeConcernKind {
+  not_like_noise,     ///< plain weights predict poses left out to `value`, the noise that was found to `reference` [m]
+  beyond_pixels,      ///< boards scatter by `value` [rad], `reference` times what their pixels can tell
+  noise_of_one_side,  ///< position noise was given of hand or board alone: it was not used
+  noise_too_small,    ///< poses scatter by `value` times the noise that was given
+  board_scale,        ///< the loop closes best with lengths of board poses times `value`, standard error `reference`
+  behind_camera,      ///< `value` of `reference` boards are not in front of the camera
+};
+struct HandEyeConcern {
+  HandEyeConcernKind kind;
+  double value = kEstimate, reference = kEstimate;
 };
 
 enum class HandEyeStatus {
@@ -134,7 +157,7 @@ enum class HandEyeStatus {
   not_converged,
 };
 
-/// Standard deviations of one component, as told or as found. Position noise of hand and board poses adds up: data see
+/// Standard deviations of one component, as given or as found. Position noise of hand and board poses adds up: data see
 /// the sum alone.
 struct HandEyeNoise {
   double position = 0.0;               ///< [m] of hand and board pose together; with images of the hand alone
@@ -146,9 +169,10 @@ struct HandEyeNoise {
 
 struct HandEyeResult {
   HandEyeStatus status = HandEyeStatus::done;
-  std::string message;                ///< one sentence
-  std::vector<std::string> warnings;  ///< what the user should know or do: a board of another size, a robot that is
-                                      ///< off, noise told too small …
+  std::string message;  ///< one sentence
+  /// What the user should know or do: a board of another size, a robot that is off, noise given too small …
+  std::vector<std::string> warnings;
+  std::vector<HandEyeConcern> concerns;  ///< what each warning is about: for programs, which must not go by its text
   UncertainFrame
       camera;  ///< T_parent_camera: in the hand (eye in hand) or in the base. Only with status done or not_converged
   UncertainFrame board;  ///< T_parent_board: in the base (eye in hand) or in the hand
@@ -164,9 +188,10 @@ struct HandEyeResult {
   Eigen::Matrix<double, 8, 1> singular_values =
       Eigen::Matrix<double, 8, 1>::Zero();  ///< of the motions' equations, lengths in units of `length_scale`
   double singular_gap = 0.0;                ///< sixth over seventh: how clearly two null vectors stand out
-  double axes_spread = 0.0;  ///< second over first principal rotation of the motions: 0 one axis, 1 two alike
+  double axes_spread = 0.0;  ///< second over first principal rotation of the motions: 0 one axis, 1 two equal
   double board_scale = 1.0,
-         board_scale_sigma = kEstimate;        ///< factor on the board's lengths that would fit best; 1: as told
+         board_scale_sigma = kEstimate;        ///< factor on the board's lengths that would fit best; 1: as given
+  Reading as_given;                            ///< closure of the poses as they are; not_closing only
   std::vector<Reading> readings;               ///< other readings that close, best first; not_closing only
   std::vector<int> symmetry;                   ///< per pose: which of board_symmetries (1 …) it was read in; 0 as given
   std::optional<Camera> camera_model;          ///< as refined
@@ -203,6 +228,14 @@ ClosedForm handeye_closed_form(const HandEyePoses& poses, HandEyeSetup setup);
 /// All readings that `handeye` tries, in the order tried; closures are not set.
 std::vector<Reading> handeye_readings();
 
+/// What hand, camera and board are called: with a tracker instead of a camera they have other names.
+struct HandEyeNouns {
+  std::string hand = "hand", camera = "camera", board = "board";
+};
+
+/// What a reading would mean, or several joined by "+". Throws std::invalid_argument that lists the names there are.
+std::string explain_reading(const std::string& name, const HandEyeNouns& nouns = {});
+
 /// A robot pose that would help.
 struct NextHandPose {
   Eigen::Isometry3d T_base_hand = Eigen::Isometry3d::Identity();
@@ -236,7 +269,7 @@ struct ClockOffset {
   std::vector<Eigen::Isometry3d> T_base_hand;  ///< hand poses at the times of those rows
 };
 
-/// Angular speed of hand and board are equal whatever the frames; the offset makes them agree, then the loop closes
+/// Angular speeds of hand and board are equal whatever the frames; the offset makes them agree, then the loop closes
 /// best. Times in s, increasing. Throws std::invalid_argument.
 ClockOffset handeye_clock(const std::vector<double>& hand_time, const std::vector<Eigen::Isometry3d>& T_base_hand,
                           const std::vector<double>& camera_time, const std::vector<Eigen::Isometry3d>& T_camera_board,

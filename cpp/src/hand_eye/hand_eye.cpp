@@ -16,6 +16,7 @@
 #include "hand_eye/images.hpp"
 #include "hand_eye/readings.hpp"
 #include "hand_eye/refine.hpp"
+#include "hand_eye/words.hpp"
 #include "math/constants.hpp"
 #include "math/frame.hpp"
 #include "math/statistics.hpp"
@@ -32,14 +33,15 @@ constexpr double kLeastRotation =
 constexpr double kOverNoise = 3.0;      // and no less than so many times the noise of the angles
 constexpr double kLargestNoise = 0.01;  // [rad] angle noise beyond this is a wrong reading, not noise
 constexpr double kDoubtful =
-    0.02;  // closures beyond this, rad or shares of the motion's size, make us try other readings
-constexpr double kHopeless = 0.2;      // and beyond this nothing is said
-constexpr double kWidest = 0.1;        // standard errors beyond this share of the distance, or rad, are not an answer
-constexpr double kExact = 1e-8;        // [m], [rad] closures below this are rounding, not noise
+    0.02;  // closures beyond this, rad or fractions of the motion's size, make us try other readings
+constexpr double kHopeless = 0.2;  // and beyond this nothing is said
+constexpr double kWidest = 0.1;    // standard errors beyond this fraction of the distance, or rad, are not an answer
+constexpr double kExact = 1e-8;    // [m], [rad] closures below this are rounding, not noise
 constexpr double kBeyondPixels = 3.0;  // times what pixels can tell of a board's orientation: more is not theirs
 constexpr double kBentLens = 1.2;  // a lens whose pixels scatter with no more than this times the variance fits as well
 constexpr int kRejectRounds = 10;
-constexpr double kPlainGain = 16.0;  // over the poses: by how much more plain weights must predict better, as a share
+constexpr double kPlainGain =
+    16.0;  // over the poses: by how much more plain weights must predict better, as a fraction
 
 // ---- Checks --------------------------------------------------------------------------------------------------------
 
@@ -101,21 +103,7 @@ void check_rows(const HandEyePoses& poses, const Rows& rows) {
     throw std::invalid_argument("all board poses are equal: the camera's result was not read anew");
 }
 
-// ---- Words ---------------------------------------------------------------------------------------------------------
-
-struct Names {
-  std::string camera_parent, board_parent;
-};
-Names names_of(HandEyeSetup setup) {
-  return setup == HandEyeSetup::eye_in_hand ? Names{"flange", "base"} : Names{"base", "flange"};
-}
-
-/// "base z", or the vector where it is not near an axis.
-std::string direction_name(const Eigen::Vector3d& d, const std::string& frame) {
-  Eigen::Index k = 0;
-  if (d.cwiseAbs().maxCoeff(&k) > 0.996) return frame + " " + std::string(1, "xyz"[k]);
-  return frame + " (" + number(d.x(), 3) + ", " + number(d.y(), 3) + ", " + number(d.z(), 3) + ")";
-}
+// ---- Degenerate motions --------------------------------------------------------------------------------------------
 
 Eigen::Vector3d with_positive_largest(Eigen::Vector3d d) {
   Eigen::Index k = 0;
@@ -123,43 +111,26 @@ Eigen::Vector3d with_positive_largest(Eigen::Vector3d d) {
   return d(k) < 0.0 ? Eigen::Vector3d(-d) : d;
 }
 
-void refuse(HandEyeResult* result, HandEyeStatus status) {
-  result->status = status;
-  std::string text;
-  for (const Unobservable& u : result->unobservable)
-    text += (text.empty() ? "" : " ") + u.what + " is not observable; " + u.advice + ".";
-  if (text.empty()) return;
-  text[0] = 'T';  // "the camera's …"
-  result->message = text;
+void refuse(HandEyeResult* result) {
+  result->status = HandEyeStatus::not_observable;
+  result->message = unobservable_message(result->unobservable);
 }
-
-// ---- Degenerate motions --------------------------------------------------------------------------------------------
 
 /// Motions without two axes of rotation. Nothing found: the axis, where there is one only.
 void look_at_axes(const CameraSolution& all, const HandEyeOptions& options, HandEyeResult* result,
                   std::optional<Eigen::Vector3d>* axis) {
   const double noise = std::max(kLeastRotation, kOverNoise * std::min(all.incongruence, kLargestNoise));
-  const std::string parent = names_of(options.setup).camera_parent;
   if (all.principal_rotations(0) < noise) {
     for (int k = 0; k < 3; ++k)
-      result->unobservable.push_back({"the camera's position along " + direction_name(Eigen::Vector3d::Unit(k), parent),
-                                      Eigen::Vector3d::Unit(k), false, std::numeric_limits<double>::infinity(),
-                                      "the hand did not turn: rotate it by 30 deg or more about two axes"});
-    result->status = HandEyeStatus::not_observable;
-    result->message =
-        "The camera's position is not observable: the hand moved without turning. Rotate it by 30 deg or more about "
-        "two axes.";
-    return;
+      result->unobservable.push_back(
+          unobservable(UnobservableReason::no_rotation, Eigen::Vector3d::Unit(k), options.setup));
+    return refuse(result);
   }
   if (all.principal_rotations(1) >= noise) return;
-  const Eigen::Vector3d only = with_positive_largest(all.principal_axes.col(0));
-  *axis = only;
+  *axis = with_positive_largest(all.principal_axes.col(0));
   if (options.known_height) return;
-  result->unobservable.push_back({"the camera's height along " + direction_name(only, parent), only, false,
-                                  std::numeric_limits<double>::infinity(),
-                                  "all rotations are about this one axis: rotate about a second one by 30 deg, or tell "
-                                  "the height (known height)"});
-  refuse(result, HandEyeStatus::not_observable);
+  result->unobservable.push_back(unobservable(UnobservableReason::one_axis, **axis, options.setup));
+  refuse(result);
 }
 
 void look_at_motions(const CameraSolution& solution, HandEyeResult* result) {
@@ -170,24 +141,18 @@ void look_at_motions(const CameraSolution& solution, HandEyeResult* result) {
 
 /// Directions of the camera's position and orientation that stay too wide to be an answer.
 void look_at_errors(const HandEyeOptions& options, double distance, HandEyeResult* result) {
-  const std::string parent = names_of(options.setup).camera_parent;
   const auto look = [&](const Eigen::Matrix3d& C, bool rotation, double limit) {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(C);
     for (int k = 2; k >= 0; --k) {
       const double sigma = std::sqrt(std::max(0.0, eigen.eigenvalues()(k)));
       if (sigma <= limit) continue;
       const Eigen::Vector3d d = with_positive_largest(eigen.eigenvectors().col(k));
-      result->unobservable.push_back(
-          {std::string("the camera's ") + (rotation ? "rotation about " : "position along ") +
-               direction_name(d, parent),
-           d, rotation, sigma,
-           "its standard error would be " + (rotation ? degrees(sigma) : millimetres(sigma)) +
-               ": turn the hand further, by 30 deg or more about two axes, or take more poses"});
+      result->unobservable.push_back(unobservable(UnobservableReason::large_error, d, options.setup, rotation, sigma));
     }
   };
   look(result->working_point_covariance, false, kWidest * distance);
   look(result->camera.covariance.bottomRightCorner<3, 3>(), true, kWidest);
-  if (!result->unobservable.empty()) refuse(result, HandEyeStatus::not_observable);
+  if (!result->unobservable.empty()) refuse(result);
 }
 
 // ---- Results -------------------------------------------------------------------------------------------------------
@@ -216,7 +181,7 @@ struct Work {
 /// Board poses anew from the pixels, with what they weigh.
 void fit_boards(const Camera& camera, Work* work, double* pixel_variance) {
   double sum = 0.0;
-  int freedom = 0;
+  int degrees_of_freedom = 0;
   work->problem.pixel_shape.assign(work->poses.images.size(), Matrix6d::Identity());
   std::vector<double> per_image;
   for (std::size_t i = 0; i < work->poses.images.size(); ++i) {
@@ -225,11 +190,11 @@ void fit_boards(const Camera& camera, Work* work, double* pixel_variance) {
       throw std::invalid_argument("the board's pose in image " + std::to_string(i) +
                                   " does not fit its pixels: is it behind the camera?");
     work->problem.B[i] = fit.T_camera_board, work->problem.pixel_shape[i] = fit.shape;
-    sum += fit.sum, freedom += fit.freedom;
-    per_image.push_back(fit.sum / std::max(1, fit.freedom));
+    sum += fit.sum, degrees_of_freedom += fit.degrees_of_freedom;
+    per_image.push_back(fit.sum / std::max(1, fit.degrees_of_freedom));
   }
   // The median over images: one with misread corners must not weigh on the others.
-  *pixel_variance = std::max(1e-12, freedom > 0 ? median_of(per_image) : sum);
+  *pixel_variance = std::max(1e-12, degrees_of_freedom > 0 ? median_of(per_image) : sum);
 }
 
 LoopNoise noise_asked(const HandEyeOptions& options, const HandEyePoses& poses, const Agreement& agreement) {
@@ -277,15 +242,11 @@ void question_noise(const HandEyeOptions& options, Work* work, HandEyeResult* re
   const auto [plain_position, plain_rotation] = left_out_closures(work->problem, work->fitted, other);
   const double clearly = 1.0 + kPlainGain / static_cast<double>(work->fitted.size());
   if (std::max(position / plain_position, rotation / plain_rotation) < clearly) return;
-  const double freedom = 1.0 - 2.0 / static_cast<double>(work->fitted.size());
-  other.noise.variance = {plain_position * plain_position / 3.0 * freedom, plain.variance[1],
-                          plain_rotation * plain_rotation / 3.0 * freedom, 0.0};
+  const double left = 1.0 - 2.0 / static_cast<double>(work->fitted.size());
+  other.noise.variance = {plain_position * plain_position / 3.0 * left, plain.variance[1],
+                          plain_rotation * plain_rotation / 3.0 * left, 0.0};
   work->fit = refine_loop(work->problem, work->fitted, other.X, other.Y, other.noise, options.max_iterations);
-  result->warnings.push_back(
-      "What is left does not look like noise of robot and camera poses: plain weights predict poses that were left out "
-      "better (" +
-      millimetres(plain_position) + " for " + millimetres(position) +
-      "). The robot's own kinematics may be off: give joint values and the robot model (with kinematics).");
+  warn(result, {HandEyeConcernKind::not_like_noise, plain_position, position});
 }
 
 /// Fit, leave out what does not fit, take back what does, until nothing changes.
@@ -317,15 +278,12 @@ double scatter_beyond_pixels(const LoopProblem& problem, const Rows& rows, const
   return std::sqrt(noise.variance[2] / median_of(by_pixels));
 }
 
-/// Then lens, board or shutter are not what the pixels are told: their noise is no measure, and the loop's own stands.
+/// Then lens, board or shutter are not what was given for the pixels: their noise is no measure, and the loop's own
+/// stands.
 bool beyond_pixels(const LoopProblem& problem, const Rows& rows, const LoopNoise& noise, HandEyeResult* result) {
   const double times = scatter_beyond_pixels(problem, rows, noise);
   if (times < kBeyondPixels) return false;
-  result->warnings.push_back("Boards scatter by " + degrees(std::sqrt(noise.variance[2])) +
-                             " about what the loop expects, " + number(times, 2) +
-                             " times what their pixels can tell: is the lens calibrated, the board flat, did anything "
-                             "move while the image was taken? Board poses are "
-                             "weighed by that scatter, not pixels by theirs.");
+  warn(result, {HandEyeConcernKind::beyond_pixels, std::sqrt(noise.variance[2]), times});
   return true;
 }
 
@@ -405,24 +363,21 @@ void describe_noise(const HandEyeOptions& options, const LoopProblem& problem, c
                   (!problem.pixel_shape.empty() && !std::isfinite(options.pixel_sigma));
 }
 
-/// Where noise was told and the data are worse, standard errors grow by what is missing.
+/// Where noise was given and the data are worse, standard errors grow by what is missing.
 void widen(const LoopNoise& noise, const Rows& rows, LoopEstimate* fit, HandEyeResult* result) {
   if (noise.estimate[0] || noise.estimate[1]) return;
-  const double freedom = std::max(1.0, 6.0 * static_cast<double>(rows.size()) - 12.0),
-               per_freedom = fit->chi2 / freedom;
-  if (per_freedom <= 1.0) return;
-  fit->covariance *= per_freedom;
-  if (per_freedom > 1.0 + 5.0 * std::sqrt(2.0 / freedom))  // five standard deviations of chi^2
-    result->warnings.push_back("The poses scatter " + number(std::sqrt(per_freedom), 3) +
-                               " times as much as the noise that was told; standard errors are widened by that.");
+  const double degrees_of_freedom = std::max(1.0, 6.0 * static_cast<double>(rows.size()) - 12.0),
+               per_degree = fit->chi2 / degrees_of_freedom;
+  if (per_degree <= 1.0) return;
+  fit->covariance *= per_degree;
+  if (per_degree > 1.0 + 5.0 * std::sqrt(2.0 / degrees_of_freedom))  // five standard deviations of chi^2
+    warn(result, {HandEyeConcernKind::noise_too_small, std::sqrt(per_degree)});
 }
 
 void look_at_board_scale(HandEyeResult* result) {
   const double off = result->board_scale - 1.0;
   if (!(std::abs(off) > std::max(4.0 * result->board_scale_sigma, 0.002))) return;
-  result->warnings.push_back("The loop closes better with a board " + number(100.0 * std::abs(off), 3) + " % " +
-                             (off > 0.0 ? "larger" : "smaller") + " than told (standard error " +
-                             number(100.0 * result->board_scale_sigma, 2) + " %): check the size of its squares.");
+  warn(result, {HandEyeConcernKind::board_scale, result->board_scale, result->board_scale_sigma});
 }
 
 /// Hand and board poses both inverted close the loop as well, with camera and board in each other's place.
@@ -430,31 +385,13 @@ void look_behind(const Frames& B, const Rows& rows, HandEyeResult* result) {
   const auto behind = static_cast<std::size_t>(
       std::count_if(rows.begin(), rows.end(), [&](std::size_t i) { return !(B[i].translation().z() > 0.0); }));
   if (behind > rows.size() / 2)
-    result->warnings.push_back(std::to_string(behind) + " of " + std::to_string(rows.size()) +
-                               " boards lie behind the camera (z of the board pose is not "
-                               "positive): does its z axis look out of the lens? If hand and board poses are both "
-                               "inverted, camera and board have changed places.");
+    warn(result, {HandEyeConcernKind::behind_camera, static_cast<double>(behind), static_cast<double>(rows.size())});
 }
-
-std::string reading_message(const HandEyeResult& result, const Agreement& agreement) {
-  const std::string given = "The loop does not close as given (median " + millimetres(agreement.position) + ", " +
-                            degrees(agreement.rotation) + ").";
-  if (result.readings.empty())
-    return given +
-           " No other reading of the poses that was tried closes it: check that every board belongs to its hand pose, "
-           "and how orientations are written.";
-  const Reading& best = result.readings.front();
-  return given + " It closes to " + millimetres(best.position_rms) + ", " + degrees(best.rotation_rms) + " if " +
-         best.explanation + ": reading \"" + best.name + "\".";
-}
-
-/// Does a reading change board poses?
-bool of_board(const std::string& reading) { return reading.find("board-") != std::string::npos; }
 
 /// With images the boards are what was found in them.
 void check_with_images(const HandEyePoses& poses, const HandEyeOptions& options) {
   if (poses.images.empty()) return;
-  if (of_board(options.reading))
+  if (scope_of(options.reading).board)
     throw std::invalid_argument(
         "reading '" + options.reading +
         "' is about board poses; with images they are found, not read: bring hands and images into order instead");
@@ -479,22 +416,20 @@ void turn_boards(const Agreement& agreement, double size, Work* work, HandEyeRes
   }
 }
 
-/// What is told of the noise, and a first idea of what is not.
+/// What is given of the noise, and a first idea of what is not.
 LoopNoise noise_to_start_with(const HandEyeOptions& options, const Agreement& agreement, Work* work,
                               HandEyeResult* result) {
   LoopNoise noise = noise_asked(options, work->poses, agreement);
   if (work->poses.images.empty()) {
     if (std::isfinite(options.hand_position_sigma) != std::isfinite(options.camera_position_sigma))
-      result->warnings.push_back(
-          "Position noise was told of one side, robot or camera, only: what acts is their sum, which was found from "
-          "the data.");
+      warn(result, {HandEyeConcernKind::noise_of_one_side});
     return noise;
   }
   fit_boards(*work->poses.camera, work,
              &noise.variance[3]);  // what pixels scatter about their own board says more than the loop
   if (std::isfinite(options.pixel_sigma)) noise.variance[3] = options.pixel_sigma * options.pixel_sigma;
   if (!noise.estimate[0] && !noise.estimate[1])
-    noise.variance[2] = kExact * kExact, noise.estimate[2] = false;  // all is told
+    noise.variance[2] = kExact * kExact, noise.estimate[2] = false;  // all is given
   return noise;
 }
 
@@ -517,6 +452,82 @@ void fit_poses(const HandEyeOptions& options, const Rows& rows, const LoopNoise&
   result->solver.iterations = work->fit.iterations, result->solver.converged = work->fit.converged;
   result->solver.stopped_because =
       work->fit.converged ? "the step is small beside its standard errors" : "the limit of iterations";
+}
+
+/// The poses in the reading that is asked for, as the refinement sees them.
+Work read_poses(const HandEyePoses& given, const HandEyeOptions& options) {
+  Work work;
+  work.poses = given;
+  apply_reading(options.reading, &work.poses.T_base_hand, &work.poses.T_camera_board);
+  work.held_out = rows_of(given, true);
+  work.problem.setup = options.setup;
+  work.problem.A = work.poses.T_base_hand;
+  work.problem.M = moving_frames(work.problem.A, options.setup);
+  work.problem.B = work.poses.T_camera_board;
+  return work;
+}
+
+Eigen::Vector3d mean_position(const Frames& frames, const Rows& rows) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const std::size_t i : rows) mean += frames[i].translation() / static_cast<double>(rows.size());
+  return mean;
+}
+
+/// Readings that would close the loop. With images boards were found, not read: only their order may be wrong.
+std::vector<Reading> other_readings(const HandEyeOptions& options, const Work& work, const Rows& rows,
+                                    const Agreement& agreement) {
+  if (!options.recognise) return {};
+  std::vector<Reading> readings =
+      find_readings(work.problem.A, work.problem.B, options.setup, rows, agreement.position, agreement.rotation);
+  if (work.poses.images.empty()) return readings;
+  const auto impossible = [](const Reading& reading) {
+    const ReadingScope scope = scope_of(reading.name);
+    return scope.board && !scope.rows;
+  };
+  readings.erase(std::remove_if(readings.begin(), readings.end(), impossible), readings.end());
+  return readings;
+}
+
+/// False: there is no answer, and the result says why. `angles_differ`: hand and board turn by different angles.
+bool closes(const HandEyeOptions& options, const Work& work, const Rows& rows, const Agreement& agreement, double size,
+            bool angles_differ, HandEyeResult* result) {
+  const double open = std::hypot(agreement.position / size, agreement.rotation);
+  if ((result->unobservable.empty() || angles_differ) && open > kDoubtful)
+    result->readings = other_readings(options, work, rows, agreement);
+  if (!result->readings.empty())
+    result->unobservable.clear();  // in another reading they may be seen
+  else if (!result->unobservable.empty())
+    return false;
+  if (result->readings.empty() && !(open > kHopeless)) return true;
+  result->status = HandEyeStatus::not_closing;
+  result->as_given = {"", "", agreement.position, agreement.rotation};
+  result->message = not_closing_message(*result);
+  return false;
+}
+
+/// Pixels are what was measured, where they scatter as they say.
+void use_images(const HandEyeOptions& options, Work* work, HandEyeResult* result) {
+  if (options.refine_camera) refine_lens(options, work, result);
+  if (!beyond_pixels(work->problem, work->fitted, work->fit.noise, result)) fit_images(options, work, result);
+}
+
+/// What was found, how well it is known and what is odd about it.
+void describe(const HandEyeOptions& options, const Agreement& agreement, double size, const Work& work,
+              HandEyeResult* result) {
+  result->camera = {work.fit.X, work.fit.covariance.topLeftCorner<6, 6>()};
+  result->board = {work.fit.Y, work.fit.covariance.bottomRightCorner<6, 6>()};
+  result->working_point_covariance = at_working_point(result->camera, result->working_point);
+  describe_noise(options, work.problem, work.fit.noise, result);
+  describe_poses(options, agreement, work, result);
+  find_board_scale(work.problem, work.fitted, work.fit, result);
+  look_at_board_scale(result);
+  look_behind(work.problem.B, work.fitted, result);
+  look_at_errors(options, std::max(result->working_point.norm(), size), result);
+  if (result->status != HandEyeStatus::done) return;
+  if (!result->solver.converged) result->status = HandEyeStatus::not_converged;
+  result->message = "Camera found from " + std::to_string(work.fitted.size()) + " poses; at the working point " +
+                    millimetres(std::sqrt(result->working_point_covariance.trace() / 3.0)) +
+                    " standard error per axis.";
 }
 
 }  // namespace
@@ -546,98 +557,38 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
   if (!options.is_valid(&error)) throw std::invalid_argument(error);
   check(given);
   check_with_images(given, options);
-  Work work;
-  work.poses = given;
-  apply_reading(options.reading, &work.poses.T_base_hand, &work.poses.T_camera_board);
+  Work work = read_poses(given, options);
   const Rows rows = rows_of(given, false);
-  work.held_out = rows_of(given, true);
   check_rows(work.poses, rows);
 
-  LoopProblem& problem = work.problem;
-  problem.setup = options.setup;
-  problem.A = work.poses.T_base_hand, problem.M = moving_frames(problem.A, options.setup),
-  problem.B = work.poses.T_camera_board;
-
   HandEyeResult result;
-  const CameraSolution all = solve_camera(problem.M, problem.B, rows);
+  const CameraSolution all = solve_camera(work.problem.M, work.problem.B, rows);
   look_at_motions(all, &result);
-  result.working_point = options.working_point ? *options.working_point : Eigen::Vector3d::Zero();
-  if (!options.working_point) {
-    for (const std::size_t i : rows)
-      result.working_point += problem.B[i].translation() / static_cast<double>(rows.size());
-  }
-
-  const auto try_readings = [&](const Agreement& a) {
-    if (options.recognise)
-      result.readings = find_readings(problem.A, problem.B, options.setup, rows, a.position, a.rotation);
-    if (!given.images.empty()) {  // boards were found in them, not read: only their order may be wrong
-      const auto impossible = [](const Reading& r) {
-        return of_board(r.name) && r.name.find("board-one-") == std::string::npos;
-      };
-      result.readings.erase(std::remove_if(result.readings.begin(), result.readings.end(), impossible),
-                            result.readings.end());
-    }
-    return !result.readings.empty();
-  };
-  const auto not_closing = [&](const Agreement& a) {
-    result.status = HandEyeStatus::not_closing;
-    result.message = reading_message(result, a);
-    return result;
-  };
-
+  result.working_point = options.working_point ? *options.working_point : mean_position(work.problem.B, rows);
   std::optional<Eigen::Vector3d> axis;
   look_at_axes(all, options, &result, &axis);
-  CameraSolver solve;
-  if (axis) solve = {*axis, options.known_height.value_or(0.0)};
+  const CameraSolver solve = axis ? CameraSolver{*axis, options.known_height.value_or(0.0)} : CameraSolver{};
   const Agreement agreement =
-      find_agreement(problem.M, problem.B, rows, work.poses.board_symmetries, solve, {options.reject, 200});
-  const double size = make_screws(problem.M, problem.B, agreement.rows).length;
-  const double open = std::hypot(agreement.position / size, agreement.rotation);
-  const bool angles_differ = all.incongruence > kLargestNoise;
-  if ((result.unobservable.empty() || angles_differ) && open > kDoubtful && try_readings(agreement)) {
-    result.unobservable.clear();
-    return not_closing(agreement);
-  }
-  if (!result.unobservable.empty()) return result;
-  if (open > kHopeless) return not_closing(agreement);
+      find_agreement(work.problem.M, work.problem.B, rows, work.poses.board_symmetries, solve, {options.reject, 200});
+  const double size = make_screws(work.problem.M, work.problem.B, agreement.rows).length;
+  if (!closes(options, work, rows, agreement, size, all.incongruence > kLargestNoise, &result)) return result;
 
   turn_boards(agreement, size, &work, &result);
-  look_at_motions(solve_camera(problem.M, problem.B, agreement.rows),
-                  &result);  // of poses that agree: bad ones blur it
-
+  // Of poses that agree: bad ones blur it.
+  look_at_motions(solve_camera(work.problem.M, work.problem.B, agreement.rows), &result);
   const LoopNoise noise = noise_to_start_with(options, agreement, &work, &result);
   if (axis)
-    problem.known =
+    work.problem.known =
         LoopProblem::Known{*axis, options.known_height.value_or(0.0), std::max(options.known_height_sigma, 1e-7)};
-
   fit_poses(options, rows, noise, agreement, &work, &result);
   if (work.fit.singular) {
-    result.unobservable.push_back({"the place of camera and board together", Eigen::Vector3d::Zero(), false,
-                                   std::numeric_limits<double>::infinity(),
-                                   "rotate the hand about two axes by 30 deg or more, and move it"});
-    refuse(&result, HandEyeStatus::not_observable);
+    result.unobservable.push_back(unobservable(UnobservableReason::singular, Eigen::Vector3d::Zero(), options.setup));
+    refuse(&result);
     return result;
   }
   widen(noise, work.fitted, &work.fit, &result);
-  if (!work.poses.images.empty() && options.method == HandEyeMethod::refined) {
-    if (options.refine_camera) refine_lens(options, &work, &result);
-    if (!beyond_pixels(problem, work.fitted, work.fit.noise, &result)) fit_images(options, &work, &result);
-  }
-
-  result.camera.T = work.fit.X, result.board.T = work.fit.Y;
-  result.camera.covariance = work.fit.covariance.topLeftCorner<6, 6>(),
-  result.board.covariance = work.fit.covariance.bottomRightCorner<6, 6>();
-  result.working_point_covariance = at_working_point(result.camera, result.working_point);
-  describe_noise(options, problem, work.fit.noise, &result);
-  describe_poses(options, agreement, work, &result);
-  find_board_scale(problem, work.fitted, work.fit, &result);
-  look_at_board_scale(&result);
-  look_behind(problem.B, work.fitted, &result);
-  look_at_errors(options, std::max(result.working_point.norm(), size), &result);
-  if (result.status != HandEyeStatus::done) return result;
-  if (!result.solver.converged) result.status = HandEyeStatus::not_converged;
-  result.message = "Camera found from " + std::to_string(work.fitted.size()) + " poses; at the working point " +
-                   millimetres(std::sqrt(result.working_point_covariance.trace() / 3.0)) + " standard error per axis.";
+  if (!work.poses.images.empty() && options.method == HandEyeMethod::refined) use_images(options, &work, &result);
+  describe(options, agreement, size, work, &result);
   return result;
 }
 

@@ -189,7 +189,7 @@ BoardFit fit_board(const Camera& camera, const BoardImage& image, const Eigen::I
   BoardFit out;
   out.T_camera_board = start;
   const Eigen::Index n = image.points.cols();
-  out.freedom = static_cast<int>(2 * n) - 6;
+  out.degrees_of_freedom = static_cast<int>(2 * n) - 6;
   const double count = static_cast<double>(2 * n);
   const auto sum_at = [&](const Eigen::Isometry3d& T) { return count * std::pow(pixel_rms(camera, image, T), 2); };
   out.sum = n < 4 ? std::numeric_limits<double>::infinity() : sum_at(start);

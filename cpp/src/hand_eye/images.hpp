@@ -15,7 +15,7 @@ struct BoardFit {
   Eigen::Isometry3d T_camera_board = Eigen::Isometry3d::Identity();
   Matrix6d shape = Matrix6d::Identity();  ///< covariance of (position, turn about its origin) for pixels of unit noise
   double sum = 0.0;                       ///< of squared pixel errors
-  int freedom = 0;                        ///< 2 points - 6
+  int degrees_of_freedom = 0;             ///< 2 points - 6
   bool converged = false;
 };
 

@@ -88,6 +88,73 @@ Matrix6d inverted(const Eigen::Isometry3d& T) {
   return J;
 }
 
+/// Where to start: hand-eye alone. A robot that is off is no reason to leave poses out.
+HandEyeResult start_of(const HandEyePoses& poses, HandEyeOptions options) {
+  options.reject = false;
+  options.known_height.reset();
+  HandEyeResult start = handeye(poses, options);
+  if (start.status == HandEyeStatus::not_observable || start.status == HandEyeStatus::not_closing)
+    throw std::invalid_argument(start.message);
+  return start;
+}
+
+/// The robot whose tool is the camera, carried on to where boards are, or the board; and its base in the other's frame.
+Robot nominal_robot(const Robot& robot, const HandEyeResult& start, const Eigen::Isometry3d& at_board, bool in_hand) {
+  Robot out = robot;
+  out.targets.resize(1);
+  const Eigen::Isometry3d T_last_flange = robot.targets[0].T_last_target;
+  out.targets[0].T_last_target = in_hand ? T_last_flange * start.camera.T * at_board : T_last_flange * start.board.T;
+  out.T_measurement_base = (in_hand ? start.board.T : start.camera.T).inverse(Eigen::Isometry);
+  out.anchor.reset();
+  return out;
+}
+
+/// Both kinds of error weigh by what they turn out to be: 1 rad counts as the ratio of the two.
+Identification identify_weighed(const Robot& nominal, const Measurements& measurements, IdentifyOptions options) {
+  Identification found = identify(nominal, measurements, options);
+  options.rotation_length = found.train.after.rms / found.train.after.rotation_rms;
+  if (options.rotation_length > 0.0 && std::isfinite(options.rotation_length))
+    found = identify(nominal, measurements, options);
+  return found;
+}
+
+/// Camera and board from the tool and the base that were identified.
+void find_frames(const Identification& found, const Eigen::Isometry3d& T_last_flange, const Eigen::Isometry3d& at_board,
+                 bool in_hand, HandEyeKinematics* out) {
+  const Eigen::Isometry3d T_flange_target =
+      T_last_flange.inverse(Eigen::Isometry) * found.robot.targets[0].T_last_target;
+  const Eigen::Isometry3d T_base_measurement = found.robot.T_measurement_base.inverse(Eigen::Isometry);
+  const Matrix6d at_flange = turned(T_last_flange.inverse(Eigen::Isometry)),
+                 from_base = inverted(found.robot.T_measurement_base);
+  UncertainFrame on_hand{T_flange_target * at_board.inverse(Eigen::Isometry), Matrix6d::Zero()},
+      in_base{T_base_measurement, Matrix6d::Zero()};
+  const Matrix6d J = through(T_flange_target, at_board.inverse(Eigen::Isometry)) * at_flange;
+  on_hand.covariance = J * frame_covariance(found, found.robot.targets[0].name) * J.transpose();
+  in_base.covariance = from_base * frame_covariance(found, "base") * from_base.transpose();
+  out->camera = in_hand ? on_hand : in_base;
+  out->board = in_hand ? in_base : on_hand;
+}
+
+/// Closures with a robot, by what it predicts; `at_board` as above, identity for the board on the hand.
+std::vector<HandEyeResidual> closures(const Robot& model, const Measurements& measurements, const HandEyePoses& poses,
+                                      const Eigen::Isometry3d& at_board, bool in_hand) {
+  const Prediction predicted = predict(model, measurements);
+  std::vector<HandEyeResidual> residuals(poses.T_camera_board.size());
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    T.linear() = Eigen::Quaterniond(predicted.orientation(row, 0), predicted.orientation(row, 1),
+                                    predicted.orientation(row, 2), predicted.orientation(row, 3))
+                     .toRotationMatrix();
+    T.translation() = predicted.position.row(row).transpose();
+    if (in_hand) T = at_board * T.inverse(Eigen::Isometry);  // the board in the camera
+    const Vector6d e = closure(T, poses.T_camera_board[i]);
+    residuals[i].position = residuals[i].position_left_out = e.head<3>().norm();
+    residuals[i].rotation = residuals[i].rotation_left_out = e.tail<3>().norm();
+  }
+  return residuals;
+}
+
 }  // namespace
 
 HandEyeKinematics handeye_with_kinematics(
@@ -99,75 +166,26 @@ HandEyeKinematics handeye_with_kinematics(
   if (robot.targets.empty())
     throw std::invalid_argument("the robot has no tool: give the flange, identity if it is the last link's frame");
   const bool in_hand = options.setup == HandEyeSetup::eye_in_hand;
-  HandEyeKinematics out;
-
-  // Where to start: hand-eye alone. A robot that is off is no reason to leave poses out.
-  HandEyeOptions start_options = options;
-  start_options.reject = false;
-  start_options.known_height.reset();
-  const HandEyeResult start = handeye(poses, start_options);
-  if (start.status == HandEyeStatus::not_observable || start.status == HandEyeStatus::not_closing)
-    throw std::invalid_argument(start.message);
-  out.working_point = start.working_point;
-
+  const HandEyeResult start = start_of(poses, options);
   Eigen::Isometry3d at_board = Eigen::Isometry3d::Identity();  // from the camera to where boards are
   if (in_hand) at_board.translation() = start.working_point;
-  Robot nominal = robot;
-  const Eigen::Isometry3d T_last_flange = robot.targets[0].T_last_target;
-  nominal.targets.resize(1);
-  nominal.targets[0].T_last_target =
-      in_hand ? T_last_flange * start.camera.T * at_board : T_last_flange * start.board.T;
-  nominal.T_measurement_base = (in_hand ? start.board.T : start.camera.T).inverse(Eigen::Isometry);
-  nominal.anchor.reset();
-
   Frames measured;
   for (const Eigen::Isometry3d& B : poses.T_camera_board)
     measured.push_back(in_hand ? B.inverse(Eigen::Isometry) * at_board : B);
   Table table;
   fill(reading, poses, measured, &table);
-  // Both kinds of error weigh by what they turn out to be: 1 rad counts as the ratio of the two.
-  IdentifyOptions weighed = fit;
-  out.identification = identify(nominal, table.measurements, weighed);
-  weighed.rotation_length = out.identification.train.after.rms / out.identification.train.after.rotation_rms;
-  if (weighed.rotation_length > 0.0 && std::isfinite(weighed.rotation_length))
-    out.identification = identify(nominal, table.measurements, weighed);
-  const Identification& found = out.identification;
 
-  const Eigen::Isometry3d T_flange_target =
-      T_last_flange.inverse(Eigen::Isometry) * found.robot.targets[0].T_last_target;
-  const Eigen::Isometry3d T_base_measurement = found.robot.T_measurement_base.inverse(Eigen::Isometry);
-  const Matrix6d at_flange = turned(T_last_flange.inverse(Eigen::Isometry)),
-                 from_base = inverted(found.robot.T_measurement_base);
-  UncertainFrame on_hand{T_flange_target * at_board.inverse(Eigen::Isometry), Matrix6d::Zero()},
-      in_base{T_base_measurement, Matrix6d::Zero()};
-  const Matrix6d J = through(T_flange_target, at_board.inverse(Eigen::Isometry)) * at_flange;
-  on_hand.covariance = J * frame_covariance(found, found.robot.targets[0].name) * J.transpose();
-  in_base.covariance = from_base * frame_covariance(found, "base") * from_base.transpose();
-  out.camera = in_hand ? on_hand : in_base;
-  out.board = in_hand ? in_base : on_hand;
+  HandEyeKinematics out;
+  out.working_point = start.working_point;
+  out.identification = identify_weighed(nominal_robot(robot, start, at_board, in_hand), table.measurements, fit);
+  const Identification& found = out.identification;
+  find_frames(found, robot.targets[0].T_last_target, at_board, in_hand, &out);
   out.working_point_covariance = at_working_point(out.camera, out.working_point);
 
-  const auto closures = [&](const Robot& model) {
-    const Prediction predicted = predict(model, table.measurements);
-    std::vector<HandEyeResidual> residuals(measured.size());
-    for (std::size_t i = 0; i < measured.size(); ++i) {
-      const auto row = static_cast<Eigen::Index>(i);
-      Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-      T.linear() = Eigen::Quaterniond(predicted.orientation(row, 0), predicted.orientation(row, 1),
-                                      predicted.orientation(row, 2), predicted.orientation(row, 3))
-                       .toRotationMatrix();
-      T.translation() = predicted.position.row(row).transpose();
-      if (in_hand) T = at_board * T.inverse(Eigen::Isometry);  // the board in the camera
-      const Vector6d e = closure(T, poses.T_camera_board[i]);
-      residuals[i].position = residuals[i].position_left_out = e.head<3>().norm();
-      residuals[i].rotation = residuals[i].rotation_left_out = e.tail<3>().norm();
-    }
-    return residuals;
-  };
   Rows train, test;
   for (std::size_t i = 0; i < measured.size(); ++i) (table.measurements.set[i] != 0 ? test : train).push_back(i);
-  const std::vector<HandEyeResidual> before = closures(found.before);
-  out.residuals = closures(found.robot);
+  const std::vector<HandEyeResidual> before = closures(found.before, table.measurements, poses, at_board, in_hand);
+  out.residuals = closures(found.robot, table.measurements, poses, at_board, in_hand);
   for (const std::size_t i : found.rejected_rows) out.residuals[i].rejected = true;
   out.train_before = errors_of(before, train, false), out.train_after = errors_of(out.residuals, train, false);
   if (!test.empty())

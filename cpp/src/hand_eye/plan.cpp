@@ -24,7 +24,7 @@ using namespace hand_eye;
 namespace {
 
 constexpr double kOrbit = 1.0;      // [rad] how far a new view turns away from a measured one
-constexpr double kDistance = 0.25;  // share by which its distance changes
+constexpr double kDistance = 0.25;  // fraction by which its distance changes
 
 /// Views of the board that the camera had.
 struct Seen {

@@ -8,6 +8,8 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
+#include <numeric>
 #include <stdexcept>
 
 #include "hand_eye/consensus.hpp"
@@ -31,7 +33,8 @@ enum class Part { rotation, inversion, position, rows };
 
 /// A reading of one side's poses.
 struct Atom {
-  std::string name, explanation;
+  std::string name;
+  std::string explanation;  ///< with {hand}, {camera} and {board} for what they are called
   Part part;
   bool hand;
   Change change;
@@ -101,13 +104,13 @@ Eigen::Vector3d in_order(const std::array<int, 3>& order, const Eigen::Vector3d&
 
 /// What was built as `as` is built as `is` from the same three numbers.
 void add_orders(bool hand, std::vector<Atom>* out) {
-  const std::string side = hand ? "hand" : "board";
+  const std::string side = hand ? "hand" : "board", noun = "{" + side + "}";
   const auto tait_bryan = [](const Order& o) { return o.axes[0] != o.axes[2]; };
   const auto even = [](const std::array<int, 3>& axes) { return (axes[1] - axes[0] + 3) % 3 == 1; };
   const auto add = [&](const std::string& is, const std::string& as, const std::string& how,
                        std::function<Eigen::Matrix3d(const Eigen::Matrix3d&)> f) {
     out->push_back({side + "-" + is + "-as-" + as + how,
-                    side + " angles are " + is +
+                    noun + " angles are " + is +
                         (how.empty() ? "" : ", the three numbers in the order of the rotations,") +
                         " and were read as " + as,
                     Part::rotation, hand, [f](const Eigen::Isometry3d& T) { return with_rotation(T, f(T.linear())); }});
@@ -132,13 +135,13 @@ void add_orders(bool hand, std::vector<Atom>* out) {
     add(o.name, "rotation-vector", "",
         [o](const Eigen::Matrix3d& R) { return compose(o.axes, in_order(o.axes, vector_from_rotation(R))); });
     out->push_back({side + "-radians-as-degrees-" + o.name,
-                    side + " angles (" + o.name + ") are in radians and were read as degrees", Part::rotation, hand,
+                    noun + " angles (" + o.name + ") are in radians and were read as degrees", Part::rotation, hand,
                     [o](const Eigen::Isometry3d& T) {
                       return with_rotation(
                           T, compose(o.axes, Eigen::Vector3d(180.0 / kPi * decompose(o.axes, T.linear()))));
                     }});
   }
-  out->push_back({side + "-radians-as-degrees", side + " rotation vectors are in radians and were read as degrees",
+  out->push_back({side + "-radians-as-degrees", noun + " rotation vectors are in radians and were read as degrees",
                   Part::rotation, hand, [](const Eigen::Isometry3d& T) {
                     return with_rotation(T, rotation_from_vector(180.0 / kPi * vector_from_rotation(T.linear())));
                   }});
@@ -149,11 +152,11 @@ void add_orders(bool hand, std::vector<Atom>* out) {
 void add_side(bool hand, std::vector<Atom>* out) {
   const std::string side = hand ? "hand" : "board";
   const auto add = [&](const std::string& name, const std::string& text, Part part, Change change) {
-    out->push_back({side + "-" + name, side + " " + text, part, hand, std::move(change)});
+    out->push_back({side + "-" + name, "{" + side + "} " + text, part, hand, std::move(change)});
   };
   add("inverted",
-      hand ? "poses are inverted (base in hand), or the set-up is the other one (eye-in-hand, eye-to-hand)"
-           : "poses are inverted (camera in board)",
+      hand ? "poses are inverted (base in {hand}), or the set-up is the other one (eye-in-hand, eye-to-hand)"
+           : "poses are inverted ({camera} in {board})",
       Part::inversion, [](const Eigen::Isometry3d& T) { return T.inverse(Eigen::Isometry); });
   add("millimetres", "positions are in mm and were read as m", Part::position, [](Eigen::Isometry3d T) {
     T.translation() *= 1e-3;
@@ -205,9 +208,9 @@ const std::vector<Atom>& atoms() {
     add_side(true, &out);
     add_side(false, &out);
     out.push_back(
-        {"board-one-later", "every board belongs to the hand pose of the next row", Part::rows, false, nullptr});
-    out.push_back(
-        {"board-one-earlier", "every board belongs to the hand pose of the row before", Part::rows, false, nullptr});
+        {"board-one-later", "every {board} belongs to the {hand} pose of the next row", Part::rows, false, nullptr});
+    out.push_back({"board-one-earlier", "every {board} belongs to the {hand} pose of the row before", Part::rows, false,
+                   nullptr});
     return out;
   }();
   return list;
@@ -293,6 +296,89 @@ bool in_front(const Frames& board) {
 
 std::string joined(const std::string& a, const std::string& b) { return a.empty() ? b : b.empty() ? a : a + "+" + b; }
 
+/// An atom's explanation with its nouns.
+std::string in_words(std::string text, const HandEyeNouns& nouns) {
+  for (const auto& [mark, noun] : {std::pair<std::string, const std::string&>{"{hand}", nouns.hand},
+                                   {"{camera}", nouns.camera},
+                                   {"{board}", nouns.board}}) {
+    for (std::size_t at = text.find(mark); at != std::string::npos; at = text.find(mark, at + noun.size()))
+      text.replace(at, mark.size(), noun);
+  }
+  return text;
+}
+
+// ---- The search ----------------------------------------------------------------------------------------------------
+
+/// A reading and how well the loop closes in it.
+struct Found {
+  double distance;
+  std::size_t changes;  ///< one more where lengths are not those of an arm in its cell
+  Reading reading;
+};
+
+double length_of(const Frames& hand, const Frames& board, HandEyeSetup setup) {
+  Rows all(hand.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return make_screws(moving_frames(hand, setup), board, all).length;
+}
+
+/// As given, and the readings that bring the angles of hand and board together: how far a motion turns does not depend
+/// on frames or inversions. Those that keep every angle (transposed, left-handed) tie with the given one.
+std::vector<std::string> readings_of_rotations(const Frames& hand, const Frames& board, bool with_rows) {
+  const double given = incongruence(hand, board);
+  std::vector<std::pair<double, std::string>> turns;
+  for (const Atom& atom : atoms()) {
+    if (atom.part != Part::rotation && atom.part != Part::rows) continue;
+    if (atom.part == Part::rows && !with_rows) continue;
+    Frames h = hand, b = board;
+    apply_reading(atom.name, &h, &b);
+    turns.emplace_back(incongruence(h, b), atom.name);
+  }
+  std::stable_sort(turns.begin(), turns.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<std::string> kept{""};
+  for (const auto& [difference, name] : turns)
+    if (kept.size() <= kKept && difference < std::max(0.6 * given, given + 1e-9)) kept.push_back(name);
+  return kept;
+}
+
+/// Each with every reading of the positions and every inversion. Both inverted close as well as none: camera and board
+/// change places. Positions are put right before poses are inverted.
+std::vector<std::string> worth_trying(const std::vector<std::string>& rotations) {
+  std::vector<std::string> positions{""};
+  for (const Atom& atom : atoms())
+    if (atom.part == Part::position) positions.push_back(atom.name);
+  std::vector<std::string> names;
+  for (const std::string& turn : rotations)
+    for (const std::string& inversion : {std::string(), std::string("hand-inverted"), std::string("board-inverted")})
+      for (const std::string& position : positions) {
+        const std::string name = joined(joined(turn, position), inversion);
+        if (!name.empty()) names.push_back(name);
+      }
+  return names;
+}
+
+Found close_in(const std::string& name, Frames hand, Frames board, HandEyeSetup setup) {
+  apply_reading(name, &hand, &board);
+  Found found;
+  found.reading = close_up(name, hand, board, setup, &found.distance);
+  found.changes = parts_of(name).size() + (plausible(hand) && plausible(board) && in_front(board) ? 0 : 1);
+  return found;
+}
+
+/// Of those that close about as well as the best the simplest first, then the others.
+void sort_readings(std::vector<Found>* found) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const Found& f : *found) best = std::min(best, f.distance);
+  std::stable_sort(found->begin(), found->end(), [&](const Found& a, const Found& b) {
+    const bool a_good = a.distance <= kAsGood * best, b_good = b.distance <= kAsGood * best;
+    if (a_good != b_good) return a_good;
+    if (!a_good) return a.distance < b.distance;
+    const bool a_hand = scope_of(a.reading.name).hand_first,
+               b_hand = scope_of(b.reading.name).hand_first;  // a mirror may be on either side
+    return a.changes != b.changes ? a.changes < b.changes : a_hand != b_hand ? a_hand : a.distance < b.distance;
+  });
+}
+
 }  // namespace
 
 void apply_reading(const std::string& name, Frames* hand, Frames* board) {
@@ -312,10 +398,16 @@ void apply_reading(const std::string& name, Frames* hand, Frames* board) {
   }
 }
 
-std::string explain_reading(const std::string& name) {
-  std::string text;
-  for (const std::string& part : parts_of(name)) text += (text.empty() ? "" : "; ") + find_atom(part).explanation;
-  return text;
+ReadingScope scope_of(const std::string& name) {
+  ReadingScope scope;
+  if (name.empty()) return scope;
+  for (const std::string& part : parts_of(name)) {
+    const Atom& atom = find_atom(part);
+    scope.board = scope.board || !atom.hand;
+    scope.rows = scope.rows || atom.part == Part::rows;
+  }
+  scope.hand_first = find_atom(parts_of(name)[0]).hand;
+  return scope;
 }
 
 std::vector<Reading> find_readings(const Frames& T_base_hand, const Frames& T_camera_board, HandEyeSetup setup,
@@ -324,72 +416,16 @@ std::vector<Reading> find_readings(const Frames& T_base_hand, const Frames& T_ca
   const std::size_t stride = std::max<std::size_t>(1, rows.size() / kPoses);
   for (std::size_t r = 0; r < rows.size(); r += stride)
     hand.push_back(T_base_hand[rows[r]]), board.push_back(T_camera_board[rows[r]]);
-
-  // Rotations first: how far a motion turns does not depend on frames or inversions.
-  std::vector<std::pair<double, std::string>> turns;
-  const double given = incongruence(hand, board);
-  turns.emplace_back(given, "");
-  for (const Atom& atom : atoms()) {
-    if (atom.part != Part::rotation && atom.part != Part::rows) continue;
-    if (atom.part == Part::rows && stride != 1) continue;
-    Frames h = hand, b = board;
-    apply_reading(atom.name, &h, &b);
-    turns.emplace_back(incongruence(h, b), atom.name);
-  }
-  std::stable_sort(turns.begin() + 1, turns.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  // Readings that keep every angle (transposed, left-handed) tie with the given one.
-  std::vector<std::string> kept{""};
-  for (std::size_t k = 1; k < turns.size() && kept.size() <= kKept; ++k)
-    if (turns[k].first < std::max(0.6 * given, given + 1e-9)) kept.push_back(turns[k].second);
-
-  struct Found {
-    double distance;
-    std::size_t changes;
-    Reading reading;
-  };  // changes: one more where lengths are not those of an arm in its cell
+  const double as_given = std::hypot(position / length_of(hand, board, setup), rotation);
   std::vector<Found> found;
-  double length = 1.0;
-  for (const std::string& turn : kept)
-    // Both inverted close as well as none: camera and board change places.
-    for (const std::string& inversion : {std::string(), std::string("hand-inverted"), std::string("board-inverted")}) {
-      std::vector<std::string> positions{""};
-      for (const Atom& atom : atoms())
-        if (atom.part == Part::position) positions.push_back(atom.name);
-      for (const std::string& moved_by : positions) {
-        // Positions are put right before poses are inverted.
-        const std::string name = joined(joined(turn, moved_by), inversion);
-        if (name.empty()) {
-          Rows all(hand.size());
-          for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
-          length = make_screws(moving_frames(hand, setup), board, all).length;
-          continue;
-        }
-        Frames h = hand, b = board;
-        apply_reading(name, &h, &b);
-        double distance = 0.0;
-        const Reading reading = close_up(name, h, b, setup, &distance);
-        found.push_back(
-            {distance, parts_of(name).size() + (plausible(h) && plausible(b) && in_front(b) ? 0 : 1), reading});
-      }
-    }
-  const double as_given = std::hypot(position / length, rotation);
-  std::vector<Found> better;
-  for (const Found& f : found)
-    if (std::isfinite(f.distance) && f.distance < kClearlyBetter * as_given && f.distance < 0.1) better.push_back(f);
-  if (better.empty()) return {};
-  const double best = std::min_element(better.begin(), better.end(), [](const Found& a, const Found& b) {
-                        return a.distance < b.distance;
-                      })->distance;
-  std::stable_sort(better.begin(), better.end(), [&](const Found& a, const Found& b) {
-    const bool a_good = a.distance <= kAsGood * best, b_good = b.distance <= kAsGood * best;
-    if (a_good != b_good) return a_good;
-    if (!a_good) return a.distance < b.distance;
-    const bool a_hand = a.reading.name.rfind("hand", 0) == 0,
-               b_hand = b.reading.name.rfind("hand", 0) == 0;  // a mirror may be on either side
-    return a.changes != b.changes ? a.changes < b.changes : a_hand != b_hand ? a_hand : a.distance < b.distance;
-  });
+  for (const std::string& name : worth_trying(readings_of_rotations(hand, board, stride == 1))) {
+    const Found here = close_in(name, hand, board, setup);
+    if (std::isfinite(here.distance) && here.distance < kClearlyBetter * as_given && here.distance < 0.1)
+      found.push_back(here);
+  }
+  sort_readings(&found);
   std::vector<Reading> out;
-  for (std::size_t k = 0; k < std::min<std::size_t>(3, better.size()); ++k) out.push_back(better[k].reading);
+  for (std::size_t k = 0; k < std::min<std::size_t>(3, found.size()); ++k) out.push_back(found[k].reading);
   return out;
 }
 
@@ -398,9 +434,16 @@ std::vector<Reading> find_readings(const Frames& T_base_hand, const Frames& T_ca
 namespace truing {
 using namespace hand_eye;
 
+std::string explain_reading(const std::string& name, const HandEyeNouns& nouns) {
+  std::string text;
+  for (const std::string& part : parts_of(name))
+    text += (text.empty() ? "" : "; ") + in_words(find_atom(part).explanation, nouns);
+  return text;
+}
+
 std::vector<Reading> handeye_readings() {
   std::vector<Reading> out;
-  for (const Atom& atom : atoms()) out.push_back({atom.name, atom.explanation, 0.0, 0.0});
+  for (const Atom& atom : atoms()) out.push_back({atom.name, in_words(atom.explanation, {}), 0.0, 0.0});
   return out;
 }
 

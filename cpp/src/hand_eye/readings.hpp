@@ -17,8 +17,13 @@ namespace truing::hand_eye {
 /// are.
 void apply_reading(const std::string& name, Frames* hand, Frames* board);
 
-/// In words.
-std::string explain_reading(const std::string& name);
+/// What a reading, or several joined by "+", is about.
+struct ReadingScope {
+  bool hand_first = false;  ///< the first of them is of the hand's poses
+  bool board = false;       ///< one is of the boards, or of the rows they belong to
+  bool rows = false;        ///< one is of the rows
+};
+ReadingScope scope_of(const std::string& name);
 
 /// Readings in which the loop of `rows` closes clearly better than in the one given (medians), best first, simplest
 /// among equals.

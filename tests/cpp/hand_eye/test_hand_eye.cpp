@@ -342,7 +342,7 @@ TEST_CASE("noise told too small is said, and standard errors are widened") {
   const HandEyeResult told = handeye(s.poses, o), found = handeye(s.poses, options_for(s));
   REQUIRE(told.rejected.empty());
   REQUIRE(told.warnings.size() == 1);
-  CHECK(told.warnings[0].find("noise that was told") != std::string::npos);
+  CHECK(told.warnings[0].find("noise that was given") != std::string::npos);
   CHECK(std::sqrt(told.working_point_covariance.trace()) > 0.5 * std::sqrt(found.working_point_covariance.trace()));
 }
 
@@ -540,7 +540,7 @@ TEST_CASE("a board of another size is said") {
   const HandEyeResult r = handeye(s.poses, options_for(s));
   CHECK(r.board_scale == doctest::Approx(1.0 / 0.96).epsilon(0.01));
   CHECK(std::any_of(r.warnings.begin(), r.warnings.end(),
-                    [](const std::string& w) { return w.find("% larger than told") != std::string::npos; }));
+                    [](const std::string& w) { return w.find("% larger than given") != std::string::npos; }));
 }
 
 // ---- What motions cannot show --------------------------------------------------------------------------------------
