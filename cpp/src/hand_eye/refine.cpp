@@ -12,12 +12,13 @@
 #include <Eigen/LU>
 
 #include "math/frame.hpp"
+#include "math/gauss_newton.hpp"
 
 namespace truing::hand_eye {
 namespace {
 
 constexpr double kStep = 1e-9;          // the estimate stands when a step is this small beside its standard errors …
-constexpr double kVarianceStep = 1e-2;  // … and variances change by no more than this share
+constexpr double kVarianceStep = 1e-2;  // … and variances change by no more than this fraction
 constexpr double kLargestChange = 2.0;  // of a variance's logarithm in one step
 constexpr double kPriorSpread =
     3.0;  // [log of variance] of the weak prior that keeps what data cannot split near an even split
@@ -25,6 +26,7 @@ constexpr double kLeastVariance = 1e-18;  // [m^2, rad^2, px^2] a nanometre, a n
 constexpr double kSingular = 1e-13;       // smallest eigenvalue of the unit-diagonal information
 
 using Shapes = std::array<Matrix6d, kVariances>;
+using Vector12d = Eigen::Matrix<double, 12, 1>;
 
 /// V = sum of variance times shape.
 Shapes shapes(const LoopProblem& problem, std::size_t i, const Eigen::Vector3d& w) {
@@ -69,8 +71,8 @@ Matrix6d weighted_sum(const Shapes& shape, const LoopNoise& noise) {
 
 /// Sums over poses for a step of X, Y and of the variances.
 struct LoopSums {
-  Matrix12d N = Matrix12d::Zero();                                        // J^T W J, W = V^-1
-  Eigen::Matrix<double, 12, 1> g = Eigen::Matrix<double, 12, 1>::Zero();  // J^T W e
+  Matrix12d N = Matrix12d::Zero();  // J^T W J, W = V^-1
+  Vector12d g = Vector12d::Zero();  // J^T W e
   double chi2 = 0.0;
   // For variances: W V_k W between closures, between columns; traces.
   std::array<double, 3> trace{};                                                             // tr W V_k
@@ -120,7 +122,7 @@ LoopSums sum_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Iso
 
 /// Inverse of the information, by unit diagonal; false where it has none.
 bool invert(const Matrix12d& N, Matrix12d* C) {
-  const Eigen::Matrix<double, 12, 1> unit = N.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const Vector12d unit = N.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
   const Eigen::SelfAdjointEigenSolver<Matrix12d> eigen(unit.asDiagonal() * N * unit.asDiagonal());
   if (!(eigen.eigenvalues()(0) > kSingular * eigen.eigenvalues()(11))) return false;
   *C = unit.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
@@ -157,7 +159,7 @@ double step_variances(const LoopSums& s, const Matrix12d& C, std::size_t rows, S
     }
   }
   F.diagonal().array() += 1.0 / (kPriorSpread * kPriorSpread);
-  // The prior pulls back to an even split of what there is: shares of the trace.
+  // The prior pulls back to an even split of what there is: fractions of the trace.
   double total = 0.0;
   for (const int k : free) total += noise->variance[static_cast<std::size_t>(k)] * s.trace[static_cast<std::size_t>(k)];
   for (Eigen::Index a = 0; a < n; ++a) {
@@ -182,30 +184,52 @@ double step_variances(const LoopSums& s, const Matrix12d& C, std::size_t rows, S
   return largest;
 }
 
+/// X, Y and the variances where the iteration stands.
+struct LoopIteration {
+  const LoopProblem& problem;
+  const Rows& rows;
+  LoopEstimate* out;
+  LoopSums sums;
+  Stride stride;
+  double variance_change = 0.0;  ///< largest, of a logarithm
+
+  bool estimates() const {
+    const std::array<bool, kVariances>& asked = out->noise.estimate;
+    return asked[0] || asked[1] || asked[2];
+  }
+  NormalSystem<12> system() {
+    sums = sum_loop(problem, rows, out->X, out->Y, out->noise, estimates());
+    return {sums.N, sums.g, sums.chi2};
+  }
+  void move(const Vector12d& step) {
+    out->X = moved(out->X, step.head<6>());
+    out->Y = moved(out->Y, step.tail<6>());
+  }
+  bool settled(const NormalSystem<12>& at, const Vector12d& step) {
+    const double length = std::sqrt(std::max(0.0, step.dot(at.gram * step)) / 12.0);  // in standard errors
+    out->chi2 = at.cost + at.gradient.dot(step);
+    // Variances from closures that the step has already moved: far from the fit they would only see its errors.
+    if (estimates() && length < 1.0)
+      variance_change = step_variances(sums, out->covariance, rows.size(), &stride, &out->noise);
+    return length < kStep * (estimates() ? 1e4 : 1.0) && (!estimates() || variance_change < kVarianceStep);
+  }
+};
+
 }  // namespace
 
 LoopEstimate refine_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Isometry3d& X,
                          const Eigen::Isometry3d& Y, LoopNoise noise, int max_iterations) {
   LoopEstimate out;
   out.X = X, out.Y = Y, out.noise = noise;
-  const bool estimate = noise.estimate[0] || noise.estimate[1] || noise.estimate[2];
-  double change = 0.0;
-  Stride stride;
-  for (out.iterations = 0; out.iterations < max_iterations && !out.converged; ++out.iterations) {
-    LoopSums s = sum_loop(problem, rows, out.X, out.Y, out.noise, estimate);
-    Matrix12d C;
-    if (!s.N.allFinite() || !invert(s.N, &C)) {
-      out.singular = true;
-      return out;
-    }
-    const Eigen::Matrix<double, 12, 1> step = -C * s.g;
-    const double length = std::sqrt(std::max(0.0, step.dot(s.N * step)) / 12.0);  // in standard errors
-    out.X = moved(out.X, step.head<6>()), out.Y = moved(out.Y, step.tail<6>());
-    out.covariance = C, out.chi2 = s.chi2 + s.g.dot(step);
-    // Variances from closures that the step has already moved: far from the fit they would only see its errors.
-    if (estimate && length < 1.0) change = step_variances(s, C, rows.size(), &stride, &out.noise);
-    out.converged = length < kStep * (estimate ? 1e4 : 1.0) && (!estimate || change < kVarianceStep);
-  }
+  LoopIteration iteration{problem, rows, &out, {}, {}};
+  const auto solve = [&out](const NormalSystem<12>& system) -> Vector12d {
+    if (!system.gram.allFinite() || !invert(system.gram, &out.covariance)) return Vector12d::Constant(kNaN);
+    return -out.covariance * system.gradient;
+  };
+  const Iterations ended = gauss_newton(&iteration, max_iterations, solve);
+  out.iterations = ended.steps;
+  out.converged = ended.reason == StopReason::settled;
+  out.singular = ended.reason == StopReason::singular;
   return out;
 }
 

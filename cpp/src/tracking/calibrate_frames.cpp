@@ -5,7 +5,6 @@
 #include "truing/tracking/calibrate.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <stdexcept>
 
@@ -13,6 +12,8 @@
 #include <Eigen/Eigenvalues>
 
 #include "math/constants.hpp"
+#include "math/direction.hpp"
+#include "math/gauss_newton.hpp"
 #include "math/registration.hpp"
 #include "math/rotation.hpp"
 #include "math/text.hpp"
@@ -31,9 +32,9 @@ using Matrix12d = Eigen::Matrix<double, 12, 12>;
 using Vector12d = Eigen::Matrix<double, 12, 1>;
 using Matrix6x12 = Eigen::Matrix<double, 6, 12>;
 
-constexpr double kFreedom = 5.0;    // degrees of freedom of the t distribution that errors have
-constexpr double kLeastTurn = 0.1;  // [rad] pivot poses that turn less do not show the tool point
-constexpr double kExact = 1e-9;     // [m], [rad] errors below this are rounding
+constexpr double kDegreesOfFreedom = 5.0;  // of the t distribution that errors have
+constexpr double kLeastTurn = 0.1;         // [rad] pivot poses that turn less do not show the tool point
+constexpr double kExact = 1e-9;            // [m], [rad] errors below this are rounding
 
 // ---- Standstills ----------------------------------------------------------------------------------------------------
 
@@ -73,20 +74,64 @@ void average_tracker(const std::vector<PoseSample>& tracker, double start, doubl
 
 // ---- Frames ---------------------------------------------------------------------------------------------------------
 
-/// What `handeye` says of hand, camera and board, said of flange, tracker and receiver.
-std::string in_our_words(std::string text) {
-  const std::pair<const char*, const char*> words[] = {
-      {"camera", "tracker"}, {"board", "receiver"}, {"hand", "flange"}};
-  const auto letter = [&](std::size_t at) {
-    return at < text.size() && (std::isalpha(static_cast<unsigned char>(text[at])) || text[at] == '-');
-  };
-  for (const auto& [theirs, ours] : words) {
-    const std::string from = theirs, to = ours;
-    for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + 1)) {
-      if (!letter(at + from.size()) && (at == 0 || !letter(at - 1))) text.replace(at, from.size(), to);
+// What hand-eye found, in the words of this room: the camera is the tracker, the board the receiver, the hand the
+// flange.
+
+std::string unobservable_text(const HandEyeResult& found) {
+  std::string text;
+  for (const Unobservable& u : found.unobservable) {
+    if (!text.empty()) text += " ";
+    switch (u.reason) {
+      case UnobservableReason::no_rotation:
+        return "The tracker's position is not observable: the flange moved without turning. Rotate it by 30 deg or "
+               "more "
+               "about two axes.";
+      case UnobservableReason::one_axis:
+        text += "The tracker's height along " + direction_name(u.direction, "base") +
+                " is not observable; all rotations are about this one axis: rotate about a second one by 30 deg.";
+        break;
+      case UnobservableReason::large_error:
+        text += std::string("The tracker's ") + (u.rotation ? "rotation about " : "position along ") +
+                direction_name(u.direction, "base") + " is not observable; its standard error would be " +
+                (u.rotation ? degrees(u.sigma) : millimetres(u.sigma)) +
+                ": turn the flange further, by 30 deg or more about two axes, or take more positions.";
+        break;
+      case UnobservableReason::singular:
+        text +=
+            "The place of tracker and receiver together is not observable; rotate the flange about two axes by 30 "
+            "deg or more, and move it.";
+        break;
     }
   }
   return text;
+}
+
+std::string meaning(const Reading& reading) { return explain_reading(reading.name, {"flange", "tracker", "receiver"}); }
+
+std::string not_closing_text(const HandEyeResult& found) {
+  const std::string given = "The loop does not close as given (median " + millimetres(found.as_given.position_rms) +
+                            ", " + degrees(found.as_given.rotation_rms) + ").";
+  if (found.readings.empty())
+    return given +
+           " No other reading of the numbers that was tried closes it: check that every tracker pose belongs to its "
+           "flange pose, and how orientations are written.";
+  const Reading& best = found.readings.front();
+  return given + " It closes to " + millimetres(best.position_rms) + ", " + degrees(best.rotation_rms) + " if " +
+         meaning(best) + ".";
+}
+
+/// Empty: no concern of trackers. They have no lens to be in front of, no images, and their noise is not given.
+std::string concern_text(const HandEyeConcern& concern) {
+  if (concern.kind == HandEyeConcernKind::not_like_noise)
+    return "What is left does not look like noise of robot and tracker: plain weights predict positions that were left "
+           "out better (" +
+           millimetres(concern.value) + " for " + millimetres(concern.reference) +
+           "). The robot's own kinematics may be off: calibrate it first.";
+  if (concern.kind != HandEyeConcernKind::board_scale) return {};
+  const double off = concern.value - 1.0;
+  return "The loop closes better with the tracker's lengths " + number(100.0 * std::abs(off), 3) + " % " +
+         (off > 0.0 ? "longer" : "shorter") + " (standard error " + number(100.0 * concern.reference, 2) +
+         " %): check the tracker's scale.";
 }
 
 /// Measured minus predicted receiver: position and rotation vector in the tracker frame, T_tracker_base T_base_flange
@@ -107,73 +152,95 @@ Vector6d frame_error(const Isometry3d& W, const Isometry3d& F, const Isometry3d&
   return e;
 }
 
-void move(const Eigen::Ref<const Vector6d>& d, Isometry3d* T) {
+void move_frame(const Eigen::Ref<const Vector6d>& d, Isometry3d* T) {
   T->translation() += d.head<3>();
   T->linear() = (exp_rotation(d.tail<3>()) * Quaterniond(T->linear())).normalized().toRotationMatrix();
 }
 
-/// Expectation and maximisation in turn: weights from the errors, frames and sigmas from the weights.
-void refine_frames(const std::vector<Isometry3d>& F, const std::vector<Isometry3d>& T, FramesResult* out) {
-  const auto n = static_cast<double>(F.size());
-  const double freedom = (6.0 * n - 12.0) / (6.0 * n);  // of the residuals
-  Isometry3d &W = out->T_tracker_base.T, &R = out->T_flange_receiver.T;
-  std::vector<Vector6d> e(F.size());
-  std::vector<Matrix6x12> J(F.size());
-  const auto look = [&]() {
-    for (std::size_t i = 0; i < F.size(); ++i) e[i] = frame_error(W, F[i], R, T[i], &J[i]);
-  };
-  const auto scale = [&]() {
+/// Expectation and maximisation in turn: weights of a t distribution from the errors, frames and sigmas from the
+/// weights.
+struct FramesIteration {
+  const std::vector<Isometry3d>& F;
+  const std::vector<Isometry3d>& T;
+  FramesResult* out;
+  std::vector<Vector6d> e;  ///< where the frames are
+  std::vector<Matrix6x12> J;
+
+  double count() const { return static_cast<double>(F.size()); }
+  /// What the fit leaves of the errors' variance.
+  double left() const { return (6.0 * count() - 12.0) / (6.0 * count()); }
+  Vector6d weight() const {
+    Vector6d weight;
+    weight << Vector3d::Constant(std::pow(out->position_sigma, -2)),
+        Vector3d::Constant(std::pow(out->rotation_sigma, -2));
+    return weight;
+  }
+
+  void look() {
+    for (std::size_t i = 0; i < F.size(); ++i)
+      e[i] = frame_error(out->T_tracker_base.T, F[i], out->T_flange_receiver.T, T[i], &J[i]);
+  }
+  void set_sigmas() {
     double p = 0.0, r = 0.0;
     for (std::size_t i = 0; i < F.size(); ++i)
       p += out->errors[i].weight * e[i].head<3>().squaredNorm(),
           r += out->errors[i].weight * e[i].tail<3>().squaredNorm();
-    out->position_sigma = std::max(kExact, std::sqrt(p / (3.0 * n * freedom)));
-    out->rotation_sigma = std::max(kExact, std::sqrt(r / (3.0 * n * freedom)));
-  };
-  Matrix12d information;
-  look();
-  scale();
-  out->status = CalibrationStatus::not_converged;
-  for (out->iterations = 1; out->iterations <= 200; ++out->iterations) {
-    Vector6d weight;
-    weight << Vector3d::Constant(std::pow(out->position_sigma, -2)),
-        Vector3d::Constant(std::pow(out->rotation_sigma, -2));
-    information.setZero();
-    Vector12d right = Vector12d::Zero();
+    out->position_sigma = std::max(kExact, std::sqrt(p / (3.0 * count() * left())));
+    out->rotation_sigma = std::max(kExact, std::sqrt(r / (3.0 * count() * left())));
+  }
+
+  NormalSystem<12> system() {
+    const Vector6d weight = this->weight();
+    NormalSystem<12> system{Matrix12d::Zero(), Vector12d::Zero(), 0.0};
     for (std::size_t i = 0; i < F.size(); ++i) {
       const double d = e[i].dot(weight.cwiseProduct(e[i]));
-      out->errors[i].weight = (kFreedom + 6.0) / (kFreedom + d);
-      information += out->errors[i].weight * J[i].transpose() * weight.asDiagonal() * J[i];
-      right += out->errors[i].weight * J[i].transpose() * weight.cwiseProduct(e[i]);
+      out->errors[i].weight = (kDegreesOfFreedom + 6.0) / (kDegreesOfFreedom + d);
+      system.gram += out->errors[i].weight * J[i].transpose() * weight.asDiagonal() * J[i];
+      system.gradient -= out->errors[i].weight * J[i].transpose() * weight.cwiseProduct(e[i]);
+      system.cost += out->errors[i].weight * d;
     }
-    const Vector12d step = information.ldlt().solve(right);
-    if (!step.allFinite()) return;
-    move(step.head<6>(), &W);
-    move(step.tail<6>(), &R);
+    return system;
+  }
+  void move(const Vector12d& step) {
+    move_frame(step.head<6>(), &out->T_tracker_base.T);
+    move_frame(step.tail<6>(), &out->T_flange_receiver.T);
+  }
+  bool settled(const NormalSystem<12>& at, const Vector12d& step) {
     look();
     const double before = out->position_sigma;
-    scale();
-    if (step.norm() < 1e-11 ||
-        (step.dot(information * step) < 1e-12 && std::abs(out->position_sigma / before - 1.0) < 1e-8)) {
-      out->status = CalibrationStatus::done;
-      break;
-    }
+    set_sigmas();
+    return step.norm() < 1e-11 ||
+           (step.dot(at.gram * step) < 1e-12 && std::abs(out->position_sigma / before - 1.0) < 1e-8);
   }
-  // Covariance of an M-estimate (Huber 1981, eq. (6.5) of chapter 7): psi = w e, its variance over the square of its
-  // mean slope.
-  Vector6d weight;
-  weight << Vector3d::Constant(std::pow(out->position_sigma, -2)),
-      Vector3d::Constant(std::pow(out->rotation_sigma, -2));
+};
+
+/// Covariance of an M-estimate (Huber 1981, eq. (6.5) of chapter 7): psi = w e, its variance over the square of its
+/// mean slope. Sets what every position counted, too.
+Matrix12d covariance_of(const FramesIteration& fit, std::vector<PositionError>* errors) {
+  const Vector6d weight = fit.weight();
+  const double n = fit.count();
   double psi = 0.0, slope = 0.0;
-  information.setZero();
-  for (std::size_t i = 0; i < F.size(); ++i) {
-    const double d = e[i].dot(weight.cwiseProduct(e[i])), w = (kFreedom + 6.0) / (kFreedom + d);
-    psi += w * w * d / (6.0 * n * freedom);
-    slope += (w - 2.0 / 6.0 * w * d / (kFreedom + d)) / n;
-    information += J[i].transpose() * weight.asDiagonal() * J[i];
-    out->errors[i] = {e[i].head<3>().norm(), e[i].tail<3>().norm(), w};
+  Matrix12d information = Matrix12d::Zero();
+  for (std::size_t i = 0; i < fit.F.size(); ++i) {
+    const Vector6d& e = fit.e[i];
+    const double d = e.dot(weight.cwiseProduct(e)), w = (kDegreesOfFreedom + 6.0) / (kDegreesOfFreedom + d);
+    psi += w * w * d / (6.0 * n * fit.left());
+    slope += (w - 2.0 / 6.0 * w * d / (kDegreesOfFreedom + d)) / n;
+    information += fit.J[i].transpose() * weight.asDiagonal() * fit.J[i];
+    (*errors)[i] = {e.head<3>().norm(), e.tail<3>().norm(), w};
   }
-  const Matrix12d covariance = psi / (slope * slope) * information.ldlt().solve(Matrix12d::Identity());
+  return psi / (slope * slope) * information.ldlt().solve(Matrix12d::Identity());
+}
+
+void refine_frames(const std::vector<Isometry3d>& F, const std::vector<Isometry3d>& T, FramesResult* out) {
+  FramesIteration fit{F, T, out, std::vector<Vector6d>(F.size()), std::vector<Matrix6x12>(F.size())};
+  fit.look();
+  fit.set_sigmas();
+  const Iterations ended = gauss_newton(&fit, 200);
+  out->iterations = ended.steps;
+  out->status = converged(ended.reason) ? CalibrationStatus::done : CalibrationStatus::not_converged;
+  if (ended.reason == StopReason::singular) return;
+  const Matrix12d covariance = covariance_of(fit, &out->errors);
   out->T_tracker_base.covariance = covariance.topLeftCorner<6, 6>();
   out->T_flange_receiver.covariance = covariance.bottomRightCorner<6, 6>();
 }
@@ -217,16 +284,19 @@ FramesResult calibrate_frames(const std::vector<Isometry3d>& T_base_flange,
   options.setup = HandEyeSetup::eye_to_hand;
   const HandEyeResult start = handeye(poses, options);
   FramesResult out;
-  for (const std::string& warning : start.warnings) {
-    if (warning.find(" lie behind ") == std::string::npos)
-      out.warnings.push_back(in_our_words(warning));  // a camera's trouble: trackers have no lens
+  for (const HandEyeConcern& concern : start.concerns) {
+    const std::string text = concern_text(concern);
+    if (!text.empty()) out.warnings.push_back(text);
   }
-  out.message = in_our_words(start.message);
-  if (start.status == HandEyeStatus::not_observable || start.status == HandEyeStatus::not_closing) {
-    out.status = start.status == HandEyeStatus::not_observable ? CalibrationStatus::not_observable
-                                                               : CalibrationStatus::not_consistent;
-    for (const Reading& reading : start.readings)
-      out.warnings.push_back("the frames agree if " + in_our_words(reading.explanation));
+  if (start.status == HandEyeStatus::not_observable) {
+    out.status = CalibrationStatus::not_observable;
+    out.message = unobservable_text(start);
+    return out;
+  }
+  if (start.status == HandEyeStatus::not_closing) {
+    out.status = CalibrationStatus::not_consistent;
+    out.message = not_closing_text(start);
+    for (const Reading& reading : start.readings) out.warnings.push_back("the frames agree if " + meaning(reading));
     return out;
   }
   out.T_tracker_base.T = start.camera.T.inverse();

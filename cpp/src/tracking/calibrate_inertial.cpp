@@ -4,16 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
+#include "math/constants.hpp"
+#include "math/gauss_newton.hpp"
 #include "math/registration.hpp"
 #include "math/rotation.hpp"
 #include "math/text.hpp"
 #include "rooms.hpp"
+#include "tracking/inertial_start.hpp"
 #include "truing/tracking/calibrate.hpp"
 
 namespace truing {
@@ -27,9 +31,8 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kGravity = 9.80665;
-constexpr double kStep = 0.01, kSpan = 0.2;  // of the angular speeds that are correlated [s]
-constexpr double kAlike = 0.5;               // least correlation of two angular speeds of one motion
-constexpr double kMirrored = 0.5;            // of the misfit: a reflection that fits so much better is one
+constexpr double kOneMotion = 0.5;  // least correlation of two angular speeds of one motion
+constexpr double kMirrored = 0.5;   // of the misfit: a reflection that fits so much better is one
 constexpr double kDegrees = 57.295779513082323;
 constexpr int kGlobal = 16, kLocal = 9;
 enum Global : int { kTurn = 0, kLever = 3, kGyroBias = 6, kAccelBias = 9, kG = 12, kTau = 15 };
@@ -38,81 +41,6 @@ using GlobalMatrix = Eigen::Matrix<double, kGlobal, kGlobal>;
 using GlobalVector = Eigen::Matrix<double, kGlobal, 1>;
 
 // ---- A start: angular speeds ----------------------------------------------------------------------------------------
-
-/// Mean angular velocity over `kSpan` around times on a grid, in the sensor's own frame; NaN where there is none.
-/// shape=(3, count)
-Matrix3Xd gyro_means(const std::vector<ImuSample>& imu, double start, Eigen::Index count) {
-  Matrix3Xd out = Matrix3Xd::Constant(3, count, std::nan(""));
-  std::vector<Vector3d> sum(imu.size(), Vector3d::Zero());  // integral up to every sample
-  for (std::size_t k = 1; k < imu.size(); ++k)
-    sum[k] = sum[k - 1] + 0.5 * (imu[k].t - imu[k - 1].t) * (imu[k].gyro + imu[k - 1].gyro);
-  const auto integral = [&](double t, Vector3d* value) {
-    const auto after =
-        std::upper_bound(imu.begin(), imu.end(), t, [](double x, const ImuSample& s) { return x < s.t; });
-    if (after == imu.begin() || after == imu.end()) return false;
-    const auto j = static_cast<std::size_t>(after - imu.begin());
-    *value = sum[j - 1] + (t - imu[j - 1].t) / (imu[j].t - imu[j - 1].t) * (sum[j] - sum[j - 1]);
-    return true;
-  };
-  for (Eigen::Index k = 0; k < count; ++k) {
-    const double t = start + kStep * static_cast<double>(k);
-    Vector3d a, b;
-    if (integral(t - kSpan / 2.0, &a) && integral(t + kSpan / 2.0, &b)) out.col(k) = (b - a) / kSpan;
-  }
-  return out;
-}
-
-bool orientation_at(const std::vector<PoseSample>& tracker, double t, Quaterniond* out) {
-  const auto after =
-      std::upper_bound(tracker.begin(), tracker.end(), t, [](double x, const PoseSample& s) { return x < s.t; });
-  if (after == tracker.begin() || after == tracker.end() || after->t - (after - 1)->t > kSpan) return false;
-  const PoseSample &a = *(after - 1), &b = *after;
-  *out = a.orientation.slerp((t - a.t) / (b.t - a.t), b.orientation);
-  return true;
-}
-
-/// The same of the tracker, by differences, in the receiver's frame.
-Matrix3Xd tracker_means(const std::vector<PoseSample>& tracker, double start, Eigen::Index count) {
-  Matrix3Xd out = Matrix3Xd::Constant(3, count, std::nan(""));
-  for (Eigen::Index k = 0; k < count; ++k) {
-    const double t = start + kStep * static_cast<double>(k);
-    Quaterniond a, b, middle;
-    if (!orientation_at(tracker, t - kSpan / 2.0, &a) || !orientation_at(tracker, t + kSpan / 2.0, &b)) continue;
-    out.col(k) = log_rotation(a.conjugate() * b) / kSpan;
-  }
-  return out;
-}
-
-struct Pairs {
-  Matrix3Xd imu, receiver;
-};
-
-/// Columns that both have, the inertial ones taken `shift` steps earlier: t_imu = t_tracker - shift * kStep.
-Pairs pairs_at(const Matrix3Xd& imu, const Matrix3Xd& receiver, Eigen::Index shift) {
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index k = 0; k < receiver.cols(); ++k) {
-    const Eigen::Index j = k - shift;
-    if (j >= 0 && j < imu.cols() && receiver.col(k).allFinite() && imu.col(j).allFinite()) rows.push_back(k);
-  }
-  Pairs out{Matrix3Xd(3, static_cast<Eigen::Index>(rows.size())), Matrix3Xd(3, static_cast<Eigen::Index>(rows.size()))};
-  for (std::size_t n = 0; n < rows.size(); ++n) {
-    out.imu.col(static_cast<Eigen::Index>(n)) = imu.col(rows[n] - shift);
-    out.receiver.col(static_cast<Eigen::Index>(n)) = receiver.col(rows[n]);
-  }
-  return out;
-}
-
-/// How well one turns into the other by any rotation or reflection: sum of singular values of their covariance over
-/// what it would be if they were one motion. Means are taken away, and with them the gyro's bias.
-double alikeness(const Pairs& pairs, Matrix3d* covariance = nullptr) {
-  if (pairs.imu.cols() < 50) return 0.0;
-  const Matrix3Xd a = pairs.imu.colwise() - pairs.imu.rowwise().mean(),
-                  b = pairs.receiver.colwise() - pairs.receiver.rowwise().mean();
-  const Matrix3d H = b * a.transpose();
-  if (covariance) *covariance = H;
-  const double scale = std::sqrt(a.squaredNorm() * b.squaredNorm());
-  return scale > 0.0 ? Eigen::JacobiSVD<Matrix3d>(H).singularValues().sum() / scale : 0.0;
-}
 
 // ---- Segments -------------------------------------------------------------------------------------------------------
 
@@ -160,13 +88,9 @@ struct Segment {
   Vector3d p = Vector3d::Zero(), v = Vector3d::Zero();
 };
 
-/// What one segment says: normal equations with its own pose and speed eliminated (Schur).
-struct Reduced {
-  GlobalMatrix A = GlobalMatrix::Zero();
-  GlobalVector b = GlobalVector::Zero();
-  Eigen::Matrix<double, kLocal, kLocal> local = Eigen::Matrix<double, kLocal, kLocal>::Zero();
-  Eigen::Matrix<double, kLocal, kGlobal> cross = Eigen::Matrix<double, kLocal, kGlobal>::Zero();
-  Eigen::Matrix<double, kLocal, 1> local_b = Eigen::Matrix<double, kLocal, 1>::Zero();
+/// What one segment says of what all share, and of its own pose and speed.
+struct SegmentSystem {
+  BlockSystem<kGlobal, kLocal> block;
   double position = 0.0, rotation = 0.0, samples = 0.0;  // squared errors
 };
 
@@ -206,8 +130,8 @@ class Problem {
     }
   }
 
-  Reduced look(const Unknowns& x, const Segment& s, double position_weight, double rotation_weight) const {
-    Reduced out;
+  SegmentSystem look(const Unknowns& x, const Segment& s, double position_weight, double rotation_weight) const {
+    SegmentSystem out;
     std::size_t k = 0;
     const double start = tracker_[s.first].t - x.tau;
     if (!before(start, &k)) return out;
@@ -242,13 +166,7 @@ class Problem {
       L.block<3, 3>(0, 6) = dt * Matrix3d::Identity();
       Vector6d weight;
       weight << Vector3d::Constant(position_weight), Vector3d::Constant(rotation_weight);
-      const auto WG = (weight.asDiagonal() * G).eval();
-      const auto WL = (weight.asDiagonal() * L).eval();
-      out.A.noalias() += G.transpose() * WG;
-      out.b.noalias() += WG.transpose() * e;
-      out.local.noalias() += L.transpose() * WL;
-      out.cross.noalias() += L.transpose() * WG;
-      out.local_b.noalias() += WL.transpose() * e;
+      out.block.add<6>(G, L, -e, weight);
       out.position += e.head<3>().squaredNorm();
       out.rotation += e.tail<3>().squaredNorm();
       out.samples += 1.0;
@@ -259,9 +177,9 @@ class Problem {
  private:
   void sample(std::size_t k, double t, const Unknowns& x, Vector3d* gyro, Vector3d* accel) const {
     const ImuSample &a = imu_[k], &b = imu_[k + 1];
-    const double share = (t - a.t) / (b.t - a.t);
-    *gyro = a.gyro + share * (b.gyro - a.gyro) - x.gyro_bias;
-    *accel = a.accel + share * (b.accel - a.accel) - x.accel_bias;
+    const double fraction = (t - a.t) / (b.t - a.t);
+    *gyro = a.gyro + fraction * (b.gyro - a.gyro) - x.gyro_bias;
+    *accel = a.accel + fraction * (b.accel - a.accel) - x.accel_bias;
   }
 
   const std::vector<ImuSample>& imu_;
@@ -292,13 +210,6 @@ void check(const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tra
     if (k > 0 && !(tracker[k].t > tracker[k - 1].t)) fail("the tracker's record goes back in time", k);
     if (std::abs(tracker[k].orientation.norm() - 1.0) > 1e-3) fail("the tracker's record has no unit quaternion", k);
   }
-}
-
-InertialResult refused(CalibrationStatus status, const std::string& message) {
-  InertialResult out;
-  out.status = status;
-  out.message = message;
-  return out;
 }
 
 std::string axis_of(const Vector3d& up) {
@@ -360,174 +271,197 @@ bool InertialOptions::is_valid(std::string* error) const {
 
 namespace {
 
-/// The numbers as they are given.
-InertialResult fit(const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker,
-                   const InertialOptions& options) {
-  // Units that show by themselves.
+// ---- What shows before any fit --------------------------------------------------------------------------------------
+
+/// Why the records cannot be used.
+struct Refusal {
+  CalibrationStatus status;
+  std::string message;
+};
+
+/// Units of the accelerometer that show by themselves.
+std::optional<Refusal> look_at_force(const std::vector<ImuSample>& imu) {
   double force = 0.0;
   for (const ImuSample& sample : imu) force += sample.accel.norm() / static_cast<double>(imu.size());
-  if (force > 0.7 && force < 1.4)
-    return refused(CalibrationStatus::not_consistent,
-                   "The accelerometer's mean is " + number(force, 3) +
-                       " m/s^2 where 9.81 is expected: it seems to be in g; multiply by 9.80665.");
-  if (force > 700.0 && force < 1400.0)
-    return refused(CalibrationStatus::not_consistent,
-                   "The accelerometer's mean is " + number(force, 3) +
-                       " m/s^2 where 9.81 is expected: it seems to be in mg; multiply by 0.00980665.");
-  if (force < 8.0 || force > 12.0)
-    return refused(CalibrationStatus::not_consistent,
-                   "The accelerometer's mean is " + number(force, 3) +
-                       " m/s^2 where 9.81 is expected: check its unit, and that gravity was not taken away.");
+  const std::string found = "The accelerometer's mean is " + number(force, 3) + " m/s^2 where 9.81 is expected: ";
+  const auto refusal = [&](const char* what) { return Refusal{CalibrationStatus::not_consistent, found + what}; };
+  if (force > 0.7 && force < 1.4) return refusal("it seems to be in g; multiply by 9.80665.");
+  if (force > 700.0 && force < 1400.0) return refusal("it seems to be in mg; multiply by 0.00980665.");
+  if (force < 8.0 || force > 12.0) return refusal("check its unit, and that gravity was not taken away.");
+  return {};
+}
 
-  // Offset on a grid, then orientation.
-  const double start = std::max(imu.front().t, tracker.front().t) - options.clock_search,
-               end = std::min(imu.back().t, tracker.back().t) + options.clock_search;
-  const auto count = static_cast<Eigen::Index>(std::max(0.0, (end - start) / kStep));
-  const Matrix3Xd gyro = gyro_means(imu, start, count), turn = tracker_means(tracker, start, count);
-  const auto most = static_cast<Eigen::Index>(options.clock_search / kStep);
-  Eigen::Index shift = 0;
-  double best = 0.0;
-  for (Eigen::Index k = -most; k <= most; k += 2) {
-    const double alike = alikeness(pairs_at(gyro, turn, k));
-    if (alike > best) best = alike, shift = k;
-  }
-  for (Eigen::Index k = shift - 1; k <= shift + 1; k += 2) {
-    const double alike = alikeness(pairs_at(gyro, turn, k));
-    if (alike > best) best = alike, shift = k;
-  }
-  if (best < kAlike) {
-    return refused(CalibrationStatus::not_observable,
-                   "The two records show no common rotation (correlation " + number(best, 2) +
-                       "): do they belong together? Rotate by 30 deg or more about two axes while recording.");
-  }
-  const Pairs pairs = pairs_at(gyro, turn, shift);
-  Matrix3d H;
-  alikeness(pairs, &H);
-  const double ratio = std::sqrt((pairs.imu.colwise() - pairs.imu.rowwise().mean()).squaredNorm() /
-                                 (pairs.receiver.colwise() - pairs.receiver.rowwise().mean()).squaredNorm());
-  if (ratio > 0.6 * kDegrees && ratio < 1.6 * kDegrees)
-    return refused(
+/// Units of the gyro: how much faster it turns than the tracker.
+std::optional<Refusal> look_at_speed(const SpeedPairs& pairs) {
+  const double ratio = std::sqrt(pairs.centred_imu().squaredNorm() / pairs.centred_receiver().squaredNorm());
+  const auto as_degrees = [](double times) { return times > 0.6 * kDegrees && times < 1.6 * kDegrees; };
+  if (as_degrees(ratio))
+    return Refusal{
         CalibrationStatus::not_consistent,
-        "The gyro turns " + number(ratio, 3) + " times as fast as the tracker: it is in deg/s and was read as rad/s.");
-  if (1.0 / ratio > 0.6 * kDegrees && 1.0 / ratio < 1.6 * kDegrees)
-    return refused(CalibrationStatus::not_consistent,
+        "The gyro turns " + number(ratio, 3) + " times as fast as the tracker: it is in deg/s and was read as rad/s."};
+  if (as_degrees(1.0 / ratio))
+    return Refusal{CalibrationStatus::not_consistent,
                    "The gyro turns " + number(1.0 / ratio, 3) +
-                       " times more slowly than the tracker: it is in rad/s and was read as deg/s.");
-  const Eigen::JacobiSVD<Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
+                       " times more slowly than the tracker: it is in rad/s and was read as deg/s."};
+  return {};
+}
+
+/// Handedness of the frames, and about how many axes they turn.
+std::optional<Refusal> look_at_axes(const Matrix3d& covariance) {
+  const Eigen::JacobiSVD<Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Vector3d singular = svd.singularValues();
   const bool reflected = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0;
-  const Matrix3Xd centred = pairs.receiver.colwise() - pairs.receiver.rowwise().mean();
+  if (reflected && singular[2] > (1.0 - kMirrored) * 0.5 * singular[1])
+    return Refusal{
+        CalibrationStatus::not_consistent,
+        "Gyro and tracker agree as mirror images: one of the two records is in a left-handed frame (an axis with the "
+        "wrong sign, or two axes swapped)."};
+  if (singular[1] < 0.02 * singular[0])
+    return Refusal{
+        CalibrationStatus::not_observable,
+        "The motion turns about one axis only: the inertial sensor's orientation and lever arm do not show. Rotate by "
+        "30 deg or more about a second axis."};
+  return {};
+}
+
+std::optional<Refusal> look_at_motion(const SpeedAlignment& aligned) {
+  if (aligned.correlation < kOneMotion)
+    return Refusal{CalibrationStatus::not_observable,
+                   "The two records show no common rotation (correlation " + number(aligned.correlation, 2) +
+                       "): do they belong together? Rotate by 30 deg or more about two axes while recording."};
+  if (const auto refusal = look_at_speed(aligned.pairs)) return refusal;
+  return look_at_axes(aligned.covariance);
+}
+
+/// Rms about the three principal axes, descending [rad/s].
+Vector3d rotation_rate(const SpeedPairs& pairs) {
+  const Matrix3Xd centred = pairs.centred_receiver();
   const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(centred * centred.transpose() /
                                                      static_cast<double>(centred.cols()));
-  if (reflected && singular[2] > (1.0 - kMirrored) * 0.5 * singular[1]) {
-    return refused(CalibrationStatus::not_consistent,
-                   "Gyro and tracker agree as mirror images: one of the two records is in a left-handed frame (an axis "
-                   "with the wrong sign, or two axes swapped).");
-  }
-  if (singular[1] < 0.02 * singular[0]) {
-    return refused(CalibrationStatus::not_observable,
-                   "The motion turns about one axis only: the inertial sensor's orientation and lever arm do not show. "
-                   "Rotate by 30 deg or more about a second axis.");
-  }
+  return axes.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
+}
 
-  InertialResult out;
-  out.rotation_rate = axes.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
+// ---- The fit --------------------------------------------------------------------------------------------------------
+
+Unknowns start_of(const SpeedAlignment& aligned) {
+  const SpeedPairs& pairs = aligned.pairs;
   Unknowns x;
-  x.tau = kStep * static_cast<double>(shift);
-  x.R_receiver_imu = Quaterniond(nearest_rotation(H));
+  x.tau = aligned.clock_offset;
+  x.R_receiver_imu = Quaterniond(nearest_rotation(aligned.covariance));
   x.gyro_bias = pairs.imu.rowwise().mean() - x.R_receiver_imu.conjugate() * Vector3d(pairs.receiver.rowwise().mean());
-  std::vector<Segment> segments = segments_of(imu, tracker, x.tau, options.segment);
-  if (segments.size() < 5)
-    return refused(CalibrationStatus::not_observable, "The records overlap for " + std::to_string(segments.size()) +
-                                                          " segments of " + number(options.segment, 3) +
-                                                          " s; 5 or more are needed: record for longer.");
+  return x;
+}
 
-  Problem problem(imu, tracker);
+/// Up is where the mean of the accelerometer points.
+Vector3d mean_gravity(const Problem& problem, const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker,
+                      const Unknowns& x) {
   Vector3d up = Vector3d::Zero();
   for (const PoseSample& sample : tracker) {
     std::size_t k = 0;
     if (problem.before(sample.t - x.tau, &k)) up += sample.orientation * (x.R_receiver_imu * imu[k].accel);
   }
-  x.gravity = -kGravity * up.normalized();
-  for (Segment& s : segments) {
+  return -kGravity * up.normalized();
+}
+
+void start_segments(const std::vector<PoseSample>& tracker, const Unknowns& x, std::vector<Segment>* segments) {
+  for (Segment& s : *segments) {
     const PoseSample &a = tracker[s.first], &b = tracker[s.last - 1];
     s.R = a.orientation * x.R_receiver_imu;
     s.p = a.position;
     s.v = (b.position - a.position) / (b.t - a.t);
   }
+}
 
-  // Gauss and Newton; every segment's pose and speed are solved for in it and put back.
+GlobalVector prior_weight(const InertialOptions& options) {
+  GlobalVector weight = GlobalVector::Zero();
+  weight.segment<3>(kGyroBias).setConstant(std::pow(options.gyro_bias, -2));
+  weight.segment<3>(kAccelBias).setConstant(std::pow(options.accel_bias, -2));
+  return weight;
+}
+
+/// Errors of all segments together.
+struct Squares {
+  double position = 0.0, rotation = 0.0, samples = 0.0;
+};
+
+/// The iteration and where it stands: every segment's pose and speed are solved for in it and put back.
+struct Fit {
+  const Problem& problem;
+  const GlobalVector prior;  ///< weights of the biases before any data
+  Unknowns x;
+  std::vector<Segment> segments;
+  std::vector<SegmentSystem> systems;               ///< of every segment, at the last step
+  std::vector<NormalSystem<kGlobal>> shared;        ///< what they say of what all share
+  GlobalMatrix information = GlobalMatrix::Zero();  ///< of all together, with the priors
+  Squares squares;
   double position_sigma = 1e-2, rotation_sigma = 1e-2;
-  GlobalMatrix A, inverse;
-  GlobalVector prior_weight = GlobalVector::Zero();
-  prior_weight.segment<3>(kGyroBias).setConstant(std::pow(options.gyro_bias, -2));
-  prior_weight.segment<3>(kAccelBias).setConstant(std::pow(options.accel_bias, -2));
-  std::vector<Reduced> reduced(segments.size());
-  out.status = CalibrationStatus::not_converged;
-  for (out.iterations = 1; out.iterations <= options.max_iterations; ++out.iterations) {
-    A = prior_weight.asDiagonal();
-    GlobalVector b = GlobalVector::Zero();
-    b.segment<3>(kGyroBias) = -prior_weight[kGyroBias] * x.gyro_bias;
-    b.segment<3>(kAccelBias) = -prior_weight[kAccelBias] * x.accel_bias;
-    double position = 0.0, rotation = 0.0, samples = 0.0;
-    for (std::size_t n = 0; n < segments.size(); ++n) {
-      reduced[n] = problem.look(x, segments[n], std::pow(position_sigma, -2), std::pow(rotation_sigma, -2));
-      Reduced& r = reduced[n];
-      if (r.samples == 0.0) continue;
-      const auto factor = r.local.ldlt();
-      r.A -= r.cross.transpose() * factor.solve(r.cross);
-      r.b -= r.cross.transpose() * factor.solve(r.local_b);
-      A += r.A;
-      b += r.b;
-      position += r.position, rotation += r.rotation, samples += r.samples;
-    }
-    const GlobalVector step = A.ldlt().solve(b);
-    if (!step.allFinite() || samples == 0.0) break;
-    for (std::size_t n = 0; n < segments.size(); ++n) {
-      const Reduced& r = reduced[n];
-      if (r.samples == 0.0) continue;
-      const Eigen::Matrix<double, kLocal, 1> own = r.local.ldlt().solve(r.local_b - r.cross * step);
-      Segment& s = segments[n];
-      s.R = (exp_rotation(own.head<3>()) * s.R).normalized();
-      s.p += own.segment<3>(3);
-      s.v += own.tail<3>();
-    }
-    x.R_receiver_imu = (exp_rotation(step.segment<3>(kTurn)) * x.R_receiver_imu).normalized();
-    x.lever += step.segment<3>(kLever);
-    x.gyro_bias += step.segment<3>(kGyroBias);
-    x.accel_bias += step.segment<3>(kAccelBias);
-    x.gravity += step.segment<3>(kG);
-    x.tau += std::clamp(step[kTau], -0.05, 0.05);
-    out.position_rms = std::sqrt(position / (3.0 * samples));
-    out.rotation_rms = std::sqrt(rotation / (3.0 * samples));
-    const double before_p = position_sigma, before_r = rotation_sigma;
-    position_sigma = std::max(1e-8, out.position_rms);
-    rotation_sigma = std::max(1e-8, out.rotation_rms);
-    const bool settled =
-        std::abs(position_sigma / before_p - 1.0) < 1e-4 && std::abs(rotation_sigma / before_r - 1.0) < 1e-4;
-    if (out.iterations > 2 && settled && step.dot(A * step) < 1e-4) {
-      out.status = CalibrationStatus::done;
-      break;
-    }
-  }
-  const double size = x.gravity.norm();
-  if (out.status == CalibrationStatus::not_converged) {
-    out.message = "The fit did not come to an end: do the two records belong together?";
-    return out;
-  }
-  if (size < 0.9 * kGravity || size > 1.1 * kGravity) {
-    return refused(CalibrationStatus::not_consistent,
-                   "Gravity comes out as " + number(size, 4) +
-                       " m/s^2: the tracker's positions or the accelerometer have another unit than was read.");
-  }
+  double position_rms = 0.0, rotation_rms = 0.0;
+  int steps = 0;
 
-  // Sandwich (Huber 1967): segments are independent of each other, what is inside one need not be.
-  inverse = A.ldlt().solve(GlobalMatrix::Identity());
-  // Each with its own pull on the result taken out (jackknife; MacKinnon and White 1985, HC3).
-  GlobalMatrix B = prior_weight.asDiagonal();
-  for (const Reduced& r : reduced) {
-    if (r.samples == 0.0) continue;
-    const GlobalVector alone = (GlobalMatrix::Identity() - r.A * inverse).partialPivLu().solve(r.b);
+  Fit(const Problem& p, const InertialOptions& options) : problem(p), prior(prior_weight(options)) {}
+  NormalSystem<kGlobal> system();
+  void move(const GlobalVector& step);
+  bool settled(const NormalSystem<kGlobal>& at, const GlobalVector& step);
+};
+
+NormalSystem<kGlobal> Fit::system() {
+  NormalSystem<kGlobal> out{prior.asDiagonal(), GlobalVector::Zero(), 0.0};
+  out.gradient.segment<3>(kGyroBias) = prior[kGyroBias] * x.gyro_bias;
+  out.gradient.segment<3>(kAccelBias) = prior[kAccelBias] * x.accel_bias;
+  squares = {};
+  for (std::size_t n = 0; n < segments.size(); ++n) {
+    SegmentSystem& s = systems[n];
+    s = problem.look(x, segments[n], std::pow(position_sigma, -2), std::pow(rotation_sigma, -2));
+    if (s.samples == 0.0) continue;
+    shared[n] = eliminate(s.block);
+    out.gram += shared[n].gram;
+    out.gradient += shared[n].gradient;
+    out.cost += shared[n].cost;
+    squares.position += s.position, squares.rotation += s.rotation, squares.samples += s.samples;
+  }
+  if (squares.samples == 0.0) out.gradient.setConstant(kNaN);  // the records no longer overlap: there is no step
+  information = out.gram;
+  return out;
+}
+
+void Fit::move(const GlobalVector& step) {
+  for (std::size_t n = 0; n < segments.size(); ++n) {
+    if (systems[n].samples == 0.0) continue;
+    const Eigen::Matrix<double, kLocal, 1> own = recover(systems[n].block, step);
+    Segment& s = segments[n];
+    s.R = (exp_rotation(own.head<3>()) * s.R).normalized();
+    s.p += own.segment<3>(3);
+    s.v += own.tail<3>();
+  }
+  x.R_receiver_imu = (exp_rotation(step.segment<3>(kTurn)) * x.R_receiver_imu).normalized();
+  x.lever += step.segment<3>(kLever);
+  x.gyro_bias += step.segment<3>(kGyroBias);
+  x.accel_bias += step.segment<3>(kAccelBias);
+  x.gravity += step.segment<3>(kG);
+  x.tau += std::clamp(step[kTau], -0.05, 0.05);
+}
+
+/// Both kinds of error weigh by what they turn out to be.
+bool Fit::settled(const NormalSystem<kGlobal>& at, const GlobalVector& step) {
+  position_rms = std::sqrt(squares.position / (3.0 * squares.samples));
+  rotation_rms = std::sqrt(squares.rotation / (3.0 * squares.samples));
+  const double before_p = position_sigma, before_r = rotation_sigma;
+  position_sigma = std::max(1e-8, position_rms);
+  rotation_sigma = std::max(1e-8, rotation_rms);
+  const bool same =
+      std::abs(position_sigma / before_p - 1.0) < 1e-4 && std::abs(rotation_sigma / before_r - 1.0) < 1e-4;
+  return ++steps > 2 && same && step.dot(at.gram * step) < 1e-4;
+}
+
+/// Sandwich (Huber 1967): segments are independent of each other, what is inside one need not be. Each with its own
+/// pull on the result taken out (jackknife; MacKinnon and White 1985, HC3).
+GlobalMatrix covariance_of(const Fit& fit) {
+  const GlobalMatrix inverse = fit.information.ldlt().solve(GlobalMatrix::Identity());
+  GlobalMatrix B = fit.prior.asDiagonal();
+  for (std::size_t n = 0; n < fit.segments.size(); ++n) {
+    if (fit.systems[n].samples == 0.0) continue;
+    const NormalSystem<kGlobal>& own = fit.shared[n];
+    const GlobalVector alone = (GlobalMatrix::Identity() - own.gram * inverse).partialPivLu().solve(own.gradient);
     B += alone * alone.transpose();
   }
   const GlobalMatrix sandwich = inverse * B * inverse;
@@ -539,30 +473,84 @@ InertialResult fit(const std::vector<ImuSample>& imu, const std::vector<PoseSamp
     covariance.row(i) *= factor;
     covariance.col(i) *= factor;
   }
-  out.T_receiver_imu.T.linear() = x.R_receiver_imu.toRotationMatrix();
-  out.T_receiver_imu.T.translation() = x.lever;
-  out.T_receiver_imu.covariance << covariance.block<3, 3>(kLever, kLever), covariance.block<3, 3>(kLever, kTurn),
+  return covariance;
+}
+
+// ---- The result -----------------------------------------------------------------------------------------------------
+
+void set_values(const Unknowns& x, const GlobalMatrix& covariance, InertialResult* out) {
+  out->T_receiver_imu.T.linear() = x.R_receiver_imu.toRotationMatrix();
+  out->T_receiver_imu.T.translation() = x.lever;
+  out->T_receiver_imu.covariance << covariance.block<3, 3>(kLever, kLever), covariance.block<3, 3>(kLever, kTurn),
       covariance.block<3, 3>(kTurn, kLever), covariance.block<3, 3>(kTurn, kTurn);
-  out.gravity = x.gravity;
-  out.gravity_covariance = covariance.block<3, 3>(kG, kG);
-  out.tracker_up = axis_of(-x.gravity);
-  out.clock_offset = x.tau;
-  out.clock_offset_sigma = std::sqrt(covariance(kTau, kTau));
-  out.gyro_bias = x.gyro_bias;
-  out.accel_bias = x.accel_bias;
-  out.rich_enough = out.clock_offset_sigma <= options.clock_wanted;
-  out.message = "Clock offset " + number(1e3 * out.clock_offset, 4) + " ms, standard error " +
-                number(1e3 * out.clock_offset_sigma, 2) + " ms.";
-  double samples = 0.0;
-  for (const Reduced& r : reduced) samples += r.samples;
-  if (!out.rich_enough)
-    out.advice = advice_for(out.clock_offset_sigma, rotation_sigma, options.clock_wanted, samples, out.rotation_rate,
-                            out.rotation_rate);
-  if (out.tracker_up != "+z") out.warnings.push_back("the tracker's axis " + out.tracker_up + " points up, not +z");
-  const double steep = std::acos(std::clamp((-x.gravity).normalized().cwiseAbs().maxCoeff(), 0.0, 1.0));
+  out->gravity = x.gravity;
+  out->gravity_covariance = covariance.block<3, 3>(kG, kG);
+  out->tracker_up = axis_of(-x.gravity);
+  out->clock_offset = x.tau;
+  out->clock_offset_sigma = std::sqrt(covariance(kTau, kTau));
+  out->gyro_bias = x.gyro_bias;
+  out->accel_bias = x.accel_bias;
+}
+
+void set_words(const Fit& fit, const InertialOptions& options, InertialResult* out) {
+  out->rich_enough = out->clock_offset_sigma <= options.clock_wanted;
+  out->message = "Clock offset " + number(1e3 * out->clock_offset, 4) + " ms, standard error " +
+                 number(1e3 * out->clock_offset_sigma, 2) + " ms.";
+  if (!out->rich_enough)
+    out->advice = advice_for(out->clock_offset_sigma, fit.rotation_sigma, options.clock_wanted, fit.squares.samples,
+                             out->rotation_rate, out->rotation_rate);
+  if (out->tracker_up != "+z") out->warnings.push_back("the tracker's axis " + out->tracker_up + " points up, not +z");
+  const double steep = std::acos(std::clamp((-out->gravity).normalized().cwiseAbs().maxCoeff(), 0.0, 1.0));
   if (steep > 5.0 / kDegrees)
-    out.warnings.push_back("gravity is " + number(steep * kDegrees, 3) +
-                           " deg from the tracker's nearest axis: the tracker is tilted, which does no harm");
+    out->warnings.push_back("gravity is " + number(steep * kDegrees, 3) +
+                            " deg from the tracker's nearest axis: the tracker is tilted, which does no harm");
+}
+
+InertialResult refused(const Refusal& refusal) {
+  InertialResult out;
+  out.status = refusal.status;
+  out.message = refusal.message;
+  return out;
+}
+
+/// The numbers as they are given.
+InertialResult fit_as_given(const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker,
+                            const InertialOptions& options) {
+  if (const auto refusal = look_at_force(imu)) return refused(*refusal);
+  const SpeedAlignment aligned = align_speeds(imu, tracker, options.clock_search);
+  if (const auto refusal = look_at_motion(aligned)) return refused(*refusal);
+
+  const Problem problem(imu, tracker);
+  Fit fit(problem, options);
+  fit.x = start_of(aligned);
+  fit.segments = segments_of(imu, tracker, fit.x.tau, options.segment);
+  if (fit.segments.size() < 5)
+    return refused({CalibrationStatus::not_observable,
+                    "The records overlap for " + std::to_string(fit.segments.size()) + " segments of " +
+                        number(options.segment, 3) + " s; 5 or more are needed: record for longer."});
+  fit.x.gravity = mean_gravity(problem, imu, tracker, fit.x);
+  start_segments(tracker, fit.x, &fit.segments);
+  fit.systems.resize(fit.segments.size());
+  fit.shared.resize(fit.segments.size());
+  const Iterations ended = gauss_newton(&fit, options.max_iterations);
+
+  InertialResult out;
+  out.rotation_rate = rotation_rate(aligned.pairs);
+  out.position_rms = fit.position_rms;
+  out.rotation_rms = fit.rotation_rms;
+  out.iterations = ended.steps;
+  if (!converged(ended.reason)) {
+    out.status = CalibrationStatus::not_converged;
+    out.message = "The fit did not come to an end: do the two records belong together?";
+    return out;
+  }
+  const double size = fit.x.gravity.norm();
+  if (size < 0.9 * kGravity || size > 1.1 * kGravity)
+    return refused({CalibrationStatus::not_consistent,
+                    "Gravity comes out as " + number(size, 4) +
+                        " m/s^2: the tracker's positions or the accelerometer have another unit than was read."});
+  set_values(fit.x, covariance_of(fit), &out);
+  set_words(fit, options, &out);
   return out;
 }
 
@@ -602,14 +590,14 @@ InertialResult calibrate_inertial(const std::vector<ImuSample>& imu, const std::
   std::string error;
   if (!options.is_valid(&error)) throw std::invalid_argument("InertialOptions: " + error);
   check(imu, tracker);
-  const InertialResult as_given = fit(imu, tracker, options);
+  const InertialResult as_given = fit_as_given(imu, tracker, options);
   const bool usual =
       as_given.status == CalibrationStatus::done && as_given.position_rms < 3e-3 && as_given.rotation_rms < 5e-3;
   if (usual || as_given.status == CalibrationStatus::not_observable) return as_given;
   for (const TrackerReading& reading : kReadings) {
-    const InertialResult other = fit(imu, read_as(reading, tracker), options);
+    const InertialResult other = fit_as_given(imu, read_as(reading, tracker), options);
     if (convincing(other) && !(convincing(as_given) && other.position_rms > 0.5 * as_given.position_rms))
-      return refused(CalibrationStatus::not_consistent, reading.message);
+      return refused({CalibrationStatus::not_consistent, reading.message});
   }
   return as_given;
 }

@@ -12,6 +12,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
+#include "math/gauss_newton.hpp"
 #include "math/text.hpp"
 #include "rooms.hpp"
 #include "tracking/deviation.hpp"
@@ -30,8 +31,8 @@ constexpr double kLowest = 0.3, kHighest = 12.0;  // frequencies that are looked
 constexpr int kInputs = 3 * ModalModel::kMost;    // a mode and an axis of the plan's acceleration each
 constexpr int kColumns = 6 + kInputs;
 constexpr int kEvery = 3;  // of the rows, one is predicted from
-// A gain is the share of the tip's acceleration that a mode feels: of the order of one. Slow motion does not tell modes
-// apart, and without this prior their gains would be huge and cancel each other, at these frequencies only.
+// A gain is the fraction of the tip's acceleration that a mode feels: of the order of one. Slow motion does not tell
+// modes apart, and without this prior their gains would be huge and cancel each other, at these frequencies only.
 constexpr double kGain = 0.5, kPredictionNoise = 2e-3;  // standard deviations [-], [m]
 
 struct Mode {
@@ -179,49 +180,63 @@ Mode moved(const Mode& mode, double log_frequency, double log_damping) {
           std::clamp(mode.damping * std::exp(log_damping), 1e-3, 0.5)};
 }
 
-/// Levenberg-Marquardt over logarithms of frequencies and dampings, differences for derivatives.
-Fit refine(const std::vector<DeviationRow>& rows, const DeviationOptions& options, int iterations,
-           std::vector<Mode>* modes, MatrixXd* information) {
-  const auto n = static_cast<Eigen::Index>(2 * modes->size());
-  Fit fit = evaluate(rows, *modes, options);
-  double damping = 1e-3;
-  for (int iteration = 0; iteration < iterations; ++iteration) {
+/// Logarithms of frequencies and dampings, differences for derivatives.
+struct ModesProblem {
+  const std::vector<DeviationRow>& rows;
+  const DeviationOptions& options;
+  std::vector<Mode> modes, tried;
+  Fit fit, next;
+  NormalSystem<> normal;
+
+  /// Modes moved by a step of (logarithm of frequency, of damping) each.
+  std::vector<Mode> moved_by(const VectorXd& step) const {
+    std::vector<Mode> out = modes;
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      const auto at = static_cast<Eigen::Index>(2 * k);
+      out[k] = moved(out[k], step[at], step[at + 1]);
+    }
+    return out;
+  }
+  const NormalSystem<>& system() {
+    const auto n = static_cast<Eigen::Index>(2 * modes.size());
     MatrixXd J(fit.residuals.size(), n);
     for (Eigen::Index k = 0; k < n; ++k) {
-      std::vector<Mode> other = *modes;
       const double h = k % 2 == 0 ? 1e-3 : 2e-2;
-      other[static_cast<std::size_t>(k / 2)] =
-          moved(other[static_cast<std::size_t>(k / 2)], k % 2 == 0 ? h : 0.0, k % 2 == 0 ? 0.0 : h);
-      J.col(k) = (evaluate(rows, other, options).residuals - fit.residuals) / h;
+      J.col(k) = (evaluate(rows, moved_by(h * VectorXd::Unit(n, k)), options).residuals - fit.residuals) / h;
     }
-    const MatrixXd JtJ = J.transpose() * J;
-    const VectorXd g = J.transpose() * fit.residuals;
-    *information = JtJ;
-    bool better = false;
-    double fall = 0.0;
-    for (int attempt = 0; attempt < 5 && !better; ++attempt) {
-      MatrixXd A = JtJ;
-      A.diagonal() *= 1.0 + damping;
-      VectorXd step = -A.ldlt().solve(g);
-      for (Eigen::Index k = 0; k < n; ++k)
-        step[k] = std::clamp(step[k], k % 2 == 0 ? -0.1 : -0.7, k % 2 == 0 ? 0.1 : 0.7);
-      std::vector<Mode> other = *modes;
-      for (Eigen::Index k = 0; k < n; k += 2)
-        other[static_cast<std::size_t>(k / 2)] = moved(other[static_cast<std::size_t>(k / 2)], step[k], step[k + 1]);
-      Fit next = evaluate(rows, other, options);
-      if (next.cost < fit.cost) {
-        fall = 1.0 - next.cost / fit.cost;
-        fit = std::move(next);
-        *modes = other;
-        damping = std::max(1e-6, damping / 10.0);
-        better = true;
-      } else {
-        damping *= 10.0;
-      }
-    }
-    if (!better || fall < 1e-4) break;
+    normal = {J.transpose() * J, J.transpose() * fit.residuals, fit.residuals.squaredNorm()};
+    return normal;
   }
-  return fit;
+  double attempt(VectorXd step) {
+    for (Eigen::Index k = 0; k < step.size(); ++k)
+      step[k] = std::clamp(step[k], k % 2 == 0 ? -0.1 : -0.7, k % 2 == 0 ? 0.1 : 0.7);
+    tried = moved_by(step);
+    next = evaluate(rows, tried, options);
+    return next.residuals.squaredNorm();
+  }
+  void accept() {
+    fit = std::move(next);
+    modes = tried;
+  }
+  void move(const VectorXd& step) {
+    attempt(step);
+    accept();
+  }
+};
+
+/// The modes whose predictions err least; `information`: of the logarithms, where the last step began.
+Fit refine(const std::vector<DeviationRow>& rows, const DeviationOptions& options, int iterations,
+           std::vector<Mode>* modes, MatrixXd* information) {
+  ModesProblem problem{rows, options, *modes, {}, evaluate(rows, *modes, options), {}, {}};
+  LevenbergMarquardtOptions how;
+  how.max_linearisations = iterations;
+  how.max_failures = 5;
+  how.first_damping = 0.0;
+  how.small_fall = [](double from, double to) { return 1.0 - to / from < 1e-4; };
+  levenberg_marquardt(&problem, how);
+  *modes = problem.modes;
+  *information = problem.normal.gram;
+  return std::move(problem.fit);
 }
 
 }  // namespace
