@@ -17,7 +17,7 @@
 
 namespace truing {
 
-/// Compensation: what to tell a controller that believes in the nominal robot, so that the real one, which the
+/// Compensation: what to command a controller that believes in the nominal robot, so that the real one, which the
 /// calibrated robot describes, goes where it is wanted.
 
 struct CompensateOptions {

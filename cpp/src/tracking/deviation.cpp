@@ -412,8 +412,8 @@ void DeviationModel::settle(double now) {
     for (int p = 0; p < kPredictors; ++p) {
       Grade& grade = grades_[static_cast<std::size_t>(p)];
       const Vector6d error = guess.d[static_cast<std::size_t>(p)] - done.z.d;
-      const double share = options_.period / std::min(options_.grade_time, grade.seconds + options_.period);
-      grade.mean_square += share * (error.cwiseAbs2() - grade.mean_square);
+      const double fraction = options_.period / std::min(options_.grade_time, grade.seconds + options_.period);
+      grade.mean_square += fraction * (error.cwiseAbs2() - grade.mean_square);
       grade.seconds += options_.period;
     }
   }

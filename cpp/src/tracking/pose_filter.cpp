@@ -373,7 +373,7 @@ void PoseFilter::transition(const Belief& from, const Nominal& to_x, double t, C
   M.col(kClock) += dt * M.col(kDrift);
 
   const FilterOptions& o = options_;
-  // Scale errors: of what moved, alike over `kScaleTime`.
+  // Scale errors: of what moved, correlated over `kScaleTime`.
   const double turn = 4.0 * (to_x.q * from.x.q.conjugate()).vec().squaredNorm(),
                speed_up = (to_x.v - from.x.v).squaredNorm();
   const double scale = o.imu_scale * o.imu_scale * kScaleTime / dt;
@@ -522,14 +522,14 @@ void PoseFilter::measure_flange(double t, Belief* belief) const {
     sway << fk_t * r.head<3>(), fk_t * r.tail<3>();
     learn_sway(sway, belief);
   }
-  const double alike = std::max(1.0, options_.sway_correlation / kMark);
-  S.topLeftCorner<3, 3>() += alike * fk.linear() * belief->sway.head<3>().asDiagonal() * fk_t;
-  S.bottomRightCorner<3, 3>() += alike * fk.linear() * belief->sway.tail<3>().asDiagonal() * fk_t;
+  const double repeats = std::max(1.0, options_.sway_correlation / kMark);
+  S.topLeftCorner<3, 3>() += repeats * fk.linear() * belief->sway.head<3>().asDiagonal() * fk_t;
+  S.bottomRightCorner<3, 3>() += repeats * fk.linear() * belief->sway.tail<3>().asDiagonal() * fk_t;
   double nis = 0.0;
   fuse<6>(PHt, S, r, kInfinity, belief, &nis);
 }
 
-/// The arm shows how much it sways while the tracker is there; never believed to be less than half of what was told.
+/// The arm shows how much it sways while the tracker is there; never taken to be less than half of what was given.
 void PoseFilter::learn_sway(const Vector6d& sway, Belief* belief) const {
   const double p = 0.5 * options_.sway_position, r = 0.5 * options_.sway_rotation;
   Vector6d least;

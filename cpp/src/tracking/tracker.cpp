@@ -24,6 +24,8 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kNever = -1e300;
+constexpr double kOutOfPlan =
+    1.0;  // forward kinematics as the plan: continued at constant velocity at most so long [s]
 
 /// Covariance of position and orientation of the sensor, carried over to a point `lever` from it (base frame).
 Matrix6d moved(const Covariance& P, const Vector3d& lever) {
@@ -156,6 +158,73 @@ struct Tracker::Inside {
     }
   }
 
+  /// Is the estimate worth more than forward kinematics? Then it is valid, or coasting without the tracker.
+  bool near_enough(const Belief& belief, double newest, Status* status) const {
+    const Vector6d sway = filter.sway_variance().cwiseSqrt();
+    const double position = std::sqrt(belief.P.diagonal().segment<3>(kP).maxCoeff()),
+                 rotation = std::sqrt(belief.P.diagonal().segment<3>(kTheta).maxCoeff());
+    *status = newest - belief.last_pose < kCoastingAge ? Status::valid : Status::coasting;
+    return *status == Status::valid || (position < std::max(options.coast_position, sway.head<3>().maxCoeff()) &&
+                                        rotation < std::max(options.coast_rotation, sway.tail<3>().maxCoeff()));
+  }
+
+  /// T_base_imu within the window: as the filter has it.
+  Isometry3d looked_up(const Belief& belief, PosePrediction* out) const {
+    Isometry3d T_base_imu = Isometry3d::Identity();
+    T_base_imu.translation() = belief.x.p;
+    T_base_imu.linear() = belief.x.q.toRotationMatrix();
+    out->covariance = moved(belief.P, belief.x.q * T_imu_tool.translation());
+    return T_base_imu;
+  }
+
+  /// T_base_imu to come, by the predictor that has done best; without a plan (null) at constant acceleration.
+  Isometry3d ahead(const Belief& belief, const PlanPoint* reference, PosePrediction* out) {
+    const double newest = out->made, h = std::max(0.0, out->t - newest);
+    const Motion motion = filter.motion_at(newest);
+    Isometry3d T_base_imu = Isometry3d::Identity();
+    PlanPoint here;
+    Vector6d d = Vector6d::Zero();
+    out->predictor = deviation.best();
+    if (reference && deviation.reference_at(newest, &here, kOutOfPlan) &&
+        deviation.predict(out->predictor, newest, deviation_of(motion, here), out->t, &d)) {
+      T_base_imu = deviated(reference->T, d);
+    } else {
+      out->predictor = Predictor::acceleration;
+      T_base_imu.translation() = motion.x.p + h * motion.x.v + 0.5 * h * h * motion.acceleration;
+      T_base_imu.linear() = (exp_rotation(h * motion.rate) * motion.x.q).toRotationMatrix();
+    }
+    // What predictions were found to be wrong by, at the graded horizon; it grows with the horizon's square where
+    // acceleration is unknown.
+    const double ratio = h / options.deviation.horizon;
+    const Vector6d growth = deviation.grade(out->predictor) * (ratio * ratio);
+    out->covariance = moved(belief.P, T_base_imu.linear() * T_imu_tool.translation());
+    const Matrix3d R = T_base_imu.linear();
+    out->covariance.topLeftCorner<3, 3>() += R * growth.head<3>().asDiagonal() * R.transpose();
+    out->covariance.bottomRightCorner<3, 3>() += R * growth.tail<3>().asDiagonal() * R.transpose();
+    return T_base_imu;
+  }
+
+  /// T_base_imu by forward kinematics or plan, and the last static deviation.
+  Isometry3d held(const PlanPoint& reference, const Belief& belief, bool imu_alive, PosePrediction* out) {
+    out->predictor = Predictor::slow;
+    const Isometry3d T_base_imu = deviated(reference.T, deviation.slow());
+    const FilterOptions& f = options.filter;
+    const double away = filter.initialised() ? std::max(0.0, out->t - belief.last_pose) : 0.0,
+                 wander = imu_alive ? std::min(away, 1e4) : 0.0;
+    const double slow_p = deviation.ready() ? 0.0 : f.slow_position * f.slow_position,
+                 slow_r = deviation.ready() ? 0.0 : f.slow_rotation * f.slow_rotation;
+    Vector6d sway;
+    sway << Vector3d::Constant(f.sway_position * f.sway_position),
+        Vector3d::Constant(f.sway_rotation * f.sway_rotation);
+    if (filter.initialised()) sway = filter.sway_variance();
+    const Matrix3d R = T_base_imu.linear() * setup.T_flange_imu.linear().transpose();
+    out->covariance.topLeftCorner<3, 3>() = R * sway.head<3>().asDiagonal() * R.transpose();
+    out->covariance.bottomRightCorner<3, 3>() = R * sway.tail<3>().asDiagonal() * R.transpose();
+    out->covariance.diagonal().head<3>().array() += f.slow_position_walk * f.slow_position_walk * wander + slow_p;
+    out->covariance.diagonal().tail<3>().array() += f.slow_rotation_walk * f.slow_rotation_walk * wander + slow_r;
+    return T_base_imu;
+  }
+
   TrackSetup setup;
   TrackOptions options;
   PoseFilter filter;
@@ -208,80 +277,22 @@ PosePrediction Tracker::predict(double t) {
   PosePrediction out;
   out.t = t;
   out.made = now();
-  const double newest = out.made;
-  const bool joints_alive = in.newest_joints > newest - in.options.joints_timeout;
-  const bool imu_alive = in.filter.initialised() && newest > in.newest_joints - in.options.imu_timeout;
-
+  const bool joints_alive = in.newest_joints > out.made - in.options.joints_timeout;
+  const bool imu_alive = in.filter.initialised() && out.made > in.newest_joints - in.options.imu_timeout;
   Belief belief;
-  if (imu_alive) {
-    belief = in.filter.belief_at(std::min(t, newest));
-    const double age = newest - belief.last_pose;
-    const Vector6d sway = in.filter.sway_variance().cwiseSqrt();
-    const double position = std::sqrt(belief.P.diagonal().segment<3>(kP).maxCoeff()),
-                 rotation = std::sqrt(belief.P.diagonal().segment<3>(kTheta).maxCoeff());
-    if (age < kCoastingAge)
-      out.status = Status::valid;
-    else if (position < std::max(in.options.coast_position, sway.head<3>().maxCoeff()) &&
-             rotation < std::max(in.options.coast_rotation, sway.tail<3>().maxCoeff()))
-      out.status = Status::coasting;
-    else
-      out.status = joints_alive ? Status::hold : Status::lost;
-  } else {
+  if (imu_alive) belief = in.filter.belief_at(std::min(t, out.made));
+  if (!imu_alive || !in.near_enough(belief, out.made, &out.status))
     out.status = joints_alive ? Status::hold : Status::lost;
-  }
-
   PlanPoint reference;
-  const double out_of_plan =
-      1.0;  // forward kinematics as the plan: continued at constant velocity for so long at most [s]
-  const bool has_reference = in.deviation.reference_at(t, &reference, out_of_plan);
-  const bool estimate = out.status == Status::valid || out.status == Status::coasting;
-  const double h = std::max(0.0, t - newest);
+  const bool has_reference = in.deviation.reference_at(t, &reference, kOutOfPlan);
   Isometry3d T_base_imu = Isometry3d::Identity();
-  if (estimate && t <= newest) {
-    T_base_imu.translation() = belief.x.p;
-    T_base_imu.linear() = belief.x.q.toRotationMatrix();
-    out.covariance = moved(belief.P, belief.x.q * in.T_imu_tool.translation());
-  } else if (estimate) {
-    const Motion motion = in.filter.motion_at(newest);
-    PlanPoint here;
-    Vector6d d = Vector6d::Zero();
-    out.predictor = in.deviation.best();
-    if (has_reference && in.deviation.reference_at(newest, &here, out_of_plan) &&
-        in.deviation.predict(out.predictor, newest, deviation_of(motion, here), t, &d)) {
-      T_base_imu = deviated(reference.T, d);
-    } else {  // no plan: the pose itself at constant acceleration
-      out.predictor = Predictor::acceleration;
-      T_base_imu.translation() = motion.x.p + h * motion.x.v + 0.5 * h * h * motion.acceleration;
-      T_base_imu.linear() = (exp_rotation(h * motion.rate) * motion.x.q).toRotationMatrix();
-    }
-    // What predictions were found to be wrong by, at the graded horizon; it grows with the horizon's square where
-    // acceleration is unknown.
-    const double ratio = h / in.options.deviation.horizon;
-    const Vector6d growth = in.deviation.grade(out.predictor) * (ratio * ratio);
-    out.covariance = moved(belief.P, T_base_imu.linear() * in.T_imu_tool.translation());
-    const Matrix3d R = T_base_imu.linear();
-    out.covariance.topLeftCorner<3, 3>() += R * growth.head<3>().asDiagonal() * R.transpose();
-    out.covariance.bottomRightCorner<3, 3>() += R * growth.tail<3>().asDiagonal() * R.transpose();
-  } else if (has_reference) {
-    out.predictor = Predictor::slow;
-    T_base_imu = deviated(reference.T, in.deviation.slow());
-    const FilterOptions& f = in.options.filter;
-    const double away = in.filter.initialised() ? std::max(0.0, t - belief.last_pose) : 0.0,
-                 wander = imu_alive ? std::min(away, 1e4) : 0.0;
-    const double slow_p = in.deviation.ready() ? 0.0 : f.slow_position * f.slow_position,
-                 slow_r = in.deviation.ready() ? 0.0 : f.slow_rotation * f.slow_rotation;
-    Vector6d sway;
-    sway << Vector3d::Constant(f.sway_position * f.sway_position),
-        Vector3d::Constant(f.sway_rotation * f.sway_rotation);
-    if (in.filter.initialised()) sway = in.filter.sway_variance();
-    const Matrix3d R = T_base_imu.linear() * in.setup.T_flange_imu.linear().transpose();
-    out.covariance.topLeftCorner<3, 3>() = R * sway.head<3>().asDiagonal() * R.transpose();
-    out.covariance.bottomRightCorner<3, 3>() = R * sway.tail<3>().asDiagonal() * R.transpose();
-    out.covariance.diagonal().head<3>().array() += f.slow_position_walk * f.slow_position_walk * wander + slow_p;
-    out.covariance.diagonal().tail<3>().array() += f.slow_rotation_walk * f.slow_rotation_walk * wander + slow_r;
-  } else {
+  if (out.status == Status::valid || out.status == Status::coasting)
+    T_base_imu =
+        t <= out.made ? in.looked_up(belief, &out) : in.ahead(belief, has_reference ? &reference : nullptr, &out);
+  else if (has_reference)
+    T_base_imu = in.held(reference, belief, imu_alive, &out);
+  else
     out.status = Status::lost;
-  }
   if (out.status == Status::lost) out.covariance = Matrix6d::Identity() * 1e6;
   out.T_base_tool = T_base_imu * in.T_imu_tool;
   return out;
@@ -292,7 +303,7 @@ Compensation Tracker::compensate(double t) {
   Compensation out;
   out.predicted = predict(t);
   PlanPoint plan;
-  out.has_plan = in.deviation.reference_at(t, &plan, 1.0);
+  out.has_plan = in.deviation.reference_at(t, &plan, kOutOfPlan);
   if (out.has_plan) {
     out.T_base_tool_planned = plan.T * in.T_imu_tool;
     if (out.predicted.status != Status::lost) {

@@ -21,7 +21,7 @@ constexpr double kWarmUp = 10.0;       // after a start, and while the filter se
 constexpr double kPart = 0.8;          // thresholds of equal probability: three degrees of freedom against six
 constexpr int kBehind = 8;             // samples that an onset and a jump are judged by
 constexpr double kStaticTime = 30.0;   // over which the deviation from forward kinematics is averaged [s]
-constexpr double kAlike = 1.0;         // time over which that deviation resembles itself [s]
+constexpr double kCorrelation = 1.0;   // time of that deviation [s]
 constexpr double kSure = 5.0;          // logarithm of odds
 
 Vector6d log_frame(const Isometry3d& T) {
@@ -54,7 +54,7 @@ void ShiftWatch::push(const PoseGrade& grade, const Isometry3d* T_base_flange) {
   now.T_base_receiver = grade.T_base_receiver;
   now.has_flange = T_base_flange != nullptr && grade.dimensions == 6;
   if (now.has_flange) now.T_base_flange = *T_base_flange;
-  // Share of an innovation that is left after it was fused: R S^-1.
+  // Fraction of an innovation that is left after it was fused: R S^-1.
   const Eigen::LLT<Matrix6d> factor(grade.S);
   now.kept = Matrix6d::Identity();
   if (grade.accepted) now.kept -= factor.solve(grade.S - Matrix6d(grade.R.asDiagonal())).transpose();
@@ -107,10 +107,10 @@ void ShiftWatch::learn_deviation(const Row& row) {
   const Vector6d d = deviation_of_receiver(row);
   if (learned_ == 0.0) mean_ = d;
   learned_ += seconds;
-  const double share = seconds / std::min(kStaticTime, learned_ + 1e-3);
+  const double fraction = seconds / std::min(kStaticTime, learned_ + 1e-3);
   const Vector6d off = d - mean_;
-  mean_ += share * off;
-  variance_ += share * (off.cwiseAbs2() - variance_);
+  mean_ += fraction * off;
+  variance_ += fraction * (off.cwiseAbs2() - variance_);
 }
 
 /// Where the sum of the following innovations is longest, as far back as the average that has flagged it remembers.
@@ -165,7 +165,7 @@ void ShiftWatch::flag() {
 
 /// A shifted station moves all that is measured by one motion of the base, a slipped receiver by one motion on the
 /// flange. Which of them leaves the deviation from forward kinematics nearest to what it was before? Logarithm of the
-/// odds, samples within `kAlike` counting as one.
+/// odds, samples within `kCorrelation` counting as one.
 void ShiftWatch::compare(const Row& row) {
   if (!row.has_flange) return;
   const Isometry3d T_base_expected = row.T_base_flange * setup_.T_flange_receiver;
@@ -174,7 +174,7 @@ void ShiftWatch::compare(const Row& row) {
                  by_receiver = d - log_frame(receiver_);
   const double seconds = std::clamp(row.t - this->row(count_ - 2).t, 0.0, 0.1);
   const Vector6d weight = (variance_.array() + 1e-12).inverse();
-  shift_.odds += 0.5 * seconds / kAlike * weight.dot(by_receiver.cwiseAbs2() - by_station.cwiseAbs2());
+  shift_.odds += 0.5 * seconds / kCorrelation * weight.dot(by_receiver.cwiseAbs2() - by_station.cwiseAbs2());
   shift_.cause = shift_.odds > kSure    ? ShiftCause::station
                  : shift_.odds < -kSure ? ShiftCause::receiver
                                         : ShiftCause::station_or_receiver;

@@ -67,7 +67,7 @@ struct FramesResult {
 };
 
 /// Tracker frame and receiver, T_tracker_receiver = T_tracker_base T_base_flange T_flange_receiver: dual quaternions in
-/// closed form (as `handeye`, whose words for what is wrong with the numbers are used), then least squares in which
+/// closed form (as `handeye`, whose reasons for what is wrong with the numbers are used), then least squares in which
 /// every position counts by its own error: weights of a multivariate t distribution with five degrees of freedom
 /// (Lange, Little and Taylor 1989). Throws std::invalid_argument as `handeye` does.
 FramesResult calibrate_frames(const std::vector<Eigen::Isometry3d>& T_base_flange,
@@ -129,7 +129,8 @@ struct InertialResult {
 /// speeds and by the rotation that makes them agree (Wahba 1965), then inertial data integrated over short segments
 /// against the tracker, with everything unknown in one least squares: per segment pose and speed, over all the frame,
 /// biases, gravity and the offset. Standard errors from the scatter of the segments, so that they hold for errors that
-/// are alike within one. Needs orientations of the tracker. Throws std::invalid_argument on data that cannot be used.
+/// are correlated within one. Needs orientations of the tracker. Throws std::invalid_argument on data that cannot be
+/// used.
 InertialResult calibrate_inertial(const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker,
                                   const InertialOptions& options = {});
 

@@ -87,7 +87,7 @@ struct ReplayResult {
   bool stopped = false;  ///< `progress` said so
 };
 
-/// `progress` is told the share that is done, about a hundred times; false stops the replay.
+/// `progress` is given the fraction that is done, about a hundred times; false stops the replay.
 /// Throws std::invalid_argument on options that make no sense, and on streams that are not sorted by arrival.
 ReplayResult replay(const RecordedStreams& streams, const TrackSetup& setup, const ReplayOptions& options = {},
                     const std::function<bool(double)>& progress = {});

@@ -25,7 +25,7 @@ struct FlexibleMode {
   double damping = 0.015;                                   ///< ratio zeta
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();     ///< of the tip's motion, per unit of q
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();       ///< of the tip, per unit of q [rad/m]
-  Eigen::Vector3d participation = Eigen::Vector3d::Zero();  ///< share of the tip's acceleration that drives it
+  Eigen::Vector3d participation = Eigen::Vector3d::Zero();  ///< fraction of the tip's acceleration that drives it
   double gust = 0.0;  ///< standard deviation of the sway that gusts alone would make [m]
 };
 
@@ -55,8 +55,8 @@ struct TrackerErrors {
   double latency_jitter = 0.004;  ///< standard deviation, never before the sample was taken [s]
   double clock_offset = 0.0;      ///< t_tracker = t_imu * (1 + clock_drift) + clock_offset [s]
   double clock_drift = 0.0;       ///< [s/s]
-  double out_of_order = 0.0;      ///< share of the samples that take 25 ms more
-  double lost = 0.0;              ///< share of single samples that never arrive
+  double out_of_order = 0.0;      ///< fraction of the samples that take 25 ms more
+  double lost = 0.0;              ///< fraction of single samples that never arrive
 };
 
 struct Dropout {
@@ -81,7 +81,7 @@ struct StreamSimulationOptions {
   double joint_noise = 2e-6;        ///< standard deviation of encoder readings [rad | m]
   double actuator_lag = 0.04;       ///< joints follow the plan so late [s]
   std::vector<FlexibleMode> modes;  ///< empty: those of `large_boom_modes`
-  double frequency_spread = 0.05;   ///< every mode's frequency is drawn anew by the seed, to within this share
+  double frequency_spread = 0.05;   ///< every mode's frequency is drawn anew by the seed, to within this fraction
   double gust_corner = 6.0;         ///< gusts are white noise below this frequency [Hz]
   double reach_exponent = 0.5;      ///< frequencies go as (reference reach / reach)^this
   ImuErrors imu;

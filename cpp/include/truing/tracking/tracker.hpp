@@ -37,11 +37,11 @@ const char* name(Outcome outcome);
 /// True for the outcomes that begin with accepted.
 bool accepted(Outcome outcome);
 
-/// How many samples met which fate.
+/// Number of samples by what became of them.
 struct Counters {
   std::array<std::uint64_t, 11> imu{}, pose{}, joints{}, plan{};  ///< by Outcome
   std::uint64_t outliers = 0;    ///< tracker samples that the gate rejected (those that left the window)
-  std::uint64_t reacquired = 0;  ///< times that the filter gave in to a tracker that disagreed for long
+  std::uint64_t reacquired = 0;  ///< times that the filter followed a tracker that had disagreed for long
 };
 
 struct FilterOptions {
@@ -55,7 +55,7 @@ struct FilterOptions {
   double accel_bias = 1e-1;          ///< [m/s^2]
   double gyro_bias_walk = 2e-5;      ///< [rad/s/sqrt(s)]
   double accel_bias_walk = 2e-4;     ///< [m/s^2/sqrt(s)]
-  double imu_scale = 5e-4;           ///< standard deviation of the scale of gyro and accelerometer, as a share
+  double imu_scale = 5e-4;           ///< standard deviation of the scale of gyro and accelerometer, as a fraction
   double gyro_range = 34.0;          ///< a component at or beyond is saturated [rad/s]
   double accel_range = 156.0;        ///< [m/s^2]
   double largest_gap = 0.02;         ///< between inertial samples, before uncertainty is widened [s]
@@ -65,7 +65,7 @@ struct FilterOptions {
   double position_sigma = 1e-3;      ///< of the tracker, one component [m]
   double rotation_sigma = 1e-3;      ///< [rad]
   double gate = 50.0;                ///< tracker samples with a larger normalised innovation squared are outliers
-  int reacquire_after = 25;          ///< outliers in a row, then the tracker is believed
+  int reacquire_after = 25;          ///< outliers in a row, then the filter follows the tracker
   int frozen_after = 3;              ///< equal tracker samples in a row, then they are refused
   double clock_walk = 2e-5;          ///< of the tracker's clock [s/sqrt(s)]
   double clock_drift = 1e-4;         ///< standard deviation of its drift [s/s]
@@ -73,7 +73,7 @@ struct FilterOptions {
   double sway_position =
       0.02;  ///< standard deviation of the tip about its slow mean, before any data; then as the arm shows it [m]
   double sway_rotation = 0.003;   ///< [rad]
-  double sway_correlation = 0.5;  ///< time over which sway is like itself [s]
+  double sway_correlation = 0.5;  ///< correlation time of the sway [s]
   double slow_position = 0.05;    ///< standard deviation of the deviation from forward kinematics before any data [m]
   double slow_rotation = 0.02;    ///< [rad]
   double slow_position_walk = 3e-3;  ///< how it wanders [m/sqrt(s)]
@@ -111,9 +111,9 @@ struct DeviationOptions {
   double slow_noise = 3e-3;       ///< acceleration that drives the slow part [m/s^2/sqrt(Hz)]
   double static_time = 2.0;       ///< over which the static deviation is averaged [s]
   double mode_noise = 2e-2;       ///< acceleration that drives a mode beside the plan's [m/s^2/sqrt(Hz)]
-  double frequency_sigma = 0.05;  ///< standard deviation of the given frequencies, as a share; 0: they stay
-  double frequency_walk = 0.003;  ///< how they wander, as a share [1/sqrt(s)]
-  double frequency_range = 0.2;   ///< and how far at most, as a share
+  double frequency_sigma = 0.05;  ///< standard deviation of the given frequencies, as a fraction; 0: they stay
+  double frequency_walk = 0.003;  ///< how they wander, as a fraction [1/sqrt(s)]
+  double frequency_range = 0.2;   ///< and how far at most, as a fraction
   double grade_time = 3.0;        ///< over which grades are averaged [s]
   double settle_time = 0.1;       ///< after so long no more late samples are waited for, and a prediction is graded [s]
   double least_evidence = 1.0;    ///< predictions of modes are used after so long of grades [s]
