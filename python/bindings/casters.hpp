@@ -152,10 +152,10 @@ struct Words<Choose> {
 template <>
 struct Words<Reason> {
   static constexpr const char* what = "reason";
-  static constexpr std::array<const char*, 6> list{"reached",      "retreated", "interference",
+  static constexpr std::array<const char*, 6> list{"reached",      "retreated", "collision",
                                                    "out_of_reach", "limit",     "singular"};
   static constexpr auto type = py::detail::const_name(
-      "typing.Literal['reached', 'retreated', 'interference', 'out_of_reach', 'limit', 'singular']");
+      "typing.Literal['reached', 'retreated', 'collision', 'out_of_reach', 'limit', 'singular']");
 };
 
 template <>

@@ -159,7 +159,7 @@ void bind_solution(py::module_& m) {
       "shape=(driven joints,) [rad | m]: readings; of a failure the nearest that was found, within limits.");
   cls.def_readonly("reason", &Solution::reason, R"(What came of it.
 
-'reached'; 'retreated': the target was moved by `retreat`, and is reached there; 'interference': it could be reached, but a
+'reached'; 'retreated': the target was moved by `retreat`, and is reached there; 'collision': it could be reached, but a
 `contact` is in the way; 'out_of_reach': it stays away by `miss` along `direction`, limits aside; 'limit': that of `joint` is in
 the way, by `excess`; 'singular': the tip cannot move along `direction`.)");
   cls.def_property_readonly("reached", &Solution::reached, "Whether the task is met.");
@@ -275,7 +275,7 @@ axis: shape=(3,) the tool's axis in the target's frame, unit vector. travel: sha
 roll: (lower, upper) [rad] of a torch, the turn about `axis` that takes the wanted frame to the reached one.
 preferred_roll: [rad] as near to it as can be; None: any.
 lead, work: (lower, upper) [rad] how far the axis may lean towards `travel` and towards axis x travel.
-retreat: shape=(3,) unit vector in the wanted frame: where everything interferes, the target is moved along it by the least that
+retreat: shape=(3,) unit vector in the wanted frame: where every way to it collides, the target is moved along it by the least that
 frees it, and by no more than longest_retreat [m]; 0: not at all.)");
   cls.def(py::init([](const Eigen::Isometry3d& T, TaskKind kind, const Eigen::Vector3d& axis,
                       const Eigen::Vector3d& travel, const Window& roll, const std::optional<double>& preferred_roll,
@@ -388,7 +388,7 @@ start, end: shape=(3,) [m]. radius: [m].)");
 
   py::class_<Scene> scene(m, "Scene", R"(What the robot must not touch, and what of it must not.
 
-clearance: [m] what comes nearer than this interferes.
+clearance: [m] what comes nearer than this is a collision.
 ignored: pairs of names that are not looked at. Capsules of one link and of neighbouring links never are, nor is the base's with
 what stands still.)");
   scene.def(py::init([](std::vector<Obstacle> obstacles, std::vector<LinkCapsule> capsules, double clearance,
@@ -409,7 +409,7 @@ what stands still.)");
   });
   define_value(scene, {"obstacles", "capsules", "clearance", "ignored"});
 
-  py::class_<Contact> contact(m, "Contact", "The pair that interferes most, or comes nearest.");
+  py::class_<Contact> contact(m, "Contact", "The pair that collides most deeply, or comes nearest.");
   contact.def_readonly("first", &Contact::first, "A capsule.");
   contact.def_readonly("second", &Contact::second, "A capsule or an obstacle.");
   contact.def_readonly("distance", &Contact::distance,

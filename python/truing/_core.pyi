@@ -2608,7 +2608,7 @@ class Reading:
         """
 class HandEyeNoise:
     """
-    Standard deviations of one component, as told or as found. Position noise of hand and board poses adds up: data see the sum alone.
+    Standard deviations of one component, as given or as found. Position noise of hand and board poses adds up: data see the sum alone.
     """
     def __repr__(self) -> str:
         ...
@@ -2773,7 +2773,7 @@ class HandEyeResult:
     @property
     def board_scale(self) -> float:
         """
-        Factor on the board's lengths that would fit best; 1: as told.
+        Factor on the board's lengths that would fit best; 1: as given.
         """
     @property
     def board_scale_sigma(self) -> float:
@@ -3038,7 +3038,7 @@ class Scene:
     """
     What the robot must not touch, and what of it must not.
     
-    clearance: [m] what comes nearer than this interferes.
+    clearance: [m] what comes nearer than this is a collision.
     ignored: pairs of names that are not looked at. Capsules of one link and of neighbouring links never are, nor is the base's with
     what stands still.
     """
@@ -3078,7 +3078,7 @@ class Scene:
         """
 class Contact:
     """
-    The pair that interferes most, or comes nearest.
+    The pair that collides most deeply, or comes nearest.
     """
     def __repr__(self) -> str:
         ...
@@ -3107,7 +3107,7 @@ class Task:
     roll: (lower, upper) [rad] of a torch, the turn about `axis` that takes the wanted frame to the reached one.
     preferred_roll: [rad] as near to it as can be; None: any.
     lead, work: (lower, upper) [rad] how far the axis may lean towards `travel` and towards axis x travel.
-    retreat: shape=(3,) unit vector in the wanted frame: where everything interferes, the target is moved along it by the least that
+    retreat: shape=(3,) unit vector in the wanted frame: where every way to it collides, the target is moved along it by the least that
     frees it, and by no more than longest_retreat [m]; 0: not at all.
     """
     def __init__(self, T_measurement_target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"], *, kind: typing.Literal['pose', 'torch', 'point'] = 'pose', axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., travel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., roll: tuple[float, float] = ..., preferred_roll: typing.SupportsFloat | typing.SupportsIndex | None = None, lead: tuple[float, float] = (0.0, 0.0), work: tuple[float, float] = (0.0, 0.0), retreat: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., longest_retreat: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
@@ -3465,11 +3465,11 @@ class Solution:
         Whether the task is met.
         """
     @property
-    def reason(self) -> typing.Literal['reached', 'retreated', 'interference', 'out_of_reach', 'limit', 'singular']:
+    def reason(self) -> typing.Literal['reached', 'retreated', 'collision', 'out_of_reach', 'limit', 'singular']:
         """
         What came of it.
         
-        'reached'; 'retreated': the target was moved by `retreat`, and is reached there; 'interference': it could be reached, but a
+        'reached'; 'retreated': the target was moved by `retreat`, and is reached there; 'collision': it could be reached, but a
         `contact` is in the way; 'out_of_reach': it stays away by `miss` along `direction`, limits aside; 'limit': that of `joint` is in
         the way, by `excess`; 'singular': the tip cannot move along `direction`.
         """
@@ -3551,7 +3551,7 @@ class Solutions:
         shape=(n,): whether the task is met.
         """
     @property
-    def reasons(self) -> tuple[typing.Literal['reached', 'retreated', 'interference', 'out_of_reach', 'limit', 'singular'], ...]:
+    def reasons(self) -> tuple[typing.Literal['reached', 'retreated', 'collision', 'out_of_reach', 'limit', 'singular'], ...]:
         """
         Of each, as `Solution.reason`.
         """

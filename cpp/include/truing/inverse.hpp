@@ -41,7 +41,7 @@ struct Window {
 
 enum class TaskKind {
   pose,   ///< position and orientation
-  torch,  ///< position and the direction of the tool's axis; the roll about it is free
+  torch,  ///< axis-symmetric tool (5-DOF task): position and axis direction; the roll about the axis is free
   point,  ///< position alone
 };
 
@@ -59,7 +59,7 @@ struct Task {
   /// [rad]
   Window lead{0.0, 0.0};
   Window work{0.0, 0.0};
-  /// Where every way to the target interferes with the scene, the target is moved along this direction, in the wanted
+  /// Where every way to the target collides with the scene, the target is moved along this direction, in the wanted
   /// frame, by the least that frees it: back along the torch, as it is. Unit vector.
   Eigen::Vector3d retreat = -Eigen::Vector3d::UnitZ();
   double longest_retreat = 0.0;  ///< and by no more than this; zero: not at all [m]
@@ -78,8 +78,9 @@ struct Conditions {
 
 /// Which of several answers.
 enum class Choose {
-  nearest,        ///< to the seed
-  limits_margin,  ///< furthest from the joint limits: the smallest share of a joint's range that is left on either side
+  nearest,         ///< to the seed
+  limits_margin,   ///< furthest from the joint limits: the smallest fraction of a joint's range that is left on either
+                   ///< side
   manipulability,  ///< of the joints that turn, furthest from singular: sqrt(det(J J^T)), lengths over `reach / pi`
   rail_travel,     ///< least way of the prismatic joints from the seed, then nearest
 };
@@ -101,7 +102,7 @@ struct InverseOptions {
 enum class Reason {
   reached,
   retreated,     ///< the target was moved by `retreat`, and is reached there
-  interference,  ///< it could be reached, but a `contact` is in the way
+  collision,     ///< it could be reached, but a `contact` is in the way
   out_of_reach,  ///< no joints reach it, limits aside: it stays away by `miss` along `direction`
   limit,         ///< a joint's limit stands in the way: `joint`, and by how much in `excess`
   singular,      ///< the target is within reach, but the way ends where the tip cannot move along `direction`
@@ -194,7 +195,7 @@ class InverseSolver {
   Eigen::Isometry3d forward(const Joints& joints, TipJacobian* jacobian, const Conditions* conditions = nullptr) const;
 
   /// One answer, by Choose. Throws std::invalid_argument on a seed of the wrong size, on values that are not finite, on
-  /// a wanted pose that is not rigid. What cannot be reached is told in the result.
+  /// a wanted pose that is not rigid. What cannot be reached, the result says.
   Solution solve(const Task& task, const Joints& seed, const Conditions* conditions = nullptr) const;
 
   /// Every answer for a full pose: of a closed form its branches, carried over to the robot as it is. Prismatic joints
@@ -215,7 +216,7 @@ class InverseSolver {
 
   /// A path through the targets in steps as short as can be: the cheapest chain over samples of roll, rails and
   /// branches (dynamic programming), then evened out and put on the robot as it is. Where no chain keeps within the
-  /// steps, the gap is told, and the path goes on from the cheapest place beyond it. `seed`: where the robot comes
+  /// steps, the gap is listed, and the path goes on from the cheapest place beyond it. `seed`: where the robot comes
   /// from.
   Path path(const std::vector<Task>& tasks, const Joints& seed, const PathOptions& options = {},
             const Conditions* conditions = nullptr, const std::function<bool(std::size_t)>& progress = {}) const;

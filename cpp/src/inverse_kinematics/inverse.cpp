@@ -230,7 +230,7 @@ std::string InverseSolver::describe(const Solution& solution) const {
       return "reached";
     case Reason::retreated:
       return "reached " + number(1e3 * solution.retreat, 4) + " mm back, free of what is in the way";
-    case Reason::interference:
+    case Reason::collision:
       return contact() + " are " + number(-1e3 * solution.contact_distance, 4) + " mm in each other";
     case Reason::out_of_reach:
       return "out of reach by " + miss;

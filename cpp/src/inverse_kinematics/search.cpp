@@ -31,7 +31,7 @@ bool check(const Query& query, const double* readings, Trace* trace, Solution* s
     solution->contact = {pair.first, pair.second};
     solution->contact_distance = pair.distance + robot.options.scene.clearance;
     if (pair.distance < 0.0) {
-      solution->reason = Reason::interference;
+      solution->reason = Reason::collision;
       if (trace->colliding.joints.size() == 0 || solution->contact_distance > trace->colliding.contact_distance)
         trace->colliding = *solution;
       return false;

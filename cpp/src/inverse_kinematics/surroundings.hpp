@@ -27,7 +27,7 @@ double segment_box_distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
 /// Indices into the scene; second: capsule, or capsule count + obstacle; -1: no pair to look at.
 struct NearestPair {
   int first = -1, second = -1;
-  double distance = 0.0;  ///< less the clearance: negative interferes
+  double distance = 0.0;  ///< less the clearance: negative: a collision
 };
 
 class Surroundings {

@@ -44,7 +44,7 @@ NEAR_LIMIT = 0.02  # share of a joint's range
 REASONS: Mapping[str, tuple[str, str]] = {
     "reached": ("reached", AFTER),
     "retreated": ("reached after a retreat", "#2e8b57"),
-    "interference": ("something is in the way", "#7b3fa0"),
+    "collision": ("something is in the way", "#7b3fa0"),
     "out_of_reach": ("out of reach", REJECTED),
     "limit": ("a joint's limit is in the way", BEFORE),
     "singular": ("singular", INK),
@@ -247,7 +247,7 @@ def _limits_in_the_way(result: Mapping[str, Any]) -> list[str]:
 
 
 def _parts_in_the_way(result: Mapping[str, Any]) -> list[str]:
-    met = [f for f in result["failures"] if f["reason"] == "interference"]
+    met = [f for f in result["failures"] if f["reason"] == "collision"]
     pairs = _most_frequent(" and ".join(f["pair"]) for f in met)
     if not pairs:
         return []

@@ -91,7 +91,7 @@ def _failure(solver: _core.InverseSolver, target: int, s: _core.Solution) -> dic
     found: dict[str, Any] = {"target": target, "reason": s.reason, "text": status_text(solver, s)}
     if s.reason == "retreated":
         return {**found, "retreat_m": s.retreat}
-    if s.reason == "interference":
+    if s.reason == "collision":
         return {
             **found,
             "pair": contact_names(solver, s),
@@ -125,7 +125,7 @@ def limited_joint(robot: _core.Robot, index: int) -> _core.Joint:
 
 
 def contact_names(solver: _core.InverseSolver, s: _core.Solution) -> list[str]:
-    """The pair that interferes."""
+    """The pair that collides."""
     if s.contact is None:
         return []
     scene = solver.options.scene

@@ -17,7 +17,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
@@ -288,7 +287,7 @@ def track_calibrate(
     notes += more
     frames = _core.calibrate_frames(places.hand, places.board)
     notes += list(frames.warnings)
-    status, message = frames.status, re.sub(r': reading "[^"]*"', "", frames.message)
+    status, message = frames.status, frames.message
 
     inertial, found_tool = None, None
     if imu is not None and status == "done":

@@ -73,7 +73,7 @@ TEST_CASE("distances of segments and boxes are those of their nearest points") {
   CHECK(truing::inverse_kinematics::segment_box_distance(o, 3 * x, Vector3d::Ones()) == doctest::Approx(-1.0));
 }
 
-TEST_CASE("an answer that interferes is none: another branch is taken, or the pair is named with its depth") {
+TEST_CASE("an answer that collides is none: another branch is taken, or the pair is named with its depth") {
   const Robot robot = wrist_arm();
   Joints q(6);
   q << 0.3, 0.4, -0.3, 0.5, 0.8, 0.2;
@@ -110,14 +110,14 @@ TEST_CASE("an answer that interferes is none: another branch is taken, or the pa
     options.scene.ignored = {{"forearm", "ball"}, {"upper arm", "ball"}};
     const InverseSolver solver(robot, options);
     const Solution solution = solver.solve(task, q);
-    CHECK(solution.reason == Reason::interference);
+    CHECK(solution.reason == Reason::collision);
     CHECK(solution.contact_distance == doctest::Approx(-0.05));
     CHECK(solver.describe(solution) == "torch and ball are 50 mm in each other");
   }
   CHECK(wrist.allFinite());
 }
 
-TEST_CASE("a target that interferes is moved back by the least that frees it, and that is told") {
+TEST_CASE("a target that collides is moved back by the least that frees it, and the result says so") {
   const Robot robot = perturbed(wrist_arm(), 1e-3, 1e-3, 3);
   Joints q(6);
   q << 0.3, 0.4, -0.3, 0.5, 0.8, 0.2;
@@ -131,7 +131,7 @@ TEST_CASE("a target that interferes is moved back by the least that frees it, an
   T_plate.translation() += T_plate.linear() * Vector3d(0, 0, -0.03 + 0.05);
   options.scene.obstacles = {{"plate", truing::Shape::box, T_plate, {0.4, 0.4, 0.1}, 0.0}};
   options.scene.ignored = {{"forearm", "plate"}, {"upper arm", "plate"}};
-  CHECK(InverseSolver(robot, options).solve(task, q).reason == Reason::interference);
+  CHECK(InverseSolver(robot, options).solve(task, q).reason == Reason::collision);
   task.longest_retreat = 0.1;
   const InverseSolver solver(robot, options);
   const Solution solution = solver.solve(task, q);
@@ -142,10 +142,10 @@ TEST_CASE("a target that interferes is moved back by the least that frees it, an
   moved.T_measurement_target.translation() -= solution.retreat * task.T_measurement_target.linear().col(2);
   CHECK(holds(robot, moved, solution));
   task.longest_retreat = 0.02;
-  CHECK(solver.solve(task, q).reason == Reason::interference);
+  CHECK(solver.solve(task, q).reason == Reason::collision);
 }
 
-TEST_CASE("links interfere with each other, but not with their neighbours") {
+TEST_CASE("links collide with each other, but not with their neighbours") {
   const Robot robot = wrist_arm();
   Scene scene = scene_of_wrist_arm();
   Joints folded(6), open(6);

@@ -507,14 +507,14 @@ def scene(wall_at: float) -> Scene:
     )
 
 
-def test_what_interferes_is_not_reached_and_retreats_by_the_least() -> None:
+def test_what_collides_is_not_reached_and_retreats_by_the_least() -> None:
     robot = irb()
     T = truing.forward_kinematics(robot, [0.0, 0.3, 0.0, 0.0, 0.6, 0.0])[-1]
     options = InverseOptions(scene=scene(float(T[0, 3])))
     solver = InverseSolver(robot, options)
     found = solver.solve(Task(T))
     assert (
-        found.reason == "interference"
+        found.reason == "collision"
         and not found.reached
         and found.contact is not None
         and found.contact_distance < 0

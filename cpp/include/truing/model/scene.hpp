@@ -43,7 +43,7 @@ struct LinkCapsule {
 struct Scene {
   std::vector<Obstacle> obstacles;
   std::vector<LinkCapsule> capsules;
-  double clearance = 0.0;  ///< what comes nearer than this interferes [m]
+  double clearance = 0.0;  ///< what comes nearer than this collides [m]
   /// Pairs of names that are not looked at. Capsules of one link and of neighbouring links never are, nor is the base's
   /// with what stands still.
   std::vector<std::pair<std::string, std::string>> ignored;
@@ -51,7 +51,7 @@ struct Scene {
   bool empty() const { return capsules.empty(); }
 };
 
-/// The pair that interferes most, or comes nearest.
+/// The pair that collides most deeply, or comes nearest.
 struct Contact {
   std::string first, second;  ///< a capsule, and a capsule or obstacle
   double distance = 0.0;      ///< between their surfaces; negative: how deep they are in each other [m]
