@@ -541,6 +541,23 @@ TEST_CASE("a board of another size is said") {
   CHECK(r.board_scale == doctest::Approx(1.0 / 0.96).epsilon(0.01));
   CHECK(std::any_of(r.warnings.begin(), r.warnings.end(),
                     [](const std::string& w) { return w.find("% larger than given") != std::string::npos; }));
+  REQUIRE(r.concerns.size() == r.warnings.size());
+  const auto scale = std::find_if(r.concerns.begin(), r.concerns.end(), [](const HandEyeConcern& concern) {
+    return concern.kind == HandEyeConcernKind::board_scale;
+  });
+  REQUIRE(scale != r.concerns.end());
+  CHECK(scale->value == r.board_scale);
+}
+
+TEST_CASE("a reading is explained in the caller's nouns") {
+  CHECK(explain_reading("hand-inverted+board-millimetres", {"flange", "tracker", "receiver"}) ==
+        "flange poses are inverted (base in flange), or the set-up is the other one (eye-in-hand, eye-to-hand); "
+        "receiver positions are in mm and were read as m");
+  CHECK_THROWS_AS(explain_reading("board-upside-down"), std::invalid_argument);
+  for (const Reading& reading : handeye_readings()) {
+    CHECK(reading.explanation == explain_reading(reading.name));
+    CHECK(reading.explanation.find('{') == std::string::npos);
+  }
 }
 
 // ---- What motions cannot show --------------------------------------------------------------------------------------
@@ -554,6 +571,7 @@ TEST_CASE("one axis of rotation: the height along it is refused, or told") {
       REQUIRE(r.status == HandEyeStatus::not_observable);
       REQUIRE(r.unobservable.size() == 1);
       CHECK(std::abs(r.unobservable[0].direction.z()) > 0.999);
+      CHECK(r.unobservable[0].reason == UnobservableReason::one_axis);
       CHECK(r.message.find("known height") != std::string::npos);
       CHECK_THROWS_WITH_AS(handeye_closed_form(s.poses, setup), doctest::Contains("known height"),
                            std::invalid_argument);

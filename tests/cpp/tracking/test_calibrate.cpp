@@ -158,6 +158,26 @@ TEST_CASE("readings of the tracker's numbers are named: mm for m, left-handed, d
   }
 }
 
+TEST_CASE("what is wrong is said of flange, tracker and receiver, not of hand, camera and board: seed 5") {
+  const Positions good = positions(15, 5e-4, 5e-4, 5);
+  Positions inverted = good, scaled = good, still = good;
+  for (Isometry3d& T : inverted.flange) T = T.inverse();
+  for (Isometry3d& T : scaled.receiver) T.translation() *= 1.01;
+  for (std::size_t k = 0; k < still.flange.size(); ++k) {
+    still.flange[k].linear().setIdentity();
+    still.receiver[k] = kTrackerBase * still.flange[k] * kFlangeReceiver;
+  }
+  for (const Positions& p : {inverted, scaled, still}) {
+    const FramesResult r = calibrate_frames(p.flange, p.receiver);
+    std::string said = r.message;
+    for (const std::string& warning : r.warnings) said += " " + warning;
+    CAPTURE(said);
+    CHECK((said.find("flange") != std::string::npos || said.find("tracker") != std::string::npos));
+    for (const char* theirs : {"camera", "board", "the hand", "hand poses"})
+      CHECK(said.find(theirs) == std::string::npos);
+  }
+}
+
 TEST_CASE("standstills are found, and averaged over the sway") {
   std::vector<FrameSample> flange;
   std::vector<PoseSample> tracker;
