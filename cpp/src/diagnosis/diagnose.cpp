@@ -17,6 +17,7 @@
 #include "diagnosis/sanity.hpp"
 #include "diagnosis/where.hpp"
 #include "math/statistics.hpp"
+#include "model/effects/traits.hpp"
 #include "rooms.hpp"
 
 namespace truing {
@@ -44,6 +45,7 @@ void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, co
         "diagnose needs measured positions, poses or distances: touched fixed points alone show no scale, and are for "
         "identify");
   for (const std::string& name : options.leave_out) find_effect(name, options.own_effects);
+  for (const std::string& name : options.also) find_effect(name, options.own_effects);
 }
 
 /// Base and targets (and anchor) are always unknown.
@@ -119,7 +121,10 @@ void say_what_is_not_testable(const Work& work, Diagnosis* out) {
   }
   if (work.given.inferred_direction) {
     out->not_testable.push_back(
-        {"backlash", {}, "no columns dir1 …: only a direction inferred from the order of the rows could be tried"});
+        {effect_that([](const EffectTraits& traits) { return traits.driver == Driver::direction; }).name,
+         {},
+         "no columns dir1 …: only a direction inferred from the order of the rows could be tried",
+         Untestable::column_missing});
   }
 }
 

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "math/statistics.hpp"
+#include "model/effects/traits.hpp"
 
 namespace truing::diagnosis {
 
@@ -66,8 +67,9 @@ struct RefitTask {
 };
 
 static bool asks_for_moments(const Explanation& e) {
-  return std::any_of(e.requests.begin(), e.requests.end(),
-                     [](const EffectRequest& request) { return request.effect == "gravity_moment"; });
+  return std::any_of(e.requests.begin(), e.requests.end(), [](const EffectRequest& request) {
+    return model::traits_of(request.effect, {}).search == Search::with_unknown_weights;
+  });
 }
 
 /// The explanation's effects as part of the robot, with the parameters that the search found under its prior.
@@ -117,8 +119,7 @@ static RefitTask refit_task(const DiagnoseOptions& options, const Design& design
       continue;
     }
     for (const EffectRequest& request : e.requests) {
-      if (request.effect == "gear_ratio" || request.effect == "joint_offset" || request.effect == "link_geometry")
-        continue;
+      if (model::traits_of(request.effect, {}).stands_for != StandsFor::terms) continue;
       if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second)
         out.options.effects.push_back(request);
     }

@@ -94,8 +94,7 @@ static std::vector<int> flexible_columns(const Design& design) {
   for (const int k : out) in[static_cast<std::size_t>(k)] = true;
   for (std::size_t g = 0; g < design.candidates.groups.size(); ++g) {
     const Explanation& e = design.candidates.named[g];
-    const bool coarse_drift =
-        e.kind == Kind::drift && e.effect == "drift" && e.site != "base.xyz" && e.knots[0].size() <= 12;
+    const bool coarse_drift = e.kind == Kind::drift && frame_coordinates(e.site).size() == 6 && e.knots[0].size() <= 12;
     if (e.kind == Kind::drift && !coarse_drift) continue;
     for (const int k : design.candidates.groups[g].columns) {
       if (!in[static_cast<std::size_t>(k)]) out.push_back(k);

@@ -5,7 +5,7 @@
 The rule: a string literal of cpp/src or python/truing is not, and does not begin with, the name of an effect
 of the catalogue ("backlash", "backlash:J2", "transmission_error@"). Not searched: cpp/src/model/effects
 itself; exam/, whose effects are its own and share nothing with the catalogue; comments, docstrings and
-sentences, where a name is an example. Words that are effects' names and mean something else are listed.
+sentences, where a name is an example. Words that mean something else, and requests of the demonstration, are listed.
 """
 
 from __future__ import annotations
@@ -26,9 +26,12 @@ EFFECT = re.compile(rf"(?:{'|'.join(NAMES)})(?![a-z_ ])")
 LITERAL = re.compile(r'"((?:[^"\\\n]|\\.)*)"')
 COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 
-# File, and the literal that is no effect there.
+# File, and a literal that may stand there.
 OTHER_MEANING = {
     ("python/truing/tracking/result.py", "drift"),  # of two clocks [s/s]
+    ("python/truing/tracking/page.py", "drift"),
+    ("python/truing/cli/commands/demo.py", "backlash:J3"),  # a request, as a user makes it
+    ("python/truing/cli/commands/demo.py", "backlash.J3"),  # and what was hidden for it
 }
 
 
