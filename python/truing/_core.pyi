@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'joint_motion', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'joint_motion', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
 class Joint:
     """
     One joint and the link that belongs to it. Lengths in m, angles in rad, masses in kg.
@@ -492,6 +492,125 @@ class Measurements:
         """
         shape=(n,), or None.
         """
+class EffectTraits:
+    """
+    What diagnosis, planning and simulation know of an effect; they read these and no name.
+    """
+    def __init__(self, *, driver: str = 'several', moves: str = 'joint', law: str = '', law_test: str = '', of_instrument: bool = False, needs_masses: bool = False, mimicked_by: collections.abc.Sequence[str] = [], separated_by: collections.abc.Mapping[str, str] = {}, prior: typing.SupportsFloat | typing.SupportsIndex = 0.01, usual: typing.SupportsFloat | typing.SupportsIndex = 0.0, plausible: typing.SupportsFloat | typing.SupportsIndex = 0.0, main_part: str = '') -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def documentation(self) -> typing.Annotated[list[str], "FixedSize(3)"]:
+        """
+        Law, parameters and needs, as docs/reference/effects.md has them.
+        """
+    @property
+    def driver(self) -> str:
+        """
+        The input that its basis is a function of.
+        """
+    @property
+    def law(self) -> str:
+        """
+        The law of one input that its motion of a joint follows.
+        """
+    @property
+    def law_test(self) -> str:
+        """
+        The free function that the law is tested against.
+        """
+    @property
+    def main_part(self) -> str:
+        """
+        The parameter that is meant by the effect's name alone.
+        """
+    @property
+    def mimicked_by(self) -> tuple[str, ...]:
+        """
+        Effects that may do the same, and show only with a column of their own.
+        """
+    @property
+    def moves(self) -> str:
+        """
+        joint, axis, link, base or target.
+        """
+    @property
+    def needs_masses(self) -> bool:
+        """
+        Searched only where the links' masses are known.
+        """
+    @property
+    def of_instrument(self) -> bool:
+        """
+        Not a motion of the robot.
+        """
+    @property
+    def plausible(self) -> float:
+        """
+        No machine in working order has more, in the parameter's unit; 0: unknown.
+        """
+    @property
+    def prior(self) -> float:
+        """
+        Motion of its site that it may well make [rad | m].
+        """
+    @property
+    def search(self) -> str:
+        """
+        When it takes part in a diagnosis or a plan.
+        """
+    @property
+    def separated_by(self) -> dict[str, str]:
+        """
+        By other effect ('': any): what to measure to tell them apart. Of own effects.
+        """
+    @property
+    def stands_for(self) -> str:
+        """
+        Parameters of the model that it stands for; empty: it has terms of its own.
+        """
+    @property
+    def usual(self) -> float:
+        """
+        Size that a simulation draws, in the parameter's unit; 0: unknown.
+        """
+    @property
+    def wanders(self) -> bool:
+        """
+        Also tried as a free function of time.
+        """
+    @property
+    def weights_found_by(self) -> str:
+        """
+        The effect that finds the weights where no mass is known.
+        """
+class CatalogueEffect:
+    """
+    An effect that truing knows by name.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def per_joint(self) -> bool:
+        """
+        False: it belongs to the robot as a whole.
+        """
+    @property
+    def summary(self) -> str:
+        """
+        What it is.
+        """
+    @property
+    def traits(self) -> EffectTraits:
+        """
+        What it says of itself.
+        """
 class EffectRequest:
     """
     An effect asked for: its name, and joints (none: every driven joint).
@@ -524,7 +643,7 @@ class OwnEffect:
     """
     The values of a user's effect for the rows of some data; `truing.Effect` makes these.
     """
-    def __init__(self, name: str, summary: str = '') -> None:
+    def __init__(self, name: str, summary: str = '', traits: EffectTraits = ...) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -536,6 +655,11 @@ class OwnEffect:
     def name(self) -> str:
         """
         Name of the effect.
+        """
+    @property
+    def traits(self) -> EffectTraits:
+        """
+        What it says of itself.
         """
 class IdentifyOptions:
     """
@@ -5612,13 +5736,17 @@ def catalogue() -> list[tuple[str, str]]:
     """
     Name and summary of the effects that truing knows.
     """
+def catalogue_effects() -> tuple[CatalogueEffect, ...]:
+    """
+    The effects that truing knows, with what they say of themselves.
+    """
 def diagnose(robot: Robot, data: Measurements, options: DiagnoseOptions | None = None, own_effects: collections.abc.Sequence[OwnEffect] = []) -> Diagnosis:
     """
     Where the gap between robot and model lies, which effect causes it, and how far it shrinks.
     
     Raises InputError on data or options that cannot be used.
     """
-def distinguish(robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], options: DistinguishOptions | None = None) -> Distinction:
+def distinguish(robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], options: DistinguishOptions | None = None, own_effects: collections.abc.Sequence[typing.Any] = []) -> Distinction:
     """
     Before any data: which effects a plan can tell apart, how small it would still see them, and the poses to add.
     
