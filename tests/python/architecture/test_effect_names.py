@@ -5,7 +5,8 @@
 The rule: a string literal of cpp/src or python/truing is not, and does not begin with, the name of an effect
 of the catalogue ("backlash", "backlash:J2", "transmission_error@"). Not searched: cpp/src/model/effects
 itself; exam/, whose effects are its own and share nothing with the catalogue; comments, docstrings and
-sentences, where a name is an example. Words that mean something else, and requests of the demonstration, are listed.
+sentences, where a name is an example. Words that mean something else, and requests of the demonstration,
+are listed.
 """
 
 from __future__ import annotations
