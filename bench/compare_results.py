@@ -165,11 +165,13 @@ def collect(truing: str, out: Path, data: Path | None, examples: Path, jobs: int
     cases = chosen(listed(), only, data is not None)
     took: dict[str, float] = {}
     for name, status, took[name] in run_all(runner, cases, jobs):
-        if status > int(cases[name].startswith(MAY_FAIL)):
-            error = (out / name / "stderr.txt").read_text(encoding="utf-8").strip()
+        error = (out / name / "stderr.txt").read_text(encoding="utf-8").strip()
+        if status > int(cases[name].startswith(MAY_FAIL)) or "Traceback" in error:
             print(f"{name}: exit status {status}: {error[-300:]}")
     slowest = ", ".join(f"{name} {took[name]:.1f} s" for name in sorted(took, key=lambda n: -took[n])[:5])
-    print(f"{len(cases)} runs in {time.perf_counter() - started:.0f} s; slowest: {slowest}")
+    seconds, used = time.perf_counter() - started, os.times()
+    used_seconds = used.children_user + used.children_system
+    print(f"{len(cases)} runs in {seconds:.0f} s, {used_seconds:.0f} s of processor time; slowest: {slowest}")
 
 
 # ---- Reading what was written ------------------------------------------------------------------------------
