@@ -116,7 +116,7 @@ def test_the_wrappers_defaults_are_those_of_the_core() -> None:
     ):
         for name, parameter in inspect.signature(function).parameters.items():
             if not hasattr(options, name):
-                assert name in {"robot", "data", "joints", "raise_if_not_converged"}
+                assert name in {"robot", "data", "joints", "effects", "raise_if_not_converged"}
                 continue
             default = {} if parameter.default is None else parameter.default
             assert default == getattr(options, name), name
@@ -563,8 +563,9 @@ def test_distinguish_says_what_a_plan_tells_apart(robot: truing.Robot, q: np.nda
         truing.distinguish(robot, q[:, :3])
     with pytest.raises(truing.InputError, match="shape"):
         truing.distinguish(robot, q[0])
-    with pytest.raises(truing.InputError, match="own effects"):
-        truing.distinguish(robot, q, separate=truing.Effect("mine", "J2", lambda d: np.ones(len(d))))
+    mine = truing.Effect("mine", "J2", lambda d: np.ones(len(d)))
+    asked = truing.distinguish(robot, q, separate=[mine, *parse_effects("joint_offset:J2")], add=0)
+    assert {e.effect for e in asked.effects} == {"mine", "joint_offset"}
 
 
 def test_plan_gives_poses(robot: truing.Robot) -> None:
