@@ -77,7 +77,7 @@ URDF = """<?xml version="1.0"?>
 # The part of bench/track_real.py that has no command. Names are looked for where versions have them.
 INERTIAL = """\
 def known(name):
-    modules = ["truing", "truing.tracking", "truing.track", "truing.files"]
+    modules = ["truing", "truing.model", "truing.tracking", "truing.track", "truing.files"]
     for module in modules:
         try:
             return getattr(importlib.import_module(module), name)
