@@ -62,7 +62,9 @@ def table(title: str, head: Sequence[str], lines: Sequence[Sequence[str]], words
     drawn = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, show_header=any(head))
     for k, name in enumerate(head):
         left = k == 0 or len(head) == 2 or words
-        drawn.add_column(name, justify="left" if left else "right", overflow="fold")
+        # What a line is about stays on one line; the other columns give way.
+        least = min(24, max((len(line[0]) for line in lines), default=0)) if k == 0 else None
+        drawn.add_column(name, justify="left" if left else "right", overflow="fold", min_width=least)
     for line in lines:
         drawn.add_row(*line)
     console().print(drawn)

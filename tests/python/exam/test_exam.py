@@ -10,7 +10,6 @@ import ast
 import functools
 import json
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +23,7 @@ import truing
 
 pytest.importorskip("mujoco")
 
+from candidates import crashing, silent
 from truing.exam import laws, sealing, sets, surprises
 from truing.exam.answers import Answer, Named, Unknown, baseline
 from truing.exam.design import draw, usual_plan
@@ -348,28 +348,6 @@ def test_a_changed_label_breaks_its_seal() -> None:
     assert (
         sealing.sealed({"family": "none"}).seal != envelope.seal
     )  # salted: equal labels have different seals
-
-
-def silent(robot: truing.Robot, data: truing.Measurements) -> Any:
-    """A candidate that never finds anything."""
-    share = SimpleNamespace(value=0.0, low=0.0, high=0.0)
-    return SimpleNamespace(
-        verdict="none",
-        effects=[],
-        unknown=[],
-        not_testable=[],
-        shrink=share,
-        sentence="",
-        candidates=[],
-        robot=robot,
-        robot_before=robot,
-    )
-
-
-def crashing(robot: truing.Robot, data: truing.Measurements) -> Any:
-    if data.rows == sets.make("development/none/1")[1].rows:
-        os._exit(1)
-    return silent(robot, data)
 
 
 def failing(robot: truing.Robot, data: truing.Measurements) -> Any:
