@@ -17,31 +17,33 @@
 
 namespace truing {
 
-/// Compensation: what to command a controller that believes in the nominal robot, so that the real one, which the
+/// Compensation: what to command of a controller that computes with the nominal robot, so that the real one, which the
 /// calibrated robot describes, goes where it is wanted.
 
+/// How `Compensator` works.
 struct CompensateOptions {
-  InverseOptions inverse;
-  /// Wanted poses and commands are in each robot's own base frame, as programs have them; false: in the measurement
+  InverseOptions inverse;  ///< of both solvers
+  /// Wanted poses and commands are in each robot's own base frame, as programs have them; else in the measurement
   /// frame.
   bool in_base = false;
 };
 
+/// What to command of a controller that computes with the nominal robot.
 struct Compensated {
   /// Of the calibrated robot: joints to command, whether the target is reached with them, and why not if it is not.
   Solution solution;
-  /// Pose to command: a controller whose inverse kinematics is the nominal robot's takes these joints for it, if it
-  /// stays in their configuration.
+  /// shape=(4, 4) [m]: pose to command. A controller whose inverse kinematics is the nominal robot's takes these joints
+  /// for it, if it stays in their configuration.
   Eigen::Isometry3d T_command = Eigen::Isometry3d::Identity();
   /// The joints are more than half a radian from those that the nominal robot would take: a controller that is given
   /// T_command may choose others.
   bool other_configuration = false;
-  /// How far the real robot would be from the task if the wanted pose were commanded as it is; NaN: the nominal robot
-  /// cannot reach it. [m], [rad]
+  /// [m] how far the real robot would be from the task if the wanted pose were commanded as it is; not known where the
+  /// nominal robot cannot reach it.
   double position_before = std::numeric_limits<double>::quiet_NaN();
-  double rotation_before = std::numeric_limits<double>::quiet_NaN();
-  /// Standard error of where the target will be, by what the calibration does not know of its parameters: position [m]
-  /// and rotation [rad] along the measurement frame's axes. NaN: no uncertainty was given.
+  double rotation_before = std::numeric_limits<double>::quiet_NaN();  ///< [rad] likewise
+  /// shape=(6,): standard error of where the target will be, from the covariance of the calibration: position [m] and
+  /// rotation [rad] along the measurement frame's axes. NaN: no uncertainty was given.
   Eigen::Matrix<double, 6, 1> sigma = Eigen::Matrix<double, 6, 1>::Constant(std::numeric_limits<double>::quiet_NaN());
 };
 

@@ -20,16 +20,16 @@
 namespace truing {
 
 enum class Solver {
-  lm,     ///< truing's own Levenberg-Marquardt on streamed normal equations
+  lm,     ///< Levenberg-Marquardt on streamed normal equations
   ceres,  ///< Ceres with the same residuals and Jacobians; takes bounds
 };
 
 enum class Loss {
-  reject,  ///< Cauchy to find gross outliers, then plain least squares without them (they are listed); the default
-  none,
-  huber,
-  cauchy,
-  tukey,
+  reject,  ///< Cauchy to find gross outliers, then plain least squares without them; they are listed
+  none,    ///< plain least squares
+  huber,   ///< Huber's loss
+  cauchy,  ///< Cauchy's loss
+  tukey,   ///< Tukey's loss
 };
 
 enum class FrameBy {
@@ -37,44 +37,47 @@ enum class FrameBy {
   svd,         ///< refitted by registration (Umeyama) after every step, as the palletizer method has it; positions only
 };
 
+/// How `identify` works.
 struct IdentifyOptions : ParameterSelection, SolverOptions {
-  std::vector<Effect> own_effects;  ///< effects outside the catalogue
-  Solver solver = Solver::lm;
-  Loss loss = Loss::reject;
-  FrameBy frame_by = FrameBy::parameters;
-  double rotation_length = 0.1;  ///< [m]: a rotation error of 1 rad counts as this length, where rows give no sigma
-  double test_share = 0.2;       ///< of the pose groups, held out when `set` is absent
+  std::vector<Effect> own_effects;         ///< effects outside the catalogue
+  Solver solver = Solver::lm;              ///< what minimises
+  Loss loss = Loss::reject;                ///< how gross outliers are treated
+  FrameBy frame_by = FrameBy::parameters;  ///< how the measurement frame is found
+  double rotation_length = 0.1;  ///< [m] a rotation error of 1 rad counts as this length, where rows give no sigma
+  double test_share = 0.2;       ///< fraction of the pose groups held out when the data has no `set`
   std::uint64_t seed = 0;        ///< of the split
-  double rank_tolerance = 1e-6;  ///< a unit column that the others explain but for this share is not observable
-  double reject_beyond = 6.0;    ///< Loss::reject: rows whose residual is longer than this many medians
+  double rank_tolerance = 1e-6;  ///< a unit column that the others explain up to this fraction is not observable
+  double reject_beyond = 6.0;    ///< loss `reject`: rows whose residual is longer than this many medians
   int threads = 0;               ///< 0: as many as the machine has
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
 };
 
-/// Errors of the nominal robot with base, targets (and anchor, fixed points) fitted, and of the calibrated one.
+/// Errors before and after calibration.
 struct BeforeAfter {
   ErrorStatistics before;  ///< nominal robot with base, targets (and anchor, fixed points) fitted
-  ErrorStatistics after;
+  ErrorStatistics after;   ///< calibrated robot
 };
 
+/// What `identify` found.
 struct Identification {
-  Robot robot;                        ///< calibrated
-  Robot before;                       ///< nominal with base and targets fitted
+  Robot robot;                        ///< calibrated; part of this result: copy it before changing it
+  Robot before;                       ///< nominal, with base and targets fitted; part of this result
   std::vector<Parameter> parameters;  ///< every parameter asked for, frozen ones included
-  Eigen::MatrixXd covariance;         ///< of the fitted (not frozen) ones, in order of `parameters`
-  std::vector<Frozen> frozen;
-  BeforeAfter train;
-  std::optional<BeforeAfter> test;
-  std::vector<std::size_t> rejected_rows;  ///< training rows left out as gross outliers
-  std::vector<std::int8_t> set;            ///< 0 train, 1 test, for every row
-  std::vector<std::string> warnings;
-  SolverSummary solver;
-  double noise_sigma = 0.0;           ///< of one position component (or distance), from the training residuals [m]
-  double rotation_noise_sigma = 0.0;  ///< of one rotation component [rad]; NaN: none measured
-  int rank = 0;                       ///< fitted parameters
-  int columns = 0;                    ///< parameters asked for
+  /// shape=(rank, rank), of the fitted (not frozen) parameters in order of `parameters`, in their units.
+  Eigen::MatrixXd covariance;
+  std::vector<Frozen> frozen;              ///< what the data cannot see
+  BeforeAfter train;                       ///< errors of the training rows
+  std::optional<BeforeAfter> test;         ///< errors of the held-out rows, if any
+  std::vector<std::size_t> rejected_rows;  ///< training rows (counted from 0) left out as gross outliers
+  std::vector<std::int8_t> set;            ///< shape=(n,): 0 train, 1 test, for every row
+  std::vector<std::string> warnings;       ///< what to know before trusting it
+  SolverSummary solver;                    ///< how the solver ended
+  double noise_sigma = 0.0;                ///< [m] of one position component (or distance), from the training residuals
+  double rotation_noise_sigma = 0.0;       ///< [rad] of one rotation component; NaN: none measured
+  int rank = 0;                            ///< number of parameters fitted
+  int columns = 0;                         ///< number of parameters asked for
 };
 
 /// Finds the robot's parameters from measurements.
@@ -85,23 +88,24 @@ struct Identification {
 /// parameter names …). A fit that did not converge returns with solver.converged == false.
 Identification identify(const Robot& nominal, const Measurements& data, const IdentifyOptions& options = {});
 
-/// What the robot predicts for the rows of `data`; row-major.
+/// What the robot predicts for the rows of some data.
 struct Prediction {
-  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> position;     ///< target in the measurement frame [m]
-  Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor> orientation;  ///< w x y z, w >= 0
-  Eigen::VectorXd distance;                                               ///< [m]; empty without an anchor
+  /// shape=(n, 3) [m]: target in the measurement frame.
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> position;
+  Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor> orientation;  ///< shape=(n, 4): w x y z, w >= 0
+  Eigen::VectorXd distance;                                               ///< shape=(n,) [m]; empty without an anchor
 };
 
 /// Throws std::invalid_argument on unknown effects or columns that they need.
 Prediction predict(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects = {},
                    int threads = 0);
 
-/// Predicted minus measured, row-major, NaN where not measured. [m], [rad] (twice the vector part of the error
-/// quaternion)
+/// Predicted minus measured; NaN where not measured.
 struct Residuals {
-  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> position;
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> position;  ///< shape=(n, 3) [m]
+  /// shape=(n, 3) [rad]: twice the vector part of the error quaternion.
   Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> rotation;
-  Eigen::VectorXd distance;
+  Eigen::VectorXd distance;  ///< shape=(n,) [m]
 };
 
 /// Rows of a fixed point are compared with the mean of that point's predictions.

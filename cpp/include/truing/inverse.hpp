@@ -48,51 +48,52 @@ enum class TaskKind {
 /// What is wanted of one target. The wanted pose's own axes say what the angles mean: with the default axes z is the
 /// torch, x the direction of travel.
 struct Task {
-  Eigen::Isometry3d T_measurement_target = Eigen::Isometry3d::Identity();  ///< wanted
-  TaskKind kind = TaskKind::pose;
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();    ///< the tool's axis in the target's frame, unit vector; torch
-  Eigen::Vector3d travel = Eigen::Vector3d::UnitX();  ///< across `axis`: the direction that lead is measured in
-  /// Torch: the turn about `axis` that takes the wanted frame to the reached one, in (-pi, pi]. [rad]
+  Eigen::Isometry3d T_measurement_target = Eigen::Isometry3d::Identity();  ///< shape=(4, 4) [m] the wanted pose
+  TaskKind kind = TaskKind::pose;                                          ///< what of it is asked for
+  Eigen::Vector3d axis =
+      Eigen::Vector3d::UnitZ();  ///< shape=(3,) of a torch: its axis in the target's frame, unit vector
+  Eigen::Vector3d travel =
+      Eigen::Vector3d::UnitX();  ///< shape=(3,) across `axis`: the direction that lead is measured in
+  /// (lower, upper) [rad] of a torch: the turn about `axis` that takes the wanted frame to the reached one, in (-pi,
+  /// pi].
   Window roll;
-  double preferred_roll = std::numeric_limits<double>::quiet_NaN();  ///< as near to it as can be; NaN: any [rad]
-  /// Torch: how far the axis may lean towards `travel` (lead) and towards axis x travel (work). Zero width: not at all.
-  /// [rad]
-  Window lead{0.0, 0.0};
-  Window work{0.0, 0.0};
-  /// Where every way to the target collides with the scene, the target is moved along this direction, in the wanted
-  /// frame, by the least that frees it: back along the torch, as it is. Unit vector.
+  double preferred_roll = std::numeric_limits<double>::quiet_NaN();  ///< [rad] the roll is as near to it as can be
+  Window lead{0.0, 0.0};  ///< (lower, upper) [rad] of a torch: how far the axis may lean towards `travel`
+  Window work{0.0, 0.0};  ///< (lower, upper) [rad] of a torch: how far the axis may lean towards `axis` x `travel`
+  /// shape=(3,) unit vector in the wanted frame. Where every way to the target collides, the target is moved along it
+  /// by the least that frees it; by default back along the torch.
   Eigen::Vector3d retreat = -Eigen::Vector3d::UnitZ();
-  double longest_retreat = 0.0;  ///< and by no more than this; zero: not at all [m]
+  double longest_retreat = 0.0;  ///< [m] maximum of that motion; 0: the target is not moved
 };
 
 /// What acts on the robot besides its joints. Only what its effects ask for is looked at.
 struct Conditions {
-  /// Approach direction of every driven joint, -1, 0 or 1. Empty: the way from the seed to the answer.
+  /// Approach direction of every driven joint, -1, 0 or 1; empty: the way from the seed to the answer.
   std::vector<int> direction;
-  double payload = 0.0;                                           ///< at the tool [kg]
+  double payload = 0.0;                                           ///< [kg] at the tool
   double temperature = std::numeric_limits<double>::quiet_NaN();  ///< [deg C]
   double time = std::numeric_limits<double>::quiet_NaN();         ///< [s]
-  std::vector<double> joint_speed;                                ///< of every driven joint [rad/s | m/s]
+  std::vector<double> joint_speed;                                ///< [rad/s | m/s] of every driven joint
   std::map<std::string, double> covariates;                       ///< what else the effects look at, by column name
 };
 
 /// Which of several answers.
 enum class Choose {
-  nearest,         ///< to the seed
-  limits_margin,   ///< furthest from the joint limits: the smallest fraction of a joint's range that is left on either
-                   ///< side
+  nearest,         ///< nearest to the seed
+  limits_margin,   ///< furthest from the joint limits: by the smallest fraction of a joint's range left on either side
   manipulability,  ///< of the joints that turn, furthest from singular: sqrt(det(J J^T)), lengths over `reach / pi`
   rail_travel,     ///< least way of the prismatic joints from the seed, then nearest
 };
 
+/// How `InverseSolver` works.
 struct InverseOptions {
-  double position_tolerance = 1e-6;  ///< a solution misses the task by no more [m]
-  double rotation_tolerance = 1e-6;  ///< [rad]
-  Choose choose = Choose::nearest;
-  int max_iterations = 60;        ///< of one descent
-  int max_restarts = 200;         ///< descents from other seeds before a target is given up
-  double wrist_tolerance = 0.01;  ///< axes that miss each other by no more are taken to meet, for the seeds alone [m]
-  double parallel_tolerance = 0.02;  ///< axes nearer to parallel than this are taken to be, for the seeds alone [rad]
+  double position_tolerance = 1e-6;  ///< [m] a solution misses the task by no more
+  double rotation_tolerance = 1e-6;  ///< [rad] likewise
+  Choose choose = Choose::nearest;   ///< which of several solutions
+  int max_iterations = 60;           ///< of one descent
+  int max_restarts = 200;            ///< descents from other seeds before a target is given up
+  double wrist_tolerance = 0.01;  ///< [m] axes that miss each other by no more are taken to meet, for the seeds alone
+  double parallel_tolerance = 0.02;  ///< [rad] axes nearer to parallel than this are taken to be, for the seeds alone
   Scene scene;                       ///< what the robot must not touch
 
   /// False, and why, when an option makes no sense.
@@ -100,51 +101,53 @@ struct InverseOptions {
 };
 
 enum class Reason {
-  reached,
+  reached,       ///< the task is met
   retreated,     ///< the target was moved by `retreat`, and is reached there
-  collision,     ///< it could be reached, but a `contact` is in the way
+  collision,     ///< it could be reached, but there is a collision: `contact`
   out_of_reach,  ///< no joints reach it, limits aside: it stays away by `miss` along `direction`
-  limit,         ///< a joint's limit stands in the way: `joint`, and by how much in `excess`
+  limit,         ///< the limit of `joint` is in the way, by `excess`
   singular,      ///< the target is within reach, but the way ends where the tip cannot move along `direction`
 };
 
-/// One answer.
+/// One solution of inverse kinematics.
 struct Solution {
-  Joints joints;  ///< readings; of a failure the nearest that was found, within limits
-  Reason reason = Reason::out_of_reach;
-  double position_error = 0.0;  ///< of the task, from a second forward computation [m]
-  double rotation_error = 0.0;  ///< of the task: what of the orientation is asked for [rad]
-  double roll = 0.0;            ///< torch: as Task::roll counts it [rad]
-  int branch = -1;              ///< which of the closed form's branches it came from; -1: by descent
-  int iterations = 0;           ///< of all descents together
-  // Of a failure:
-  double miss = 0.0;  ///< [m], or [rad] when the position is reached and the orientation is not
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< from the nearest to the wanted, measurement frame
-  int joint = -1;                                       ///< driven joint whose limit stands in the way
-  double excess = 0.0;                                  ///< how far beyond its limit it would have to go [rad | m]
-  // With a scene:
-  std::array<int, 2> contact{
-      -1, -1};  ///< the nearest pair: index of a capsule; of another one, or capsule count + index of an obstacle
-  double contact_distance = std::numeric_limits<double>::infinity();  ///< of their surfaces; negative: so deep [m]
-  double retreat = 0.0;  ///< how far the target was moved along Task::retreat [m]
+  Joints
+      joints;  ///< shape=(driven joints,) [rad | m]: readings; of a failure the nearest that was found, within limits
+  Reason reason = Reason::out_of_reach;  ///< what came of it
+  double position_error = 0.0;           ///< [m] of the task, from a second forward computation
+  double rotation_error = 0.0;           ///< [rad] of the task: what of the orientation is asked for
+  double roll = 0.0;                     ///< [rad] of a torch: the turn about the axis from the wanted frame
+  int branch = -1;                       ///< which of the closed form's branches it came from; -1: by descent
+  int iterations = 0;                    ///< of all descents together
+  double miss = 0.0;  ///< of a failure: [m], or [rad] when the position is reached and the orientation is not
+  /// Of a failure, shape=(3,): from the nearest to the wanted, in the measurement frame.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  int joint = -1;       ///< driven joint whose limit is in the way, after them passive ones with limits; -1: none
+  double excess = 0.0;  ///< [rad | m] how far beyond its limit it would have to go
+  /// With a scene the nearest pair: index of a capsule; of another one, or number of capsules + index of an obstacle.
+  std::array<int, 2> contact{-1, -1};
+  /// [m] between their surfaces; negative: so deep. Infinite without a scene.
+  double contact_distance = std::numeric_limits<double>::infinity();
+  double retreat = 0.0;  ///< [m] how far the target was moved along the task's `retreat`
 
   bool reached() const { return reason == Reason::reached; }
 };
 
-/// Answers that differ in configuration, at most as many as a closed form has.
+/// Solutions that differ in configuration, at most as many as a closed form has.
 struct Branches {
   std::array<Solution, 16> solution;
   int count = 0;
-  int beyond_limits = 0;  ///< further ones, outside the joint limits
+  int beyond_limits = 0;  ///< number of further ones, outside the joint limits
 };
 
+/// How `InverseSolver.path` works.
 struct PathOptions {
-  double longest_turn =
-      0.3490658503988659;       ///< of a turning joint between neighbouring targets; more is a gap [rad] (20 deg)
-  double longest_slide = 0.25;  ///< of a sliding joint [m]
+  /// [rad] maximum step of a revolute joint between neighbouring targets; more is a gap (20 deg).
+  double longest_turn = 0.3490658503988659;
+  double longest_slide = 0.25;  ///< [m] the same of a prismatic joint
   int rolls = 24;               ///< samples of a torch's roll, where it is free
   int rail_places = 5;          ///< samples of each rail before the arm, over what it can be reached from
-  int smoothing = 20;           ///< rounds that even the path out where the task leaves something free
+  int smoothing = 20;           ///< smoothing iterations of the path, where the task leaves degrees of freedom
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
@@ -152,17 +155,17 @@ struct PathOptions {
 
 /// Two neighbouring targets that the joints do not pass between in steps that are allowed.
 struct PathGap {
-  std::size_t from = 0;  ///< to from + 1
-  int joint = -1;        ///< whose step is too long; -1: one of the two is not reached
-  double step = 0.0;     ///< [rad | m]
+  std::size_t start = 0;  ///< index of the target before it; the next is start + 1
+  int joint = -1;         ///< the joint whose step is too long; -1: one of the two is not reached
+  double step = 0.0;      ///< [rad | m]
 };
 
 /// Joints along a chain of targets.
 struct Path {
   std::vector<Solution> solutions;  ///< one per target
   std::vector<PathGap> gaps;        ///< empty: every step is within the bounds
-  double longest_turn = 0.0;        ///< the longest step of a turning joint that is no gap [rad]
-  double longest_slide = 0.0;       ///< of a sliding joint [m]
+  double longest_turn = 0.0;        ///< [rad] the longest step of a revolute joint that is no gap
+  double longest_slide = 0.0;       ///< [m] the same of a prismatic joint
 
   bool continuous() const { return gaps.empty(); }
 };
@@ -198,14 +201,14 @@ class InverseSolver {
   /// a wanted pose that is not rigid. What cannot be reached, the result says.
   Solution solve(const Task& task, const Joints& seed, const Conditions* conditions = nullptr) const;
 
-  /// Every answer for a full pose: of a closed form its branches, carried over to the robot as it is. Prismatic joints
-  /// before the arm stay at the seed's. Of each, the turns nearest to the seed within limits.
-  /// Without closed form: what descents from 8 * max_restarts seeds found, not known to be all.
+  /// Every solution for a full pose: of a closed form its branches, carried over to the robot as it is. Prismatic
+  /// joints before the arm stay at the seed's. Of each, the turns nearest to the seed within limits. Without closed
+  /// form: what descents from 8 * max_restarts seeds found, not known to be all.
   void branches(const Task& task, const Joints& seed, Branches* found, const Conditions* conditions = nullptr) const;
 
-  /// One answer per task; `seeds`: one for all or one per task; `conditions`: none, one, or one per task. The same for
-  /// any number of threads (0: as many as the machine has). `progress` (done) is called now and then from the calling
-  /// thread; false stops: what is left has reason out_of_reach.
+  /// One solution per task; `seeds`: one for all or one per task; `conditions`: none, one, or one per task. The same
+  /// for any number of threads (0: as many as the machine has). `progress` (done) is called now and then from the
+  /// calling thread; false stops: what is left has reason out_of_reach.
   std::vector<Solution> solve_batch(const std::vector<Task>& tasks, const std::vector<Joints>& seeds,
                                     const std::vector<Conditions>& conditions = {}, int threads = 0,
                                     const std::function<bool(std::size_t)>& progress = {}) const;

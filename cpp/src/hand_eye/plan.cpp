@@ -84,7 +84,7 @@ std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeR
                                        const HandEyeOptions& options, const HandEyePlanOptions& plan) {
   if (result.status != HandEyeStatus::done)
     throw std::invalid_argument("a plan starts from a camera that was found: " + result.message);
-  if (plan.poses < 1 || plan.candidates < 1)
+  if (plan.count < 1 || plan.candidates < 1)
     throw std::invalid_argument("a plan needs one pose and one candidate or more");
   HandEyePoses poses = given;
   apply_reading(options.reading, &poses.T_base_hand, &poses.T_camera_board);
@@ -120,7 +120,7 @@ std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeR
 
   Random random(plan.seed);
   std::vector<NextHandPose> out;
-  for (int k = 0; k < plan.poses; ++k) {
+  for (int k = 0; k < plan.count; ++k) {
     NextHandPose best;
     Matrix12d best_C = C;
     double least = std::numeric_limits<double>::infinity();

@@ -103,7 +103,7 @@ Surroundings::Surroundings(const Scene& scene, const Arm& arm) : clearance_(scen
     const int frame = capsule.link == "base"   ? -1
                       : capsule.link == "tool" ? static_cast<int>(joints)
                                                : static_cast<int>(arm.robot().joint_index(capsule.link));
-    capsules_.push_back({frame, capsule.from, capsule.to, capsule.radius});
+    capsules_.push_back({frame, capsule.start, capsule.end, capsule.radius});
   }
   for (const Obstacle& obstacle : scene.obstacles) {
     const Isometry3d& T = obstacle.T_measurement_shape;
@@ -179,7 +179,7 @@ void validate(const Scene& scene, const Robot& robot) {
     take("link capsule", capsule.name);
     const std::string where = "link capsule '" + capsule.name + "'";
     if (capsule.link != "base" && capsule.link != "tool") (void)robot.joint_index(capsule.link);
-    if (!capsule.from.allFinite() || !capsule.to.allFinite())
+    if (!capsule.start.allFinite() || !capsule.end.allFinite())
       throw std::invalid_argument(where + ": an end is not finite");
     require_length(where, "radius", capsule.radius, true);
   }

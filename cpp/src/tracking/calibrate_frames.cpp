@@ -50,8 +50,8 @@ void check_times(const std::vector<Sample>& rows, const char* what) {
 }
 
 bool moved(const Isometry3d& a, const Isometry3d& b, const RestOptions& options) {
-  return (a.translation() - b.translation()).norm() > options.position ||
-         log_rotation(Quaterniond(a.linear().transpose() * b.linear())).norm() > options.rotation;
+  return (a.translation() - b.translation()).norm() > options.moved_by ||
+         log_rotation(Quaterniond(a.linear().transpose() * b.linear())).norm() > options.turned_by;
 }
 
 /// Mean position and rotation of the tracker's samples with stamps from `start` to `end`.

@@ -434,7 +434,7 @@ SimulatedStreams simulate_streams(const Robot& robot, const StreamSimulationOpti
   validate(robot);
   Random random(options.seed), noise(options.seed ^ 0x5deece66dull);  // the arm, and its sensors
   SimulatedStreams out;
-  out.setup = options.default_setup ? default_setup() : options.setup;
+  out.setup = options.setup ? *options.setup : default_setup();
   out.setup.gravity = robot.gravity;
   out.setup.clock_offset = options.tracker.clock_offset;
   out.setup.actuator_lag = options.actuator_lag;

@@ -47,7 +47,7 @@ std::vector<Task> seam(const Vector3d& from, const Vector3d& to, int count, Task
 void check_path(const Robot& robot, const std::vector<Task>& tasks, const Path& path, const PathOptions& options) {
   REQUIRE(path.solutions.size() == tasks.size());
   std::vector<bool> gap(tasks.size(), false);
-  for (const auto& g : path.gaps) gap.at(g.from) = true;
+  for (const auto& g : path.gaps) gap.at(g.start) = true;
   const auto driven = robot.driven_joints();
   for (std::size_t k = 0; k < tasks.size(); ++k) {
     if (path.solutions[k].reached()) CHECK(holds(robot, tasks[k], path.solutions[k]));
@@ -109,7 +109,7 @@ TEST_CASE("where no continuous way exists, the gap is told and the path goes on 
   const InverseSolver solver(robot);
   Path path = solver.path(tasks, a);
   REQUIRE(path.gaps.size() == 1);
-  CHECK(path.gaps[0].from == 19);
+  CHECK(path.gaps[0].start == 19);
   CHECK(path.gaps[0].joint >= 0);
   CHECK(path.gaps[0].step > PathOptions().longest_turn);
   check_path(robot, tasks, path, {});
@@ -119,8 +119,8 @@ TEST_CASE("where no continuous way exists, the gap is told and the path goes on 
   tasks[7].T_measurement_target.translation() = Vector3d(30, 0, 0);
   path = solver.path(tasks, a);
   REQUIRE(path.gaps.size() == 2);
-  CHECK(path.gaps[0].from == 6);
-  CHECK(path.gaps[1].from == 7);
+  CHECK(path.gaps[0].start == 6);
+  CHECK(path.gaps[1].start == 7);
   CHECK(path.gaps[0].joint == -1);
   CHECK(path.solutions[7].reason == Reason::out_of_reach);
   check_path(robot, tasks, path, {});

@@ -8,9 +8,13 @@ namespace truing {
 
 /// Length of the position (or distance) errors of a set of rows.
 struct ErrorStatistics {
-  double rms = 0.0, mean = 0.0, median = 0.0, p95 = 0.0, max = 0.0;  ///< [m]
-  double rotation_rms = 0.0;                                         ///< [rad]; NaN: no orientation measured
-  std::size_t n = 0;
+  double rms = 0.0;           ///< [m]
+  double mean = 0.0;          ///< [m]
+  double median = 0.0;        ///< [m]
+  double p95 = 0.0;           ///< [m] 95th percentile
+  double max = 0.0;           ///< [m]
+  double rotation_rms = 0.0;  ///< [rad]; NaN: no orientation measured
+  std::size_t n = 0;          ///< number of rows
 };
 
 }  // namespace truing

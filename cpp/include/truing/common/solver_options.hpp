@@ -10,20 +10,21 @@ namespace truing {
 
 /// When an iteration of least squares stops, and how it is damped.
 struct SolverOptions {
-  int max_iterations = 5000;      ///< long valleys take thousands of short steps; well-seen robots stop after 3 to 5
-  double initial_damping = 1e-9;  ///< mu, on columns of unit norm
+  /// The fit stops here at the latest: long valleys take thousands of short steps, well-seen robots stop after 3 to 5.
+  int max_iterations = 5000;
+  double initial_damping = 1e-9;  ///< damping mu of the first step, on columns of unit norm
   double rms_fall = 1e-12;  ///< [m] stop when an accepted step lowers the rms by no more (the method's own: 1e-3 mm)
   double gradient = 1e-14;  ///< stop when |g| of unit columns, relative to the residual's norm, is no more
-  bool undamped = false;    ///< mu = 0: the least-squares iteration of the differential error model
-  std::map<std::string, std::pair<double, double>> bounds;  ///< by parameter; Solver::ceres only
+  bool undamped = false;    ///< no damping, mu = 0: the least-squares iteration of the differential error model
+  std::map<std::string, std::pair<double, double>> bounds;  ///< (lowest, highest) by parameter; solver `ceres` only
 };
 
-/// How an iteration ended.
+/// How the solver ended.
 struct SolverSummary {
-  std::string name;
-  int iterations = 0;
-  bool converged = false;
-  std::string stopped_because;
+  std::string name;             ///< 'lm' or 'ceres'
+  int iterations = 0;           ///< steps made
+  bool converged = false;       ///< false: the result must not be used
+  std::string stopped_because;  ///< the reason, in words
 };
 
 }  // namespace truing

@@ -9,9 +9,9 @@ namespace truing {
 
 /// A frame with its uncertainty.
 struct UncertainFrame {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  /// Of (x, y, z [m], rotation vector about the parent's axes [rad]): small changes that move the frame's origin, and
-  /// turn it about that origin.
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();  ///< [m]
+  /// Of x, y, z [m] and the rotation vector about the parent's axes [rad]: small changes that move the frame's origin,
+  /// and turn it about that origin.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
 

@@ -198,8 +198,8 @@ const Effect& find_effect(const std::string& name, const std::vector<Effect>& ow
 /// An effect asked for: its name, and joints ({}: every driven joint that suits, or every passive one if only those
 /// do).
 struct EffectRequest {
-  std::string effect;
-  std::vector<std::string> joints;
+  std::string effect;               ///< name, as in `catalogue()`
+  std::vector<std::string> joints;  ///< names of joints; none: every driven one
 };
 
 /// Terms of the requested effects, in order. Effects that are model parameters give none.

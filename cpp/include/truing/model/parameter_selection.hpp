@@ -11,7 +11,7 @@ namespace truing {
 
 /// Which parameters of a model are to be found.
 struct ParameterSelection {
-  /// Names and globs ("J2.*", "*.ratio"); empty: every geometric value and the targets. What belongs to the instrument
+  /// Names and globs ('J2.*', '*.ratio'); empty: every geometric value and the targets. What belongs to the instrument
   /// (base frame, anchor, fixed points) is always found unless it is in `hold`.
   std::vector<std::string> free;
   std::vector<std::string> hold;              ///< names and globs that stay at nominal whatever else is asked for

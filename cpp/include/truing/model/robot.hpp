@@ -30,55 +30,58 @@ enum class JointType { revolute, prismatic };
 /// sum of the *corrected* motions of the joints in `driven_by` (a palletizer's q4 = -(q2 + q3)), so their ratios
 /// and offsets act through it too. The motion adds to `theta` (revolute) or `d` (prismatic).
 struct Joint {
-  std::string name;
-  JointType type = JointType::revolute;
-  double theta = 0.0;  ///< [rad]
-  double d = 0.0;      ///< [m]
-  double a = 0.0;      ///< [m]
-  double alpha = 0.0;  ///< [rad]
-  double beta = 0.0;   ///< [rad] Hayati's twist about y, for near-parallel neighbouring axes
-  Eigen::Isometry3d T_parent_joint = Eigen::Isometry3d::Identity();  ///< Convention::urdf only
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();                   ///< Convention::urdf only, unit vector
-  double ratio = 1.0;                                                ///< gear-ratio correction [-]
-  double offset = 0.0;                                               ///< joint zero [rad | m]
-  std::vector<std::pair<std::string, double>> driven_by;             ///< empty: the joint has a reading
-  double lower = -std::numeric_limits<double>::infinity();           ///< limit [rad | m]
-  double upper = std::numeric_limits<double>::infinity();            ///< limit [rad | m]
-  std::optional<double> mass;                                        ///< of the link that this joint moves [kg]
-  Eigen::Vector3d center_of_mass = Eigen::Vector3d::Zero();          ///< in the frame after the link [m]
+  std::string name;                      ///< name, unique within the robot
+  JointType type = JointType::revolute;  ///< the kind of motion
+  double theta = 0.0;                    ///< [rad] the motion of a revolute joint adds to it
+  double d = 0.0;                        ///< [m] the motion of a prismatic joint adds to it
+  double a = 0.0;                        ///< [m] link length
+  double alpha = 0.0;                    ///< [rad] link twist
+  double beta = 0.0;                     ///< [rad] Hayati's twist about y, for near-parallel neighbouring axes
+  Eigen::Isometry3d T_parent_joint = Eigen::Isometry3d::Identity();  ///< shape=(4, 4) [m], convention `urdf` only
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();                   ///< shape=(3,) unit vector, convention `urdf` only
+  double ratio = 1.0;                                                ///< [-] gear-ratio correction
+  double offset = 0.0;                                               ///< [rad | m] joint zero
+  /// Pairs of driving joint and weight; empty: the joint has a reading.
+  std::vector<std::pair<std::string, double>> driven_by;
+  double lower = -std::numeric_limits<double>::infinity();   ///< [rad | m] lower limit, -inf if there is none
+  double upper = std::numeric_limits<double>::infinity();    ///< [rad | m] upper limit, inf if there is none
+  std::optional<double> mass;                                ///< [kg] of the link that this joint moves, if known
+  Eigen::Vector3d center_of_mass = Eigen::Vector3d::Zero();  ///< shape=(3,) [m] in the frame after the link
 
   bool passive() const { return !driven_by.empty(); }
 };
 
 /// A measured point (and orientation) on the last link.
 struct Target {
-  std::string name;
-  Eigen::Isometry3d T_last_target = Eigen::Isometry3d::Identity();  ///< target in the frame after the last link
+  std::string name;  ///< name, unique within the robot
+  /// shape=(4, 4) [m]: target in the frame after the last link.
+  Eigen::Isometry3d T_last_target = Eigen::Isometry3d::Identity();
 };
 
 /// An effect with its fitted parameters, as `identify` found them, e.g. {"backlash", {"J3"}, {{"backlash.J3", 2e-4}}}.
 struct AppliedEffect {
-  std::string effect;
-  std::vector<std::string> joints;
-  std::map<std::string, double> parameters;
+  std::string effect;                        ///< name, as in `catalogue()`
+  std::vector<std::string> joints;           ///< names of the joints it acts on
+  std::map<std::string, double> parameters;  ///< value by full name: {'backlash.J3': 2e-4}
 };
 
-/// The far end of a draw-wire or ballbar: a fixed point, and the length that the instrument leaves out.
+/// The far end of a draw-wire or ballbar: reading = distance + zero.
 struct Anchor {
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< in the measurement frame [m]
-  double zero = 0.0;                                ///< reading = distance + zero [m]
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< shape=(3,) [m] in the measurement frame
+  double zero = 0.0;                                ///< [m] the length that the instrument leaves out
 };
 
 /// A robot model, nominal or calibrated: a plain value. `validate` says whether it can be used.
 struct Robot {
-  std::string name;
-  Convention convention = Convention::dh;
-  Eigen::Vector3d gravity{0.0, 0.0, -9.81};                              ///< in the base frame [m/s^2]
-  Eigen::Isometry3d T_measurement_base = Eigen::Isometry3d::Identity();  ///< base in the measurement frame
-  std::vector<Joint> joints;                                             ///< in chain order
-  std::vector<Target> targets;                                           ///< targets[0] is the tool
-  std::vector<AppliedEffect> effects;
-  std::optional<Anchor> anchor;
+  std::string name;                          ///< name of the model
+  Convention convention = Convention::dh;    ///< how the links are read
+  Eigen::Vector3d gravity{0.0, 0.0, -9.81};  ///< shape=(3,) [m/s^2] in the base frame
+  /// shape=(4, 4) [m]: base in the measurement frame.
+  Eigen::Isometry3d T_measurement_base = Eigen::Isometry3d::Identity();
+  std::vector<Joint> joints;           ///< the joints in chain order
+  std::vector<Target> targets;         ///< the targets, the tool first
+  std::vector<AppliedEffect> effects;  ///< effects with their fitted parameters
+  std::optional<Anchor> anchor;        ///< the far end of a draw-wire or ballbar, if there is one
 
   /// Number of joints that have a reading.
   std::size_t driven_count() const;

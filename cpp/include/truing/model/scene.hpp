@@ -21,31 +21,32 @@ enum class Shape {
   box,      ///< `size` along the frame's axes, its centre at the origin
 };
 
-/// Something that stands still.
+/// A fixed obstacle.
 struct Obstacle {
-  std::string name;
-  Shape shape = Shape::box;
-  Eigen::Isometry3d T_measurement_shape = Eigen::Isometry3d::Identity();
-  Eigen::Vector3d size = Eigen::Vector3d::Zero();  ///< whole lengths, of a box; of a capsule z alone [m]
-  double radius = 0.0;                             ///< of spheres and capsules [m]
+  std::string name;                                                       ///< unique within the scene
+  Shape shape = Shape::box;                                               ///< what it is
+  Eigen::Isometry3d T_measurement_shape = Eigen::Isometry3d::Identity();  ///< shape=(4, 4) [m]
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();  ///< shape=(3,) [m] whole lengths, of a box; of a capsule z alone
+  double radius = 0.0;                             ///< [m] of spheres and capsules
 };
 
 /// Part of a link, a capsule: `radius` about the segment between two points.
 struct LinkCapsule {
-  std::string name;
-  std::string link;  ///< the joint whose link carries it, in the frame after it; "base": the base frame; "tool": the
-                     ///< target's frame
-  Eigen::Vector3d from = Eigen::Vector3d::Zero();  ///< [m]
-  Eigen::Vector3d to = Eigen::Vector3d::Zero();    ///< [m]
-  double radius = 0.0;                             ///< [m]
+  std::string name;  ///< unique within the scene
+  /// The joint whose link carries it, in the frame after it; 'base': the base frame; 'tool': the target's frame.
+  std::string link;
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();  ///< shape=(3,) [m]
+  Eigen::Vector3d end = Eigen::Vector3d::Zero();    ///< shape=(3,) [m]
+  double radius = 0.0;                              ///< [m]
 };
 
+/// The obstacles around the robot, and the capsules of the robot that must not touch them or each other.
 struct Scene {
-  std::vector<Obstacle> obstacles;
-  std::vector<LinkCapsule> capsules;
-  double clearance = 0.0;  ///< what comes nearer than this collides [m]
-  /// Pairs of names that are not looked at. Capsules of one link and of neighbouring links never are, nor is the base's
-  /// with what stands still.
+  std::vector<Obstacle> obstacles;    ///< what the robot must not touch
+  std::vector<LinkCapsule> capsules;  ///< the robot's own shape
+  double clearance = 0.0;             ///< [m] smallest distance that is no collision
+  /// Pairs of names that are not checked. Capsules of one link and of neighbouring links never are, nor is the base's
+  /// with obstacles.
   std::vector<std::pair<std::string, std::string>> ignored;
 
   bool empty() const { return capsules.empty(); }
@@ -53,8 +54,9 @@ struct Scene {
 
 /// The pair that collides most deeply, or comes nearest.
 struct Contact {
-  std::string first, second;  ///< a capsule, and a capsule or obstacle
-  double distance = 0.0;      ///< between their surfaces; negative: how deep they are in each other [m]
+  std::string first;      ///< a capsule
+  std::string second;     ///< a capsule or an obstacle
+  double distance = 0.0;  ///< [m] between their surfaces; negative: how deep they are in each other
 };
 
 /// Throws std::invalid_argument on unknown links, empty or equal names, sizes that are not positive, frames that are

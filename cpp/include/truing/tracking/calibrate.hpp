@@ -20,19 +20,20 @@ namespace truing {
 
 /// A standstill, averaged.
 struct RestPose {
-  double start = 0.0, end = 0.0;  ///< controller's clock [s]
-  Eigen::Isometry3d T_base_flange = Eigen::Isometry3d::Identity();
-  Eigen::Isometry3d T_tracker_receiver = Eigen::Isometry3d::Identity();
-  double scatter = 0.0;     ///< of the tracker's position, rms of a component: noise and sway [m]
-  std::size_t samples = 0;  ///< of the tracker
+  double start = 0.0;                                                    ///< [s] controller's clock
+  double end = 0.0;                                                      ///< [s] controller's clock
+  Eigen::Isometry3d T_base_flange = Eigen::Isometry3d::Identity();       ///< shape=(4, 4)
+  Eigen::Isometry3d T_tracker_receiver = Eigen::Isometry3d::Identity();  ///< shape=(4, 4)
+  double scatter = 0.0;     ///< [m] of the tracker's position, rms of a component: noise and sway
+  std::size_t samples = 0;  ///< number of samples of the tracker
 };
 
 struct RestOptions {
-  double least = 2.0;         ///< shorter ones do not count: sway has to average out [s]
-  double margin = 0.5;        ///< left out after the arm has stopped and before it starts [s]
-  double position = 5e-4;     ///< the flange of forward kinematics stays within this [m]
-  double rotation = 5e-4;     ///< [rad]
-  double clock_offset = 0.0;  ///< t_controller = t_tracker - clock_offset, a fraction of `margin` is enough [s]
+  double least = 2.0;         ///< [s] shorter ones do not count: sway has to average out
+  double margin = 0.5;        ///< [s] left out after the arm has stopped and before it starts
+  double moved_by = 5e-4;     ///< [m] the flange of forward kinematics stays within this
+  double turned_by = 5e-4;    ///< [rad] likewise
+  double clock_offset = 0.0;  ///< [s] t_controller = t_tracker - clock_offset, to within a fraction of `margin`
 };
 
 /// Standstills of forward kinematics with what the tracker saw during them. Both sorted by time. Throws
@@ -42,9 +43,9 @@ std::vector<RestPose> find_rests(const std::vector<FrameSample>& flange, const s
 
 enum class CalibrationStatus {
   done,
-  not_observable,  ///< the message says what does not show, and what to do
-  not_consistent,  ///< the message names the reading of the numbers that would make them agree, if there is one
-  not_converged,
+  not_observable,  ///< "not observable": the message says what does not show, and what to do
+  not_consistent,  ///< "not consistent": the message names the reading that would make the numbers agree, if any
+  not_converged,   ///< "not converged"
 };
 const char* name(CalibrationStatus status);
 
@@ -55,15 +56,17 @@ struct PositionError {
   double weight = 1.0;    ///< about 1 where errors are usual, towards 0 where they are large
 };
 
+/// Tracker frame and receiver, of `calibrate_frames`.
 struct FramesResult {
-  CalibrationStatus status = CalibrationStatus::done;
-  std::string message;
-  std::vector<std::string> warnings;
-  UncertainFrame T_tracker_base, T_flange_receiver;
-  std::vector<PositionError> errors;  ///< one per test position
-  double position_sigma = 0.0;        ///< usual error of one component [m]
-  double rotation_sigma = 0.0;        ///< [rad]
-  int iterations = 0;
+  CalibrationStatus status = CalibrationStatus::done;  ///< whether there is a result, and why not
+  std::string message;                                 ///< one sentence
+  std::vector<std::string> warnings;                   ///< what to know or do
+  UncertainFrame T_tracker_base;                       ///< with covariance
+  UncertainFrame T_flange_receiver;                    ///< with covariance
+  std::vector<PositionError> errors;                   ///< one per test position
+  double position_sigma = 0.0;                         ///< [m] usual error of one component
+  double rotation_sigma = 0.0;                         ///< [rad] likewise
+  int iterations = 0;                                  ///< of the refinement
 };
 
 /// Tracker frame and receiver, T_tracker_receiver = T_tracker_base T_base_flange T_flange_receiver: dual quaternions in
@@ -82,13 +85,14 @@ struct ToolPoses {
   std::vector<Eigen::Matrix3d> prescribed;  ///< R_base_tool of those
 };
 
+/// The tool on the flange, of `calibrate_tool`.
 struct ToolResult {
-  CalibrationStatus status = CalibrationStatus::done;
-  std::string message;
-  UncertainFrame T_flange_tool;
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< where the tip was, base [m]
-  std::vector<double> pivot_error;                  ///< of every pivot pose [m]
-  std::vector<double> orientation_error;            ///< of every orientation pose [rad]
+  CalibrationStatus status = CalibrationStatus::done;  ///< whether there is a result, and why not
+  std::string message;                                 ///< one sentence
+  UncertainFrame T_flange_tool;                        ///< with covariance
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();     ///< shape=(3,) [m] where the tip was, in the base frame
+  std::vector<double> pivot_error;                     ///< [m] of every pivot pose
+  std::vector<double> orientation_error;               ///< [rad] of every orientation pose
 };
 
 /// Throws std::invalid_argument on fewer than three pivot poses and unequal counts. Standard errors follow the scatter
@@ -98,31 +102,36 @@ ToolResult calibrate_tool(const ToolPoses& poses);
 // ---- Inertial sensor, gravity, clock --------------------------------------------------------------------------------
 
 struct InertialOptions {
-  double clock_search = 2.0;   ///< offsets up to this are looked for [s]
-  double clock_wanted = 1e-3;  ///< a larger standard error of the offset is not enough, and advice is given [s]
-  double segment = 2.0;        ///< inertial data are integrated over so long [s]
-  double gyro_bias = 0.05;     ///< standard deviations before any data [rad/s]
-  double accel_bias = 0.1;     ///< [m/s^2]
-  int max_iterations = 30;
+  double clock_search = 2.0;   ///< [s] offsets up to this are searched
+  double clock_wanted = 1e-3;  ///< [s] standard error of the offset that is wanted; above it, advice is given
+  double segment = 2.0;        ///< [s] length of the segments over which inertial data are integrated
+  double gyro_bias = 0.05;     ///< [rad/s] standard deviation before any data
+  double accel_bias = 0.1;     ///< [m/s^2] standard deviation before any data
+  int max_iterations = 30;     ///< the fit stops here at the latest
 
   bool is_valid(std::string* error) const;
 };
 
+/// Inertial sensor, gravity and clock, of `calibrate_inertial`.
 struct InertialResult {
-  CalibrationStatus status = CalibrationStatus::done;
-  std::string message;
-  std::vector<std::string> warnings;
-  UncertainFrame T_receiver_imu;
-  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< in the tracker frame [m/s^2]
-  Eigen::Matrix3d gravity_covariance = Eigen::Matrix3d::Zero();
-  std::string tracker_up;                               ///< the tracker's axis that points up: "+z", "+y", …
-  double clock_offset = 0.0, clock_offset_sigma = 0.0;  ///< t_imu = t_tracker - clock_offset [s]
-  bool rich_enough = false;                             ///< the offset is known as well as wanted
-  std::string advice;                                   ///< what would make it so
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
-  Eigen::Vector3d rotation_rate = Eigen::Vector3d::Zero();  ///< rms about the three principal axes, descending [rad/s]
-  double position_rms = 0.0, rotation_rms = 0.0;            ///< of one component, what is left [m], [rad]
-  int iterations = 0;
+  CalibrationStatus status = CalibrationStatus::done;            ///< whether there is a result, and why not
+  std::string message;                                           ///< one sentence
+  std::vector<std::string> warnings;                             ///< what to know or do
+  UncertainFrame T_receiver_imu;                                 ///< with covariance
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();             ///< shape=(3,) [m/s^2] in the tracker frame
+  Eigen::Matrix3d gravity_covariance = Eigen::Matrix3d::Zero();  ///< shape=(3, 3)
+  std::string tracker_up;                                        ///< the tracker's axis that points up: '+z', '+y' …
+  double clock_offset = 0.0;                                     ///< [s] t_imu = t_tracker - clock_offset
+  double clock_offset_sigma = 0.0;                               ///< [s] standard error
+  bool rich_enough = false;                                      ///< the offset is known as well as wanted
+  std::string advice;                                            ///< what would make it so
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();           ///< shape=(3,) [rad/s]
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();          ///< shape=(3,) [m/s^2]
+  /// shape=(3,) [rad/s] rms about the three principal axes, descending.
+  Eigen::Vector3d rotation_rate = Eigen::Vector3d::Zero();
+  double position_rms = 0.0;  ///< [m] residual of one component
+  double rotation_rms = 0.0;  ///< [rad] likewise
+  int iterations = 0;         ///< of the fit
 };
 
 /// Where the inertial sensor is on the receiver, gravity, and the offset of the clocks: a start by correlating angular

@@ -25,9 +25,10 @@ struct RecordedStreams {
 
 struct ReplayOptions {
   TrackOptions track;  ///< compensations are made `track.deviation.horizon` before the instant they are for
-  std::vector<double> horizons = {0.02, 0.04,
-                                  0.08};  ///< at which predictions are graded against the tracker's later samples [s]
-  double learn_modes = 0.0;  ///< modes are identified from so many seconds, and used from then on; 0: never [s]
+  /// [s] leads at which predictions are graded against the tracker's later samples.
+  std::vector<double> horizons = {0.02, 0.04, 0.08};
+  double learn_modes =
+      0.0;  ///< [s] modes are identified from the start of this length, and used from then on; 0: never
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
@@ -45,9 +46,9 @@ const char* name(Baseline baseline);
 
 /// A row of the plan: what to add there.
 struct CompensationRow {
-  bool made = false;  ///< false: the streams do not reach there, and nothing else is set but `t`
-  double t = 0.0;     ///< when the tool is to be there, the inertial sensor's clock [s]
-  Compensation compensation;
+  bool made = false;          ///< false: the streams do not reach there, and nothing else is set but `t`
+  double t = 0.0;             ///< [s] when the tool is to be there, the inertial sensor's clock
+  Compensation compensation;  ///< what to add there
 };
 
 /// A prediction, and what the tracker said when its time had come. Errors are measured minus predicted, of the
@@ -74,14 +75,15 @@ struct TimelineRow {
   std::array<double, ModalModel::kMost> frequencies{};  ///< [Hz]
 };
 
+/// What a replay gave. Times are of the inertial sensor's clock.
 struct ReplayResult {
   std::vector<CompensationRow> rows;     ///< one per row of the plan, in its order
   std::vector<GradedPrediction> graded;  ///< by tracker sample, then by horizon
   std::vector<Innovation> innovations;
   std::vector<TimelineRow> timeline;
   std::vector<Shift> shifts;  ///< of the tracker, as they were noticed
-  ModesResult modes;          ///< identified; count 0 where none were asked for or found
-  double modes_from = 0.0;    ///< they are used from then on [s]; 0: never
+  ModesResult modes;          ///< as identified in the replay; none where none were asked for or found
+  double modes_from = 0.0;    ///< [s] they are used from then on; 0: never
   Counters counters;
   ClockEstimate clock;   ///< at the end
   bool stopped = false;  ///< `progress` said so

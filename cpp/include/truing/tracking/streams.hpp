@@ -36,17 +36,17 @@ struct FrameSample {
   Eigen::Isometry3d T_base_frame = Eigen::Isometry3d::Identity();
 };
 
-/// Where things are, as `calibrate` finds it.
+/// Where things are, and how clocks differ. `T_a_b` maps b-coordinates into a.
 struct TrackSetup {
-  Eigen::Isometry3d T_tracker_base = Eigen::Isometry3d::Identity();
-  Eigen::Isometry3d T_flange_receiver = Eigen::Isometry3d::Identity();
-  Eigen::Isometry3d T_flange_tool = Eigen::Isometry3d::Identity();
-  Eigen::Isometry3d T_flange_imu = Eigen::Isometry3d::Identity();
-  Eigen::Vector3d gravity{0.0, 0.0, -9.81};  ///< in the base frame [m/s^2]
-  double clock_offset = 0.0;                 ///< t_imu = t_tracker - clock_offset [s]
-  double clock_offset_sigma = 0.0;           ///< its standard error [s]; 0: known, and not estimated
-  double controller_clock_offset = 0.0;      ///< t_imu = t_controller - controller_clock_offset [s]
-  double actuator_lag = 0.0;                 ///< the joints are where the plan was so long ago [s]
+  Eigen::Isometry3d T_tracker_base = Eigen::Isometry3d::Identity();     ///< shape=(4, 4)
+  Eigen::Isometry3d T_flange_receiver = Eigen::Isometry3d::Identity();  ///< shape=(4, 4)
+  Eigen::Isometry3d T_flange_tool = Eigen::Isometry3d::Identity();      ///< shape=(4, 4)
+  Eigen::Isometry3d T_flange_imu = Eigen::Isometry3d::Identity();       ///< shape=(4, 4)
+  Eigen::Vector3d gravity{0.0, 0.0, -9.81};                             ///< shape=(3,) [m/s^2] in the base frame
+  double clock_offset = 0.0;                                            ///< [s] t_imu = t_tracker - clock_offset
+  double clock_offset_sigma = 0.0;       ///< [s] standard error of `clock_offset`; 0: known, and not estimated
+  double controller_clock_offset = 0.0;  ///< [s] t_imu = t_controller - controller_clock_offset
+  double actuator_lag = 0.0;             ///< [s] delay of the joints behind the plan
 };
 
 }  // namespace truing

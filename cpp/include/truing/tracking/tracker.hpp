@@ -37,47 +37,48 @@ const char* name(Outcome outcome);
 /// True for the outcomes that begin with accepted.
 bool accepted(Outcome outcome);
 
-/// Number of samples by what became of them.
+/// Number of samples by outcome.
 struct Counters {
   std::array<std::uint64_t, 11> imu{}, pose{}, joints{}, plan{};  ///< by Outcome
   std::uint64_t outliers = 0;    ///< tracker samples that the gate rejected (those that left the window)
   std::uint64_t reacquired = 0;  ///< times that the filter followed a tracker that had disagreed for long
 };
 
+/// Noise, gaps and gates of the filter.
 struct FilterOptions {
-  double window = 0.5;               ///< measurements up to so late are put at their place [s]
-  double future_limit = 0.1;         ///< of a stamp against the newest inertial sample [s]
-  double highest_imu_rate = 2000.0;  ///< sizes the ring buffer [Hz]
-  double highest_pose_rate = 400.0;  ///< [Hz]
-  double gyro_noise = 1e-4;          ///< [rad/s/sqrt(Hz)]
-  double accel_noise = 1e-3;         ///< [m/s^2/sqrt(Hz)]
-  double gyro_bias = 1e-2;           ///< standard deviation before any data [rad/s]
-  double accel_bias = 1e-1;          ///< [m/s^2]
-  double gyro_bias_walk = 2e-5;      ///< [rad/s/sqrt(s)]
-  double accel_bias_walk = 2e-4;     ///< [m/s^2/sqrt(s)]
-  double imu_scale = 5e-4;           ///< standard deviation of the scale of gyro and accelerometer, as a fraction
-  double gyro_range = 34.0;          ///< a component at or beyond is saturated [rad/s]
-  double accel_range = 156.0;        ///< [m/s^2]
-  double largest_gap = 0.02;         ///< between inertial samples, before uncertainty is widened [s]
-  double restart_gap = 5.0;          ///< [s]
-  double gap_acceleration = 2.0;     ///< standard deviation of what a gap or saturation hides [m/s^2]
-  double gap_rate = 0.2;             ///< [rad/s]
-  double position_sigma = 1e-3;      ///< of the tracker, one component [m]
-  double rotation_sigma = 1e-3;      ///< [rad]
+  double window = 0.5;               ///< [s] maximum lateness of a measurement that is still put at its place
+  double future_limit = 0.1;         ///< [s] maximum lead of a stamp over the newest inertial sample
+  double highest_imu_rate = 2000.0;  ///< [Hz] sizes the ring buffer
+  double highest_pose_rate = 400.0;  ///< [Hz] likewise
+  double gyro_noise = 1e-4;          ///< [rad/s/sqrt(Hz)] noise density
+  double accel_noise = 1e-3;         ///< [m/s^2/sqrt(Hz)] noise density
+  double gyro_bias = 1e-2;           ///< [rad/s] standard deviation before any data
+  double accel_bias = 1e-1;          ///< [m/s^2] standard deviation before any data
+  double gyro_bias_walk = 2e-5;      ///< [rad/s/sqrt(s)] random walk of the bias
+  double accel_bias_walk = 2e-4;     ///< [m/s^2/sqrt(s)] random walk of the bias
+  double imu_scale = 5e-4;           ///< standard deviation of the relative scale error of gyro and accelerometer
+  double gyro_range = 34.0;          ///< [rad/s] a component at or beyond is saturated
+  double accel_range = 156.0;        ///< [m/s^2] a component at or beyond is saturated
+  double largest_gap = 0.02;         ///< [s] maximum gap between inertial samples before uncertainty is widened
+  double restart_gap = 5.0;          ///< [s] gap between inertial samples after which the filter starts anew
+  double gap_acceleration = 2.0;     ///< [m/s^2] standard deviation of what a gap or saturation hides
+  double gap_rate = 0.2;             ///< [rad/s] likewise
+  double position_sigma = 1e-3;      ///< [m] noise of the tracker, one component
+  double rotation_sigma = 1e-3;      ///< [rad] likewise
   double gate = 50.0;                ///< tracker samples with a larger normalised innovation squared are outliers
-  int reacquire_after = 25;          ///< outliers in a row, then the filter follows the tracker
-  int frozen_after = 3;              ///< equal tracker samples in a row, then they are refused
-  double clock_walk = 2e-5;          ///< of the tracker's clock [s/sqrt(s)]
-  double clock_drift = 1e-4;         ///< standard deviation of its drift [s/s]
-  double clock_drift_walk = 1e-6;    ///< [1/sqrt(s)]
-  double sway_position =
-      0.02;  ///< standard deviation of the tip about its slow mean, before any data; then as the arm shows it [m]
-  double sway_rotation = 0.003;   ///< [rad]
-  double sway_correlation = 0.5;  ///< correlation time of the sway [s]
-  double slow_position = 0.05;    ///< standard deviation of the deviation from forward kinematics before any data [m]
-  double slow_rotation = 0.02;    ///< [rad]
-  double slow_position_walk = 3e-3;  ///< how it wanders [m/sqrt(s)]
-  double slow_rotation_walk = 5e-4;  ///< [rad/sqrt(s)]
+  int reacquire_after = 25;          ///< consecutive outliers after which the filter follows the tracker again
+  int frozen_after = 3;              ///< consecutive equal tracker samples after which they are refused
+  double clock_walk = 2e-5;          ///< [s/sqrt(s)] random walk of the tracker's clock
+  double clock_drift = 1e-4;         ///< [s/s] standard deviation of the clock's drift
+  double clock_drift_walk = 1e-6;    ///< [1/sqrt(s)] random walk of the clock's drift
+  /// [m] standard deviation of the tip about its slow mean before any data; afterwards it is estimated.
+  double sway_position = 0.02;
+  double sway_rotation = 0.003;   ///< [rad] likewise
+  double sway_correlation = 0.5;  ///< [s] correlation time of the sway
+  double slow_position = 0.05;    ///< [m] standard deviation of the deviation from forward kinematics before any data
+  double slow_rotation = 0.02;    ///< [rad] likewise
+  double slow_position_walk = 3e-3;  ///< [m/sqrt(s)] random walk of that deviation
+  double slow_rotation_walk = 5e-4;  ///< [rad/sqrt(s)] likewise
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
@@ -93,9 +94,9 @@ struct FilterOptions {
 struct ModalModel {
   static constexpr int kMost = 4;
   int count = 0;
-  std::array<double, kMost> frequency{};                  ///< undamped [Hz]
+  std::array<double, kMost> frequency{};                  ///< [Hz] undamped
   std::array<double, kMost> damping{};                    ///< ratio
-  std::array<double, kMost> frequency_sigma{};            ///< standard error [Hz]
+  std::array<double, kMost> frequency_sigma{};            ///< [Hz] standard error
   std::array<Eigen::Matrix<double, 6, 3>, kMost> gain{};  ///< [-], [rad/m]
 
   ModalModel() {
@@ -103,22 +104,24 @@ struct ModalModel {
   }
 };
 
+/// The model of the deviation from the plan.
 struct DeviationOptions {
-  double period = 0.01;           ///< of the model's steps, on multiples of it [s]
-  double horizon = 0.04;          ///< for which predictions are graded [s]
-  double position_noise = 3e-4;   ///< of the filter's position, as the model sees it [m], rotations as 1 m
-  double velocity_noise = 1e-3;   ///< [m/s]
-  double slow_noise = 3e-3;       ///< acceleration that drives the slow part [m/s^2/sqrt(Hz)]
-  double static_time = 2.0;       ///< over which the static deviation is averaged [s]
-  double mode_noise = 2e-2;       ///< acceleration that drives a mode beside the plan's [m/s^2/sqrt(Hz)]
-  double frequency_sigma = 0.05;  ///< standard deviation of the given frequencies, as a fraction; 0: they stay
-  double frequency_walk = 0.003;  ///< how they wander, as a fraction [1/sqrt(s)]
-  double frequency_range = 0.2;   ///< and how far at most, as a fraction
-  double grade_time = 3.0;        ///< over which grades are averaged [s]
-  double settle_time = 0.1;       ///< after so long no more late samples are waited for, and a prediction is graded [s]
-  double least_evidence = 1.0;    ///< predictions of modes are used after so long of grades [s]
-  double plan_limit = 10.0;       ///< plan samples further ahead are refused [s]
+  double period = 0.01;           ///< [s] step of the model
+  double horizon = 0.04;          ///< [s] lead for which predictions are graded
+  double position_noise = 3e-4;   ///< [m] noise of the filter's position as the model sees it, rotations as 1 m
+  double velocity_noise = 1e-3;   ///< [m/s] likewise
+  double slow_noise = 3e-3;       ///< [m/s^2/sqrt(Hz)] acceleration that drives the slow part
+  double static_time = 2.0;       ///< [s] averaging time of the static deviation
+  double mode_noise = 2e-2;       ///< [m/s^2/sqrt(Hz)] acceleration that drives a mode beside the plan's
+  double frequency_sigma = 0.05;  ///< relative standard deviation of the given frequencies; 0: they stay
+  double frequency_walk = 0.003;  ///< [1/sqrt(s)] relative random walk of the frequencies
+  double frequency_range = 0.2;   ///< maximum relative change of a frequency
+  double grade_time = 3.0;        ///< [s] averaging time of the grades
+  double settle_time = 0.1;       ///< [s] delay before a prediction is graded, in which late samples may come
+  double least_evidence = 1.0;    ///< [s] duration of grades after which predictions of modes are used
+  double plan_limit = 10.0;       ///< [s] plan samples further ahead are refused
 
+  /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
 };
 
@@ -136,14 +139,16 @@ struct DeviationRow {
   double t = 0.0;
   Eigen::Matrix<double, 6, 1> deviation = Eigen::Matrix<double, 6, 1>::Zero();  ///< [m], [rad]
   Eigen::Matrix<double, 6, 1> rate = Eigen::Matrix<double, 6, 1>::Zero();       ///< [m/s], [rad/s]
-  Eigen::Vector3d plan_acceleration = Eigen::Vector3d::Zero();                  ///< over the following period [m/s^2]
+  Eigen::Vector3d plan_acceleration = Eigen::Vector3d::Zero();                  ///< [m/s^2] over the following period
 };
 
+/// What `identify_modes` found.
 struct ModesResult {
-  ModalModel model;
-  std::vector<double> error;  ///< rms of predictions `2 * horizon` ahead: of no change, with one mode, two … [m]
-  double rows = 0;            ///< used
-  std::string stopped_because;
+  ModalModel model;  ///< the modes
+  /// [m] rms of predictions twice the horizon ahead: of no change, with one mode, with two …
+  std::vector<double> error;
+  double rows = 0;              ///< number of rows used
+  std::string stopped_because;  ///< why there are no more modes
 };
 
 /// Frequencies, damping and gains from a recording of rows `options.period` apart. The start is the eigensystem
@@ -153,23 +158,25 @@ struct ModesResult {
 ModesResult identify_modes(const std::vector<DeviationRow>& rows, const DeviationOptions& options = {},
                            int most = ModalModel::kMost, double worth = 0.03);
 
-/// Bounds of what is sent to the arm.
+/// Bounds of the corrections that are sent to the arm.
 struct CorrectionLimits {
-  double position = 0.15;        ///< size [m]
-  double rotation = 0.05;        ///< [rad]
+  double position = 0.15;        ///< [m] maximum length
+  double rotation = 0.05;        ///< [rad] maximum angle
   double position_rate = 0.5;    ///< [m/s]
   double rotation_rate = 0.2;    ///< [rad/s]
   double position_jerk = 100.0;  ///< [m/s^3]
   double rotation_jerk = 40.0;   ///< [rad/s^3]
 };
 
-/// Watches for jumps of the tracker against inertial sensor and forward kinematics.
+/// Detection of jumps of the tracker against inertial sensor and forward kinematics.
 struct WatchOptions {
   double threshold = 55.0;  ///< of averages that are chi-square distributed with six degrees of freedom
-  double forget = 1.0;      ///< after a gap of the tracker longer than this, averages begin anew [s]
-  double compare = 120.0;   ///< after a shift, station and receiver are told apart for so long, and what else is odd is
-                            ///< taken for its after-effect [s]
+  double forget = 1.0;      ///< [s] after a longer gap of the tracker the averages begin anew
+  /// [s] after a shift, station and receiver are told apart for this time; further jumps are taken for its
+  /// after-effect.
+  double compare = 120.0;
 
+  /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
 };
 
@@ -181,29 +188,32 @@ enum class ShiftCause {
 };
 const char* name(ShiftCause cause);
 
-/// The last jump that was noticed.
+/// The last jump of the tracker that was noticed.
 struct Shift {
-  std::uint64_t count = 0;  ///< since the start; 0: none, and the rest means nothing
-  double t = 0.0;           ///< when it happened, the inertial sensor's clock [s]
-  double flagged = 0.0;     ///< stamp of the tracker sample that it was noticed by [s]
-  Eigen::Matrix<double, 6, 1> jump =
-      Eigen::Matrix<double, 6, 1>::Zero();  ///< of the receiver as measured, base frame [m], rotation vector [rad]
-  ShiftCause cause = ShiftCause::station_or_receiver;
-  double odds = 0.0;  ///< logarithm of the odds of station against receiver
+  std::uint64_t count = 0;  ///< number of jumps since the start; 0: the rest means nothing
+  double t = 0.0;           ///< [s] when it happened, the inertial sensor's clock
+  double flagged = 0.0;     ///< [s] stamp of the tracker sample that it was noticed by
+  /// shape=(6,) [m], rotation vector [rad]: of the receiver as measured, base frame.
+  Eigen::Matrix<double, 6, 1> jump = Eigen::Matrix<double, 6, 1>::Zero();
+  ShiftCause cause = ShiftCause::station_or_receiver;  ///< what jumped
+  double odds = 0.0;                                   ///< log odds of station against receiver
 };
 
+/// How `Tracker` works.
 struct TrackOptions {
-  FilterOptions filter;
-  DeviationOptions deviation;
-  WatchOptions watch;
-  ModalModel modes;  ///< of `identify_modes`; none: predictions at constant acceleration
-  CorrectionLimits limits;
-  double coast_position = 0.03;  ///< without the tracker, estimates with a larger standard deviation than this and than
-                                 ///< forward kinematics' are not used [m]
-  double coast_rotation = 0.02;  ///< [rad]
-  double imu_timeout = 0.1;      ///< the inertial sensor is taken for dead when it is so much older than the joints [s]
-  double joints_timeout = 0.5;   ///< [s]
+  FilterOptions filter;        ///< noise, gaps and gates of the filter
+  DeviationOptions deviation;  ///< the model of the deviation from the plan
+  WatchOptions watch;          ///< detection of jumps of the tracker
+  ModalModel modes;            ///< of `identify_modes`; none: predictions at constant acceleration
+  CorrectionLimits limits;     ///< bounds of corrections
+  /// [m] without the tracker, estimates with a larger standard deviation than this and than forward kinematics' are not
+  /// used.
+  double coast_position = 0.03;
+  double coast_rotation = 0.02;  ///< [rad] likewise
+  double imu_timeout = 0.1;      ///< [s] lag behind the joints after which the inertial sensor is taken for dead
+  double joints_timeout = 0.5;   ///< [s] the same of the joints
 
+  /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
 };
 
@@ -216,31 +226,35 @@ enum class Status {
 const char* name(Status status);
 const char* name(Predictor predictor);
 
-/// The tool at time `t`, as known at time `made`.
+/// The tool at time `t`, as known at time `made`; the inertial sensor's clock.
 struct PosePrediction {
-  double t = 0.0, made = 0.0;  ///< [s], the inertial sensor's clock
-  Eigen::Isometry3d T_base_tool = Eigen::Isometry3d::Identity();
-  Eigen::Matrix<double, 6, 6> covariance =
-      Eigen::Matrix<double, 6, 6>::Zero();  ///< position [m], then rotation vector [rad], about the base frame's axes
-  Status status = Status::lost;
-  Predictor predictor = Predictor::slow;
+  double t = 0.0;                                                 ///< [s]
+  double made = 0.0;                                              ///< [s]
+  Eigen::Isometry3d T_base_tool = Eigen::Isometry3d::Identity();  ///< shape=(4, 4)
+  /// shape=(6, 6), of position [m] and rotation vector [rad] about the base frame's axes.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  Status status = Status::lost;           ///< what it rests on
+  Predictor predictor = Predictor::slow;  ///< how it was made
 };
 
 /// What to add to the plan so that the tool is where it was planned.
 struct Compensation {
-  PosePrediction predicted;
-  bool has_plan = false;  ///< false: the plan does not reach that far, and nothing is corrected
-  Eigen::Isometry3d T_base_tool_planned = Eigen::Isometry3d::Identity();
-  Eigen::Matrix<double, 6, 1> wanted =
-      Eigen::Matrix<double, 6, 1>::Zero();  ///< correction in the base frame [m], rotation vector [rad]
-  Eigen::Matrix<double, 6, 1> correction = Eigen::Matrix<double, 6, 1>::Zero();  ///< the same within the limits
+  PosePrediction predicted;  ///< the prediction behind it
+  bool has_plan = false;     ///< false: the plan does not reach that far, and nothing is corrected
+  Eigen::Isometry3d T_base_tool_planned = Eigen::Isometry3d::Identity();  ///< shape=(4, 4)
+  /// shape=(6,) [m], rotation vector [rad]: the correction in the base frame.
+  Eigen::Matrix<double, 6, 1> wanted = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 1> correction = Eigen::Matrix<double, 6, 1>::Zero();  ///< shape=(6,): within the limits
   bool limited = false;                                             ///< the two differ by more than 1 mm or 1 mrad
-  Eigen::Isometry3d T_base_flange = Eigen::Isometry3d::Identity();  ///< corrected
+  Eigen::Isometry3d T_base_flange = Eigen::Isometry3d::Identity();  ///< shape=(4, 4): corrected
 };
 
+/// The tracker's clock: t_imu = t_tracker - offset.
 struct ClockEstimate {
-  double offset = 0.0, sigma = 0.0, drift = 0.0;
-};  ///< t_imu = t_tracker - offset [s], [s/s]
+  double offset = 0.0;  ///< [s]
+  double sigma = 0.0;   ///< [s] standard error
+  double drift = 0.0;   ///< [s/s]
+};
 
 /// A tracker sample against what was expected of it.
 struct Innovation {
@@ -274,7 +288,7 @@ class Tracker {
   void set_modes(const ModalModel& modes);
   double now() const;  ///< stamp of the newest inertial sample
   ClockEstimate clock();
-  std::array<double, ModalModel::kMost> frequencies() const;  ///< as tracked [Hz]
+  std::array<double, ModalModel::kMost> frequencies() const;  ///< [Hz] as tracked
   /// Settled rows since the last call for `identify_modes`, and settled innovations: the number written, at most
   /// `capacity`. Call often: few are kept.
   int take_rows(DeviationRow* out, int capacity);
