@@ -5,53 +5,56 @@
 
 #include <array>
 
-#include "casters.hpp"
+#include "convert/text.hpp"
+#include "convert/values.hpp"
+#include "parts.hpp"
+#include "truing/model/effect.hpp"
 
 namespace truing::python {
 namespace {
 
 template <typename Value>
-using Words = std::vector<std::pair<const char*, Value>>;
+using Spellings = std::vector<std::pair<const char*, Value>>;
 
-const Words<Driver> kDrivers = {{"several", Driver::several},
-                                {"constant", Driver::constant},
-                                {"angle", Driver::angle},
-                                {"other_angles", Driver::other_angles},
-                                {"speed", Driver::speed},
-                                {"direction", Driver::direction},
-                                {"gravity_torque", Driver::gravity_torque},
-                                {"motor_torque", Driver::motor_torque},
-                                {"temperature", Driver::temperature},
-                                {"time", Driver::time}};
-const Words<Moves> kMoves = {{"joint", Moves::joint},
-                             {"axis", Moves::axis},
-                             {"link", Moves::link},
-                             {"base", Moves::base},
-                             {"target", Moves::target}};
-const Words<StandsFor> kStandsFor = {{"", StandsFor::terms},
-                                     {"ratio", StandsFor::gear_ratio},
-                                     {"offset", StandsFor::joint_offset},
-                                     {"geometry", StandsFor::link_geometry},
-                                     {"base", StandsFor::base_frame},
-                                     {"target", StandsFor::tool_frame}};
-const Words<Law> kLaws = {{"", Law::none},
-                          {"of_torque", Law::of_torque},
-                          {"of_direction", Law::of_direction},
-                          {"of_angle", Law::of_angle},
-                          {"of_lengths_in_warmth", Law::of_lengths_in_warmth},
-                          {"of_warmth", Law::of_warmth}};
-const Words<LawTest> kLawTests = {{"", LawTest::none},
-                                  {"of_driver", LawTest::of_driver},
-                                  {"times_direction", LawTest::times_direction},
-                                  {"times_the_lengths", LawTest::times_the_lengths}};
-const Words<Search> kSearches = {{"always", Search::always},
-                                 {"if_asked", Search::if_asked},
-                                 {"by_order", Search::by_order},
-                                 {"with_unknown_weights", Search::with_unknown_weights},
-                                 {"never", Search::never}};
+const Spellings<Driver> kDrivers = {{"several", Driver::several},
+                                    {"constant", Driver::constant},
+                                    {"angle", Driver::angle},
+                                    {"other_angles", Driver::other_angles},
+                                    {"speed", Driver::speed},
+                                    {"direction", Driver::direction},
+                                    {"gravity_torque", Driver::gravity_torque},
+                                    {"motor_torque", Driver::motor_torque},
+                                    {"temperature", Driver::temperature},
+                                    {"time", Driver::time}};
+const Spellings<Moves> kMoves = {{"joint", Moves::joint},
+                                 {"axis", Moves::axis},
+                                 {"link", Moves::link},
+                                 {"base", Moves::base},
+                                 {"target", Moves::target}};
+const Spellings<StandsFor> kStandsFor = {{"", StandsFor::terms},
+                                         {"ratio", StandsFor::gear_ratio},
+                                         {"offset", StandsFor::joint_offset},
+                                         {"geometry", StandsFor::link_geometry},
+                                         {"base", StandsFor::base_frame},
+                                         {"target", StandsFor::tool_frame}};
+const Spellings<Law> kLaws = {{"", Law::none},
+                              {"of_torque", Law::of_torque},
+                              {"of_direction", Law::of_direction},
+                              {"of_angle", Law::of_angle},
+                              {"of_lengths_in_warmth", Law::of_lengths_in_warmth},
+                              {"of_warmth", Law::of_warmth}};
+const Spellings<LawTest> kLawTests = {{"", LawTest::none},
+                                      {"of_driver", LawTest::of_driver},
+                                      {"times_direction", LawTest::times_direction},
+                                      {"times_the_lengths", LawTest::times_the_lengths}};
+const Spellings<Search> kSearches = {{"always", Search::always},
+                                     {"if_asked", Search::if_asked},
+                                     {"by_order", Search::by_order},
+                                     {"with_unknown_weights", Search::with_unknown_weights},
+                                     {"never", Search::never}};
 
 template <typename Value>
-Value value_of(const Words<Value>& words, const std::string& word, const char* keyword) {
+Value value_of(const Spellings<Value>& words, const std::string& word, const char* keyword) {
   std::string known;
   for (const auto& [name, value] : words) {
     if (word == name) return value;
@@ -61,7 +64,7 @@ Value value_of(const Words<Value>& words, const std::string& word, const char* k
 }
 
 template <typename Value>
-std::string word_of(const Words<Value>& words, Value value) {
+std::string word_of(const Spellings<Value>& words, Value value) {
   for (const auto& [name, other] : words) {
     if (other == value) return name;
   }
@@ -70,7 +73,7 @@ std::string word_of(const Words<Value>& words, Value value) {
 
 template <typename Value>
 void define_word(py::class_<EffectTraits>* cls, const char* name, Value EffectTraits::* member,
-                 const Words<Value>& words, const char* what) {
+                 const Spellings<Value>& words, const char* what) {
   cls->def_property_readonly(name, [member, &words](const EffectTraits& t) { return word_of(words, t.*member); }, what);
 }
 

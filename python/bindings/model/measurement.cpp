@@ -4,41 +4,13 @@
 #include <limits>
 #include <unordered_map>
 
-#include "casters.hpp"
+#include "convert/columns.hpp"
+#include "convert/options.hpp"
+#include "convert/text.hpp"
+#include "parts.hpp"
+#include "tables/model/robot.hpp"
 
 namespace truing::python {
-
-py::array float_array(py::handle object, const std::string& name) {
-  py::object given = py::reinterpret_borrow<py::object>(object);
-  // numpy drops the mask of a masked array without a word when it makes a plain array of it.
-  if (py::isinstance(given, py::module_::import("numpy").attr("ma").attr("MaskedArray")))
-    given = given.attr("astype")("f8").attr("filled")(std::numeric_limits<double>::quiet_NaN());
-  auto array = py::array::ensure(given);
-  if (!array)
-    throw std::invalid_argument(name + " cannot be made an array of numbers; are its rows of different lengths?");
-  const char kind = array.dtype().kind();
-  if (kind != 'f' && kind != 'i' && kind != 'u')
-    throw std::invalid_argument(name + " holds " + py::str(array.dtype()).cast<std::string>() +
-                                " values, not numbers (write NaN where something is missing)");
-  bool as_it_is = py::isinstance<py::array_t<double>>(array) &&
-                  reinterpret_cast<std::uintptr_t>(array.data()) % sizeof(double) == 0;
-  for (py::ssize_t axis = 0; axis < array.ndim(); ++axis)
-    as_it_is = as_it_is && array.strides(axis) % static_cast<py::ssize_t>(sizeof(double)) == 0;
-  return as_it_is ? array : py::array(array.attr("astype")("=f8"));
-}
-
-Column column_of(const py::array& array) {
-  const py::ssize_t stride = array.ndim() == 0 ? 0 : array.strides(0);
-  return {static_cast<const double*>(array.data()), stride / static_cast<py::ssize_t>(sizeof(double))};
-}
-
-std::shared_ptr<const void> keep_alive(std::vector<py::object> objects) {
-  return {new std::vector<py::object>(std::move(objects)), [](const std::vector<py::object>* kept) {
-            if (!Py_IsInitialized()) return;  // Python is gone, and its objects with it
-            const py::gil_scoped_acquire gil;
-            delete kept;
-          }};
-}
 
 namespace {
 
@@ -327,28 +299,9 @@ std::string repr(const Measurements& data) {
   return out + ")";
 }
 
-}  // namespace
+using Class = py::class_<Measurements>;
 
-void bind_measurements(py::module_& m) {
-  py::class_<Measurements> cls(m, "Measurements",
-                               R"(One row per measurement: n rows of joint readings, and what was measured there.
-
-joints: shape=(n, driven joints) [rad | m], chain order.
-positions: shape=(n, 3) [m] of the target in the measurement frame; NaN rows: not measured.
-orientations: shape=(n, 4) w x y z, Hamilton; NaN rows: not measured.
-distances: shape=(n,) [m] to the robot's anchor; NaN: not measured.
-fixed_points: n names ('' or None: none), or indices into `fixed_point_names` (-1: none).
-targets: n names, or indices into `robot.targets`; absent: the tool. `target_names`: the targets in the robot's order,
-    unless `robot` is given; default ["tool"].
-directions: shape=(n, driven joints), approach direction -1, 0, 1. joint_speeds: shape=(n, driven joints) [rad/s | m/s].
-payload [kg], temperature [deg C], time [s], position_sigma [m], rotation_sigma [rad], weight: shape=(n,); all but time
-    may be one number for all rows.
-pose: n numbers or names, rows of one robot pose share one; absent: equal joints. set: n of 'train', 'test' (or 0, 1).
-covariates: more columns by name, shape=(n,).
-
-Arrays of float64 are not copied, whatever their strides: do not change them while this object is in use. A list or tuple
-of arrays holds columns (from Arrow or pandas); a list of lists of numbers holds rows.
-Raises InputError naming the column when shapes or types do not fit; `validate_measurements` checks the values.)");
+void bind_constructor(Class& cls) {
   cls.def(py::init(&make), py::arg("joints"), py::kw_only(), py::arg("positions") = py::none(),
           py::arg("orientations") = py::none(), py::arg("distances") = py::none(), py::arg("fixed_points") = py::none(),
           py::arg("fixed_point_names") = std::vector<std::string>{}, py::arg("targets") = py::none(),
@@ -358,8 +311,11 @@ Raises InputError naming the column when shapes or types do not fit; `validate_m
           py::arg("position_sigma") = py::none(), py::arg("rotation_sigma") = py::none(),
           py::arg("weight") = py::none(), py::arg("covariates") = std::map<std::string, ArrayLike>{},
           py::arg("robot") = py::none());
+}
+
+/// What was measured, and where.
+void bind_measured(Class& cls) {
   cls.def_readonly("rows", &Measurements::rows, "Number of rows n.");
-  cls.def("__len__", [](const Measurements& data) { return data.rows; });
   cls.def_property_readonly(
       "joints", [](const Measurements& data) { return block_of(data, data.joints).cast<py::array_t<double>>(); },
       "shape=(n, driven joints) [rad | m], a copy.");
@@ -378,6 +334,10 @@ Raises InputError naming the column when shapes or types do not fit; `validate_m
                             "shape=(n, driven joints), a copy, or None.");
   cls.def_property_readonly("joint_speeds", block_getter(&Measurements::joint_speed),
                             "shape=(n, driven joints) [rad/s | m/s], a copy, or None.");
+}
+
+/// What else was recorded.
+void bind_recorded(Class& cls) {
   cls.def_property_readonly("payload", column_getter(&Measurements::payload), "shape=(n,) [kg], or None.");
   cls.def_property_readonly("temperature", column_getter(&Measurements::temperature), "shape=(n,) [deg C], or None.");
   cls.def_property_readonly("time", column_getter(&Measurements::time), "shape=(n,) [s], or None.");
@@ -396,6 +356,34 @@ Raises InputError naming the column when shapes or types do not fit; `validate_m
         return py::reinterpret_steal<Mapping<std::string, py::array_t<double>>>(mapping_proxy(columns).release());
       },
       "More columns by name, each of shape (n,).");
+}
+
+}  // namespace
+
+void bind_measurement(py::module_& m) {
+  Class cls(m, "Measurements",
+            R"(One row per measurement: n rows of joint readings, and what was measured there.
+
+joints: shape=(n, driven joints) [rad | m], chain order.
+positions: shape=(n, 3) [m] of the target in the measurement frame; NaN rows: not measured.
+orientations: shape=(n, 4) w x y z, Hamilton; NaN rows: not measured.
+distances: shape=(n,) [m] to the robot's anchor; NaN: not measured.
+fixed_points: n names ('' or None: none), or indices into `fixed_point_names` (-1: none).
+targets: n names, or indices into `robot.targets`; absent: the tool. `target_names`: the targets in the robot's order,
+    unless `robot` is given; default ["tool"].
+directions: shape=(n, driven joints), approach direction -1, 0, 1. joint_speeds: shape=(n, driven joints) [rad/s | m/s].
+payload [kg], temperature [deg C], time [s], position_sigma [m], rotation_sigma [rad], weight: shape=(n,); all but time
+    may be one number for all rows.
+pose: n numbers or names, rows of one robot pose share one; absent: equal joints. set: n of 'train', 'test' (or 0, 1).
+covariates: more columns by name, shape=(n,).
+
+Arrays of float64 are not copied, whatever their strides: do not change them while this object is in use. A list or
+tuple of arrays holds columns (from Arrow or pandas); a list of lists of numbers holds rows.
+Raises InputError naming the column when shapes or types do not fit; `validate_measurements` checks the values.)");
+  bind_constructor(cls);
+  bind_measured(cls);
+  bind_recorded(cls);
+  cls.def("__len__", [](const Measurements& data) { return data.rows; });
   cls.def("__repr__", [](const Measurements& data) { return repr(data); });
   define_value(cls, {"joints", "positions", "orientations", "distances", "fixed_points", "fixed_point_names", "targets",
                      "directions", "joint_speeds", "payload", "temperature", "time", "pose", "set", "position_sigma",
@@ -405,8 +393,8 @@ Raises InputError naming the column when shapes or types do not fit; `validate_m
         py::arg("robot"), py::arg("joints_only") = false, py::call_guard<py::gil_scoped_release>(),
         R"(Raises InputError naming the row (counted from 0) and what is wrong with the measurements for this robot.
 
-Checked are: counts that do not fit the robot, joints or inputs that are not finite, a row without any measurement (unless
-`joints_only`), half a position, a quaternion that is not of unit length, directions, sigmas.)");
+Checked are: counts that do not fit the robot, joints or inputs that are not finite, a row without any measurement
+(unless `joints_only`), half a position, a quaternion that is not of unit length, directions, sigmas.)");
   m.def(
       "pose_groups",
       [](const Measurements& data) {

@@ -1,6 +1,11 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "casters.hpp"
+#include "tables/model/effect.hpp"
+#include "convert/columns.hpp"
+#include "convert/options.hpp"
+#include "convert/own_effects.hpp"
+#include "convert/text.hpp"
+#include "parts.hpp"
 
 namespace truing::python {
 
@@ -64,8 +69,6 @@ std::vector<Effect> effects_evaluated_when_asked(const std::vector<py::object>& 
 
 namespace {
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 Eigen::VectorXd reading_of(const Measurements& data, std::size_t row) {
   Eigen::VectorXd q(static_cast<Eigen::Index>(data.joints.size()));
   for (Eigen::Index j = 0; j < q.size(); ++j) q[j] = data.joints[static_cast<std::size_t>(j)][row];
@@ -112,7 +115,7 @@ RowMajor gravity_torque_rows(const Robot& robot, const Measurements& data) {
 
 }  // namespace
 
-void bind_effects(py::module_& m) {
+void bind_effect(py::module_& m) {
   py::class_<EffectRequest> request(m, "EffectRequest",
                                     R"(An effect asked for: its name, and joints (none: every driven joint).)");
   request.def(py::init([](std::string effect, std::vector<std::string> joints) {
