@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 /// The Python module truing._core: conversion, keywords, docstrings, and the GIL released around long calls.
-#include "casters.hpp"
+#include "parts.hpp"
+#include "truing/version.hpp"
 
 namespace py = pybind11;
 
@@ -19,16 +20,23 @@ PYBIND11_MODULE(_core, m) {
     }
   });
 
+  // Signatures name the classes that were bound before.
+  truing::python::bind_common(m);
   truing::python::bind_robot(m);
-  truing::python::bind_measurements(m);
+  truing::python::bind_measurement(m);
   truing::python::bind_effect_traits(m);
-  truing::python::bind_effects(m);
+  truing::python::bind_effect(m);
+  truing::python::bind_urdf(m);
+  truing::python::bind_scene(m);
   truing::python::bind_identify(m);
   truing::python::bind_plan(m);
   truing::python::bind_diagnose(m);
-  truing::python::bind_distinguish(m);
   truing::python::bind_handeye(m);
   truing::python::bind_inverse(m);
-  truing::python::bind_track(m);
-  truing::python::bind_track_calibrate(m);
+  truing::python::bind_compensate(m);
+  truing::python::bind_streams(m);
+  truing::python::bind_tracker(m);
+  truing::python::bind_replay(m);
+  truing::python::bind_simulation(m);
+  truing::python::bind_calibrate(m);
 }
