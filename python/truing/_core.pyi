@@ -7,13 +7,197 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'joint_motion', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'joint_motion', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+class Parameter:
+    """
+    One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
+    `anchor.zero` … Orientation corrections rx ry rz are rotation vectors from the nominal to the found
+    orientation, about the parent's axes.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def frozen(self) -> bool:
+        """
+        Held at nominal, because the data cannot see it.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Full name.
+        """
+    @property
+    def nominal(self) -> float:
+        """
+        Value before, in `unit`.
+        """
+    @property
+    def sigma(self) -> float:
+        """
+        Standard error, in `unit`; NaN when frozen.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        m, rad, -, rad/Nm ….
+        """
+    @property
+    def value(self) -> float:
+        """
+        Value found, in `unit`.
+        """
+class Frozen:
+    """
+    A combination of parameters that the data cannot see: moving them together so changes no
+    measurement.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def combination(self) -> types.MappingProxyType[str, float]:
+        """
+        Weight by parameter, 1 for `parameter`.
+        """
+    @property
+    def parameter(self) -> str:
+        """
+        The one held at nominal.
+        """
+    @property
+    def why(self) -> str:
+        """
+        Why it is frozen.
+        """
+class ErrorStatistics:
+    """
+    Length of the position (or distance) errors of a set of rows.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def max(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def mean(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def median(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def n(self) -> int:
+        """
+        Number of rows.
+        """
+    @property
+    def p95(self) -> float:
+        """
+        [m] 95th percentile.
+        """
+    @property
+    def rms(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def rotation_rms(self) -> float:
+        """
+        [rad]; NaN: no orientation measured.
+        """
+class SolverSummary:
+    """
+    How the solver ended.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def converged(self) -> bool:
+        """
+        False: the result must not be used.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Steps made.
+        """
+    @property
+    def name(self) -> str:
+        """
+        'lm' or 'ceres'.
+        """
+    @property
+    def stopped_because(self) -> str:
+        """
+        The reason, in words.
+        """
+class NotTestable:
+    """
+    An effect that the data could not show, whether it is there or not.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effect(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Where; empty: at any joint.
+        """
+    @property
+    def reason(self) -> typing.Literal['column_missing', 'masses_missing', 'joint_at_rest', 'input_constant', 'no_motion', 'same_as_frames', 'other']:
+        """
+        The same for programs.
+        
+        'column_missing': a column is missing, or has rows without a number
+        'masses_missing': masses of the links are missing
+        'joint_at_rest': the joint does not move
+        'input_constant': its input never changes
+        'no_motion': it moves nothing at these poses
+        'same_as_frames': base and tool do the same
+        'other': as `why` says
+        """
+    @property
+    def why(self) -> str:
+        """
+        "no column temp_C", "J1 does not move", "the same as the base frame" ….
+        """
+class UncertainFrame:
+    """
+    A frame with its uncertainty.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def T(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        [m]
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+        """
+        Of x, y, z [m] and the rotation vector about the parent's axes [rad]: small changes that move the
+        frame's origin, and turn it about that origin.
+        """
+    @property
+    def sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(6,): standard errors of x, y, z [m] and of the turns about x, y, z [rad].
+        """
 class Joint:
     """
     One joint and the link that belongs to it. Lengths in m, angles in rad, masses in kg.
     
-    A driven joint moves by `ratio * reading + offset`. A passive joint has no reading: it moves by the weighted sum of the
-    corrected motions of the joints in `driven_by`, a mapping or pairs of name and weight (a palletizer's J4: {"J2": -1, "J3": -1}).
+    A driven joint moves by `ratio * reading + offset`. A passive joint has no reading: it moves by the weighted sum of
+    the corrected motions of the joints in `driven_by`, a mapping or pairs of name and weight (a palletizer's J4:
+    {"J2": -1, "J3": -1}).
     """
     def __init__(self, name: str, *, type: typing.Literal['revolute', 'prismatic'] = 'revolute', theta: typing.SupportsFloat | typing.SupportsIndex = 0.0, d: typing.SupportsFloat | typing.SupportsIndex = 0.0, a: typing.SupportsFloat | typing.SupportsIndex = 0.0, alpha: typing.SupportsFloat | typing.SupportsIndex = 0.0, beta: typing.SupportsFloat | typing.SupportsIndex = 0.0, T_parent_joint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, driven_by: collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex]] | dict[str, typing.SupportsFloat | typing.SupportsIndex] = [], lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., mass: typing.SupportsFloat | typing.SupportsIndex | None = None, center_of_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ...) -> None:
         ...
@@ -32,10 +216,10 @@ class Joint:
     @property
     def T_parent_joint(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4) [m]: joint in its parent; convention 'urdf' only. Setting it to what is not rigid raises InputError.
+        Shape=(4, 4) [m], convention `urdf` only.
         """
     @T_parent_joint.setter
-    def T_parent_joint(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+    def T_parent_joint(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
         ...
     @property
     def a(self) -> float:
@@ -43,7 +227,7 @@ class Joint:
         [m] link length.
         """
     @a.setter
-    def a(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def a(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def alpha(self) -> float:
@@ -51,12 +235,12 @@ class Joint:
         [rad] link twist.
         """
     @alpha.setter
-    def alpha(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def alpha(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def axis(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(3,) unit vector; convention 'urdf' only.
+        Shape=(3,) unit vector, convention `urdf` only.
         """
     @axis.setter
     def axis(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
@@ -67,12 +251,12 @@ class Joint:
         [rad] Hayati's twist about y, for near-parallel neighbouring axes.
         """
     @beta.setter
-    def beta(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def beta(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def center_of_mass(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(3,) [m] in the frame after the link.
+        Shape=(3,) [m] in the frame after the link.
         """
     @center_of_mass.setter
     def center_of_mass(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
@@ -83,7 +267,7 @@ class Joint:
         [m] the motion of a prismatic joint adds to it.
         """
     @d.setter
-    def d(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def d(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def driven_by(self) -> tuple[tuple[str, float], ...]:
@@ -99,15 +283,15 @@ class Joint:
         [rad | m] lower limit, -inf if there is none.
         """
     @lower.setter
-    def lower(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def lower(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def mass(self) -> float | None:
         """
-        [kg] of the link that this joint moves; None: not known.
+        [kg] of the link that this joint moves, if known.
         """
     @mass.setter
-    def mass(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+    def mass(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
         ...
     @property
     def name(self) -> str:
@@ -115,7 +299,7 @@ class Joint:
         Name, unique within the robot.
         """
     @name.setter
-    def name(self, arg0: str) -> None:
+    def name(self, arg1: str) -> None:
         ...
     @property
     def offset(self) -> float:
@@ -123,7 +307,7 @@ class Joint:
         [rad | m] joint zero.
         """
     @offset.setter
-    def offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def offset(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def passive(self) -> bool:
@@ -136,7 +320,7 @@ class Joint:
         [-] gear-ratio correction.
         """
     @ratio.setter
-    def ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def ratio(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def theta(self) -> float:
@@ -144,15 +328,15 @@ class Joint:
         [rad] the motion of a revolute joint adds to it.
         """
     @theta.setter
-    def theta(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def theta(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def type(self) -> typing.Literal['revolute', 'prismatic']:
         """
-        'revolute' or 'prismatic'.
+        The kind of motion.
         """
     @type.setter
-    def type(self, arg0: typing.Literal['revolute', 'prismatic']) -> None:
+    def type(self, arg1: typing.Literal['revolute', 'prismatic']) -> None:
         ...
     @property
     def upper(self) -> float:
@@ -160,7 +344,7 @@ class Joint:
         [rad | m] upper limit, inf if there is none.
         """
     @upper.setter
-    def upper(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def upper(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
 class Target:
     """
@@ -183,10 +367,10 @@ class Target:
     @property
     def T_last_target(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4) [m]: target in the frame after the last link. Setting it to what is not rigid raises InputError.
+        Shape=(4, 4) [m]: target in the frame after the last link.
         """
     @T_last_target.setter
-    def T_last_target(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+    def T_last_target(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
         ...
     @property
     def name(self) -> str:
@@ -194,7 +378,7 @@ class Target:
         Name, unique within the robot.
         """
     @name.setter
-    def name(self, arg0: str) -> None:
+    def name(self, arg1: str) -> None:
         ...
 class Anchor:
     """
@@ -217,9 +401,9 @@ class Anchor:
         A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
         """
     @property
-    def point(self) -> numpy.typing.NDArray[numpy.float64]:
+    def point(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,) [m] in the measurement frame.
+        Shape=(3,) [m] in the measurement frame.
         """
     @property
     def zero(self) -> float:
@@ -259,7 +443,7 @@ class AppliedEffect:
     @property
     def parameters(self) -> types.MappingProxyType[str, float]:
         """
-        Value by full name, e.g. {'backlash.J3': 2e-4}.
+        Value by full name: {'backlash.J3': 2e-4}.
         """
 class Robot:
     """
@@ -297,15 +481,15 @@ class Robot:
     @property
     def T_measurement_base(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4) [m]: base in the measurement frame. Setting it to what is not rigid raises InputError.
+        Shape=(4, 4) [m]: base in the measurement frame.
         """
     @T_measurement_base.setter
-    def T_measurement_base(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+    def T_measurement_base(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
         ...
     @property
     def anchor(self) -> Anchor | None:
         """
-        The far end of a draw-wire or ballbar, or None.
+        The far end of a draw-wire or ballbar, if there is one.
         """
     @anchor.setter
     def anchor(self, arg1: Anchor | None) -> None:
@@ -313,13 +497,14 @@ class Robot:
     @property
     def convention(self) -> typing.Literal['dh', 'mdh', 'urdf']:
         """
-        How the links are read: 'dh', 'mdh' or 'urdf'.
+        How the links are read.
         
-        dh: Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta). mdh: Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d). urdf: T_parent_joint, then the
-        motion about or along `axis`.
+        'dh': Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta): Denavit-Hartenberg, distal
+        'mdh': Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d): modified DH (Craig), proximal
+        'urdf': T_parent_joint, then the motion about or along `axis`
         """
     @convention.setter
-    def convention(self, arg0: typing.Literal['dh', 'mdh', 'urdf']) -> None:
+    def convention(self, arg1: typing.Literal['dh', 'mdh', 'urdf']) -> None:
         ...
     @property
     def driven_count(self) -> int:
@@ -337,7 +522,7 @@ class Robot:
     @property
     def gravity(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(3,) [m/s^2] in the base frame.
+        Shape=(3,) [m/s^2] in the base frame.
         """
     @gravity.setter
     def gravity(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
@@ -353,7 +538,7 @@ class Robot:
         Name of the model.
         """
     @name.setter
-    def name(self, arg0: str) -> None:
+    def name(self, arg1: str) -> None:
         ...
     @property
     def targets(self) -> tuple[Target, ...]:
@@ -377,8 +562,8 @@ class Measurements:
     pose: n numbers or names, rows of one robot pose share one; absent: equal joints. set: n of 'train', 'test' (or 0, 1).
     covariates: more columns by name, shape=(n,).
     
-    Arrays of float64 are not copied, whatever their strides: do not change them while this object is in use. A list or tuple
-    of arrays holds columns (from Arrow or pandas); a list of lists of numbers holds rows.
+    Arrays of float64 are not copied, whatever their strides: do not change them while this object is in use. A list or
+    tuple of arrays holds columns (from Arrow or pandas); a list of lists of numbers holds rows.
     Raises InputError naming the column when shapes or types do not fit; `validate_measurements` checks the values.
     """
     def __init__(self, joints: numpy.typing.ArrayLike, *, positions: numpy.typing.ArrayLike | None = None, orientations: numpy.typing.ArrayLike | None = None, distances: numpy.typing.ArrayLike | None = None, fixed_points: numpy.typing.ArrayLike | collections.abc.Sequence[str | None] | None = None, fixed_point_names: collections.abc.Sequence[str] = [], targets: numpy.typing.ArrayLike | collections.abc.Sequence[str | None] | None = None, target_names: collections.abc.Sequence[str] | None = None, directions: numpy.typing.ArrayLike | None = None, joint_speeds: numpy.typing.ArrayLike | None = None, payload: numpy.typing.ArrayLike | None = None, temperature: numpy.typing.ArrayLike | None = None, time: numpy.typing.ArrayLike | None = None, pose: numpy.typing.ArrayLike | collections.abc.Sequence[str | None] | None = None, set: numpy.typing.ArrayLike | collections.abc.Sequence[str | None] | None = None, position_sigma: numpy.typing.ArrayLike | None = None, rotation_sigma: numpy.typing.ArrayLike | None = None, weight: numpy.typing.ArrayLike | None = None, covariates: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, robot: Robot | None = None) -> None:
@@ -661,11 +846,197 @@ class OwnEffect:
         """
         What it says of itself.
         """
+class Obstacle:
+    """
+    A fixed obstacle; `replace(...)` makes another one.
+    
+    shape: 'sphere' (radius about the frame's origin), 'capsule' (radius about the segment from the origin to
+    (0, 0, size[2])) or 'box' (`size` along the frame's axes, its centre at the origin).
+    """
+    def __init__(self, name: str, *, shape: typing.Literal['sphere', 'capsule', 'box'] = 'box', T_measurement_shape: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Obstacle:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Obstacle:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def T_measurement_shape(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        Shape=(4, 4) [m]
+        """
+    @property
+    def name(self) -> str:
+        """
+        Unique within the scene.
+        """
+    @property
+    def radius(self) -> float:
+        """
+        [m] of spheres and capsules.
+        """
+    @property
+    def shape(self) -> typing.Literal['sphere', 'capsule', 'box']:
+        """
+        What it is.
+        
+        'sphere': `radius` about the frame's origin
+        'capsule': `radius` about the segment from the origin to (0, 0, `size.z()`)
+        'box': `size` along the frame's axes, its centre at the origin
+        """
+    @property
+    def size(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Shape=(3,) [m] whole lengths, of a box; of a capsule z alone.
+        """
+class LinkCapsule:
+    """
+    Part of a link, a capsule: `radius` about the segment between two points.
+    """
+    def __init__(self, name: str, *, link: str, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], radius: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> LinkCapsule:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> LinkCapsule:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def end(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Shape=(3,) [m]
+        """
+    @property
+    def link(self) -> str:
+        """
+        The joint whose link carries it, in the frame after it; 'base': the base frame; 'tool': the target's
+        frame.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Unique within the scene.
+        """
+    @property
+    def radius(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def start(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Shape=(3,) [m]
+        """
+class Scene:
+    """
+    The obstacles around the robot, and the capsules of the robot that must not touch them or each
+    other.
+    """
+    def __init__(self, *, obstacles: collections.abc.Sequence[Obstacle] = [], capsules: collections.abc.Sequence[LinkCapsule] = [], clearance: typing.SupportsFloat | typing.SupportsIndex = 0.0, ignored: collections.abc.Sequence[tuple[str, str]] = []) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Scene:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Scene:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def capsules(self) -> tuple[LinkCapsule, ...]:
+        """
+        The robot's own shape.
+        """
+    @property
+    def clearance(self) -> float:
+        """
+        [m] smallest distance that is no collision.
+        """
+    @property
+    def ignored(self) -> tuple[tuple[str, str], ...]:
+        """
+        Pairs of names that are not checked. Capsules of one link and of neighbouring links never are, nor
+        is the base's with obstacles.
+        """
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """
+        What the robot must not touch.
+        """
+class Contact:
+    """
+    The pair that collides most deeply, or comes nearest.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def distance(self) -> float:
+        """
+        [m] between their surfaces; negative: how deep they are in each other.
+        """
+    @property
+    def first(self) -> str:
+        """
+        A capsule.
+        """
+    @property
+    def second(self) -> str:
+        """
+        A capsule or an obstacle.
+        """
 class IdentifyOptions:
     """
-    How `identify` works; see the attributes.
+    How `identify` works.
+    
+    free = []: Names and globs ('J2.*', '*.ratio'); empty: every geometric value and the targets. What belongs to
+        the instrument (base frame, anchor, fixed points) is always found unless it is in `hold`.
+    hold = []: Names and globs that stay at nominal whatever else is asked for.
+    effects = []: Effects to fit as well.
+    hayati_angle = 0.08726646259971647: [rad] neighbouring axes nearer to parallel get beta (5 deg)
+    max_iterations = 5000: The fit stops here at the latest: long valleys take thousands of short steps, well-seen robots stop
+        after 3 to 5.
+    initial_damping = 1e-09: Damping mu of the first step, on columns of unit norm.
+    rms_fall = 1e-12: [m] stop when an accepted step lowers the rms by no more (the method's own: 1e-3 mm)
+    gradient = 1e-14: Stop when |g| of unit columns, relative to the residual's norm, is no more.
+    undamped = False: No damping, mu = 0: the least-squares iteration of the differential error model.
+    bounds = {}: (lowest, highest) by parameter; solver `ceres` only.
+    solver = 'lm': What minimises.
+        'lm': Levenberg-Marquardt on streamed normal equations
+        'ceres': Ceres with the same residuals and Jacobians; takes bounds
+    loss = 'reject': How gross outliers are treated.
+        'reject': Cauchy to find gross outliers, then plain least squares without them; they are listed
+        'none': plain least squares
+        'huber': Huber's loss
+        'cauchy': Cauchy's loss
+        'tukey': Tukey's loss
+    frame_by = 'parameters': How the measurement frame is found.
+        'parameters': the measurement frame is six more parameters
+        'svd': refitted by registration (Umeyama) after every step, as the palletizer method has it; positions only
+    rotation_length = 0.1: [m] a rotation error of 1 rad counts as this length, where rows give no sigma.
+    test_share = 0.2: Fraction of the pose groups held out when the data has no `set`.
+    seed = 0: Of the split.
+    rank_tolerance = 1e-06: A unit column that the others explain up to this fraction is not observable.
+    reject_beyond = 6.0: Loss `reject`: rows whose residual is longer than this many medians.
+    threads = 0: 0: as many as the machine has.
     """
-    def __init__(self, *, free: collections.abc.Sequence[str] = [], hold: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, max_iterations: typing.SupportsInt | typing.SupportsIndex = 5000, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, free: collections.abc.Sequence[str] = [], hold: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, max_iterations: typing.SupportsInt | typing.SupportsIndex = 5000, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -682,7 +1053,7 @@ class IdentifyOptions:
     @property
     def bounds(self) -> types.MappingProxyType[str, tuple[float, float]]:
         """
-        (lowest, highest) by parameter; solver 'ceres' only.
+        (lowest, highest) by parameter; solver `ceres` only.
         """
     @bounds.setter
     def bounds(self, arg1: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
@@ -698,15 +1069,19 @@ class IdentifyOptions:
     @property
     def frame_by(self) -> typing.Literal['parameters', 'svd']:
         """
-        The measurement frame: 'parameters' (six more), or 'svd' (registered after every step; positions only).
+        How the measurement frame is found.
+        
+        'parameters': the measurement frame is six more parameters
+        'svd': refitted by registration (Umeyama) after every step, as the palletizer method has it; positions only
         """
     @frame_by.setter
-    def frame_by(self, arg0: typing.Literal['parameters', 'svd']) -> None:
+    def frame_by(self, arg1: typing.Literal['parameters', 'svd']) -> None:
         ...
     @property
     def free(self) -> tuple[str, ...]:
         """
-        Names and globs ('J2.*', '*.ratio'); empty: every geometric value, base and targets.
+        Names and globs ('J2.*', '*.ratio'); empty: every geometric value and the targets. What belongs to
+        the instrument (base frame, anchor, fixed points) is always found unless it is in `hold`.
         """
     @free.setter
     def free(self, arg1: collections.abc.Sequence[str]) -> None:
@@ -714,18 +1089,18 @@ class IdentifyOptions:
     @property
     def gradient(self) -> float:
         """
-        Stop when the gradient of unit columns, relative to the residual's norm, is no more.
+        Stop when |g| of unit columns, relative to the residual's norm, is no more.
         """
     @gradient.setter
-    def gradient(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def gradient(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def hayati_angle(self) -> float:
         """
-        [rad] neighbouring axes nearer to parallel get beta.
+        [rad] neighbouring axes nearer to parallel get beta (5 deg)
         """
     @hayati_angle.setter
-    def hayati_angle(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def hayati_angle(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def hold(self) -> tuple[str, ...]:
@@ -738,50 +1113,57 @@ class IdentifyOptions:
     @property
     def initial_damping(self) -> float:
         """
-        mu, on columns of unit norm.
+        Damping mu of the first step, on columns of unit norm.
         """
     @initial_damping.setter
-    def initial_damping(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def initial_damping(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def loss(self) -> typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey']:
         """
-        'reject' (gross outliers are found, listed and left out), 'none', 'huber', 'cauchy' or 'tukey'.
+        How gross outliers are treated.
+        
+        'reject': Cauchy to find gross outliers, then plain least squares without them; they are listed
+        'none': plain least squares
+        'huber': Huber's loss
+        'cauchy': Cauchy's loss
+        'tukey': Tukey's loss
         """
     @loss.setter
-    def loss(self, arg0: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey']) -> None:
+    def loss(self, arg1: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey']) -> None:
         ...
     @property
     def max_iterations(self) -> int:
         """
-        The fit stops here at the latest.
+        The fit stops here at the latest: long valleys take thousands of short steps, well-seen robots stop
+        after 3 to 5.
         """
     @max_iterations.setter
-    def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def max_iterations(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def rank_tolerance(self) -> float:
         """
-        A unit column that the others explain but for this share is not observable.
+        A unit column that the others explain up to this fraction is not observable.
         """
     @rank_tolerance.setter
-    def rank_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def rank_tolerance(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def reject_beyond(self) -> float:
         """
-        Loss 'reject': rows whose residual is longer than this many medians.
+        Loss `reject`: rows whose residual is longer than this many medians.
         """
     @reject_beyond.setter
-    def reject_beyond(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def reject_beyond(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def rms_fall(self) -> float:
         """
-        [m] stop when a step lowers the rms by no more.
+        [m] stop when an accepted step lowers the rms by no more (the method's own: 1e-3 mm)
         """
     @rms_fall.setter
-    def rms_fall(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def rms_fall(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def rotation_length(self) -> float:
@@ -789,7 +1171,7 @@ class IdentifyOptions:
         [m] a rotation error of 1 rad counts as this length, where rows give no sigma.
         """
     @rotation_length.setter
-    def rotation_length(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def rotation_length(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def seed(self) -> int:
@@ -797,23 +1179,26 @@ class IdentifyOptions:
         Of the split.
         """
     @seed.setter
-    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def seed(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def solver(self) -> typing.Literal['lm', 'ceres']:
         """
-        'lm' (Levenberg-Marquardt) or 'ceres' (takes bounds).
+        What minimises.
+        
+        'lm': Levenberg-Marquardt on streamed normal equations
+        'ceres': Ceres with the same residuals and Jacobians; takes bounds
         """
     @solver.setter
-    def solver(self, arg0: typing.Literal['lm', 'ceres']) -> None:
+    def solver(self, arg1: typing.Literal['lm', 'ceres']) -> None:
         ...
     @property
     def test_share(self) -> float:
         """
-        Share of the pose groups held out when the data has no `set`.
+        Fraction of the pose groups held out when the data has no `set`.
         """
     @test_share.setter
-    def test_share(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def test_share(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def threads(self) -> int:
@@ -821,114 +1206,16 @@ class IdentifyOptions:
         0: as many as the machine has.
         """
     @threads.setter
-    def threads(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def threads(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def undamped(self) -> bool:
         """
-        mu = 0: plain least-squares iteration.
+        No damping, mu = 0: the least-squares iteration of the differential error model.
         """
     @undamped.setter
-    def undamped(self, arg0: bool) -> None:
+    def undamped(self, arg1: bool) -> None:
         ...
-class Parameter:
-    """
-    One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3` ...
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def frozen(self) -> bool:
-        """
-        Held at nominal, because the data cannot see it.
-        """
-    @property
-    def name(self) -> str:
-        """
-        Full name.
-        """
-    @property
-    def nominal(self) -> float:
-        """
-        Value before, in `unit`.
-        """
-    @property
-    def sigma(self) -> float:
-        """
-        Standard error, in `unit`; NaN when frozen.
-        """
-    @property
-    def unit(self) -> str:
-        """
-        m, rad, -, rad/Nm ...
-        """
-    @property
-    def value(self) -> float:
-        """
-        Value found, in `unit`.
-        """
-class Frozen:
-    """
-    A combination of parameters that the data cannot see: moving them together so changes no measurement.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def combination(self) -> types.MappingProxyType[str, float]:
-        """
-        Weight by parameter, 1 for `parameter`.
-        """
-    @property
-    def parameter(self) -> str:
-        """
-        The one held at nominal.
-        """
-    @property
-    def why(self) -> str:
-        """
-        Why it is frozen.
-        """
-class ErrorStatistics:
-    """
-    Length of the position (or distance) errors of a set of rows.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def max(self) -> float:
-        """
-        [m]
-        """
-    @property
-    def mean(self) -> float:
-        """
-        [m]
-        """
-    @property
-    def median(self) -> float:
-        """
-        [m]
-        """
-    @property
-    def n(self) -> int:
-        """
-        Number of rows.
-        """
-    @property
-    def p95(self) -> float:
-        """
-        [m] 95th percentile.
-        """
-    @property
-    def rms(self) -> float:
-        """
-        [m]
-        """
-    @property
-    def rotation_rms(self) -> float:
-        """
-        [rad]; NaN: no orientation measured.
-        """
 class BeforeAfter:
     """
     Errors before and after calibration.
@@ -943,33 +1230,7 @@ class BeforeAfter:
     @property
     def before(self) -> ErrorStatistics:
         """
-        Nominal robot with base, targets (anchor, fixed points) fitted.
-        """
-class SolverSummary:
-    """
-    How the solver ended.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def converged(self) -> bool:
-        """
-        False: the result must not be used.
-        """
-    @property
-    def iterations(self) -> int:
-        """
-        Steps made.
-        """
-    @property
-    def name(self) -> str:
-        """
-        'lm' or 'ceres'.
-        """
-    @property
-    def stopped_because(self) -> str:
-        """
-        The reason, in words.
+        Nominal robot with base, targets (and anchor, fixed points) fitted.
         """
 class Identification:
     """
@@ -988,7 +1249,7 @@ class Identification:
     @property
     def before(self) -> Robot:
         """
-        Nominal robot with base and targets fitted. Part of this result.
+        Nominal, with base and targets fitted; part of this result.
         """
     @property
     def columns(self) -> int:
@@ -998,12 +1259,12 @@ class Identification:
     @property
     def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        shape=(rank, rank), of the fitted (not frozen) parameters in order of `parameters`, in their units.
+        Shape=(rank, rank), of the fitted (not frozen) parameters in order of `parameters`, in their units.
         """
     @property
     def errors(self) -> types.MappingProxyType[str, BeforeAfter]:
         """
-        Errors [m] by set: 'train', and 'test' if rows were held out.
+        Errors by set: 'train', and 'test' if rows were held out.
         """
     @property
     def frozen(self) -> tuple[Frozen, ...]:
@@ -1033,7 +1294,7 @@ class Identification:
     @property
     def robot(self) -> Robot:
         """
-        Calibrated robot. Part of this result: copy() it before changing it.
+        Calibrated; part of this result: copy it before changing it.
         """
     @property
     def rotation_noise_sigma(self) -> float:
@@ -1043,7 +1304,7 @@ class Identification:
     @property
     def set(self) -> numpy.typing.NDArray[numpy.int8]:
         """
-        shape=(n,): 0 train, 1 test, for every row.
+        Shape=(n,): 0 train, 1 test, for every row.
         """
     @property
     def solver(self) -> SolverSummary:
@@ -1053,12 +1314,12 @@ class Identification:
     @property
     def test(self) -> BeforeAfter | None:
         """
-        Errors of the held-out rows [m], or None.
+        Errors of the held-out rows, if any.
         """
     @property
     def train(self) -> BeforeAfter:
         """
-        Errors of the training rows [m].
+        Errors of the training rows.
         """
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -1074,17 +1335,17 @@ class Prediction:
     @property
     def distance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
-        shape=(n,) [m]; empty without an anchor.
+        Shape=(n,) [m]; empty without an anchor.
         """
     @property
     def orientation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 4]"]:
         """
-        shape=(n, 4): w x y z, w >= 0.
+        Shape=(n, 4): w x y z, w >= 0.
         """
     @property
     def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
-        shape=(n, 3) [m]: target in the measurement frame.
+        Shape=(n, 3) [m]: target in the measurement frame.
         """
 class Residuals:
     """
@@ -1095,21 +1356,39 @@ class Residuals:
     @property
     def distance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
-        shape=(n,) [m]
+        Shape=(n,) [m]
         """
     @property
     def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
-        shape=(n, 3) [m]
+        Shape=(n, 3) [m]
         """
     @property
     def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
-        shape=(n, 3) [rad]: twice the vector part of the error quaternion.
+        Shape=(n, 3) [rad]: twice the vector part of the error quaternion.
         """
 class PlanOptions:
     """
-    How `plan` works; see the attributes.
+    How `plan` works.
+    
+    poses = 50: Number of poses.
+    min_step = 0.2617993877991494: [rad] least motion of a revolute joint between neighbours (15 deg)
+    min_step_prismatic = 0.0: [m] the same for prismatic joints.
+    index = 'd_optimal': What the plan maximises.
+        'd_optimal': determinant (O1 of Borm and Menq 1989)
+        'a_optimal': minus the sum of variances of unit-scaled parameters
+        'e_optimal': smallest singular value (O3 of Nahvi et al. 1994)
+        'inverse_condition': smallest over largest singular value (O2 of Driels and Pathre 1990)
+        'noise_amplification': smallest squared over largest singular value (O4 of Nahvi and Hollerbach 1996)
+    orientation = False: Full poses are measured, not only positions.
+    position_sigma = 3e-05: [m] noise of one component, for the standard errors promised.
+    rotation_sigma = 0.0001: [rad] likewise.
+    sweeps = 4: Passes of exchange over all poses.
+    proposals = 64: Candidates tried for a pose in a pass.
+    seed = 0: Of the random start and the candidates.
+    free = []: As in `IdentifyOptions`.
+    effects = []: Effects that shall be seen as well.
     """
     def __init__(self, *, poses: typing.SupportsInt | typing.SupportsIndex = 50, min_step: typing.SupportsFloat | typing.SupportsIndex = 0.2617993877991494, min_step_prismatic: typing.SupportsFloat | typing.SupportsIndex = 0.0, index: typing.Literal['d_optimal', 'a_optimal', 'e_optimal', 'inverse_condition', 'noise_amplification'] = 'd_optimal', orientation: bool = False, position_sigma: typing.SupportsFloat | typing.SupportsIndex = 3e-05, rotation_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0001, sweeps: typing.SupportsInt | typing.SupportsIndex = 4, proposals: typing.SupportsInt | typing.SupportsIndex = 64, seed: typing.SupportsInt | typing.SupportsIndex = 0, free: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = []) -> None:
         ...
@@ -1136,7 +1415,7 @@ class PlanOptions:
     @property
     def free(self) -> tuple[str, ...]:
         """
-        As in `identify`.
+        As in `IdentifyOptions`.
         """
     @free.setter
     def free(self, arg1: collections.abc.Sequence[str]) -> None:
@@ -1144,22 +1423,24 @@ class PlanOptions:
     @property
     def index(self) -> typing.Literal['d_optimal', 'a_optimal', 'e_optimal', 'inverse_condition', 'noise_amplification']:
         """
-        What the plan makes large.
+        What the plan maximises.
         
-        'd_optimal' (determinant; O1 of Borm and Menq 1989), 'a_optimal' (minus the sum of variances), 'e_optimal' (smallest
-        singular value; O3 of Nahvi et al. 1994), 'inverse_condition' (O2 of Driels and Pathre 1990) or 'noise_amplification'
-        (O4 of Nahvi and Hollerbach 1996).
+        'd_optimal': determinant (O1 of Borm and Menq 1989)
+        'a_optimal': minus the sum of variances of unit-scaled parameters
+        'e_optimal': smallest singular value (O3 of Nahvi et al. 1994)
+        'inverse_condition': smallest over largest singular value (O2 of Driels and Pathre 1990)
+        'noise_amplification': smallest squared over largest singular value (O4 of Nahvi and Hollerbach 1996)
         """
     @index.setter
-    def index(self, arg0: typing.Literal['d_optimal', 'a_optimal', 'e_optimal', 'inverse_condition', 'noise_amplification']) -> None:
+    def index(self, arg1: typing.Literal['d_optimal', 'a_optimal', 'e_optimal', 'inverse_condition', 'noise_amplification']) -> None:
         ...
     @property
     def min_step(self) -> float:
         """
-        [rad] every revolute joint moves by more between neighbours.
+        [rad] least motion of a revolute joint between neighbours (15 deg)
         """
     @min_step.setter
-    def min_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def min_step(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def min_step_prismatic(self) -> float:
@@ -1167,7 +1448,7 @@ class PlanOptions:
         [m] the same for prismatic joints.
         """
     @min_step_prismatic.setter
-    def min_step_prismatic(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def min_step_prismatic(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def orientation(self) -> bool:
@@ -1175,7 +1456,7 @@ class PlanOptions:
         Full poses are measured, not only positions.
         """
     @orientation.setter
-    def orientation(self, arg0: bool) -> None:
+    def orientation(self, arg1: bool) -> None:
         ...
     @property
     def poses(self) -> int:
@@ -1183,15 +1464,15 @@ class PlanOptions:
         Number of poses.
         """
     @poses.setter
-    def poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def poses(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def position_sigma(self) -> float:
         """
-        [m] of one component, for the standard errors promised.
+        [m] noise of one component, for the standard errors promised.
         """
     @position_sigma.setter
-    def position_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def position_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def proposals(self) -> int:
@@ -1199,15 +1480,15 @@ class PlanOptions:
         Candidates tried for a pose in a pass.
         """
     @proposals.setter
-    def proposals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def proposals(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def rotation_sigma(self) -> float:
         """
-        [rad]
+        [rad] likewise.
         """
     @rotation_sigma.setter
-    def rotation_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def rotation_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def seed(self) -> int:
@@ -1215,7 +1496,7 @@ class PlanOptions:
         Of the random start and the candidates.
         """
     @seed.setter
-    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def seed(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def sweeps(self) -> int:
@@ -1223,7 +1504,7 @@ class PlanOptions:
         Passes of exchange over all poses.
         """
     @sweeps.setter
-    def sweeps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def sweeps(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
 class PlanResult:
     """
@@ -1234,7 +1515,7 @@ class PlanResult:
     @property
     def exchanges(self) -> int:
         """
-        Poses exchanged.
+        Number of poses exchanged.
         """
     @property
     def frozen(self) -> tuple[Frozen, ...]:
@@ -1254,18 +1535,360 @@ class PlanResult:
     @property
     def joints(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        shape=(poses, driven joints) [rad | m]
+        Shape=(poses, driven joints) [rad | m].
         """
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """
-        sigma: the standard error that this plan promises.
+        Sigma: the standard error that this plan promises.
+        """
+class DistinguishOptions:
+    """
+    How `distinguish` works: what will be recorded beside joints and tip, how far it will be varied, and
+    what shall be told apart.
+    
+    columns = []: What is recorded beside joints and tip, of 'dir', 'payload', 'temp', 't'.
+    separate = []: Effects to be told apart; poses are added if it takes any. Empty: the whole catalogue is looked at,
+        and none are.
+    payload = 5.0: [kg] a pose is measured with this or with nothing.
+    temperature_low = 20.0: [deg C] at the first and the last pose.
+    temperature_high = 35.0: [deg C] halfway.
+    seconds_per_pose = 30.0: [s]
+    orientation = False: Full poses are measured, not only positions.
+    position_sigma = 3e-05: [m] noise of one component.
+    rotation_sigma = 0.0001: [rad] likewise.
+    alike = 0.98: An effect of which another explains a larger fraction is not told from it.
+    add = 12: Maximum number of poses added.
+    proposals = 300: Candidates that each of them is chosen from.
+    min_step = 0.2617993877991494: [rad] least motion of a revolute joint to an added pose.
+    min_step_prismatic = 0.0: [m] the same for prismatic joints.
+    seed = 0: Of directions, payloads and proposals.
+    """
+    def __init__(self, *, columns: collections.abc.Sequence[str] = [], separate: collections.abc.Sequence[EffectRequest] = [], payload: typing.SupportsFloat | typing.SupportsIndex = 5.0, temperature_low: typing.SupportsFloat | typing.SupportsIndex = 20.0, temperature_high: typing.SupportsFloat | typing.SupportsIndex = 35.0, seconds_per_pose: typing.SupportsFloat | typing.SupportsIndex = 30.0, orientation: bool = False, position_sigma: typing.SupportsFloat | typing.SupportsIndex = 3e-05, rotation_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0001, alike: typing.SupportsFloat | typing.SupportsIndex = 0.98, add: typing.SupportsInt | typing.SupportsIndex = 12, proposals: typing.SupportsInt | typing.SupportsIndex = 300, min_step: typing.SupportsFloat | typing.SupportsIndex = 0.2617993877991494, min_step_prismatic: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> DistinguishOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> DistinguishOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def add(self) -> int:
+        """
+        Maximum number of poses added.
+        """
+    @add.setter
+    def add(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def alike(self) -> float:
+        """
+        An effect of which another explains a larger fraction is not told from it.
+        """
+    @alike.setter
+    def alike(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """
+        What is recorded beside joints and tip, of 'dir', 'payload', 'temp', 't'.
+        """
+    @columns.setter
+    def columns(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
+    def min_step(self) -> float:
+        """
+        [rad] least motion of a revolute joint to an added pose.
+        """
+    @min_step.setter
+    def min_step(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_step_prismatic(self) -> float:
+        """
+        [m] the same for prismatic joints.
+        """
+    @min_step_prismatic.setter
+    def min_step_prismatic(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def orientation(self) -> bool:
+        """
+        Full poses are measured, not only positions.
+        """
+    @orientation.setter
+    def orientation(self, arg1: bool) -> None:
+        ...
+    @property
+    def payload(self) -> float:
+        """
+        [kg] a pose is measured with this or with nothing.
+        """
+    @payload.setter
+    def payload(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_sigma(self) -> float:
+        """
+        [m] noise of one component.
+        """
+    @position_sigma.setter
+    def position_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def proposals(self) -> int:
+        """
+        Candidates that each of them is chosen from.
+        """
+    @proposals.setter
+    def proposals(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_sigma(self) -> float:
+        """
+        [rad] likewise.
+        """
+    @rotation_sigma.setter
+    def rotation_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seconds_per_pose(self) -> float:
+        """
+        [s]
+        """
+    @seconds_per_pose.setter
+    def seconds_per_pose(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of directions, payloads and proposals.
+        """
+    @seed.setter
+    def seed(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def separate(self) -> tuple[EffectRequest, ...]:
+        """
+        Effects to be told apart; poses are added if it takes any. Empty: the whole catalogue is looked at,
+        and none are.
+        """
+    @separate.setter
+    def separate(self, arg1: collections.abc.Sequence[EffectRequest]) -> None:
+        ...
+    @property
+    def temperature_high(self) -> float:
+        """
+        [deg C] halfway.
+        """
+    @temperature_high.setter
+    def temperature_high(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def temperature_low(self) -> float:
+        """
+        [deg C] at the first and the last pose.
+        """
+    @temperature_low.setter
+    def temperature_low(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class EffectSize:
+    """
+    The smallest effect that a plan would see.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effect(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def joint(self) -> str:
+        """
+        Where; empty: it belongs to no joint.
+        """
+    @property
+    def parameter(self) -> str:
+        """
+        The one of its parameters that shows best.
+        """
+    @property
+    def size(self) -> float:
+        """
+        In `unit`, when base and tool are fitted.
+        """
+    @property
+    def size_at_tip(self) -> float:
+        """
+        [m] rms motion of the tip that this makes.
+        """
+    @property
+    def size_with_geometry(self) -> float:
+        """
+        In `unit`, when all geometry is fitted as well; NaN: geometry takes it all up.
+        """
+    @property
+    def size_with_geometry_at_tip(self) -> float:
+        """
+        [m] rms motion of the tip that this makes.
+        """
+    @property
+    def standard_errors(self) -> float:
+        """
+        `size` in standard errors of the parameter, the others of its effect left out.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        Of `size`.
+        """
+class EffectPair:
+    """
+    Two effects, and how far the other can explain the first.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effect(self) -> str:
+        """
+        The first.
+        """
+    @property
+    def joint(self) -> str:
+        """
+        Where; empty: it belongs to no joint.
+        """
+    @property
+    def other(self) -> str:
+        """
+        The other.
+        """
+    @property
+    def other_joint(self) -> str:
+        """
+        Where the other is; empty: it belongs to no joint.
+        """
+    @property
+    def parameter(self) -> str:
+        """
+        Of the first: what `size` is of.
+        """
+    @property
+    def r2(self) -> float:
+        """
+        Fraction of the first's motion of the tip, beyond base and tool, that the other explains.
+        """
+    @property
+    def r2_after(self) -> float:
+        """
+        With the added poses; NaN: none were asked for.
+        """
+    @property
+    def separated_by(self) -> str:
+        """
+        What to measure to tell.
+        """
+    @property
+    def size(self) -> float:
+        """
+        From which on the two are told apart; NaN: never.
+        """
+    @property
+    def size_after(self) -> float:
+        """
+        The same with the added poses.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        Of `size`.
+        """
+class Distinction:
+    """
+    What `distinguish` found, of all poses, added ones included.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def added(self) -> int:
+        """
+        Number of poses added; they are the last ones.
+        """
+    @property
+    def alike(self) -> tuple[EffectPair, ...]:
+        """
+        Pairs that are not told apart, largest r2 first.
+        """
+    @property
+    def direction(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(poses, driven joints): approach direction, -1 or 1; None unless asked for.
+        """
+    @property
+    def effects(self) -> tuple[EffectSize, ...]:
+        """
+        The smallest sizes that the plan would see.
+        """
+    @property
+    def joints(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(poses, driven joints) [rad | m]: the poses given, then those added.
+        """
+    @property
+    def not_testable(self) -> tuple[NotTestable, ...]:
+        """
+        Effects that such data could not show.
+        """
+    @property
+    def payload(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(poses,) [kg]; None unless asked for.
+        """
+    @property
+    def r2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(effects, effects): fraction of the row's effect that the column's explains.
+        """
+    @property
+    def separated(self) -> tuple[EffectPair, ...]:
+        """
+        Every pair of those to be told apart, before and after poses were added.
+        """
+    @property
+    def temperature(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(poses,) [deg C]; None unless asked for.
+        """
+    @property
+    def time(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        shape=(poses,) [s]; None unless asked for.
         """
 class DiagnoseOptions:
     """
-    How `diagnose` works; see the attributes.
+    How `diagnose` works.
+    
+    leave_out = []: Effects that are not to be considered, by name.
+    false_alarm = 0.01: False-positive rate: chance that a robot without any gap is said to have one.
+    max_effects = 12: Maximum number of effects named.
+    test_share = 0.2: Fraction of the pose groups held out when the data has no `set`.
+    search_poses = 6000: Maximum number of pose groups searched; errors are those of all rows.
+    resamples = 60: Bootstrap samples of folds of pose groups for the intervals, the chosen effects fitted again; at
+        most 10 more repeat the selection.
+    rotation_length = 0.1: [m] a rotation error of 1 rad counts as this length in reported errors.
+    seed = 0: Of the split and of every simulation.
+    threads = 0: 0: as many as the machine has.
+    also = []: Effects that are considered only when they are asked for, by name.
     """
-    def __init__(self, *, leave_out: collections.abc.Sequence[str] = [], false_alarm: typing.SupportsFloat | typing.SupportsIndex = 0.01, max_effects: typing.SupportsInt | typing.SupportsIndex = 12, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, search_poses: typing.SupportsInt | typing.SupportsIndex = 6000, resamples: typing.SupportsInt | typing.SupportsIndex = 60, rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, seed: typing.SupportsInt | typing.SupportsIndex = 0, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, leave_out: collections.abc.Sequence[str] = [], false_alarm: typing.SupportsFloat | typing.SupportsIndex = 0.01, max_effects: typing.SupportsInt | typing.SupportsIndex = 12, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, search_poses: typing.SupportsInt | typing.SupportsIndex = 6000, resamples: typing.SupportsInt | typing.SupportsIndex = 60, rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, seed: typing.SupportsInt | typing.SupportsIndex = 0, threads: typing.SupportsInt | typing.SupportsIndex = 0, also: collections.abc.Sequence[str] = []) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -1280,12 +1903,20 @@ class DiagnoseOptions:
         A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
         """
     @property
+    def also(self) -> tuple[str, ...]:
+        """
+        Effects that are considered only when they are asked for, by name.
+        """
+    @also.setter
+    def also(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
     def false_alarm(self) -> float:
         """
-        Chance that a robot without any gap is said to have one.
+        False-positive rate: chance that a robot without any gap is said to have one.
         """
     @false_alarm.setter
-    def false_alarm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def false_alarm(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def leave_out(self) -> tuple[str, ...]:
@@ -1298,18 +1929,19 @@ class DiagnoseOptions:
     @property
     def max_effects(self) -> int:
         """
-        At most so many are named.
+        Maximum number of effects named.
         """
     @max_effects.setter
-    def max_effects(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def max_effects(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def resamples(self) -> int:
         """
-        Draws of folds of pose groups for the intervals, with what was chosen fitted again; at most 10 more repeat the selection.
+        Bootstrap samples of folds of pose groups for the intervals, the chosen effects fitted again; at
+        most 10 more repeat the selection.
         """
     @resamples.setter
-    def resamples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def resamples(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def rotation_length(self) -> float:
@@ -1317,15 +1949,15 @@ class DiagnoseOptions:
         [m] a rotation error of 1 rad counts as this length in reported errors.
         """
     @rotation_length.setter
-    def rotation_length(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def rotation_length(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def search_poses(self) -> int:
         """
-        Of more pose groups, so many are searched; errors are those of all rows.
+        Maximum number of pose groups searched; errors are those of all rows.
         """
     @search_poses.setter
-    def search_poses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def search_poses(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def seed(self) -> int:
@@ -1333,15 +1965,15 @@ class DiagnoseOptions:
         Of the split and of every simulation.
         """
     @seed.setter
-    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def seed(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def test_share(self) -> float:
         """
-        Share of the pose groups held out when the data has no `set`.
+        Fraction of the pose groups held out when the data has no `set`.
         """
     @test_share.setter
-    def test_share(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def test_share(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def threads(self) -> int:
@@ -1349,11 +1981,11 @@ class DiagnoseOptions:
         0: as many as the machine has.
         """
     @threads.setter
-    def threads(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def threads(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
 class Share:
     """
-    A share and its 90 % interval.
+    A fraction and its 90 % interval.
     """
     def __repr__(self) -> str:
         ...
@@ -1391,7 +2023,7 @@ class Alternative:
     @property
     def probability(self) -> float:
         """
-        Its part of the class's probability.
+        Its part of the class's posterior probability.
         """
     @property
     def separated_by(self) -> str:
@@ -1417,32 +2049,32 @@ class Curve:
     @property
     def points(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(n, 3): input, value, standard error.
+        Shape=(n, 3): input, value, standard error.
         """
     @property
     def samples(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(n, 2): input and value, what single poses say; at most 600.
+        Shape=(n, 2): input and value of single poses, at most 600.
         """
     @property
     def second_high(self) -> float:
         """
-        Of the second input.
+        Of the second input: upper bound.
         """
     @property
     def second_input(self) -> str:
         """
-        Of a function of two inputs: the other one, which is between `second_low` and `second_high`; or ''.
+        Of a function of two inputs the other one, held between the two bounds below; or empty.
         """
     @property
     def second_low(self) -> float:
         """
-        Of the second input.
+        Of the second input: lower bound.
         """
     @property
     def site(self) -> str:
         """
-        What moves: a joint's name, 'base.x' ...
+        What moves: a joint's name, 'base.x' ….
         """
     @property
     def unit(self) -> str:
@@ -1463,7 +2095,7 @@ class FoundEffect:
     @property
     def curves(self) -> tuple[Curve, ...]:
         """
-        The law, drawn through what single poses say.
+        The law, drawn through single poses.
         """
     @property
     def effect(self) -> str:
@@ -1473,17 +2105,18 @@ class FoundEffect:
     @property
     def held_out_after(self) -> ErrorStatistics:
         """
-        Held-out errors with all named effects [m].
+        Held-out errors with all named effects.
         """
     @property
     def held_out_before(self) -> ErrorStatistics:
         """
-        Held-out errors without this effect, all others in [m].
+        Held-out errors without this effect, all others in.
         """
     @property
     def identify_as(self) -> str:
         """
-        What `identify(effects=...)` and `--effects` take for it: 'backlash:J3'; empty for a frame that wanders.
+        What `effects` of `identify` and `truing identify --effects` take for it: 'backlash:J3'; empty for a
+        frame that wanders.
         """
     @property
     def joints(self) -> tuple[str, ...]:
@@ -1493,7 +2126,7 @@ class FoundEffect:
     @property
     def note(self) -> str:
         """
-        What else is to be known of it; may be empty.
+        What else is to be known of it: 'not linear in the torque' …; may be empty.
         """
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -1503,22 +2136,22 @@ class FoundEffect:
     @property
     def probability(self) -> float:
         """
-        Of the class: this effect or one of `confounded_with`.
+        Posterior of the class: this effect or one of `confounded_with`.
         """
     @property
     def share(self) -> float:
         """
-        Of the gap's mean square; those of all effects and unknowns add up to what was closed.
+        Fraction of the gap's mean square; those of all effects and unknowns add up to what was closed.
         """
     @property
     def share_alone(self) -> float:
         """
-        Of the gap's mean square, what it closes when it is the only one.
+        Fraction of the gap's mean square that it closes when it is the only one.
         """
     @property
     def share_last(self) -> float:
         """
-        What it closes when all others are in already.
+        Fraction that it closes when all others are in already.
         """
     @property
     def shrink(self) -> Share:
@@ -1527,7 +2160,8 @@ class FoundEffect:
         """
 class UnknownEffect:
     """
-    Something that no effect of the catalogue is: a joint that moves as a free function of recorded inputs.
+    A gap that no effect of the catalogue explains: a joint that moves as a smooth, stepwise or two-
+    input function of recorded inputs; or more than repeats show, and no such function describes it.
     """
     def __repr__(self) -> str:
         ...
@@ -1539,22 +2173,22 @@ class UnknownEffect:
     @property
     def held_out_after(self) -> ErrorStatistics:
         """
-        Held-out errors with it [m].
+        Held-out errors with it.
         """
     @property
     def held_out_before(self) -> ErrorStatistics:
         """
-        Held-out errors without it [m].
+        Held-out errors without it.
         """
     @property
     def inputs(self) -> tuple[str, ...]:
         """
-        One or two; none: more is left than repeats show, and no function describes it.
+        One or two; none: no function of them describes it.
         """
     @property
     def joint(self) -> str:
         """
-        A joint's name, 'base', or '' when only 'somewhere' can be said.
+        A joint's name, 'base', or empty when only 'somewhere' can be said.
         """
     @property
     def looks_like(self) -> str:
@@ -1564,38 +2198,17 @@ class UnknownEffect:
     @property
     def probability(self) -> float:
         """
-        That there is such a thing.
+        Posterior that there is such a thing.
         """
     @property
     def share(self) -> float:
         """
-        Of the gap's mean square, as that of an effect.
+        Fraction of the gap's mean square, as that of an effect.
         """
     @property
     def shrink(self) -> Share:
         """
         Of the held-out rms: 1 - after / before.
-        """
-class NotTestable:
-    """
-    An effect that these data could not show.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def effect(self) -> str:
-        """
-        Its name.
-        """
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """
-        Where; empty: at any joint.
-        """
-    @property
-    def why(self) -> str:
-        """
-        'no column temp_C', 'J1 does not move' ...
         """
 class Detectable:
     """
@@ -1621,12 +2234,12 @@ class Detectable:
     @property
     def size(self) -> float:
         """
-        In the parameter's unit.
+        In `unit`.
         """
     @property
     def size_at_tip(self) -> float:
         """
-        Rms at the tip [m].
+        [m] rms motion of the tip that this makes.
         """
     @property
     def unit(self) -> str:
@@ -1635,14 +2248,14 @@ class Detectable:
         """
 class Candidate:
     """
-    One candidate before any choice: what methods without a search would go by.
+    One candidate before any selection: what methods without a search would go by.
     """
     def __repr__(self) -> str:
         ...
     @property
     def columns(self) -> int:
         """
-        Parameters that the data can see.
+        Number of parameters that the data can see.
         """
     @property
     def effect(self) -> str:
@@ -1662,7 +2275,7 @@ class Candidate:
     @property
     def held_out_gain(self) -> float:
         """
-        Cross-validated fall of the mean square, as a share of the gap.
+        Cross-validated fall of the mean square, as a fraction of the gap.
         """
     @property
     def joints(self) -> tuple[str, ...]:
@@ -1683,7 +2296,8 @@ class SanityFinding:
     @property
     def kind(self) -> str:
         """
-        joint_record, joint_order, joint_sign, joint_unit, duplicates, direction, lag, moved_target, constant or outliers.
+        'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'duplicates', 'direction', 'lag',
+        'moved_target', 'constant' or 'outliers'.
         """
     @property
     def rows(self) -> tuple[int, ...]:
@@ -1709,7 +2323,7 @@ class NextPose:
     @property
     def joints(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(driven joints,) [rad | m]
+        Shape=(driven joints,) [rad | m]
         """
     @property
     def payload(self) -> float:
@@ -1735,11 +2349,11 @@ class WhereJoint:
     @property
     def share(self) -> Share:
         """
-        Of the closable gap, what a free function of the inputs at this joint explains.
+        Fraction of the closable gap that a free function of the inputs at this joint explains.
         """
 class WhereInput:
     """
-    How much of the gap goes with an input.
+    How much of the closable gap goes with an input.
     """
     def __repr__(self) -> str:
         ...
@@ -1751,7 +2365,7 @@ class WhereInput:
     @property
     def share(self) -> float:
         """
-        Of the closable gap.
+        Fraction of the closable gap.
         """
 class WorkspaceCell:
     """
@@ -1762,7 +2376,7 @@ class WorkspaceCell:
     @property
     def center(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(3,) [m] in the base frame.
+        Shape=(3,) [m] in the base frame.
         """
     @property
     def n(self) -> int:
@@ -1772,7 +2386,7 @@ class WorkspaceCell:
     @property
     def rms(self) -> float:
         """
-        Of the gap [m].
+        [m] of the gap.
         """
 class Diagnosis:
     """
@@ -1787,37 +2401,37 @@ class Diagnosis:
     @property
     def after(self) -> ErrorStatistics:
         """
-        Held-out errors with all named effects, corrections of their laws and drifts included [m].
+        Held-out errors with all named effects, corrections of their laws and drifts included.
         """
     @property
     def after_unknown(self) -> ErrorStatistics:
         """
-        Held-out errors with the unknown functions as well [m].
+        Held-out errors with the unknown functions as well.
         """
     @property
     def candidates(self) -> tuple[Candidate, ...]:
         """
-        Every candidate, before any choice.
+        Every candidate, before any selection.
         """
     @property
     def closable(self) -> float:
         """
-        Share of the gap's mean square above the noise floor that the named effects close.
+        Fraction of the gap's mean square above the noise floor that the named effects close.
         """
     @property
     def detectable(self) -> tuple[Detectable, ...]:
         """
-        The smallest effects that would have been found; of each, its easiest joint first.
+        The smallest effects that would have been found, easiest joint first.
         """
     @property
     def direction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
         """
-        shape=(3, 3): principal axes of the residual in the base frame, as columns.
+        Shape=(3, 3): principal axes of the residual in the base frame, as columns.
         """
     @property
     def direction_rms(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,) [m]: along them.
+        Shape=(3,) [m]: along them.
         """
     @property
     def directions(self) -> numpy.typing.NDArray[numpy.float64] | None:
@@ -1832,17 +2446,17 @@ class Diagnosis:
     @property
     def error_after(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(n,) [m]: with all named effects, as `after`.
+        Shape=(n,) [m]: of every row, as `after`.
         """
     @property
     def error_before(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(n,) [m]: with base and targets fitted only.
+        Shape=(n,) [m]: of every row, as `gap`.
         """
     @property
     def gap(self) -> ErrorStatistics:
         """
-        Held-out errors with base, targets (and anchor) fitted only [m].
+        Held-out errors with base, targets (and anchor) fitted only.
         """
     @property
     def joint_record(self) -> str:
@@ -1857,7 +2471,7 @@ class Diagnosis:
     @property
     def neighbour_share(self) -> float:
         """
-        Of the remaining mean square, what a nearest-neighbour predictor still explains.
+        Fraction of the remaining mean square that a nearest-neighbour predictor explains.
         """
     @property
     def next_poses(self) -> tuple[NextPose, ...]:
@@ -1872,7 +2486,7 @@ class Diagnosis:
     @property
     def noise_from_repeats(self) -> bool:
         """
-        The noise is that of repeated poses, not of what a flexible fit leaves.
+        The noise is that of repeated poses, not what a flexible fit leaves.
         """
     @property
     def not_testable(self) -> tuple[NotTestable, ...]:
@@ -1882,17 +2496,17 @@ class Diagnosis:
     @property
     def outliers(self) -> tuple[int, ...]:
         """
-        Rows (counted from 0) that counted for little.
+        Rows (counted from 0) with little weight.
         """
     @property
     def p_gap(self) -> float:
         """
-        Chance of a gain as large under noise alone.
+        p-value of the gap: probability of a gain as large under noise alone.
         """
     @property
     def remaining_structure_p(self) -> float:
         """
-        Permutation test of the free functions on what is left.
+        p-value of the free functions on the residual, by permutation.
         """
     @property
     def residuals_after(self) -> Residuals:
@@ -1907,12 +2521,12 @@ class Diagnosis:
     @property
     def robot(self) -> Robot:
         """
-        Robot with the effects that were named; free functions are left out. Part of this result.
+        With the effects that were named, free functions left out; part of this result.
         """
     @property
     def robot_before(self) -> Robot:
         """
-        Nominal robot with base and targets fitted. Part of this result: copy() it before changing it.
+        Nominal, with base and targets (and anchor) fitted; part of this result: copy it to change it.
         """
     @property
     def sanity(self) -> tuple[SanityFinding, ...]:
@@ -1932,7 +2546,7 @@ class Diagnosis:
     @property
     def set(self) -> numpy.typing.NDArray[numpy.int8]:
         """
-        shape=(n,): 0 train, 1 test, for every row.
+        Shape=(n,): 0 train, 1 test, for every row.
         """
     @property
     def shrink(self) -> Share:
@@ -1942,12 +2556,17 @@ class Diagnosis:
     @property
     def unknown(self) -> tuple[UnknownEffect, ...]:
         """
-        What no effect of the catalogue is.
+        What no effect of the catalogue explains.
         """
     @property
     def verdict(self) -> typing.Literal['none', 'effects', 'unknown', 'effects+unknown']:
         """
-        'none' (no gap beyond noise), 'effects' (named, and nothing is left), 'unknown' (a gap that no effect of the catalogue explains) or 'effects+unknown' (named, and something is left).
+        Whether there is a gap, and whether the effects named explain it.
+        
+        'none': no gap beyond noise
+        'effects': named, and nothing is left
+        'unknown': a gap that no effect of the catalogue explains
+        'effects+unknown': named, and something is left
         """
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -1968,317 +2587,6 @@ class Diagnosis:
     def workspace(self) -> tuple[WorkspaceCell, ...]:
         """
         The gap by part of the workspace.
-        """
-class EffectSize:
-    """
-    The smallest effect that a plan would see.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def effect(self) -> str:
-        """
-        Its name.
-        """
-    @property
-    def joint(self) -> str:
-        """
-        Where; empty: it belongs to no joint.
-        """
-    @property
-    def parameter(self) -> str:
-        """
-        The one of its parameters that shows best.
-        """
-    @property
-    def size(self) -> float:
-        """
-        In the parameter's unit, when base and tool are fitted.
-        """
-    @property
-    def size_at_tip(self) -> float:
-        """
-        Rms motion of the tip that this makes [m].
-        """
-    @property
-    def size_with_geometry(self) -> float:
-        """
-        When all geometry is fitted as well; NaN: geometry takes it all up.
-        """
-    @property
-    def size_with_geometry_at_tip(self) -> float:
-        """
-        Its motion of the tip [m].
-        """
-    @property
-    def standard_errors(self) -> float:
-        """
-        How many of the parameter's standard errors `size` is.
-        """
-    @property
-    def unit(self) -> str:
-        """
-        Of `size`.
-        """
-class EffectPair:
-    """
-    Two effects, and how far the first is like what the other can do.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def effect(self) -> str:
-        """
-        The first.
-        """
-    @property
-    def joint(self) -> str:
-        """
-        Where; empty: it belongs to no joint.
-        """
-    @property
-    def other(self) -> str:
-        """
-        The other.
-        """
-    @property
-    def other_joint(self) -> str:
-        """
-        Where the other is.
-        """
-    @property
-    def parameter(self) -> str:
-        """
-        Of the first: what `size` is of.
-        """
-    @property
-    def r2(self) -> float:
-        """
-        Share of the first's motion of the tip, beyond base and tool, that the other explains.
-        """
-    @property
-    def r2_after(self) -> float:
-        """
-        With the added poses; NaN: none were asked for.
-        """
-    @property
-    def separated_by(self) -> str:
-        """
-        What to measure to tell.
-        """
-    @property
-    def size(self) -> float:
-        """
-        From which on the first is told from the other; NaN: never.
-        """
-    @property
-    def size_after(self) -> float:
-        """
-        With the added poses.
-        """
-    @property
-    def unit(self) -> str:
-        """
-        Of `size`.
-        """
-class DistinguishOptions:
-    """
-    How `distinguish` works; see the attributes.
-    """
-    def __init__(self, *, columns: collections.abc.Sequence[str] = [], separate: collections.abc.Sequence[EffectRequest] = [], payload: typing.SupportsFloat | typing.SupportsIndex = 5.0, temperature_low: typing.SupportsFloat | typing.SupportsIndex = 20.0, temperature_high: typing.SupportsFloat | typing.SupportsIndex = 35.0, seconds_per_pose: typing.SupportsFloat | typing.SupportsIndex = 30.0, orientation: bool = False, position_sigma: typing.SupportsFloat | typing.SupportsIndex = 3e-05, rotation_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0001, alike: typing.SupportsFloat | typing.SupportsIndex = 0.98, add: typing.SupportsInt | typing.SupportsIndex = 12, proposals: typing.SupportsInt | typing.SupportsIndex = 300, min_step: typing.SupportsFloat | typing.SupportsIndex = 0.2617993877991494, min_step_prismatic: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> DistinguishOptions:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> DistinguishOptions:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def add(self) -> int:
-        """
-        At most so many poses are added.
-        """
-    @add.setter
-    def add(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def alike(self) -> float:
-        """
-        An effect of which another explains a larger share is not told from it.
-        """
-    @alike.setter
-    def alike(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """
-        Of 'dir', 'payload', 'temp', 't'.
-        """
-    @columns.setter
-    def columns(self, arg1: collections.abc.Sequence[str]) -> None:
-        ...
-    @property
-    def min_step(self) -> float:
-        """
-        [rad] every revolute joint moves by more to an added pose.
-        """
-    @min_step.setter
-    def min_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def min_step_prismatic(self) -> float:
-        """
-        [m] the same for prismatic joints.
-        """
-    @min_step_prismatic.setter
-    def min_step_prismatic(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def orientation(self) -> bool:
-        """
-        Full poses are measured, not only positions.
-        """
-    @orientation.setter
-    def orientation(self, arg0: bool) -> None:
-        ...
-    @property
-    def payload(self) -> float:
-        """
-        [kg] a pose is measured with this or with nothing.
-        """
-    @payload.setter
-    def payload(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def position_sigma(self) -> float:
-        """
-        [m] of one component.
-        """
-    @position_sigma.setter
-    def position_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def proposals(self) -> int:
-        """
-        Poses that each of them is chosen from.
-        """
-    @proposals.setter
-    def proposals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rotation_sigma(self) -> float:
-        """
-        [rad]
-        """
-    @rotation_sigma.setter
-    def rotation_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def seconds_per_pose(self) -> float:
-        """
-        [s]
-        """
-    @seconds_per_pose.setter
-    def seconds_per_pose(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def seed(self) -> int:
-        """
-        Of directions, payloads and proposals.
-        """
-    @seed.setter
-    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def separate(self) -> tuple[EffectRequest, ...]:
-        """
-        Effects to be told apart; empty: the whole catalogue is looked at, and no poses are added.
-        """
-    @separate.setter
-    def separate(self, arg1: collections.abc.Sequence[EffectRequest]) -> None:
-        ...
-    @property
-    def temperature_high(self) -> float:
-        """
-        [deg C] halfway.
-        """
-    @temperature_high.setter
-    def temperature_high(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def temperature_low(self) -> float:
-        """
-        [deg C] at the first and the last pose.
-        """
-    @temperature_low.setter
-    def temperature_low(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-class Distinction:
-    """
-    What `distinguish` found.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def added(self) -> int:
-        """
-        The last so many poses.
-        """
-    @property
-    def alike(self) -> tuple[EffectPair, ...]:
-        """
-        Not told apart, most alike first.
-        """
-    @property
-    def direction(self) -> numpy.typing.NDArray[numpy.float64] | None:
-        """
-        shape=(poses, driven joints): -1 or 1; None: not asked for.
-        """
-    @property
-    def effects(self) -> tuple[EffectSize, ...]:
-        """
-        Smallest sizes, as of all poses, added ones included.
-        """
-    @property
-    def joints(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
-        """
-        shape=(poses, driven joints) [rad | m]: the poses given, then those added.
-        """
-    @property
-    def not_testable(self) -> tuple[NotTestable, ...]:
-        """
-        Effects that such data could not show.
-        """
-    @property
-    def payload(self) -> numpy.typing.NDArray[numpy.float64] | None:
-        """
-        shape=(poses,) [kg]
-        """
-    @property
-    def r2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
-        """
-        shape=(effects, effects): share of the row's effect that the column's explains.
-        """
-    @property
-    def separated(self) -> tuple[EffectPair, ...]:
-        """
-        Every pair of those to be told apart, before and after poses were added.
-        """
-    @property
-    def temperature(self) -> numpy.typing.NDArray[numpy.float64] | None:
-        """
-        shape=(poses,) [deg C]
-        """
-    @property
-    def time(self) -> numpy.typing.NDArray[numpy.float64] | None:
-        """
-        shape=(poses,) [s]
         """
 class Camera:
     """
@@ -2304,7 +2612,7 @@ class Camera:
         [px]
         """
     @cx.setter
-    def cx(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def cx(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def cy(self) -> float:
@@ -2312,7 +2620,7 @@ class Camera:
         [px]
         """
     @cy.setter
-    def cy(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def cy(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def distortion(self) -> tuple[float, ...]:
@@ -2328,7 +2636,7 @@ class Camera:
         [px]
         """
     @fx.setter
-    def fx(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def fx(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def fy(self) -> float:
@@ -2336,7 +2644,7 @@ class Camera:
         [px]
         """
     @fy.setter
-    def fy(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def fy(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def height(self) -> int:
@@ -2344,7 +2652,7 @@ class Camera:
         [px]
         """
     @height.setter
-    def height(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def height(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def width(self) -> int:
@@ -2352,7 +2660,7 @@ class Camera:
         [px]
         """
     @width.setter
-    def width(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def width(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
 class HandEyePoses:
     """
@@ -2360,13 +2668,15 @@ class HandEyePoses:
     
     T_base_hand: shape=(n, 4, 4), the flange in the robot base, as the controller reports it.
     T_camera_board: shape=(n, 4, 4), the board in the camera.
-    images: of each pose, the points of the board, shape=(m, 3) [m] in its frame, and where they were seen, shape=(m, 2) [px];
-        then pixels are what was measured, and T_camera_board is what was found from them. None: board poses were measured.
+    images: of each pose, the points of the board, shape=(m, 3) [m] in its frame, and where they were seen, shape=(m, 2)
+        [px]; then pixels are what was measured, and T_camera_board is what was found from them. None: board poses were
+        measured.
     camera: needed with images.
     set: 0 or 'train', 1 or 'test' (held out) for each pose; None: all are fitted.
     board_symmetries: turns after which the board looks the same, T_board_turned, shape=(4, 4), without the identity.
     
-    Raises InputError that names the pose: values that are not finite, rotations that are not orthonormal (to 1e-6) or left-handed.
+    Raises InputError that names the pose: values that are not finite, rotations that are not
+    orthonormal (to 1e-6) or left-handed.
     """
     def __init__(self, T_base_hand: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], T_camera_board: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], *, images: collections.abc.Sequence[tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike]] | None = None, camera: Camera | None = None, set: numpy.typing.ArrayLike | collections.abc.Sequence[str | None] | None = None, board_symmetries: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]] = []) -> None:
         ...
@@ -2416,7 +2726,32 @@ class HandEyePoses:
         """
 class HandEyeOptions:
     """
-    How `handeye` works; see the attributes. Noise that is None is estimated.
+    How `handeye` works. Sigmas are standard deviations of one component; those that are not given are
+    estimated.
+    
+    setup = 'eye-in-hand': Where the camera is.
+        'eye-in-hand': camera on the hand, board in the cell
+        'eye-to-hand': camera in the cell, board on the hand
+    method = 'refined': How the frames are found.
+        'refined': maximum likelihood: what was measured, robot poses and board poses (or pixels), each with its noise
+        'closed-form': dual quaternions and one SVD alone (Daniilidis 1999)
+    hand_position_sigma = None: [m] of the reported robot positions. Position noise of hand and board poses adds up: give both, or
+        neither.
+    hand_rotation_sigma = None: [rad] of the reported robot rotations.
+    camera_position_sigma = None: [m] of the board's positions, without images.
+    camera_rotation_sigma = None: [rad] of the board's rotations, without images.
+    pixel_sigma = None: [px] of the board's points, with images.
+    refine_camera = False: With images: focal lengths, centre and distortion are found as well.
+    working_point = None: Shape=(3,) [m] in the camera frame: where accuracy is asked for; not given: the mean of the board's
+        positions.
+    known_height = None: [m] where all rotation axes are parallel: the camera's coordinate along that axis, in the frame that
+        carries the camera.
+    known_height_sigma = 0.0: [m] standard deviation of `known_height`.
+    reject = True: Find poses that do not fit the others, list them, go on without.
+    reject_beyond = 3.0: Poses whose root mean square of six standardised residuals is larger.
+    recognise = True: Where the loop does not close: try other readings of the same numbers, and name the one that closes.
+    reading = '': Use the poses in this other reading, a name of `handeye_readings`; empty: as given.
+    max_iterations = 50: The fit stops here at the latest.
     """
     def __init__(self, *, setup: typing.Literal['eye-in-hand', 'eye-to-hand'] = 'eye-in-hand', method: typing.Literal['refined', 'closed-form'] = 'refined', hand_position_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, hand_rotation_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, camera_position_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, camera_rotation_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, pixel_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, refine_camera: bool = False, working_point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, known_height: typing.SupportsFloat | typing.SupportsIndex | None = None, known_height_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0, reject: bool = True, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 3.0, recognise: bool = True, reading: str = '', max_iterations: typing.SupportsInt | typing.SupportsIndex = 50) -> None:
         ...
@@ -2435,7 +2770,7 @@ class HandEyeOptions:
     @property
     def camera_position_sigma(self) -> float | None:
         """
-        [m] of the board's positions, without images; None: estimated.
+        [m] of the board's positions, without images.
         """
     @camera_position_sigma.setter
     def camera_position_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
@@ -2443,7 +2778,7 @@ class HandEyeOptions:
     @property
     def camera_rotation_sigma(self) -> float | None:
         """
-        [rad] likewise.
+        [rad] of the board's rotations, without images.
         """
     @camera_rotation_sigma.setter
     def camera_rotation_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
@@ -2451,7 +2786,8 @@ class HandEyeOptions:
     @property
     def hand_position_sigma(self) -> float | None:
         """
-        [m] standard deviation of one component of the reported robot positions; None: estimated.
+        [m] of the reported robot positions. Position noise of hand and board poses adds up: give both, or
+        neither.
         """
     @hand_position_sigma.setter
     def hand_position_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
@@ -2459,7 +2795,7 @@ class HandEyeOptions:
     @property
     def hand_rotation_sigma(self) -> float | None:
         """
-        [rad] likewise.
+        [rad] of the reported robot rotations.
         """
     @hand_rotation_sigma.setter
     def hand_rotation_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
@@ -2467,18 +2803,19 @@ class HandEyeOptions:
     @property
     def known_height(self) -> float | None:
         """
-        [m] where all rotation axes are parallel: the camera's coordinate along that axis, in the frame that carries the camera.
+        [m] where all rotation axes are parallel: the camera's coordinate along that axis, in the frame that
+        carries the camera.
         """
     @known_height.setter
-    def known_height(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+    def known_height(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
         ...
     @property
     def known_height_sigma(self) -> float:
         """
-        [m]
+        [m] standard deviation of `known_height`.
         """
     @known_height_sigma.setter
-    def known_height_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def known_height_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def max_iterations(self) -> int:
@@ -2486,20 +2823,23 @@ class HandEyeOptions:
         The fit stops here at the latest.
         """
     @max_iterations.setter
-    def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def max_iterations(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def method(self) -> typing.Literal['refined', 'closed-form']:
         """
-        'refined' (maximum likelihood) or 'closed-form' (dual quaternions and one SVD alone).
+        How the frames are found.
+        
+        'refined': maximum likelihood: what was measured, robot poses and board poses (or pixels), each with its noise
+        'closed-form': dual quaternions and one SVD alone (Daniilidis 1999)
         """
     @method.setter
-    def method(self, arg0: typing.Literal['refined', 'closed-form']) -> None:
+    def method(self, arg1: typing.Literal['refined', 'closed-form']) -> None:
         ...
     @property
     def pixel_sigma(self) -> float | None:
         """
-        [px] with images; None: estimated.
+        [px] of the board's points, with images.
         """
     @pixel_sigma.setter
     def pixel_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
@@ -2507,10 +2847,10 @@ class HandEyeOptions:
     @property
     def reading(self) -> str:
         """
-        Use the poses in this other reading, a name of `handeye_readings`; '': as given.
+        Use the poses in this other reading, a name of `handeye_readings`; empty: as given.
         """
     @reading.setter
-    def reading(self, arg0: str) -> None:
+    def reading(self, arg1: str) -> None:
         ...
     @property
     def recognise(self) -> bool:
@@ -2518,7 +2858,7 @@ class HandEyeOptions:
         Where the loop does not close: try other readings of the same numbers, and name the one that closes.
         """
     @recognise.setter
-    def recognise(self, arg0: bool) -> None:
+    def recognise(self, arg1: bool) -> None:
         ...
     @property
     def refine_camera(self) -> bool:
@@ -2526,7 +2866,7 @@ class HandEyeOptions:
         With images: focal lengths, centre and distortion are found as well.
         """
     @refine_camera.setter
-    def refine_camera(self, arg0: bool) -> None:
+    def refine_camera(self, arg1: bool) -> None:
         ...
     @property
     def reject(self) -> bool:
@@ -2534,7 +2874,7 @@ class HandEyeOptions:
         Find poses that do not fit the others, list them, go on without.
         """
     @reject.setter
-    def reject(self, arg0: bool) -> None:
+    def reject(self, arg1: bool) -> None:
         ...
     @property
     def reject_beyond(self) -> float:
@@ -2542,45 +2882,28 @@ class HandEyeOptions:
         Poses whose root mean square of six standardised residuals is larger.
         """
     @reject_beyond.setter
-    def reject_beyond(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def reject_beyond(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def setup(self) -> typing.Literal['eye-in-hand', 'eye-to-hand']:
         """
-        'eye-in-hand' (camera on the hand, board in the cell) or 'eye-to-hand' (camera in the cell, board on the hand).
+        Where the camera is.
+        
+        'eye-in-hand': camera on the hand, board in the cell
+        'eye-to-hand': camera in the cell, board on the hand
         """
     @setup.setter
-    def setup(self, arg0: typing.Literal['eye-in-hand', 'eye-to-hand']) -> None:
+    def setup(self, arg1: typing.Literal['eye-in-hand', 'eye-to-hand']) -> None:
         ...
     @property
     def working_point(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"] | None:
         """
-        shape=(3,) [m] in the camera frame: where accuracy is asked for; None: the mean of the board's positions.
+        Shape=(3,) [m] in the camera frame: where accuracy is asked for; not given: the mean of the board's
+        positions.
         """
     @working_point.setter
-    def working_point(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None) -> None:
+    def working_point(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None) -> None:
         ...
-class UncertainFrame:
-    """
-    A frame with its uncertainty.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def T(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
-        """
-        shape=(4, 4), [m].
-        """
-    @property
-    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
-        """
-        shape=(6, 6), of x, y, z [m] and the rotation vector about the parent's axes [rad]: small changes that move the frame's origin, and turn it about that origin.
-        """
-    @property
-    def sigma(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        shape=(6,): standard errors of x, y, z [m] and of the turns about x, y, z [rad].
-        """
 class HandEyeResidual:
     """
     How far a pose is from closing the loop: seen minus predicted board pose.
@@ -2687,7 +3010,17 @@ class Unobservable:
     @property
     def direction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,): unit vector in the frame that carries the camera.
+        Shape=(3,): unit vector in the frame with the camera.
+        """
+    @property
+    def reason(self) -> typing.Literal['no_rotation', 'one_axis', 'large_error', 'singular']:
+        """
+        Why, for programs.
+        
+        'no_rotation': the hand moved without turning
+        'one_axis': all rotations are about one axis: the camera's coordinate along it
+        'large_error': the standard error is too large to be an answer
+        'singular': camera and board can move together without opening the loop
         """
     @property
     def rotation(self) -> bool:
@@ -2713,12 +3046,12 @@ class Reading:
     @property
     def explanation(self) -> str:
         """
-        In words.
+        In words: 'hand poses are base in hand (inverted)'.
         """
     @property
     def name(self) -> str:
         """
-        To be given as `reading`.
+        To be given as `reading`; empty: as given.
         """
     @property
     def position_rms(self) -> float:
@@ -2730,9 +3063,38 @@ class Reading:
         """
         [rad]
         """
+class HandEyeConcern:
+    """
+    What a warning is about, with its numbers.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def kind(self) -> typing.Literal['not_like_noise', 'beyond_pixels', 'noise_of_one_side', 'noise_too_small', 'board_scale', 'behind_camera']:
+        """
+        What it is.
+        
+        'not_like_noise': plain weights predict poses left out to `value`, the noise that was found to `reference` [m]
+        'beyond_pixels': boards scatter by `value` [rad], `reference` times what their pixels can tell
+        'noise_of_one_side': position noise was given of hand or board alone: it was not used
+        'noise_too_small': poses scatter by `value` times the noise that was given
+        'board_scale': the loop closes best with lengths of board poses times `value`, standard error `reference`
+        'behind_camera': `value` of `reference` boards are not in front of the camera
+        """
+    @property
+    def reference(self) -> float:
+        """
+        As `kind` says.
+        """
+    @property
+    def value(self) -> float:
+        """
+        As `kind` says.
+        """
 class HandEyeNoise:
     """
-    Standard deviations of one component, as given or as found. Position noise of hand and board poses adds up: data see the sum alone.
+    Standard deviations of one component, as given or as found. Position noise of hand and board poses
+    adds up: data see the sum alone.
     """
     def __repr__(self) -> str:
         ...
@@ -2744,7 +3106,7 @@ class HandEyeNoise:
     @property
     def estimated(self) -> bool:
         """
-        Any of them was found from the data.
+        Any of them was estimated from the data.
         """
     @property
     def hand_rotation(self) -> float:
@@ -2770,12 +3132,12 @@ class ClosedForm:
     @property
     def T_parent_board(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4): in the base (eye in hand) or in the hand.
+        Shape=(4, 4): in the base (eye in hand) or in the hand.
         """
     @property
     def T_parent_camera(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4): in the hand (eye in hand) or in the base.
+        Shape=(4, 4): in the hand (eye in hand) or in the base.
         """
     @property
     def axes_spread(self) -> float:
@@ -2790,7 +3152,7 @@ class ClosedForm:
     @property
     def motions(self) -> int:
         """
-        How many were used.
+        Number of motions used.
         """
     @property
     def residual(self) -> float:
@@ -2805,7 +3167,7 @@ class ClosedForm:
     @property
     def singular_values(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[8, 1]"]:
         """
-        shape=(8,), descending; of exact data the last two are 0.
+        Shape=(8,), descending; of exact data the last two are 0.
         """
 class NextHandPose:
     """
@@ -2816,17 +3178,18 @@ class NextHandPose:
     @property
     def T_base_hand(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4)
+        Shape=(4, 4)
         """
     @property
     def T_camera_board(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4): what the camera is expected to see.
+        Shape=(4, 4): what the camera is expected to see.
         """
     @property
     def working_point_sigma(self) -> float:
         """
-        [m] standard error of the working point per axis (rms over three), with this pose and those before it measured.
+        [m] standard error of the working point per axis (rms over three), with this pose and those before
+        it measured.
         """
 class ClockOffset:
     """
@@ -2837,7 +3200,7 @@ class ClockOffset:
     @property
     def T_base_hand(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(rows, 4, 4): hand poses at the times of those rows.
+        Shape=(rows, 4, 4): hand poses at the times of those rows.
         """
     @property
     def correlation(self) -> float:
@@ -2857,7 +3220,7 @@ class ClockOffset:
     @property
     def offset(self) -> float:
         """
-        [s] t_hand = t_camera + offset
+        [s] t_hand = t_camera + offset.
         """
     @property
     def rows(self) -> tuple[int, ...]:
@@ -2882,7 +3245,12 @@ class HandEyeResult:
     @property
     def T_base_hand(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(n, 4, 4): robot poses as found, of fitted poses; as reported elsewhere.
+        Shape=(n, 4, 4): fitted poses as found, others as reported.
+        """
+    @property
+    def as_given(self) -> Reading:
+        """
+        Closure of the poses as they are; with status `not closing` alone.
         """
     @property
     def axes_spread(self) -> float:
@@ -2892,7 +3260,7 @@ class HandEyeResult:
     @property
     def board(self) -> UncertainFrame:
         """
-        In the base (eye in hand) or in the hand.
+        T_parent_board, in the base (eye in hand) or in the hand.
         """
     @property
     def board_scale(self) -> float:
@@ -2902,22 +3270,28 @@ class HandEyeResult:
     @property
     def board_scale_sigma(self) -> float:
         """
-        Of it; NaN: not known.
+        Standard error of `board_scale`; NaN: not known.
         """
     @property
     def camera(self) -> UncertainFrame:
         """
-        In the hand (eye in hand) or in the base. Only with status 'done' or 'not converged'.
+        T_parent_camera, in the hand (eye in hand) or in the base; only with status `done` or `not
+        converged`.
         """
     @property
     def camera_model(self) -> Camera | None:
         """
-        As refined; or None.
+        As refined, if it was.
         """
     @property
     def camera_model_sigma(self) -> tuple[float, ...]:
         """
         Standard errors of fx fy cx cy [px] k1 k2 p1 p2 k3.
+        """
+    @property
+    def concerns(self) -> tuple[HandEyeConcern, ...]:
+        """
+        What each warning is about, for programs, which must not go by its text.
         """
     @property
     def left_out(self) -> HandEyeErrors:
@@ -2932,12 +3306,12 @@ class HandEyeResult:
     @property
     def noise(self) -> HandEyeNoise:
         """
-        Given or found.
+        As given or estimated.
         """
     @property
     def readings(self) -> tuple[Reading, ...]:
         """
-        Other readings that close, best first; 'not closing' only.
+        Other readings that close, best first; with status `not closing` alone.
         """
     @property
     def rejected(self) -> tuple[int, ...]:
@@ -2952,12 +3326,13 @@ class HandEyeResult:
     @property
     def singular_gap(self) -> float:
         """
-        Sixth over seventh: how clearly two null vectors stand out.
+        Sixth over seventh singular value: how clearly two null vectors stand out.
         """
     @property
     def singular_values(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[8, 1]"]:
         """
-        shape=(8,), of the motions' equations, descending.
+        Shape=(8,), of the motions' equations, descending, lengths in units of the closed form's
+        `length_scale`.
         """
     @property
     def solver(self) -> SolverSummary:
@@ -2967,17 +3342,20 @@ class HandEyeResult:
     @property
     def status(self) -> typing.Literal['done', 'not observable', 'not closing', 'not converged']:
         """
-        'done'; 'not observable' (`unobservable` says which directions, and what to do); 'not closing' (`readings` has the reading that closes, if any); 'not converged'.
+        Whether there is a result, and why not.
+        
+        'not observable': `unobservable` says which directions, and what to do
+        'not closing': the loop does not close; `readings` has the one that does, if any
         """
     @property
     def symmetry(self) -> tuple[int, ...]:
         """
-        Per pose: which of board_symmetries (1 ...) it was read in; 0 as given.
+        Per pose: which of board_symmetries (1 …) it was read in; 0: as given.
         """
     @property
     def test(self) -> HandEyeErrors | None:
         """
-        Held-out poses, all of them; or None.
+        Held-out poses, all of them, if any.
         """
     @property
     def train(self) -> HandEyeErrors:
@@ -2992,58 +3370,60 @@ class HandEyeResult:
     @property
     def warnings(self) -> tuple[str, ...]:
         """
-        What to know or do: a board of another size, a robot that is off, noise told too small ...
+        What to know or do: a board of another size, a robot that is off, noise given too small ….
         """
     @property
     def working_point(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,) [m] in the camera frame.
+        Shape=(3,) [m] in the camera frame.
         """
     @property
     def working_point_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
         """
-        shape=(3, 3) [m^2] of that point in the frame that carries the camera.
+        Shape=(3, 3) [m^2] of that point in the frame that carries the camera.
         """
 class HandEyeKinematics:
     """
-    What `handeye_with_kinematics` found.
+    What `handeye_with_kinematics` found: hand-eye, board mount and the robot's own parameters.
     """
     def __repr__(self) -> str:
         ...
     @property
     def board(self) -> UncertainFrame:
         """
-        As in HandEyeResult, of the calibrated robot.
+        As in `HandEyeResult`, of the calibrated robot.
         """
     @property
     def camera(self) -> UncertainFrame:
         """
-        As in HandEyeResult, of the calibrated robot.
+        As in `HandEyeResult`, of the calibrated robot.
         """
     @property
     def identification(self) -> Identification:
         """
-        Of the robot whose tool is the camera (eye in hand) or the board, measured in the frame of the other.
+        Of the robot whose tool is the camera (eye in hand) or the board, measured in the frame of the
+        other.
         """
     @property
     def residuals(self) -> tuple[HandEyeResidual, ...]:
         """
-        One per pose, with the calibrated robot.
+        One per pose, with the calibrated robot; none is left out.
         """
     @property
     def robot(self) -> Robot:
         """
-        Calibrated, its tool the flange as given, its base the origin. Part of this result: copy() it before changing it.
+        Calibrated, its tool the flange as given, its base the origin; part of this result: copy it before
+        changing it.
         """
     @property
     def test_after(self) -> HandEyeErrors | None:
         """
-        Held-out poses, or None.
+        The same of held-out poses, if any.
         """
     @property
     def test_before(self) -> HandEyeErrors | None:
         """
-        Held-out poses, or None.
+        The same of held-out poses, if any.
         """
     @property
     def train_after(self) -> HandEyeErrors:
@@ -3058,181 +3438,19 @@ class HandEyeKinematics:
     @property
     def working_point(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,) [m] in the camera frame.
+        Shape=(3,) [m] in the camera frame.
         """
     @property
     def working_point_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
         """
-        shape=(3, 3) [m^2] of that point in the frame that carries the camera.
-        """
-class Obstacle:
-    """
-    Something that stands still.
-    
-    shape: 'sphere' (radius about the frame's origin), 'capsule' (radius about the segment from the origin to (0, 0, size[2])) or 'box'
-    (`size` along the frame's axes, its centre at the origin).
-    T_measurement_shape: shape=(4, 4) [m]. size: shape=(3,) [m] whole lengths. radius: [m].
-    """
-    def __init__(self, name: str, *, shape: typing.Literal['sphere', 'capsule', 'box'] = 'box', T_measurement_shape: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> Obstacle:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> Obstacle:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def T_measurement_shape(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
-        """
-        shape=(4, 4) [m]
-        """
-    @property
-    def name(self) -> str:
-        """
-        As answers call it.
-        """
-    @property
-    def radius(self) -> float:
-        """
-        [m]
-        """
-    @property
-    def shape(self) -> typing.Literal['sphere', 'capsule', 'box']:
-        """
-        'sphere', 'capsule' or 'box'.
-        """
-    @property
-    def size(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        shape=(3,) [m]
-        """
-class LinkCapsule:
-    """
-    Part of a link: `radius` about the segment between two points.
-    
-    link: the joint whose link carries it, in the frame after it; 'base': the base frame; 'tool': the target's frame.
-    start, end: shape=(3,) [m]. radius: [m].
-    """
-    def __init__(self, name: str, *, link: str, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], radius: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> LinkCapsule:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> LinkCapsule:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def end(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        shape=(3,) [m]
-        """
-    @property
-    def link(self) -> str:
-        """
-        Name of a joint, 'base' or 'tool'.
-        """
-    @property
-    def name(self) -> str:
-        """
-        As answers call it.
-        """
-    @property
-    def radius(self) -> float:
-        """
-        [m]
-        """
-    @property
-    def start(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        shape=(3,) [m]
-        """
-class Scene:
-    """
-    What the robot must not touch, and what of it must not.
-    
-    clearance: [m] what comes nearer than this is a collision.
-    ignored: pairs of names that are not looked at. Capsules of one link and of neighbouring links never are, nor is the base's with
-    what stands still.
-    """
-    def __init__(self, *, obstacles: collections.abc.Sequence[Obstacle] = [], capsules: collections.abc.Sequence[LinkCapsule] = [], clearance: typing.SupportsFloat | typing.SupportsIndex = 0.0, ignored: collections.abc.Sequence[tuple[str, str]] = []) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> Scene:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> Scene:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def capsules(self) -> tuple[LinkCapsule, ...]:
-        """
-        What of the robot must not touch.
-        """
-    @property
-    def clearance(self) -> float:
-        """
-        [m]
-        """
-    @property
-    def ignored(self) -> tuple[tuple[str, str], ...]:
-        """
-        Pairs of names.
-        """
-    @property
-    def obstacles(self) -> tuple[Obstacle, ...]:
-        """
-        What stands still.
-        """
-class Contact:
-    """
-    The pair that collides most deeply, or comes nearest.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def distance(self) -> float:
-        """
-        [m] between their surfaces; negative: how deep they are in each other.
-        """
-    @property
-    def first(self) -> str:
-        """
-        A capsule.
-        """
-    @property
-    def second(self) -> str:
-        """
-        A capsule or an obstacle.
+        Shape=(3, 3) [m^2] of that point in the frame that carries the camera.
         """
 class Task:
     """
-    What is wanted of one target. `replace(...)` makes another one.
+    What is wanted of one target; `replace(...)` makes another one.
     
-    T_measurement_target: shape=(4, 4) [m] the wanted pose. Its own axes say what the angles mean.
-    kind: 'pose' (position and orientation), 'torch' (position and the direction of `axis`; roll about it is free) or 'point'.
-    axis: shape=(3,) the tool's axis in the target's frame, unit vector. travel: shape=(3,) the direction that lead is measured in.
-    roll: (lower, upper) [rad] of a torch, the turn about `axis` that takes the wanted frame to the reached one.
-    preferred_roll: [rad] as near to it as can be; None: any.
-    lead, work: (lower, upper) [rad] how far the axis may lean towards `travel` and towards axis x travel.
-    retreat: shape=(3,) unit vector in the wanted frame: where every way to it collides, the target is moved along it by the least that
-    frees it, and by no more than longest_retreat [m]; 0: not at all.
+    The wanted pose's own axes say what the angles mean: with the default axes z is the torch, x the direction of
+    travel.
     """
     def __init__(self, T_measurement_target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"], *, kind: typing.Literal['pose', 'torch', 'point'] = 'pose', axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., travel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., roll: tuple[float, float] = ..., preferred_roll: typing.SupportsFloat | typing.SupportsIndex | None = None, lead: tuple[float, float] = (0.0, 0.0), work: tuple[float, float] = (0.0, 0.0), retreat: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., longest_retreat: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
@@ -3251,60 +3469,69 @@ class Task:
     @property
     def T_measurement_target(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4) [m]
+        Shape=(4, 4) [m] the wanted pose.
         """
     @property
-    def axis(self) -> numpy.typing.NDArray[numpy.float64]:
+    def axis(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,)
+        Shape=(3,) of a torch: its axis in the target's frame, unit vector.
         """
     @property
     def kind(self) -> typing.Literal['pose', 'torch', 'point']:
         """
-        'pose', 'torch' or 'point'.
+        What of it is asked for.
+        
+        'pose': position and orientation
+        'torch': axis-symmetric tool (5-DOF task): position and axis direction; the roll about the axis is free
+        'point': position alone
         """
     @property
     def lead(self) -> tuple[float, float]:
         """
-        (lower, upper) [rad]
+        (lower, upper) [rad] of a torch: how far the axis may lean towards `travel`.
         """
     @property
     def longest_retreat(self) -> float:
         """
-        [m]
+        [m] maximum of that motion; 0: the target is not moved.
         """
     @property
     def preferred_roll(self) -> float | None:
         """
-        [rad] or None.
+        [rad] the roll is as near to it as can be; None: any.
         """
     @property
-    def retreat(self) -> numpy.typing.NDArray[numpy.float64]:
+    def retreat(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,)
+        Shape=(3,) unit vector in the wanted frame. Where every way to the target collides, the target is
+        moved along it by the least that frees it; by default back along the torch.
         """
     @property
     def roll(self) -> tuple[float, float]:
         """
-        (lower, upper) [rad]
+        (lower, upper) [rad] of a torch: the turn about `axis` that takes the wanted frame to the reached
+        one, in (-pi, pi].
         """
     @property
-    def travel(self) -> numpy.typing.NDArray[numpy.float64]:
+    def travel(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,)
+        Shape=(3,) across `axis`: the direction that lead is measured in.
         """
     @property
     def work(self) -> tuple[float, float]:
         """
-        (lower, upper) [rad]
+        (lower, upper) [rad] of a torch: how far the axis may lean towards `axis` x `travel`.
         """
 class Conditions:
     """
-    What acts on the robot besides its joints; only what its effects ask for is looked at.
+    What acts on the robot besides its joints. Only what its effects ask for is looked at.
     
-    direction: approach direction of every driven joint, -1, 0 or 1; empty: the way from the seed to the answer.
-    payload: [kg] at the tool. temperature: [deg C]. time: [s]. joint_speed: of every driven joint [rad/s | m/s].
-    covariates: what else the effects look at, by column name.
+    direction = []: Approach direction of every driven joint, -1, 0 or 1; empty: the way from the seed to the answer.
+    payload = 0.0: [kg] at the tool.
+    temperature = None: [deg C]
+    time = None: [s]
+    joint_speed = []: [rad/s | m/s] of every driven joint.
+    covariates = {}: What else the effects look at, by column name.
     """
     def __init__(self, *, direction: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], payload: typing.SupportsFloat | typing.SupportsIndex = 0.0, temperature: typing.SupportsFloat | typing.SupportsIndex | None = None, time: typing.SupportsFloat | typing.SupportsIndex | None = None, joint_speed: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], covariates: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex] = {}) -> None:
         ...
@@ -3323,36 +3550,67 @@ class Conditions:
     @property
     def covariates(self) -> types.MappingProxyType[str, float]:
         """
-        By column name.
+        What else the effects look at, by column name.
         """
+    @covariates.setter
+    def covariates(self, arg1: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
     @property
     def direction(self) -> tuple[int, ...]:
         """
-        -1, 0 or 1 each.
+        Approach direction of every driven joint, -1, 0 or 1; empty: the way from the seed to the answer.
         """
+    @direction.setter
+    def direction(self, arg1: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
     @property
     def joint_speed(self) -> tuple[float, ...]:
         """
-        [rad/s | m/s]
+        [rad/s | m/s] of every driven joint.
         """
+    @joint_speed.setter
+    def joint_speed(self, arg1: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
     @property
     def payload(self) -> float:
         """
-        [kg]
+        [kg] at the tool.
         """
+    @payload.setter
+    def payload(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def temperature(self) -> float | None:
         """
-        [deg C] or None.
+        [deg C]
         """
+    @temperature.setter
+    def temperature(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
     @property
     def time(self) -> float | None:
         """
-        [s] or None.
+        [s]
         """
+    @time.setter
+    def time(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
 class InverseOptions:
     """
-    How `InverseSolver` works; see the attributes.
+    How `InverseSolver` works.
+    
+    position_tolerance = 1e-06: [m] a solution misses the task by no more.
+    rotation_tolerance = 1e-06: [rad] likewise.
+    choose = 'nearest': Which of several solutions.
+        'nearest': nearest to the seed
+        'limits_margin': furthest from the joint limits: by the smallest fraction of a joint's range left on either side
+        'manipulability': of the joints that turn, furthest from singular: sqrt(det(J J^T)), lengths over `reach / pi`
+        'rail_travel': least way of the prismatic joints from the seed, then nearest
+    max_iterations = 60: Of one descent.
+    max_restarts = 200: Descents from other seeds before a target is given up.
+    wrist_tolerance = 0.01: [m] axes that miss each other by no more are taken to meet, for the seeds alone.
+    parallel_tolerance = 0.02: [rad] axes nearer to parallel than this are taken to be, for the seeds alone.
+    scene = Scene(): What the robot must not touch.
     """
     def __init__(self, *, position_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, rotation_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, choose: typing.Literal['nearest', 'limits_margin', 'manipulability', 'rail_travel'] = 'nearest', max_iterations: typing.SupportsInt | typing.SupportsIndex = 60, max_restarts: typing.SupportsInt | typing.SupportsIndex = 200, wrist_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.01, parallel_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, scene: Scene = ...) -> None:
         ...
@@ -3371,13 +3629,15 @@ class InverseOptions:
     @property
     def choose(self) -> typing.Literal['nearest', 'limits_margin', 'manipulability', 'rail_travel']:
         """
-        Which of several answers.
+        Which of several solutions.
         
-        'nearest' to the seed; 'limits_margin': furthest from the joint limits; 'manipulability': furthest from singular; 'rail_travel':
-        least way of the prismatic joints from the seed, then nearest.
+        'nearest': nearest to the seed
+        'limits_margin': furthest from the joint limits: by the smallest fraction of a joint's range left on either side
+        'manipulability': of the joints that turn, furthest from singular: sqrt(det(J J^T)), lengths over `reach / pi`
+        'rail_travel': least way of the prismatic joints from the seed, then nearest
         """
     @choose.setter
-    def choose(self, arg0: typing.Literal['nearest', 'limits_margin', 'manipulability', 'rail_travel']) -> None:
+    def choose(self, arg1: typing.Literal['nearest', 'limits_margin', 'manipulability', 'rail_travel']) -> None:
         ...
     @property
     def max_iterations(self) -> int:
@@ -3385,7 +3645,7 @@ class InverseOptions:
         Of one descent.
         """
     @max_iterations.setter
-    def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def max_iterations(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def max_restarts(self) -> int:
@@ -3393,7 +3653,7 @@ class InverseOptions:
         Descents from other seeds before a target is given up.
         """
     @max_restarts.setter
-    def max_restarts(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def max_restarts(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def parallel_tolerance(self) -> float:
@@ -3401,7 +3661,7 @@ class InverseOptions:
         [rad] axes nearer to parallel than this are taken to be, for the seeds alone.
         """
     @parallel_tolerance.setter
-    def parallel_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def parallel_tolerance(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def position_tolerance(self) -> float:
@@ -3409,15 +3669,15 @@ class InverseOptions:
         [m] a solution misses the task by no more.
         """
     @position_tolerance.setter
-    def position_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def position_tolerance(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def rotation_tolerance(self) -> float:
         """
-        [rad]
+        [rad] likewise.
         """
     @rotation_tolerance.setter
-    def rotation_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def rotation_tolerance(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def scene(self) -> Scene:
@@ -3425,7 +3685,7 @@ class InverseOptions:
         What the robot must not touch.
         """
     @scene.setter
-    def scene(self, arg1: Scene) -> None:
+    def scene(self, arg0: Scene) -> None:
         ...
     @property
     def wrist_tolerance(self) -> float:
@@ -3433,103 +3693,11 @@ class InverseOptions:
         [m] axes that miss each other by no more are taken to meet, for the seeds alone.
         """
     @wrist_tolerance.setter
-    def wrist_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-class PathOptions:
-    """
-    How `InverseSolver.path` works; see the attributes.
-    """
-    def __init__(self, *, longest_turn: typing.SupportsFloat | typing.SupportsIndex = 0.3490658503988659, longest_slide: typing.SupportsFloat | typing.SupportsIndex = 0.25, rolls: typing.SupportsInt | typing.SupportsIndex = 24, rail_places: typing.SupportsInt | typing.SupportsIndex = 5, smoothing: typing.SupportsInt | typing.SupportsIndex = 20) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> PathOptions:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> PathOptions:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def longest_slide(self) -> float:
-        """
-        [m] of a sliding joint.
-        """
-    @longest_slide.setter
-    def longest_slide(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def longest_turn(self) -> float:
-        """
-        [rad] of a turning joint between neighbouring targets; more is a gap.
-        """
-    @longest_turn.setter
-    def longest_turn(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rail_places(self) -> int:
-        """
-        Samples of each rail before the arm, over what it can be reached from.
-        """
-    @rail_places.setter
-    def rail_places(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rolls(self) -> int:
-        """
-        Samples of a torch's roll, where it is free.
-        """
-    @rolls.setter
-    def rolls(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def smoothing(self) -> int:
-        """
-        Rounds that even the path out where the task leaves something free.
-        """
-    @smoothing.setter
-    def smoothing(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-class CompensateOptions:
-    """
-    How `Compensator` works; see the attributes.
-    """
-    def __init__(self, *, inverse: InverseOptions = ..., in_base: bool = False) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> CompensateOptions:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> CompensateOptions:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def in_base(self) -> bool:
-        """
-        Wanted poses and commands are in each robot's own base frame, as programs have them; else in the measurement frame.
-        """
-    @in_base.setter
-    def in_base(self, arg0: bool) -> None:
-        ...
-    @property
-    def inverse(self) -> InverseOptions:
-        """
-        Of both solvers.
-        """
-    @inverse.setter
-    def inverse(self, arg0: InverseOptions) -> None:
+    def wrist_tolerance(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
 class Solution:
     """
-    One answer of inverse kinematics.
+    One solution of inverse kinematics.
     """
     def __repr__(self) -> str:
         ...
@@ -3549,7 +3717,7 @@ class Solution:
         [m] between their surfaces; negative: so deep. Infinite without a scene.
         """
     @property
-    def direction(self) -> numpy.typing.NDArray[numpy.float64]:
+    def direction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Of a failure, shape=(3,): from the nearest to the wanted, in the measurement frame.
         """
@@ -3566,7 +3734,7 @@ class Solution:
     @property
     def joint(self) -> int:
         """
-        Driven joint whose limit stands in the way, after them passive ones with limits; -1: none.
+        Driven joint whose limit is in the way, after them passive ones with limits; -1: none.
         """
     @property
     def joints(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -3593,19 +3761,22 @@ class Solution:
         """
         What came of it.
         
-        'reached'; 'retreated': the target was moved by `retreat`, and is reached there; 'collision': it could be reached, but a
-        `contact` is in the way; 'out_of_reach': it stays away by `miss` along `direction`, limits aside; 'limit': that of `joint` is in
-        the way, by `excess`; 'singular': the tip cannot move along `direction`.
+        'reached': the task is met
+        'retreated': the target was moved by `retreat`, and is reached there
+        'collision': it could be reached, but there is a collision: `contact`
+        'out_of_reach': no joints reach it, limits aside: it stays away by `miss` along `direction`
+        'limit': the limit of `joint` is in the way, by `excess`
+        'singular': the target is within reach, but the way ends where the tip cannot move along `direction`
         """
     @property
     def retreat(self) -> float:
         """
-        [m] how far the target was moved along `Task.retreat`.
+        [m] how far the target was moved along the task's `retreat`.
         """
     @property
     def roll(self) -> float:
         """
-        [rad] torch: the turn about the axis from the wanted frame.
+        [rad] of a torch: the turn about the axis from the wanted frame.
         """
     @property
     def rotation_error(self) -> float:
@@ -3614,7 +3785,7 @@ class Solution:
         """
 class Solutions:
     """
-    Answers for many targets, in their order: a sequence of `Solution`, and their values as arrays.
+    Solutions for many targets, in their order: a sequence of `Solution`, and their values as arrays.
     """
     def __getitem__(self, k: typing.SupportsInt | typing.SupportsIndex) -> Solution:
         ...
@@ -3652,7 +3823,7 @@ class Solutions:
     @property
     def joint(self) -> numpy.typing.NDArray[numpy.int32]:
         """
-        shape=(n,): whose limit stands in the way; -1: none.
+        shape=(n,): whose limit is in the way; -1: none.
         """
     @property
     def joints(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -3696,7 +3867,7 @@ class Solutions:
         """
 class Branches:
     """
-    Answers that differ in configuration.
+    Solutions that differ in configuration, at most as many as a closed form has.
     """
     def __len__(self) -> int:
         ...
@@ -3712,16 +3883,80 @@ class Branches:
         """
         Those within the joint limits.
         """
+class PathOptions:
+    """
+    How `InverseSolver.path` works.
+    
+    longest_turn = 0.3490658503988659: [rad] maximum step of a revolute joint between neighbouring targets; more is a gap (20 deg).
+    longest_slide = 0.25: [m] the same of a prismatic joint.
+    rolls = 24: Samples of a torch's roll, where it is free.
+    rail_places = 5: Samples of each rail before the arm, over what it can be reached from.
+    smoothing = 20: Smoothing iterations of the path, where the task leaves degrees of freedom.
+    """
+    def __init__(self, *, longest_turn: typing.SupportsFloat | typing.SupportsIndex = 0.3490658503988659, longest_slide: typing.SupportsFloat | typing.SupportsIndex = 0.25, rolls: typing.SupportsInt | typing.SupportsIndex = 24, rail_places: typing.SupportsInt | typing.SupportsIndex = 5, smoothing: typing.SupportsInt | typing.SupportsIndex = 20) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> PathOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> PathOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def longest_slide(self) -> float:
+        """
+        [m] the same of a prismatic joint.
+        """
+    @longest_slide.setter
+    def longest_slide(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def longest_turn(self) -> float:
+        """
+        [rad] maximum step of a revolute joint between neighbouring targets; more is a gap (20 deg).
+        """
+    @longest_turn.setter
+    def longest_turn(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rail_places(self) -> int:
+        """
+        Samples of each rail before the arm, over what it can be reached from.
+        """
+    @rail_places.setter
+    def rail_places(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rolls(self) -> int:
+        """
+        Samples of a torch's roll, where it is free.
+        """
+    @rolls.setter
+    def rolls(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def smoothing(self) -> int:
+        """
+        Smoothing iterations of the path, where the task leaves degrees of freedom.
+        """
+    @smoothing.setter
+    def smoothing(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
 class PathGap:
     """
-    Two neighbouring targets that the joints do not pass between.
+    Two neighbouring targets that the joints do not pass between in steps that are allowed.
     """
     def __repr__(self) -> str:
         ...
     @property
     def joint(self) -> int:
         """
-        Whose step is too long; -1: one of the two is not reached.
+        The joint whose step is too long; -1: one of the two is not reached.
         """
     @property
     def start(self) -> int:
@@ -3752,12 +3987,12 @@ class JointPath:
     @property
     def longest_slide(self) -> float:
         """
-        [m] of a sliding joint.
+        [m] the same of a prismatic joint.
         """
     @property
     def longest_turn(self) -> float:
         """
-        [rad] the longest step of a turning joint that is no gap.
+        [rad] the longest step of a revolute joint that is no gap.
         """
     @property
     def solutions(self) -> Solutions:
@@ -3768,8 +4003,8 @@ class InverseSolver:
     """
     A robot made ready for inverse kinematics, nominal or calibrated, effects included.
     
-    Built once it does not change, and any number of threads may use it. Where a seed is asked for, None is the middle of every
-    joint's range.
+    Built once it does not change, and any number of threads may use it. Where a seed is asked for, None is the middle of
+    every joint's range.
     conditions: those of every solve that names no others; they also say which inputs there are. target: its index in
     `robot.targets`. Raises InputError when robot, target or options cannot be used, or effects lack an input.
     """
@@ -3779,7 +4014,7 @@ class InverseSolver:
         ...
     def branches(self, task: Task, seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None) -> Branches:
         """
-        Every answer for a full pose; prismatic joints before the arm stay at the seed's.
+        Every solution for a full pose; prismatic joints before the arm stay at the seed's.
         
         Without a closed form what descents from many seeds found, not known to be all. Raises InputError.
         """
@@ -3809,13 +4044,14 @@ class InverseSolver:
         """
     def solve(self, task: Task, seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None) -> Solution:
         """
-        One answer. What cannot be reached is told in the result.
+        One solution. What cannot be reached is told in the result.
         
-        seed: shape=(driven joints,) [rad | m]. Raises InputError on a seed of the wrong size and on values that are not finite.
+        seed: shape=(driven joints,) [rad | m]. Raises InputError on a seed of the wrong size and on values that are not
+        finite.
         """
     def solve_batch(self, targets: collections.abc.Sequence[Task] | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], seeds: numpy.typing.ArrayLike | None = None, conditions: Conditions | collections.abc.Sequence[Conditions] | None = None, *, like: Task | None = None, threads: typing.SupportsInt | typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> Solutions:
         """
-        One answer per target, the same for any number of threads (0: as many as the machine has).
+        One solution per target, the same for any number of threads (0: as many as the machine has).
         
         targets: tasks, or shape=(n, 4, 4) [m] poses, each a task like `like` (None: a full pose).
         seeds: shape=(driven joints,) or (n, driven joints) [rad | m]. conditions: one, or one per target.
@@ -3841,21 +4077,62 @@ class InverseSolver:
         """
         A copy of the robot.
         """
+class CompensateOptions:
+    """
+    How `Compensator` works.
+    
+    inverse = InverseOptions(): Of both solvers.
+    in_base = False: Wanted poses and commands are in each robot's own base frame, as programs have them; else in the
+        measurement frame.
+    """
+    def __init__(self, *, inverse: InverseOptions = ..., in_base: bool = False) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> CompensateOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> CompensateOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def in_base(self) -> bool:
+        """
+        Wanted poses and commands are in each robot's own base frame, as programs have them; else in the
+        measurement frame.
+        """
+    @in_base.setter
+    def in_base(self, arg1: bool) -> None:
+        ...
+    @property
+    def inverse(self) -> InverseOptions:
+        """
+        Of both solvers.
+        """
+    @inverse.setter
+    def inverse(self, arg0: InverseOptions) -> None:
+        ...
 class Compensated:
     """
-    What to tell a controller that believes in the nominal robot.
+    What to command of a controller that computes with the nominal robot.
     """
     def __repr__(self) -> str:
         ...
     @property
     def T_command(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4) [m]: pose to command; the nominal robot takes these joints for it.
+        Shape=(4, 4) [m]: pose to command. A controller whose inverse kinematics is the nominal robot's
+        takes these joints for it, if it stays in their configuration.
         """
     @property
     def other_configuration(self) -> bool:
         """
-        The joints are more than half a radian from those that the nominal robot would take: a controller that is given T_command may choose others.
+        The joints are more than half a radian from those that the nominal robot would take: a controller
+        that is given T_command may choose others.
         """
     @property
     def position_before(self) -> float | None:
@@ -3868,14 +4145,16 @@ class Compensated:
         [rad] likewise.
         """
     @property
-    def sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+    def sigma(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
         """
-        shape=(6,): standard error of where the target will be, position [m] and rotation [rad] along the measurement frame's axes; NaN: no uncertainty was given.
+        Shape=(6,): standard error of where the target will be, from the covariance of the calibration:
+        position [m] and rotation [rad] along the measurement frame's axes. NaN: no uncertainty was given.
         """
     @property
     def solution(self) -> Solution:
         """
-        Of the calibrated robot: joints to command, and whether the target is reached with them.
+        Of the calibrated robot: joints to command, whether the target is reached with them, and why not if
+        it is not.
         """
 class Compensations:
     """
@@ -3921,7 +4200,7 @@ class Compensations:
         """
 class Compensator:
     """
-    Says what to command so that the real robot, which `calibrated` describes, goes where it is wanted.
+    Computes what to command so that the real robot, which `calibrated` describes, goes where it is wanted.
     
     Built once from both robots, then any number of threads may use it. conditions, target: as of `InverseSolver`.
     Raises InputError when the robots have different joints, or as InverseSolver does.
@@ -3932,7 +4211,7 @@ class Compensator:
         ...
     def joints(self, program: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None) -> Compensated:
         """
-        A joint position of a program, shape=(driven joints,) [rad | m]: the nominal robot's pose there is what is wanted.
+        A joint position of a program, shape=(driven joints,) [rad | m]: the nominal robot's pose there is the target.
         
         seed: where the robot comes from; None: it stands there already. Raises InputError.
         """
@@ -3944,9 +4223,9 @@ class Compensator:
         """
     def pose(self, task: Task, seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None) -> Compensated:
         """
-        A pose of a program. seed: shape=(driven joints,) [rad | m], where the robot comes from; it decides the configuration.
+        A pose of a program. Raises InputError.
         
-        Raises InputError.
+        seed: shape=(driven joints,) [rad | m], where the robot comes from; it decides the configuration.
         """
     def pose_batch(self, targets: collections.abc.Sequence[Task] | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], seeds: numpy.typing.ArrayLike | None = None, conditions: Conditions | collections.abc.Sequence[Conditions] | None = None, *, like: Task | None = None, threads: typing.SupportsInt | typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> Compensations:
         """
@@ -3954,7 +4233,8 @@ class Compensator:
         """
     def set_uncertainty(self, names: collections.abc.Sequence[str], values: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> None:
         """
-        What `identify` says of its parameters: names and values of the fitted ones, and their covariance, shape=(n, n).
+        What `identify` found of its parameters: names and values of the fitted ones,
+        and their covariance, shape=(n, n).
         
         Raises InputError on a parameter that the calibrated robot does not have, or a covariance of another size.
         """
@@ -3968,685 +4248,19 @@ class Compensator:
         """
         The solver of the nominal robot.
         """
-class FilterOptions:
-    """
-    What the filter takes for granted: noise, gaps, gates. Keywords are the attributes.
-    """
-    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> FilterOptions:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> FilterOptions:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def accel_bias(self) -> float:
-        """
-        [m/s^2]
-        """
-    @accel_bias.setter
-    def accel_bias(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def accel_bias_walk(self) -> float:
-        """
-        [m/s^2/sqrt(s)]
-        """
-    @accel_bias_walk.setter
-    def accel_bias_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def accel_noise(self) -> float:
-        """
-        [m/s^2/sqrt(Hz)]
-        """
-    @accel_noise.setter
-    def accel_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def accel_range(self) -> float:
-        """
-        [m/s^2]
-        """
-    @accel_range.setter
-    def accel_range(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def clock_drift(self) -> float:
-        """
-        standard deviation of its drift [s/s]
-        """
-    @clock_drift.setter
-    def clock_drift(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def clock_drift_walk(self) -> float:
-        """
-        [1/sqrt(s)]
-        """
-    @clock_drift_walk.setter
-    def clock_drift_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def clock_walk(self) -> float:
-        """
-        of the tracker's clock [s/sqrt(s)]
-        """
-    @clock_walk.setter
-    def clock_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def frozen_after(self) -> int:
-        """
-        equal tracker samples in a row, then they are refused
-        """
-    @frozen_after.setter
-    def frozen_after(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def future_limit(self) -> float:
-        """
-        of a stamp against the newest inertial sample [s]
-        """
-    @future_limit.setter
-    def future_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gap_acceleration(self) -> float:
-        """
-        standard deviation of what a gap or saturation hides [m/s^2]
-        """
-    @gap_acceleration.setter
-    def gap_acceleration(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gap_rate(self) -> float:
-        """
-        [rad/s]
-        """
-    @gap_rate.setter
-    def gap_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gate(self) -> float:
-        """
-        tracker samples with a larger normalised innovation squared are outliers
-        """
-    @gate.setter
-    def gate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gyro_bias(self) -> float:
-        """
-        standard deviation before any data [rad/s]
-        """
-    @gyro_bias.setter
-    def gyro_bias(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gyro_bias_walk(self) -> float:
-        """
-        [rad/s/sqrt(s)]
-        """
-    @gyro_bias_walk.setter
-    def gyro_bias_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gyro_noise(self) -> float:
-        """
-        [rad/s/sqrt(Hz)]
-        """
-    @gyro_noise.setter
-    def gyro_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gyro_range(self) -> float:
-        """
-        a component at or beyond is saturated [rad/s]
-        """
-    @gyro_range.setter
-    def gyro_range(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def highest_imu_rate(self) -> float:
-        """
-        sizes the ring buffer [Hz]
-        """
-    @highest_imu_rate.setter
-    def highest_imu_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def highest_pose_rate(self) -> float:
-        """
-        [Hz]
-        """
-    @highest_pose_rate.setter
-    def highest_pose_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def imu_scale(self) -> float:
-        """
-        standard deviation of the scale of gyro and accelerometer, as a share
-        """
-    @imu_scale.setter
-    def imu_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def largest_gap(self) -> float:
-        """
-        between inertial samples, before uncertainty is widened [s]
-        """
-    @largest_gap.setter
-    def largest_gap(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def position_sigma(self) -> float:
-        """
-        of the tracker, one component [m]
-        """
-    @position_sigma.setter
-    def position_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def reacquire_after(self) -> int:
-        """
-        outliers in a row, then the tracker is believed
-        """
-    @reacquire_after.setter
-    def reacquire_after(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def restart_gap(self) -> float:
-        """
-        [s]
-        """
-    @restart_gap.setter
-    def restart_gap(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rotation_sigma(self) -> float:
-        """
-        [rad]
-        """
-    @rotation_sigma.setter
-    def rotation_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def slow_position(self) -> float:
-        """
-        standard deviation of the deviation from forward kinematics before any data [m]
-        """
-    @slow_position.setter
-    def slow_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def slow_position_walk(self) -> float:
-        """
-        how it wanders [m/sqrt(s)]
-        """
-    @slow_position_walk.setter
-    def slow_position_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def slow_rotation(self) -> float:
-        """
-        [rad]
-        """
-    @slow_rotation.setter
-    def slow_rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def slow_rotation_walk(self) -> float:
-        """
-        [rad/sqrt(s)]
-        """
-    @slow_rotation_walk.setter
-    def slow_rotation_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def sway_correlation(self) -> float:
-        """
-        time over which sway is like itself [s]
-        """
-    @sway_correlation.setter
-    def sway_correlation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def sway_position(self) -> float:
-        """
-        standard deviation of the tip about its slow mean, before any data; then as the arm shows it [m]
-        """
-    @sway_position.setter
-    def sway_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def sway_rotation(self) -> float:
-        """
-        [rad]
-        """
-    @sway_rotation.setter
-    def sway_rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def window(self) -> float:
-        """
-        measurements up to so late are put at their place [s]
-        """
-    @window.setter
-    def window(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-class DeviationOptions:
-    """
-    How the deviation from the plan is modelled. Keywords are the attributes.
-    """
-    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> DeviationOptions:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> DeviationOptions:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def frequency_range(self) -> float:
-        """
-        and how far at most, as a share
-        """
-    @frequency_range.setter
-    def frequency_range(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def frequency_sigma(self) -> float:
-        """
-        standard deviation of the given frequencies, as a share; 0: they stay
-        """
-    @frequency_sigma.setter
-    def frequency_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def frequency_walk(self) -> float:
-        """
-        how they wander, as a share [1/sqrt(s)]
-        """
-    @frequency_walk.setter
-    def frequency_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def grade_time(self) -> float:
-        """
-        over which grades are averaged [s]
-        """
-    @grade_time.setter
-    def grade_time(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def horizon(self) -> float:
-        """
-        for which predictions are graded [s]
-        """
-    @horizon.setter
-    def horizon(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def least_evidence(self) -> float:
-        """
-        predictions of modes are used after so long of grades [s]
-        """
-    @least_evidence.setter
-    def least_evidence(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def mode_noise(self) -> float:
-        """
-        acceleration that drives a mode beside the plan's [m/s^2/sqrt(Hz)]
-        """
-    @mode_noise.setter
-    def mode_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def period(self) -> float:
-        """
-        of the model's steps, on multiples of it [s]
-        """
-    @period.setter
-    def period(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def plan_limit(self) -> float:
-        """
-        plan samples further ahead are refused [s]
-        """
-    @plan_limit.setter
-    def plan_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def position_noise(self) -> float:
-        """
-        of the filter's position, as the model sees it [m], rotations as 1 m
-        """
-    @position_noise.setter
-    def position_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def settle_time(self) -> float:
-        """
-        after so long no more late samples are waited for, and a prediction is graded [s]
-        """
-    @settle_time.setter
-    def settle_time(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def slow_noise(self) -> float:
-        """
-        acceleration that drives the slow part [m/s^2/sqrt(Hz)]
-        """
-    @slow_noise.setter
-    def slow_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def static_time(self) -> float:
-        """
-        over which the static deviation is averaged [s]
-        """
-    @static_time.setter
-    def static_time(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def velocity_noise(self) -> float:
-        """
-        [m/s]
-        """
-    @velocity_noise.setter
-    def velocity_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-class WatchOptions:
-    """
-    Watching for jumps of the tracker. Keywords are the attributes.
-    """
-    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> WatchOptions:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> WatchOptions:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def compare(self) -> float:
-        """
-        after a shift, station and receiver are told apart for so long [s]
-        """
-    @compare.setter
-    def compare(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def forget(self) -> float:
-        """
-        after a gap of the tracker longer than this, averages begin anew [s]
-        """
-    @forget.setter
-    def forget(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def threshold(self) -> float:
-        """
-        of averages that are chi-square distributed with six degrees of freedom
-        """
-    @threshold.setter
-    def threshold(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-class CorrectionLimits:
-    """
-    Bounds of what is sent to the arm. Keywords are the attributes.
-    """
-    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> CorrectionLimits:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> CorrectionLimits:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def position(self) -> float:
-        """
-        size [m]
-        """
-    @position.setter
-    def position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def position_jerk(self) -> float:
-        """
-        [m/s^3]
-        """
-    @position_jerk.setter
-    def position_jerk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def position_rate(self) -> float:
-        """
-        [m/s]
-        """
-    @position_rate.setter
-    def position_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rotation(self) -> float:
-        """
-        [rad]
-        """
-    @rotation.setter
-    def rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rotation_jerk(self) -> float:
-        """
-        [rad/s^3]
-        """
-    @rotation_jerk.setter
-    def rotation_jerk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rotation_rate(self) -> float:
-        """
-        [rad/s]
-        """
-    @rotation_rate.setter
-    def rotation_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-class ImuErrors:
-    """
-    Errors of a simulated inertial sensor. Keywords are the attributes.
-    """
-    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> ImuErrors:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> ImuErrors:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def accel_bias(self) -> float:
-        """
-        [m/s^2]
-        """
-    @accel_bias.setter
-    def accel_bias(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def accel_bias_walk(self) -> float:
-        """
-        [m/s^2/sqrt(s)]
-        """
-    @accel_bias_walk.setter
-    def accel_bias_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def accel_noise(self) -> float:
-        """
-        [m/s^2/sqrt(Hz)]
-        """
-    @accel_noise.setter
-    def accel_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def accel_scale(self) -> float:
-        ...
-    @accel_scale.setter
-    def accel_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gyro_bias(self) -> float:
-        """
-        standard deviation at the start [rad/s]
-        """
-    @gyro_bias.setter
-    def gyro_bias(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gyro_bias_walk(self) -> float:
-        """
-        [rad/s/sqrt(s)]
-        """
-    @gyro_bias_walk.setter
-    def gyro_bias_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gyro_noise(self) -> float:
-        """
-        [rad/s/sqrt(Hz)]
-        """
-    @gyro_noise.setter
-    def gyro_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def gyro_scale(self) -> float:
-        """
-        standard deviation of each axis' scale error
-        """
-    @gyro_scale.setter
-    def gyro_scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-class TrackerErrors:
-    """
-    Errors of a simulated tracker, and of its way to the computer. Keywords are the attributes.
-    """
-    def __init__(self, **kwargs: typing.SupportsFloat | typing.SupportsIndex | typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, ...]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def copy(self) -> TrackerErrors:
-        """
-        An independent copy.
-        """
-    def replace(self, **kwargs: typing.Any) -> TrackerErrors:
-        """
-        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
-        """
-    @property
-    def clock_drift(self) -> float:
-        """
-        [s/s]
-        """
-    @clock_drift.setter
-    def clock_drift(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def clock_offset(self) -> float:
-        """
-        t_tracker = t_imu * (1 + clock_drift) + clock_offset [s]
-        """
-    @clock_offset.setter
-    def clock_offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def latency(self) -> float:
-        """
-        [s]
-        """
-    @latency.setter
-    def latency(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def latency_jitter(self) -> float:
-        """
-        standard deviation, never before the sample was taken [s]
-        """
-    @latency_jitter.setter
-    def latency_jitter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def lost(self) -> float:
-        """
-        share of single samples that never arrive
-        """
-    @lost.setter
-    def lost(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def out_of_order(self) -> float:
-        """
-        share of the samples that take 25 ms more
-        """
-    @out_of_order.setter
-    def out_of_order(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def position_noise(self) -> float:
-        """
-        of one component [m]
-        """
-    @position_noise.setter
-    def position_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def rotation_noise(self) -> float:
-        """
-        of one component [rad]
-        """
-    @rotation_noise.setter
-    def rotation_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
 class TrackSetup:
     """
-    Where things are, and how clocks differ. `T_a_b` maps b-coordinates into a, shape=(4, 4).
+    Where things are, and how clocks differ. `T_a_b` maps b-coordinates into a.
     
-    t_imu = t_tracker - clock_offset = t_controller - controller_clock_offset; joints are where the plan was `actuator_lag` ago.
+    T_tracker_base = identity: Shape=(4, 4)
+    T_flange_receiver = identity: Shape=(4, 4)
+    T_flange_tool = identity: Shape=(4, 4)
+    T_flange_imu = identity: Shape=(4, 4)
+    gravity = [0.0, 0.0, -9.81]: Shape=(3,) [m/s^2] in the base frame.
+    clock_offset = 0.0: [s] t_imu = t_tracker - clock_offset.
+    clock_offset_sigma = 0.0: [s] standard error of `clock_offset`; 0: known, and not estimated.
+    controller_clock_offset = 0.0: [s] t_imu = t_controller - controller_clock_offset.
+    actuator_lag = 0.0: [s] delay of the joints behind the plan.
     """
     def __init__(self, *, T_tracker_base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_receiver: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_tool: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_imu: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, clock_offset_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0, controller_clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, actuator_lag: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
@@ -4665,80 +4279,83 @@ class TrackSetup:
     @property
     def T_flange_imu(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4)
+        Shape=(4, 4)
         """
     @T_flange_imu.setter
-    def T_flange_imu(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+    def T_flange_imu(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
         ...
     @property
     def T_flange_receiver(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4)
+        Shape=(4, 4)
         """
     @T_flange_receiver.setter
-    def T_flange_receiver(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+    def T_flange_receiver(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
         ...
     @property
     def T_flange_tool(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4)
+        Shape=(4, 4)
         """
     @T_flange_tool.setter
-    def T_flange_tool(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+    def T_flange_tool(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
         ...
     @property
     def T_tracker_base(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4)
+        Shape=(4, 4)
         """
     @T_tracker_base.setter
-    def T_tracker_base(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
+    def T_tracker_base(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
         ...
     @property
     def actuator_lag(self) -> float:
         """
-        [s] joints are where the plan was so long ago.
+        [s] delay of the joints behind the plan.
         """
     @actuator_lag.setter
-    def actuator_lag(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def actuator_lag(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def clock_offset(self) -> float:
         """
-        [s] t_imu = t_tracker - clock_offset
+        [s] t_imu = t_tracker - clock_offset.
         """
     @clock_offset.setter
-    def clock_offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def clock_offset(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def clock_offset_sigma(self) -> float:
         """
-        [s] its standard error; 0: known, and not estimated.
+        [s] standard error of `clock_offset`; 0: known, and not estimated.
         """
     @clock_offset_sigma.setter
-    def clock_offset_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def clock_offset_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def controller_clock_offset(self) -> float:
         """
-        [s] t_imu = t_controller - controller_clock_offset
+        [s] t_imu = t_controller - controller_clock_offset.
         """
     @controller_clock_offset.setter
-    def controller_clock_offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def controller_clock_offset(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
-    def gravity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+    def gravity(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(3,) [m/s^2] in the base frame.
+        Shape=(3,) [m/s^2] in the base frame.
         """
     @gravity.setter
-    def gravity(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+    def gravity(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         ...
 class ModalModel:
     """
-    Sway as damped modes, x'' + 2 zeta omega x' + omega^2 x = gain a_plan + noise, for each component of the deviation from the plan.
+    Sway as damped modes of each component of the deviation from the plan.
     
-    frequency: shape=(n,) [Hz], n at most 4. damping: shape=(n,) ratio. gain: shape=(n, 6, 3) [-], [rad/m]; None: 0. frequency_sigma: shape=(n,) [Hz] standard error; None: 0.
+    x'' + 2 zeta omega x' + omega^2 x = gain a_plan + noise.
+    
+    frequency: shape=(n,) [Hz], n at most 4. damping: shape=(n,) ratio.
+    gain: shape=(n, 6, 3) [-], [rad/m]; None: 0. frequency_sigma: shape=(n,) [Hz] standard error; None: 0.
     """
     def __init__(self, frequency: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], gain: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, frequency_sigma: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None) -> None:
         ...
@@ -4779,35 +4396,593 @@ class ModalModel:
         """
         shape=(n, 6, 3): per planned acceleration in the frame of the planned inertial sensor; translation [-], rotation [rad/m].
         """
-class ModesResult:
+class FilterOptions:
     """
-    What `identify_modes` found.
+    Noise, gaps and gates of the filter.
+    
+    window = 0.5: [s] maximum lateness of a measurement that is still put at its place.
+    future_limit = 0.1: [s] maximum lead of a stamp over the newest inertial sample.
+    highest_imu_rate = 2000.0: [Hz] sizes the ring buffer.
+    highest_pose_rate = 400.0: [Hz] likewise.
+    gyro_noise = 0.0001: [rad/s/sqrt(Hz)] noise density.
+    accel_noise = 0.001: [m/s^2/sqrt(Hz)] noise density.
+    gyro_bias = 0.01: [rad/s] standard deviation before any data.
+    accel_bias = 0.1: [m/s^2] standard deviation before any data.
+    gyro_bias_walk = 2e-05: [rad/s/sqrt(s)] random walk of the bias.
+    accel_bias_walk = 0.0002: [m/s^2/sqrt(s)] random walk of the bias.
+    imu_scale = 0.0005: Standard deviation of the relative scale error of gyro and accelerometer.
+    gyro_range = 34.0: [rad/s] a component at or beyond is saturated.
+    accel_range = 156.0: [m/s^2] a component at or beyond is saturated.
+    largest_gap = 0.02: [s] maximum gap between inertial samples before uncertainty is widened.
+    restart_gap = 5.0: [s] gap between inertial samples after which the filter starts anew.
+    gap_acceleration = 2.0: [m/s^2] standard deviation of what a gap or saturation hides.
+    gap_rate = 0.2: [rad/s] likewise.
+    position_sigma = 0.001: [m] noise of the tracker, one component.
+    rotation_sigma = 0.001: [rad] likewise.
+    gate = 50.0: Tracker samples with a larger normalised innovation squared are outliers.
+    reacquire_after = 25: Consecutive outliers after which the filter follows the tracker again.
+    frozen_after = 3: Consecutive equal tracker samples after which they are refused.
+    clock_walk = 2e-05: [s/sqrt(s)] random walk of the tracker's clock.
+    clock_drift = 0.0001: [s/s] standard deviation of the clock's drift.
+    clock_drift_walk = 1e-06: [1/sqrt(s)] random walk of the clock's drift.
+    sway_position = 0.02: [m] standard deviation of the tip about its slow mean before any data; afterwards it is estimated.
+    sway_rotation = 0.003: [rad] likewise.
+    sway_correlation = 0.5: [s] correlation time of the sway.
+    slow_position = 0.05: [m] standard deviation of the deviation from forward kinematics before any data.
+    slow_rotation = 0.02: [rad] likewise.
+    slow_position_walk = 0.003: [m/sqrt(s)] random walk of that deviation.
+    slow_rotation_walk = 0.0005: [rad/sqrt(s)] likewise.
     """
+    def __init__(self, *, window: typing.SupportsFloat | typing.SupportsIndex = 0.5, future_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, highest_imu_rate: typing.SupportsFloat | typing.SupportsIndex = 2000.0, highest_pose_rate: typing.SupportsFloat | typing.SupportsIndex = 400.0, gyro_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0001, accel_noise: typing.SupportsFloat | typing.SupportsIndex = 0.001, gyro_bias: typing.SupportsFloat | typing.SupportsIndex = 0.01, accel_bias: typing.SupportsFloat | typing.SupportsIndex = 0.1, gyro_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 2e-05, accel_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0002, imu_scale: typing.SupportsFloat | typing.SupportsIndex = 0.0005, gyro_range: typing.SupportsFloat | typing.SupportsIndex = 34.0, accel_range: typing.SupportsFloat | typing.SupportsIndex = 156.0, largest_gap: typing.SupportsFloat | typing.SupportsIndex = 0.02, restart_gap: typing.SupportsFloat | typing.SupportsIndex = 5.0, gap_acceleration: typing.SupportsFloat | typing.SupportsIndex = 2.0, gap_rate: typing.SupportsFloat | typing.SupportsIndex = 0.2, position_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001, rotation_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001, gate: typing.SupportsFloat | typing.SupportsIndex = 50.0, reacquire_after: typing.SupportsInt | typing.SupportsIndex = 25, frozen_after: typing.SupportsInt | typing.SupportsIndex = 3, clock_walk: typing.SupportsFloat | typing.SupportsIndex = 2e-05, clock_drift: typing.SupportsFloat | typing.SupportsIndex = 0.0001, clock_drift_walk: typing.SupportsFloat | typing.SupportsIndex = 1e-06, sway_position: typing.SupportsFloat | typing.SupportsIndex = 0.02, sway_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.003, sway_correlation: typing.SupportsFloat | typing.SupportsIndex = 0.5, slow_position: typing.SupportsFloat | typing.SupportsIndex = 0.05, slow_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.02, slow_position_walk: typing.SupportsFloat | typing.SupportsIndex = 0.003, slow_rotation_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0005) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
     def __repr__(self) -> str:
         ...
-    @property
-    def error(self) -> tuple[float, ...]:
+    def copy(self) -> FilterOptions:
         """
-        [m] rms of predictions twice the horizon ahead: of no change, with one mode, two ...
+        An independent copy.
         """
-    @property
-    def model(self) -> ModalModel:
+    def replace(self, **kwargs: typing.Any) -> FilterOptions:
         """
-        The modes.
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
         """
     @property
-    def rows(self) -> float:
+    def accel_bias(self) -> float:
         """
-        Number of rows used.
+        [m/s^2] standard deviation before any data.
+        """
+    @accel_bias.setter
+    def accel_bias(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_bias_walk(self) -> float:
+        """
+        [m/s^2/sqrt(s)] random walk of the bias.
+        """
+    @accel_bias_walk.setter
+    def accel_bias_walk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_noise(self) -> float:
+        """
+        [m/s^2/sqrt(Hz)] noise density.
+        """
+    @accel_noise.setter
+    def accel_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_range(self) -> float:
+        """
+        [m/s^2] a component at or beyond is saturated.
+        """
+    @accel_range.setter
+    def accel_range(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clock_drift(self) -> float:
+        """
+        [s/s] standard deviation of the clock's drift.
+        """
+    @clock_drift.setter
+    def clock_drift(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clock_drift_walk(self) -> float:
+        """
+        [1/sqrt(s)] random walk of the clock's drift.
+        """
+    @clock_drift_walk.setter
+    def clock_drift_walk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clock_walk(self) -> float:
+        """
+        [s/sqrt(s)] random walk of the tracker's clock.
+        """
+    @clock_walk.setter
+    def clock_walk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def frozen_after(self) -> int:
+        """
+        Consecutive equal tracker samples after which they are refused.
+        """
+    @frozen_after.setter
+    def frozen_after(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def future_limit(self) -> float:
+        """
+        [s] maximum lead of a stamp over the newest inertial sample.
+        """
+    @future_limit.setter
+    def future_limit(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gap_acceleration(self) -> float:
+        """
+        [m/s^2] standard deviation of what a gap or saturation hides.
+        """
+    @gap_acceleration.setter
+    def gap_acceleration(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gap_rate(self) -> float:
+        """
+        [rad/s] likewise.
+        """
+    @gap_rate.setter
+    def gap_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gate(self) -> float:
+        """
+        Tracker samples with a larger normalised innovation squared are outliers.
+        """
+    @gate.setter
+    def gate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_bias(self) -> float:
+        """
+        [rad/s] standard deviation before any data.
+        """
+    @gyro_bias.setter
+    def gyro_bias(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_bias_walk(self) -> float:
+        """
+        [rad/s/sqrt(s)] random walk of the bias.
+        """
+    @gyro_bias_walk.setter
+    def gyro_bias_walk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_noise(self) -> float:
+        """
+        [rad/s/sqrt(Hz)] noise density.
+        """
+    @gyro_noise.setter
+    def gyro_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_range(self) -> float:
+        """
+        [rad/s] a component at or beyond is saturated.
+        """
+    @gyro_range.setter
+    def gyro_range(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def highest_imu_rate(self) -> float:
+        """
+        [Hz] sizes the ring buffer.
+        """
+    @highest_imu_rate.setter
+    def highest_imu_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def highest_pose_rate(self) -> float:
+        """
+        [Hz] likewise.
+        """
+    @highest_pose_rate.setter
+    def highest_pose_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def imu_scale(self) -> float:
+        """
+        Standard deviation of the relative scale error of gyro and accelerometer.
+        """
+    @imu_scale.setter
+    def imu_scale(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def largest_gap(self) -> float:
+        """
+        [s] maximum gap between inertial samples before uncertainty is widened.
+        """
+    @largest_gap.setter
+    def largest_gap(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_sigma(self) -> float:
+        """
+        [m] noise of the tracker, one component.
+        """
+    @position_sigma.setter
+    def position_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reacquire_after(self) -> int:
+        """
+        Consecutive outliers after which the filter follows the tracker again.
+        """
+    @reacquire_after.setter
+    def reacquire_after(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def restart_gap(self) -> float:
+        """
+        [s] gap between inertial samples after which the filter starts anew.
+        """
+    @restart_gap.setter
+    def restart_gap(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_sigma(self) -> float:
+        """
+        [rad] likewise.
+        """
+    @rotation_sigma.setter
+    def rotation_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slow_position(self) -> float:
+        """
+        [m] standard deviation of the deviation from forward kinematics before any data.
+        """
+    @slow_position.setter
+    def slow_position(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slow_position_walk(self) -> float:
+        """
+        [m/sqrt(s)] random walk of that deviation.
+        """
+    @slow_position_walk.setter
+    def slow_position_walk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slow_rotation(self) -> float:
+        """
+        [rad] likewise.
+        """
+    @slow_rotation.setter
+    def slow_rotation(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slow_rotation_walk(self) -> float:
+        """
+        [rad/sqrt(s)] likewise.
+        """
+    @slow_rotation_walk.setter
+    def slow_rotation_walk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sway_correlation(self) -> float:
+        """
+        [s] correlation time of the sway.
+        """
+    @sway_correlation.setter
+    def sway_correlation(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sway_position(self) -> float:
+        """
+        [m] standard deviation of the tip about its slow mean before any data; afterwards it is estimated.
+        """
+    @sway_position.setter
+    def sway_position(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sway_rotation(self) -> float:
+        """
+        [rad] likewise.
+        """
+    @sway_rotation.setter
+    def sway_rotation(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def window(self) -> float:
+        """
+        [s] maximum lateness of a measurement that is still put at its place.
+        """
+    @window.setter
+    def window(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class DeviationOptions:
+    """
+    The model of the deviation from the plan.
+    
+    period = 0.01: [s] step of the model.
+    horizon = 0.04: [s] lead for which predictions are graded.
+    position_noise = 0.0003: [m] noise of the filter's position as the model sees it, rotations as 1 m.
+    velocity_noise = 0.001: [m/s] likewise.
+    slow_noise = 0.003: [m/s^2/sqrt(Hz)] acceleration that drives the slow part.
+    static_time = 2.0: [s] averaging time of the static deviation.
+    mode_noise = 0.02: [m/s^2/sqrt(Hz)] acceleration that drives a mode beside the plan's.
+    frequency_sigma = 0.05: Relative standard deviation of the given frequencies; 0: they stay.
+    frequency_walk = 0.003: [1/sqrt(s)] relative random walk of the frequencies.
+    frequency_range = 0.2: Maximum relative change of a frequency.
+    grade_time = 3.0: [s] averaging time of the grades.
+    settle_time = 0.1: [s] delay before a prediction is graded, in which late samples may come.
+    least_evidence = 1.0: [s] duration of grades after which predictions of modes are used.
+    plan_limit = 10.0: [s] plan samples further ahead are refused.
+    """
+    def __init__(self, *, period: typing.SupportsFloat | typing.SupportsIndex = 0.01, horizon: typing.SupportsFloat | typing.SupportsIndex = 0.04, position_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0003, velocity_noise: typing.SupportsFloat | typing.SupportsIndex = 0.001, slow_noise: typing.SupportsFloat | typing.SupportsIndex = 0.003, static_time: typing.SupportsFloat | typing.SupportsIndex = 2.0, mode_noise: typing.SupportsFloat | typing.SupportsIndex = 0.02, frequency_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.05, frequency_walk: typing.SupportsFloat | typing.SupportsIndex = 0.003, frequency_range: typing.SupportsFloat | typing.SupportsIndex = 0.2, grade_time: typing.SupportsFloat | typing.SupportsIndex = 3.0, settle_time: typing.SupportsFloat | typing.SupportsIndex = 0.1, least_evidence: typing.SupportsFloat | typing.SupportsIndex = 1.0, plan_limit: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> DeviationOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> DeviationOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
         """
     @property
-    def stopped_because(self) -> str:
+    def frequency_range(self) -> float:
         """
-        Why there are no more modes.
+        Maximum relative change of a frequency.
         """
+    @frequency_range.setter
+    def frequency_range(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def frequency_sigma(self) -> float:
+        """
+        Relative standard deviation of the given frequencies; 0: they stay.
+        """
+    @frequency_sigma.setter
+    def frequency_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def frequency_walk(self) -> float:
+        """
+        [1/sqrt(s)] relative random walk of the frequencies.
+        """
+    @frequency_walk.setter
+    def frequency_walk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def grade_time(self) -> float:
+        """
+        [s] averaging time of the grades.
+        """
+    @grade_time.setter
+    def grade_time(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def horizon(self) -> float:
+        """
+        [s] lead for which predictions are graded.
+        """
+    @horizon.setter
+    def horizon(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def least_evidence(self) -> float:
+        """
+        [s] duration of grades after which predictions of modes are used.
+        """
+    @least_evidence.setter
+    def least_evidence(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def mode_noise(self) -> float:
+        """
+        [m/s^2/sqrt(Hz)] acceleration that drives a mode beside the plan's.
+        """
+    @mode_noise.setter
+    def mode_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def period(self) -> float:
+        """
+        [s] step of the model.
+        """
+    @period.setter
+    def period(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def plan_limit(self) -> float:
+        """
+        [s] plan samples further ahead are refused.
+        """
+    @plan_limit.setter
+    def plan_limit(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_noise(self) -> float:
+        """
+        [m] noise of the filter's position as the model sees it, rotations as 1 m.
+        """
+    @position_noise.setter
+    def position_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def settle_time(self) -> float:
+        """
+        [s] delay before a prediction is graded, in which late samples may come.
+        """
+    @settle_time.setter
+    def settle_time(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slow_noise(self) -> float:
+        """
+        [m/s^2/sqrt(Hz)] acceleration that drives the slow part.
+        """
+    @slow_noise.setter
+    def slow_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def static_time(self) -> float:
+        """
+        [s] averaging time of the static deviation.
+        """
+    @static_time.setter
+    def static_time(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def velocity_noise(self) -> float:
+        """
+        [m/s] likewise.
+        """
+    @velocity_noise.setter
+    def velocity_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class WatchOptions:
+    """
+    Detection of jumps of the tracker against inertial sensor and forward kinematics.
+    
+    threshold = 55.0: Of averages that are chi-square distributed with six degrees of freedom.
+    forget = 1.0: [s] after a longer gap of the tracker the averages begin anew.
+    compare = 120.0: [s] after a shift, station and receiver are told apart for this time; further jumps are taken for
+        its after-effect.
+    """
+    def __init__(self, *, threshold: typing.SupportsFloat | typing.SupportsIndex = 55.0, forget: typing.SupportsFloat | typing.SupportsIndex = 1.0, compare: typing.SupportsFloat | typing.SupportsIndex = 120.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> WatchOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> WatchOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def compare(self) -> float:
+        """
+        [s] after a shift, station and receiver are told apart for this time; further jumps are taken for
+        its after-effect.
+        """
+    @compare.setter
+    def compare(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def forget(self) -> float:
+        """
+        [s] after a longer gap of the tracker the averages begin anew.
+        """
+    @forget.setter
+    def forget(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def threshold(self) -> float:
+        """
+        Of averages that are chi-square distributed with six degrees of freedom.
+        """
+    @threshold.setter
+    def threshold(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class CorrectionLimits:
+    """
+    Bounds of the corrections that are sent to the arm.
+    
+    position = 0.15: [m] maximum length.
+    rotation = 0.05: [rad] maximum angle.
+    position_rate = 0.5: [m/s]
+    rotation_rate = 0.2: [rad/s]
+    position_jerk = 100.0: [m/s^3]
+    rotation_jerk = 40.0: [rad/s^3]
+    """
+    def __init__(self, *, position: typing.SupportsFloat | typing.SupportsIndex = 0.15, rotation: typing.SupportsFloat | typing.SupportsIndex = 0.05, position_rate: typing.SupportsFloat | typing.SupportsIndex = 0.5, rotation_rate: typing.SupportsFloat | typing.SupportsIndex = 0.2, position_jerk: typing.SupportsFloat | typing.SupportsIndex = 100.0, rotation_jerk: typing.SupportsFloat | typing.SupportsIndex = 40.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> CorrectionLimits:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> CorrectionLimits:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def position(self) -> float:
+        """
+        [m] maximum length.
+        """
+    @position.setter
+    def position(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_jerk(self) -> float:
+        """
+        [m/s^3]
+        """
+    @position_jerk.setter
+    def position_jerk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_rate(self) -> float:
+        """
+        [m/s]
+        """
+    @position_rate.setter
+    def position_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation(self) -> float:
+        """
+        [rad] maximum angle.
+        """
+    @rotation.setter
+    def rotation(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_jerk(self) -> float:
+        """
+        [rad/s^3]
+        """
+    @rotation_jerk.setter
+    def rotation_jerk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_rate(self) -> float:
+        """
+        [rad/s]
+        """
+    @rotation_rate.setter
+    def rotation_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
 class TrackOptions:
     """
     How `Tracker` works.
+    
+    filter = FilterOptions(): Noise, gaps and gates of the filter.
+    deviation = DeviationOptions(): The model of the deviation from the plan.
+    watch = WatchOptions(): Detection of jumps of the tracker.
+    modes = ModalModel(): Of `identify_modes`; none: predictions at constant acceleration.
+    limits = CorrectionLimits(): Bounds of corrections.
+    coast_position = 0.03: [m] without the tracker, estimates with a larger standard deviation than this and than forward
+        kinematics' are not used.
+    coast_rotation = 0.02: [rad] likewise.
+    imu_timeout = 0.1: [s] lag behind the joints after which the inertial sensor is taken for dead.
+    joints_timeout = 0.5: [s] the same of the joints.
     """
     def __init__(self, *, filter: FilterOptions = ..., deviation: DeviationOptions = ..., watch: WatchOptions = ..., modes: ModalModel = ..., limits: CorrectionLimits = ..., coast_position: typing.SupportsFloat | typing.SupportsIndex = 0.03, coast_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.02, imu_timeout: typing.SupportsFloat | typing.SupportsIndex = 0.1, joints_timeout: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> None:
         ...
@@ -4826,18 +5001,19 @@ class TrackOptions:
     @property
     def coast_position(self) -> float:
         """
-        [m] without the tracker, estimates with a larger standard deviation are not used.
+        [m] without the tracker, estimates with a larger standard deviation than this and than forward
+        kinematics' are not used.
         """
     @coast_position.setter
-    def coast_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def coast_position(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def coast_rotation(self) -> float:
         """
-        [rad]
+        [rad] likewise.
         """
     @coast_rotation.setter
-    def coast_rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def coast_rotation(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def deviation(self) -> DeviationOptions:
@@ -4850,7 +5026,7 @@ class TrackOptions:
     @property
     def filter(self) -> FilterOptions:
         """
-        Noise, gaps, gates.
+        Noise, gaps and gates of the filter.
         """
     @filter.setter
     def filter(self, arg0: FilterOptions) -> None:
@@ -4858,18 +5034,18 @@ class TrackOptions:
     @property
     def imu_timeout(self) -> float:
         """
-        [s] the inertial sensor is taken for dead when it is so much older than the joints.
+        [s] lag behind the joints after which the inertial sensor is taken for dead.
         """
     @imu_timeout.setter
-    def imu_timeout(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def imu_timeout(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def joints_timeout(self) -> float:
         """
-        [s]
+        [s] the same of the joints.
         """
     @joints_timeout.setter
-    def joints_timeout(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def joints_timeout(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def limits(self) -> CorrectionLimits:
@@ -4890,11 +5066,37 @@ class TrackOptions:
     @property
     def watch(self) -> WatchOptions:
         """
-        Watching for jumps of the tracker.
+        Detection of jumps of the tracker.
         """
     @watch.setter
     def watch(self, arg0: WatchOptions) -> None:
         ...
+class ModesResult:
+    """
+    What `identify_modes` found.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def error(self) -> tuple[float, ...]:
+        """
+        [m] rms of predictions twice the horizon ahead: of no change, with one mode, with two ...
+        """
+    @property
+    def model(self) -> ModalModel:
+        """
+        The modes.
+        """
+    @property
+    def rows(self) -> float:
+        """
+        Number of rows used.
+        """
+    @property
+    def stopped_because(self) -> str:
+        """
+        Why there are no more modes.
+        """
 class PosePrediction:
     """
     The tool at time `t`, as known at time `made`; the inertial sensor's clock.
@@ -4904,12 +5106,12 @@ class PosePrediction:
     @property
     def T_base_tool(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4)
+        Shape=(4, 4)
         """
     @property
     def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
         """
-        shape=(6, 6), of position [m] and rotation vector [rad] about the base frame's axes.
+        Shape=(6, 6), of position [m] and rotation vector [rad] about the base frame's axes.
         """
     @property
     def made(self) -> float:
@@ -4919,12 +5121,21 @@ class PosePrediction:
     @property
     def predictor(self) -> typing.Literal['slow', 'acceleration', 'modes']:
         """
-        What it was made by: 'slow', 'acceleration', 'modes'.
+        How it was made.
+        
+        'slow': plan and slow deviation: what forward kinematics would give, and the last static deviation
+        'acceleration': plan and deviation at constant acceleration
+        'modes': plan, slow deviation and damped modes driven by the plan
         """
     @property
     def status(self) -> typing.Literal['valid', 'coasting', 'hold', 'lost']:
         """
-        'valid', 'coasting' (the tracker is away), 'hold' (forward kinematics and the last static deviation), 'lost'.
+        What it rests on.
+        
+        'valid': inertial sensor and tracker
+        'coasting': inertial sensor and forward kinematics, the tracker is away
+        'hold': forward kinematics (or the plan) and the last static deviation
+        'lost': nothing to go by
         """
     @property
     def t(self) -> float:
@@ -4940,17 +5151,17 @@ class Compensation:
     @property
     def T_base_flange(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4): corrected.
+        Shape=(4, 4): corrected.
         """
     @property
     def T_base_tool_planned(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4)
+        Shape=(4, 4)
         """
     @property
     def correction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
         """
-        shape=(6,): the same within the limits.
+        Shape=(6,): within the limits.
         """
     @property
     def has_plan(self) -> bool:
@@ -4970,7 +5181,7 @@ class Compensation:
     @property
     def wanted(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
         """
-        shape=(6,) [m], rotation vector [rad]: the correction in the base frame.
+        Shape=(6,) [m], rotation vector [rad]: the correction in the base frame.
         """
 class ClockEstimate:
     """
@@ -4991,7 +5202,7 @@ class ClockEstimate:
     @property
     def sigma(self) -> float:
         """
-        [s]
+        [s] standard error.
         """
 class Shift:
     """
@@ -5002,12 +5213,16 @@ class Shift:
     @property
     def cause(self) -> typing.Literal['station_or_receiver', 'station', 'receiver']:
         """
-        'station' (constant in the tracker frame), 'receiver' (constant on the flange), or not told apart (yet).
+        What jumped.
+        
+        'station_or_receiver': not told apart (yet): the arm has to move and turn
+        'station': constant in the tracker frame: a base station was moved
+        'receiver': constant on the flange: the receiver has slipped
         """
     @property
     def count(self) -> int:
         """
-        Since the start; 0: none, and the rest means nothing.
+        Number of jumps since the start; 0: the rest means nothing.
         """
     @property
     def flagged(self) -> float:
@@ -5017,12 +5232,12 @@ class Shift:
     @property
     def jump(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
         """
-        shape=(6,) [m], rotation vector [rad]: of the receiver as measured, base frame.
+        Shape=(6,) [m], rotation vector [rad]: of the receiver as measured, base frame.
         """
     @property
     def odds(self) -> float:
         """
-        Logarithm of the odds of station against receiver.
+        Log odds of station against receiver.
         """
     @property
     def t(self) -> float:
@@ -5031,9 +5246,11 @@ class Shift:
         """
 class Tracker:
     """
-    Fusion and prediction, sample by sample. Samples may come late, twice, or out of order within the window: the result is the same.
+    Fusion and prediction, sample by sample.
     
-    Stamps are of each device's own clock; the answers' times are of the inertial sensor's. Refused samples change nothing. Not for two threads at once.
+    Samples may come late, twice, or out of order within the window: the result is the same. Stamps are of each device's
+    own clock; the answers' times are of the inertial sensor's. Refused samples change nothing. Not for two threads at
+    once.
     """
     def __init__(self, setup: TrackSetup, options: TrackOptions | None = None) -> None:
         """
@@ -5143,11 +5360,13 @@ class CompensationRow:
     """
     @property
     def compensation(self) -> Compensation:
-        ...
+        """
+        What to add there.
+        """
     @property
     def made(self) -> bool:
         """
-        False: the streams do not reach there.
+        False: the streams do not reach there, and nothing else is set but `t`.
         """
     @property
     def t(self) -> float:
@@ -5188,7 +5407,7 @@ class ReplayResult:
     @property
     def modes(self) -> ModesResult:
         """
-        Identified in the replay; no modes where none were asked for.
+        As identified in the replay; none where none were asked for or found.
         """
     @property
     def modes_from(self) -> float:
@@ -5198,12 +5417,12 @@ class ReplayResult:
     @property
     def rows(self) -> tuple[CompensationRow, ...]:
         """
-        One for each row of the plan.
+        One per row of the plan, in its order.
         """
     @property
     def shifts(self) -> tuple[Shift, ...]:
         """
-        Jumps of the tracker.
+        Of the tracker, as they were noticed.
         """
     @property
     def timeline(self) -> dict[str, typing.Any]:
@@ -5212,7 +5431,13 @@ class ReplayResult:
         """
 class FlexibleMode:
     """
-    A flexible mode of a simulated arm; vectors in the base axes, slewed with the first joint. See stream_simulation.hpp.
+    A flexible mode of the arm: one damped oscillator, driven by the acceleration of the rigid arm's
+    tip, by gravity and by gusts,
+    
+    q'' + 2 zeta omega q' + omega^2 q = -participation . (a_tip - g) * reach/reference + gust,
+    
+    that moves the tip by direction * q and turns it by rotation * q. Vectors stand in the base's axes,
+    slewed with the first joint.
     """
     def __init__(self, *, frequency: typing.SupportsFloat | typing.SupportsIndex, damping: typing.SupportsFloat | typing.SupportsIndex, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], participation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], gust: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
@@ -5231,18 +5456,18 @@ class FlexibleMode:
     @property
     def damping(self) -> float:
         """
-        Ratio.
+        Damping ratio zeta.
         """
     @damping.setter
-    def damping(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def damping(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
-    def direction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+    def direction(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(3,): of the tip's motion, per unit of the mode.
+        Shape=(3,): of the tip's motion, per unit of the mode.
         """
     @direction.setter
-    def direction(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+    def direction(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         ...
     @property
     def frequency(self) -> float:
@@ -5250,7 +5475,7 @@ class FlexibleMode:
         [Hz] undamped, at the reference reach.
         """
     @frequency.setter
-    def frequency(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def frequency(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def gust(self) -> float:
@@ -5258,29 +5483,236 @@ class FlexibleMode:
         [m] standard deviation of the sway that gusts alone would make.
         """
     @gust.setter
-    def gust(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def gust(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
-    def participation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+    def participation(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(3,): share of the tip's acceleration that drives it.
+        Shape=(3,): fraction of the tip's acceleration driving it.
         """
     @participation.setter
-    def participation(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+    def participation(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         ...
     @property
-    def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+    def rotation(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        shape=(3,) [rad/m]: of the tip, per unit of the mode.
+        Shape=(3,) [rad/m]: of the tip, per unit of the mode.
         """
     @rotation.setter
-    def rotation(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+    def rotation(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+class ImuErrors:
+    """
+    Errors of a simulated inertial sensor (densities as in data sheets).
+    
+    gyro_noise = 0.0001: [rad/s/sqrt(Hz)] noise density.
+    accel_noise = 0.001: [m/s^2/sqrt(Hz)] noise density.
+    gyro_bias = 0.002: [rad/s] standard deviation at the start.
+    accel_bias = 0.03: [m/s^2] standard deviation at the start.
+    gyro_bias_walk = 1e-05: [rad/s/sqrt(s)] random walk.
+    accel_bias_walk = 0.0001: [m/s^2/sqrt(s)] random walk.
+    gyro_scale = 0.0003: Standard deviation of each axis' scale error.
+    accel_scale = 0.0003: Standard deviation of each axis' scale error.
+    """
+    def __init__(self, *, gyro_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0001, accel_noise: typing.SupportsFloat | typing.SupportsIndex = 0.001, gyro_bias: typing.SupportsFloat | typing.SupportsIndex = 0.002, accel_bias: typing.SupportsFloat | typing.SupportsIndex = 0.03, gyro_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 1e-05, accel_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0001, gyro_scale: typing.SupportsFloat | typing.SupportsIndex = 0.0003, accel_scale: typing.SupportsFloat | typing.SupportsIndex = 0.0003) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> ImuErrors:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> ImuErrors:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def accel_bias(self) -> float:
+        """
+        [m/s^2] standard deviation at the start.
+        """
+    @accel_bias.setter
+    def accel_bias(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_bias_walk(self) -> float:
+        """
+        [m/s^2/sqrt(s)] random walk.
+        """
+    @accel_bias_walk.setter
+    def accel_bias_walk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_noise(self) -> float:
+        """
+        [m/s^2/sqrt(Hz)] noise density.
+        """
+    @accel_noise.setter
+    def accel_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_scale(self) -> float:
+        """
+        Standard deviation of each axis' scale error.
+        """
+    @accel_scale.setter
+    def accel_scale(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_bias(self) -> float:
+        """
+        [rad/s] standard deviation at the start.
+        """
+    @gyro_bias.setter
+    def gyro_bias(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_bias_walk(self) -> float:
+        """
+        [rad/s/sqrt(s)] random walk.
+        """
+    @gyro_bias_walk.setter
+    def gyro_bias_walk(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_noise(self) -> float:
+        """
+        [rad/s/sqrt(Hz)] noise density.
+        """
+    @gyro_noise.setter
+    def gyro_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_scale(self) -> float:
+        """
+        Standard deviation of each axis' scale error.
+        """
+    @gyro_scale.setter
+    def gyro_scale(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class TrackerErrors:
+    """
+    Errors of a simulated tracker, and of its way to the computer.
+    
+    position_noise = 0.001: [m] of one component.
+    rotation_noise = 0.001: [rad] of one component.
+    latency = 0.03: [s] mean.
+    latency_jitter = 0.004: [s] standard deviation; no sample arrives before it was taken.
+    clock_offset = 0.0: [s] t_tracker = t_imu * (1 + clock_drift) + clock_offset.
+    clock_drift = 0.0: [s/s]
+    out_of_order = 0.0: Fraction of the samples that take 25 ms more.
+    lost = 0.0: Fraction of single samples that never arrive.
+    """
+    def __init__(self, *, position_noise: typing.SupportsFloat | typing.SupportsIndex = 0.001, rotation_noise: typing.SupportsFloat | typing.SupportsIndex = 0.001, latency: typing.SupportsFloat | typing.SupportsIndex = 0.03, latency_jitter: typing.SupportsFloat | typing.SupportsIndex = 0.004, clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, clock_drift: typing.SupportsFloat | typing.SupportsIndex = 0.0, out_of_order: typing.SupportsFloat | typing.SupportsIndex = 0.0, lost: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> TrackerErrors:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> TrackerErrors:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def clock_drift(self) -> float:
+        """
+        [s/s]
+        """
+    @clock_drift.setter
+    def clock_drift(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clock_offset(self) -> float:
+        """
+        [s] t_tracker = t_imu * (1 + clock_drift) + clock_offset.
+        """
+    @clock_offset.setter
+    def clock_offset(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def latency(self) -> float:
+        """
+        [s] mean.
+        """
+    @latency.setter
+    def latency(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def latency_jitter(self) -> float:
+        """
+        [s] standard deviation; no sample arrives before it was taken.
+        """
+    @latency_jitter.setter
+    def latency_jitter(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def lost(self) -> float:
+        """
+        Fraction of single samples that never arrive.
+        """
+    @lost.setter
+    def lost(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def out_of_order(self) -> float:
+        """
+        Fraction of the samples that take 25 ms more.
+        """
+    @out_of_order.setter
+    def out_of_order(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_noise(self) -> float:
+        """
+        [m] of one component.
+        """
+    @position_noise.setter
+    def position_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rotation_noise(self) -> float:
+        """
+        [rad] of one component.
+        """
+    @rotation_noise.setter
+    def rotation_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
 class StreamSimulationOptions:
     """
-    A simulated recording; see the attributes.
+    A simulated recording.
+    
+    seconds = 60.0: [s] length.
+    motion = 'gentle': How the arm moves.
+        'still': no motion, gusts only
+        'gentle': slow waves of all joints
+        'stop-and-go': jerk-limited moves between random joint positions, with rests
+    tip_speed = 0.3: [m/s] rms of a gentle motion, maximum of stop-and-go.
+    imu_rate = 1000.0: [Hz]
+    tracker_rate = 100.0: [Hz]
+    joint_rate = 250.0: [Hz]
+    plan_rate = 100.0: [Hz]
+    plan_ahead = 0.5: [s] how long before its time a planned pose is known.
+    joint_noise = 2e-06: [rad | m] standard deviation of encoder readings.
+    actuator_lag = 0.04: [s] delay of the joints behind the plan.
+    modes = []: Flexible modes of the arm; empty: those of `large_boom_modes`.
+    frequency_spread = 0.05: Every mode's frequency is drawn anew by the seed, to within this fraction.
+    gust_corner = 6.0: [Hz] gusts are white noise below this frequency.
+    reach_exponent = 0.5: Frequencies go as (reference reach / reach)^this.
+    imu = ImuErrors(): Errors of the inertial sensor.
+    tracker = TrackerErrors(): Errors of the tracker.
+    dropouts = []: Of the tracker: start and length [s]
+    shifts = []: From a time [s] on the tracker frame is another: T_old_new, shape=(4, 4)
+    setup = None: Where the sensors truly are (clock offsets and actuator lag are taken from above); not given: as on
+        a large arm.
+    seed = 0: Of everything that is drawn.
     """
-    def __init__(self, *, seconds: typing.SupportsFloat | typing.SupportsIndex = 60.0, motion: typing.Literal['still', 'gentle', 'stop-and-go'] = 'gentle', tip_speed: typing.SupportsFloat | typing.SupportsIndex = 0.3, imu_rate: typing.SupportsFloat | typing.SupportsIndex = 1000.0, tracker_rate: typing.SupportsFloat | typing.SupportsIndex = 100.0, joint_rate: typing.SupportsFloat | typing.SupportsIndex = 250.0, plan_rate: typing.SupportsFloat | typing.SupportsIndex = 100.0, plan_ahead: typing.SupportsFloat | typing.SupportsIndex = 0.5, joint_noise: typing.SupportsFloat | typing.SupportsIndex = 2e-06, actuator_lag: typing.SupportsFloat | typing.SupportsIndex = 0.04, modes: collections.abc.Sequence[FlexibleMode] = [], imu: ImuErrors = ..., tracker: TrackerErrors = ..., dropouts: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = [], shifts: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]]] = [], setup: TrackSetup | None = None, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, seconds: typing.SupportsFloat | typing.SupportsIndex = 60.0, motion: typing.Literal['still', 'gentle', 'stop-and-go'] = 'gentle', tip_speed: typing.SupportsFloat | typing.SupportsIndex = 0.3, imu_rate: typing.SupportsFloat | typing.SupportsIndex = 1000.0, tracker_rate: typing.SupportsFloat | typing.SupportsIndex = 100.0, joint_rate: typing.SupportsFloat | typing.SupportsIndex = 250.0, plan_rate: typing.SupportsFloat | typing.SupportsIndex = 100.0, plan_ahead: typing.SupportsFloat | typing.SupportsIndex = 0.5, joint_noise: typing.SupportsFloat | typing.SupportsIndex = 2e-06, actuator_lag: typing.SupportsFloat | typing.SupportsIndex = 0.04, modes: collections.abc.Sequence[FlexibleMode] = [], frequency_spread: typing.SupportsFloat | typing.SupportsIndex = 0.05, gust_corner: typing.SupportsFloat | typing.SupportsIndex = 6.0, reach_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.5, imu: ImuErrors = ..., tracker: TrackerErrors = ..., dropouts: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = [], shifts: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]]] = [], setup: TrackSetup | None = None, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -5297,16 +5729,35 @@ class StreamSimulationOptions:
     @property
     def actuator_lag(self) -> float:
         """
-        [s] joints follow the plan so late.
+        [s] delay of the joints behind the plan.
         """
     @actuator_lag.setter
-    def actuator_lag(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def actuator_lag(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def dropouts(self) -> tuple[tuple[float, float], ...]:
         """
-        Of the tracker: start and length [s].
+        Of the tracker: start and length [s]
         """
+    @dropouts.setter
+    def dropouts(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def frequency_spread(self) -> float:
+        """
+        Every mode's frequency is drawn anew by the seed, to within this fraction.
+        """
+    @frequency_spread.setter
+    def frequency_spread(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gust_corner(self) -> float:
+        """
+        [Hz] gusts are white noise below this frequency.
+        """
+    @gust_corner.setter
+    def gust_corner(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
     def imu(self) -> ImuErrors:
         """
@@ -5321,7 +5772,7 @@ class StreamSimulationOptions:
         [Hz]
         """
     @imu_rate.setter
-    def imu_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def imu_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def joint_noise(self) -> float:
@@ -5329,7 +5780,7 @@ class StreamSimulationOptions:
         [rad | m] standard deviation of encoder readings.
         """
     @joint_noise.setter
-    def joint_noise(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def joint_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def joint_rate(self) -> float:
@@ -5337,28 +5788,35 @@ class StreamSimulationOptions:
         [Hz]
         """
     @joint_rate.setter
-    def joint_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def joint_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def modes(self) -> tuple[FlexibleMode, ...]:
         """
-        Empty: those of a large boom.
+        Flexible modes of the arm; empty: those of `large_boom_modes`.
         """
+    @modes.setter
+    def modes(self, arg1: collections.abc.Sequence[FlexibleMode]) -> None:
+        ...
     @property
     def motion(self) -> typing.Literal['still', 'gentle', 'stop-and-go']:
         """
-        'still', 'gentle' (slow waves of all joints) or 'stop-and-go' (jerk-limited moves with rests).
+        How the arm moves.
+        
+        'still': no motion, gusts only
+        'gentle': slow waves of all joints
+        'stop-and-go': jerk-limited moves between random joint positions, with rests
         """
     @motion.setter
-    def motion(self, arg0: typing.Literal['still', 'gentle', 'stop-and-go']) -> None:
+    def motion(self, arg1: typing.Literal['still', 'gentle', 'stop-and-go']) -> None:
         ...
     @property
     def plan_ahead(self) -> float:
         """
-        [s] a planned pose is known so long before.
+        [s] how long before its time a planned pose is known.
         """
     @plan_ahead.setter
-    def plan_ahead(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def plan_ahead(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def plan_rate(self) -> float:
@@ -5366,15 +5824,23 @@ class StreamSimulationOptions:
         [Hz]
         """
     @plan_rate.setter
-    def plan_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def plan_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reach_exponent(self) -> float:
+        """
+        Frequencies go as (reference reach / reach)^this.
+        """
+    @reach_exponent.setter
+    def reach_exponent(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def seconds(self) -> float:
         """
-        [s]
+        [s] length.
         """
     @seconds.setter
-    def seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def seconds(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def seed(self) -> int:
@@ -5382,25 +5848,32 @@ class StreamSimulationOptions:
         Of everything that is drawn.
         """
     @seed.setter
-    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def seed(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def setup(self) -> TrackSetup | None:
         """
-        Where the sensors truly are; None: as on a large arm.
+        Where the sensors truly are (clock offsets and actuator lag are taken from above); not given: as on
+        a large arm.
         """
+    @setup.setter
+    def setup(self, arg1: TrackSetup | None) -> None:
+        ...
     @property
     def shifts(self) -> tuple[tuple[float, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]], ...]:
         """
-        From a time [s] on the tracker frame is another: T_old_new, shape=(4, 4).
+        From a time [s] on the tracker frame is another: T_old_new, shape=(4, 4)
         """
+    @shifts.setter
+    def shifts(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]]]) -> None:
+        ...
     @property
     def tip_speed(self) -> float:
         """
-        [m/s] rms of a gentle motion, highest of stop-and-go.
+        [m/s] rms of a gentle motion, maximum of stop-and-go.
         """
     @tip_speed.setter
-    def tip_speed(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def tip_speed(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def tracker(self) -> TrackerErrors:
@@ -5416,7 +5889,7 @@ class StreamSimulationOptions:
         [Hz]
         """
     @tracker_rate.setter
-    def tracker_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def tracker_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
 class SimulatedStreams:
     """
@@ -5477,22 +5950,22 @@ class RestPose:
     @property
     def T_base_flange(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4)
+        Shape=(4, 4)
         """
     @property
     def T_tracker_receiver(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
         """
-        shape=(4, 4)
+        Shape=(4, 4)
         """
     @property
     def end(self) -> float:
         """
-        [s]
+        [s] controller's clock.
         """
     @property
     def samples(self) -> int:
         """
-        Of the tracker.
+        Number of samples of the tracker.
         """
     @property
     def scatter(self) -> float:
@@ -5502,11 +5975,11 @@ class RestPose:
     @property
     def start(self) -> float:
         """
-        [s] the controller's clock.
+        [s] controller's clock.
         """
 class PositionError:
     """
-    How far a test position is from the frames found, and what it counted.
+    How far a test position is from the frames found, and what it counted in the refinement.
     """
     def __repr__(self) -> str:
         ...
@@ -5544,7 +6017,7 @@ class FramesResult:
     @property
     def errors(self) -> tuple[PositionError, ...]:
         """
-        One per position.
+        One per test position.
         """
     @property
     def iterations(self) -> int:
@@ -5564,12 +6037,15 @@ class FramesResult:
     @property
     def rotation_sigma(self) -> float:
         """
-        [rad]
+        [rad] likewise.
         """
     @property
     def status(self) -> typing.Literal['done', 'not observable', 'not consistent', 'not converged']:
         """
-        'done', 'not observable', 'not consistent' (the message names the reading that would close), 'not converged'.
+        Whether there is a result, and why not.
+        
+        'not observable': the message says what does not show, and what to do
+        'not consistent': the message names the reading that would make the numbers agree, if any
         """
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -5605,12 +6081,15 @@ class ToolResult:
     @property
     def point(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,) [m] where the tip was, in the base.
+        Shape=(3,) [m] where the tip was, in the base frame.
         """
     @property
     def status(self) -> typing.Literal['done', 'not observable', 'not consistent', 'not converged']:
         """
-        'done' or 'not observable'.
+        Whether there is a result, and why not.
+        
+        'not observable': the message says what does not show, and what to do
+        'not consistent': the message names the reading that would make the numbers agree, if any
         """
 class InertialResult:
     """
@@ -5626,7 +6105,7 @@ class InertialResult:
     @property
     def accel_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,) [m/s^2]
+        Shape=(3,) [m/s^2]
         """
     @property
     def advice(self) -> str:
@@ -5636,7 +6115,7 @@ class InertialResult:
     @property
     def clock_offset(self) -> float:
         """
-        [s] t_imu = t_tracker - clock_offset
+        [s] t_imu = t_tracker - clock_offset.
         """
     @property
     def clock_offset_sigma(self) -> float:
@@ -5646,17 +6125,17 @@ class InertialResult:
     @property
     def gravity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,) [m/s^2] in the tracker frame.
+        Shape=(3,) [m/s^2] in the tracker frame.
         """
     @property
     def gravity_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
         """
-        shape=(3, 3)
+        Shape=(3, 3)
         """
     @property
     def gyro_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,) [rad/s]
+        Shape=(3,) [rad/s]
         """
     @property
     def iterations(self) -> int:
@@ -5671,7 +6150,7 @@ class InertialResult:
     @property
     def position_rms(self) -> float:
         """
-        [m] of one component, what is left.
+        [m] residual of one component.
         """
     @property
     def rich_enough(self) -> bool:
@@ -5681,22 +6160,25 @@ class InertialResult:
     @property
     def rotation_rate(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        shape=(3,) [rad/s] rms about the three principal axes, descending.
+        Shape=(3,) [rad/s] rms about the three principal axes, descending.
         """
     @property
     def rotation_rms(self) -> float:
         """
-        [rad]
+        [rad] likewise.
         """
     @property
     def status(self) -> typing.Literal['done', 'not observable', 'not consistent', 'not converged']:
         """
-        'done', 'not observable', 'not consistent', 'not converged'.
+        Whether there is a result, and why not.
+        
+        'not observable': the message says what does not show, and what to do
+        'not consistent': the message names the reading that would make the numbers agree, if any
         """
     @property
     def tracker_up(self) -> str:
         """
-        The tracker's axis that points up: '+z', '+y', ...
+        The tracker's axis that points up: '+z', '+y' ….
         """
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -5709,26 +6191,34 @@ def assemble_setup(frames: FramesResult, inertial: InertialResult, tool: ToolRes
     """
 def calibrate_frames(T_base_flange: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], T_tracker_receiver: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"]) -> FramesResult:
     """
-    Tracker frame and receiver on the flange from test positions: closed form, then least squares in which every position counts by its own error.
+    Tracker frame and receiver on the flange from test positions.
     
+    A closed form, then least squares in which every position is weighted by its own error.
     T_base_flange, T_tracker_receiver: shape=(n, 4, 4). Raises InputError.
     """
 def calibrate_inertial(t: numpy.typing.ArrayLike, gyro: numpy.typing.ArrayLike, accel: numpy.typing.ArrayLike, tracker_t: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, orientation: numpy.typing.ArrayLike, *, clock_search: typing.SupportsFloat | typing.SupportsIndex = 2.0, clock_wanted: typing.SupportsFloat | typing.SupportsIndex = 0.001, segment: typing.SupportsFloat | typing.SupportsIndex = 2.0, gyro_bias: typing.SupportsFloat | typing.SupportsIndex = 0.05, accel_bias: typing.SupportsFloat | typing.SupportsIndex = 0.1, max_iterations: typing.SupportsInt | typing.SupportsIndex = 30) -> InertialResult:
     """
-    Where the inertial sensor is on the receiver, gravity, and the offset of the clocks, from one motion that both saw.
+    Where the inertial sensor is on the receiver, gravity, and the clock offset, from one motion that both saw.
     
-    t, gyro, accel: shape=(n,) [s], (n, 3) [rad/s], (n, 3) [m/s^2]. tracker_t, position, orientation: shape=(m,) [s], (m, 3) [m], (m, 4) w x y z.
-    clock_search: [s] offsets up to this are looked for. clock_wanted: [s] a larger standard error is not enough, and advice is given.
-    segment: [s] inertial data are integrated over so long. gyro_bias, accel_bias: [rad/s], [m/s^2] standard deviations before any data.
+    t, gyro, accel: shape=(n,) [s], (n, 3) [rad/s], (n, 3) [m/s^2].
+    tracker_t, position, orientation: shape=(m,) [s], (m, 3) [m], (m, 4) w x y z.
     
     Raises InputError on data that cannot be used.
+    
+    clock_search = 2.0: [s] offsets up to this are searched.
+    clock_wanted = 0.001: [s] standard error of the offset that is wanted; above it, advice is given.
+    segment = 2.0: [s] length of the segments over which inertial data are integrated.
+    gyro_bias = 0.05: [rad/s] standard deviation before any data.
+    accel_bias = 0.1: [m/s^2] standard deviation before any data.
+    max_iterations = 30: The fit stops here at the latest.
     """
 def calibrate_tool(pivot: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], orientation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"] | None = None, prescribed: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]] = []) -> ToolResult:
     """
     The tool from poses of the flange.
     
     pivot: shape=(n, 4, 4), the tool tip on one point in three or more orientations.
-    orientation: shape=(m, 4, 4), the tool in prescribed orientations; None: the flange's axes are the tool's. prescribed: R_base_tool of those, shape=(3, 3) each.
+    orientation: shape=(m, 4, 4), the tool in prescribed orientations; None: the flange's axes are the tool's.
+    prescribed: R_base_tool of those, shape=(3, 3) each.
     
     Raises InputError.
     """
@@ -5756,11 +6246,16 @@ def find_rests(t: numpy.typing.ArrayLike, T_base_flange: typing.Annotated[numpy.
     """
     Standstills of forward kinematics, with what the tracker saw during them.
     
-    t, tracker_t: shape=(n,), shape=(m,) [s]. T_base_flange: shape=(n, 4, 4). position: shape=(m, 3) [m]. orientation: shape=(m, 4) w x y z.
-    least: [s] shorter ones do not count: sway has to average out. margin: [s] left out after the arm has stopped and before it starts.
-    moved_by, turned_by: [m], [rad] the flange stays within these. clock_offset: [s] t_controller = t_tracker - clock_offset.
+    t, tracker_t: shape=(n,), shape=(m,) [s]. T_base_flange: shape=(n, 4, 4). position: shape=(m, 3) [m].
+    orientation: shape=(m, 4) w x y z.
     
     Raises InputError.
+    
+    least = 2.0: [s] shorter ones do not count: sway has to average out.
+    margin = 0.5: [s] left out after the arm has stopped and before it starts.
+    moved_by = 0.0005: [m] the flange of forward kinematics stays within this.
+    turned_by = 0.0005: [rad] likewise.
+    clock_offset = 0.0: [s] t_controller = t_tracker - clock_offset, to within a fraction of `margin`.
     """
 def flange_poses(robot: Robot, joints: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -5808,10 +6303,13 @@ def handeye_closed_form(poses: HandEyePoses, setup: typing.Literal['eye-in-hand'
     """
 def handeye_plan(poses: HandEyePoses, result: HandEyeResult, options: HandEyeOptions | None = None, *, count: typing.SupportsInt | typing.SupportsIndex = 5, candidates: typing.SupportsInt | typing.SupportsIndex = 400, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.7853981633974483, reach: typing.SupportsFloat | typing.SupportsIndex = 0.15, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> tuple[NextHandPose, ...]:
     """
-    Robot poses, one after the other, that shrink the covariance of the working point most.
+    Robot poses, one after the other, that shrink the covariance of the working point most. Raises InputError.
     
-    count: how many. candidates: tried for each. tilt: [rad] the board is seen at no more than this from its normal, beyond what
-    was seen. reach: [m] hands stay this close to a measured one. Raises InputError.
+    count = 5: Number of poses.
+    candidates = 400: Candidates tried for each.
+    tilt = 0.7853981633974483: [rad] the board is seen at no more than this from its normal, beyond what was seen (45 deg).
+    reach = 0.15: [m] hands stay this close to a measured one.
+    seed = 0: Of the candidates.
     """
 def handeye_readings() -> tuple[Reading, ...]:
     """
@@ -5833,8 +6331,10 @@ def identify_modes(t: numpy.typing.ArrayLike, deviation: numpy.typing.ArrayLike,
     """
     Frequencies, damping and gains of the sway from what `Tracker.take_rows` gave over a recording.
     
-    t: shape=(n,) [s], `options.period` apart. deviation, rate: shape=(n, 6) [m, rad], [m/s, rad/s]. plan_acceleration: shape=(n, 3) [m/s^2].
-    most: at most so many modes; another is taken while it lowers the error of predictions by at least the share `worth`.
+    t: shape=(n,) [s], `options.period` apart. deviation, rate: shape=(n, 6) [m, rad], [m/s, rad/s].
+    plan_acceleration: shape=(n, 3) [m/s^2].
+    most: maximum number of modes; another is taken while it lowers the error of predictions by at least the fraction
+    `worth`.
     
     Raises InputError on fewer than 500 rows.
     """
@@ -5860,8 +6360,8 @@ def plan(robot: Robot, options: PlanOptions | None = None) -> PlanResult:
     """
     Measurement poses by exchange on an observability index.
     
-    Revolute joints without limits use -pi ... pi. Raises InputError: fewer poses than the parameters need, a joint whose range is too
-    small for `min_step`.
+    Revolute joints without limits use -pi ... pi. Raises InputError: fewer poses than the parameters need, a joint
+    whose range is too small for `min_step`.
     """
 def pose_groups(data: Measurements) -> numpy.typing.NDArray[numpy.int32]:
     """
@@ -5873,15 +6373,17 @@ def predict(robot: Robot, data: Measurements, own_effects: collections.abc.Seque
     """
 def project(camera: Camera, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Pixels, shape=(m, 2), of points in the camera frame, shape=(m, 3) [m]; z looks out of the lens, x right, y down.
+    Pixels, shape=(m, 2), of points in the camera frame, shape=(m, 3) [m]; z points out of the lens, x right, y
+    down.
     """
 def replay(streams: RecordedStreams, setup: TrackSetup, options: TrackOptions | None = None, *, horizons: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [0.02, 0.04, 0.08], learn_modes: typing.SupportsFloat | typing.SupportsIndex = 0.0, progress: collections.abc.Callable[[float], bool] | None = None) -> ReplayResult:
     """
     Plays a recording as it would have gone on the day: nothing is used before it arrived.
     
-    horizons: [s] at which predictions are graded against the tracker's later samples. Compensations are made `options.deviation.horizon` ahead.
-    learn_modes: [s] modes are identified from so much of the recording's start and used from then on; 0: never.
-    progress: called with the share that is done; it returns False to stop. Ctrl-C stops as well.
+    horizons: [s] at which predictions are graded against the tracker's later samples.
+        Compensations are made `options.deviation.horizon` ahead.
+    learn_modes: [s] modes are identified from the recording's start of this length and used from then on; 0: never.
+    progress: called with the fraction that is done; it returns False to stop. Ctrl-C stops as well.
     
     Raises InputError.
     """
@@ -5897,7 +6399,8 @@ def robot_from_urdf(urdf_text: str, base_link: str = '', tip_link: str = '') -> 
     
     Fixed joints are folded into the next moving joint, the last ones into the tool; link masses are merged the same way;
     `mimic` becomes `driven_by`. Empty link names: the only root, the only leaf.
-    Raises InputError: not a URDF, unknown base or tip (lists the links there are), tip not below base, planar or floating joint.
+    Raises InputError: not a URDF, unknown base or tip (lists the links there are), tip not below base, planar or
+    floating joint.
     """
 def rotation_from_rpy(rpy: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
     """
@@ -5923,15 +6426,15 @@ def validate_measurements(data: Measurements, robot: Robot, joints_only: bool = 
     """
     Raises InputError naming the row (counted from 0) and what is wrong with the measurements for this robot.
     
-    Checked are: counts that do not fit the robot, joints or inputs that are not finite, a row without any measurement (unless
-    `joints_only`), half a position, a quaternion that is not of unit length, directions, sigmas.
+    Checked are: counts that do not fit the robot, joints or inputs that are not finite, a row without any measurement
+    (unless `joints_only`), half a position, a quaternion that is not of unit length, directions, sigmas.
     """
 def validate_robot(robot: Robot) -> None:
     """
     Raises InputError when the robot cannot be used.
     
-    The error names the joint and what is wrong: no joints, duplicate or empty names, unknown or circular `driven_by`, values that
-    are not finite, an axis that is not of unit length, lower > upper.
+    The error names the joint and what is wrong: no joints, duplicate or empty names, unknown or circular `driven_by`,
+    values that are not finite, an axis that is not of unit length, lower > upper.
     """
 def validate_scene(scene: Scene, robot: Robot) -> None:
     """

@@ -498,7 +498,7 @@ def test_the_parts_can_be_had_alone() -> None:
     assert "hand-inverted" in {reading.name for reading in handeye_readings()}
     with pytest.raises(truing.InputError, match="working_point"):
         truing.handeye(poses, working_point=[0, 0])
-    with pytest.raises(truing.InputError, match="set-up"):
+    with pytest.raises(truing.InputError, match="setup 'eye'; choose one of 'eye-in-hand', 'eye-to-hand'"):
         truing.handeye(poses, setup="eye")  # type: ignore[arg-type]
 
 
