@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "math/constants.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/random.hpp"
 #include "math/text.hpp"
 
@@ -474,7 +475,8 @@ double left_by(const Curve& curve, const std::vector<std::vector<double>>& colum
   }
   Eigen::MatrixXd xx = x.transpose() * x;
   xx.diagonal() *= 1.0 + 1e-12;
-  return std::max(0.0, y.squaredNorm() - (x.transpose() * y).dot(xx.ldlt().solve(x.transpose() * y)));
+  return std::max(0.0,
+                  y.squaredNorm() - (x.transpose() * y).dot(solve_symmetric<Eigen::Dynamic, 1>(xx, x.transpose() * y)));
 }
 
 }  // namespace

@@ -6,9 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 #include "estimation/evaluate.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/random.hpp"
 #include "math/text.hpp"
 #include "model/model.hpp"
@@ -196,7 +195,7 @@ std::vector<Telling> most_telling(const Motion& motion, int count, double least)
   right += x.transpose() * motion.signal / 50.0;
   std::vector<Telling> chosen;
   for (int n = 0; n < count; ++n) {
-    const Eigen::VectorXd left = motion.signal - x * information.ldlt().solve(right);
+    const Eigen::VectorXd left = motion.signal - x * solve_symmetric<Eigen::Dynamic, 1>(information, right);
     Telling best{-1, 0.0};
     for (int k = 0; k < kTried; ++k) {
       const double difference = left.segment<3>(3 * k).norm();

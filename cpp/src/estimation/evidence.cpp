@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "kernel/kernel.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/random.hpp"
 
 namespace truing::estimation {
@@ -234,7 +235,7 @@ double Evidence::explained(const State& state, const std::vector<int>& what, con
     bb(k, k) += 1e-9 * gram_.xx(by[static_cast<std::size_t>(k)], by[static_cast<std::size_t>(k)]) + 1e-300;
   const double all = theta.dot(aa * theta);
   const Eigen::VectorXd right = ab.transpose() * theta;
-  return all > 0.0 ? std::min(1.0, right.dot(bb.ldlt().solve(right)) / all) : 0.0;
+  return all > 0.0 ? std::min(1.0, right.dot(solve_symmetric<Eigen::Dynamic, 1>(bb, right)) / all) : 0.0;
 }
 
 std::vector<Evidence::Gain> Evidence::gains(const State& state) const {

@@ -9,10 +9,8 @@
 #include <limits>
 #include <numeric>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-
 #include "math/frame.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/registration.hpp"
 
 namespace truing::hand_eye {
@@ -132,10 +130,9 @@ Pivot find_pivot(const Frames& poses, const Rows& rows) {
   }
   S /= n, t /= n, Rt /= n;
   // Along an axis that nothing turns about, the mean position.
-  Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix3d> turned(Eigen::Matrix3d::Identity() - S * S.transpose());
-  turned.setThreshold(1e-6);
   Pivot out;
-  out.center = t + turned.solve(S * (S.transpose() * t - Rt));
+  out.center =
+      t + shortest_solution(Eigen::Matrix3d::Identity() - S * S.transpose(), S * (S.transpose() * t - Rt), 1e-6);
   const Eigen::Vector3d p = S.transpose() * out.center - Rt;
   double sum = 0.0;
   for (const std::size_t i : rows) sum += (poses[i] * p - out.center).squaredNorm();
@@ -228,15 +225,15 @@ CameraSolution solve_camera(const Frames& M, const Frames& B, const Rows& rows) 
   out.motions = sums.motions, out.length = screws.length;
   out.incongruence = std::sqrt(sums.incongruence / count);
 
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(sums.axes / count);
+  const SymmetricEigen<3> axes = symmetric_eigen<3>(sums.axes / count);
   for (int k = 0; k < 3; ++k) {
-    out.principal_rotations(k) = 2.0 * std::asin(std::min(1.0, std::sqrt(std::max(0.0, axes.eigenvalues()(2 - k)))));
-    out.principal_axes.col(k) = axes.eigenvectors().col(2 - k);
+    out.principal_rotations(k) = 2.0 * std::asin(std::min(1.0, std::sqrt(std::max(0.0, axes.values(2 - k)))));
+    out.principal_axes.col(k) = axes.vectors.col(2 - k);
   }
 
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> svd(sums.normal / count);  // singular values are its roots
-  out.singular_values = svd.eigenvalues().cwiseMax(0.0).cwiseSqrt().reverse();
-  const Vector8d x = unit_combination(svd.eigenvectors().col(1), svd.eigenvectors().col(0));
+  const auto svd = symmetric_eigen<Eigen::Dynamic>(sums.normal / count);  // singular values are its roots
+  out.singular_values = svd.values.cwiseMax(0.0).cwiseSqrt().reverse();
+  const Vector8d x = unit_combination(svd.vectors.col(1), svd.vectors.col(0));
   out.residual = std::sqrt(std::max(0.0, x.dot(sums.normal * x) / count));
 
   DualQuaternion q;
@@ -257,8 +254,7 @@ Eigen::Isometry3d solve_camera_one_axis(const Frames& M, const Frames& B, const 
                              b = screws.B[i].real * screws.B[0].real.conjugate();
     seen += a.vec().dot(axis) * b.vec();
   }
-  const Eigen::Quaterniond tilt =
-      Eigen::Quaterniond::FromTwoVectors(seen, axis);  // X's rotation but for a turn about the axis
+  const Eigen::Quaterniond tilt = least_rotation(seen, axis);  // X's rotation but for a turn about the axis
   // In the plane across it, (I - R_a) t + z tilt t_b - t_a = 0 with the turn z and the position t as complex numbers:
   // linear in both.
   const Eigen::Vector3d e1 = axis.unitOrthogonal(), e2 = axis.cross(e1);
@@ -276,11 +272,11 @@ Eigen::Isometry3d solve_camera_one_axis(const Frames& M, const Frames& B, const 
     A.row(row + 1) << tb.y(), tb.x(), -std::sin(angle), 1.0 - std::cos(angle);
     rhs.segment<2>(row) = ta;
   }
-  const Eigen::Vector4d z = A.colPivHouseholderQr().solve(rhs);
+  const Eigen::Vector4d z = least_squares(A, rhs);
   const double turn = std::atan2(z(1), z(0));
   // The position again, now with a turn that is one.
   const Eigen::VectorXd rest = rhs - A.leftCols<2>() * Eigen::Vector2d(std::cos(turn), std::sin(turn));
-  const Eigen::Vector2d t = A.rightCols<2>().colPivHouseholderQr().solve(rest);
+  const Eigen::Vector2d t = least_squares(A.rightCols<2>(), rest);
   Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
   X.linear() = (Eigen::AngleAxisd(turn, axis) * tilt).toRotationMatrix();
   X.translation() = t.x() * e1 + t.y() * e2 + height * axis;

@@ -7,9 +7,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-
 #include "hand_eye/closed_form.hpp"
 #include "hand_eye/consensus.hpp"
 #include "hand_eye/errors.hpp"
@@ -19,6 +16,7 @@
 #include "hand_eye/words.hpp"
 #include "math/constants.hpp"
 #include "math/frame.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/statistics.hpp"
 #include "math/text.hpp"
 #include "rooms.hpp"
@@ -142,11 +140,11 @@ void look_at_motions(const CameraSolution& solution, HandEyeResult* result) {
 /// Directions of the camera's position and orientation that stay too wide to be an answer.
 void look_at_errors(const HandEyeOptions& options, double distance, HandEyeResult* result) {
   const auto look = [&](const Eigen::Matrix3d& C, bool rotation, double limit) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(C);
+    const SymmetricEigen<3> eigen = symmetric_eigen<3>(C);
     for (int k = 2; k >= 0; --k) {
-      const double sigma = std::sqrt(std::max(0.0, eigen.eigenvalues()(k)));
+      const double sigma = std::sqrt(std::max(0.0, eigen.values(k)));
       if (sigma <= limit) continue;
-      const Eigen::Vector3d d = with_positive_largest(eigen.eigenvectors().col(k));
+      const Eigen::Vector3d d = with_positive_largest(eigen.vectors.col(k));
       result->unobservable.push_back(unobservable(UnobservableReason::large_error, d, options.setup, rotation, sigma));
     }
   };

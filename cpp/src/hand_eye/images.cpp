@@ -9,11 +9,11 @@
 
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
-#include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
 #include "math/frame.hpp"
+#include "math/linear_algebra.hpp"
 #include "rooms.hpp"
 
 namespace truing::hand_eye {
@@ -173,9 +173,8 @@ PixelSums sum_pixels(const Camera& camera, const Eigen::Matrix3Xd& points, const
 }
 
 Matrix6d inverse_of(const Matrix6d& H) {
-  const Vector6d unit = H.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-  return unit.asDiagonal() * Matrix6d(unit.asDiagonal() * H * unit.asDiagonal()).ldlt().solve(Matrix6d::Identity()) *
-         unit.asDiagonal();
+  const Vector6d unit = unit_scale<6>(H);
+  return scaled_both<6>(unit, inverse_symmetric<6>(scaled_both<6>(unit, H)));
 }
 
 }  // namespace
@@ -196,12 +195,12 @@ BoardFit fit_board(const Camera& camera, const BoardImage& image, const Eigen::I
   if (!std::isfinite(out.sum)) return out;
   for (int iteration = 0; iteration < 50 && !out.converged; ++iteration) {
     const PixelSums sums = sum_pixels(camera, image.points, &image.pixels, out.T_camera_board);
-    const Vector6d unit = sums.H.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-    const Matrix6d scaled = unit.asDiagonal() * sums.H * unit.asDiagonal();
+    const Vector6d unit = unit_scale<6>(sums.H);
+    const Matrix6d scaled = scaled_both<6>(unit, sums.H);
     out.shape = inverse_of(sums.H);
     const Vector6d down = -(unit.asDiagonal() * sums.g);
     for (double damping = 0.0; damping < 1e6; damping = std::max(1e-3, 10.0 * damping)) {  // shorter until it is better
-      const Vector6d step = unit.asDiagonal() * (scaled + damping * Matrix6d::Identity()).ldlt().solve(down);
+      const Vector6d step = unit.cwiseProduct(solve_symmetric<6, 1>(scaled + damping * Matrix6d::Identity(), down));
       const Eigen::Isometry3d next = moved(out.T_camera_board, step);
       const double sum = sum_at(next);
       out.converged = std::abs(out.sum - sum) <= 1e-10 * out.sum + 1e-18;

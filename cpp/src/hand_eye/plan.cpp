@@ -6,14 +6,13 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <Eigen/Cholesky>
-
 #include "hand_eye/closed_form.hpp"
 #include "hand_eye/errors.hpp"
 #include "hand_eye/images.hpp"
 #include "hand_eye/readings.hpp"
 #include "hand_eye/refine.hpp"
 #include "math/frame.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/random.hpp"
 #include "rooms.hpp"
 #include "truing/handeye.hpp"
@@ -75,7 +74,7 @@ Eigen::Vector3d any_vector(Random* random, double length) {
 /// Covariance once a pose of these derivatives and this noise is measured too (Woodbury).
 Matrix12d with_pose(const Matrix12d& C, const LoopRow& row) {
   const Eigen::Matrix<double, 6, 12> JC = row.J * C;
-  return C - JC.transpose() * Matrix6d(row.V + JC * row.J.transpose()).ldlt().solve(JC);
+  return C - JC.transpose() * solve_symmetric<6, 12>(row.V + JC * row.J.transpose(), JC);
 }
 
 }  // namespace
@@ -108,12 +107,10 @@ std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeR
   for (std::size_t i = 0; i < poses.T_base_hand.size(); ++i) {
     if (result.residuals[i].rejected || (!poses.set.empty() && poses.set[i] != 0)) continue;
     const LoopRow row = row_of(poses.T_base_hand[i], poses.T_camera_board[i]);
-    N += row.J.transpose() * row.V.llt().solve(row.J);
+    N += row.J.transpose() * solve_definite<6, 12>(row.V, row.J);
   }
   const Eigen::Matrix<double, 12, 1> unit = N.diagonal().cwiseSqrt().cwiseInverse();
-  Matrix12d C = unit.asDiagonal() *
-                Matrix12d(unit.asDiagonal() * N * unit.asDiagonal()).ldlt().solve(Matrix12d::Identity()) *
-                unit.asDiagonal();
+  Matrix12d C = scaled_both<12>(unit, inverse_symmetric<Eigen::Dynamic>(scaled_both<12>(unit, N)));
   const auto variance = [&](const Matrix12d& covariance) {
     return at_working_point({X, covariance.topLeftCorner<6, 6>()}, result.working_point).trace();
   };

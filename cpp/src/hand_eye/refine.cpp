@@ -7,12 +7,9 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include "math/frame.hpp"
 #include "math/gauss_newton.hpp"
+#include "math/linear_algebra.hpp"
 
 namespace truing::hand_eye {
 namespace {
@@ -91,7 +88,7 @@ LoopSums sum_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Iso
   for (const std::size_t i : rows) {
     linearise(problem, i, X, Y, &e, &J, &w);
     const Shapes shape = shapes(problem, i, w);
-    const Matrix6d W = weighted_sum(shape, noise).llt().solve(Matrix6d::Identity());
+    const Matrix6d W = solve_definite<6, 6>(weighted_sum(shape, noise), Matrix6d::Identity());
     const Eigen::Matrix<double, 6, 12> WJ = W * J;
     const Vector6d We = W * e;
     s.N.noalias() += J.transpose() * WJ;
@@ -122,11 +119,11 @@ LoopSums sum_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Iso
 
 /// Inverse of the information, by unit diagonal; false where it has none.
 bool invert(const Matrix12d& N, Matrix12d* C) {
-  const Vector12d unit = N.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Matrix12d> eigen(unit.asDiagonal() * N * unit.asDiagonal());
-  if (!(eigen.eigenvalues()(0) > kSingular * eigen.eigenvalues()(11))) return false;
-  *C = unit.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
-       eigen.eigenvectors().transpose() * unit.asDiagonal();
+  const Vector12d unit = unit_scale<12>(N);
+  const auto eigen = symmetric_eigen<Eigen::Dynamic>(scaled_both<12>(unit, N));
+  if (!(eigen.values(0) > kSingular * eigen.values(11))) return false;
+  *C = scaled_both<12>(
+      unit, carried<Eigen::Dynamic, Eigen::Dynamic>(eigen.vectors, eigen.values.cwiseInverse().asDiagonal()));
   return true;
 }
 
@@ -167,7 +164,7 @@ double step_variances(const LoopSums& s, const Matrix12d& C, std::size_t rows, S
     const double even = total / static_cast<double>(n) / std::max(s.trace[k], 1e-300);
     score(a) -= std::log(noise->variance[k] / even) / (kPriorSpread * kPriorSpread);
   }
-  const Eigen::VectorXd full = F.ldlt().solve(score);
+  const Eigen::VectorXd full = solve_symmetric<Eigen::Dynamic, 1>(F, score);
   if (stride->last.size() == n)
     stride->factor = stride->last.dot(full) < -0.25 * stride->last.squaredNorm() ? 0.5 * stride->factor
                                                                                  : std::min(1.0, 1.5 * stride->factor);
@@ -250,30 +247,28 @@ OneMore one_more_unknown(const LoopProblem& problem, const Rows& rows, const Loo
     const LoopRow row = loop_row(problem, i, fit.X, fit.Y, fit.noise);
     Eigen::Matrix<double, 6, 13> J;
     J << row.J, derivative(i);
-    const Eigen::Matrix<double, 6, 13> WJ = row.V.llt().solve(J);
+    const Eigen::Matrix<double, 6, 13> WJ = solve_definite<6, 13>(row.V, J);
     N += J.transpose() * WJ, g += WJ.transpose() * row.e;
   }
-  const Eigen::VectorXd unit = N.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit.asDiagonal() * N * unit.asDiagonal());
+  const Eigen::VectorXd unit = unit_scale<Eigen::Dynamic>(N);
+  const auto eigen = symmetric_eigen<Eigen::Dynamic>(scaled_both<Eigen::Dynamic>(unit, N));
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  if (!(eigen.eigenvalues()(0) > kSingular * eigen.eigenvalues()(12))) return {nan, nan};
+  if (!(eigen.values(0) > kSingular * eigen.values(12))) return {nan, nan};
   // The last row of the inverse.
-  const Eigen::VectorXd last =
-      unit(12) *
-      (unit.asDiagonal() * (eigen.eigenvectors() *
-                            (eigen.eigenvectors().row(12).transpose().array() / eigen.eigenvalues().array()).matrix()));
+  const Eigen::VectorXd share = eigen.vectors.row(12).transpose().cwiseQuotient(eigen.values);
+  const Eigen::VectorXd last = unit(12) * unit.cwiseProduct(eigen.vectors * share);
   return {-last.dot(g), std::sqrt(last(12))};
 }
 
 Vector6d left_out(const LoopRow& row, const Matrix12d& covariance) {
-  const Matrix6d hat = row.J * covariance * row.J.transpose() * row.V.llt().solve(Matrix6d::Identity());
-  return (Matrix6d::Identity() - hat).partialPivLu().solve(row.e);
+  const Matrix6d hat = carried<6, 12>(row.J, covariance) * solve_definite<6, 6>(row.V, Matrix6d::Identity());
+  return solve_square<6>(Matrix6d::Identity() - hat, row.e);
 }
 
 double standardised(const LoopRow& row, const Matrix12d& covariance, bool fitted) {
-  const Matrix6d seen = row.J * covariance * row.J.transpose();
+  const Matrix6d seen = carried<6, 12>(row.J, covariance);
   const Matrix6d V = fitted ? Matrix6d(row.V - seen) : Matrix6d(row.V + seen);
-  return std::sqrt(std::max(0.0, row.e.dot(V.ldlt().solve(row.e))) / 6.0);
+  return std::sqrt(std::max(0.0, row.e.dot(solve_symmetric<6, 1>(V, row.e))) / 6.0);
 }
 
 }  // namespace truing::hand_eye

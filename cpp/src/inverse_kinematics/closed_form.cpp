@@ -8,6 +8,7 @@
 
 #include <Eigen/LU>
 
+#include "math/linear_algebra.hpp"
 #include "math/trigonometry.hpp"
 
 // Product of exponentials (Brockett 1984): T(q) = e1(q1) ... e6(q6) T(0), e_k a turn about axis k where it stands at
@@ -138,7 +139,7 @@ Vector3d meeting_point(const Vector3d* h, const Vector3d* o, std::initializer_li
     A += P;
     b += P * o[k];
   }
-  return A.ldlt().solve(b);
+  return solve_symmetric<3, 1>(A, b);
 }
 
 double distance_to_line(const Vector3d& point, const Vector3d& h, const Vector3d& o) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "inverse_kinematics/descent.hpp"
 #include "math/constants.hpp"
+#include "math/registration.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -329,8 +330,7 @@ Goal pose_at_roll(const Goal& goal, double roll) {
                          std::tan(nearest_to_zero(goal.work)) * goal.across + goal.axis;
   Goal pose = goal;
   pose.kind = TaskKind::pose;
-  pose.rotation =
-      goal.rotation * Eigen::Quaterniond::FromTwoVectors(goal.axis, leant) * Eigen::AngleAxisd(roll, goal.axis);
+  pose.rotation = goal.rotation * least_rotation(goal.axis, leant) * Eigen::AngleAxisd(roll, goal.axis);
   return pose;
 }
 

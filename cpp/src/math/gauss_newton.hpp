@@ -19,6 +19,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "math/linear_algebra.hpp"
+
 #include "rooms.hpp"
 
 namespace truing::math {
@@ -57,7 +59,7 @@ struct Iterations {
 struct CholeskyStep {
   template <int N>
   Eigen::Matrix<double, N, 1> operator()(const NormalSystem<N>& system) const {
-    return -system.gram.ldlt().solve(system.gradient);
+    return -solve_symmetric<Eigen::Dynamic, 1>(system.gram, system.gradient);
   }
 };
 
@@ -114,7 +116,7 @@ DampedStep<N> damped_step(const NormalSystem<N>& system, double mu) {
   Eigen::Matrix<double, N, N> h = scale.asDiagonal() * system.gram * scale.asDiagonal();
   const Eigen::Matrix<double, N, 1> g = scale.cwiseProduct(system.gradient);
   h.diagonal().array() += mu;
-  const Eigen::Matrix<double, N, 1> step = -h.llt().solve(g);
+  const Eigen::Matrix<double, N, 1> step = -solve_definite<Eigen::Dynamic, 1>(h, g);
   DampedStep<N> out;
   out.delta = scale.cwiseProduct(step);
   out.predicted_fall = -step.dot(g) + mu * step.squaredNorm();  // |r|^2 - |r + J step|^2 for the damped step

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
+#include "math/linear_algebra.hpp"
 
 namespace truing::math {
 namespace {
@@ -57,8 +57,8 @@ Rank find_rank(const Eigen::MatrixXd& gram, const std::vector<int>& priority, do
     for (Eigen::Index i = 0; i < kept; ++i)
       cross(i, j) = scale[rank.kept[i]] * gram(rank.kept[i], rank.frozen[j]) * scale[rank.frozen[j]];
   }
-  rank.combination =
-      kept > 0 && frozen > 0 ? Eigen::MatrixXd(inner.ldlt().solve(cross)) : Eigen::MatrixXd::Zero(kept, frozen);
+  rank.combination = kept > 0 && frozen > 0 ? solve_symmetric<Eigen::Dynamic, Eigen::Dynamic>(inner, cross)
+                                            : Eigen::MatrixXd::Zero(kept, frozen);
   for (Eigen::Index j = 0; j < frozen; ++j) {
     for (Eigen::Index i = 0; i < kept; ++i) {
       // A unit column explained to one part in a million has its weights no better than that.
@@ -72,8 +72,7 @@ Rank find_rank(const Eigen::MatrixXd& gram, const std::vector<int>& priority, do
 
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& gram) {
   const Eigen::VectorXd scale = unit_scales(gram);
-  const Eigen::MatrixXd unit = scale.asDiagonal() * gram * scale.asDiagonal();
-  const Eigen::MatrixXd inverse = unit.ldlt().solve(Eigen::MatrixXd::Identity(gram.rows(), gram.cols()));
+  const Eigen::MatrixXd inverse = inverse_symmetric<Eigen::Dynamic>(scaled_both<Eigen::Dynamic>(scale, gram));
   return scale.asDiagonal() * (0.5 * (inverse + inverse.transpose())) * scale.asDiagonal();
 }
 

@@ -3,15 +3,19 @@
 
 #include "math/registration.hpp"
 
-#include <Eigen/SVD>
+#include "math/linear_algebra.hpp"
 
 namespace truing::math {
 
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const SingularValues svd = singular_values(m);
   Eigen::Matrix3d sign = Eigen::Matrix3d::Identity();
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0) sign(2, 2) = -1.0;  // Umeyama eq. (39)
-  return svd.matrixU() * sign * svd.matrixV().transpose();
+  if (svd.U.determinant() * svd.V.determinant() < 0.0) sign(2, 2) = -1.0;  // Umeyama eq. (39)
+  return svd.U * sign * svd.V.transpose();
+}
+
+Eigen::Quaterniond least_rotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  return Eigen::Quaterniond::FromTwoVectors(from, to);
 }
 
 Eigen::Isometry3d register_points(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {

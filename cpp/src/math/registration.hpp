@@ -8,6 +8,9 @@
 
 namespace truing::math {
 
+/// The least rotation that turns one direction into the other.
+Eigen::Quaterniond least_rotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 /// The rigid frame T that makes T * from nearest to `to` in least squares: Umeyama 1991, eqs. (38)-(42), without scale.
 /// shape=(3, n)
 Eigen::Isometry3d register_points(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to);

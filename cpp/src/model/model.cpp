@@ -9,6 +9,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "math/registration.hpp"
+
 namespace truing::model {
 namespace {
 
@@ -79,8 +81,7 @@ class Builder {
         break;
       case Convention::urdf: {
         add_frame(joint.name, joint.T_parent_joint, Role::geometry, index);
-        const Eigen::Matrix3d z_to_axis =
-            Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), joint.axis).toRotationMatrix();
+        const Eigen::Matrix3d z_to_axis = least_rotation(Eigen::Vector3d::UnitZ(), joint.axis).toRotationMatrix();
         add_fixed(z_to_axis);
         Site motion;
         motion.motion = joint.type == JointType::revolute ? Motion::rotate_z : Motion::translate_z;

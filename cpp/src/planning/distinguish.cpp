@@ -9,9 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include <Eigen/QR>
-
 #include "math/constants.hpp"
+#include "math/linear_algebra.hpp"
 #include "model/effects/traits.hpp"
 #include "model/model.hpp"
 #include "planning/groups.hpp"
@@ -105,7 +104,7 @@ MatrixXd left_by_rival(const View& view, const Columns& there, const std::vector
   MatrixXd both(x.here.rows() + x.there.rows(), x.here.cols()), wanted(both.rows(), y.here.cols());
   both << x.here, little * x.there;
   wanted << y.here, little * y.there;
-  return y.there - x.there * Eigen::ColPivHouseholderQR<MatrixXd>(both).solve(wanted);
+  return y.there - x.there * least_squares(both, wanted);
 }
 
 /// The pose, of some hundred, where rivals that are fitted to each other on what is planned already still differ most

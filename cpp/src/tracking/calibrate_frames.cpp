@@ -8,12 +8,10 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-
 #include "math/constants.hpp"
 #include "math/direction.hpp"
 #include "math/gauss_newton.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/registration.hpp"
 #include "math/rotation.hpp"
 #include "math/text.hpp"
@@ -229,7 +227,7 @@ Matrix12d covariance_of(const FramesIteration& fit, std::vector<PositionError>* 
     information += fit.J[i].transpose() * weight.asDiagonal() * fit.J[i];
     (*errors)[i] = {e.head<3>().norm(), e.tail<3>().norm(), w};
   }
-  return psi / (slope * slope) * information.ldlt().solve(Matrix12d::Identity());
+  return psi / (slope * slope) * inverse_symmetric<Eigen::Dynamic>(information);
 }
 
 void refine_frames(const std::vector<Isometry3d>& F, const std::vector<Isometry3d>& T, FramesResult* out) {
@@ -337,23 +335,22 @@ ToolResult calibrate_tool(const ToolPoses& poses) {
     mean += poses.pivot[i].linear() / static_cast<double>(n);
   }
   // What the poses turn by: the normal matrix of t alone is n (I - mean^T mean), zero along an axis they all share.
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> spread(Matrix3d::Identity() - mean.transpose() * mean);
-  if (spread.eigenvalues()[0] < kLeastTurn * kLeastTurn) {
+  const SymmetricEigen<3> spread = symmetric_eigen<3>(Matrix3d::Identity() - mean.transpose() * mean);
+  if (spread.values[0] < kLeastTurn * kLeastTurn) {
     out.status = CalibrationStatus::not_observable;
-    const Vector3d axis = spread.eigenvectors().col(0);
+    const Vector3d axis = spread.vectors.col(0);
     out.message = "The tool point is not observable along flange (" + number(axis.x(), 2) + ", " + number(axis.y(), 2) +
                   ", " + number(axis.z(), 2) +
                   "): tilt the tool by 30 deg or more about two axes while its tip stays on the point.";
     return out;
   }
   const Eigen::Matrix<double, 6, 6> normal = A.transpose() * A;
-  const Vector6d x = normal.ldlt().solve(A.transpose() * b);
+  const Vector6d x = solve_symmetric<6, 1>(normal, A.transpose() * b);
   const Eigen::VectorXd e = A * x - b;
   out.T_flange_tool.T.translation() = x.head<3>();
   out.point = x.tail<3>();
   const double variance = e.squaredNorm() / std::max(1.0, 3.0 * static_cast<double>(n) - 6.0);
-  out.T_flange_tool.covariance.topLeftCorner<3, 3>() =
-      variance * Eigen::Matrix<double, 6, 6>(normal.inverse()).topLeftCorner<3, 3>();
+  out.T_flange_tool.covariance.topLeftCorner<3, 3>() = variance * inverse_symmetric<6>(normal).topLeftCorner<3, 3>();
   for (std::size_t i = 0; i < n; ++i) out.pivot_error.push_back(e.segment<3>(static_cast<Eigen::Index>(3 * i)).norm());
 
   const std::size_t m = poses.orientation.size();

@@ -7,12 +7,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
-
 #include "math/constants.hpp"
 #include "math/gauss_newton.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/registration.hpp"
 #include "math/rotation.hpp"
 #include "math/text.hpp"
@@ -308,9 +305,9 @@ std::optional<Refusal> look_at_speed(const SpeedPairs& pairs) {
 
 /// Handedness of the frames, and about how many axes they turn.
 std::optional<Refusal> look_at_axes(const Matrix3d& covariance) {
-  const Eigen::JacobiSVD<Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Vector3d singular = svd.singularValues();
-  const bool reflected = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0;
+  const SingularValues svd = singular_values(covariance);
+  const Vector3d& singular = svd.values;
+  const bool reflected = (svd.U * svd.V.transpose()).determinant() < 0.0;
   if (reflected && singular[2] > (1.0 - kMirrored) * 0.5 * singular[1])
     return Refusal{
         CalibrationStatus::not_consistent,
@@ -336,9 +333,8 @@ std::optional<Refusal> look_at_motion(const SpeedAlignment& aligned) {
 /// Rms about the three principal axes, descending [rad/s].
 Vector3d rotation_rate(const SpeedPairs& pairs) {
   const Matrix3Xd centred = pairs.centred_receiver();
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(centred * centred.transpose() /
-                                                     static_cast<double>(centred.cols()));
-  return axes.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
+  const Matrix3d covariance = centred * centred.transpose() / static_cast<double>(centred.cols());
+  return symmetric_eigen<3>(covariance).values.reverse().cwiseMax(0.0).cwiseSqrt();
 }
 
 // ---- The fit --------------------------------------------------------------------------------------------------------
@@ -456,12 +452,13 @@ bool Fit::settled(const NormalSystem<kGlobal>& at, const GlobalVector& step) {
 /// Sandwich (Huber 1967): segments are independent of each other, what is inside one need not be. Each with its own
 /// pull on the result taken out (jackknife; MacKinnon and White 1985, HC3).
 GlobalMatrix covariance_of(const Fit& fit) {
-  const GlobalMatrix inverse = fit.information.ldlt().solve(GlobalMatrix::Identity());
+  const GlobalMatrix inverse = inverse_symmetric<Eigen::Dynamic>(fit.information);
   GlobalMatrix B = fit.prior.asDiagonal();
   for (std::size_t n = 0; n < fit.segments.size(); ++n) {
     if (fit.systems[n].samples == 0.0) continue;
     const NormalSystem<kGlobal>& own = fit.shared[n];
-    const GlobalVector alone = (GlobalMatrix::Identity() - own.gram * inverse).partialPivLu().solve(own.gradient);
+    const GlobalVector alone =
+        solve_square<Eigen::Dynamic>(GlobalMatrix::Identity() - own.gram * inverse, own.gradient);
     B += alone * alone.transpose();
   }
   const GlobalMatrix sandwich = inverse * B * inverse;

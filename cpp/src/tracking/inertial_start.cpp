@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/SVD>
-
+#include "math/linear_algebra.hpp"
 #include "math/rotation.hpp"
 
 namespace truing::tracking {
@@ -87,7 +86,7 @@ double correlation(const SpeedPairs& pairs, Matrix3d* covariance = nullptr) {
   const Matrix3d H = b * a.transpose();
   if (covariance) *covariance = H;
   const double scale = std::sqrt(a.squaredNorm() * b.squaredNorm());
-  return scale > 0.0 ? Eigen::JacobiSVD<Matrix3d>(H).singularValues().sum() / scale : 0.0;
+  return scale > 0.0 ? singular_values(H).values.sum() / scale : 0.0;
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "math/linear_algebra.hpp"
+
 namespace truing::tracking {
 namespace {
 

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "math/registration.hpp"
 #include "model/effects/families.hpp"
 #include "model/effects/terms.hpp"
 
@@ -24,7 +25,7 @@ std::vector<Term> wobble(const std::string& name, int order, const Robot& robot,
   Eigen::Matrix<double, 3, 2> tilts = Eigen::Matrix<double, 3, 2>::Identity();
   const auto about_any_axis = [&](const std::string& frame, const Eigen::Matrix3d& rotation, const Vector3d& axis) {
     sites = {frame + ".rx", frame + ".ry", frame + ".rz"};
-    const Eigen::Matrix3d from_z = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
+    const Eigen::Matrix3d from_z = least_rotation(Vector3d::UnitZ(), axis).toRotationMatrix();
     tilts = (rotation * from_z).leftCols<2>();
   };
   switch (robot.convention) {
