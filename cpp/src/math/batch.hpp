@@ -17,7 +17,8 @@ namespace truing::math {
 
 /// Calls work(k) for every k below count, on so many threads (0: as many as the machine has). What work(k) does must
 /// not depend on the others, and then nothing depends on the number of threads. `progress` is called by the calling
-/// thread; false stops. The first exception comes out when all threads have ended.
+/// thread with how many are done, the last time with all; false stops. The first exception comes out when all threads
+/// have ended.
 inline void for_each_on_threads(std::size_t count, int threads, const std::function<bool(std::size_t)>& progress,
                                 const std::function<void(std::size_t)>& work) {
   constexpr std::size_t kChunk = 64;
@@ -27,6 +28,7 @@ inline void for_each_on_threads(std::size_t count, int threads, const std::funct
   workers = std::max<std::size_t>(1, std::min(workers, chunks));
   std::atomic<std::size_t> next{0}, done{0};
   std::atomic<bool> stop{false};
+  std::size_t reported = 0;
   std::exception_ptr failure;
   std::mutex mutex;
   const auto run = [&](bool reports) {
@@ -35,7 +37,7 @@ inline void for_each_on_threads(std::size_t count, int threads, const std::funct
         const std::size_t end = std::min(count, (chunk + 1) * kChunk);
         for (std::size_t k = chunk * kChunk; k < end; ++k) work(k);
         done += end - chunk * kChunk;
-        if (reports && progress && !progress(done)) stop = true;
+        if (reports && progress && !progress(reported = done)) stop = true;
       }
     } catch (...) {
       const std::lock_guard<std::mutex> lock(mutex);
@@ -48,6 +50,7 @@ inline void for_each_on_threads(std::size_t count, int threads, const std::funct
   run(true);
   for (std::thread& helper : helpers) helper.join();
   if (failure) std::rethrow_exception(failure);
+  if (progress && !stop && reported < count) progress(count);  // the others did the last ones
 }
 
 }  // namespace truing::math
