@@ -4,7 +4,7 @@
 
 /// Sanitizers look at memory, not at statistics, and take fifty times as long: tests that average over seeds take a few
 /// under them, and leave the averages unchecked.
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(TRUING_SANITIZED)
 constexpr bool kSanitized = true;
 #else
 constexpr bool kSanitized = false;

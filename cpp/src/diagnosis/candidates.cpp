@@ -15,7 +15,6 @@
 namespace truing::diagnosis {
 namespace {
 
-const char* const kFrame[6] = {"x", "y", "z", "rx", "ry", "rz"};
 constexpr int kDriftKnots[3] = {6, 12, 24};
 /// Every law has a number at every joint.
 constexpr int kLaws = 8;

@@ -16,6 +16,9 @@
 
 namespace truing::diagnosis {
 
+/// Coordinates of a frame, in the order of its columns.
+constexpr const char* kFrame[6] = {"x", "y", "z", "rx", "ry", "rz"};
+
 /// One candidate, as the user reads it and as `identify` is asked for it.
 struct Explanation {
   enum class Kind { catalogue, all_geometry, drift, law, free };

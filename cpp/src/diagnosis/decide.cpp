@@ -21,6 +21,10 @@ constexpr double kFreeShare = 0.04;  ///< of what is left, that a free function 
 constexpr double kMeshNats =
     5.0;  ///< beyond the threshold, that a mesh order must win: waves this short fit anything a little
 
+const EffectTraits& effect_traits(const Work& work, const Explanation& e) {
+  return model::traits_of(e.effect, work.given.options.own_effects);
+}
+
 int input_named(const Work& work, const std::string& name) {
   for (std::size_t k = 0; k < work.inputs.size(); ++k) {
     if (work.inputs[k].name == name) return static_cast<int>(k);
@@ -234,10 +238,6 @@ static int add_fine_function(Work* work, const Robot& robot, std::size_t joint, 
   return static_cast<int>(work->design.candidates.groups.size()) - 1;
 }
 
-static const EffectTraits& traits_of(const Work& work, const Explanation& e) {
-  return model::traits_of(e.effect, work.given.options.own_effects);
-}
-
 static Evidence evidence_now(const Work& work) {
   return Evidence(work.grams.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
 }
@@ -250,7 +250,7 @@ static void drop_parts_of_all_links(const Work& work, Decision* decision) {
   for (const int g : decision->state.choice.groups) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     all_links |= e.kind == Kind::all_geometry;
-    const bool is_part = e.effect == links || is_contained(traits_of(work, e), links, Containment::part);
+    const bool is_part = e.effect == links || is_contained(effect_traits(work, e), links, Containment::part);
     if (e.kind == Kind::catalogue && is_part) single.push_back(g);
   }
   if (all_links && !single.empty())
@@ -264,7 +264,7 @@ static void drop_special_cases(const Work& work, Decision* decision) {
     std::vector<int> smaller;
     for (const int g : decision->state.choice.groups) {
       const Explanation& other = work.design.candidates.named[static_cast<std::size_t>(g)];
-      if (other.joints == e.joints && is_contained(traits_of(work, other), e.effect, Containment::special_case))
+      if (other.joints == e.joints && is_contained(effect_traits(work, other), e.effect, Containment::special_case))
         smaller.push_back(g);
     }
     if (smaller.empty()) continue;
@@ -290,7 +290,7 @@ struct Question {
 
 /// An effect whose law at the joint may be another one.
 static bool has_law_at(const Work& work, const Explanation& e, const std::string& joint) {
-  const EffectTraits& traits = traits_of(work, e);
+  const EffectTraits& traits = effect_traits(work, e);
   return e.joints == std::vector<std::string>{joint} && traits.stands_for != StandsFor::link_geometry &&
          traits.search != Search::by_order;
 }
@@ -326,7 +326,7 @@ static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence
       continue;
     const Evidence::Gain gain = evidence.gain(rest, groups[g].columns, groups[g].cost);
     const double share = gain.squares / std::max(together, 1e-300);
-    if (share > least_share_of_law(traits_of(work, e)) && gain.score > best.score) {
+    if (share > least_share_of_law(effect_traits(work, e)) && gain.score > best.score) {
       best = gain;
       best.group = static_cast<int>(g);
     }
@@ -343,7 +343,7 @@ static std::vector<int> replaced_by_function(const Work& work, const Question& q
   for (const int g : q.here) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     const bool of_these = std::any_of(inputs.begin(), inputs.end(), [&](int i) { return name_of(i) == e.driver; });
-    if (g != q.function && (of_these || (by_configuration && follows_configuration(traits_of(work, e)))))
+    if (g != q.function && (of_these || (by_configuration && follows_configuration(effect_traits(work, e)))))
       gone.push_back(g);
   }
   return gone;

@@ -151,10 +151,6 @@ static std::string at_joints(const std::vector<std::string>& joints) {
   return " at " + listed(joints);
 }
 
-static const EffectTraits& traits_of(const Work& work, const Explanation& e) {
-  return model::traits_of(e.effect, work.given.options.own_effects);
-}
-
 /// What the data vary, as far as it tells effects apart.
 static Recorded recorded(const Work& work) {
   Recorded out;
@@ -279,7 +275,7 @@ static std::vector<Alternative> class_of(const Work& work, const Explanation& e,
 static std::vector<Alternative> untested_mimics(const Work& work, const Explanation& e) {
   std::vector<Alternative> out;
   const std::vector<NotTestable>& untested = work.design.candidates.not_testable;
-  for (const std::string& name : traits_of(work, e).mimicked_by) {
+  for (const std::string& name : effect_traits(work, e).mimicked_by) {
     const auto lacking = std::find_if(untested.begin(), untested.end(), [&](const NotTestable& n) {
       return n.effect == name && n.reason == Untestable::column_missing;
     });
@@ -295,7 +291,7 @@ static std::vector<Alternative> untested_mimics(const Work& work, const Explanat
 static void draw_law(const Work& work, const Decision& decision, int g, FoundEffect* out) {
   const auto& named = work.design.candidates.named;
   const Explanation& e = named[static_cast<std::size_t>(g)];
-  const EffectTraits& traits = traits_of(work, e);
+  const EffectTraits& traits = effect_traits(work, e);
   const auto at_joint = [&](int input) {
     const std::size_t joint = work.given.frames.robot.joint_index(e.joints[0]);
     return Along{input, work.design.joint_column[joint][0]};
@@ -458,7 +454,7 @@ std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidenc
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const Explanation& e = named[g];
     if (e.kind != Kind::catalogue || groups[g].columns.empty() || groups[g].shadow ||
-        traits_of(work, e).search == Search::by_order)
+        effect_traits(work, e).search == Search::by_order)
       continue;
     const std::vector<int>& chosen = state.choice.groups;
     if (std::find(chosen.begin(), chosen.end(), static_cast<int>(g)) != chosen.end()) continue;

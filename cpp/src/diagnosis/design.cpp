@@ -21,7 +21,6 @@ namespace {
 using Kind = Explanation::Kind;
 constexpr int kFolds = 12;
 constexpr int kTestFolds = 8;
-const char* const kFrame[6] = {"x", "y", "z", "rx", "ry", "rz"};
 
 double root_mean_square(const std::vector<double>& values, const std::vector<std::int32_t>& rows) {
   double sum = 0.0;

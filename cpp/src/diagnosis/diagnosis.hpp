@@ -116,6 +116,8 @@ inline bool is_named(const Explanation& e) {
          e.kind == Explanation::Kind::drift;
 }
 
+/// Traits of the effect that an explanation names.
+const EffectTraits& effect_traits(const Work& work, const Explanation& e);
 /// Index of an input; -1: there is none of that name.
 int input_named(const Work& work, const std::string& name);
 /// A choice less one group, and less what corrects its law.

@@ -219,7 +219,7 @@ static double design_effect_of(const Design& design, const Eigen::VectorXd& weig
 }
 
 Weighted weigh(const Design& design, const Measurements& data) {
-  constexpr int kRounds = 3;             // fits
+  constexpr int kFits = 3;               // fits
   constexpr double kCountsLittle = 0.2;  // root of the weight of a row that is said to be an outlier
   const std::vector<Block> blocks = blocks_of(design);
   const Eigen::VectorXd own = own_weights(design, data);
@@ -233,11 +233,11 @@ Weighted weigh(const Design& design, const Measurements& data) {
     for (std::size_t b = 0; b < blocks.size(); ++b) {
       const auto [first, count, kind, training] = blocks[b];
       const double root = tails ? root_weight(blocks[b], squares[b]) : 1.0;
-      if (round == kRounds && root < kCountsLittle)
+      if (round == kFits && root < kCountsLittle)
         out.noise.outliers.push_back(design.row[static_cast<std::size_t>(first)]);
       out.weight.segment(first, count) = own.segment(first, count) * root / sigma[static_cast<std::size_t>(kind)];
     }
-    if (round == kRounds) break;
+    if (round == kFits) break;
     const auto kinds = std::count_if(sigma.begin(), sigma.end(), [](double noise) { return noise > 0.0; });
     flexible.fit(out.weight, kinds == 1 && !tails ? *std::max_element(sigma.begin(), sigma.end()) : 0.0);
   }

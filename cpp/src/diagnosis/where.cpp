@@ -7,10 +7,9 @@
 #include <cmath>
 #include <map>
 
-#include <Eigen/Eigenvalues>
-
 #include "diagnosis/free_search.hpp"
 #include "estimation/evidence.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/random.hpp"
 #include "math/statistics.hpp"
 
@@ -84,7 +83,8 @@ double explained(const Gram& gram, Eigen::Index nuisance, double* closable) {
   const Eigen::Index p = d.rows();
   const Eigen::MatrixXd base =
       d.topLeftCorner(nuisance, nuisance) + (1e-10 * d.diagonal().head(nuisance)).asDiagonal().toDenseMatrix();
-  const double before = gram.yy - gram.xy.head(nuisance).dot(base.ldlt().solve(gram.xy.head(nuisance)));
+  const double before =
+      gram.yy - gram.xy.head(nuisance).dot(solve_symmetric<Eigen::Dynamic, 1>(base, gram.xy.head(nuisance)));
   for (Eigen::Index k = 0; k < p; ++k) d(k, k) += 1e-10 * gram.xx(k, k) + (k < nuisance ? 0.0 : 1.0 / (1e-3 * 1e-3));
   const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(d));
   const double after = gram.yy - gram.xy.dot(factor.solve(gram.xy));
@@ -124,12 +124,12 @@ Share share_of(const Design& design, const Design::Rows& more, const std::vector
 
 void share_out(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot, double design_effect,
                std::uint64_t seed, Diagnosis* out) {
-  constexpr std::size_t kMostInputs = 20;
+  constexpr std::size_t kMostMoving = 20;
   const std::vector<Eigen::Index> at = some_training_rows(design, kMostValues).at;
   const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size());
   std::vector<int> moving;
   for (std::size_t k = 0; k < inputs.size(); ++k) {
-    if (!inputs[k].constant && inputs[k].name.rfind("torque", 0) != 0 && moving.size() < kMostInputs)
+    if (!inputs[k].constant && inputs[k].name.rfind("torque", 0) != 0 && moving.size() < kMostMoving)
       moving.push_back(static_cast<int>(k));
   }
   std::vector<int> every_site;
@@ -173,9 +173,9 @@ void map_workspace(const Robot& robot, const Measurements& data, const Residuals
   if (places.size() < 3) return;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& e : errors) covariance += e * e.transpose() / static_cast<double>(errors.size());
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
-  out->direction = axes.eigenvectors().rowwise().reverse();
-  out->direction_rms = axes.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
+  const SymmetricEigen<3> axes = symmetric_eigen<3>(covariance);
+  out->direction = axes.vectors.rowwise().reverse();
+  out->direction_rms = axes.values.reverse().cwiseMax(0.0).cwiseSqrt();
   Eigen::Vector3d low = places[0], high = places[0];
   for (const Eigen::Vector3d& p : places) {
     low = low.cwiseMin(p);

@@ -18,7 +18,7 @@
 namespace truing::inverse_kinematics {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
+constexpr double kNoWay = std::numeric_limits<double>::infinity();
 constexpr int kMostPlaces = 160;  // rolls times places of the rails
 constexpr int kSearchSeeds = 24;  // of robots without closed form, for each target
 constexpr double kGapCost = 1e6;  // so that the fewest gaps come first
@@ -26,7 +26,7 @@ constexpr double kGapCost = 1e6;  // so that the fewest gaps come first
 /// A way to be at one target, and the cheapest chain that ends there.
 struct Node {
   double readings[kMaxDrivenJoints];
-  double cost = kNone;
+  double cost = kNoWay;
   std::int32_t before = -1;  ///< node of the target before
 };
 using Layer = std::vector<Node>;
@@ -146,7 +146,7 @@ double step_cost(const PreparedRobot& robot, const double* from, const double* t
   double sum = 0.0;
   for (int j = 0; j < robot.driven(); ++j) {
     const double way = std::abs(to[j] - from[j]);
-    if (way > slack * longest_step(robot, how, j)) return kNone;
+    if (way > slack * longest_step(robot, how, j)) return kNoWay;
     const double scaled = way / robot.scales.joint[j];
     sum += scaled * scaled;
   }
@@ -175,7 +175,7 @@ void connect(const PreparedRobot& robot, const PathOptions& how, double slack, c
     std::copy(node->readings, node->readings + n, readings);
     turn_near(robot, from.readings, readings);
     double cost = step_cost(robot, from.readings, readings, how, slack);
-    if (cost == kNone) cost = kGapCost + distance2(robot, readings, from.readings);
+    if (cost == kNoWay) cost = kGapCost + distance2(robot, readings, from.readings);
     if (from.cost + cost >= node->cost) continue;
     node->cost = from.cost + cost;
     node->before = static_cast<std::int32_t>(i);
@@ -254,7 +254,7 @@ std::vector<Joints> follow_back(const PreparedRobot& robot, const std::vector<Go
 void even_out(const PreparedRobot& robot, const std::vector<Goal>& goals, const PathOptions& how,
               EffectScratch* scratch, std::vector<Joints>* joints) {
   const auto cost = [&](const Joints& a, const Joints& b, const Joints& c) {
-    return step_cost(robot, a.data(), b.data(), how, kNone) + step_cost(robot, b.data(), c.data(), how, kNone);
+    return step_cost(robot, a.data(), b.data(), how, kNoWay) + step_cost(robot, b.data(), c.data(), how, kNoWay);
   };
   for (int round = 0; round < how.smoothing; ++round) {
     double gain = 0.0;

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/constants.hpp"
+
 namespace truing::tracking {
 namespace {
 
@@ -14,7 +16,6 @@ using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kTwoPi = 6.283185307179586;
 constexpr double kColoured =
     4.0;  // innovations come from another filter and resemble their neighbours: so many say as much as one
 constexpr double kChord = 0.02;  // frames are extrapolated by their speed over so long [s]

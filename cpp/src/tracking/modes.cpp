@@ -8,11 +8,9 @@
 #include <complex>
 #include <stdexcept>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
-
+#include "math/constants.hpp"
 #include "math/gauss_newton.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/text.hpp"
 #include "rooms.hpp"
 #include "tracking/deviation.hpp"
@@ -26,7 +24,6 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kTwoPi = 6.283185307179586;
 constexpr double kLowest = 0.3, kHighest = 12.0;  // frequencies that are looked for [Hz]
 constexpr int kInputs = 3 * ModalModel::kMost;    // a mode and an axis of the plan's acceleration each
 constexpr int kColumns = 6 + kInputs;
@@ -71,13 +68,13 @@ std::vector<Mode> realise(const std::vector<DeviationRow>& rows, double period, 
       H1.block<3, 3>(3 * i, 3 * j) = covariance[static_cast<std::size_t>(std::min(i + j + 2, 2 * blocks))];
     }
   }
-  const Eigen::BDCSVD<MatrixXd> svd(H0, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const ThinSingularValues svd = thin_singular_values(H0);
   const int order = 2 * most + 4;
-  const VectorXd root = svd.singularValues().head(order).cwiseSqrt().cwiseInverse();
-  const MatrixXd A = root.asDiagonal() * svd.matrixU().leftCols(order).transpose() * H1 *
-                     svd.matrixV().leftCols(order) * root.asDiagonal();
+  const VectorXd root = svd.values.head(order).cwiseSqrt().cwiseInverse();
+  const MatrixXd A =
+      root.asDiagonal() * svd.U.leftCols(order).transpose() * H1 * svd.V.leftCols(order) * root.asDiagonal();
   std::vector<Mode> out;
-  const Eigen::VectorXcd poles = A.eigenvalues();
+  const Eigen::VectorXcd poles = eigenvalues(A);
   for (Eigen::Index k = 0; k < poles.size(); ++k) {
     if (poles[k].imag() <= 0.0) continue;
     const std::complex<double> s = std::log(poles[k]) / step;
@@ -90,7 +87,7 @@ std::vector<Mode> realise(const std::vector<DeviationRow>& rows, double period, 
 
 // ---- Errors of predictions ------------------------------------------------------------------------------------------
 
-struct Fit {
+struct ModeFit {
   double cost = 0.0;   // mean square of position errors [m^2]
   VectorXd residuals;  // position only
   std::array<Eigen::Matrix<double, 6, 3>, ModalModel::kMost> gain;
@@ -99,7 +96,8 @@ struct Fit {
 /// Runs the model's filter over the rows with these modes. A state is linear in what was observed and in the gains, so
 /// it is carried in columns: six for the observations without any gain, and one for a unit gain of every mode and axis;
 /// the best gains are then linear least squares.
-Fit evaluate(const std::vector<DeviationRow>& rows, const std::vector<Mode>& modes, const DeviationOptions& options) {
+ModeFit evaluate(const std::vector<DeviationRow>& rows, const std::vector<Mode>& modes,
+                 const DeviationOptions& options) {
   const int count = static_cast<int>(modes.size()), inputs = 3 * count;
   ModalModel model;
   model.count = count;
@@ -157,12 +155,12 @@ Fit evaluate(const std::vector<DeviationRow>& rows, const std::vector<Mode>& mod
     gram += error.tail<kInputs>().transpose() * error.tail<kInputs>();
     right -= error.tail<kInputs>().transpose() * error.head<6>();
   }
-  Fit fit;
+  ModeFit fit;
   MatrixXd solution = MatrixXd::Zero(kInputs, 6);
   if (inputs > 0) {
     MatrixXd A = gram.topLeftCorner(inputs, inputs);
     A.diagonal().array() += kPredictionNoise * kPredictionNoise / (kGain * kGain);
-    solution.topRows(inputs) = A.ldlt().solve(right.topRows(inputs));
+    solution.topRows(inputs) = solve_symmetric<Eigen::Dynamic, Eigen::Dynamic>(A, right.topRows(inputs));
   }
   fit.residuals.resize(static_cast<Eigen::Index>(3 * errors.size()));
   for (std::size_t n = 0; n < errors.size(); ++n) {
@@ -185,7 +183,7 @@ struct ModesProblem {
   const std::vector<DeviationRow>& rows;
   const DeviationOptions& options;
   std::vector<Mode> modes, tried;
-  Fit fit, next;
+  ModeFit fit, next;
   NormalSystem<> normal;
 
   /// Modes moved by a step of (logarithm of frequency, of damping) each.
@@ -225,8 +223,8 @@ struct ModesProblem {
 };
 
 /// The modes whose predictions err least; `information`: of the logarithms, where the last step began.
-Fit refine(const std::vector<DeviationRow>& rows, const DeviationOptions& options, int iterations,
-           std::vector<Mode>* modes, MatrixXd* information) {
+ModeFit refine(const std::vector<DeviationRow>& rows, const DeviationOptions& options, int iterations,
+               std::vector<Mode>* modes, MatrixXd* information) {
   ModesProblem problem{rows, options, *modes, {}, evaluate(rows, *modes, options), {}, {}};
   LevenbergMarquardtOptions how;
   how.max_linearisations = iterations;
@@ -248,14 +246,14 @@ ModesResult identify_modes(const std::vector<DeviationRow>& rows, const Deviatio
   most = std::clamp(most, 0, ModalModel::kMost);
   ModesResult out;
   out.rows = static_cast<double>(rows.size());
-  Fit fit = evaluate(rows, {}, options);
+  ModeFit fit = evaluate(rows, {}, options);
   out.error = {std::sqrt(fit.cost)};
   std::vector<Mode> candidates = realise(rows, options.period, most), modes;
   MatrixXd information;
   out.stopped_because = "most modes allowed";
   while (static_cast<int>(modes.size()) < most) {
     std::size_t best = candidates.size();
-    Fit best_fit;
+    ModeFit best_fit;
     for (std::size_t k = 0; k < candidates.size(); ++k) {
       if (std::any_of(modes.begin(), modes.end(), [&](const Mode& mode) {
             return std::abs(std::log(mode.frequency / candidates[k].frequency)) < 0.15;
@@ -263,7 +261,7 @@ ModesResult identify_modes(const std::vector<DeviationRow>& rows, const Deviatio
         continue;
       std::vector<Mode> other = modes;
       other.push_back(candidates[k]);
-      Fit next = evaluate(rows, other, options);
+      ModeFit next = evaluate(rows, other, options);
       if (best == candidates.size() || next.cost < best_fit.cost) {
         best = k;
         best_fit = std::move(next);
@@ -276,7 +274,7 @@ ModesResult identify_modes(const std::vector<DeviationRow>& rows, const Deviatio
     std::vector<Mode> other = modes;
     other.push_back(candidates[best]);
     MatrixXd other_information;
-    Fit next = refine(rows, options, 6, &other, &other_information);
+    ModeFit next = refine(rows, options, 6, &other, &other_information);
     if (!(std::sqrt(next.cost) < (1.0 - worth) * std::sqrt(fit.cost))) {
       out.stopped_because = "another mode would not be worth it";
       break;
@@ -299,8 +297,7 @@ ModesResult identify_modes(const std::vector<DeviationRow>& rows, const Deviatio
                               ? fit.residuals.squaredNorm() / static_cast<double>(fit.residuals.size()) * overlap
                               : 0.0;
   MatrixXd covariance = MatrixXd::Zero(information.rows(), information.cols());
-  if (!modes.empty())
-    covariance = variance * information.ldlt().solve(MatrixXd::Identity(information.rows(), information.cols()));
+  if (!modes.empty()) covariance = variance * inverse_symmetric<Eigen::Dynamic>(information);
   for (std::size_t k = 0; k < modes.size(); ++k) {
     const std::size_t m = order[k];
     out.model.frequency[k] = modes[m].frequency;

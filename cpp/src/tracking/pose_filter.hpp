@@ -184,7 +184,6 @@ class PoseFilter {
   static constexpr int kPlaces = 8;
   std::array<double, kPlaces> place_{};  // clock offset with which stamps of second k are placed, k modulo kPlaces
   std::array<std::int64_t, kPlaces> place_second_{};
-  std::int64_t placed_until_ = 0;
   std::vector<PoseGrade> grades_;
   int grade_count_ = 0;
   Counters counters_;

@@ -11,6 +11,7 @@
 
 #include "math/constants.hpp"
 #include "math/frame.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/rotation.hpp"
 #include "rooms.hpp"
 
@@ -23,7 +24,6 @@ using Eigen::Isometry3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kNever = -1e300;
 constexpr double kNotYet = std::numeric_limits<double>::infinity();
 constexpr double kTimelineStep = 0.1;     // [s]
 constexpr double kEncoderStep = 0.02;     // over which encoders are differenced: what is shorter is their noise [s]
@@ -202,8 +202,8 @@ class Replay {
     out.position_sigma = S.diagonal().head<3>().cwiseSqrt();
     Vector6d e;
     e << out.position, out.rotation;
-    out.squares = out.dimensions == 6 ? e.dot(S.ldlt().solve(e))
-                                      : e.head<3>().dot(S.topLeftCorner<3, 3>().ldlt().solve(e.head<3>()));
+    out.squares = out.dimensions == 6 ? e.dot(solve_symmetric<6, 1>(S, e))
+                                      : e.head<3>().dot(solve_symmetric<3, 1>(S.topLeftCorner<3, 3>(), e.head<3>()));
     return out;
   }
 

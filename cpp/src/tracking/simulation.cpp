@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "math/constants.hpp"
 #include "math/random.hpp"
 #include "math/rotation.hpp"
 #include "rooms.hpp"
@@ -21,7 +22,6 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kTwoPi = 6.283185307179586;
 constexpr double kGrid = 1e-3;       // of the truth [s]
 constexpr double kMargin = 0.1;      // the truth begins so long before t = 0 and ends so long after [s]
 constexpr double kRampUp = 2.0;      // of a gentle motion [s]

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "math/constants.hpp"
 #include "rooms.hpp"
 #include "tracking/correction_limiter.hpp"
 #include "tracking/deviation.hpp"
@@ -23,7 +24,6 @@ using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kNever = -1e300;
 constexpr double kOutOfPlan =
     1.0;  // forward kinematics as the plan: continued at constant velocity at most so long [s]
 

@@ -17,8 +17,8 @@ using truing::Diagnosis;
 using truing::Robot;
 
 /// Poses of the arm, measured with noise of 30 um; temperature rises.
-std::unique_ptr<arms::Table> measured(const Robot& truth, std::size_t rows, unsigned seed,
-                                      const std::vector<truing::Effect>& own = {}) {
+std::unique_ptr<arms::Table> a_table(const Robot& truth, std::size_t rows, unsigned seed,
+                                     const std::vector<truing::Effect>& own = {}) {
   auto table = arms::random_joints(truth, rows, seed);
   std::vector<double> temperature(rows);
   for (std::size_t row = 0; row < rows; ++row) temperature[row] = 20.0 + static_cast<double>((7 * row) % 13);
@@ -60,7 +60,7 @@ truing::Effect jump() {
 
 TEST_CASE("an effect that is searched only if asked is a candidate when it is asked for") {
   const Robot robot = arms::ur10();
-  const auto table = measured(robot, 60, 11);
+  const auto table = a_table(robot, 60, 11);
   DiagnoseOptions options;
   options.resamples = 2;
   options.threads = 1;
@@ -77,7 +77,7 @@ TEST_CASE("an own effect is found at its joint and drawn over the input that dri
   const Robot robot = arms::ur10();
   Robot truth = robot;
   truth.effects = {{"jump", {"J2"}, {{"jump.J2", 5e-4}}}};
-  const auto table = measured(truth, 120, 12, {jump()});
+  const auto table = a_table(truth, 120, 12, {jump()});
   DiagnoseOptions options;
   options.own_effects = {jump()};
   options.resamples = 4;

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "support/arms.hpp"
+#include "support/sanitized.hpp"
 
 using namespace arms;
 using truing::diagnose;
@@ -407,7 +408,7 @@ TEST_CASE("diagnose gives the same bits on one and on two threads") {
     CHECK(one.where_joints[k].share.value == two.where_joints[k].share.value);
 }
 
-TEST_CASE("diagnose does not depend on where the instrument stands") {
+TEST_CASE("diagnose does not depend on where the instrument stands" * doctest::skip(kSanitized)) {
   Robot truth = perturbed(light_arm(), 5e-4, 5e-4, 610);
   truth.effects = {backlash("J4", 1.5e-3)};
   auto table = measured(truth, 120, 611);
@@ -432,7 +433,8 @@ TEST_CASE("diagnose does not depend on where the instrument stands") {
   CHECK(here.after.rms == doctest::Approx(there.after.rms).epsilon(1e-6));
 }
 
-TEST_CASE("diagnose repeats itself with the same seed, and draws another split with another") {
+TEST_CASE("diagnose repeats itself with the same seed, and draws another split with another" *
+          doctest::skip(kSanitized)) {
   Robot truth = light_arm();
   truth.effects = {backlash("J3", 8e-4)};
   const auto table = measured(truth, 120, 200);
@@ -498,7 +500,7 @@ TEST_CASE("diagnose refuses a handful of poses") {
                        std::invalid_argument);
 }
 
-TEST_CASE("diagnose finds unequal bars of a palletizer's parallelograms") {
+TEST_CASE("diagnose finds unequal bars of a palletizer's parallelograms" * doctest::skip(kSanitized)) {
   const std::map<std::string, double> between = {{"linkage.J4.cos", 1.5e-3}, {"linkage.J4.sin", -8e-4}};
   const std::map<std::string, double> fixed_to_base_and_wrist = {{"linkage.J4.sin_first", 1.5e-3},
                                                                  {"linkage.J4.cos_sum", -1.5e-3}};
@@ -614,7 +616,7 @@ TEST_CASE("diagnose recognises exchanged and turned joint columns") {
   CHECK(finding(e, "joint_sign")->text.find("joint column 2") != std::string::npos);
 }
 
-TEST_CASE("diagnose goes on with the record of the joints that fits better") {
+TEST_CASE("diagnose goes on with the record of the joints that fits better" * doctest::skip(kSanitized)) {
   auto table = measured(light_arm(), 120, 910);
   std::mt19937_64 random(911);
   std::normal_distribution<double> normal(0.0, 1e-3);
@@ -652,7 +654,7 @@ TEST_CASE("diagnose points at copies of rows") {
   CHECK(finding(d, "duplicates")->rows == std::vector<std::size_t>{100, 101, 102});
 }
 
-TEST_CASE("diagnose infers approach directions from the order of the poses, and says so") {
+TEST_CASE("diagnose infers approach directions from the order of the poses, and says so" * doctest::skip(kSanitized)) {
   Robot truth = light_arm();
   truth.effects = {backlash("J3", 8e-4)};
   truth.T_measurement_base = somewhere();
@@ -728,7 +730,7 @@ TEST_CASE("diagnose does not take for noise what repeats show to be a gap") {
   CHECK(d.sentence.find("Repeats show a noise of") != std::string::npos);
 }
 
-TEST_CASE("diagnose says the noise in metres, whatever the rows say of theirs") {
+TEST_CASE("diagnose says the noise in metres, whatever the rows say of theirs" * doctest::skip(kSanitized)) {
   Robot truth = light_arm();
   truth.effects = {backlash("J3", 8e-4)};
   auto table = measured(truth, 120, 945);
@@ -749,7 +751,7 @@ TEST_CASE("diagnose says the noise in metres, whatever the rows say of theirs") 
   same(diagnose(light_arm(), table->data));
 }
 
-TEST_CASE("diagnose is not misled by gross outliers or a wandering frame") {
+TEST_CASE("diagnose is not misled by gross outliers or a wandering frame" * doctest::skip(kSanitized)) {
   auto table = measured(light_arm(), 120, 950);
   std::mt19937_64 random(951);
   std::normal_distribution<double> normal(0.0, 1.0);

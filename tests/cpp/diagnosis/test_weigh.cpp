@@ -16,11 +16,11 @@ using namespace truing::diagnosis;
 namespace {
 
 /// Positions of `poses` poses, measured `repeats` times each; errors of `sigma`, and of `common` for all of a pose.
-struct Scene {
+struct Weighed {
   Design design;
   Measurements data;
 
-  Scene(int poses, int repeats, double sigma, double common) {
+  Weighed(int poses, int repeats, double sigma, double common) {
     constexpr Eigen::Index kColumns = 4;
     Random random(11);
     const Eigen::Index n = 3 * poses * repeats;
@@ -50,7 +50,7 @@ struct Scene {
 }  // namespace
 
 TEST_CASE("noise is found, and weights are its inverse") {
-  const Scene scene(400, 1, 2e-4, 0.0);
+  const Weighed scene(400, 1, 2e-4, 0.0);
   const Weighted weighted = weigh(scene.design, scene.data);
   CHECK(weighted.noise.position_sigma == doctest::Approx(2e-4).epsilon(0.06));
   CHECK(weighted.noise.design_effect == doctest::Approx(1.0));  // nothing is repeated
@@ -60,7 +60,7 @@ TEST_CASE("noise is found, and weights are its inverse") {
 }
 
 TEST_CASE("a row far out counts for nothing, and is named") {
-  Scene scene(400, 1, 2e-4, 0.0);
+  Weighed scene(400, 1, 2e-4, 0.0);
   scene.design.y[3 * 70 + 1] += 0.05;
   const Weighted weighted = weigh(scene.design, scene.data);
   CHECK(weighted.noise.outliers == std::vector<std::int32_t>{70});
@@ -70,13 +70,13 @@ TEST_CASE("a row far out counts for nothing, and is named") {
 TEST_CASE("rows of a pose that err together count by the design effect 1 + (m - 1) rho") {
   for (const double rho : {0.0, 0.5, 0.9}) {
     CAPTURE(rho);
-    const Scene scene(600, 4, 2e-4 * std::sqrt(1.0 - rho), 2e-4 * std::sqrt(rho));
+    const Weighed scene(600, 4, 2e-4 * std::sqrt(1.0 - rho), 2e-4 * std::sqrt(rho));
     CHECK(weigh(scene.design, scene.data).noise.design_effect == doctest::Approx(1.0 + 3.0 * rho).epsilon(0.08));
   }
 }
 
 TEST_CASE("sums of appended columns are those of all columns made afresh") {
-  Scene scene(60, 2, 2e-4, 1e-4);
+  Weighed scene(60, 2, 2e-4, 1e-4);
   Design& design = scene.design;
   design.weight = weigh(design, scene.data).weight;
   const Design::Rows all = design.x;

@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "support/contains.hpp"
 #include "support/inverse_arms.hpp"
 
 using namespace arms;
@@ -38,8 +39,6 @@ std::string complaint(const InverseSolver& solver, const Task& task, const Joint
   }
   return "";
 }
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 double turns_apart(const Joints& a, const Joints& b) {
   double most = 0.0;

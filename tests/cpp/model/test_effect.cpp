@@ -68,8 +68,8 @@ double potential_energy(const Robot& robot, const VectorXd& q, double payload) {
 
 Measurements no_columns() { return Measurements(); }
 
-std::string complaint(const std::vector<truing::EffectRequest>& requests, const Robot& robot, const Measurements& data,
-                      const std::vector<truing::Effect>& own = {}) {
+std::string refusal(const std::vector<truing::EffectRequest>& requests, const Robot& robot, const Measurements& data,
+                    const std::vector<truing::Effect>& own = {}) {
   try {
     truing::effect_terms(requests, robot, data, own);
   } catch (const std::invalid_argument& error) {
@@ -149,17 +149,17 @@ TEST_CASE("one's own effect stands beside the catalogue, under another name") {
   REQUIRE(terms.size() == 1);
   CHECK(terms[0].parameter == "creep.J2");
   creep.name = "backlash";
-  CHECK(complaint({{"backlash", {"J2"}}}, robot, no_columns(), {creep}).find("exists twice") != std::string::npos);
+  CHECK(refusal({{"backlash", {"J2"}}}, robot, no_columns(), {creep}).find("exists twice") != std::string::npos);
 }
 
 TEST_CASE("the effects that are model parameters have no terms, but look whether the joint suits") {
   const Robot robot = loaded_arm(Convention::dh);
   CHECK(truing::effect_terms({{"gear_ratio", {}}, {"joint_offset", {}}, {"link_geometry", {}}}, robot, no_columns())
             .empty());
-  CHECK(complaint({{"gear_ratio", {"J4"}}}, robot, no_columns()) ==
+  CHECK(refusal({{"gear_ratio", {"J4"}}}, robot, no_columns()) ==
         "gear_ratio at J4 needs a joint with a reading; J4 is passive, driven by J2, J3");
-  CHECK(complaint({{"joint_offset", {"J4"}}}, robot, no_columns()) == "");
-  CHECK(complaint({{"joint_offset", {"J6"}}}, robot, no_columns()) ==
+  CHECK(refusal({{"joint_offset", {"J4"}}}, robot, no_columns()) == "");
+  CHECK(refusal({{"joint_offset", {"J6"}}}, robot, no_columns()) ==
         "joint 'J6' does not exist; the joints are J1, J2, J3, J4, J5");
 }
 
@@ -179,11 +179,11 @@ TEST_CASE("backlash is half the play on the side of approach") {
   Inputs in;
   in.data = &data;
   for (in.row = 0; in.row < 3; ++in.row) CHECK(terms[0].basis(in) == 0.5 * directions[in.row]);
-  CHECK(complaint({{"backlash", {"J2"}}}, robot, data) ==
+  CHECK(refusal({{"backlash", {"J2"}}}, robot, data) ==
         "backlash at J2 needs the column dir2 (approach direction -1, 0, 1)");
-  CHECK(complaint({{"backlash", {"J4"}}}, robot, data).find("J4 is passive") != std::string::npos);
-  CHECK(complaint({{"backlash", {}}}, robot, data).find("dir1") != std::string::npos);
-  CHECK(complaint({{"backlash", {"J5"}}}, robot, no_columns()).find("dir4") != std::string::npos);
+  CHECK(refusal({{"backlash", {"J4"}}}, robot, data).find("J4 is passive") != std::string::npos);
+  CHECK(refusal({{"backlash", {}}}, robot, data).find("dir1") != std::string::npos);
+  CHECK(refusal({{"backlash", {"J5"}}}, robot, no_columns()).find("dir4") != std::string::npos);
 }
 
 TEST_CASE("harmonics go once and twice per turn, at revolute joints") {
@@ -198,7 +198,7 @@ TEST_CASE("harmonics go once and twice per turn, at revolute joints") {
     CHECK(terms[k].parameter == names[k]);
     CHECK(terms[k].basis(in) == doctest::Approx(expected[k]));
   }
-  CHECK(complaint({{"harmonic", {"J3"}}}, robot, no_columns()).find("J3 is prismatic") != std::string::npos);
+  CHECK(refusal({{"harmonic", {"J3"}}}, robot, no_columns()).find("J3 is prismatic") != std::string::npos);
   CHECK(truing::effect_terms({{"harmonic", {}}}, robot, no_columns()).size() == 3 * 4);  // J1, J2, J5
 }
 
@@ -215,15 +215,14 @@ TEST_CASE("joint compliance is a spring under gravity torque, and says when no m
   in.gravity_torque = (VectorXd(5) << 1, 2, 3, 4, 5).finished();
   CHECK(terms[3].basis(in) == 5.0);
   for (Joint& joint : robot.joints) joint.mass.reset();
-  CHECK(complaint({{"joint_compliance", {"J2"}}}, robot, no_columns()).find("payload_kg") != std::string::npos);
+  CHECK(refusal({{"joint_compliance", {"J2"}}}, robot, no_columns()).find("payload_kg") != std::string::npos);
   const double payload = 10.0;
   Measurements data;
   data.payload.data = &payload;
-  CHECK(complaint({{"joint_compliance", {"J2"}}}, robot, data) == "");
+  CHECK(refusal({{"joint_compliance", {"J2"}}}, robot, data) == "");
 }
 
 TEST_CASE("the same effect twice at one joint is refused") {
   const Robot robot = loaded_arm(Convention::dh);
-  CHECK(complaint({{"harmonic", {"J2"}}, {"harmonic", {}}}, robot, no_columns()) ==
-        "harmonic at J2 is asked for twice");
+  CHECK(refusal({{"harmonic", {"J2"}}, {"harmonic", {}}}, robot, no_columns()) == "harmonic at J2 is asked for twice");
 }

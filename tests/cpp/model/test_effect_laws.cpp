@@ -6,11 +6,13 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 #include <set>
 
 #include "estimation/evaluate.hpp"
 #include "support/arms.hpp"
+#include "support/contains.hpp"
 
 using namespace arms;
 using namespace truing::estimation;
@@ -137,8 +139,6 @@ std::string complaint(const EffectRequest& request, const Robot& robot, const Me
   }
   return "";
 }
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 
@@ -294,12 +294,11 @@ TEST_CASE("law: what is missing is named") {
   Measurements bare;
   bare.rows = table->data.rows;
   bare.joints = table->data.joints;
-  for (const auto& [name, column] : std::vector<std::pair<std::string, std::string>>{{"backlash", "dir1"},
-                                                                                     {"windup", "tau1_Nm"},
-                                                                                     {"thermal", "temp_C"},
-                                                                                     {"thermal_zero", "temp_C"},
-                                                                                     {"drift", "t_s"},
-                                                                                     {"time_offset", "qd1_rad_s"}}) {
+  const std::map<std::string, std::string> wanted{{"backlash", "dir1"},  {"windup", "tau1_Nm"},
+                                                  {"thermal", "temp_C"}, {"thermal_zero", "temp_C"},
+                                                  {"drift", "t_s"},      {"time_offset", "qd1_rad_s"}};
+  for (const auto& one : wanted) {
+    const std::string &name = one.first, &column = one.second;
     CAPTURE(name);
     CHECK(contains(complaint({name, {}}, robot, bare), column));
     CHECK(complaint({name, {}}, robot, table->data) == "");

@@ -9,6 +9,7 @@
 
 #include <doctest/doctest.h>
 
+#include "support/contains.hpp"
 #include "truing/model/measurement.hpp"
 
 namespace {
@@ -33,11 +34,11 @@ Robot small_robot() {
 }
 
 /// Four rows, row-major: q1 q3 x y z qw qx qy qz distance other.
-struct Table {
+struct Written {
   std::vector<double> values;
   static constexpr std::ptrdiff_t columns = 11;
 
-  Table() {
+  Written() {
     for (int row = 0; row < 4; ++row) {
       for (const double v : {0.1 * row, 0.2, 1.0, 2.0, 3.0, 0.6, 0.0, -0.8, 0.0, 1.5, 1.0}) values.push_back(v);
     }
@@ -65,12 +66,10 @@ std::string complaint(const Measurements& data, bool joints_only = false) {
   return "";
 }
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
 }  // namespace
 
 TEST_CASE("validate accepts every kind of row") {
-  Table table;
+  Written table;
   for (const std::size_t column : {2, 3, 4, 5, 6, 7, 8}) table.at(0, column) = not_measured;  // a distance only
   for (const std::size_t column : {5, 6, 7, 8, 9}) table.at(1, column) = not_measured;        // a position only
   for (const std::size_t column : {2, 3, 4, 5, 6, 7, 8, 9})
@@ -86,7 +85,7 @@ TEST_CASE("validate accepts every kind of row") {
 }
 
 TEST_CASE("validate names the row and what is wrong with it") {
-  Table table;
+  Written table;
   Measurements data = table.measurements();
   SUBCASE("no rows") {
     data.rows = 0;

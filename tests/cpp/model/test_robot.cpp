@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+#include "support/contains.hpp"
 #include "truing/model/robot.hpp"
 
 namespace {
@@ -45,7 +46,7 @@ Robot oblique_arm() {
 }
 
 /// A palletizer: axes 2, 3 and the passive 4 are parallel and horizontal, axis 5 is vertical.
-Robot palletizer() {
+Robot palletizing_arm() {
   Robot robot;
   robot.joints = {revolute("J1", 0.0, 0.7, 0.26, -pi / 2), revolute("J2", 0.0, 0.0, 0.9, 0.0),
                   revolute("J3", 0.0, 0.0, 1.0, 0.0), revolute("J4", 0.0, 0.0, 0.2, pi / 2),
@@ -89,8 +90,6 @@ std::string complaint(const Robot& robot) {
   }
   return "";
 }
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 
@@ -169,7 +168,7 @@ TEST_CASE("a joint moves by ratio * reading + offset") {
 }
 
 TEST_CASE("a palletizer's q4 = -(q2 + q3) keeps the tool level, whatever the joints' own errors") {
-  Robot robot = palletizer();
+  Robot robot = palletizing_arm();
   CHECK(robot.driven_count() == 4);
   CHECK(robot.driven_joints() == std::vector<std::size_t>{0, 1, 2, 4});
   const VectorXd home = (VectorXd(4) << 0.4, 0.0, 0.0, -0.3).finished();
@@ -219,7 +218,7 @@ TEST_CASE("every target has its own frame; without targets the last frame is the
 }
 
 TEST_CASE("forward kinematics says how many readings it expects") {
-  CHECK_THROWS_WITH_AS(truing::forward_kinematics(palletizer(), VectorXd::Zero(5)),
+  CHECK_THROWS_WITH_AS(truing::forward_kinematics(palletizing_arm(), VectorXd::Zero(5)),
                        "got 5 joint readings, the robot has 4 driven joints", std::invalid_argument);
 }
 
@@ -239,11 +238,11 @@ TEST_CASE("roll, pitch and yaw give the rotation back, at and near the poles too
 
 TEST_CASE("validate accepts a robot that can be used") {
   CHECK(complaint(oblique_arm()) == "");
-  CHECK(complaint(palletizer()) == "");
+  CHECK(complaint(palletizing_arm()) == "");
 }
 
 TEST_CASE("validate names the joint and what is wrong with it") {
-  Robot robot = palletizer();
+  Robot robot = palletizing_arm();
   SUBCASE("no joints") {
     robot.joints.clear();
     CHECK(contains(complaint(robot), "no joints"));
@@ -275,10 +274,10 @@ TEST_CASE("validate names the joint and what is wrong with it") {
   SUBCASE("values that are not finite") {
     robot.joints[1].a = std::numeric_limits<double>::quiet_NaN();
     CHECK(contains(complaint(robot), "joint 'J2': a is nan"));
-    robot = palletizer();
+    robot = palletizing_arm();
     robot.targets[0].T_last_target.translation().x() = std::numeric_limits<double>::infinity();
     CHECK(contains(complaint(robot), "target 'tool'"));
-    robot = palletizer();
+    robot = palletizing_arm();
     robot.gravity.x() = std::numeric_limits<double>::quiet_NaN();
     CHECK(contains(complaint(robot), "gravity"));
   }
@@ -307,7 +306,7 @@ TEST_CASE("validate names the joint and what is wrong with it") {
 }
 
 TEST_CASE("an unknown joint name is answered with the names there are") {
-  CHECK(palletizer().joint_index("J3") == 2);
-  CHECK_THROWS_WITH_AS(palletizer().joint_index("j3"), "joint 'j3' does not exist; the joints are J1, J2, J3, J4, J5",
-                       std::invalid_argument);
+  CHECK(palletizing_arm().joint_index("J3") == 2);
+  CHECK_THROWS_WITH_AS(palletizing_arm().joint_index("j3"),
+                       "joint 'j3' does not exist; the joints are J1, J2, J3, J4, J5", std::invalid_argument);
 }

@@ -7,6 +7,7 @@
 
 #include <doctest/doctest.h>
 
+#include "support/contains.hpp"
 #include "truing/model/urdf.hpp"
 
 namespace {
@@ -101,11 +102,11 @@ Isometry3d origin(double x, double y, double z, double roll = 0.0, double pitch 
   return T;
 }
 
-double difference(const Isometry3d& a, const Isometry3d& b) { return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff(); }
+double frame_difference(const Isometry3d& a, const Isometry3d& b) {
+  return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff();
+}
 
 VectorXd readings(double a, double s, double b) { return (VectorXd(3) << a, s, b).finished(); }
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const auto at = text.find(from);
@@ -139,7 +140,7 @@ double worst_difference(const Robot& a, const Robot& b) {
   double worst = 0.0;
   for (const VectorXd& q : {readings(0, 0, 0), readings(1.2, 0.3, -0.8), readings(-2, 0.6, 3)}) {
     const auto of_a = truing::forward_kinematics(a, q), of_b = truing::forward_kinematics(b, q);
-    for (std::size_t i = 0; i < of_a.size(); ++i) worst = std::max(worst, difference(of_a[i], of_b[i]));
+    for (std::size_t i = 0; i < of_a.size(); ++i) worst = std::max(worst, frame_difference(of_a[i], of_b[i]));
   }
   return worst;
 }
@@ -155,16 +156,16 @@ TEST_CASE("a URDF chain is the product of its origins and motions, about any axi
   for (const VectorXd& q : {readings(0, 0, 0), readings(0.7, 0.3, -1.1), readings(-2.0, 0.1, 2.5)}) {
     const auto frames = truing::forward_kinematics(robot, q);
     Isometry3d T = origin(1, 0, 0.5, 0, 0, 0.3) * origin(0, 0, 0.4, 0.1, -0.2, 0.3) * turn(Vector3d(0, -1, 0), q[0]);
-    CHECK(difference(frames[0], T) < 1e-14);
+    CHECK(frame_difference(frames[0], T) < 1e-14);
     T = T * origin(0.2, 0.1, 0, 0, 0.5, 0) * origin(0, 0, 0.1, 0, 0, 0.7) *
         Isometry3d(Eigen::Translation3d(q[1] / 3.0, 2.0 * q[1] / 3.0, 2.0 * q[1] / 3.0));
-    CHECK(difference(frames[1], T) < 1e-14);
+    CHECK(frame_difference(frames[1], T) < 1e-14);
     T = T * turn(Vector3d(-0.3, 0.5, -0.8), q[2]);
-    CHECK(difference(frames[2], T) < 1e-14);
+    CHECK(frame_difference(frames[2], T) < 1e-14);
     T = T * origin(0.5, 0, 0) * turn(Vector3d(1, 0, 0), -1.5 * q[0] + 0.2);  // the axis is x when none is given
-    CHECK(difference(frames[3], T) < 1e-14);
+    CHECK(frame_difference(frames[3], T) < 1e-14);
     T = T * origin(0, 0, 0.05, 0, 2 * std::atan(1.0), 0) * origin(0, 0.02, 0.1, 0.4, 0, 0);
-    CHECK(difference(frames[4], T) < 1e-14);
+    CHECK(frame_difference(frames[4], T) < 1e-14);
   }
 }
 
@@ -231,7 +232,7 @@ TEST_CASE("a calibrated robot survives the way through URDF, zeros and tool incl
   const Robot back = truing::robot_from_urdf(text, "", "truing_tool");
   for (const VectorXd& q : {readings(0, 0, 0), readings(1.2, 0.3, -0.8), readings(-2, 0.6, 3)}) {
     const auto expected = truing::forward_kinematics(found, q), got = truing::forward_kinematics(back, q);
-    for (std::size_t i = 0; i < expected.size(); ++i) CHECK(difference(expected[i], got[i]) < 1e-14);
+    for (std::size_t i = 0; i < expected.size(); ++i) CHECK(frame_difference(expected[i], got[i]) < 1e-14);
   }
   CHECK(back.joints[0].offset == 0.0);  // it is in the origin
   CHECK(contains(text, "fixed to wrist"));

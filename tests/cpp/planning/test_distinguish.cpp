@@ -134,7 +134,7 @@ TEST_CASE("what no column shows is said with the column's name") {
                                        {"windup", "tau1"},
                                        {"time_offset", "qd1"}}) {
     const truing::NotTestable* why = not_testable(bare, effect);
-    REQUIRE_MESSAGE(why != nullptr, effect);
+    REQUIRE(why != nullptr);
     CHECK(why->why.find(column) != std::string::npos);
   }
   DistinguishOptions options;

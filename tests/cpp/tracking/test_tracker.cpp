@@ -25,7 +25,7 @@
 #include "truing/tracking/simulation.hpp"
 #include "truing/tracking/tracker.hpp"
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__GLIBC__) && !defined(TRUING_SANITIZED)
 // Eigen allocates by malloc, the standard library by operator new, which ends there as well.
 static std::atomic<std::uint64_t> allocations{0};
 extern "C" void* __libc_malloc(std::size_t size);
@@ -228,7 +228,7 @@ TEST_CASE("samples in any order within the window give the same state to the las
   }
 }
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__GLIBC__) && !defined(TRUING_SANITIZED)
 TEST_CASE("after construction nothing is allocated: seed 20") {
   const SimulatedStreams s = boom(SimulatedMotion::stop_and_go, 20, 6.0);
   TrackOptions options;
