@@ -53,6 +53,7 @@ install_system_packages() {
       missing+=("$package")
     fi
   done
+  if [[ $extras == test ]] && ! clang_sanitizes; then missing+=(clang libclang-rt-dev); fi
   if [[ ${#missing[@]} -eq 0 ]]; then
     return
   fi
@@ -72,6 +73,10 @@ install_system_packages() {
   if ! "${as_root[@]}" apt-get update > "$log" 2>&1; then
     tail -n 5 "$log" >&2
     say "apt-get update failed (no network?); trying with the package lists that are there"
+  fi
+  # Where no package has this name, clang brings the runtime along.
+  if [[ " ${missing[*]} " == *" libclang-rt-dev "* ]] && ! apt-cache show libclang-rt-dev > /dev/null 2>&1; then
+    unset 'missing[-1]'
   fi
   if ! "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}" \
     > "$log" 2>&1; then
@@ -158,9 +163,9 @@ install_truing() {
     local log=build/wheel.log
     # With its tests, warnings are errors from the start: the flag is part of every command line, and to set it later
     # would compile everything once more.
-    local environment=()
-    [[ -z $extras ]] || environment+=(SKBUILD_CMAKE_ARGS=-DTRUING_WERROR=ON)
-    if ! env "${environment[@]}" \
+    local cmake_arguments=-DTRUING_UNITY=$unity
+    [[ -z $extras ]] || cmake_arguments+=";-DTRUING_WERROR=ON"
+    if ! env "SKBUILD_CMAKE_ARGS=$cmake_arguments" \
       "$venv_python" -m pip wheel --disable-pip-version-check --verbose --no-build-isolation --no-deps \
       --wheel-dir build/dist . > "$log" 2>&1; then
       grep -nE 'error|Error|warning: unused' "$log" | head -n 20 >&2 || true

@@ -34,13 +34,15 @@ run_ctest() {
 }
 
 step_cpp() {
-  configure "$release" -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DCMAKE_BUILD_TYPE=Release
+  configure "$release" -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DTRUING_UNITY="$unity" -DCMAKE_BUILD_TYPE=Release
   cmake --build "$release"
   run_ctest "$release"
 }
 
 step_sanitize() {
-  configure build/sanitize -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DTRUING_SANITIZE=ON \
+  local compiler=()
+  if clang_sanitizes; then compiler=(-DCMAKE_CXX_COMPILER=clang++); fi
+  configure build/sanitize "${compiler[@]}" -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DTRUING_SANITIZE=ON -DTRUING_UNITY=ON \
     -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1"
   cmake --build build/sanitize
   run_ctest build/sanitize
