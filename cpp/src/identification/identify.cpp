@@ -416,7 +416,7 @@ void locate_anchor(const Job& job, Robot* robot) {
     gram += column * column.transpose();
     right += column * (p.squaredNorm() - d * d);
   }
-  const Eigen::Matrix<double, 5, 1> x = solve_symmetric<Eigen::Dynamic, 1>(gram, right);
+  const Eigen::Matrix<double, 5, 1> x = solve_symmetric<5, 1>(gram, right);
   if (x.allFinite()) robot->anchor = Anchor{x.head<3>(), x[3]};
 }
 

@@ -58,6 +58,7 @@ Matrix<N> scaled_both(const Vector<N>& s, const Matrix<N>& A) {
 constexpr int X = Eigen::Dynamic;
 
 template Matrix<3, 1> solve_symmetric<3, 1>(const Matrix<3>&, const Matrix<3, 1>&);
+template Matrix<5, 1> solve_symmetric<5, 1>(const Matrix<5>&, const Matrix<5, 1>&);
 template Matrix<6, 1> solve_symmetric<6, 1>(const Matrix<6>&, const Matrix<6, 1>&);
 template Matrix<6, 12> solve_symmetric<6, 12>(const Matrix<6>&, const Matrix<6, 12>&);
 template Matrix<X, 1> solve_symmetric<X, 1>(const Matrix<X>&, const Matrix<X, 1>&);
