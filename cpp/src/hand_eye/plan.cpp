@@ -109,7 +109,7 @@ std::vector<NextHandPose> handeye_plan(const HandEyePoses& given, const HandEyeR
     const LoopRow row = row_of(poses.T_base_hand[i], poses.T_camera_board[i]);
     N += row.J.transpose() * solve_definite<6, 12>(row.V, row.J);
   }
-  const Eigen::Matrix<double, 12, 1> unit = N.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::Matrix<double, 12, 1> unit = unit_scale<12>(N);
   Matrix12d C = scaled_both<12>(unit, inverse_symmetric<Eigen::Dynamic>(scaled_both<12>(unit, N)));
   const auto variance = [&](const Matrix12d& covariance) {
     return at_working_point({X, covariance.topLeftCorner<6, 6>()}, result.working_point).trace();

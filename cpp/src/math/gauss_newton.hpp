@@ -111,8 +111,7 @@ struct DampedStep {
 
 template <int N>
 DampedStep<N> damped_step(const NormalSystem<N>& system, double mu) {
-  Eigen::Matrix<double, N, 1> scale = system.gram.diagonal();
-  for (double& s : scale) s = s > 0.0 ? 1.0 / std::sqrt(s) : 1.0;
+  const Eigen::Matrix<double, N, 1> scale = unit_scale<N>(system.gram);
   Eigen::Matrix<double, N, N> h = scale.asDiagonal() * system.gram * scale.asDiagonal();
   const Eigen::Matrix<double, N, 1> g = scale.cwiseProduct(system.gradient);
   h.diagonal().array() += mu;

@@ -6,6 +6,8 @@
 // asks Eigen for one compiles for many seconds longer. The sizes that inner loops use stand at the end of
 // linear_algebra.cpp, and Eigen::Dynamic for all others.
 
+#include <cmath>
+
 #include <Eigen/Core>
 
 #include "rooms.hpp"
@@ -68,10 +70,12 @@ Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& A);
 template <int N, int M>
 Matrix<N> carried(const Matrix<N, M>& J, const Matrix<M>& A);
 
-/// 1 / sqrt of the diagonal: scales a matrix of squares to a unit diagonal.
+/// 1 / sqrt of the diagonal: scales a matrix of squares to a unit diagonal. 1 for a column that is zero throughout.
 template <int N>
 Vector<N> unit_scale(const Matrix<N>& A) {
-  return A.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  Vector<N> scale = A.diagonal();
+  for (double& s : scale) s = s > 0.0 ? 1.0 / std::sqrt(s) : 1.0;
+  return scale;
 }
 /// diag(s) A diag(s).
 template <int N>

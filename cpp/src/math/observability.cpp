@@ -10,20 +10,10 @@
 #include "math/linear_algebra.hpp"
 
 namespace truing::math {
-namespace {
-
-/// 1 / length of every column; 1 for a column that is zero throughout.
-Eigen::VectorXd unit_scales(const Eigen::MatrixXd& gram) {
-  Eigen::VectorXd scale = gram.diagonal();
-  for (double& s : scale) s = s > 0.0 ? 1.0 / std::sqrt(s) : 1.0;
-  return scale;
-}
-
-}  // namespace
 
 Rank find_rank(const Eigen::MatrixXd& gram, const std::vector<int>& priority, double tolerance) {
   const Eigen::Index n = gram.rows();
-  const Eigen::VectorXd scale = unit_scales(gram);
+  const Eigen::VectorXd scale = unit_scale<Eigen::Dynamic>(gram);
   Eigen::MatrixXd rest =
       scale.asDiagonal() * gram * scale.asDiagonal();  // Schur complement after the columns kept so far
   std::vector<bool> done(static_cast<std::size_t>(n), false);
@@ -71,7 +61,7 @@ Rank find_rank(const Eigen::MatrixXd& gram, const std::vector<int>& priority, do
 }
 
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& gram) {
-  const Eigen::VectorXd scale = unit_scales(gram);
+  const Eigen::VectorXd scale = unit_scale<Eigen::Dynamic>(gram);
   const Eigen::MatrixXd inverse = inverse_symmetric<Eigen::Dynamic>(scaled_both<Eigen::Dynamic>(scale, gram));
   return scale.asDiagonal() * (0.5 * (inverse + inverse.transpose())) * scale.asDiagonal();
 }
