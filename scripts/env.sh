@@ -12,11 +12,11 @@ export CMAKE_GENERATOR=${CMAKE_GENERATOR:-Ninja}
 # pyproject.toml names the same folder.
 release=build/release
 
-# Rooms are compiled whole, which halves the time from nothing. Who changes C++ sets TRUING_UNITY=OFF: then a change
+# Rooms are compiled whole: from nothing that is the fastest. Who changes C++ sets TRUING_UNITY=OFF: then a change
 # compiles its file alone.
 unity=${TRUING_UNITY:-ON}
 
-# Clang and its sanitizers' runtime are there: it compiles the sanitized tests in half of GCC's time.
+# Clang and its sanitizers' runtime are there: it compiles the sanitized tests faster than GCC.
 clang_sanitizes() {
   mkdir -p build
   echo 'int main() { return 0; }' | clang++ -fsanitize=address,undefined -x c++ - -o build/sanitizers_link 2> /dev/null

@@ -41,7 +41,11 @@ step_cpp() {
 
 step_sanitize() {
   local compiler=()
-  if clang_sanitizes; then compiler=(-DCMAKE_CXX_COMPILER=clang++); fi
+  if clang_sanitizes; then
+    compiler=(-DCMAKE_CXX_COMPILER=clang++)
+  else
+    echo "clang++ cannot link the sanitizers' runtime here: the default compiler is used, which takes longer"
+  fi
   configure build/sanitize "${compiler[@]}" -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DTRUING_SANITIZE=ON -DTRUING_UNITY=ON \
     -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1"
   cmake --build build/sanitize
