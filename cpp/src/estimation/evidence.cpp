@@ -124,7 +124,7 @@ Evidence::State Evidence::evaluate(const Choice& choice) const {
   out.precision.resize(p);
   out.sigma2 = gram_.yy / std::max(1.0, gram_.n);
   double log_prior = 0.0;
-  for (int round = 0; round < 4; ++round) {
+  for (int round = 0; round < 12; ++round) {
     Eigen::MatrixXd d = xx;
     log_prior = 0.0;
     for (Eigen::Index k = 0; k < p; ++k) {

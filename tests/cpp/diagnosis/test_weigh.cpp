@@ -52,11 +52,11 @@ struct Weighed {
 TEST_CASE("noise is found, and weights are its inverse") {
   const Weighed scene(400, 1, 2e-4, 0.0);
   const Weighted weighted = weigh(scene.design, scene.data);
-  CHECK(weighted.noise.position_sigma == doctest::Approx(2e-4).epsilon(0.06));
+  CHECK(weighted.noise.position_sigma == doctest::Approx(2e-4).scale(0).epsilon(0.06));
   CHECK(weighted.noise.design_effect == doctest::Approx(1.0));  // nothing is repeated
   CHECK(weighted.noise.outliers.empty());
   CHECK(weighted.weight.minCoeff() == doctest::Approx(weighted.weight.maxCoeff()));
-  CHECK(weighted.weight[0] * weighted.noise.position_sigma == doctest::Approx(1.0).epsilon(1e-3));
+  CHECK(weighted.weight[0] * weighted.noise.position_sigma == doctest::Approx(1.0).scale(0).epsilon(1e-3));
 }
 
 TEST_CASE("a row far out counts for nothing, and is named") {
@@ -71,7 +71,8 @@ TEST_CASE("rows of a pose that err together count by the design effect 1 + (m - 
   for (const double rho : {0.0, 0.5, 0.9}) {
     CAPTURE(rho);
     const Weighed scene(600, 4, 2e-4 * std::sqrt(1.0 - rho), 2e-4 * std::sqrt(rho));
-    CHECK(weigh(scene.design, scene.data).noise.design_effect == doctest::Approx(1.0 + 3.0 * rho).epsilon(0.08));
+    CHECK(weigh(scene.design, scene.data).noise.design_effect ==
+          doctest::Approx(1.0 + 3.0 * rho).scale(0).epsilon(0.08));
   }
 }
 

@@ -558,7 +558,7 @@ TEST_CASE("backlash goes by the way from the seed, where nobody says otherwise")
     CHECK(
         (predicted(robot, solution.joints, conditions).translation() - task.T_measurement_target.translation()).norm() <
         1e-9);
-    CHECK(solution.joints[1] == doctest::Approx(q[1] + (rising ? -1e-3 : 1e-3)).epsilon(1e-6));
+    CHECK(solution.joints[1] == doctest::Approx(q[1] + (rising ? -1e-3 : 1e-3)).scale(0).epsilon(1e-6));
   }
 }
 
@@ -585,8 +585,8 @@ TEST_CASE("out of reach: by how much, in which direction, and the nearest that c
       CHECK((solution.reason == Reason::out_of_reach || solution.reason == Reason::limit));
       CHECK(within_limits(robot, solution.joints));
       const Vector3d way = far - reached(robot, solution.joints).translation();
-      CHECK(solution.miss == doctest::Approx(way.norm()).epsilon(1e-6));
-      CHECK(solution.direction.dot(way.normalized()) == doctest::Approx(1.0).epsilon(1e-9));
+      CHECK(solution.miss == doctest::Approx(way.norm()).scale(0).epsilon(1e-6));
+      CHECK(solution.direction.dot(way.normalized()) == doctest::Approx(1.0).scale(0).epsilon(1e-9));
       if (robot.name != "gantry") {
         CHECK(solution.reason == Reason::out_of_reach);
         CHECK(contains(solver.describe(solution), "out of reach by 1"));
@@ -612,7 +612,7 @@ TEST_CASE("a limit that stands in the way is named, with how far it is exceeded"
   const Solution solution = solver.solve(task, solver.middle());
   CHECK(solution.reason == Reason::limit);
   CHECK(solution.joint == 1);
-  CHECK(solution.excess == doctest::Approx(0.1).epsilon(1e-3));
+  CHECK(solution.excess == doctest::Approx(0.1).scale(0).epsilon(1e-3));
   CHECK(within_limits(robot, solution.joints));
   CHECK(contains(solver.describe(solution), "J2 would have to go 0.1 rad beyond its limit"));
 }

@@ -131,8 +131,8 @@ TEST_CASE("a linear problem takes one step, and one more to see that it was the 
     tt += line.w[i] * std::pow(line.t[i] - t / w, 2.0);
     ty += line.w[i] * (line.t[i] - t / w) * (line.y[i] - y / w);
   }
-  CHECK(line.x[1] == doctest::Approx(ty / tt).epsilon(1e-13));
-  CHECK(line.x[0] == doctest::Approx(y / w - ty / tt * t / w).epsilon(1e-13));
+  CHECK(line.x[1] == doctest::Approx(ty / tt).scale(0).epsilon(1e-13));
+  CHECK(line.x[0] == doctest::Approx(y / w - ty / tt * t / w).scale(0).epsilon(1e-13));
 }
 
 TEST_CASE("weights may change after every step: the fit of least absolute errors of a constant is the median") {
@@ -153,7 +153,7 @@ TEST_CASE("weights may change after every step: the fit of least absolute errors
   };
   Constant constant{{1.0, 7.0, 2.0, 3.5, 100.0}, std::vector<double>(5, 1.0)};
   CHECK(gauss_newton(&constant, 500).reason == StopReason::settled);
-  CHECK(constant.x == doctest::Approx(3.5).epsilon(1e-8));
+  CHECK(constant.x == doctest::Approx(3.5).scale(0).epsilon(1e-8));
 }
 
 TEST_CASE("Gauss-Newton says that there is no solution, and when its steps are used up") {
@@ -268,8 +268,9 @@ TEST_CASE("the step of a damped system is that of the rows with sqrt(mu) of each
   const Eigen::VectorXd wanted = rows.colPivHouseholderQr().solve(right);
   const NormalSystem<> system{J.transpose() * J, J.transpose() * r, r.squaredNorm()};
   const DampedStep<Eigen::Dynamic> step = damped_step(system, mu);
-  for (Eigen::Index k = 0; k < 3; ++k) CHECK(step.delta[k] == doctest::Approx(wanted[k]).epsilon(1e-11));
-  CHECK(step.predicted_fall == doctest::Approx(r.squaredNorm() - (r + J * step.delta).squaredNorm()).epsilon(1e-10));
+  for (Eigen::Index k = 0; k < 3; ++k) CHECK(step.delta[k] == doctest::Approx(wanted[k]).scale(0).epsilon(1e-11));
+  CHECK(step.predicted_fall ==
+        doctest::Approx(r.squaredNorm() - (r + J * step.delta).squaredNorm()).scale(0).epsilon(1e-10));
 }
 
 TEST_CASE("unknowns of blocks eliminated and recovered are those of the whole system") {
@@ -301,5 +302,5 @@ TEST_CASE("unknowns of blocks eliminated and recovered are those of the whole sy
     const Eigen::Vector3d own = recover(blocks[static_cast<std::size_t>(b)], step);
     CHECK((own - wanted.segment<kOwn>(kShared + b * kOwn)).norm() < 1e-10);
   }
-  CHECK(sum.cost == doctest::Approx(r.dot(w.cwiseProduct(r))).epsilon(1e-13));
+  CHECK(sum.cost == doctest::Approx(r.dot(w.cwiseProduct(r))).scale(0).epsilon(1e-13));
 }
