@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -47,8 +48,14 @@ struct IdentifyOptions : ParameterSelection, SolverOptions {
   double test_share = 0.2;       ///< fraction of the pose groups held out when the data has no `set`
   std::uint64_t seed = 0;        ///< of the split
   double rank_tolerance = 1e-6;  ///< a unit column that the others explain up to this fraction is not observable
-  double reject_beyond = 6.0;    ///< loss `reject`: rows whose residual is longer than this many medians
-  int threads = 0;               ///< 0: as many as the machine has
+  /// What is known beforehand: standard deviation about the nominal value [its unit], by parameter. A fit with many
+  /// parameters from few poses stays near the nominal robot where the data say little. Not of base, targets and anchor.
+  std::map<std::string, double> priors;
+  /// Noise that priors are weighed against: standard deviation of a position component [m], of rows with a sigma of
+  /// their own a factor to it. 0: what a fit without priors leaves.
+  double prior_noise = 0.0;
+  double reject_beyond = 6.0;  ///< loss `reject`: rows whose residual is longer than this many medians
+  int threads = 0;             ///< 0: as many as the machine has
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;

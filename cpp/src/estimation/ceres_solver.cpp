@@ -64,6 +64,26 @@ class PoseCost : public ceres::CostFunction {
   int pose_, components_, rows_, columns_;
 };
 
+/// What is known of the parameters beforehand.
+class PriorCost : public ceres::CostFunction {
+ public:
+  explicit PriorCost(const Prior& prior) : center_(prior.center), root_(prior.weight.cwiseSqrt()) {
+    set_num_residuals(static_cast<int>(root_.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(root_.size()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Index n = root_.size();
+    Eigen::Map<Eigen::VectorXd>(residuals, n) =
+        root_.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(parameters[0], n) - center_);
+    if (jacobians && jacobians[0]) Eigen::Map<Eigen::MatrixXd>(jacobians[0], n, n) = root_.asDiagonal();
+    return true;
+  }
+
+ private:
+  Eigen::VectorXd center_, root_;
+};
+
 std::unique_ptr<ceres::LossFunction> make_loss(const Weighing& weighing) {
   switch (weighing.loss) {
     case kernel::RowLoss::none:
@@ -108,6 +128,7 @@ SolverSummary solve_with_ceres(const Evaluator& evaluator, const Model& model, c
       problem.AddResidualBlock(new PoseCost(evaluator, tile, pose, plain, start), loss.get(), x.data());
     }
   }
+  if (weighing.prior.weight.size() > 0) problem.AddResidualBlock(new PriorCost(weighing.prior), nullptr, x.data());
   for (std::size_t k = 0; k < x.size(); ++k) {
     const auto bound = options.bounds.find(model.parameters[evaluator.free()[k]].name);
     if (bound == options.bounds.end()) continue;

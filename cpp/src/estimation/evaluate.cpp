@@ -501,6 +501,16 @@ Evaluator::Evaluator(Evaluator&&) noexcept = default;
 const std::vector<int>& Evaluator::free() const { return impl_->free; }
 std::size_t Evaluator::components() const { return impl_->components; }
 
+static void add_prior(const Prior& prior, const std::vector<int>& free, const Eigen::VectorXd& values,
+                      NormalEquations* out) {
+  for (Eigen::Index k = 0; k < prior.weight.size(); ++k) {
+    const double away = values[free[static_cast<std::size_t>(k)]] - prior.center[k];
+    out->gram(k, k) += prior.weight[k];
+    out->gradient[k] += prior.weight[k] * away;
+    out->cost += prior.weight[k] * away * away;
+  }
+}
+
 void Evaluator::normal_equations(const Eigen::VectorXd& values, const Weighing& weighing, NormalEquations* out) const {
   const std::lock_guard<std::mutex> lock(impl_->busy);
   Impl& impl = *impl_;
@@ -528,6 +538,7 @@ void Evaluator::normal_equations(const Eigen::VectorXd& values, const Weighing& 
   }
   out->squares = sums[static_cast<std::size_t>(p * size + p)];
   out->cost = weighing.loss == kernel::RowLoss::none ? out->squares : sums.back();
+  add_prior(weighing.prior, impl.free, values, out);
 }
 
 void Evaluator::residual_norms(const Eigen::VectorXd& values, const Weighing& weighing,

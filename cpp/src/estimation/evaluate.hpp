@@ -36,6 +36,11 @@ std::vector<Segment> make_segments(const Measurements& data, const std::vector<s
 /// robot) only.
 std::vector<std::vector<double>> make_bases(const Model& model, const Measurements& data);
 
+/// What is known of the free parameters beforehand: weight * (value - center)^2 is added to the cost.
+struct Prior {
+  Eigen::VectorXd center, weight;  ///< shape=(free parameters,); empty: nothing is known
+};
+
 /// How residual rows become unit-weight rows.
 struct Weighing {
   double position_scale = 1.0;  ///< positions and distances [1/m], on top of 1 / sigma of the row if it has one
@@ -43,11 +48,12 @@ struct Weighing {
   kernel::RowLoss loss = kernel::RowLoss::none;
   double loss_scale = 1.0;  ///< on the length of a row's unit-weight residual
   bool row_weights = true;  ///< rows count by their own sigma and weight
+  Prior prior{};
 };
 
-/// Of the free parameters; the cost is the sum of the loss of squared residuals.
+/// Of the free parameters; the cost is the sum of the loss of squared residuals, and of the prior.
 struct NormalEquations : NormalSystem<> {
-  double squares = 0.0;        ///< r^T W r
+  double squares = 0.0;        ///< r^T W r, of the rows alone
   std::size_t components = 0;  ///< residual components that went in
   double rms() const;          ///< sqrt(cost / components)
 };

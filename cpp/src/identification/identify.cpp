@@ -99,6 +99,14 @@ Asked what_is_asked(const Model& model, const Measurements& data, const std::vec
   out.free = select_free(model, out.content, options);
   if (out.free.empty()) throw std::invalid_argument("nothing is free: name parameters to fit, or hold fewer");
   for (const auto& [name, bound] : options.bounds) find_parameters(model, {name});
+  for (const auto& [glob, sigma] : options.priors) {
+    for (const int k : find_parameters(model, {glob})) {
+      const ParameterInfo& info = model.parameters[static_cast<std::size_t>(k)];
+      if (belongs_to_instrument(info.role) || info.role == Role::target)
+        throw std::invalid_argument("priors: '" + glob + "' stands for " + info.name +
+                                    ", but base, targets and instrument are found from the data alone");
+    }
+  }
   if (options.frame_by == FrameBy::svd &&
       (out.content.distance || out.content.poses || !out.content.frame || !model.point_names.empty())) {
     throw std::invalid_argument(
@@ -216,7 +224,35 @@ RowLoss row_loss(Loss loss) {
   }
 }
 
-/// Least squares; then, as asked, a robust loss at a scale of the residuals' own, or gross outliers found and left out.
+/// Noise of a unit-weight component, from the median row; NaN: no more values than parameters.
+double noise_of(const Job& job, const std::vector<int>& fitted, const std::vector<double>& norms) {
+  std::vector<double> comparable;
+  double values = 0.0;
+  for (const std::int32_t row : job.rows) {
+    const int components = components_of(job.data, static_cast<std::size_t>(row));
+    comparable.push_back(norms[static_cast<std::size_t>(row)] / kChiMedian[components]);
+    values += components;
+  }
+  const double free_values = values - static_cast<double>(fitted.size());
+  return free_values > 0.0 ? median_of(std::move(comparable)) * std::sqrt(values / free_values) : kNaN;
+}
+
+/// The options' priors of the fitted parameters about the nominal robot, against rows with this noise.
+Prior prior_of(const Job& job, const std::vector<int>& fitted, double noise) {
+  const Eigen::VectorXd nominal = initial_values(job.model);
+  Eigen::VectorXd weight = Eigen::VectorXd::Zero(nominal.size());
+  for (const auto& [glob, sigma] : job.options.priors) {
+    for (const int k : find_parameters(job.model, {glob}))
+      weight[k] = std::max(weight[k], std::pow(noise / sigma, 2.0));
+  }
+  Prior out;
+  out.center = nominal(fitted);
+  out.weight = weight(fitted);
+  return out;
+}
+
+/// Least squares, under priors if there are some; then, as asked, a robust loss at a scale of the residuals' own, or
+/// gross outliers found and left out.
 Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start) {
   Fit out;
   out.values = start;
@@ -231,10 +267,18 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
     return by_svd ? frame_by_registration(job.model, job.data, of_rows, rows) : Refit();
   };
   const Refit refit = refit_on(evaluator, job.rows);
+  std::vector<double> norms(job.data.rows, 0.0);
+  double noise = job.options.prior_noise;
+  if (!job.options.priors.empty() && !(noise > 0.0)) {
+    solve(job, evaluator, out.weighing, refit, &out.values);
+    evaluator.residual_norms(out.values, out.weighing, &norms);
+    noise = noise_of(job, fitted, norms);
+    out.values = start;
+  }
+  if (!job.options.priors.empty()) out.weighing.prior = prior_of(job, fitted, noise);
   out.solver = solve(job, evaluator, out.weighing, refit, &out.values);
   if (job.options.loss == Loss::none) return out;
 
-  std::vector<double> norms(job.data.rows, 0.0);
   const auto median_norm = [&] {
     evaluator.residual_norms(out.values, out.weighing, &norms);
     std::vector<double> of_rows;
@@ -304,7 +348,7 @@ Seen what_is_seen(const Job& job, const Asked& asked, const Eigen::VectorXd& val
     out.free.erase(std::remove(out.free.begin(), out.free.end(), out.scale_carrier), out.free.end());
   }
   out.selection = select_observable(job, out.free, values);
-  if (asked.values <= out.selection.fitted.size()) {
+  if (asked.values <= out.selection.fitted.size() && !(job.options.prior_noise > 0.0)) {
     throw std::invalid_argument(count_of(asked.values, "measured value") + " in " +
                                 count_of(job.rows.size(), "training row") + " cannot determine " +
                                 count_of(out.selection.fitted.size(), "parameter") +
@@ -471,6 +515,7 @@ Start fit_instrument(const Job& nominal_job, const std::vector<std::string>& unk
   options.solver = Solver::lm;
   options.frame_by = FrameBy::parameters;
   options.bounds.clear();
+  options.priors.clear();
   const Job job{model, nominal_job.data, nominal_job.bases, options, nominal_job.rows};
   locate_points(model, job, &values);
   std::vector<int> free;
@@ -582,7 +627,9 @@ Uncertainty uncertainty(const Job& job, const Fit& found, bool poses) {
     rotation_components += components == 6 ? 3 : 0;
   }
   Weighing positions_only = found.weighing;
-  const auto p = static_cast<double>(found.fitted.size());
+  // Parameters that the rows pay for: priors pay for the rest.
+  const Eigen::VectorXd& known = found.weighing.prior.weight;
+  const double p = static_cast<double>(found.fitted.size()) - (known.size() > 0 ? known.dot(inverse.diagonal()) : 0.0);
   if (!poses) {
     sigma2 = all.squares / std::max(1.0, position_components - p);
     out.covariance = sigma2 * inverse;
@@ -788,6 +835,10 @@ bool IdentifyOptions::is_valid(std::string* error) const {
   if (!(reject_beyond > 1.0)) return fail("reject_beyond must be more than 1 median");
   if (!bounds.empty() && solver != Solver::ceres) return fail("bounds need solver = ceres");
   if (frame_by == FrameBy::svd && solver == Solver::ceres) return fail("frame_by = svd needs solver = lm");
+  if (!(prior_noise >= 0.0)) return fail("prior_noise must not be negative");
+  for (const auto& [name, sigma] : priors) {
+    if (!(sigma > 0.0)) return fail("a prior's standard deviation must be positive");
+  }
   for (const auto& [name, bound] : bounds) {
     if (!(bound.first < bound.second)) return fail("a lower bound must be below its upper bound");
   }

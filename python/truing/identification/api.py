@@ -37,31 +37,32 @@ def identify(
     hayati_angle: float = _USUAL.hayati_angle,
     reject_beyond: float = _USUAL.reject_beyond,
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    priors: Mapping[str, float] | None = None,
+    prior_noise: float = _USUAL.prior_noise,
     threads: int = 0,
     raise_if_not_converged: bool = True,
 ) -> Identification:
     """Find the robot's parameters from measurements.
 
-    Base and targets (anchor, fixed points) are found first. Parameters that the data do not determine are
-    frozen at nominal and named in the result. Then the fit runs on the training rows.
+    Base and targets (anchor, fixed points) are found first. What the data do not determine is frozen at
+    nominal and named in the result. Then the fit runs on the training rows.
 
     robot: nominal. data: measurements, see `Measurements`.
     free: names and globs, "J2.*,*.ratio" or a list. Empty: every geometric value, base and targets.
     hold: names and globs that stay at nominal in any case, "base.*" for a frame that is known.
-    effects: to be fitted as well: "backlash,harmonic:J2+J3", or a list of such words, `EffectRequest` and
-    `Effect`.
+    effects: fitted as well: "backlash,harmonic:J2+J3", or a list of such words, `EffectRequest` and `Effect`.
     solver: "lm" (Levenberg-Marquardt) or "ceres" (takes bounds).
     loss: "reject" finds gross outliers, lists them and leaves them out; "none", "huber", "cauchy", "tukey".
-    frame_by: the measurement frame as six "parameters", or registered after every step ("svd", positions
-    only).
+    frame_by: the measurement frame as six "parameters", or registered after every step ("svd", positions).
     rotation_length: [m] a rotation error of 1 rad counts as this length, where rows give no sigma.
     test_share: fraction of the pose groups that is held out when the data has no `set`. seed: of that split.
-    max_iterations, initial_damping, rms_fall [m], gradient, undamped: of the iteration, see
-    `IdentifyOptions`.
+    max_iterations, initial_damping, rms_fall [m], gradient, undamped: see `IdentifyOptions`.
     rank_tolerance: a unit column is not observable if the others leave no larger fraction of it unexplained.
     hayati_angle: [rad] neighbouring axes that are closer to parallel get a beta.
     reject_beyond: with loss "reject", rows are rejected whose residual is longer than this many medians.
-    bounds: {parameter: (lowest, highest)}, solver "ceres" only. threads: 0: as many as the machine has.
+    bounds: {parameter: (lowest, highest)}, solver "ceres" only.
+    priors: {parameter or glob: standard deviation about nominal, as known beforehand}: a drawing's tolerance.
+    prior_noise: [m] against priors, see there. threads: 0: as many as the machine has.
 
     Raises InputError on data or options that cannot be used, and NotConvergedError (it carries the result),
     unless `raise_if_not_converged` is False.
@@ -86,6 +87,8 @@ def identify(
         hayati_angle=hayati_angle,
         reject_beyond=reject_beyond,
         bounds=bounds or {},
+        priors=priors or {},
+        prior_noise=prior_noise,
         threads=threads,
     )
     result = _core.identify(robot, data, options, evaluated(own, robot, data))

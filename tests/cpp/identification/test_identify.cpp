@@ -4,10 +4,12 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "math/observability.hpp"
 #include "math/registration.hpp"
 #include "support/arms.hpp"
+#include "support/contains.hpp"
 
 using namespace arms;
 using truing::Identification;
@@ -165,6 +167,46 @@ TEST_CASE("bounds are kept") {
   const Identification result = truing::identify(c.nominal, c.table->data, options);
   CHECK(parameter(result, "J3.a").value >= -0.6121);
   CHECK(parameter(result, "J3.a").value <= -0.6119);
+}
+
+TEST_CASE("priors hold what few poses leave open, both solvers alike, and many poses outvote them") {
+  for (const std::size_t poses : {12u, 2000u}) {
+    CAPTURE(poses);
+    const Ur10Case c(poses, 1e-4, 21);
+    IdentifyOptions options;
+    options.test_share = 0.0;
+    options.loss = truing::Loss::none;
+    const Identification free = truing::identify(c.nominal, c.table->data, options);
+    options.priors = {{"J*.theta", 1e-4}, {"J*.alpha", 1e-4}, {"J*.a", 1e-4}, {"J*.d", 1e-4}};
+    options.prior_noise = 1e-4;
+    const Identification held = truing::identify(c.nominal, c.table->data, options);
+    options.solver = truing::Solver::ceres;
+    const Identification ceres = truing::identify(c.nominal, c.table->data, options);
+    double away_free = 0.0, away_held = 0.0;
+    for (std::size_t k = 0; k < held.parameters.size(); ++k) {
+      const truing::Parameter& p = held.parameters[k];
+      CHECK(std::abs(p.value - ceres.parameters[k].value) < 1e-7);
+      if (p.frozen || p.name[0] != 'J' || p.name.find(".beta") != std::string::npos) continue;
+      away_free += std::pow(free.parameters[k].value - p.nominal, 2.0);
+      away_held += std::pow(p.value - p.nominal, 2.0);
+    }
+    if (poses < 100)
+      CHECK(away_held < 0.5 * away_free);
+    else
+      CHECK(away_held > 0.7 * away_free);
+  }
+}
+
+TEST_CASE("priors of what is always unknown, of nothing, and without a size are refused") {
+  const Ur10Case c(50, 1e-4, 22);
+  IdentifyOptions options;
+  const auto complaint_about = [&](const std::string& name, double sigma) {
+    options.priors = {{name, sigma}};
+    return complaint(c.nominal, c.table->data, options);
+  };
+  CHECK(contains(complaint_about("base.x", 1e-3), "base.x"));
+  CHECK(contains(complaint_about("J9.*", 1e-3), "J9.*"));
+  CHECK(contains(complaint_about("J2.a", 0.0), "must be positive"));
 }
 
 TEST_CASE("the measurement frame by SVD and as parameters end in the same place") {
