@@ -98,6 +98,13 @@ void bind_identify(py::module_& m) {
 
 A fit that did not converge returns with solver.converged == False.)");
   m.def(
+      "lacks_directions",
+      [](const Robot& robot, const Measurements& data, const std::vector<OwnEffect>& own) {
+        return lacks_directions(robot, data, effects_from(own));
+      },
+      py::arg("robot"), py::arg("data"), py::arg("own_effects") = none,
+      "True when an effect of the robot needs approach directions that the data lack.");
+  m.def(
       "predict",
       [](const Robot& given, const Measurements& data, const std::vector<OwnEffect>& own, int threads) {
         const std::vector<Effect> effects = effects_from(own);

@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'joint_motion', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -452,7 +452,7 @@ class Robot:
     `robot.joints[1].a = 0.3` and `robot.joint("J2").a = 0.3` change the robot. The number of joints and targets is fixed:
     `robot.replace(joints=...)` makes another robot.
     """
-    def __init__(self, name: str, *, joints: collections.abc.Sequence[Joint], targets: collections.abc.Sequence[Target] = ..., convention: typing.Literal['dh', 'mdh', 'urdf'] = 'dh', gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., T_measurement_base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., effects: collections.abc.Sequence[AppliedEffect] = [], anchor: Anchor | None = None) -> None:
+    def __init__(self, name: str, *, joints: collections.abc.Sequence[Joint], targets: collections.abc.Sequence[Target] = ..., convention: typing.Literal['dh', 'mdh', 'urdf'] = 'dh', gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., T_measurement_base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., effects: collections.abc.Sequence[AppliedEffect] = [], anchor: Anchor | None = None, fitted_range: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -518,6 +518,15 @@ class Robot:
         """
     @effects.setter
     def effects(self, arg1: collections.abc.Sequence[AppliedEffect]) -> None:
+        ...
+    @property
+    def fitted_range(self) -> types.MappingProxyType[str, tuple[float, float]]:
+        """
+        Smallest and largest value of the inputs that the effects were fitted on: 'q1' … [rad | m],
+        'payload' [kg], 'temp' [deg C]. Beyond it nobody has seen what they do. Empty: not known.
+        """
+    @fitted_range.setter
+    def fitted_range(self, arg1: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
     @property
     def gravity(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1033,10 +1042,15 @@ class IdentifyOptions:
     test_share = 0.2: Fraction of the pose groups held out when the data has no `set`.
     seed = 0: Of the split.
     rank_tolerance = 1e-06: A unit column that the others explain up to this fraction is not observable.
+    priors = {}: What is known beforehand: standard deviation about the nominal value [its unit], by parameter. A fit
+        with many parameters from few poses stays near the nominal robot where the data say little. Not of
+        base, targets and anchor.
+    prior_noise = 0.0: Noise that priors are weighed against: standard deviation of a position component [m], of rows with
+        a sigma of their own a factor to it. 0: what a fit without priors leaves.
     reject_beyond = 6.0: Loss `reject`: rows whose residual is longer than this many medians.
     threads = 0: 0: as many as the machine has.
     """
-    def __init__(self, *, free: collections.abc.Sequence[str] = [], hold: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, max_iterations: typing.SupportsInt | typing.SupportsIndex = 5000, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, free: collections.abc.Sequence[str] = [], hold: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, max_iterations: typing.SupportsInt | typing.SupportsIndex = 5000, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, priors: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex] = {}, prior_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -1140,6 +1154,25 @@ class IdentifyOptions:
         """
     @max_iterations.setter
     def max_iterations(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def prior_noise(self) -> float:
+        """
+        Noise that priors are weighed against: standard deviation of a position component [m], of rows with
+        a sigma of their own a factor to it. 0: what a fit without priors leaves.
+        """
+    @prior_noise.setter
+    def prior_noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def priors(self) -> types.MappingProxyType[str, float]:
+        """
+        What is known beforehand: standard deviation about the nominal value [its unit], by parameter. A fit
+        with many parameters from few poses stays near the nominal robot where the data say little. Not of
+        base, targets and anchor.
+        """
+    @priors.setter
+    def priors(self, arg1: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
         ...
     @property
     def rank_tolerance(self) -> float:
@@ -2559,7 +2592,7 @@ class Diagnosis:
         What no effect of the catalogue explains.
         """
     @property
-    def verdict(self) -> typing.Literal['none', 'effects', 'unknown', 'effects+unknown']:
+    def verdict(self) -> typing.Literal['none', 'effects', 'unknown', 'effects+unknown', 'does_not_hold']:
         """
         Whether there is a gap, and whether the effects named explain it.
         
@@ -2567,6 +2600,7 @@ class Diagnosis:
         'effects': named, and nothing is left
         'unknown': a gap that no effect of the catalogue explains
         'effects+unknown': named, and something is left
+        'does_not_hold': what was found makes the error of held-out poses larger: nothing of it is in `robot`
         """
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -6338,9 +6372,17 @@ def identify_modes(t: numpy.typing.ArrayLike, deviation: numpy.typing.ArrayLike,
     
     Raises InputError on fewer than 500 rows.
     """
+def inferred_directions(data: Measurements) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    shape=(n, driven joints): approach directions -1, 0, 1 as the order of the rows shows them, if the poses were driven to one after the other.
+    """
 def joint_motion(robot: Robot, data: Measurements, joint: str) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     """
     shape=(n,) [rad | m]: motion of a joint as read, of a passive one from its drivers' readings. Raises InputError.
+    """
+def lacks_directions(robot: Robot, data: Measurements, own_effects: collections.abc.Sequence[OwnEffect] = []) -> bool:
+    """
+    True when an effect of the robot needs approach directions that the data lack.
     """
 def large_boom() -> Robot:
     """

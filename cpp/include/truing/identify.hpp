@@ -103,6 +103,9 @@ struct Prediction {
   Eigen::VectorXd distance;                                               ///< shape=(n,) [m]; empty without an anchor
 };
 
+/// True when an effect of the robot needs approach directions that the data lack.
+bool lacks_directions(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects = {});
+
 /// Throws std::invalid_argument on unknown effects or columns that they need.
 Prediction predict(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects = {},
                    int threads = 0);

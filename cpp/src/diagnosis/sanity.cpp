@@ -192,35 +192,9 @@ void try_orders(const Robot& robot, const DiagnoseOptions& options, double sprea
   out->findings.push_back(finding);
 }
 
-/// Approach directions from the order of the poses: the sign of each joint's last motion.
-void infer_directions(const Robot& robot, Checked* out) {
-  const Measurements& data = out->data;
-  if (!data.direction.empty()) return;
-  const std::vector<std::int32_t> group = pose_groups(data);
-  const std::size_t driven = robot.driven_count();
-  std::vector<std::vector<double>> columns(driven, std::vector<double>(data.rows, 0.0));
-  std::vector<double> last(driven, kNaN), now(driven, 0.0);
-  std::int32_t current = -1;
-  std::vector<double> direction(driven, 0.0);
-  for (std::size_t row = 0; row < data.rows; ++row) {
-    for (std::size_t k = 0; k < driven; ++k) now[k] = data.joints[k][row];
-    if (group[row] != current) {
-      for (std::size_t k = 0; k < driven; ++k) {
-        const double step = now[k] - last[k];
-        if (std::isfinite(step) && std::abs(step) > 1e-4)
-          direction[k] = step > 0.0 ? 1.0 : -1.0;  // a joint that rests keeps its side
-      }
-      last = now;
-      current = group[row];
-    }
-    for (std::size_t k = 0; k < driven; ++k) columns[k][row] = direction[k];
-  }
-  auto owned = std::make_shared<Owned>(Owned{data.owner, std::move(columns)});
-  Measurements changed = data;
-  changed.direction.clear();
-  for (const std::vector<double>& column : owned->columns) changed.direction.push_back({column.data(), 1});
-  changed.owner = owned;
-  out->data = std::move(changed);
+void infer_directions(Checked* out) {
+  if (!out->data.direction.empty()) return;
+  out->data = with_inferred_directions(out->data);
   out->inferred_direction = true;
   out->findings.push_back({"direction",
                            "no columns dir1 …: the approach directions were inferred from the order of the rows, as if "
@@ -261,7 +235,7 @@ Checked check(const Robot& robot, const Measurements& data, const DiagnoseOption
   const double spread = spread_of(data);
   choose_record(robot, options, &out);
   try_orders(robot, options, spread, &out);
-  infer_directions(robot, &out);
+  infer_directions(&out);
   return out;
 }
 

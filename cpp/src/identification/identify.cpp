@@ -797,6 +797,25 @@ void report_parameters(const Model& nominal_model, const Model& model, const See
   }
 }
 
+/// Between which values the fitted rows have every input.
+std::map<std::string, std::pair<double, double>> ranges_of(const Measurements& data,
+                                                           const std::vector<std::int32_t>& rows) {
+  std::map<std::string, std::pair<double, double>> out;
+  const auto look_at = [&](const std::string& name, const Column& column) {
+    for (const std::int32_t row : rows) {
+      const double value = column ? column[static_cast<std::size_t>(row)] : kNaN;
+      if (!std::isfinite(value)) continue;
+      const auto found = out.emplace(name, std::pair{value, value}).first;
+      found->second.first = std::min(found->second.first, value);
+      found->second.second = std::max(found->second.second, value);
+    }
+  };
+  for (std::size_t k = 0; k < data.joints.size(); ++k) look_at("q" + std::to_string(k + 1), data.joints[k]);
+  look_at("payload", data.payload);
+  look_at("temp", data.temperature);
+  return out;
+}
+
 /// Errors before and after, on the rows fitted and on those held out.
 void report_errors(const Job& job, const Content& content, const std::vector<std::int32_t>& test,
                    const Eigen::VectorXd& before, const Fit& found, Identification* result) {
@@ -870,6 +889,7 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   result.set = rows.set;
   result.before = start.robot;
   result.robot = robot_with(model, found.values);
+  if (!result.robot.effects.empty()) result.robot.fitted_range = ranges_of(data, rows.train);
   result.solver = found.solver;
   result.frozen = seen.selection.frozen;
   result.rank = static_cast<int>(seen.selection.fitted.size());
@@ -880,6 +900,22 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   report_errors(job, asked.content, rows.test, start.values, found, &result);
   result.warnings = make_warnings(result, asked.values, spread_of(job));
   return result;
+}
+
+bool lacks_directions(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects) {
+  if (!data.direction.empty()) return false;
+  const auto works_with = [&](const AppliedEffect& effect, const Measurements& some) {
+    try {
+      effect_terms({{effect.effect, effect.joints}}, robot, some, own_effects);
+    } catch (const MissingColumn&) {
+      return false;
+    }
+    return true;
+  };
+  const Measurements with = with_inferred_directions(data);
+  return std::any_of(robot.effects.begin(), robot.effects.end(), [&](const AppliedEffect& effect) {
+    return !works_with(effect, data) && works_with(effect, with);
+  });
 }
 
 Prediction predict(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects, int threads) {

@@ -216,4 +216,29 @@ std::vector<std::int32_t> pose_groups(const Measurements& data) {
   return numbered_groups(data.rows, hash, equal);
 }
 
+Measurements with_inferred_directions(const Measurements& data) {
+  if (!data.direction.empty()) return data;
+  constexpr double kAtRest = 1e-4;  ///< [rad | m] a joint that moves less keeps its side
+  struct Owned {
+    std::shared_ptr<const void> rest;
+    std::vector<std::vector<double>> columns;
+  };
+  const std::size_t joints = data.joints.size();
+  const auto owned = std::make_shared<Owned>(
+      Owned{data.owner, std::vector<std::vector<double>>(joints, std::vector<double>(data.rows, 0.0))});
+  const std::vector<std::int32_t> group = pose_groups(data);
+  for (std::size_t k = 0; k < joints; ++k) {
+    double direction = 0.0;
+    for (std::size_t row = 1; row < data.rows; ++row) {
+      const double step = data.joints[k][row] - data.joints[k][row - 1];
+      if (group[row] != group[row - 1] && std::abs(step) > kAtRest) direction = step > 0.0 ? 1.0 : -1.0;
+      owned->columns[k][row] = direction;
+    }
+  }
+  Measurements out = data;
+  for (const std::vector<double>& column : owned->columns) out.direction.push_back({column.data(), 1});
+  out.owner = owned;
+  return out;
+}
+
 }  // namespace truing

@@ -408,6 +408,21 @@ Checked are: counts that do not fit the robot, joints or inputs that are not fin
       py::arg("data"),
       "shape=(n,): group of every row, 0 ... count-1 in order of appearance; `pose` if given, else equal "
       "joint readings.");
+  m.def(
+      "inferred_directions",
+      [](const Measurements& data) {
+        const Measurements with = with_inferred_directions(data);
+        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> out(
+            static_cast<Eigen::Index>(with.rows), static_cast<Eigen::Index>(with.direction.size()));
+        for (Eigen::Index k = 0; k < out.cols(); ++k) {
+          for (Eigen::Index row = 0; row < out.rows(); ++row)
+            out(row, k) = with.direction[static_cast<std::size_t>(k)][static_cast<std::size_t>(row)];
+        }
+        return out;
+      },
+      py::arg("data"),
+      "shape=(n, driven joints): approach directions -1, 0, 1 as the order of the rows shows them, if the poses were "
+      "driven to one after the other.");
 }
 
 }  // namespace truing::python

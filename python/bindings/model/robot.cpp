@@ -163,15 +163,16 @@ void bind_robot_class(py::module_& m) {
 `robot.replace(joints=...)` makes another robot.)");
   cls.def(py::init([](std::string name, std::vector<Joint> joints, std::vector<Target> targets, Convention convention,
                       const Eigen::Vector3d& gravity, const Eigen::Isometry3d& T_measurement_base,
-                      std::vector<AppliedEffect> effects, std::optional<Anchor> anchor) {
-            return Robot{std::move(name),    convention,         gravity, T_measurement_base, std::move(joints),
-                         std::move(targets), std::move(effects), anchor};
+                      std::vector<AppliedEffect> effects, std::optional<Anchor> anchor,
+                      std::map<std::string, std::pair<double, double>> fitted_range) {
+            return Robot{std::move(name),    convention,         gravity, T_measurement_base,     std::move(joints),
+                         std::move(targets), std::move(effects), anchor,  std::move(fitted_range)};
           }),
           py::arg("name"), py::kw_only(), py::arg("joints"),
           py::arg_v("targets", std::vector<Target>{Target{"tool"}}, "[Target('tool')]"),
           py::arg("convention") = usual.convention, py::arg("gravity") = array_from(usual.gravity),
           py::arg("T_measurement_base") = usual.T_measurement_base, py::arg("effects") = usual.effects,
-          py::arg("anchor") = usual.anchor);
+          py::arg("anchor") = usual.anchor, py::arg("fitted_range") = usual.fitted_range);
   define_attributes(cls, {"joints", "targets"});
   cls.def_property_readonly(
       "joints", [](const py::object& self) { return tuple_of_references(self.cast<Robot&>().joints, self); },
@@ -191,7 +192,8 @@ void bind_robot_class(py::module_& m) {
       "The joint of that name; what is set on it changes the robot. Raises InputError that lists the joints "
       "there are.");
   cls.def("__repr__", [](const Robot& r) { return repr(r); });
-  define_value(cls, {"name", "joints", "targets", "convention", "gravity", "T_measurement_base", "effects", "anchor"});
+  define_value(cls, {"name", "joints", "targets", "convention", "gravity", "T_measurement_base", "effects", "anchor",
+                     "fitted_range"});
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ from truing.files.yaml_tree import (
     Loc,
     MassName,
     Number,
+    Range,
     Strict,
     Text,
     Vector3,
@@ -120,6 +121,7 @@ class _RobotFile(Strict):
     tool: _Frame = _AT_ORIGIN
     targets: dict[str, _Frame] = {}
     effects: list[_Effect] = []
+    fitted_range: dict[str, Range] = {}
     anchor: _Anchor | None = None
     calibration: FreeMapping = {}
 
@@ -457,6 +459,7 @@ def _to_robot(model: _LinkTable | _UrdfChain, default_name: str) -> _core.Robot:
             )
             for entry in model.effects
         ],
+        fitted_range={name: (float(low), float(high)) for name, (low, high) in model.fitted_range.items()},
         anchor=(
             None
             if model.anchor is None
@@ -546,6 +549,11 @@ class _Writer:
         if robot.effects:
             lines.append("effects:  # values in SI units (rad, m, rad/Nm ...), whatever `units` says")
             lines += [f"  - {self._effect(effect)}" for effect in robot.effects]
+        if robot.fitted_range:
+            lines.append("fitted_range:  # of the inputs that the effects were fitted on (rad, m, kg, deg C)")
+            lines += [
+                f"  {_quoted(name)}: {self._vector(ends, _SI)}" for name, ends in robot.fitted_range.items()
+            ]
         if calibration:
             lines.append("calibration:")
             lines += [f"  {_quoted(str(key))}: {_flow(value)}" for key, value in calibration.items()]

@@ -237,6 +237,13 @@ def _pair(value: object) -> tuple[Decimal | None, Decimal | None]:
     return lower, upper
 
 
+def _range(value: object) -> tuple[Decimal, Decimal]:
+    lower, upper = _pair(value)
+    if lower is None or upper is None:
+        raise expected(value, "a list of 2 numbers, [smallest, largest]")
+    return lower, upper
+
+
 def _mapping(value: object) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise expected(value, "a mapping, {name: value}")
@@ -256,6 +263,7 @@ Number = Annotated[Decimal, PlainValidator(_number)]
 Text = Annotated[str, PlainValidator(_text)]
 Vector3 = Annotated[tuple[Decimal, Decimal, Decimal], PlainValidator(_vector3)]
 Limits = Annotated[tuple[Decimal | None, Decimal | None] | None, PlainValidator(_pair)]
+Range = Annotated[tuple[Decimal, Decimal], PlainValidator(_range)]
 FreeMapping = Annotated[dict[str, Any], PlainValidator(_mapping)]
 LengthName = Annotated[Literal["m", "mm"], PlainValidator(choice("m", "mm"))]
 AngleName = Annotated[Literal["rad", "deg"], PlainValidator(choice("rad", "deg"))]

@@ -4,13 +4,16 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
+
+import numpy as np
 
 from truing import _core
 from truing._core import Identification, Measurements, Prediction, Residuals, Robot
 from truing.effects import Effect, Effects, evaluated, name_list, own_effects, split_effects
-from truing.errors import NotConvergedError
+from truing.errors import InputWarning, NotConvergedError
 
 _USUAL = _core.IdentifyOptions()  # the defaults stand in identify.hpp and diagnose.hpp alone
 
@@ -103,9 +106,15 @@ def predict(
     """What the robot, with its fitted effects, predicts for the rows of `data`.
 
     effects: definitions of own effects that the robot carries. Those of the catalogue are known.
+
+    Warns (InputWarning) of rows beyond the ranges that the effects were fitted on, and when an effect needs
+    approach directions that the data lack: they are inferred from the order of the rows, as `diagnose` does.
     Raises InputError on unknown effects or columns that they need.
     """
-    return _core.predict(robot, data, evaluated(own_effects(effects), robot, data), threads)
+    own = evaluated(own_effects(effects), robot, data)
+    data = _with_directions(robot, data, own)
+    _warn_of_rows_beyond(robot, data)
+    return _core.predict(robot, data, own, threads)
 
 
 def residuals(
@@ -113,7 +122,46 @@ def residuals(
 ) -> Residuals:
     """Predicted minus measured, NaN where not measured.
 
-    Rows of a fixed point are compared with the mean of that point's predictions. effects: as in `predict`.
-    Raises InputError on unknown effects or columns that they need.
+    Rows of a fixed point are compared with the mean of that point's predictions. Effects, warnings and
+    errors are as in `predict`.
     """
-    return _core.residuals(robot, data, evaluated(own_effects(effects), robot, data), threads)
+    own = evaluated(own_effects(effects), robot, data)
+    data = _with_directions(robot, data, own)
+    _warn_of_rows_beyond(robot, data)
+    return _core.residuals(robot, data, own, threads)
+
+
+def _with_directions(robot: Robot, data: Measurements, own: Sequence[_core.OwnEffect]) -> Measurements:
+    if not _core.lacks_directions(robot, data, own):
+        return data
+    warnings.warn(
+        "no columns dir1 ...: the approach directions that the robot's effects need were inferred from the"
+        " order of the rows, as if the poses had been driven to one after the other",
+        InputWarning,
+        stacklevel=3,
+    )
+    return data.replace(directions=_core.inferred_directions(data))
+
+
+def _warn_of_rows_beyond(robot: Robot, data: Measurements) -> None:
+    """Beyond the range that they were fitted on, effects may do anything."""
+    columns = {f"q{k + 1}": column for k, column in enumerate(np.asarray(data.joints).T)}
+    columns |= {"payload": data.payload, "temp": data.temperature}
+    beyond = np.zeros(len(data), bool)
+    inputs = []
+    for name, (low, high) in robot.fitted_range.items():
+        column = columns.get(name)
+        if column is None:
+            continue
+        margin = 0.02 * (high - low) + 1e-9
+        out = (column < low - margin) | (column > high + margin)
+        beyond |= out
+        if out.any():
+            inputs.append(name)
+    if inputs:
+        warnings.warn(
+            f"{int(beyond.sum())} of {len(data)} rows lie beyond the range that the robot's effects were"
+            f" fitted on ({', '.join(inputs)}): nobody has seen what they do there",
+            InputWarning,
+            stacklevel=3,
+        )

@@ -209,6 +209,22 @@ TEST_CASE("priors of what is always unknown, of nothing, and without a size are 
   CHECK(contains(complaint_about("J2.a", 0.0), "must be positive"));
 }
 
+TEST_CASE("a robot with fitted effects knows the range that they were fitted on") {
+  const Ur10Case c(200, 1e-4, 23);
+  IdentifyOptions options;
+  CHECK(truing::identify(c.nominal, c.table->data, options).robot.fitted_range.empty());
+  options.effects = {{"harmonic", {"J2"}}};
+  options.test_share = 0.0;
+  const truing::Robot robot = truing::identify(c.nominal, c.table->data, options).robot;
+  REQUIRE(robot.fitted_range.size() == 6);
+  double low = 1e300, high = -1e300;
+  for (std::size_t row = 0; row < c.table->data.rows; ++row) {
+    low = std::min(low, c.table->data.joints[1][row]);
+    high = std::max(high, c.table->data.joints[1][row]);
+  }
+  CHECK(robot.fitted_range.at("q2") == std::pair{low, high});
+}
+
 TEST_CASE("the measurement frame by SVD and as parameters end in the same place") {
   const Ur10Case c(200, 1e-4, 20);
   IdentifyOptions options;

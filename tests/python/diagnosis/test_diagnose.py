@@ -18,6 +18,7 @@ import yaml
 
 import truing
 from truing.cli import main
+from truing.errors import InputWarning
 from truing.examples import example
 from truing.model import AppliedEffect, catalogue
 from truing.testing.simulation import random_joints
@@ -335,6 +336,10 @@ def test_directions_that_were_inferred_are_written_and_serve_the_robot_file() ->
     assert rms_of_robot_file(data.replace(directions=inferred)) == pytest.approx(
         result["after"]["rms_m"], rel=1e-6
     )
+    # The robot file serves on the very data that it came from: the same directions are inferred, and said.
+    with pytest.warns(InputWarning, match="inferred from the order of the rows"):
+        again = rms_of_robot_file(data.replace(directions=None))
+    assert again == pytest.approx(result["after"]["rms_m"], rel=1e-6)
     assert result["after"]["rms_m"] == pytest.approx(given["after"]["rms_m"], rel=0.1)
 
 

@@ -62,4 +62,8 @@ void validate(const Measurements& data, const Robot& robot, bool joints_only = f
 /// Group number of every row, 0 … count-1 in order of appearance: `pose` if given, else equal joint readings.
 std::vector<std::int32_t> pose_groups(const Measurements& data);
 
+/// The data with approach directions as the order of the rows shows them, if the poses were driven to one after the
+/// other: the sign of every joint's last motion, 0 before the first one. Data that have directions stay as they are.
+Measurements with_inferred_directions(const Measurements& data);
+
 }  // namespace truing

@@ -82,6 +82,9 @@ struct Robot {
   std::vector<Target> targets;         ///< the targets, the tool first
   std::vector<AppliedEffect> effects;  ///< effects with their fitted parameters
   std::optional<Anchor> anchor;        ///< the far end of a draw-wire or ballbar, if there is one
+  /// Smallest and largest value of the inputs that the effects were fitted on: 'q1' … [rad | m], 'payload' [kg], 'temp'
+  /// [deg C]. Beyond it nobody has seen what they do. Empty: not known.
+  std::map<std::string, std::pair<double, double>> fitted_range;
 
   /// Number of joints that have a reading.
   std::size_t driven_count() const;
