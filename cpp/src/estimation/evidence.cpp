@@ -4,7 +4,6 @@
 #include "estimation/evidence.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -15,8 +14,13 @@
 namespace truing::estimation {
 namespace {
 
-/// Parts of the prior size that a group's parameters may have: from "as far off as robots get" down to noise.
-constexpr std::array<double, 4> kScales = {1.0, 0.1, 0.01, 0.001};
+/// Parts of the prior size that a group's parameters may have: from "as far off as robots get" down to noise. A scale
+/// that is off by three costs half a nat a parameter: groups of many columns try the scales between as well.
+std::vector<double> scales_of(std::size_t columns) {
+  constexpr std::size_t kManyColumns = 8;
+  if (columns > kManyColumns) return {1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001};
+  return {1.0, 0.1, 0.01, 0.001};
+}
 /// A nuisance column that the others explain but for this share of its square is held at zero.
 constexpr double kFlat = 1e-9;
 
@@ -38,6 +42,55 @@ Eigen::VectorXd part(const Eigen::VectorXd& v, const std::vector<int>& rows) {
 double log_determinant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
   return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
 }
+
+/// Cholesky with pivots: A = L L^T, where L has as many columns as A has rank (Higham 1990, Analysis of the Cholesky
+/// decomposition of a semi-definite matrix, eq. (1.3)).
+Eigen::MatrixXd pivoted_cholesky(const Eigen::MatrixXd& A, double tolerance) {
+  Eigen::MatrixXd L(A.rows(), A.cols());
+  Eigen::VectorXd rest = A.diagonal();
+  Eigen::Index rank = 0;
+  for (; rank < A.cols(); ++rank) {
+    Eigen::Index pivot = 0;
+    const double largest = rest.maxCoeff(&pivot);
+    if (!(largest > tolerance)) break;
+    L.col(rank) = (A.col(pivot) - L.leftCols(rank) * L.row(pivot).head(rank).transpose()) / std::sqrt(largest);
+    rest -= L.col(rank).cwiseAbs2();
+    rest[pivot] = 0.0;
+  }
+  return L.leftCols(rank);
+}
+
+/// X^T e and e^T e of noise of unit variance, from the Gram matrix alone: with X^T X = L L^T, X^T e is L z with as many
+/// normal z as X has rank, and z^T z is what the columns can see of e^T e.
+class WhiteNoise {
+ public:
+  explicit WhiteNoise(const Gram& gram) : scale_(unit_scale<Eigen::Dynamic>(gram.xx)) {
+    constexpr double kNoPivot = 1e-9;
+    L_ = pivoted_cholesky(scaled_both<Eigen::Dynamic>(scale_, gram.xx), kNoPivot);
+    unseen_ = gram.n - static_cast<double>(L_.cols());
+  }
+
+  struct Draw {
+    Eigen::VectorXd xy;
+    double yy = 0.0;
+  };
+  Draw draw(Random* random) const {
+    Eigen::VectorXd z(L_.cols());
+    for (double& one : z) one = random->normal();
+    Draw out{scale_.cwiseInverse().cwiseProduct(L_ * z), z.squaredNorm()};
+    // A chi-square of many degrees of freedom (Wilson and Hilferty 1931).
+    if (unseen_ > 0.0) {
+      const double spread = 2.0 / (9.0 * unseen_);
+      out.yy += unseen_ * std::pow(std::max(0.0, 1.0 - spread + std::sqrt(spread) * random->normal()), 3.0);
+    }
+    return out;
+  }
+
+ private:
+  Eigen::VectorXd scale_;
+  Eigen::MatrixXd L_;
+  double unseen_ = 0.0;  ///< degrees of freedom of the noise that no column sees
+};
 
 }  // namespace
 
@@ -168,7 +221,7 @@ Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, c
   Gain best;
   Eigen::LLT<Eigen::MatrixXd> factor;
   Eigen::MatrixXd m;
-  for (const double scale : kScales) {
+  for (const double scale : scales_of(static_cast<std::size_t>(b.size()))) {
     double sigma2 = state.sigma2, fall = 0.0, determinants = 0.0;
     bool good = true;
     for (int round = 0; round < 3 && good; ++round) {
@@ -365,18 +418,13 @@ Evidence::State Evidence::search(const SearchOptions& options, const Choice& sta
 }
 
 std::vector<double> Evidence::null_scores(const State& state, int count, std::uint64_t seed) const {
-  // X^T e of white noise has covariance s^2 X^T X: no rows are needed.
-  const Eigen::Index p = gram_.xx.cols();
-  Eigen::MatrixXd jittered = gram_.xx;
-  jittered.diagonal() *= 1.0 + 1e-10;
-  jittered.diagonal().array() += 1e-30;
-  const Eigen::LLT<Eigen::MatrixXd> noise = factorised(std::move(jittered));
+  const WhiteNoise noise(gram_);
   const Projected projected = project(state);
   struct Prepared {
     const ColumnGroup* group;
     Eigen::MatrixXd v;
-    std::array<Eigen::LLT<Eigen::MatrixXd>, kScales.size()> factor;
-    std::array<double, kScales.size()> determinants;
+    std::vector<Eigen::LLT<Eigen::MatrixXd>> factor;  ///< by scale
+    std::vector<double> determinants;
   };
   std::vector<Prepared> prepared;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -389,29 +437,27 @@ std::vector<double> Evidence::null_scores(const State& state, int count, std::ui
       one.v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
     const Eigen::MatrixXd a = block(gram_.xx, columns, columns) - one.v.transpose() * one.v;
     const Eigen::VectorXd size = part(prior_, columns);
-    for (std::size_t s = 0; s < kScales.size(); ++s) {
-      const Eigen::VectorXd ridge = state.sigma2 * (kScales[s] * size).array().pow(-2.0).matrix();
+    for (const double scale : scales_of(columns.size())) {
+      const Eigen::VectorXd ridge = state.sigma2 * (scale * size).array().pow(-2.0).matrix();
       Eigen::MatrixXd m = a;
       m.diagonal() += ridge;
-      one.factor[s].compute(m);
-      one.determinants[s] = ridge.array().log().sum() - log_determinant(one.factor[s]);
+      one.factor.emplace_back(m);
+      one.determinants.push_back(ridge.array().log().sum() - log_determinant(one.factor.back()));
     }
     prepared.push_back(std::move(one));
   }
   Random random(seed);
   std::vector<double> out;
-  const double rss = state.sigma2 * degrees_of_freedom_;
   for (int k = 0; k < count; ++k) {
-    Eigen::VectorXd z(p);
-    for (Eigen::Index i = 0; i < p; ++i) z[i] = random.normal();
-    Eigen::VectorXd xy = noise.matrixL() * z;
+    auto [xy, yy] = noise.draw(&random);
     xy *= std::sqrt(state.sigma2);
     const Eigen::VectorXd u = state.factor.matrixL().solve(part(xy, state.columns));
+    const double rss = std::max(state.sigma2 * yy - u.squaredNorm(), 1e-300);
     double largest = -1e300;
     for (const Prepared& one : prepared) {
       const Eigen::VectorXd b = part(xy, one.group->columns) - one.v.transpose() * u;
-      for (std::size_t s = 0; s < kScales.size(); ++s) {
-        const double fall = std::min(one.factor[s].matrixL().solve(b).squaredNorm(), 0.99 * rss);
+      for (std::size_t s = 0; s < one.factor.size(); ++s) {
+        const double fall = std::min(one.factor[s].matrixL().solve(b).squaredNorm(), (1.0 - 1e-9) * rss);
         largest = std::max(largest, -0.5 * degrees_of_freedom_ * std::log1p(-fall / rss) + 0.5 * one.determinants[s] -
                                         one.group->cost);
       }
