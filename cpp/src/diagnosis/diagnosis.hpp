@@ -30,8 +30,9 @@ struct Registered {
 
 /// What noise is.
 struct Noise {
-  double design_effect = 1.0;          ///< values of a pose that count as one (Kish 1965)
-  double position_sigma = 0.0;         ///< [m] of a component (or a distance), from the flexible fit
+  double design_effect = 1.0;   ///< values of a pose that count as one (Kish 1965)
+  double position_sigma = 0.0;  ///< [m] of a component (or a distance), from the flexible fit
+  double unit = 0.0;  ///< of a component that its row's own sigma and weight have been divided by; without those [m]
   std::vector<std::int32_t> outliers;  ///< rows that count for little
 };
 

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <set>
 #include <thread>
 
 #include "math/statistics.hpp"
@@ -18,11 +19,14 @@ namespace truing::diagnosis {
 
 using Kind = Explanation::Kind;
 
-/// Sums over the training rows, of some columns.
-static Gram sum_of(const Design& design, const Eigen::VectorXd& weight, const std::vector<int>& columns) {
+/// Sums over the rows of the training folds that are `wanted`, of some columns.
+template <typename Wanted>
+static Gram sum_of(const Design& design, const Eigen::VectorXd& weight, const std::vector<int>& columns,
+                   const Wanted& wanted) {
   GramSum sum(static_cast<Eigen::Index>(columns.size()));
   for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
-    if (design.fold[static_cast<std::size_t>(i)] >= design.folds) continue;
+    const std::int32_t fold = design.fold[static_cast<std::size_t>(i)];
+    if (fold >= design.folds || !wanted(fold)) continue;
     double* out = sum.row();
     for (const int column : columns) {
       *out = weight[i] * design.x(i, column);
@@ -146,27 +150,51 @@ class FlexibleFit {
   /// `uniform`: the one noise that all rows are weighted with; 0: weights differ from row to row.
   void fit(const Eigen::VectorXd& weight, double uniform) {
     sum(weight, uniform);
-    const auto p = static_cast<Eigen::Index>(columns_.size());
-    Eigen::MatrixXd d = xx_;
-    for (Eigen::Index c = 0; c < p; ++c) {
-      const bool flat = c < static_cast<Eigen::Index>(design_.nuisance.size());
-      d(c, c) +=
-          flat ? 1e-9 * xx_(c, c) + 1e-30 : std::pow(0.05 * design_.prior[columns_[static_cast<std::size_t>(c)]], -2.0);
-    }
-    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(d));
+    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(with_prior(xx_));
     const Eigen::VectorXd solution = factor.solve(xy_);
     used_ = factor.solve(xx_).trace();
-    for (Eigen::Index i = 0; i < residual_.size(); ++i) {
-      double fitted = 0.0;
-      for (Eigen::Index c = 0; c < p; ++c) fitted += design_.x(i, columns_[static_cast<std::size_t>(c)]) * solution[c];
-      residual_[i] = design_.y[i] - fitted;
+    for (Eigen::Index i = 0; i < residual_.size(); ++i) residual_[i] = design_.y[i] - fitted(i, solution);
+  }
+
+  /// What every part of the training folds shows of a fit to the others.
+  Eigen::VectorXd predicted_residual(const Eigen::VectorXd& weight) const {
+    constexpr std::int32_t kParts = 4;
+    std::vector<Gram> parts;
+    Gram all;
+    for (std::int32_t part = 0; part < kParts; ++part) {
+      parts.push_back(sum_of(design_, weight, columns_, [&](std::int32_t fold) { return fold % kParts == part; }));
+      all.add(parts.back());
     }
+    std::vector<Eigen::VectorXd> solutions;
+    for (const Gram& own : parts) solutions.push_back(factorised(with_prior(all.xx - own.xx)).solve(all.xy - own.xy));
+    Eigen::VectorXd out = residual_;
+    for (Eigen::Index i = 0; i < out.size(); ++i) {
+      const std::int32_t fold = design_.fold[static_cast<std::size_t>(i)];
+      if (fold < design_.folds) out[i] = design_.y[i] - fitted(i, solutions[static_cast<std::size_t>(fold % kParts)]);
+    }
+    return out;
   }
 
   const Eigen::VectorXd& residual() const { return residual_; }
   double used() const { return used_; }  ///< effective number of parameters
 
  private:
+  Eigen::MatrixXd with_prior(Eigen::MatrixXd xx) const {
+    for (Eigen::Index c = 0; c < xx.cols(); ++c) {
+      const bool flat = c < static_cast<Eigen::Index>(design_.nuisance.size());
+      xx(c, c) +=
+          flat ? 1e-9 * xx(c, c) + 1e-30 : std::pow(0.05 * design_.prior[columns_[static_cast<std::size_t>(c)]], -2.0);
+    }
+    return xx;
+  }
+
+  double fitted(Eigen::Index row, const Eigen::VectorXd& solution) const {
+    double out = 0.0;
+    for (Eigen::Index c = 0; c < solution.size(); ++c)
+      out += design_.x(row, columns_[static_cast<std::size_t>(c)]) * solution[c];
+    return out;
+  }
+
   /// As long as all weights are equal, the sums only change their scale.
   void sum(const Eigen::VectorXd& weight, double uniform) {
     if (uniform > 0.0 && summed_at_ > 0.0) {
@@ -174,7 +202,7 @@ class FlexibleFit {
       xx_ *= times;
       xy_ *= times;
     } else {
-      const Gram sums = sum_of(design_, weight, columns_);
+      const Gram sums = sum_of(design_, weight, columns_, [](std::int32_t) { return true; });
       xx_ = sums.xx;
       xy_ = sums.xy;
     }
@@ -191,7 +219,15 @@ class FlexibleFit {
 
 }  // namespace
 
-/// Of cluster sampling (Kish 1965): rows of one pose that err together count for less than their number.
+/// Are there poses with more than one row?
+static bool has_repeats(const Design& design) {
+  const std::set<std::int32_t> rows(design.row.begin(), design.row.end()),
+      poses(design.cluster.begin(), design.cluster.end());
+  return poses.size() < rows.size();
+}
+
+/// Of cluster sampling (Kish 1965): rows of one pose that err together count for less than their number. `residual`: of
+/// poses that the fit did not see, for a flexible fit passes through the few poses that it saw.
 static double design_effect_of(const Design& design, const Eigen::VectorXd& weight, const Eigen::VectorXd& residual) {
   struct Sums {
     double errors = 0.0, squares = 0.0, count = 0.0;
@@ -220,15 +256,22 @@ static double design_effect_of(const Design& design, const Eigen::VectorXd& weig
 
 Weighted weigh(const Design& design, const Measurements& data) {
   constexpr int kFits = 3;               // fits
+  constexpr double kSaturated = 0.5;     // of the training values, that the fit's effective parameters are
   constexpr double kCountsLittle = 0.2;  // root of the weight of a row that is said to be an outlier
   const std::vector<Block> blocks = blocks_of(design);
   const Eigen::VectorXd own = own_weights(design, data);
   FlexibleFit flexible(design);
+  const auto values =
+      std::count_if(design.fold.begin(), design.fold.end(), [&](std::int32_t fold) { return fold < design.folds; });
   Weighted out;
   out.weight = Eigen::VectorXd::Zero(design.x.rows());
   for (int round = 0;; ++round) {
-    const std::array<double, 3> sigma = sigma_of(blocks, own.cwiseProduct(flexible.residual()), flexible.used());
-    const std::vector<double> squares = standardised_squares(blocks, own, flexible.residual(), sigma);
+    // A fit that passes through most of what it saw says nothing of noise: then what it predicts of other poses counts.
+    const bool predicts = flexible.used() > kSaturated * static_cast<double>(values);
+    const Eigen::VectorXd residual = predicts ? flexible.predicted_residual(out.weight) : flexible.residual();
+    const double used = predicts ? 0.0 : flexible.used();
+    const std::array<double, 3> sigma = sigma_of(blocks, own.cwiseProduct(residual), used);
+    const std::vector<double> squares = standardised_squares(blocks, own, residual, sigma);
     const bool tails = round > 0 && has_tails(blocks, squares);
     for (std::size_t b = 0; b < blocks.size(); ++b) {
       const auto [first, count, kind, training] = blocks[b];
@@ -237,14 +280,16 @@ Weighted weigh(const Design& design, const Measurements& data) {
         out.noise.outliers.push_back(design.row[static_cast<std::size_t>(first)]);
       out.weight.segment(first, count) = own.segment(first, count) * root / sigma[static_cast<std::size_t>(kind)];
     }
+    out.noise.unit = sigma[0] > 0.0 ? sigma[0] : sigma[2];
+    // In metres, whatever the rows say of themselves: their own sigmas have taken the unit away.
+    const std::array<double, 3> in_metres = sigma_of(blocks, residual, used);
+    out.noise.position_sigma = in_metres[0] > 0.0 ? in_metres[0] : in_metres[2];
     if (round == kFits) break;
     const auto kinds = std::count_if(sigma.begin(), sigma.end(), [](double noise) { return noise > 0.0; });
     flexible.fit(out.weight, kinds == 1 && !tails ? *std::max_element(sigma.begin(), sigma.end()) : 0.0);
   }
-  // In metres, whatever the rows say of themselves: their own sigmas have taken the unit away.
-  const std::array<double, 3> in_metres = sigma_of(blocks, flexible.residual(), flexible.used());
-  out.noise.position_sigma = in_metres[0] > 0.0 ? in_metres[0] : in_metres[2];
-  out.noise.design_effect = design_effect_of(design, out.weight, flexible.residual());
+  if (has_repeats(design))
+    out.noise.design_effect = design_effect_of(design, out.weight, flexible.predicted_residual(out.weight));
   return out;
 }
 
