@@ -202,7 +202,7 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
     if (is_in_catalogue(e)) catalogue_groups.push_back(g);
   }
   const auto refitted = [&](const std::vector<int>& groups) {
-    return refit(whole, work.design, inputs, robot, decision.state, groups);
+    return refit(whole, work, inputs, robot, decision.state, groups);
   };
   Fitted fitted;
   fitted.by_catalogue = refitted(catalogue_groups);

@@ -154,9 +154,9 @@ double calibrated(double posterior, double selection_frequency, double removal_l
 
 std::vector<double> held_out_lengths(const Design& design, const Evidence::State& state);
 Share percentile_interval(std::vector<double> values, double center);
-/// The chosen `groups` fitted without linearisation on the training rows of `whole`. `design` is that of the search,
-/// `inputs` those of the whole.
-Refit refit(const Registered& whole, const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot,
+/// The chosen `groups` fitted without linearisation on the training rows of `whole`, under the search's priors.
+/// `inputs` are those of the whole.
+Refit refit(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
             const Evidence::State& state, const std::vector<int>& groups);
 Repeats noise_of_repeats(const Measurements& data);
 double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set,

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "math/statistics.hpp"
@@ -66,21 +67,24 @@ struct RefitTask {
   IdentifyOptions options;
 };
 
-static bool asks_for_moments(const Explanation& e) {
-  return std::any_of(e.requests.begin(), e.requests.end(), [](const EffectRequest& request) {
-    return model::traits_of(request.effect, {}).search == Search::with_unknown_weights;
-  });
+/// Parameters of the model that `identify` will have for the explanation: at the nominal robot, whose lengths may be
+/// none where the search's are not.
+static std::set<std::string> parameters_at(const Robot& robot, const Explanation& e, const Registered& given) {
+  std::set<std::string> out(e.model_free.begin(), e.model_free.end());
+  for (const Term& term : effect_terms(e.requests, robot, given.data, given.options.own_effects))
+    out.insert(term.parameter);
+  return out;
 }
 
-/// The explanation's effects as part of the robot, with the parameters that the search found under its prior.
-static void hold(const Explanation& e, const Design& design, const Evidence::State& state, Robot* robot) {
-  for (const EffectRequest& request : e.requests) {
-    AppliedEffect applied{request.effect, request.joints, {}};
-    for (const std::string& name : e.parameters) {
-      if (name.compare(0, request.effect.size() + 1, request.effect + ".") == 0)
-        applied.parameters[name] = solution_of(state, design.column(name));
-    }
-    robot->effects.push_back(std::move(applied));
+/// Standard deviation that the search gave the group's parameters beforehand, or what few poses hardly show would run
+/// away in the fit without linearisation. Of a parameter of two groups, the wider one.
+static void add_priors(const Design& design, int group, double scale, const std::set<std::string>& there,
+                       std::map<std::string, double>* priors) {
+  for (const int column : design.candidates.groups[static_cast<std::size_t>(group)].columns) {
+    const std::string& name = design.column_names[static_cast<std::size_t>(column)];
+    if (!there.count(name)) continue;
+    double& sigma = (*priors)[name];
+    sigma = std::max(sigma, scale * design.prior[column]);
   }
 }
 
@@ -99,25 +103,23 @@ static std::vector<EffectRequest> merged(const std::vector<EffectRequest>& reque
   return out;
 }
 
-/// `hold_moments`: first moments of unknown weights are many and hardly told apart; they stay as the search found them,
-/// under its prior.
-static RefitTask refit_task(const DiagnoseOptions& options, const Design& design,
-                            const std::vector<InputColumn>& inputs, const Robot& robot, const Evidence::State& state,
-                            const std::vector<int>& groups, bool hold_moments) {
+static RefitTask refit_task(const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
+                            const Evidence::State& state, const std::vector<int>& groups) {
+  const Design& design = work.design;
+  const DiagnoseOptions& options = work.given.options;
   RefitTask out;
   out.start = robot;
   out.options.threads = options.threads;
   out.options.seed = options.seed;
   out.options.own_effects = options.own_effects;
   out.options.free = targets_of(robot);
+  out.options.prior_noise = work.noise.unit * std::sqrt(state.sigma2 * work.noise.design_effect);
   std::set<std::pair<std::string, std::string>> asked;
-  for (const int g : groups) {
+  for (std::size_t at = 0; at < state.choice.groups.size(); ++at) {
+    const int g = state.choice.groups[at];
+    if (std::find(groups.begin(), groups.end(), g) == groups.end()) continue;
     const Explanation& e = design.candidates.named[static_cast<std::size_t>(g)];
     out.options.free.insert(out.options.free.end(), e.model_free.begin(), e.model_free.end());
-    if (hold_moments && asks_for_moments(e)) {
-      hold(e, design, state, &out.start);
-      continue;
-    }
     for (const EffectRequest& request : e.requests) {
       if (model::traits_of(request.effect, {}).stands_for != StandsFor::terms) continue;
       if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second)
@@ -127,23 +129,42 @@ static RefitTask refit_task(const DiagnoseOptions& options, const Design& design
       const std::vector<int>& columns = design.candidates.groups[static_cast<std::size_t>(g)].columns;
       out.options.own_effects.push_back(free_effect(e, solutions_of(state, columns), inputs));
       out.options.effects.push_back({out.options.own_effects.back().name, {}});
+    } else {
+      add_priors(design, g, state.choice.scales[at], parameters_at(robot, e, work.given), &out.options.priors);
     }
   }
   out.options.effects = merged(out.options.effects);
   return out;
 }
 
-Refit refit(const Registered& whole, const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot,
+/// The size of a group is that of most of its parameters; one that stands far out gets a wider prior of its own: the EM
+/// step of a Student-t prior (Tipping 2001, Sparse Bayesian learning, section 5.1), here with one degree of freedom.
+/// True: some did.
+static bool widen(const std::map<std::string, double>& usual, const Identification& found,
+                  std::map<std::string, double>* priors) {
+  constexpr double kFarOut = 1.5;  ///< standard deviations
+  bool any = false;
+  for (const Parameter& p : found.parameters) {
+    const auto prior = usual.find(p.name);
+    if (prior == usual.end() || p.frozen) continue;
+    const double away = p.value - p.nominal;
+    if (std::abs(away) < kFarOut * prior->second) continue;
+    (*priors)[p.name] = std::sqrt(0.5 * (prior->second * prior->second + away * away));
+    any = true;
+  }
+  return any;
+}
+
+Refit refit(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
             const Evidence::State& state, const std::vector<int>& groups) {
+  constexpr int kWidenings = 2;
   Measurements data = whole.data;
   data.set = whole.set;
-  const auto fit = [&](bool hold_moments) {
-    const RefitTask task = refit_task(whole.options, design, inputs, robot, state, groups, hold_moments);
-    return Refit{identify(task.start, data, task.options), task.options.own_effects};
-  };
-  Refit out = fit(true);
-  // Moments that lean on geometry which the fit holds elsewhere do not fit there: then they are fitted with it.
-  if (out.found.train.after.median > whole.frames.train.after.median) out = fit(false);
+  RefitTask task = refit_task(work, inputs, robot, state, groups);
+  const std::map<std::string, double> usual = task.options.priors;
+  Refit out{identify(task.start, data, task.options), task.options.own_effects};
+  for (int k = 0; k < kWidenings && widen(usual, out.found, &task.options.priors); ++k)
+    out.found = identify(task.start, data, task.options);
   return out;
 }
 
