@@ -534,11 +534,10 @@ static std::string would_have_shown(const std::vector<Detectable>& detectable) {
          (converted ? shown.unit : easiest.unit) + " would have shown.";
 }
 
-static std::string causes_in_words(const Diagnosis& d) {
+/// "backlash at J3, harmonic at J2 and 3 more", with what the data cannot tell from them.
+static std::string names_in_words(const Diagnosis& d) {
   constexpr std::size_t kMost = 4;
-  if (d.effects.empty())
-    return "There is a gap of " + millimetres(d.gap.rms) + " that no effect of the catalogue explains.";
-  std::string text = "The gap of " + millimetres(d.gap.rms) + " shrinks to " + millimetres(d.after.rms) + ": ";
+  std::string text;
   const std::size_t shown = std::min(d.effects.size(), kMost);
   for (std::size_t k = 0; k < shown; ++k) {
     const FoundEffect& effect = d.effects[k];
@@ -548,7 +547,22 @@ static std::string causes_in_words(const Diagnosis& d) {
     text += " (or " + other.effect + at_joints(other.joints) + ": these data cannot tell)";
   }
   if (d.effects.size() > kMost) text += " and " + std::to_string(d.effects.size() - kMost) + " more";
-  return text + ".";
+  return text;
+}
+
+static std::string causes_in_words(const Diagnosis& d) {
+  if (d.effects.empty())
+    return "There is a gap of " + millimetres(d.gap.rms) + " that no effect of the catalogue explains.";
+  return "The gap of " + millimetres(d.gap.rms) + " shrinks to " + millimetres(d.after.rms) + ": " + names_in_words(d) +
+         ".";
+}
+
+static std::string failure_in_words(const Diagnosis& d) {
+  const double after = d.effects.empty() ? d.after_unknown.rms : d.after.rms;
+  return "The model found does not hold on poses that it never saw: their error of " + millimetres(d.gap.rms) +
+         " would grow to " + millimetres(after) + " with " +
+         (d.effects.empty() ? std::string("the functions found") : names_in_words(d)) +
+         ". Nothing of it is in the robot's file: measure more poses, spread over the whole range.";
 }
 
 static std::string unknown_in_words(const Diagnosis& d) {
@@ -571,6 +585,7 @@ std::string sentence_of(const Diagnosis& d) {
     return "No gap beyond noise: " + millimetres(d.gap.rms) + " rms on held-out poses, of which noise is " +
            millimetres(d.noise_floor) + "." + would_have_shown(d.detectable);
   }
+  if (d.verdict == Verdict::does_not_hold) return failure_in_words(d);
   return causes_in_words(d) + unknown_in_words(d);
 }
 

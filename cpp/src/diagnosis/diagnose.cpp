@@ -225,6 +225,10 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
   out->after_unknown = judged(lengths(fitted.after_all));
   if (catalogue_groups.empty()) return fitted;
   const double by_robot = judged(lengths(left_by(out->robot, whole.options.own_effects))).rms;
+  if (by_robot > out->gap.rms) {  // never worse than nothing
+    out->robot = whole.frames.robot;
+    return fitted;
+  }
   out->shrink = percentile_interval(resampled.shrink, out->gap.rms > 0.0 ? 1.0 - by_robot / out->gap.rms : 0.0);
   return fitted;
 }
@@ -306,6 +310,10 @@ void question_noise(const Repeats& repeats, const Measurements& data, Diagnosis*
 }
 
 Verdict verdict_of(const Diagnosis& d) {
+  const bool by_functions = std::any_of(d.unknown.begin(), d.unknown.end(),
+                                        [](const UnknownEffect& unknown) { return !unknown.inputs.empty(); });
+  const ErrorStatistics& after = d.effects.empty() && by_functions ? d.after_unknown : d.after;
+  if (after.rms > d.gap.rms) return Verdict::does_not_hold;
   if (d.effects.empty()) return d.unknown.empty() ? Verdict::none : Verdict::unknown;
   return d.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown;
 }

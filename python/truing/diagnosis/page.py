@@ -51,6 +51,7 @@ _VERDICTS = {
     "effects": ("found", "cause found"),
     "unknown": ("open", "cause unknown"),
     "effects+unknown": ("open", "causes found, and something is left"),
+    "does_not_hold": ("bad", "does not hold"),
 }
 
 

@@ -99,6 +99,11 @@ class Command(run.Command["tuple[Robot, Measurements]", "Diagnosis"]):
             tip_link=self.tip_link,
         )
 
+    def failure(self, result: Mapping[str, Any]) -> str:
+        return (
+            "what was found does not hold on held-out poses" if result["verdict"] == "does_not_hold" else ""
+        )
+
     def table(self, result: Mapping[str, Any], found: Diagnosis) -> None:
         from truing.diagnosis.page import at_joints, trouble
 
