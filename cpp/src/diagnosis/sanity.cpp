@@ -18,6 +18,7 @@
 namespace truing::diagnosis {
 namespace {
 
+constexpr double kWorthALook = 0.001, kHardlyAnything = 0.02;
 constexpr std::size_t kPoses = 400;  ///< that the quick comparisons look at
 
 /// Joint columns of one's own beside the rest of the data.
@@ -147,10 +148,11 @@ void choose_record(const Robot& robot, const DiagnoseOptions& options, Checked* 
   out->findings.push_back(finding);
 }
 
-/// When hardly anything is explained: would a swap of two joints, another sign or another unit?
+/// Would a swap of two joints, another sign or another unit explain more? Columns of the wrist cost least: they are
+/// looked at from `kWorthALook` of the measured range on, and what nothing explains is said from `kHardlyAnything` on.
 void try_orders(const Robot& robot, const DiagnoseOptions& options, double spread, Checked* out) {
   const double as_is = median_error(robot, out->data, options, false);
-  if (!(as_is > 0.02 * spread)) return;
+  if (!(as_is > kWorthALook * spread)) return;
   const std::vector<std::vector<double>> columns = joint_columns(out->data);
   const std::size_t n = columns.size();
   double best = 0.5 * as_is;
@@ -182,6 +184,7 @@ void try_orders(const Robot& robot, const DiagnoseOptions& options, double sprea
     attempt(changed, "joint_unit",
             std::string("reading the joints in ") + (factor > 1.0 ? "rad instead of deg" : "deg instead of rad"));
   }
+  if (finding.text.empty() && !(as_is > kHardlyAnything * spread)) return;
   if (finding.text.empty()) {
     finding.kind = "joint_order";
     finding.text = "with base and tool fitted the median error is " + millimetres(as_is) + ", " +
