@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <stdexcept>
 
 #include "estimation/selection.hpp"
@@ -229,11 +230,24 @@ class Builder {
       const std::vector<double> knots = knots_of(along, task_.rows, most);
       const int found = static_cast<int>(knots.size());
       if (found < std::min(most, 4) || (most > kDriftKnots[0] && found < most)) continue;
-      for (const int coordinates : {3, 6}) add_wandering_base(of_base, time, knots, coordinates);
-      if (most != kDriftKnots[0]) continue;
+      for (const int coordinates : {3, 6}) {
+        if (can_carry(coordinates * found)) add_wandering_base(of_base, time, knots, coordinates);
+      }
+      if (most != kDriftKnots[0] || !can_carry(3 * found)) continue;
       // Or it is the target that has slipped on the last link.
       for (const Target& target : task_.at.targets) add_wandering_target(of_targets, target.name, time, knots);
     }
+  }
+
+  /// Are the training poses enough for a free function with so many parameters?
+  bool can_carry(int parameters) const {
+    constexpr double kValuesEach = 4.0;  ///< measured values that a parameter of a free function needs
+    std::set<std::int32_t> poses;
+    for (const std::int32_t row : task_.rows) {
+      if (!task_.set[static_cast<std::size_t>(row)]) poses.insert(task_.cluster[static_cast<std::size_t>(row)]);
+    }
+    const double values = (task_.data.distance ? 1.0 : 3.0) * static_cast<double>(poses.size());
+    return kValuesEach * parameters <= values;
   }
 
   Explanation wandering(const std::string& effect, const std::string& site, int time,

@@ -16,8 +16,11 @@ namespace truing::diagnosis {
 
 using Kind = Explanation::Kind;
 constexpr int kNullDraws = 200;
-constexpr double kNoBetter = 1.004;  ///< a group must lower the cross-validated sum of squares by more than this
-constexpr double kFreeShare = 0.04;  ///< of what is left, that a free function must explain
+constexpr double kNoBetter = 1.004;   ///< a group must lower the cross-validated sum of squares by more than this
+constexpr double kSureRise = 1.5;     ///< and by so many standard errors over the folds
+constexpr double kManyValues = 10.0;  ///< for each parameter of the links: no longer few
+constexpr double kMuchBetter = 1.05;  ///< sums of squares that are worth another choice
+constexpr double kFreeShare = 0.04;   ///< of what is left, that a free function must explain
 constexpr double kMeshNats =
     5.0;  ///< beyond the threshold, that a mesh order must win: waves this short fit anything a little
 
@@ -35,6 +38,10 @@ int input_named(const Work& work, const std::string& name) {
 /// Adds columns of one more candidate to the design.
 static void append(Work* work, Explanation what, const Design::Rows& columns, double cost) {
   Design& design = work->design;
+  // The same function may be found again, with other knots: its parameters need names of their own.
+  while (design.column(what.parameters.front()) >= 0) {
+    for (std::string& name : what.parameters) name.insert(name.rfind('.'), "'");
+  }
   const Eigen::Index p = design.x.cols();
   design.x.conservativeResize(Eigen::NoChange, p + columns.cols());
   design.x.rightCols(columns.cols()) = columns;
@@ -113,8 +120,8 @@ Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std
   return out;
 }
 
-/// Sum of squares on every fold of the fit to the others.
-double cross_validated(const Work& work, const Choice& choice) {
+/// Sum of squares on every fold, of the fit to the others.
+static Eigen::VectorXd squares_of_folds(const Work& work, const Choice& choice) {
   const auto& groups = work.design.candidates.groups;
   std::vector<int> columns = work.design.nuisance;
   for (const int g : choice.groups)
@@ -123,31 +130,43 @@ double cross_validated(const Work& work, const Choice& choice) {
   const Evidence whole(work.grams.train, groups, work.design.nuisance, work.design.prior);
   const Evidence::State state = whole.evaluate(choice);
   const Gram all = work.grams.train.of(columns);
-  double sum = 0.0;
-  for (const Gram& fold : work.grams.train_folds) {
-    const Gram held = fold.of(columns);
+  Eigen::VectorXd out(static_cast<Eigen::Index>(work.grams.train_folds.size()));
+  for (Eigen::Index k = 0; k < out.size(); ++k) {
+    const Gram held = work.grams.train_folds[static_cast<std::size_t>(k)].of(columns);
     Eigen::MatrixXd d = all.xx - held.xx;
     d.diagonal() += state.precision;
     const Eigen::VectorXd solution = factorised(std::move(d)).solve(all.xy - held.xy);
-    sum += held.yy - 2.0 * solution.dot(held.xy) + solution.dot(held.xx * solution);
+    out[k] = held.yy - 2.0 * solution.dot(held.xy) + solution.dot(held.xx * solution);
   }
-  return sum;
+  return out;
 }
 
-/// Groups that do not help on poses they were not fitted to go, however well they fit.
+double cross_validated(const Work& work, const Choice& choice) { return squares_of_folds(work, choice).sum(); }
+
+/// Standard errors by which the folds' sums of squares rise from one choice to another; of their roots, or a single
+/// fold could decide.
+static double sure_rise(const Eigen::VectorXd& from, const Eigen::VectorXd& to) {
+  const Eigen::VectorXd rise = (to - from).unaryExpr([](double d) { return std::copysign(std::sqrt(std::abs(d)), d); });
+  const auto n = static_cast<double>(rise.size());
+  const double spread = (rise.array() - rise.mean()).matrix().norm() / std::sqrt(n - 1.0);
+  return rise.mean() / std::max(spread / std::sqrt(n), 1e-300);
+}
+
+/// Groups that do not help, for sure, on poses they were not fitted to go, however well they fit.
 static Evidence::State keep_what_predicts(const Work& work, Evidence::State state) {
   const auto& groups = work.design.candidates.groups;
   const Evidence evidence(work.grams.train, groups, work.design.nuisance, work.design.prior);
   for (;;) {
-    const double with = cross_validated(work, state.choice);
+    const Eigen::VectorXd with = squares_of_folds(work, state.choice);
     double best = 1e300;
     Choice better;
     bool any = false;
     for (std::size_t at = 0; at < state.choice.groups.size(); ++at) {
       const Choice less = without(state.choice, groups, at);
-      const double squares = cross_validated(work, less);
-      if (squares < kNoBetter * with && squares < best) {
-        best = squares;
+      const Eigen::VectorXd squares = squares_of_folds(work, less);
+      const bool helps = squares.sum() >= kNoBetter * with.sum() && sure_rise(with, squares) >= kSureRise;
+      if (!helps && squares.sum() < best) {
+        best = squares.sum();
         better = less;
         any = true;
       }
@@ -285,7 +304,7 @@ struct Question {
   int function = -1;  ///< its group
   Explanation what;
   std::size_t joint = 0;
-  std::vector<int> here;  ///< the function, and the chosen laws at its joint
+  std::vector<int> here;  ///< the function, the chosen laws at its joint, and functions of the same inputs there
 };
 
 /// An effect whose law at the joint may be another one.
@@ -304,8 +323,9 @@ static Question question_of(const Work& work, const Robot& robot, const Choice& 
   q.here = {function};
   for (const int g : choice.groups) {
     const Explanation& e = named[static_cast<std::size_t>(g)];
-    if (g != function && (e.kind == Kind::catalogue || e.kind == Kind::law) && has_law_at(work, e, q.what.site))
-      q.here.push_back(g);
+    const bool is_law = (e.kind == Kind::catalogue || e.kind == Kind::law) && has_law_at(work, e, q.what.site);
+    const bool is_the_same = e.kind == Kind::free && e.site == q.what.site && e.inputs == q.what.inputs;
+    if (g != function && (is_law || is_the_same)) q.here.push_back(g);
   }
   return q;
 }
@@ -334,7 +354,7 @@ static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence
   return best;
 }
 
-/// The function, and the laws at its joint that are functions of the same inputs.
+/// The function, and what else at its joint is a function of the same inputs.
 static std::vector<int> replaced_by_function(const Work& work, const Question& q, const std::vector<int>& inputs) {
   const auto name_of = [&](int i) -> const std::string& { return work.inputs[static_cast<std::size_t>(i)].name; };
   const bool by_configuration = std::all_of(
@@ -343,7 +363,8 @@ static std::vector<int> replaced_by_function(const Work& work, const Question& q
   for (const int g : q.here) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     const bool of_these = std::any_of(inputs.begin(), inputs.end(), [&](int i) { return name_of(i) == e.driver; });
-    if (g != q.function && (of_these || (by_configuration && follows_configuration(effect_traits(work, e)))))
+    if (g != q.function &&
+        (e.kind == Kind::free || of_these || (by_configuration && follows_configuration(effect_traits(work, e)))))
       gone.push_back(g);
   }
   return gone;
@@ -458,13 +479,65 @@ static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
   return true;
 }
 
+/// Named effects, from nothing on; and, where all links together are not among them, from those on: step by step a few
+/// single effects can stand in the way of many small errors of the links.
+static Evidence::State search_named(const Work& work, const Decision& so_far) {
+  const Evidence evidence = evidence_now(work);
+  Evidence::State best = keep_what_predicts(work, evidence.search(so_far.search));
+  for (std::size_t g = 0; g < so_far.first.size(); ++g) {
+    if (work.design.candidates.named[g].kind != Kind::all_geometry) continue;
+    const std::vector<int>& in = best.choice.groups;
+    if (std::find(in.begin(), in.end(), static_cast<int>(g)) != in.end()) continue;
+    const Choice links = {{static_cast<int>(g)}, {so_far.first[g].scale}};
+    const Evidence::State other = keep_what_predicts(work, evidence.search(so_far.search, links));
+    if (other.score > best.score) best = other;
+  }
+  return best;
+}
+
+/// All links together, and the size of their errors: what predicts other poses better than the choice does, beside it
+/// or in its place. Few poses cannot say which link it is, and still know better than nothing.
+static void prefer_links_that_predict(const Work& work, Decision* out) {
+  const auto& named = work.design.candidates.named;
+  const auto links =
+      std::find_if(named.begin(), named.end(), [](const Explanation& e) { return e.kind == Kind::all_geometry; });
+  if (links == named.end()) return;
+  const int group = static_cast<int>(links - named.begin());
+  const auto columns =
+      static_cast<double>(work.design.candidates.groups[static_cast<std::size_t>(group)].columns.size());
+  if (work.grams.train.n > kManyValues * columns) return;  // then the evidence decides
+  const Choice others = without_these(out->state.choice, {group});
+  const Eigen::VectorXd now = squares_of_folds(work, out->state.choice);
+  double best = now.sum() / kMuchBetter;
+  Choice better;
+  for (const double scale : {1.0, 0.3, 0.1, 0.03, 0.01}) {
+    for (Choice choice : {Choice{}, others}) {
+      choice.groups.push_back(group);
+      choice.scales.push_back(scale);
+      const Eigen::VectorXd squares = squares_of_folds(work, choice);
+      if (squares.sum() >= best || sure_rise(squares, now) < kSureRise) continue;
+      best = squares.sum();
+      better = choice;
+    }
+  }
+  if (!better.groups.empty()) out->state = evidence_now(work).evaluate(better);
+}
+
+bool links_predict(const Work& work, const Choice& choice, std::size_t at) {
+  const int group = choice.groups[at];
+  if (work.design.candidates.named[static_cast<std::size_t>(group)].kind != Kind::all_geometry) return false;
+  const Eigen::VectorXd with = squares_of_folds(work, choice),
+                        less = squares_of_folds(work, without_these(choice, {group}));
+  return less.sum() > kMuchBetter * with.sum() && sure_rise(with, less) >= kSureRise;
+}
+
 Decision decide(Work* work, const Robot& robot) {
   const DiagnoseOptions& options = work->given.options;
   Decision out;
   out.search.most_groups = options.max_effects;
   find_gap(*work, &out);
   // Named effects; then free functions on what they leave; then mesh orders.
-  out.state = keep_what_predicts(*work, evidence_now(*work).search(out.search));
+  out.state = search_named(*work, out);
   for (int round = 0; round < 6; ++round) {
     const Evidence evidence = evidence_now(*work);
     FreeScanOptions scan_options;
@@ -480,6 +553,7 @@ Decision decide(Work* work, const Robot& robot) {
     out.state = std::move(next);
   }
   question_laws(work, robot, &out);
+  prefer_links_that_predict(*work, &out);
   if (out.p_gap > options.false_alarm) {
     const bool only_named = std::all_of(out.state.choice.groups.begin(), out.state.choice.groups.end(), [&](int g) {
       return is_named(work->design.candidates.named[static_cast<std::size_t>(g)]);

@@ -21,6 +21,8 @@ namespace truing::diagnosis {
 
 using Kind = Explanation::Kind;
 
+constexpr double kMoreThanNoise = 2.0;  ///< times the noise: an error that noise does not make
+
 /// What a curve is drawn of: motion of a site against an input, for a range of a second one if there is one.
 struct Along {
   int input = -1;
@@ -581,6 +583,11 @@ static std::string unknown_in_words(const Diagnosis& d) {
 }
 
 std::string sentence_of(const Diagnosis& d) {
+  if (d.verdict == Verdict::none && d.gap.rms > kMoreThanNoise * d.noise_floor) {
+    return "These poses are too few to tell a gap from noise: with base and tool fitted, held-out poses are off by " +
+           millimetres(d.gap.rms) + " rms, and a fit of everything at once leaves " + millimetres(d.noise_floor) +
+           ". Measure more of them.";
+  }
   if (d.verdict == Verdict::none) {
     return "No gap beyond noise: " + millimetres(d.gap.rms) + " rms on held-out poses, of which noise is " +
            millimetres(d.noise_floor) + "." + would_have_shown(d.detectable);

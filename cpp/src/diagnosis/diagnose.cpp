@@ -155,7 +155,10 @@ std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evide
       const int g = decision->state.choice.groups[at];
       if (!is_named(work.design.candidates.named[static_cast<std::size_t>(g)])) continue;
       const Sureness sure = how_sure(work, evidence, decision->state, at);
-      out[g] = {sure, calibrated(sure.raw, selection_frequency(work, resampled, sure, g), sure.removal_loss)};
+      const double probability = calibrated(sure.raw, selection_frequency(work, resampled, sure, g), sure.removal_loss);
+      // Resampled folds of few poses hardly find all links again, though each fold is predicted better with them.
+      const bool holds = links_predict(work, decision->state.choice, at);
+      out[g] = {sure, holds ? std::max(probability, kNamed) : probability};
     }
     const auto least = std::min_element(out.begin(), out.end(), [](const auto& a, const auto& b) {
       return a.second.probability < b.second.probability;

@@ -139,6 +139,8 @@ struct Shortlist {
 Shortlist shortlist(const Work& work, const std::vector<int>& also);
 
 Decision decide(Work* work, const Robot& robot);
+/// The group is all links together, and poses that it was not fitted to are predicted better with it, for sure.
+bool links_predict(const Work& work, const Choice& choice, std::size_t at);
 
 // --- sureness.cpp: how sure that is ----------------------------------------------------------------------------------
 

@@ -338,6 +338,24 @@ TEST_CASE("diagnose says so when held-out poses contradict what was found, and l
   CHECK(fresh_error(d.robot, light_arm(), 570) < 1.1 * fresh_error(d.robot_before, light_arm(), 570));
 }
 
+TEST_CASE("of few poses the robot found is seldom worse than plain geometry, and never by much" *
+          doctest::skip(kSanitized)) {
+  int worse = 0;
+  constexpr int kDraws = 8;
+  for (unsigned draw = 0; draw < kDraws; ++draw) {
+    Robot truth = perturbed(light_arm(), 5e-4, 5e-4, 600 + draw);
+    const auto table = measured(truth, draw % 2 ? 50 : 30, 620 + 10 * draw);
+    const Diagnosis d = diagnose(light_arm(), table->data);
+    const truing::Identification geometry = truing::identify(light_arm(), table->data);
+    const double ours = fresh_error(d.robot, truth, 700), plain = fresh_error(geometry.robot, truth, 700);
+    CAPTURE(draw);
+    INFO(d.sentence);
+    CHECK(ours < 1.5 * plain);
+    worse += ours > 1.05 * plain ? 1 : 0;
+  }
+  CHECK(worse <= 1);
+}
+
 TEST_CASE("diagnose finds a displacement by a column of one's own, unknown or with an own effect named") {
   std::vector<double> humidity(160);
   std::mt19937_64 random(510);
