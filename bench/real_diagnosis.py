@@ -86,7 +86,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", type=Path, default=default_folder())
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "real-diagnosis.md")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "benchmarks" / "real-diagnosis.md")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     table = "\n".join(rows(arguments.data))

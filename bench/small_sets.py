@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Diagnoses few poses of long recordings, and judges what was found on all other poses of the recording.
+
+    python bench/small_sets.py [--data FOLDER] [--draws 12] [--poses 25,40,70] [--seed 0] [--only WORD]
+
+FOLDER as for bench/real_data.py. Of each recording so many poses are drawn, several times. What counts is how
+often robot.yaml, as `diagnose` writes it, is worse on poses that it never saw than plain geometry
+(`identify`), and than base and tool alone, by more than 5 %.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import truing
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from real_data import RECORDINGS, Recording, default_folder, fit, load
+
+NONE_PUBLISHED = RECORDINGS[0].before
+ARMS = tuple(
+    Recording(
+        f"Meca500 {side}",
+        "meca500_arms",
+        NONE_PUBLISHED,
+        NONE_PUBLISHED,
+        measurements=f"measurements_{side}.csv",
+    )
+    for side in ("left", "right")
+)
+COLUMNS = (
+    "joints",
+    "positions",
+    "orientations",
+    "distances",
+    "fixed_points",
+    "targets",
+    "directions",
+    "joint_speeds",
+    "payload",
+    "temperature",
+    "time",
+    "pose",
+    "position_sigma",
+    "rotation_sigma",
+    "weight",
+)
+
+
+def subset(data: truing.Measurements, rows: Any, robot: truing.Robot) -> truing.Measurements:
+    """These rows of the data, without a split."""
+    columns = {
+        name: np.asarray(column)[rows] for name in COLUMNS if (column := getattr(data, name)) is not None
+    }
+    if "targets" in columns:
+        columns["target_names"] = [target.name for target in robot.targets]
+    if "fixed_points" in columns:
+        columns["fixed_point_names"] = data.fixed_point_names
+    covariates = {name: np.asarray(column)[rows] for name, column in data.covariates.items()}
+    return truing.Measurements(**columns, covariates=covariates)
+
+
+def rms(robot: truing.Robot | None, data: truing.Measurements) -> float:
+    """Of position or distance errors [mm]; the worst 2 % of the rows, the recording's own, are left out."""
+    if robot is None:
+        return float("inf")
+    left = truing.residuals(robot, data)
+    error = np.abs(left.distance) if data.distances is not None else np.linalg.norm(left.position, axis=1)
+    error = np.sort(error[np.isfinite(error)])
+    return 1e3 * float(np.sqrt(np.mean(error[: round(0.98 * len(error))] ** 2)))
+
+
+def geometry_of(robot: truing.Robot, data: truing.Measurements, seed: int) -> truing.Robot | None:
+    """None: too few values."""
+    try:
+        return fit(robot, data, seed=seed).robot
+    except truing.InputError:
+        return None
+
+
+def with_directions(data: truing.Measurements, directions: Any) -> truing.Measurements:
+    """Where the small set's sides were inferred, they say nothing of the other poses': both at random."""
+    if directions is None or data.directions is not None:
+        return data
+    return data.replace(
+        directions=np.random.default_rng(0).choice([-1.0, 1.0], size=np.asarray(data.joints).shape)
+    )
+
+
+def one(recording: Recording, folder: Path, poses: Sequence[int], draws: int, seed: int) -> list[list[float]]:
+    robot, data = load(folder, recording)
+    group = np.asarray(truing.model.pose_groups(data))
+    groups = np.unique(group)
+    table = []
+    for count in poses:
+        if len(groups) < 2 * count and len(groups) < count + 40:
+            continue
+        for draw in range(draws):
+            rng = np.random.default_rng([seed, count, draw])
+            chosen = np.isin(group, rng.permutation(groups)[:count])
+            few = subset(data, chosen, robot)
+            fresh = subset(data, ~chosen, robot)
+            found = truing.diagnose(robot, few, seed=draw)
+            fresh = with_directions(fresh, found.directions)
+            nothing, plain, ours = (
+                rms(r, fresh) for r in (found.robot_before, geometry_of(robot, few, draw), found.robot)
+            )
+            names = " ".join(
+                f"{e.effect}{':' + '+'.join(e.joints) if len(e.joints) < 3 else ''}" for e in found.effects
+            )
+            print(
+                f"{recording.name:32s} {count:3d} {draw:2d}  frames {nothing:8.3f}  geometry {plain:8.3f}"
+                f"  diagnose {ours:8.3f}  said {1e3 * found.gap.rms:.3f} to {1e3 * found.after.rms:.3f}"
+                f" {found.verdict}: {names}",
+                flush=True,
+            )
+            table.append([count, nothing, plain, ours])
+    return table
+
+
+def share(worse: Any) -> str:
+    return f"{np.sum(worse)} of {len(worse)} ({100 * np.mean(worse):.1f} %)"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--data", type=Path, default=default_folder())
+    parser.add_argument("--draws", type=int, default=12)
+    parser.add_argument("--poses", default="25,40,70")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default="")
+    arguments = parser.parse_args()
+    warnings.simplefilter("ignore")
+    table: list[list[float]] = []
+    for recording in (*RECORDINGS, *ARMS):
+        if arguments.only in recording.name and (arguments.data / recording.folder).is_dir():
+            poses = [int(word) for word in arguments.poses.split(",")]
+            table += one(recording, arguments.data, poses, arguments.draws, arguments.seed)
+    count, nothing, plain, ours = np.array(table).T
+    print(f"worse than geometry by more than 5 %: {share(~(ours <= 1.05 * plain))}")
+    print(f"worse than base and tool alone by more than 5 %: {share(~(ours <= 1.05 * nothing))}")
+    print(f"median of diagnose / geometry: {np.median(ours / plain):.3f}; worst {np.max(ours / plain):.3f}")
+    print(
+        f"median of diagnose / nothing: {np.median(ours / nothing):.3f}; worst {np.max(ours / nothing):.3f}"
+    )
+
+
+if __name__ == "__main__":
+    main()
