@@ -43,16 +43,6 @@ Eigen::Vector3d shortest_solution(const Eigen::Matrix3d& A, const Eigen::Vector3
   return x;
 }
 
-template <int N, int M>
-Matrix<N> carried(const Matrix<N, M>& J, const Matrix<M>& A) {
-  return J * A * J.transpose();
-}
-
-template <int N>
-Matrix<N> scaled_both(const Vector<N>& s, const Matrix<N>& A) {
-  return s.asDiagonal() * A * s.asDiagonal();
-}
-
 // ---- Sizes in use ---------------------------------------------------------------------------------------------------
 
 constexpr int X = Eigen::Dynamic;
@@ -73,12 +63,5 @@ template Matrix<X, 1> solve_definite<X, 1>(const Matrix<X>&, const Matrix<X, 1>&
 
 template Vector<6> solve_square<6>(const Matrix<6>&, const Vector<6>&);
 template Vector<X> solve_square<X>(const Matrix<X>&, const Vector<X>&);
-
-template Matrix<6> carried<6, 12>(const Matrix<6, 12>&, const Matrix<12>&);
-template Matrix<X> carried<X, X>(const Matrix<X>&, const Matrix<X>&);
-
-template Matrix<6> scaled_both<6>(const Vector<6>&, const Matrix<6>&);
-template Matrix<12> scaled_both<12>(const Vector<12>&, const Matrix<12>&);
-template Matrix<X> scaled_both<X>(const Vector<X>&, const Matrix<X>&);
 
 }  // namespace truing::math

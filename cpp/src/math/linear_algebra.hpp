@@ -4,7 +4,7 @@
 
 // Decompositions and large products of matrices, compiled once: each is hundreds of Eigen's templates, and a file that
 // asks Eigen for one compiles for many seconds longer. The sizes that inner loops use stand at the end of
-// linear_algebra.cpp, and Eigen::Dynamic for all others.
+// linear_algebra.cpp, eigenvalues.cpp and products.cpp, and Eigen::Dynamic for all others.
 
 #include <cmath>
 
