@@ -2600,7 +2600,7 @@ class Diagnosis:
         'effects': named, and nothing is left
         'unknown': a gap that no effect of the catalogue explains
         'effects+unknown': named, and something is left
-        'does_not_hold': what was found makes the error of held-out poses larger: nothing of it is in `robot`
+        'does_not_hold': what was found does not make the error of held-out poses less: nothing of it is in `robot`
         """
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -43,7 +43,7 @@ enum class Verdict {
   effects,              ///< named, and nothing is left
   unknown,              ///< a gap that no effect of the catalogue explains
   effects_and_unknown,  ///< "effects+unknown": named, and something is left
-  does_not_hold,        ///< what was found makes the error of held-out poses larger: nothing of it is in `robot`
+  does_not_hold,        ///< what was found does not make the error of held-out poses less: nothing of it is in `robot`
 };
 
 /// A fraction and its 90 % interval.

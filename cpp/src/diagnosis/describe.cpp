@@ -562,7 +562,7 @@ static std::string causes_in_words(const Diagnosis& d) {
 static std::string failure_in_words(const Diagnosis& d) {
   const double after = d.effects.empty() ? d.after_unknown.rms : d.after.rms;
   return "The model found does not hold on poses that it never saw: their error of " + millimetres(d.gap.rms) +
-         " would grow to " + millimetres(after) + " with " +
+         " would be " + millimetres(after) + " with " +
          (d.effects.empty() ? std::string("the functions found") : names_in_words(d)) +
          ". Nothing of it is in the robot's file: measure more poses, spread over the whole range.";
 }

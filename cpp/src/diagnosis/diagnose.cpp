@@ -30,6 +30,7 @@ using Kind = Explanation::Kind;
 constexpr double kCorrectionShare = 0.05;  ///< of the gap, from which on a law's correction is something unknown
 constexpr double kLackOfFit = 4.0;         ///< standard errors beyond repeats, from which on what is left is no noise
 constexpr double kEnoughRepeats = 20.0;    ///< degrees of freedom, for the noise to be taken from repeats
+constexpr double kHardlyLess = 0.98;       ///< of the gap: what is left of it where nothing was explained
 constexpr double kNamed = 0.5;             ///< a name is given to what is more likely right than wrong
 
 void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
@@ -316,7 +317,8 @@ Verdict verdict_of(const Diagnosis& d) {
   const bool by_functions = std::any_of(d.unknown.begin(), d.unknown.end(),
                                         [](const UnknownEffect& unknown) { return !unknown.inputs.empty(); });
   const ErrorStatistics& after = d.effects.empty() && by_functions ? d.after_unknown : d.after;
-  if (after.rms > d.gap.rms) return Verdict::does_not_hold;
+  const bool hardly_less = after.rms > kHardlyLess * d.gap.rms && d.shrink.low < 0.0;
+  if (after.rms > d.gap.rms || hardly_less) return Verdict::does_not_hold;
   if (d.effects.empty()) return d.unknown.empty() ? Verdict::none : Verdict::unknown;
   return d.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown;
 }
@@ -393,6 +395,7 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   question_noise(repeats, whole.data, &result);
   share_the_gap(&result);
   result.verdict = verdict_of(result);
+  if (result.verdict == Verdict::does_not_hold) result.robot = whole.frames.robot;
   result.candidates = list_candidates(work, evidence, decision.first);
   result.detectable = smallest_sizes(work, evidence, decision);
   share_out(work.design, work.inputs, robot, work.noise.design_effect, options.seed + 17, &result);

@@ -188,8 +188,8 @@ def _remarks(result: Mapping[str, Any]) -> str:
     items = [_finding(f) for f in result["sanity"] if f not in troubles]
     if any(f["kind"] == "direction" for f in result["sanity"]):
         items.append(
-            "<li>What was inferred is in residuals.csv, columns dir1 …; where robot.yaml has backlash, it"
-            " needs such columns to predict.</li>"
+            "<li>What was inferred is in residuals.csv, columns dir1 …; where robot.yaml has backlash,"
+            " predict infers them from the order of the rows as well.</li>"
         )
     return (
         '<section class="card"><h2>How the data were read</h2><ul'
