@@ -1042,9 +1042,9 @@ class IdentifyOptions:
     test_share = 0.2: Fraction of the pose groups held out when the data has no `set`.
     seed = 0: Of the split.
     rank_tolerance = 1e-06: A unit column that the others explain up to this fraction is not observable.
-    priors = {}: What is known beforehand: standard deviation about the nominal value [its unit], by parameter. A fit
-        with many parameters from few poses stays near the nominal robot where the data say little. Not of
-        base, targets and anchor.
+    priors = {}: What is known beforehand: standard deviation about the nominal value [its unit], by parameter or
+        glob (of several that match, the smallest). A fit of many parameters to few poses stays near the
+        nominal robot where the data say little. Not of base, targets and anchor.
     prior_noise = 0.0: Noise that priors are weighed against: standard deviation of a position component [m], of rows with
         a sigma of their own a factor to it. 0: what a fit without priors leaves.
     reject_beyond = 6.0: Loss `reject`: rows whose residual is longer than this many medians.
@@ -1167,9 +1167,9 @@ class IdentifyOptions:
     @property
     def priors(self) -> types.MappingProxyType[str, float]:
         """
-        What is known beforehand: standard deviation about the nominal value [its unit], by parameter. A fit
-        with many parameters from few poses stays near the nominal robot where the data say little. Not of
-        base, targets and anchor.
+        What is known beforehand: standard deviation about the nominal value [its unit], by parameter or
+        glob (of several that match, the smallest). A fit of many parameters to few poses stays near the
+        nominal robot where the data say little. Not of base, targets and anchor.
         """
     @priors.setter
     def priors(self, arg1: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:

@@ -48,8 +48,9 @@ struct IdentifyOptions : ParameterSelection, SolverOptions {
   double test_share = 0.2;       ///< fraction of the pose groups held out when the data has no `set`
   std::uint64_t seed = 0;        ///< of the split
   double rank_tolerance = 1e-6;  ///< a unit column that the others explain up to this fraction is not observable
-  /// What is known beforehand: standard deviation about the nominal value [its unit], by parameter. A fit with many
-  /// parameters from few poses stays near the nominal robot where the data say little. Not of base, targets and anchor.
+  /// What is known beforehand: standard deviation about the nominal value [its unit], by parameter or glob (of several
+  /// that match, the smallest). A fit of many parameters to few poses stays near the nominal robot where the data say
+  /// little. Not of base, targets and anchor.
   std::map<std::string, double> priors;
   /// Noise that priors are weighed against: standard deviation of a position component [m], of rows with a sigma of
   /// their own a factor to it. 0: what a fit without priors leaves.
@@ -103,7 +104,8 @@ struct Prediction {
   Eigen::VectorXd distance;                                               ///< shape=(n,) [m]; empty without an anchor
 };
 
-/// True when an effect of the robot needs approach directions that the data lack.
+/// True when an effect of the robot needs approach directions that the data lack. Throws std::invalid_argument on
+/// unknown effects.
 bool lacks_directions(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects = {});
 
 /// Throws std::invalid_argument on unknown effects or columns that they need.

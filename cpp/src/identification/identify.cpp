@@ -340,6 +340,13 @@ struct Seen {
   Selection selection;
 };
 
+/// Number of parameters that the rows alone must determine. What priors are weighed against comes from the rows as
+/// well, unless it is given.
+std::size_t without_prior(const Job& job, const std::vector<int>& fitted) {
+  if (!(job.options.prior_noise > 0.0)) return fitted.size();
+  return static_cast<std::size_t>((prior_of(job, fitted, job.options.prior_noise).weight.array() == 0.0).count());
+}
+
 Seen what_is_seen(const Job& job, const Asked& asked, const Eigen::VectorXd& values) {
   Seen out;
   out.free = asked.free;
@@ -348,11 +355,11 @@ Seen what_is_seen(const Job& job, const Asked& asked, const Eigen::VectorXd& val
     out.free.erase(std::remove(out.free.begin(), out.free.end(), out.scale_carrier), out.free.end());
   }
   out.selection = select_observable(job, out.free, values);
-  if (asked.values <= out.selection.fitted.size() && !(job.options.prior_noise > 0.0)) {
+  const std::size_t unknown = without_prior(job, out.selection.fitted);
+  if (asked.values <= unknown) {
     throw std::invalid_argument(count_of(asked.values, "measured value") + " in " +
                                 count_of(job.rows.size(), "training row") + " cannot determine " +
-                                count_of(out.selection.fitted.size(), "parameter") +
-                                ": measure more poses, or free fewer parameters");
+                                count_of(unknown, "parameter") + ": measure more poses, or free fewer parameters");
   }
   if (out.scale_carrier >= 0) {
     const std::string& name = job.model.parameters[out.scale_carrier].name;
@@ -854,9 +861,9 @@ bool IdentifyOptions::is_valid(std::string* error) const {
   if (!(reject_beyond > 1.0)) return fail("reject_beyond must be more than 1 median");
   if (!bounds.empty() && solver != Solver::ceres) return fail("bounds need solver = ceres");
   if (frame_by == FrameBy::svd && solver == Solver::ceres) return fail("frame_by = svd needs solver = lm");
-  if (!(prior_noise >= 0.0)) return fail("prior_noise must not be negative");
+  if (!(prior_noise >= 0.0 && std::isfinite(prior_noise))) return fail("prior_noise must be finite and not negative");
   for (const auto& [name, sigma] : priors) {
-    if (!(sigma > 0.0)) return fail("a prior's standard deviation must be positive");
+    if (!(sigma > 0.0 && std::isfinite(sigma))) return fail("a prior's standard deviation must be finite and positive");
   }
   for (const auto& [name, bound] : bounds) {
     if (!(bound.first < bound.second)) return fail("a lower bound must be below its upper bound");
@@ -903,7 +910,7 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
 }
 
 bool lacks_directions(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects) {
-  if (!data.direction.empty()) return false;
+  if (!data.direction.empty() || robot.effects.empty()) return false;
   const auto works_with = [&](const AppliedEffect& effect, const Measurements& some) {
     try {
       effect_terms({{effect.effect, effect.joints}}, robot, some, own_effects);

@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "math/observability.hpp"
@@ -206,7 +207,20 @@ TEST_CASE("priors of what is always unknown, of nothing, and without a size are 
   };
   CHECK(contains(complaint_about("base.x", 1e-3), "base.x"));
   CHECK(contains(complaint_about("J9.*", 1e-3), "J9.*"));
-  CHECK(contains(complaint_about("J2.a", 0.0), "must be positive"));
+  CHECK(contains(complaint_about("J2.a", 0.0), "must be finite and positive"));
+  CHECK(contains(complaint_about("J2.a", std::numeric_limits<double>::infinity()), "must be finite and positive"));
+}
+
+TEST_CASE("priors let fewer values than parameters be fitted, but not fewer than have no prior") {
+  const Ur10Case c(8, 1e-4, 24);  // 24 values: fewer than there are parameters
+  IdentifyOptions options;
+  options.test_share = 0.0;
+  options.prior_noise = 1e-4;
+  CHECK(contains(complaint(c.nominal, c.table->data, options), "cannot determine"));
+  options.priors = {{"J*", 1e-3}};
+  const Identification found = truing::identify(c.nominal, c.table->data, options);
+  CHECK(found.solver.converged);
+  CHECK(fresh_rms(c.truth, found.robot, 25) < fresh_rms(c.truth, found.before, 25));
 }
 
 TEST_CASE("a robot with fitted effects knows the range that they were fitted on") {

@@ -63,7 +63,8 @@ void validate(const Measurements& data, const Robot& robot, bool joints_only = f
 std::vector<std::int32_t> pose_groups(const Measurements& data);
 
 /// The data with approach directions as the order of the rows shows them, if the poses were driven to one after the
-/// other: the sign of every joint's last motion, 0 before the first one. Data that have directions stay as they are.
+/// other: the sign of every joint's last motion of more than 1e-4 [rad | m], 0 before the first one. Data that have
+/// directions stay as they are.
 Measurements with_inferred_directions(const Measurements& data);
 
 }  // namespace truing
