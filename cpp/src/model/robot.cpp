@@ -226,6 +226,15 @@ std::size_t Robot::joint_index(const std::string& joint_name) const {
   throw std::invalid_argument("joint '" + joint_name + "' does not exist; the joints are " + joint_names(*this));
 }
 
+/// A name that Robot::fitted_range may have.
+static bool is_input(const std::string& name, const Robot& robot) {
+  if (name == "payload" || name == "temp") return true;
+  for (std::size_t k = 1; k <= robot.driven_count(); ++k) {
+    if (name == "q" + std::to_string(k)) return true;
+  }
+  return false;
+}
+
 void validate(const Robot& robot) {
   const std::string where = robot.name.empty() ? "robot" : "robot '" + robot.name + "'";
   if (robot.joints.empty()) refuse(where, "has no joints");
@@ -240,6 +249,11 @@ void validate(const Robot& robot) {
   validate_effects(robot);
   if (robot.anchor && !(robot.anchor->point.allFinite() && std::isfinite(robot.anchor->zero))) {
     refuse(where, "anchor has a value that is not finite");
+  }
+  for (const auto& [name, ends] : robot.fitted_range) {
+    if (!(std::isfinite(ends.first) && std::isfinite(ends.second) && ends.first <= ends.second))
+      refuse(where, "fitted_range of '" + name + "' is not a smallest and a largest value");
+    if (!is_input(name, robot)) refuse(where, "fitted_range has '" + name + "', expected q1 ..., payload or temp");
   }
 }
 

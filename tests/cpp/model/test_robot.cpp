@@ -241,6 +241,18 @@ TEST_CASE("validate accepts a robot that can be used") {
   CHECK(complaint(palletizing_arm()) == "");
 }
 
+TEST_CASE("validate refuses ranges that are none, and of what is no input") {
+  Robot robot = oblique_arm();
+  robot.fitted_range = {{"q1", {-1.0, 1.0}}, {"payload", {0.0, 0.0}}, {"temp", {18.0, 25.0}}};
+  CHECK(complaint(robot) == "");
+  robot.fitted_range["q1"] = {1.0, -1.0};
+  CHECK(contains(complaint(robot), "fitted_range of 'q1'"));
+  robot.fitted_range["q1"] = {0.0, std::numeric_limits<double>::infinity()};
+  CHECK(contains(complaint(robot), "fitted_range of 'q1'"));
+  robot.fitted_range = {{"q99", {0.0, 1.0}}};
+  CHECK(contains(complaint(robot), "fitted_range has 'q99'"));
+}
+
 TEST_CASE("validate names the joint and what is wrong with it") {
   Robot robot = palletizing_arm();
   SUBCASE("no joints") {

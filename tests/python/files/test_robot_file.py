@@ -72,6 +72,7 @@ tool: {xyz: [0, 0, 0.1]}
 anchor: {xyz: [1, 0.5, 0.2], zero: -0.03}
 effects:
   - {effect: backlash, joints: [elbow], parameters: {backlash.elbow: 2.1e-4}}
+fitted_range: {q1: [0.1, 0.7], q2: [-1.25, 2], payload: [0, 5]}
 calibration: {source: tracker.csv, date: 2026-02-03, rms_m: 4.5e-5, covariance: covariance.csv, poses: 50}
 """
 
@@ -126,6 +127,7 @@ def assert_same(found: _core.Robot, expected: _core.Robot) -> None:
     assert [(e.effect, list(e.joints), dict(e.parameters)) for e in found.effects] == [
         (e.effect, list(e.joints), dict(e.parameters)) for e in expected.effects
     ]
+    assert dict(found.fitted_range) == dict(expected.fitted_range)
     assert (found.anchor is None) == (expected.anchor is None)
     if found.anchor is not None and expected.anchor is not None:
         assert bits(found.anchor.point) == bits(expected.anchor.point)
@@ -189,6 +191,7 @@ def test_chain_anchor_effects_and_calibration(tmp_path: Path) -> None:
         ["elbow"],
         {"backlash.elbow": 2.1e-4},
     )
+    assert dict(robot.fitted_range) == {"q1": (0.1, 0.7), "q2": (-1.25, 2.0), "payload": (0.0, 5.0)}
     calibration = load_calibration(tmp_path / "robot.yaml")
     assert calibration == {
         "source": "tracker.csv",
