@@ -222,6 +222,11 @@ class Builder {
     const int time = time_index();
     if (left_out(of_base) || time < 0) return;
     const InputColumn& along = task_.inputs[static_cast<std::size_t>(time)];
+    const int affordable = most_parameters();
+    if (3 * static_cast<int>(knots_of(along, task_.rows, kDriftKnots[0]).size()) > affordable) {
+      out_.not_testable.push_back({of_base, {}, "too few poses for a frame that is a free function of time"});
+      return;
+    }
     const bool by_order = along.name == "order";
     if (by_order)
       out_.not_testable.push_back(
@@ -231,23 +236,22 @@ class Builder {
       const int found = static_cast<int>(knots.size());
       if (found < std::min(most, 4) || (most > kDriftKnots[0] && found < most)) continue;
       for (const int coordinates : {3, 6}) {
-        if (can_carry(coordinates * found)) add_wandering_base(of_base, time, knots, coordinates);
+        if (coordinates * found <= affordable) add_wandering_base(of_base, time, knots, coordinates);
       }
-      if (most != kDriftKnots[0] || !can_carry(3 * found)) continue;
+      if (most != kDriftKnots[0]) continue;
       // Or it is the target that has slipped on the last link.
       for (const Target& target : task_.at.targets) add_wandering_target(of_targets, target.name, time, knots);
     }
   }
 
-  /// Are the training poses enough for a free function with so many parameters?
-  bool can_carry(int parameters) const {
-    constexpr double kValuesEach = 4.0;  ///< measured values that a parameter of a free function needs
+  /// Parameters of a free function that the training poses are enough for.
+  int most_parameters() const {
+    constexpr double kValuesEach = 4.0;  ///< measured values that each of them needs
     std::set<std::int32_t> poses;
     for (const std::int32_t row : task_.rows) {
       if (!task_.set[static_cast<std::size_t>(row)]) poses.insert(task_.cluster[static_cast<std::size_t>(row)]);
     }
-    const double values = (task_.data.distance ? 1.0 : 3.0) * static_cast<double>(poses.size());
-    return kValuesEach * parameters <= values;
+    return static_cast<int>((task_.data.distance ? 1.0 : 3.0) * static_cast<double>(poses.size()) / kValuesEach);
   }
 
   Explanation wandering(const std::string& effect, const std::string& site, int time,

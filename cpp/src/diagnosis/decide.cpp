@@ -152,6 +152,11 @@ static double sure_rise(const Eigen::VectorXd& from, const Eigen::VectorXd& to) 
   return rise.mean() / std::max(spread / std::sqrt(n), 1e-300);
 }
 
+/// Does one choice predict the folds better than another, by this factor and for sure?
+static bool predicts_better(const Eigen::VectorXd& one, const Eigen::VectorXd& other, double factor) {
+  return other.sum() >= factor * one.sum() && sure_rise(one, other) >= kSureRise;
+}
+
 /// Groups that do not help, for sure, on poses they were not fitted to go, however well they fit.
 static Evidence::State keep_what_predicts(const Work& work, Evidence::State state) {
   const auto& groups = work.design.candidates.groups;
@@ -164,8 +169,7 @@ static Evidence::State keep_what_predicts(const Work& work, Evidence::State stat
     for (std::size_t at = 0; at < state.choice.groups.size(); ++at) {
       const Choice less = without(state.choice, groups, at);
       const Eigen::VectorXd squares = squares_of_folds(work, less);
-      const bool helps = squares.sum() >= kNoBetter * with.sum() && sure_rise(with, squares) >= kSureRise;
-      if (!helps && squares.sum() < best) {
+      if (!predicts_better(with, squares, kNoBetter) && squares.sum() < best) {
         best = squares.sum();
         better = less;
         any = true;
@@ -508,14 +512,14 @@ static void prefer_links_that_predict(const Work& work, Decision* out) {
   if (work.grams.train.n > kManyValues * columns) return;  // then the evidence decides
   const Choice others = without_these(out->state.choice, {group});
   const Eigen::VectorXd now = squares_of_folds(work, out->state.choice);
-  double best = now.sum() / kMuchBetter;
+  double best = 1e300;
   Choice better;
   for (const double scale : {1.0, 0.3, 0.1, 0.03, 0.01}) {
     for (Choice choice : {Choice{}, others}) {
       choice.groups.push_back(group);
       choice.scales.push_back(scale);
       const Eigen::VectorXd squares = squares_of_folds(work, choice);
-      if (squares.sum() >= best || sure_rise(squares, now) < kSureRise) continue;
+      if (squares.sum() >= best || !predicts_better(squares, now, kMuchBetter)) continue;
       best = squares.sum();
       better = choice;
     }
@@ -526,9 +530,8 @@ static void prefer_links_that_predict(const Work& work, Decision* out) {
 bool links_predict(const Work& work, const Choice& choice, std::size_t at) {
   const int group = choice.groups[at];
   if (work.design.candidates.named[static_cast<std::size_t>(group)].kind != Kind::all_geometry) return false;
-  const Eigen::VectorXd with = squares_of_folds(work, choice),
-                        less = squares_of_folds(work, without_these(choice, {group}));
-  return less.sum() > kMuchBetter * with.sum() && sure_rise(with, less) >= kSureRise;
+  return predicts_better(squares_of_folds(work, choice), squares_of_folds(work, without_these(choice, {group})),
+                         kMuchBetter);
 }
 
 Decision decide(Work* work, const Robot& robot) {

@@ -229,10 +229,6 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
   out->after_unknown = judged(lengths(fitted.after_all));
   if (catalogue_groups.empty()) return fitted;
   const double by_robot = judged(lengths(left_by(out->robot, whole.options.own_effects))).rms;
-  if (by_robot > out->gap.rms) {  // never worse than nothing
-    out->robot = whole.frames.robot;
-    return fitted;
-  }
   out->shrink = percentile_interval(resampled.shrink, out->gap.rms > 0.0 ? 1.0 - by_robot / out->gap.rms : 0.0);
   return fitted;
 }
@@ -395,7 +391,10 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   question_noise(repeats, whole.data, &result);
   share_the_gap(&result);
   result.verdict = verdict_of(result);
-  if (result.verdict == Verdict::does_not_hold) result.robot = whole.frames.robot;
+  if (result.verdict == Verdict::does_not_hold || result.shrink.value < 0.0) {  // no robot worse than nothing
+    result.robot = whole.frames.robot;
+    result.shrink = {};
+  }
   result.candidates = list_candidates(work, evidence, decision.first);
   result.detectable = smallest_sizes(work, evidence, decision);
   share_out(work.design, work.inputs, robot, work.noise.design_effect, options.seed + 17, &result);

@@ -44,7 +44,7 @@ double log_determinant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
 }
 
 /// Cholesky with pivots: A = L L^T, where L has as many columns as A has rank (Higham 1990, Analysis of the Cholesky
-/// decomposition of a semi-definite matrix, eq. (1.3)).
+/// decomposition of a semi-definite matrix).
 Eigen::MatrixXd pivoted_cholesky(const Eigen::MatrixXd& A, double tolerance) {
   Eigen::MatrixXd L(A.rows(), A.cols());
   Eigen::VectorXd rest = A.diagonal();

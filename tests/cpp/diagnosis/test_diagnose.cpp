@@ -9,6 +9,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numeric>
 #include <string>
 
 #include "support/arms.hpp"
@@ -655,6 +656,24 @@ TEST_CASE("diagnose recognises exchanged and turned joint columns") {
   const Diagnosis e = diagnose(light_arm(), table->data);
   REQUIRE(finding(e, "joint_sign"));
   CHECK(finding(e, "joint_sign")->text.find("joint column 2") != std::string::npos);
+}
+
+TEST_CASE("diagnose recognises exchanged columns of the wrist, which move the tip little") {
+  auto table = measured(light_arm(), 120, 905);
+  std::swap(table->data.joints[3], table->data.joints[4]);
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  REQUIRE(finding(d, "joint_order"));
+  CHECK(finding(d, "joint_order")->text.find("joint columns 4 and 5") != std::string::npos);
+}
+
+TEST_CASE("diagnose says that few poses cannot show a frame that wanders") {
+  auto table = measured(light_arm(), 20, 908);
+  std::vector<double> seconds(20);
+  std::iota(seconds.begin(), seconds.end(), 0.0);
+  table->data.time = table->add(seconds);
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  CHECK(std::any_of(d.not_testable.begin(), d.not_testable.end(),
+                    [](const truing::NotTestable& n) { return n.why.find("too few poses") == 0; }));
 }
 
 TEST_CASE("diagnose goes on with the record of the joints that fits better" * doctest::skip(kSanitized)) {

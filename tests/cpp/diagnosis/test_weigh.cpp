@@ -76,6 +76,27 @@ TEST_CASE("rows of a pose that err together count by the design effect 1 + (m - 
   }
 }
 
+TEST_CASE("a fit that passes through all poses does not hide what their repeats share") {
+  // 20 poses of 3 values each, and 60 free columns: what is left of the poses seen is the repeats' own scatter.
+  const Weighed small(30, 3, 1e-6, 1e-3);
+  Design design = small.design;
+  design.x.conservativeResize(Eigen::NoChange, 100);
+  Random random(12);
+  for (Eigen::Index pose = 0; pose < 30; ++pose) {
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      for (Eigen::Index c = 4; c < 100; ++c) {
+        const double value = random.normal();
+        for (Eigen::Index repeat = 0; repeat < 3; ++repeat) design.x(9 * pose + 3 * repeat + k, c) = value;
+      }
+    }
+  }
+  design.prior = Eigen::VectorXd::Constant(100, kLargest);
+  design.candidates.groups.resize(1);
+  design.candidates.named.resize(1);
+  for (int c = 4; c < 100; ++c) design.candidates.groups[0].columns.push_back(c);
+  CHECK(weigh(design, small.data).noise.design_effect > 2.5);
+}
+
 TEST_CASE("sums of appended columns are those of all columns made afresh") {
   Weighed scene(60, 2, 2e-4, 1e-4);
   Design& design = scene.design;

@@ -343,6 +343,38 @@ def test_directions_that_were_inferred_are_written_and_serve_the_robot_file() ->
     assert result["after"]["rms_m"] == pytest.approx(given["after"]["rms_m"], rel=0.1)
 
 
+def test_rows_beyond_what_effects_were_fitted_on_are_warned_of() -> None:
+    data = measured("effects")
+    diagnosed(data)
+    robot = truing.load_robot("found/robot.yaml")
+    assert set(robot.fitted_range) == {f"q{k + 1}" for k in range(6)}
+    truing.predict(robot, data)  # the very poses: a warning would be an error
+    joints = np.array(data.joints)
+    joints[:7, 2] += 9.0
+    with pytest.warns(InputWarning, match=r"7 of 220 rows lie beyond the range .* \(q3\)"):
+        truing.predict(robot, data.replace(joints=joints))
+
+
+def test_what_held_out_poses_contradict_ends_with_status_1(capsys: pytest.CaptureFixture[str]) -> None:
+    right = measured("effects")
+    # The rows held out have the backlash the other way round.
+    wrong = np.array(right.positions)
+    nominal = truing.load_robot(ROBOT)
+    true = nominal.copy()
+    true.T_measurement_base = truing.frame_from_xyz_rpy([0.4, -1.6, 0.3], [0.01, -0.02, 0.8])
+    no_effect = np.asarray(truing.predict(true, right).position)
+    test = np.arange(220) % 4 == 0
+    wrong[test] = 2.0 * no_effect[test] - wrong[test]
+    data = right.replace(positions=wrong, set=test.astype(np.int8))
+    assert main(["diagnose", ROBOT, written(data), "--out", "found"]) == 1
+    result = json.loads(Path("found/result.json").read_text())
+    assert result["verdict"] == "does_not_hold"
+    assert result["after"]["rms_m"] > result["gap"]["rms_m"]
+    assert truing.load_robot("found/robot.yaml").effects == ()
+    assert "does not hold" in capsys.readouterr().err
+    assert "does not hold" in Path("found/report.html").read_text()
+
+
 def test_residuals_tell_the_same_as_result_json() -> None:
     result = diagnosed(measured("effects", orientation=True))
     table = columns("found/residuals.csv")
