@@ -23,16 +23,12 @@ import numpy as np
 import truing
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from real_data import RECORDINGS, Recording, default_folder, fit, load
+from real_data import RECORDINGS, Figures, Recording, default_folder, fit, load
 
-NONE_PUBLISHED = RECORDINGS[0].before
+NO_BASELINE = Figures(rms=float("nan"))
 ARMS = tuple(
     Recording(
-        f"Meca500 {side}",
-        "meca500_arms",
-        NONE_PUBLISHED,
-        NONE_PUBLISHED,
-        measurements=f"measurements_{side}.csv",
+        f"Meca500 {side}", "meca500_arms", NO_BASELINE, NO_BASELINE, measurements=f"measurements_{side}.csv"
     )
     for side in ("left", "right")
 )
@@ -87,7 +83,7 @@ def geometry_of(robot: truing.Robot, data: truing.Measurements, seed: int) -> tr
 
 
 def with_directions(data: truing.Measurements, directions: Any) -> truing.Measurements:
-    """Where the small set's sides were inferred, they say nothing of the other poses': both at random."""
+    """Approach directions at random, where `diagnose` inferred those of the poses drawn."""
     if directions is None or data.directions is not None:
         return data
     return data.replace(
