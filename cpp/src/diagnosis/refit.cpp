@@ -138,8 +138,8 @@ static RefitTask refit_task(const Work& work, const std::vector<InputColumn>& in
 }
 
 /// The size of a group is that of most of its parameters; one that stands far out gets a wider prior of its own: the EM
-/// step of a Student-t prior (Tipping 2001, Sparse Bayesian learning, section 5.1), here with one degree of freedom.
-/// True: some did.
+/// step of a Student-t prior (Tipping 2001, Sparse Bayesian learning), here with one degree of freedom and without the
+/// posterior's own variance. True: some did.
 static bool widen(const std::map<std::string, double>& usual, const Identification& found,
                   std::map<std::string, double>* priors) {
   constexpr double kFarOut = 1.5;  ///< standard deviations
