@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import os
+import time
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,9 +25,28 @@ def silent(robot: truing.Robot, data: truing.Measurements) -> Any:
         shrink=share,
         sentence="",
         candidates=[],
+        sanity=[],
+        set=[],
         robot=robot,
         robot_before=robot,
     )
+
+
+PLACE = "TRUING_TEST_PLACE"
+"""Environment variable with the folder in which `sleeping` says which process it is."""
+
+
+def sleeping(robot: truing.Robot, data: truing.Measurements) -> Any:
+    """A candidate that does not come to an end."""
+    (Path(os.environ[PLACE]) / f"{os.getpid()}.pid").touch()
+    time.sleep(600.0)
+
+
+def leaving(name: str) -> str:
+    """A job that returns its name, divides by zero, or takes its process down."""
+    if name == "down":
+        os._exit(1)
+    return name if name != "zero" else str(1 // 0)
 
 
 def crashing(robot: truing.Robot, data: truing.Measurements) -> Any:

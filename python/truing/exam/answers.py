@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,8 @@ class Named:
     joints: tuple[str, ...]
     probability: float = 1.0
     same: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    share: float = math.nan  # of the gap's mean square that it is said to close
+    order: float = math.nan  # of transmission_error@96
 
     def members(self) -> list[tuple[str, tuple[str, ...]]]:
         return [(self.effect, self.joints), *self.same]
@@ -49,12 +53,39 @@ class Answer:
     not_testable: tuple[tuple[str, tuple[str, ...]], ...] = ()
     shrink: tuple[float, float, float] | None = None  # promised: value, 90 % interval
     realised: float | None = None  # on fresh poses
+    fresh: Mapping[str, float] = field(
+        default_factory=dict
+    )  # rms error there [m] of "frames", "robot", "geometry"
+    findings: tuple[str, ...] = ()  # kinds of what was said of the data themselves
     seconds: float = math.nan
     sentence: str = ""
     error: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
+
+
+def answer_from(stored: Mapping[str, Any]) -> Answer:
+    """From what `Answer.to_dict` gave, be it read from JSON."""
+    effects = (
+        {**item, "joints": tuple(item["joints"]), "same": tuple(_pair(other) for other in item["same"])}
+        for item in stored["effects"]
+    )
+    unknown = ({**item, "inputs": tuple(item["inputs"])} for item in stored["unknown"])
+    return Answer(
+        **{
+            **stored,
+            "effects": tuple(Named(**item) for item in effects),
+            "unknown": tuple(Unknown(**item) for item in unknown),
+            "not_testable": tuple(_pair(item) for item in stored["not_testable"]),
+            "shrink": tuple(stored["shrink"]) if stored["shrink"] else None,
+            "findings": tuple(stored["findings"]),
+        }
+    )
+
+
+def _pair(item: Sequence[Any]) -> tuple[str, tuple[str, ...]]:
+    return str(item[0]), tuple(item[1])
 
 
 def answer_of(diagnosis: Any) -> Answer:
@@ -69,6 +100,7 @@ def answer_of(diagnosis: Any) -> Answer:
         not_testable=tuple((_plain(item.effect), tuple(item.joints)) for item in diagnosis.not_testable),
         shrink=(float(share.value), float(share.low), float(share.high)),
         sentence=str(diagnosis.sentence),
+        findings=tuple(str(finding.kind) for finding in diagnosis.sanity),
     )
 
 
@@ -87,24 +119,61 @@ def _plain(effect: str) -> str:
 
 def _named(found: Any) -> Named:
     same = tuple((_plain(other.effect), tuple(other.joints)) for other in found.confounded_with)
-    return Named(_plain(found.effect), tuple(found.joints), float(found.probability), same)
+    return Named(
+        _plain(found.effect),
+        tuple(found.joints),
+        float(found.probability),
+        same,
+        float(found.share),
+        _order(found.effect),
+    )
 
 
-def realised_shrink(diagnosis: Any, fresh: truing.Measurements) -> float | None:
+def _order(effect: str) -> float:
+    """transmission_error@96 -> 96."""
+    try:
+        return float(str(effect).partition("@")[2])
+    except ValueError:
+        return math.nan
+
+
+def realised_shrink(diagnosis: Any, fresh: Mapping[str, float]) -> float | None:
     """Fall of the rms error on fresh poses, from the robot with fitted frames to the diagnosed one. None: it
     cannot be evaluated.
     """
-    if not diagnosis.effects or diagnosis.unknown:
+    if not diagnosis.effects or diagnosis.unknown or not {"frames", "robot"} <= set(fresh):
         return None
-    try:
-        before, after = (_rms(robot, fresh) for robot in (diagnosis.robot_before, diagnosis.robot))
-    except (truing.InputError, ValueError):
-        return None
-    return 1.0 - after / before if before > 0.0 else None
+    return 1.0 - fresh["robot"] / fresh["frames"] if fresh["frames"] > 0.0 else None
+
+
+def fresh_errors(
+    diagnosis: Any, robot: truing.Robot, data: truing.Measurements, fresh: truing.Measurements, geometry: bool
+) -> dict[str, float]:
+    """Rms errors on fresh poses [m]: of the robot with fitted frames, of the diagnosed one, and, if asked
+    for, of one whose link values were identified from the same training rows: what one does who asks for no
+    cause. What cannot be evaluated is left out.
+    """
+    robots = {"frames": diagnosis.robot_before, "robot": diagnosis.robot}
+    if geometry:
+        with contextlib.suppress(truing.InputError):
+            train = _train(diagnosis, data)
+            robots["geometry"] = truing.identify(robot, train, raise_if_not_converged=False).robot
+    found = {}
+    for name, made in robots.items():
+        with contextlib.suppress(truing.InputError, ValueError):
+            found[name] = _rms(made, fresh)
+    return found
+
+
+def _train(diagnosis: Any, data: truing.Measurements) -> truing.Measurements:
+    """The data, those rows held out that the diagnosis did not learn from."""
+    return data.replace(set=np.asarray(diagnosis.set, dtype=np.int8))
 
 
 def _rms(robot: truing.Robot, data: truing.Measurements) -> float:
-    error = np.asarray(truing.residuals(robot, data).position)
+    with warnings.catch_warnings():  # fresh poses may be warmer or colder than any before
+        warnings.simplefilter("ignore", truing.InputWarning)
+        error = np.asarray(truing.residuals(robot, data).position)
     return float(np.sqrt(np.nanmean(np.sum(error**2, axis=1))))
 
 

@@ -15,6 +15,9 @@ from truing.exam.kinematics import Chain, Floats
 from truing.exam.laws import Inputs
 from truing.exam.robots import Specimen
 
+RIGHT_AT = 20.0
+"""Temperature at which the nominal robot is right [deg C]: measured warm, it has other lengths and zeros."""
+
 COVARIATES = {
     "supply_bar": (6.0, 0.4),
     "humidity_pct": (45.0, 12.0),
@@ -43,6 +46,7 @@ class Plan:
         default_factory=dict
     )  # driven joints that do not move, and where they stand
     moving: tuple[int, ...] = ()  # driven joints that have a speed while measured; empty: all
+    levels: tuple[Floats, ...] = ()  # of each driven joint: where it stands, on a grid; empty: anywhere
 
 
 def usual_plan(specimen: Specimen, chain: Chain, rng: Generator, poses: int, payloads: bool) -> Plan:
@@ -101,7 +105,7 @@ def draw(specimen: Specimen, chain: Chain, plan: Plan, rng: Generator, fresh: in
         speed[rows],
         payload[rows],
         temperature(plan, time)[rows],
-        _reference(plan),
+        RIGHT_AT,
         time[rows],
         covariates,
         target,
@@ -110,15 +114,21 @@ def draw(specimen: Specimen, chain: Chain, plan: Plan, rng: Generator, fresh: in
 
 
 def _poses(specimen: Specimen, chain: Chain, plan: Plan, rng: Generator, count: int) -> Floats:
-    poses = rng.uniform(plan.low, plan.high, (count, len(plan.low)))
+    poses = _anywhere(plan, rng, count)
     for _ in range(200):
         bad = ~_reachable(specimen, chain, poses)
         if not bad.any():
             break
-        poses[bad] = rng.uniform(plan.low, plan.high, (int(bad.sum()), len(plan.low)))
+        poses[bad] = _anywhere(plan, rng, int(bad.sum()))
     for column, value in plan.still.items():
         poses[:, column] = value
     return poses
+
+
+def _anywhere(plan: Plan, rng: Generator, count: int) -> Floats:
+    if plan.levels:
+        return np.stack([rng.choice(levels, size=count) for levels in plan.levels], axis=1)
+    return np.asarray(rng.uniform(plan.low, plan.high, (count, len(plan.low))))
 
 
 def _reachable(specimen: Specimen, chain: Chain, poses: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
@@ -154,21 +164,13 @@ def temperature(plan: Plan, time: Floats) -> Floats:
     total = plan.seconds * plan.poses * (1.0 + plan.repeats)
     share = time / total
     if plan.steady_warming:
-        return np.asarray(20.0 + plan.warmth * share)
+        return np.asarray(RIGHT_AT + plan.warmth * share)
     peak = 1.0 - math.exp(-plan.cooling / 0.25)
     rising = 1.0 - np.exp(-share / 0.25)
     falling = peak * np.exp(-(share - plan.cooling) / 0.2)
     return np.asarray(
-        20.0 + plan.warmth * np.where(share < plan.cooling, rising, falling) + 0.4 * np.sin(17.0 * share)
+        RIGHT_AT + plan.warmth * np.where(share < plan.cooling, rising, falling) + 0.4 * np.sin(17.0 * share)
     )
-
-
-def _reference(plan: Plan) -> float:
-    """The mean over the plan: a robot that is right at 20 degrees has wrong zeros as well, which would be a
-    second effect.
-    """
-    total = plan.seconds * plan.poses * (1.0 + plan.repeats)
-    return float(temperature(plan, np.linspace(0.0, total, 1000)).mean())
 
 
 def _wander(rng: Generator, count: int, mean: float, spread: float) -> Floats:

@@ -119,9 +119,13 @@ class Hidden:
     inputs: tuple[str, ...] = ()  # of unlisted effects: what it depends on
     detail: Mapping[str, float] = field(default_factory=dict)  # shape, for mechanisms and for the label
     listed: bool = True
+    exact: Callable[[Context, float], Changes] | None = (
+        None  # at a size, where it is not the law times the size
+    )
+    warms: bool = False  # follows the temperature from where the robot was right
 
     def changes(self, context: Context) -> Changes:
-        return self.law(context).scaled(self.size)
+        return self.exact(context, self.size) if self.exact else self.law(context).scaled(self.size)
 
     def sized(self, size: float) -> Hidden:
         return replace(self, size=size)
@@ -344,13 +348,12 @@ def thermal(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
             changes.links[:, joint, which] = context.chain.links[joint, which] * warm
         return changes
 
-    return Hidden("thermal", (joint,), law, needs=frozenset({"temp"}))
+    return Hidden("thermal", (joint,), law, needs=frozenset({"temp"}), warms=True)
 
 
 def thermal_zero(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
-    return Hidden(
-        "thermal_zero", (joint,), at_joint(joint, lambda c: _warm(c, depart)), needs=frozenset({"temp"})
-    )
+    law = at_joint(joint, lambda c: _warm(c, depart))
+    return Hidden("thermal_zero", (joint,), law, needs=frozenset({"temp"}), warms=True)
 
 
 def axis_wobble(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:

@@ -94,7 +94,7 @@ def _load(place: Path, robot_file: str, measurement_file: str) -> Recording:
     keep = np.isfinite(positions).all(axis=1)
     inputs = _inputs(data, keep)
     nominal = robot.replace(T_measurement_base=np.eye(4))
-    chain = _fit_frames(chain_of(nominal), inputs, positions[keep])
+    chain = fit_frames(chain_of(nominal), inputs, positions[keep])
     noise = _flexible_rest(chain, inputs, positions[keep])
     sigma = 1.4826 * float(np.median(np.abs(noise)))
     return Recording(f"{place.name}/{measurement_file}", nominal, chain, inputs, noise, sigma)
@@ -158,7 +158,7 @@ def _with_frames(chain: Chain, base: Floats, places: Floats) -> Chain:
     return Chain(**{**chain.__dict__, "base": base, "targets": tuple(targets)})
 
 
-def _fit_frames(chain: Chain, inputs: Inputs, measured: Floats) -> Chain:
+def fit_frames(chain: Chain, inputs: Inputs, measured: Floats) -> Chain:
     """Base and targets by alternating registrations and linear solutions for the targets."""
     places = np.array([frame[:3, 3] for frame in chain.targets])
     base = np.eye(4)

@@ -4,14 +4,11 @@
 
 from __future__ import annotations
 
+import functools
 import json
-import multiprocessing
-import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -20,14 +17,20 @@ import mujoco  # noqa: F401  (what is not installed is said here, not by a worke
 
 import truing
 from truing.exam import sets
-from truing.exam.answers import Answer, answer_of, baselines, realised_shrink
+from truing.exam.answers import Answer, answer_from, answer_of, baselines, fresh_errors, realised_shrink
+from truing.exam.scenes import Case
 from truing.exam.score import Scores, Sheet, markdown, score
-from truing.exam.sealing import Envelope, fingerprint, opened, sealed
+from truing.exam.sealing import BrokenSealError, Envelope, fingerprint, opened, resealed, sealed
+from truing.exam.workers import dealt
 
 Candidate = Callable[[truing.Robot, truing.Measurements], Any]
 """Who sits the examination: gets robot and data, returns a Diagnosis or what has its attributes."""
 Progress = Callable[[int, int], None]
 """Sets done, sets in all."""
+
+
+_AGAINST_GEOMETRY = frozenset({"few", "mistaken"})
+"""Families in which the result is compared with what identifying link values alone would have given."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,10 @@ def run_exam(
     quick: bool = False,
     seed: int = 0,
     families: Sequence[str] | None = None,
+    only: Sequence[str] | None = None,
     limit: int | None = None,
+    build: str = "",
+    resume: bool = False,
     workers: int = 2,
     out: Path | str | None = None,
     progress: Progress | None = None,
@@ -61,20 +67,19 @@ def run_exam(
     """Makes the sets, has them answered, opens the labels, and scores.
 
     which: "development" is there to be looked at and learned from, "examination" is not: other robots, seeds,
-    unlisted effects.
-    quick: some 60 sets that take a minute. families: only these, see `sets.COUNTS`. limit: at most so many
-    sets of each family.
-    workers: processes; 1: none but this one. candidate: a function at the top of a module if there are more
-    workers than one.
-    out: folder for sealed.jsonl (written before the answers), answers.jsonl, labels.jsonl (after them),
-    scores.json and scores.md.
+    unlisted effects. quick: some 60 sets that take a minute. families: only these, see `sets.COUNTS`. only:
+    only these sets, "single/12". limit: at most so many sets of each family. build: what tells this candidate
+    from others. resume: answers that the same build has stored in `out` are kept, and their sets not asked
+    again. workers: processes; 1: none but this one. candidate: a function at the top of a module if there are
+    more workers than one. out: folder for sealed.jsonl (written before the answers), salts.jsonl,
+    answers.jsonl, labels.jsonl (after them), scores.json and scores.md.
     """
-    folder = _folder(out)
-    names = _limited(sets.ids(which, quick=quick, families=families, seed=seed), limit)
+    names = _limited(sets.ids(which, quick=quick, families=families, only=only, seed=seed), limit)
+    folder, stored = _folder(out, build, resume)
     left_out = dict(sets.skipped(which, names))
     names = [name for name in names if name not in left_out]
     papers = []
-    for paper in _sat(names, candidate, workers, folder):
+    for paper in _sat(names, candidate, workers, folder, stored):
         papers.append(paper)
         if progress:
             progress(len(papers), len(names))
@@ -86,24 +91,58 @@ def run_exam(
     return scores
 
 
-def sit(id: str, candidate: Candidate = diagnose, folder: Path | None = None) -> Paper:
-    """One set: made, sealed, answered."""
+def sit(
+    id: str,
+    candidate: Candidate = diagnose,
+    folder: Path | None = None,
+    stored: Mapping[str, Any] | None = None,
+) -> Paper:
+    """One set: made, sealed, answered. stored: its seal, salt and answer of an earlier sitting."""
     case = sets.build(id)
-    envelope = sealed(case.label)
-    _append(folder, "sealed.jsonl", {"id": id, "seal": envelope.seal, "data": fingerprint(case.data)})
+    if stored:
+        return _again(id, case.label, stored)
+    envelope = _seal(id, case, folder)
     started = time.perf_counter()
     try:
         diagnosis = candidate(case.robot, case.data)
     except Exception as error:  # a candidate that fails has answered wrongly, the others still sit
-        answer, others = Answer("error", error=f"{type(error).__name__}: {error}"), {}
-    else:
-        seconds = time.perf_counter() - started
-        answer = replace(
-            answer_of(diagnosis), seconds=seconds, realised=realised_shrink(diagnosis, case.fresh())
-        )
-        others = baselines(diagnosis.candidates, case.data.rows, bool(case.label["geometry_underneath"]))
-    _append(folder, "answers.jsonl", {"id": id, "answer": answer.to_dict()})
+        return _answered(id, envelope, Answer("error", error=f"{type(error).__name__}: {error}"), {}, folder)
+    seconds = time.perf_counter() - started
+    alone = case.label["family"] in _AGAINST_GEOMETRY
+    fresh = fresh_errors(diagnosis, case.robot, case.data, case.fresh(), alone)
+    answer = replace(
+        answer_of(diagnosis), seconds=seconds, fresh=fresh, realised=realised_shrink(diagnosis, fresh)
+    )
+    others = baselines(diagnosis.candidates, case.data.rows, bool(case.label["geometry_underneath"]))
+    return _answered(id, envelope, answer, others, folder)
+
+
+def _seal(id: str, case: Case, folder: Path | None) -> Envelope:
+    envelope = sealed(case.label)
+    _append(folder, "salts.jsonl", {"id": id, "salt": envelope.salt})
+    _append(folder, "sealed.jsonl", {"id": id, "seal": envelope.seal, "data": fingerprint(case.data)})
+    return envelope
+
+
+def _answered(
+    id: str, envelope: Envelope, answer: Answer, others: dict[str, Answer], folder: Path | None
+) -> Paper:
+    told = {name: other.to_dict() for name, other in others.items()}
+    _append(folder, "answers.jsonl", {"id": id, "answer": answer.to_dict(), "others": told})
     return Paper(id, envelope.seal, envelope, answer, others)
+
+
+def _again(id: str, label: dict[str, Any], stored: Mapping[str, Any]) -> Paper:
+    """An answer of before, with the label made anew: it must be the one that was sealed then."""
+    envelope = resealed(label, stored["salt"])
+    try:
+        opened(envelope, stored["seal"])
+    except BrokenSealError:
+        raise BrokenSealError(
+            f"{id}: the examiner makes another label than when this set was sealed, sit it from the start"
+        ) from None
+    others = {name: answer_from(other) for name, other in stored["others"].items()}
+    return Paper(id, envelope.seal, envelope, answer_from(stored["answer"]), others)
 
 
 def _limited(names: Sequence[str], limit: int | None) -> list[str]:
@@ -119,58 +158,74 @@ def _limited(names: Sequence[str], limit: int | None) -> list[str]:
     return kept
 
 
-def _sat(names: Sequence[str], candidate: Candidate, workers: int, folder: Path | None) -> Iterator[Paper]:
+def _sat(
+    names: Sequence[str],
+    candidate: Candidate,
+    workers: int,
+    folder: Path | None,
+    stored: Mapping[str, Mapping[str, Any]],
+) -> Iterator[Paper]:
     if workers <= 1:
         for name in names:
-            yield sit(name, candidate, folder)
+            yield sit(name, candidate, folder, stored.get(name))
         return
-    # Each worker is a process with one thread for linear algebra: more would fight over the processors.
-    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(variable, "1")
-    left = dict.fromkeys(names)
-    while left:
-        for paper in _until_one_crashes(list(left), candidate, workers, folder):
-            del left[paper.id]
-            yield paper
-        # A candidate that takes its process down takes the others' sets with it: find out which set it was,
-        # then go on with all workers.
-        for name in list(left):
-            alone = next(_until_one_crashes([name], candidate, 1, folder), None)
-            del left[name]
-            yield alone or _crashed(name, folder)
-            if alone is None:
-                break
-
-
-def _until_one_crashes(
-    names: Sequence[str], candidate: Candidate, workers: int, folder: Path | None
-) -> Iterator[Paper]:
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        try:
-            for done in as_completed([pool.submit(sit, name, candidate, folder) for name in names]):
-                yield done.result()
-        except BrokenProcessPool:
-            return
+    jobs = {name: functools.partial(sit, name, candidate, folder, stored.get(name)) for name in names}
+    for name, paper in dealt(jobs, workers):
+        yield _crashed(name, folder) if paper is None else paper
 
 
 def _crashed(name: str, folder: Path | None) -> Paper:
     """The first envelope went down with the process; its set is sealed again, and counts as wrong."""
-    case = sets.build(name)
-    envelope = sealed(case.label)
-    _append(folder, "sealed.jsonl", {"id": name, "seal": envelope.seal, "data": fingerprint(case.data)})
-    answer = Answer("error", error="the process crashed")
-    _append(folder, "answers.jsonl", {"id": name, "answer": answer.to_dict()})
-    return Paper(name, envelope.seal, envelope, answer, {})
+    envelope = _seal(name, sets.build(name), folder)
+    return _answered(name, envelope, Answer("error", error="the process crashed"), {}, folder)
 
 
-def _folder(out: Path | str | None) -> Path | None:
+_FILES = ("sealed.jsonl", "salts.jsonl", "answers.jsonl", "labels.jsonl", "build.txt")
+
+
+def _folder(
+    out: Path | str | None, build: str, resume: bool
+) -> tuple[Path | None, dict[str, dict[str, Any]]]:
+    """Where files go, and what the same build has answered there already."""
     if out is None:
-        return None
+        return None, {}
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    for name in ("sealed.jsonl", "answers.jsonl", "labels.jsonl"):
-        (folder / name).unlink(missing_ok=True)
-    return folder
+    (folder / "labels.jsonl").unlink(missing_ok=True)
+    before = _text(folder / "build.txt")
+    if resume and before and before != build:
+        raise truing.InputError(
+            f"{folder}: holds the answers of another build, and a sitting is of one: sit it from the start"
+        )
+    stored = _stored(folder) if resume else {}
+    if not resume:
+        for name in _FILES:
+            (folder / name).unlink(missing_ok=True)
+    (folder / "build.txt").write_text(build, encoding="utf-8")
+    return folder, stored
+
+
+def _text(file: Path) -> str:
+    return file.read_text(encoding="utf-8") if file.is_file() else ""
+
+
+def _stored(folder: Path) -> dict[str, dict[str, Any]]:
+    """Seal, salt and answer of every set that has all three; of sets sealed twice the last."""
+    found: dict[str, dict[str, Any]] = {}
+    for name in ("sealed.jsonl", "salts.jsonl", "answers.jsonl"):
+        for entry in _whole_lines(folder / name):
+            found.setdefault(entry["id"], {}).update(entry)
+    needed = {"seal", "salt", "answer", "others"}
+    return {id: entry for id, entry in found.items() if needed <= set(entry)}
+
+
+def _whole_lines(file: Path) -> list[dict[str, Any]]:
+    """What a file holds; the end of a line at which the sitting before was ended is cut off."""
+    text = _text(file)
+    whole = text[: text.rfind("\n") + 1]
+    if whole != text:
+        file.write_text(whole, encoding="utf-8")
+    return [json.loads(line) for line in whole.splitlines()]
 
 
 def _append(folder: Path | None, name: str, line: dict[str, Any]) -> None:

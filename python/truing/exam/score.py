@@ -12,13 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from truing.exam.answers import Answer, Named
+from truing.exam.answers import Answer, Named, Unknown
+from truing.exam.names import FINDINGS
 
 _Z90 = 1.6448536269514722
 _CONFIDENT = 0.9
 _GEOMETRY = frozenset({"link_geometry", "joint_offset"})  # what lies underneath, by either name
+_SHARED = frozenset({"several", "teeth"})  # one cause on several joints: the smallest may be named or not
 _WHOLE = frozenset({"drift", "scale", "joint_coupling", "time_offset"})
 _BINS = 10
+_SMALL_SHARE = 0.02
+_FEWEST = 20  # names of a family from which its ECE is judged: of fewer, ten bins show chance
 MARKER = ("<!-- scores -->", "<!-- /scores -->")
 
 Label = dict[str, Any]
@@ -70,13 +74,15 @@ def _pairs(items: Iterable[dict[str, Any]]) -> list[Effect]:
 
 
 def same(said: Effect, true: Effect) -> bool:
-    """The same effect at the same joints. Of geometry it is enough that the joint is among those named."""
+    """The same effect at the same joints. Of geometry it is enough that the joint is among those named; an
+    effect of the robot as a whole may be said of any joint.
+    """
     if said[0] != true[0]:
         return False
-    if true[0] in _WHOLE:
+    if true[0] in _WHOLE or not true[1]:
         return True
     if true[0] == "link_geometry":
-        return not true[1] or not said[1] or set(true[1]) <= set(said[1])
+        return not said[1] or set(true[1]) <= set(said[1])
     return set(said[1]) == set(true[1])
 
 
@@ -86,8 +92,27 @@ def holds(named: Named, true: Effect) -> bool:
 
 
 def right(named: Named, label: Label) -> bool:
-    """A true effect, or one that looks the same by the label."""
-    return any(holds(named, true) for true in _pairs(label["effects"]) + _pairs(label["acceptable"]))
+    """A true effect, or one that looks the same by the label. Said of several joints at once, it is so at
+    each.
+    """
+    every = _pairs(label["effects"]) + _pairs(label["acceptable"])
+    return any(
+        any(same(member, true) for true in every)
+        or all(any(same(part, true) for true in every) for part in _parts(member))
+        for member in named.members()
+    )
+
+
+def _parts(said: Effect) -> list[Effect]:
+    """An effect of several joints, joint by joint."""
+    return [(said[0], (joint,)) for joint in said[1]] or [said]
+
+
+def among(named: Named, label: Label, true: Effect) -> bool:
+    """Whether the true effect is named: by itself, or rightly among several joints."""
+    if holds(named, true):
+        return True
+    return right(named, label) and any(same(part, true) for m in named.members() for part in _parts(m))
 
 
 def called_right(named: Named, label: Label) -> bool:
@@ -116,9 +141,9 @@ def exact_set(sheet: Sheet) -> bool:
     named = counted(sheet)
     return (
         both_present(sheet)
-        and len(named) == len(sheet.label["effects"])
         and not sheet.answer.unknown
         and all(right(item, sheet.label) for item in named)
+        and (len(named) == len(sheet.label["effects"]) or sheet.label["family"] in _SHARED)
     )
 
 
@@ -126,10 +151,10 @@ def both_present(sheet: Sheet) -> bool:
     """Every true effect is named, or one that looks like it, each by another name."""
     named = counted(sheet)
     truths = _pairs(sheet.label["effects"])
-    strict = [true for true in truths if any(holds(item, true) for item in named)]
+    strict = [true for true in truths if any(among(item, sheet.label, true) for item in named)]
     if len(strict) == len(truths):
         return True
-    rest = [item for item in named if not any(holds(item, true) for true in truths)]
+    rest = [item for item in named if not any(among(item, sheet.label, true) for true in truths)]
     stand_in = [item for item in rest if right(item, sheet.label)]
     return len(strict) + len(stand_in) >= len(truths)
 
@@ -188,10 +213,68 @@ def place_right(sheet: Sheet) -> bool:
     """Joint and input of an unlisted effect. Of two inputs one is enough if nothing else is said."""
     if not sheet.answer.unknown:
         return False
-    found = sheet.answer.unknown[0]
-    wanted, said = set(sheet.label["unlisted_inputs"]), set(found.inputs)
+    found, label = sheet.answer.unknown[0], sheet.label
+    places = label.get("places", [[label["unlisted_joint"], label["unlisted_inputs"]]])
+    return any(_is_at(found, joint, set(inputs)) for joint, inputs in places)
+
+
+def _is_at(found: Unknown, joint: str, wanted: set[str]) -> bool:
+    """joint: "" is any."""
+    said = set(found.inputs)
     inputs = wanted <= said if len(wanted) == 1 else bool(said) and said <= wanted
-    return found.joint == sheet.label["unlisted_joint"] and inputs
+    return inputs and joint in ("", found.joint)
+
+
+def first_or_unknown(sheet: Sheet) -> bool:
+    """The effect is named first, or called unknown at the right joint and input: nameless, but no error."""
+    return first_right(sheet) or place_right(sheet)
+
+
+def order_right(sheet: Sheet) -> bool:
+    """Some true joint has the true order per turn, or one that no pose of an even grid tells from it."""
+    order, spacing = float(sheet.label["order"]), sheet.label["spacing"]
+    for item in sheet.answer.effects:
+        for joint in set(item.joints) & set(spacing):
+            if math.isfinite(item.order) and _same_order(item.order, order, float(spacing[joint])):
+                return True
+    return False
+
+
+def _same_order(said: float, true: float, spacing: float) -> bool:
+    """To half an order, or sum or difference is a whole number of the grid's steps per turn."""
+    per_turn = 2.0 * math.pi / spacing if spacing > 0.0 else math.inf
+    off = [abs(said - true), said + true]
+    if math.isfinite(per_turn):
+        off = [min(value % per_turn, -value % per_turn) for value in off]
+    return off[0] <= 0.5 or (math.isfinite(per_turn) and off[1] <= 0.5)
+
+
+def told_or_untestable(sheet: Sheet) -> bool:
+    return first_right(sheet) or any(_not_testable(sheet, true) for true in _pairs(sheet.label["effects"]))
+
+
+def mistake_told(sheet: Sheet) -> bool:
+    """What is wrong with the columns is said, or that what was found does not hold."""
+    said = FINDINGS[sheet.label["mistake"]] & set(sheet.answer.findings)
+    return bool(said) or sheet.answer.verdict == "does_not_hold"
+
+
+def worse_than(sheet: Sheet, other: str, by: float = 1.05) -> bool:
+    """Whether the diagnosed robot is worse than another one on fresh poses. No result counts as worse."""
+    fresh = sheet.answer.fresh
+    if "robot" not in fresh:
+        return True
+    return other in fresh and fresh["robot"] > by * fresh[other]
+
+
+def small_false_name(sheet: Sheet) -> bool:
+    """A name that is not in the truth, of what closes less than 2 % of the gap."""
+    return any(item.share < _SMALL_SHARE and not _excusable(sheet, item) for item in counted(sheet))
+
+
+def _excusable(sheet: Sheet, item: Named) -> bool:
+    underneath = sheet.label["geometry_underneath"] and item.effect in _GEOMETRY
+    return underneath or right(item, sheet.label)
 
 
 # ---- The table -----------------------------------------------------------------------------------
@@ -246,6 +329,27 @@ def _known_background(s: Sheet) -> bool:
     return s.label["family"] in ("single", "double") and s.label["source"] != "spike"
 
 
+def _mistake(kind: str) -> Test:
+    return lambda s: s.label["family"] == "mistaken" and s.label["mistake"] == kind
+
+
+def _machine(kind: str) -> Test:
+    return lambda s: s.label["family"] == "machines" and s.label["kind"] == kind
+
+
+def _teeth(kind: str) -> Test:
+    return lambda s: s.label["family"] == "teeth" and s.label["kind"] == kind
+
+
+def _known_truth(s: Sheet) -> bool:
+    """Sets of which all that is hidden is known and listed."""
+    return bool(
+        s.label["effects"]
+        and s.label["source"] != "spike"
+        and s.label["family"] not in ("missing", "confounded")
+    )
+
+
 def _called(s: Sheet) -> bool:
     return called_right(counted(s)[0], s.label) and counted(s)[0].effect not in _WHOLE
 
@@ -256,42 +360,42 @@ LINES = (
         "first-named effect right, ≥ 1 × noise, physics",
         _single(["physics"], 1.0),
         first_right,
-        at_least=0.97,
+        at_least=0.98,
     ),
     Line(
         "first_departures",
         "the same on departures and spike-in",
         _single(["departures", "spike"], 1.0),
         first_right,
-        at_least=0.90,
+        at_least=0.94,
     ),
     Line(
         "joint",
         "joint right given the effect",
         _placed,
         lambda s: right(counted(s)[0], s.label),
-        at_least=0.97,
+        at_least=0.98,
     ),
-    Line("two_exact", "two effects: exact set", _many(2), exact_set, at_least=0.85),
-    Line("two_present", "two effects: both present", _many(2), both_present, at_least=0.95),
+    Line("two_exact", "two effects: exact set", _many(2), exact_set, at_least=0.88),
+    Line("two_present", "two effects: both present", _many(2), both_present, at_least=0.96),
     Line(
-        "class", "confounded by design: class returned", _family("confounded"), class_returned, at_least=0.90
+        "class", "confounded by design: class returned", _family("confounded"), class_returned, at_least=0.95
     ),
     Line(
         "class_wrong",
         "confounded by design: confident single wrong name",
         _family("confounded"),
         confidently_wrong,
-        at_most=0.02,
+        at_most=0.01,
         good=False,
     ),
-    Line("alarm_white", "false alarms: white noise", _none("white"), false_alarm, at_most=0.02, good=False),
+    Line("alarm_white", "false alarms: white noise", _none("white"), false_alarm, at_most=0.01, good=False),
     Line(
         "alarm_other",
         "false alarms: drift, heavy tails, outliers",
         _none("drift", "heavy", "outliers"),
         false_alarm,
-        at_most=0.05,
+        at_most=0.01,
         good=False,
     ),
     Line(
@@ -299,14 +403,14 @@ LINES = (
         "unlisted effect recognised, ≥ 3 × noise",
         _unlisted,
         lambda s: bool(s.answer.unknown),
-        at_least=0.90,
+        at_least=0.93,
     ),
     Line(
         "unknown_of_listed",
         "“unknown” said of a listed effect",
         _known_background,
         lambda s: bool(s.answer.unknown),
-        at_most=0.05,
+        at_most=0.04,
         good=False,
     ),
     Line(
@@ -314,7 +418,32 @@ LINES = (
         "joint and input of the unlisted effect right",
         lambda s: _unlisted(s) and bool(s.answer.unknown),
         place_right,
-        at_least=0.80,
+        at_least=0.90,
+    ),
+    Line(
+        "unlisted_wrong",
+        "unlisted effect: a listed one named for certain",
+        _family("unlisted"),
+        confidently_wrong,
+        at_most=0.03,
+        good=False,
+    ),
+    Line(
+        "wrong_law",
+        "right effect named first though its law is wrong",
+        _family("wrong_law"),
+        first_right,
+        at_least=0.88,
+    ),
+    Line("three_exact", "three effects: exact set", _many(3), exact_set, at_least=0.82),
+    Line("three_present", "three effects: all present", _many(3), both_present, at_least=0.93),
+    Line(
+        "few_worse",
+        "25-70 poses: robot.yaml worse than geometry alone on fresh poses by > 5 %",
+        _family("few"),
+        lambda s: worse_than(s, "geometry"),
+        at_most=0.02,
+        good=False,
     ),
 )
 # Told as well, without a target.
@@ -344,21 +473,11 @@ MORE = (
         lambda s: _single(["physics", "departures"], 1.0)(s) and bool(s.label["geometry_underneath"]),
         first_right,
     ),
-    Line("three_exact", "three effects: exact set", _many(3), exact_set),
-    Line("three_present", "three effects: all present", _many(3), both_present),
-    Line("wrong_law", "right effect named first though its law is wrong", _family("wrong_law"), first_right),
     Line(
         "companion",
         "a second effect named beside one of wrong law",
         _family("wrong_law"),
         lambda s: len(counted(s)) > 1,
-        good=False,
-    ),
-    Line(
-        "unlisted_wrong",
-        "unlisted effect: a listed one named for certain",
-        _family("unlisted"),
-        confidently_wrong,
         good=False,
     ),
     Line(
@@ -372,7 +491,128 @@ MORE = (
         "missing_told",
         "column withheld: named, or called not testable",
         _family("missing"),
-        lambda s: first_right(s) or any(_not_testable(s, true) for true in _pairs(s.label["effects"])),
+        told_or_untestable,
+    ),
+    Line(
+        "few_worse_frames",
+        "25-70 poses: robot.yaml worse than base and tool alone by > 5 %",
+        _family("few"),
+        lambda s: worse_than(s, "frames"),
+        good=False,
+    ),
+    Line("few_wrong", "25-70 poses: confident wrong name", _family("few"), confidently_wrong, good=False),
+    Line(
+        "few_first",
+        "25-70 poses, one effect or two: first-named right",
+        lambda s: _family("few")(s) and bool(s.label["effects"]),
+        first_right,
+    ),
+    Line("grid", "poses on a grid: first-named right", _family("grid"), first_right),
+    Line(
+        "grid_wrong", "poses on a grid: confident wrong name", _family("grid"), confidently_wrong, good=False
+    ),
+    *(
+        Line(f"mistake_{kind}", f"{text}: said", _mistake(kind), mistake_told)
+        for kind, text in (
+            ("exchanged", "joint columns exchanged"),
+            ("sign", "wrong sign of a joint"),
+            ("convention", "table of the other DH convention"),
+        )
+    ),
+    Line(
+        "mistake_worse",
+        "such a mistake: robot.yaml worse than base and tool alone on fresh poses",
+        _family("mistaken"),
+        lambda s: worse_than(s, "frames", 1.0),
+        good=False,
+    ),
+    *(
+        Line(f"machine_{kind}", f"{text}: named first", _machine(kind), first_right)
+        for kind, text in (
+            ("rods", "four-bar linkage at a palletizer's wrist"),
+            ("elbow_rods", "four-bar linkage at an elbow"),
+            ("warm_robot", "the whole robot warm"),
+            ("wobble_twice", "axis that wobbles twice per turn"),
+            ("neighbour", "joint dragged along by the next"),
+            ("hard_spring", "spring that hardens all the way"),
+        )
+    ),
+    Line(
+        "machine_place",
+        "laws that machines have: named first, or unknown at the right joint and input",
+        _family("machines"),
+        first_or_unknown,
+    ),
+    Line(
+        "machine_wrong",
+        "laws that machines have: confident wrong name",
+        _family("machines"),
+        confidently_wrong,
+        good=False,
+    ),
+    *(
+        Line(
+            f"teeth_{kind}",
+            f"teeth, {text}: named first, or called not testable",
+            _teeth(kind),
+            told_or_untestable,
+        )
+        for kind, text in (
+            ("even_grid", "even grid"),
+            ("uneven_grid", "uneven grid"),
+            ("anywhere", "poses anywhere"),
+        )
+    ),
+    Line(
+        "teeth_place",
+        "teeth: so, or unknown at the right joint and input",
+        _family("teeth"),
+        lambda s: told_or_untestable(s) or place_right(s),
+    ),
+    Line("teeth_present", "teeth: every joint named", _family("teeth"), both_present),
+    Line(
+        "teeth_order",
+        "teeth: order per turn right, where an order is said",
+        lambda s: _family("teeth")(s) and any(math.isfinite(item.order) for item in s.answer.effects),
+        order_right,
+    ),
+    Line("teeth_wrong", "teeth: confident wrong name", _family("teeth"), confidently_wrong, good=False),
+    Line("several_first", "one cause on several joints: first-named right", _family("several"), first_right),
+    Line("several_present", "one cause on several joints: every joint", _family("several"), both_present),
+    Line("several_exact", "one cause on several joints: and nothing else", _family("several"), exact_set),
+    Line(
+        "several_wrong",
+        "one cause on several joints: confident wrong name",
+        _family("several"),
+        confidently_wrong,
+        good=False,
+    ),
+    Line(
+        "small_false",
+        "a name not in the truth that closes < 2 %, all families",
+        _known_truth,
+        small_false_name,
+        good=False,
+    ),
+    Line(
+        "small_false_companion",
+        "the same beside an effect of 1 to 2 % of the gap",
+        _family("companion"),
+        small_false_name,
+        good=False,
+    ),
+    Line(
+        "companion_main",
+        "beside a small companion: the large effect first",
+        _family("companion"),
+        first_right,
+    ),
+    Line(
+        "failed",
+        "the diagnosis failed with an error",
+        lambda s: True,
+        lambda s: bool(s.answer.error),
+        good=False,
     ),
     Line("twenty", "twenty poses: first-named right", _family("twenty"), first_right),
     Line(
@@ -444,6 +684,9 @@ def score(sheets: Sequence[Sheet], which: str = "", skipped: dict[str, int] | No
         "first_geometry",
         "wrong_law",
         "twenty",
+        "grid",
+        "several_first",
+        "companion_main",
     )
     others = {}
     for name in names:
@@ -490,10 +733,10 @@ def _values(sheets: Sequence[Sheet]) -> list[Row]:
         Row(
             "shrink",
             "predicted shrink against realised: median difference [points]",
-            "≤ 5",
+            "≤ 2",
             n=len(pairs),
             value=median,
-            met=_met(median <= 5.0, pairs),
+            met=_met(median <= 2.0, pairs),
             percent=False,
         ),
         Row(
@@ -508,23 +751,45 @@ def _values(sheets: Sequence[Sheet]) -> list[Row]:
         Row(
             "calibration",
             "stated confidence against frequency (ECE)",
-            "≤ 0.05",
+            "≤ 0.03",
             n=n,
             value=error,
-            met=_met(error <= 0.05, range(n)),
+            met=_met(error <= 0.03, range(n)),
             percent=False,
         ),
+        *_calibrations(sheets),
         Row(
             "seconds",
             "seconds per set, median",
-            "≤ 1",
+            "≤ 0.6",
             n=len(seconds),
             value=typical,
-            met=_met(typical <= 1.0, seconds),
+            met=_met(typical <= 0.6, seconds),
             percent=False,
         ),
         Row("seconds_p95", "seconds per set, 95th percentile", "", n=len(seconds), value=slow, percent=False),
     ]
+
+
+def _calibrations(sheets: Sequence[Sheet]) -> list[Row]:
+    """The same within each family."""
+    rows = []
+    for family in dict.fromkeys(sheet.label["family"] for sheet in sheets):
+        error, n = calibration_error([sheet for sheet in sheets if sheet.label["family"] == family])
+        if n >= _FEWEST:
+            text = f"ECE within {family}"
+            rows.append(
+                Row(
+                    f"calibration_{family}",
+                    text,
+                    "≤ 0.08",
+                    n=n,
+                    value=error,
+                    met=error <= 0.08,
+                    percent=False,
+                )
+            )
+    return rows
 
 
 def _met(passed: bool, of: Sequence[Any] | Any) -> bool | None:
@@ -541,9 +806,8 @@ def calibration_error(sheets: Sequence[Sheet]) -> tuple[float, int]:
             continue
         for item in sheet.answer.effects:
             said.append(item.probability)
-            underneath = sheet.label["geometry_underneath"] and item.effect in _GEOMETRY
             drifts = sheet.label.get("kind") == "drift" and item.effect == "drift"
-            true.append(float(underneath or drifts or right(item, sheet.label)))
+            true.append(float(drifts or _excusable(sheet, item)))
     if not said:
         return math.nan, 0
     p, hit = np.clip(np.array(said), 0.0, 1.0), np.array(true)

@@ -32,7 +32,12 @@ class BrokenSealError(Exception):
 
 
 def sealed(label: dict[str, Any]) -> Envelope:
-    return Envelope(json.dumps(label, sort_keys=True), secrets.token_hex(16))
+    return resealed(label, secrets.token_hex(16))
+
+
+def resealed(label: dict[str, Any], salt: str) -> Envelope:
+    """A label, made anew, with the salt of its seal."""
+    return Envelope(json.dumps(label, sort_keys=True), salt)
 
 
 def opened(envelope: Envelope, seal: str) -> dict[str, Any]:

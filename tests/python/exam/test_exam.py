@@ -7,9 +7,15 @@ quick one.
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import json
 import math
+import os
+import signal
+import subprocess
+import sys
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,9 +29,10 @@ import truing
 
 pytest.importorskip("mujoco")
 
-from candidates import crashing, silent
-from truing.exam import laws, sealing, sets, surprises
-from truing.exam.answers import Answer, Named, Unknown, baseline
+import candidates
+from candidates import crashing, leaving, silent
+from truing.exam import laws, machine_laws, names, sealing, sets, surprises
+from truing.exam.answers import Answer, Named, Unknown, answer_from, baseline
 from truing.exam.design import draw, usual_plan
 from truing.exam.kinematics import Chain, Floats, chain_of, gravity_torques, no_changes, sweep
 from truing.exam.physics import Mechanism, Parts, Play, link_frames
@@ -33,6 +40,7 @@ from truing.exam.robots import Specimen, specimens
 from truing.exam.run import run_exam, sit
 from truing.exam.score import Scores, Sheet, calibration_error, markdown, score, wilson, write_markdown
 from truing.exam.sizing import View
+from truing.exam.workers import dealt
 from truing.exam.worlds import Truth
 
 # What the quick development examination must reach at least (shares), or at most: measured, with room for a
@@ -221,6 +229,55 @@ def test_a_rod_that_is_too_long_tilts_the_wrist_and_closed_rods_do_not() -> None
 # ---- Laws ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    "bars",
+    [(1.0, 0.6, 0.6, 1.0), (1.002, 0.6, 0.6, 1.0), (1.0, 0.603, 0.598, 1.001)],
+    ids=["equal", "base bar", "all but one"],
+)
+def test_a_closed_linkage_is_closed(bars: tuple[float, float, float, float]) -> None:
+    base, crank, rocker, coupler = bars
+    theta = np.linspace(0.4, 2.7, 50)
+    phi = machine_laws.closure(theta, base, crank, rocker, coupler)
+    ends = [
+        length * np.stack([np.cos(a), np.sin(a)], axis=1) for length, a in ((crank, theta), (rocker, phi))
+    ]
+    reach = np.linalg.norm(ends[1] + [base, 0.0] - ends[0], axis=1)
+    assert np.abs(reach - coupler).max() < 1e-12
+    # To first order (closure differentiated): (dl - dc + (dr_rocker - dr_crank) cos) / (r sin).
+    first = (base - 1.0 - (coupler - 1.0) + (rocker - crank) * np.cos(theta)) / (0.6 * np.sin(theta))
+    assert np.abs(phi - theta - first).max() < 0.03 * max(float(np.abs(first).max()), 1e-9)
+
+
+def test_an_exact_law_is_the_unit_law_while_small() -> None:
+    specimen = next(specimen for _, specimen in EVERY if specimen.rod_arm)
+    _, chain = placed(specimen)
+    context = laws.Context(chain, some_inputs(specimen, chain))
+    wrist = next(j for j, drivers in enumerate(chain.drivers) if drivers)
+    crank = [(driver, 1.0) for driver, _ in chain.drivers[wrist]][:1]
+    hidden = machine_laws.four_bar(chain, wrist, crank, np.random.default_rng(4), ("q2",))
+    unit = hidden.law(context).motion[:, wrist]
+    small, large = (hidden.sized(size).changes(context).motion[:, wrist] / size for size in (1e-4, 1e-2))
+    assert np.abs(small - unit).max() < 1e-3 * np.abs(unit).max()
+    assert np.abs(large - unit).max() > 1e-3 * np.abs(unit).max()
+
+
+def test_a_robot_that_warms_up_was_right_at_twenty_degrees() -> None:
+    specimen = specimens("development")[0]
+    _, chain = placed(specimen)
+    context = laws.Context(chain, some_inputs(specimen, chain))
+    changes = laws.thermal_zero(1, np.random.default_rng(0)).changes(context)
+    assert changes.motion[:, 1] == pytest.approx(context.inputs.temperature - 20.0)
+    assert abs(float(changes.motion[:, 1].mean())) > 1.0  # it has a constant part
+
+
+def test_names_that_the_examiner_accepts_are_those_of_the_catalogue() -> None:
+    """Fails when the catalogue calls one of them otherwise: `names` is the place to write it."""
+    known = {effect.name for effect in truing.model.catalogue_effects()}
+    for word, accepted in names.ACCEPTED.items():
+        assert set(accepted) <= known, f"{word}: {set(accepted) - known}"
+    assert {names.accepted(word) for word in laws.LISTED} <= {(name,) for name in known}
+
+
 def longest_link(chain: Chain) -> int:
     ways = link_frames(chain, chain.links[None])[0, 1:-1, :3, 3]
     return int(np.argmax(np.linalg.norm(ways, axis=1)))
@@ -267,10 +324,52 @@ def test_sizes_are_what_the_label_says() -> None:
         assert case.label["rows"] == case.data.rows
 
 
+@pytest.mark.parametrize("even", [True, False])
+def test_poses_on_a_grid_stand_at_few_angles(even: bool) -> None:
+    for number in range(4):
+        case = sets.build(f"development/grid/{2 * number + even}")
+        for column in np.asarray(case.data.joints).T:
+            levels = np.unique(column)
+            assert 2 <= len(levels) <= 9
+            gaps = np.diff(levels)
+            step = gaps.min()
+            whole = np.abs(gaps / step - np.round(gaps / step)).max() < 1e-6
+            assert whole or not even
+
+
+def test_mistakes_are_in_what_is_handed_over_and_not_in_the_truth() -> None:
+    for number, kind in enumerate(("exchanged", "sign", "convention")):
+        case = sets.build(f"development/mistaken/{number}")
+        assert case.label["mistake"] == kind and not case.label["effects"]
+        names_of = [joint.name for joint in case.robot.joints if not joint.passive]
+        fresh = case.fresh()
+        limits = {joint.name: (joint.lower, joint.upper) for joint in case.robot.joints}
+        assert fresh.joints.shape[1] == case.data.joints.shape[1] == len(names_of)
+        if kind == "convention":
+            original = next(s for s in specimens("development") if s.name == case.label["robot"]).robot
+            assert case.robot.convention != original.convention and not case.label["mistake_joints"]
+            continue
+        assert len(case.label["mistake_joints"]) == (2 if kind == "exchanged" else 1)
+        for joint in set(names_of) - set(case.label["mistake_joints"]):
+            low, high = limits[joint]
+            column = np.asarray(case.data.joints)[:, names_of.index(joint)]
+            assert low - 1e-9 <= column.min() and column.max() <= high + 1e-9
+
+
+def test_one_cause_sits_on_several_joints_and_companions_are_small() -> None:
+    springs = sets.build("development/several/0").label
+    assert {item["effect"] for item in springs["effects"]} == {"joint_compliance"}
+    assert len(springs["effects"]) >= 2 and min(springs["sizes"]) >= 1.0
+    companion = sets.build("development/companion/0").label
+    share = (companion["small"] / companion["sizes"][0]) ** 2
+    assert 0.005 < share < 0.03 and len(companion["effects"]) == 1
+
+
 def test_development_and_examination_have_nothing_in_common() -> None:
     robots = [{specimen.name for specimen in specimens(which)} for which in sets.WHICH]
     unlisted = [{kind.__name__ for kind in surprises.surprises(which)} for which in sets.WHICH]
     assert not robots[0] & robots[1] and not unlisted[0] & unlisted[1]
+    assert not set(machine_laws.RATIOS["development"]) & set(machine_laws.RATIOS["examination"])
     assert min(len(group) for group in (*robots, *unlisted)) >= 3
     one, other = (sets.make(f"{which}/single/0")[1] for which in sets.WHICH)
     assert one.joints.shape != other.joints.shape or np.abs(one.joints - other.joints).max() > 0.1
@@ -298,8 +397,8 @@ def test_what_is_handed_over_does_not_tell() -> None:
 # ---- Independence --------------------------------------------------------------------------------
 
 EXAM = Path(sets.__file__).parent
-# Containers, readers and checks; nothing that predicts, fits, or knows an effect. The two exceptions are what
-# is examined.
+# Containers, readers and checks; nothing that predicts, fits, or knows an effect. The exceptions are what is
+# examined, and what it is compared with.
 MAY_USE = {
     "Robot",
     "Joint",
@@ -312,7 +411,12 @@ MAY_USE = {
     "InputError",
     "InputWarning",
 }
-ONLY_IN = {"diagnose": "run.py", "residuals": "answers.py", "__version__": "result.py"}
+ONLY_IN = {
+    "diagnose": "run.py",
+    "residuals": "answers.py",
+    "identify": "answers.py",  # what one does who asks for no cause
+    "__version__": "result.py",
+}
 WRITES = {"page.py", "result.py"}  # these see scores only, and may use the HTML toolkit
 
 
@@ -377,6 +481,140 @@ def test_a_candidate_that_crashes_has_answered_wrongly_and_the_others_sit_on() -
     }
 
 
+def test_a_sitting_that_was_ended_goes_on(tmp_path: Path) -> None:
+    def sat(**more: Any) -> Scores:
+        return run_exam(
+            "development", families=["none"], workers=1, out=tmp_path, candidate=silent, build="a", **more
+        )
+
+    first = sat(limit=2)
+    answers = (tmp_path / "answers.jsonl").read_text()
+    (tmp_path / "answers.jsonl").write_text(
+        answers + '{"id": "development/none/2", "ans'
+    )  # ended while writing
+    second = sat(limit=4, resume=True)
+    kept = (tmp_path / "answers.jsonl").read_text().splitlines()
+    assert "\n".join(kept[:2]) + "\n" == answers and (first.sets, second.sets) == (2, 4)
+    assert sorted(json.loads(line)["id"] for line in kept[-2:]) == [
+        "development/none/2",
+        "development/none/3",
+    ]
+    fresh = run_exam("development", families=["none"], limit=4, workers=1, candidate=silent)
+    assert [row.hits for row in second.rows] == [row.hits for row in fresh.rows]
+    with pytest.raises(truing.InputError, match="another build"):
+        run_exam("development", families=["none"], out=tmp_path, candidate=silent, build="b", resume=True)
+
+
+def test_a_label_that_is_made_otherwise_than_it_was_sealed_is_not_taken(tmp_path: Path) -> None:
+    options: dict[str, Any] = {
+        "families": ["none"],
+        "limit": 1,
+        "workers": 1,
+        "out": tmp_path,
+        "candidate": silent,
+        "build": "a",
+    }
+    run_exam("development", **options)
+    text = (tmp_path / "sealed.jsonl").read_text()
+    seal = json.loads(text)["seal"]
+    (tmp_path / "sealed.jsonl").write_text(text.replace(seal, "0" * 64))
+    with pytest.raises(sealing.BrokenSealError, match="development/none/0"):
+        run_exam("development", resume=True, **options)
+
+
+def test_an_answer_comes_back_from_json_as_it_was() -> None:
+    named = Named("backlash", ("J2", "J3"), 0.9, (("windup", ("J2",)),), 0.4)
+    said = Answer(
+        "effects",
+        (named,),
+        (Unknown("J1", ("q1",)),),
+        (("thermal", ("J1",)),),
+        (0.5, 0.4, 0.6),
+        findings=("lag",),
+    )
+    text = json.dumps(said.to_dict())  # as text: what is not known is NaN, which equals nothing
+    assert json.dumps(answer_from(json.loads(text)).to_dict()) == text
+    assert answer_from(json.loads(text)).effects[0].members() == named.members()
+
+
+@pytest.mark.parametrize("words", ["nonsense", "single/x", "noone/3"])
+def test_a_family_or_set_that_is_not_there_is_said(words: str) -> None:
+    chosen: Any = {"families": [words]} if "/" not in words else {"only": [words]}
+    with pytest.raises(truing.InputError, match=r"no (family|set)"):
+        sets.ids("development", **chosen)
+
+
+# ---- Workers -------------------------------------------------------------------------------------
+
+
+def test_a_job_that_takes_its_process_down_costs_itself_only() -> None:
+    jobs = {name: functools.partial(leaving, name) for name in ("a", "down", "b", "c")}
+    assert dict(dealt(jobs, 2)) == {"a": "a", "down": None, "b": "b", "c": "c"}
+
+
+def test_what_a_job_raises_reaches_the_dealer() -> None:
+    with pytest.raises(ZeroDivisionError):
+        list(dealt({"a": functools.partial(leaving, "zero")}, 1))
+
+
+def sitting(folder: Path) -> tuple[subprocess.Popen[bytes], list[int]]:
+    """An examination that is being sat by two workers, and their process ids: `sleeping` writes them down."""
+    code = f"""
+import candidates
+from truing.exam.run import run_exam
+if __name__ == "__main__":
+    out = {str(folder)!r}
+    run_exam("development", families=["none"], limit=6, workers=2, out=out, candidate=candidates.sleeping)
+"""
+    script = folder / "sit.py"
+    script.write_text(code, encoding="utf-8")
+    support = Path(candidates.__file__).parent
+    process = subprocess.Popen(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": str(support), candidates.PLACE: str(folder)},
+        stderr=subprocess.PIPE,
+        # A script in the background ignores SIGINT, and its children would as well.
+        preexec_fn=functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 120.0
+    while len(found := sorted(folder.glob("*.pid"))) < 2:
+        assert process.poll() is None and time.monotonic() < deadline, "no two workers began"
+        time.sleep(0.05)
+    return process, [int(file.stem) for file in found]
+
+
+def is_alive(process: int) -> bool:
+    """Whether it runs: one that has died and whom nobody has waited for does not."""
+    try:
+        state = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state != "Z"
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are looked at in /proc")
+@pytest.mark.parametrize("how", ["interrupt", "interrupt of all", "kill"])
+def test_the_workers_die_with_the_examination(tmp_path: Path, how: str) -> None:
+    process, workers = sitting(tmp_path)
+    if how == "interrupt of all":  # Ctrl-C in a terminal
+        os.killpg(process.pid, signal.SIGINT)
+    else:
+        process.send_signal(signal.SIGINT if how == "interrupt" else signal.SIGKILL)
+    try:
+        process.communicate(timeout=60.0)  # who waits for his workers waits ten minutes
+        deadline = time.monotonic() + 60.0
+        while any(is_alive(worker) for worker in workers) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        assert not [worker for worker in workers if is_alive(worker)]
+        assert process.returncode != 0
+    finally:
+        for one in (process.pid, *workers):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(one, signal.SIGKILL)
+        process.wait()
+
+
 def test_a_candidate_that_fails_has_answered_wrongly() -> None:
     paper = sit("development/none/0", failing)
     assert paper.answer.error == "ValueError: no idea" and paper.answer.verdict == "error"
@@ -386,7 +624,8 @@ def test_a_candidate_that_fails_has_answered_wrongly() -> None:
 
 
 def sheet(effects: Sequence[tuple[str, str]], named: Sequence[Named], **more: Any) -> Sheet:
-    answer = {key: more.pop(key) for key in ("unknown", "not_testable", "shrink", "realised") if key in more}
+    told = ("unknown", "not_testable", "shrink", "realised", "fresh", "findings")
+    answer = {key: more.pop(key) for key in told if key in more}
     label = {
         "family": "single",
         "source": "physics",
@@ -443,6 +682,73 @@ def test_a_twin_alone_and_for_certain_is_wrong() -> None:
     assert share([sheet(truth, [honest], **twin)], "class") == 1.0
     told = sheet(truth, [alone], not_testable=(("backlash", ("J2",)),), **twin)
     assert share([told], "class") == 1.0 and share([told], "class_wrong") == 0.0
+
+
+def test_an_effect_said_of_several_joints_is_said_of_each() -> None:
+    truth = [("joint_compliance", "J2"), ("joint_compliance", "J3")]
+    both = Named("joint_compliance", ("J2", "J3"))
+    too_many = Named("joint_compliance", ("J2", "J3", "J5"))
+    kind = {"family": "several"}
+    assert share([sheet(truth, [both], **kind)], "several_exact") == 1.0
+    assert share([sheet(truth, [Named(e, (j,)) for e, j in truth], **kind)], "several_exact") == 1.0
+    assert share([sheet(truth, [too_many], **kind)], "several_present") == 0.0
+    assert share([sheet(truth, [Named("joint_compliance", ("J2",))], **kind)], "several_present") == 0.0
+    weak = [{"effect": "joint_compliance", "joints": ["J5"]}]
+    assert share([sheet(truth, [too_many], acceptable=weak, **kind)], "several_exact") == 1.0
+
+
+def test_a_result_is_compared_with_geometry_alone_on_fresh_poses() -> None:
+    def few(**fresh: float) -> Sheet:
+        return sheet([], [], family="few", fresh=fresh)
+
+    assert share([few(robot=1.04, geometry=1.0, frames=2.0)], "few_worse") == 0.0
+    assert share([few(robot=1.06, geometry=1.0, frames=2.0)], "few_worse") == 1.0
+    assert share([few(robot=1.06, geometry=1.0, frames=1.0)], "few_worse_frames") == 1.0
+    assert share([few()], "few_worse") == 1.0  # no result is no good result
+
+
+def test_a_mistake_is_said_by_its_finding_or_by_the_verdict() -> None:
+    label = {"family": "mistaken", "mistake": "sign", "kind": "sign"}
+    said = sheet([], [], findings=("joint_sign",), **label)
+    wrong = sheet([], [], findings=("joint_order",), fresh={"robot": 1.0, "frames": 0.9}, **label)
+    held = Sheet("x", said.label, Answer("does_not_hold"))
+    assert [share([one], "mistake_sign") for one in (said, wrong, held)] == [1.0, 0.0, 1.0]
+    assert share([wrong], "mistake_worse") == 1.0
+
+
+@pytest.mark.parametrize(
+    ("said", "spacing", "right"), [(100.0, 0.0, 1.0), (90.0, 0.0, 0.0), (20.0, 40, 1.0), (21.0, 40, 0.0)]
+)
+def test_orders_that_a_grid_does_not_tell_apart_are_the_same(said: float, spacing: int, right: float) -> None:
+    """On 40 steps per turn 100 = 2 * 40 + 20 looks like 20."""
+    truth = [("transmission_error", "J2")]
+    label = {"family": "teeth", "kind": "even_grid", "order": 100.0}
+    step = 2.0 * math.pi / spacing if spacing else 0.0
+    named = Named("transmission_error", ("J2",), order=said)
+    assert share([sheet(truth, [named], spacing={"J2": step}, **label)], "teeth_order") == right
+
+
+def test_a_name_of_little_that_is_not_there_counts() -> None:
+    truth = [("backlash", "J2")]
+    main = Named("backlash", ("J2",), share=0.9)
+    for name, of in (
+        (Named("gear_ratio", ("J5",), share=0.01), 1.0),
+        (Named("gear_ratio", ("J5",), share=0.1), 0.0),
+    ):
+        assert share([sheet(truth, [main, name])], "small_false") == of
+    assert share([sheet(truth, [Named("backlash", ("J2",), share=0.01)])], "small_false") == 0.0
+
+
+def test_confidence_is_judged_within_each_family() -> None:
+    truth = [("backlash", "J2")]
+    sheets = [sheet(truth, [Named("backlash", ("J3",), 0.95)], family="grid") for _ in range(20)]
+    sheets += [sheet(truth, [Named("backlash", ("J2",), 1.0)]) for _ in range(180)]
+    scores = score(sheets)
+    assert scores.row("calibration").value == pytest.approx(0.095)
+    assert (
+        scores.row("calibration_grid").value == pytest.approx(0.95) and not scores.row("calibration_grid").met
+    )
+    assert scores.row("calibration_single").met
 
 
 def test_only_drift_may_be_named_where_the_frame_wanders() -> None:

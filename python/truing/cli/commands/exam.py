@@ -7,12 +7,12 @@ Writes result.json (the score table) and report.html. Needs MuJoCo: pip install 
 
 from __future__ import annotations
 
+import hashlib
+import importlib.util
 import os
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from truing.cli import run
@@ -27,14 +27,12 @@ PANEL = "Diagnose"
 _RUN = "truing.exam.run:run_exam"
 
 
-@dataclass(frozen=True)
-class Sat:
-    scores: Scores
-    folder: TemporaryDirectory[str]  # what was sealed, answered and opened
+SITTING = "sitting"
+"""Folder within the output's that grows meanwhile: what was sealed, answered and opened."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command[None, Sat]):
+class Command(run.Command[None, "Scores"]):
     doing = "examining"
     own_processes = True
 
@@ -44,6 +42,8 @@ class Command(run.Command[None, Sat]):
     ] = "development"
     quick: Annotated[bool, Flag("A few data sets of every family.")] = False
     families: Annotated[list[str], Words("Only these families of data sets: 'none,one'. Default: all.")] = ()  # type: ignore[assignment]
+    sets: Annotated[list[str], Words("Only these data sets: 'single/12,grid/3'. Default: all.")] = ()  # type: ignore[assignment]
+    resume: Annotated[bool, Flag("Keep the answers of a sitting that was ended, if by this build.")] = False
     workers: Annotated[int, Count("Processes at a time. 0: as many as the machine has.")] = 0
     limit: Annotated[int, Count("No more sets of each family than this. 0: all.")] = 0
     seed: Seed = 0
@@ -59,39 +59,52 @@ class Command(run.Command[None, Sat]):
                 ' "truing[exam]"'
             ) from None
 
-    def solve(self, loaded: None, progress: run.Progress) -> Sat:
+    def solve(self, loaded: None, progress: run.Progress) -> Scores:
         from truing.exam.run import run_exam
 
-        folder = TemporaryDirectory(prefix="truing-exam-")
-        scores = run_exam(
+        try:
+            (self.out / SITTING).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{self.out / SITTING}: cannot be written: {error.strerror}") from None
+        return run_exam(
             self.which,
             quick=self.quick,
             seed=self.seed,
             families=self.families or None,
+            only=self.sets or None,
             limit=self.limit or None,
+            build=self._build(),
+            resume=self.resume,
             workers=self.workers or os.cpu_count() or 1,
-            out=folder.name,
+            out=self.out / SITTING,
             progress=progress.of,
         )
-        return Sat(scores, folder)
 
-    def write(self, folder: Path, loaded: None, found: Sat, warnings: list[str]) -> Mapping[str, Any]:
+    def _build(self) -> str:
+        """The version and what was compiled: answers of another build are another candidate's."""
+        import truing
+
+        compiled = importlib.util.find_spec("truing._core")
+        if compiled is None or compiled.origin is None:
+            raise RuntimeError("truing is installed without its compiled core")
+        return f"{truing.__version__} {hashlib.sha256(Path(compiled.origin).read_bytes()).hexdigest()}"
+
+    def write(self, folder: Path, loaded: None, found: Scores, warnings: list[str]) -> Mapping[str, Any]:
         from truing.exam.result import write_exam
         from truing.exam.score import table as score_table
 
-        shutil.copytree(found.folder.name, folder, dirs_exist_ok=True)
         return write_exam(
             folder,
             {
                 "set": self.which,
                 "seed": self.seed,
-                "sets": found.scores.sets,
-                "scores": score_table(found.scores),
-                "failures": found.scores.failures,
+                "sets": found.sets,
+                "scores": score_table(found),
+                "failures": found.failures,
             },
         )
 
-    def table(self, result: Mapping[str, Any], found: Sat) -> None:
+    def table(self, result: Mapping[str, Any], found: Scores) -> None:
         from truing.exam.page import plain
 
         names = list(dict.fromkeys(name for score in result["scores"] for name in score))
