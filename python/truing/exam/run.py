@@ -190,8 +190,11 @@ def _folder(
     if out is None:
         return None, {}
     folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "labels.jsonl").unlink(missing_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "labels.jsonl").unlink(missing_ok=True)
+    except OSError as error:
+        raise truing.InputError(f"{folder}: cannot be written: {error.strerror}") from None
     before = _text(folder / "build.txt")
     if resume and before and before != build:
         raise truing.InputError(

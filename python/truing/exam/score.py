@@ -526,6 +526,9 @@ MORE = (
         lambda s: worse_than(s, "frames", 1.0),
         good=False,
     ),
+    Line(
+        "mistake_wrong", "such a mistake: confident name", _family("mistaken"), confidently_wrong, good=False
+    ),
     *(
         Line(f"machine_{kind}", f"{text}: named first", _machine(kind), first_right)
         for kind, text in (

@@ -62,10 +62,6 @@ class Command(run.Command[None, "Scores"]):
     def solve(self, loaded: None, progress: run.Progress) -> Scores:
         from truing.exam.run import run_exam
 
-        try:
-            (self.out / SITTING).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{self.out / SITTING}: cannot be written: {error.strerror}") from None
         return run_exam(
             self.which,
             quick=self.quick,
