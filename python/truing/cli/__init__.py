@@ -3,9 +3,27 @@
 """The command line. Every file in ``commands/`` is a command, every folder there a group of commands.
 
 Exit status: 0 done (a diagnosis that finds nothing, or something unknown, is an answer too), 1 did not
-converge or could not decide, 2 bad input (one line on stderr, nothing written), 130 interrupted.
+converge, could not decide or could not write (a full disk), 2 bad input (one line on stderr, nothing
+written), 130 interrupted.
 """
 
-from truing.cli.app import main
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from truing.cli.interrupts import was_interrupted
 
 __all__ = ["main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command line; the exit status."""
+    try:
+        from truing.cli.app import main as run  # late: Ctrl-C ends imports, too, with a line
+    except (KeyboardInterrupt, ImportError) as error:
+        if not was_interrupted(error):
+            raise
+        sys.stderr.write("truing: interrupted\n")
+        return 130
+    return run(arguments)

@@ -8,8 +8,10 @@ its file, and imported only when it runs or its own help is asked for: `truing -
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
+import io
 import os
 import re
 import sys
@@ -22,7 +24,9 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, ge
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from truing.cli.interrupts import was_interrupted
 from truing.cli.options import Choice, Default, File, Flag, Kind
+from truing.cli.tables import harmless
 from truing.errors import InputError
 
 COMMANDS = Path(__file__).parent / "commands"
@@ -278,6 +282,7 @@ def _application() -> Any:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line; the exit status."""
+    lost = _prepare_streams()
     try:
         status = _application()(
             args=None if arguments is None else list(arguments), prog_name="truing", standalone_mode=False
@@ -286,26 +291,69 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = status if isinstance(status, int) else 0
         if code == 130:  # newer typers make this of Ctrl-C
             _fail("interrupted", 130)
+        elif lost:
+            code = _fail("standard output is closed: what would have been printed is lost", code or 1)
     except InputError as error:
         code = _fail(str(error), 2)
     except _ClickException as error:
         code = _usage(error)
     except (KeyboardInterrupt, typer.Abort):
         code = _fail("interrupted", 130)
-    except BrokenPipeError:  # the reader of our output went away: not our trouble
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 0
+    except (BrokenPipeError, SystemExit):
+        code = 0  # the reader of our output went away: not our trouble (SystemExit: while typer printed help)
+    except OSError as error:  # a full disk, say: no fault of the input, nor of the program
+        code = _fail(_words_of(error), 1)
+    except MemoryError:
+        code = _fail("the memory does not suffice: give fewer rows or a smaller file", 1)
+    except Exception as error:
+        if not was_interrupted(error):
+            raise
+        code = _fail("interrupted", 130)
+    _empty_streams()
     if code == 130 and threading.active_count() > 1:
         # The core is still computing in its thread, and cannot be asked to stop; all of ours is put away.
-        sys.stdout.flush()
-        sys.stderr.flush()
         os._exit(130)
     return code
 
 
+def _prepare_streams() -> bool:
+    """Makes sure that there is something to print to, and that every character can be printed. True: standard
+    output is closed.
+    """
+    lost = sys.stdout is None
+    if lost or sys.stderr is None:
+        while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+            pass  # else the next file to be opened were standard output, to whatever prints there
+        os.close(descriptor)
+        sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+        sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    return lost
+
+
+def _empty_streams() -> None:
+    """What cannot be written any more is dropped here: Python would complain of it in its own words."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)
+
+
+def _words_of(error: OSError) -> str:
+    """What the operating system said, and of which file."""
+    text = error.strerror or str(error)
+    return f"{error.filename}: {text}" if error.filename else text
+
+
 def _fail(message: str, code: int) -> int:
     """One line on stderr."""
-    sys.stderr.write("truing: " + " ".join(message.split()) + "\n")
+    with contextlib.suppress(OSError):
+        sys.stderr.write("truing: " + harmless(" ".join(message.split())) + "\n")
     return code
 
 

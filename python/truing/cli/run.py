@@ -12,7 +12,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -103,6 +103,12 @@ class Command(Generic[Loaded, Found]):
         """Whether a file of an earlier run stays although this run did not write it: it was read."""
         return False
 
+    def inputs(self) -> list[Path]:
+        """The files that its options name; the words of an option may be one."""
+        values = [getattr(self, field.name) for field in fields(self) if field.name != "out"]
+        words = [word for value in values for word in (value if isinstance(value, list) else [value])]
+        return [Path(word) for word in words if isinstance(word, str | Path) and str(word)]
+
     def run(self) -> int:
         """Reads, solves, writes and prints; the exit status."""
         from truing.files import atomic_output_dir
@@ -112,12 +118,13 @@ class Command(Generic[Loaded, Found]):
             found = working(
                 self.doing, lambda progress: self.solve(loaded, progress), in_thread=not self.own_processes
             )
-            with atomic_output_dir(self.out) as folder, bar_of(Progress("writing")):
+            obsolete = [name for name in self.sometimes if not self.keeps(self.out / name)]
+            with (
+                atomic_output_dir(self.out, inputs=self.inputs(), obsolete=obsolete) as folder,
+                bar_of(Progress("writing")),
+            ):
                 result = self.write(folder, loaded, found, heard)
                 written = {path.name for path in folder.iterdir()}
-        for name in self.sometimes:
-            if name not in written and not self.keeps(self.out / name):
-                (self.out / name).unlink(missing_ok=True)
         tables.warn([text for text in result.get("warnings", ()) if text not in heard])
         if self.json:
             from truing.report.json_text import to_json

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -13,21 +14,39 @@ if TYPE_CHECKING:
 AXES = "xyz"
 
 
-def console() -> Console:
+# Of Unicode's categories: control and format characters (escape sequences, text run backwards), half
+# characters, breaks of line and paragraph.
+_UNSEEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
+
+
+def harmless(text: str) -> str:
+    """`text` with what steers a terminal written out, as \\x1b: names come from files of others."""
+    return "".join(
+        character.encode("unicode_escape").decode()
+        if character != "\n" and unicodedata.category(character) in _UNSEEN
+        else character
+        for character in text
+    )
+
+
+def console(**options: Any) -> Console:
     from rich.console import Console
 
-    return Console(highlight=False)
+    class Plain(Console):
+        def on_broken_pipe(self) -> None:
+            """Rich would end the program here; what to do of it is for `app` to say."""
+            raise BrokenPipeError
+
+    return Plain(highlight=False, **options)
 
 
 def error_console() -> Console:
-    from rich.console import Console
-
-    return Console(stderr=True, highlight=False, soft_wrap=True)
+    return console(stderr=True, soft_wrap=True)
 
 
 def say(text: str) -> None:
     """A line that is never wrapped: a path stays a path."""
-    console().print(text, soft_wrap=True, markup=False)
+    console().print(harmless(text), soft_wrap=True, markup=False)
 
 
 def say_first(lines: Sequence[str], most: int, rest: str) -> None:
@@ -46,27 +65,36 @@ def joined(words: Sequence[str], most: int) -> str:
 
 def warn(messages: Sequence[str]) -> None:
     for message in messages:
-        error_console().print(f"warning: {message}", style="yellow", markup=False)
+        error_console().print(f"warning: {harmless(message)}", style="yellow", markup=False)
 
 
 def fail(message: str) -> None:
     """Why a command ends with exit status 1."""
-    error_console().print(f"truing: {message}", style="bold red", markup=False, highlight=False)
+    error_console().print(f"truing: {harmless(message)}", style="bold red", markup=False, highlight=False)
 
 
 def table(title: str, head: Sequence[str], lines: Sequence[Sequence[str]], words: bool = False) -> None:
     """A table on stdout. `words`: its cells are no numbers."""
     from rich import box
     from rich.table import Table
+    from rich.text import Text
 
-    drawn = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, show_header=any(head))
+    # Text, not str: in that rich looks for markup, and a robot may be called "arm [/x]".
+    drawn = Table(
+        title=Text(harmless(title), style="table.title"),
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        show_header=any(head),
+    )
     for k, name in enumerate(head):
         left = k == 0 or len(head) == 2 or words
         # What a line is about stays on one line; the other columns give way.
         least = min(24, max((len(line[0]) for line in lines), default=0)) if k == 0 else None
-        drawn.add_column(name, justify="left" if left else "right", overflow="fold", min_width=least)
+        drawn.add_column(
+            Text(harmless(name)), justify="left" if left else "right", overflow="fold", min_width=least
+        )
     for line in lines:
-        drawn.add_row(*line)
+        drawn.add_row(*(Text(harmless(cell)) for cell in line))
     console().print(drawn)
 
 

@@ -1,18 +1,12 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the readers and writers share: units, messages, output that is never half-written."""
+"""What the readers and writers share: units, messages, tables."""
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
-import os
-import secrets
-import shutil
-import signal
-import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -24,12 +18,18 @@ import pyarrow.parquet
 from numpy.typing import ArrayLike, NDArray
 
 from truing.errors import InputError
+from truing.files.output import (
+    PathLike as PathLike,
+    atomic_output_dir as atomic_output_dir,
+    atomic_write as atomic_write,
+    reason as reason,
+    require_whole_file,
+)
 from truing.rotations import quaternions_from_rotations
 
 if TYPE_CHECKING:
     from truing._core import Robot
 
-PathLike = str | os.PathLike[str]
 LengthUnit = Literal["m", "mm"]
 AngleUnit = Literal["rad", "deg"]
 
@@ -67,6 +67,7 @@ def listed(names: Sequence[str], limit: int = 30) -> str:
 
 def read_bytes(path: Path, largest: int) -> bytes:
     """The whole file. InputError if it is not there, cannot be read, or has more than `largest` bytes."""
+    require_whole_file(path)
     try:
         with path.open("rb") as file:
             data = file.read(largest + 1)
@@ -94,110 +95,6 @@ def decoded(path: Path, data: bytes) -> str:
             f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8: a binary file, or text in"
             " another encoding"
         ) from None
-
-
-def reason(error: BaseException) -> str:
-    """The part of an operating system's error that a user needs."""
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    return str(error).strip().split("\n")[0] or type(error).__name__
-
-
-# ---- Output that is whole or not there -----------------------------------------------------------
-
-
-def _temporary_beside(path: Path) -> Path:
-    return path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
-
-
-@contextlib.contextmanager
-def atomic_write(path: PathLike) -> Iterator[Path]:
-    """Write a file so that it is there as a whole or not at all.
-
-    Yields the path of an empty temporary file in the same folder (with the same suffix) to write to; it is
-    renamed to `path` when the block ends well and removed when it raises, Ctrl-C included. Raises InputError
-    when `path` cannot be written.
-    """
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected the name of a file to write")
-    try:
-        temporary = _temporary_beside(path)
-        temporary.touch(exist_ok=False)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be written: {reason(error)}") from None
-    try:
-        yield temporary
-        try:
-            temporary.replace(path)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written: {reason(error)}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-@contextlib.contextmanager
-def atomic_output_dir(path: PathLike) -> Iterator[Path]:
-    """Write several files so that all of them appear, or none.
-
-    Yields a temporary folder on the same disk. When the block ends well its content moves to `path` (made if
-    needed; files of the same names are replaced, others stay); when it raises, Ctrl-C included, nothing is
-    left behind. Raises InputError when `path` cannot be written.
-    """
-    path = Path(path)
-    if path.exists() and not path.is_dir():
-        raise InputError(f"{path}: is a file, expected a folder to write to")
-    # Inside the folder if it exists (it may be a disk of its own), else as near to it as there is one.
-    home = path.absolute()
-    while not home.is_dir():
-        home = home.parent
-    temporary = home / f".truing-{secrets.token_hex(4)}"
-    try:
-        temporary.mkdir()
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be written: {reason(error)}") from None
-    try:
-        yield temporary
-        with _interrupts_held_back():
-            try:
-                _move_content(temporary, path)
-            except OSError as error:
-                raise InputError(f"{path}: cannot be written: {reason(error)}") from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _move_content(source: Path, destination: Path) -> None:
-    if not destination.exists():
-        destination.parent.mkdir(parents=True, exist_ok=True)
-        source.replace(destination)
-        return
-    files = [file for file in sorted(source.rglob("*")) if not file.is_dir()]
-    for file in files:
-        # First look for what would stop us half-way.
-        if (destination / file.relative_to(source)).is_dir():
-            raise IsADirectoryError(0, f"{file.relative_to(source)} is a folder there")
-    for file in files:
-        target = destination / file.relative_to(source)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        file.replace(target)
-
-
-@contextlib.contextmanager
-def _interrupts_held_back() -> Iterator[None]:
-    """Ctrl-C waits until the block is done. Only the main thread gets signals."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    held: list[int] = []
-    previous = signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, lambda number, _: held.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous if previous is not None else signal.SIG_DFL)
-        if held:
-            raise KeyboardInterrupt
 
 
 # ---- Tables --------------------------------------------------------------------------------------

@@ -24,6 +24,8 @@ from truing import _core
 from truing.errors import InputError
 from truing.files.common import PathLike, Units, atomic_write, decoded, listed, read_bytes, shown
 from truing.files.yaml_tree import (
+    LONGEST_NAME,
+    NAME,
     AngleName,
     Document,
     FreeMapping,
@@ -197,10 +199,14 @@ def _from_urdf(path: Path, base_link: str, tip_link: str) -> _core.Robot:
     if not text.strip():
         raise InputError(f"{path}: is empty, expected a URDF")
     try:
-        return _core.robot_from_urdf(text, base_link, tip_link)
+        robot = _core.robot_from_urdf(text, base_link, tip_link)
     except ValueError as error:
         # The parser quotes the file, line ends and all.
-        raise InputError(f"{path}: {' '.join(str(error).split())}") from None
+        raise InputError(f"{path}: {' '.join(str(error).split())[:1000]}") from None
+    for name in (robot.name, *(joint.name for joint in robot.joints)):
+        if len(name) > LONGEST_NAME:
+            raise InputError(f"{path}: found {shown(name)}, expected {NAME}")
+    return robot
 
 
 def _read(path: Path) -> tuple[Document, _LinkTable | _UrdfChain]:
@@ -221,6 +227,8 @@ def _check_names(document: Document, model: _LinkTable | _UrdfChain) -> None:
     ]
     places += [(name, ("targets", name)) for name in model.targets]
     for name, loc in places:
+        if len(name) > LONGEST_NAME:
+            document.refuse(loc, f"found {shown(name)}, expected {NAME}")
         if name in _KEPT_NAMES:
             document.refuse(
                 loc, f"the name {name!r} is kept for parameters such as base.x and anchor.zero: rename it"

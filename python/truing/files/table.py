@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from truing.errors import InputError
 from truing.files.common import PARQUET_SUFFIXES, decoded, listed, reason, shown
+from truing.files.output import require_whole_file
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int32]
@@ -45,6 +46,7 @@ class Table:
         self.path = path
         self.rows = 0
         self._columns: dict[str, Any] = {}
+        require_whole_file(path)
         try:
             with path.open("rb") as file:
                 head = file.read(65536)

@@ -28,6 +28,8 @@ Loc = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
 
 _LARGEST_FILE = 16_000_000
+LONGEST_NAME = 200  # characters
+NAME = f"a name of at most {LONGEST_NAME} characters"
 # YAML 1.2's numbers: 1e-3 is one (YAML 1.1 wants 1.0e-3), 1:30 is none (YAML 1.1 reads 90).
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
@@ -218,6 +220,8 @@ def _text(value: object) -> str:
         raise expected(value, "a name (put a name that looks like a number in quotes)")
     if not isinstance(value, str) or not value:
         raise expected(value, "a name")
+    if len(value) > LONGEST_NAME:
+        raise expected(value, NAME)
     return value
 
 

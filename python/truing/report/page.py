@@ -9,8 +9,10 @@ knows more than what is on disk.
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 
@@ -45,17 +47,39 @@ class Page:
         # Late: it is the slowest import of all, and most commands need none.
         from plotly.offline import get_plotlyjs
 
-        charts = json.dumps(without_nan(self._charts), separators=(",", ":"), allow_nan=False)
-        charts = charts.replace("</", "<\\/")
-        script = part_of_page("report", "page.js")
+        scripts = [get_plotlyjs(), part_of_page("report", "page.js")]
         return (
             '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport"'
             ' content="width=device-width, initial-scale=1">'
+            f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">'
             f"<title>{escaped(self._title)}</title><style>{self._style}</style></head>\n<body><main>\n"
             + "\n".join(self._body)
-            + f'\n</main>\n<script>{get_plotlyjs()}</script>\n<script type="application/json"'
-            f' id="charts">{charts}</script>\n<script>{script}</script>\n</body></html>\n'
+            + f'\n</main>\n<script>{scripts[0]}</script>\n<script type="application/json"'
+            f' id="charts">{_json_in_html(self._charts)}</script>\n<script>{scripts[1]}</script>'
+            "\n</body></html>\n"
         )
+
+
+def _json_in_html(value: Any) -> str:
+    """JSON that stands in a script element. That ends not only at "</script": after "<!--<script" it ends
+    nowhere (HTML standard, 13.2.5, "script data double escaped state"), so that no "<" may be left in it.
+    """
+    text = json.dumps(without_nan(value), separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _policy(scripts: Sequence[str]) -> str:
+    """What the page may do: run these very scripts, and load nothing. Names in it come from files of others.
+
+    plotly.js compiles its shaders' bindings with Function ("unsafe-eval"), sets styles, and makes its
+    pictures from data and blob addresses.
+    """
+    digests = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts]
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
+    return (
+        f"default-src 'none'; script-src {allowed} 'unsafe-eval'; style-src 'unsafe-inline';"
+        " img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
 
 
 def table_cell(value: float, text: str) -> str:

@@ -244,7 +244,7 @@ def test_the_report_says_what_the_result_says(run: Path) -> None:
     } <= set(charts)
     bars = {trace["name"]: trace for trace in charts["horizons"]["data"]}
     assert bars["truing"]["y"] == pytest.approx([1e3 * row["truing"]["rms_m"] for row in result["errors"]])
-    assert "NEES" in text and "http" not in page.split("<script>")[0]
+    assert "NEES" in text and "://" not in page.split("<script>")[0]
 
 
 def test_a_horizon_of_its_own_is_graded_too(

@@ -1,0 +1,223 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Output that is whole or not there, and what of it was left unfinished is not read.
+
+A folder is filled beside its place and then moved there. Where a folder is there already, its files can only
+be replaced one by one: a list of them stands in the folder meanwhile, so that after a power cut or `kill -9`
+no reader takes a mixture of old and new for one result.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import re
+import secrets
+import shutil
+import signal
+import stat
+import threading
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
+
+from truing.errors import InputError
+
+PathLike = str | os.PathLike[str]
+
+MANIFEST = ".truing-unfinished"
+"""Names the files of its folder that are being replaced."""
+
+_FOLDER = re.compile(r"\.truing-[0-9a-f]{8}")
+# The machine's trouble, not a path that cannot be: it is no use to name another one.
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+
+def reason(error: BaseException) -> str:
+    """The part of an operating system's error that a user needs."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return str(error).strip().split("\n")[0] or type(error).__name__
+
+
+def require_whole_file(path: Path) -> None:
+    """Raises InputError for what cannot be read to its end (a pipe, a device), and for a file that a run was
+    replacing when it was ended.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return  # opening it says why
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise InputError(f"{path}: is a pipe or a device, expected a file: write what it gives into a file")
+    try:
+        names = (path.parent / MANIFEST).read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError):
+        return
+    if path.name in names:
+        raise InputError(
+            f"{path}: a run that was ended while it replaced the files of this folder left old and new ones"
+            f" mixed: run it again, or remove {path.parent / MANIFEST} if you know that they belong together"
+        )
+
+
+def _not_written(path: Path, error: OSError | ValueError) -> Exception:
+    """What to raise for an output that cannot be written."""
+    text = f"{path}: cannot be written: {reason(error)}"
+    if isinstance(error, OSError) and error.errno in _NO_ROOM:
+        return OSError(error.errno, text)
+    return InputError(text)
+
+
+@contextlib.contextmanager
+def atomic_write(path: PathLike) -> Iterator[Path]:
+    """Write a file so that it is there as a whole or not at all.
+
+    Yields the path of an empty temporary file in the same folder (with the same suffix) to write to; it is
+    renamed to `path` when the block ends well and removed when it raises, Ctrl-C included. Raises InputError
+    when `path` cannot be written, OSError when the disk is full.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, expected the name of a file to write")
+    try:
+        temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
+        temporary.touch(exist_ok=False)
+    except (OSError, ValueError) as error:
+        raise _not_written(path, error) from None
+    try:
+        yield temporary
+        try:
+            temporary.replace(path)
+        except OSError as error:
+            raise _not_written(path, error) from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def atomic_output_dir(
+    path: PathLike, *, inputs: Sequence[Path] = (), obsolete: Collection[str] = ()
+) -> Iterator[Path]:
+    """Write several files so that all of them appear, or none.
+
+    Yields a temporary folder on the same disk. When the block ends well its content moves to `path` (made if
+    needed; files of the same names are replaced, others stay); when it raises, Ctrl-C included, nothing is
+    left behind. inputs: files that were read; none of them is replaced. obsolete: names of an earlier run's
+    files that go unless they were written anew. Raises InputError when `path` cannot be written, OSError when
+    the disk is full.
+    """
+    path = Path(path)
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{path}: is a file, expected a folder to write to")
+    try:
+        # Inside the folder if it exists (it may be a disk of its own), else as near to it as there is one.
+        home = path.absolute()
+        while not home.is_dir():
+            home = home.parent
+        for folder in {home, path.absolute().parent}:
+            _clear(folder)
+        temporary, lock = _locked_folder(home)
+    except (OSError, ValueError) as error:
+        raise _not_written(path, error) from None
+    try:
+        yield temporary
+        _require_no_input(temporary, path, inputs)
+        with _interrupts_held_back():
+            try:
+                _move_content(temporary, path, obsolete)
+            except OSError as error:
+                raise _not_written(path, error) from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        os.close(lock)
+
+
+def _locked_folder(home: Path) -> tuple[Path, int]:
+    """A new folder, and the lock by which others see that its run is alive."""
+    while True:
+        folder = home / f".truing-{secrets.token_hex(4)}"
+        folder.mkdir()
+        with contextlib.suppress(FileNotFoundError):
+            lock = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+            with contextlib.suppress(OSError):  # of a disk without locks: nobody clears folders there
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            if folder.exists():  # else another run cleared it away before it was locked
+                return folder, lock
+            os.close(lock)
+
+
+def _clear(home: Path) -> None:
+    """Removes the temporary folders of runs that were killed: nobody holds their locks."""
+    if not home.is_dir():
+        return
+    for folder in home.glob(".truing-*"):
+        if not _FOLDER.fullmatch(folder.name):
+            continue
+        with contextlib.suppress(OSError):
+            lock = os.open(folder, os.O_RDONLY | os.O_CLOEXEC | os.O_DIRECTORY)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(folder, ignore_errors=True)
+            finally:
+                os.close(lock)
+
+
+def _require_no_input(source: Path, destination: Path, inputs: Sequence[Path]) -> None:
+    for file in source.rglob("*"):
+        target = destination / file.relative_to(source)
+        for read in inputs:
+            with contextlib.suppress(OSError):
+                if target.samefile(read):
+                    raise InputError(
+                        f"{target}: is an input of this run, and would be replaced by its result: write to"
+                        " another folder (--out)"
+                    )
+
+
+def _move_content(source: Path, destination: Path, obsolete: Collection[str]) -> None:
+    if not destination.exists():
+        destination.parent.mkdir(parents=True, exist_ok=True)
+        source.replace(destination)
+        return
+    files = [file.relative_to(source) for file in sorted(source.rglob("*")) if not file.is_dir()]
+    for file in files:
+        # First look for what would stop us half-way.
+        if (destination / file).is_dir():
+            raise IsADirectoryError(0, f"{file} is a folder there")
+    gone = [name for name in obsolete if Path(name) not in files and (destination / name).exists()]
+    manifest = destination / MANIFEST
+    _write_through(manifest, "".join(f"{name}\n" for name in sorted({file.name for file in files} | {*gone})))
+    for file in files:
+        target = destination / file
+        target.parent.mkdir(parents=True, exist_ok=True)
+        (source / file).replace(target)
+    for name in gone:
+        (destination / name).unlink(missing_ok=True)
+    manifest.unlink()
+
+
+def _write_through(path: Path, text: str) -> None:
+    """Writes a file that is on the disk before anything that is written after it."""
+    with path.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextlib.contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Ctrl-C waits until the block is done. Only the main thread gets signals."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[int] = []
+    previous = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, lambda number, _: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous if previous is not None else signal.SIG_DFL)
+        if held:
+            raise KeyboardInterrupt
