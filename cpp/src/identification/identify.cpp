@@ -9,6 +9,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 
 #include "estimation/evaluate.hpp"
@@ -188,12 +189,18 @@ Refit frame_by_registration(const Model& model, const Measurements& data, const 
   };
 }
 
-/// Rows whose residual is longer than `beyond` medians; lengths are first made comparable between kinds of rows.
-std::vector<std::int32_t> gross_outliers(const Job& job, std::vector<double>* norms, double beyond) {
-  std::vector<double> comparable;
-  comparable.reserve(job.rows.size());
+/// Lengths of the training rows' residuals, made comparable between kinds of rows.
+std::vector<double> comparable_lengths(const Job& job, const std::vector<double>& norms) {
+  std::vector<double> out;
+  out.reserve(job.rows.size());
   for (const std::int32_t row : job.rows)
-    comparable.push_back((*norms)[row] / kChiMedian[components_of(job.data, row)]);
+    out.push_back(norms[static_cast<std::size_t>(row)] / kChiMedian[components_of(job.data, row)]);
+  return out;
+}
+
+/// Rows whose residual is longer than `beyond` medians.
+std::vector<std::int32_t> gross_outliers(const Job& job, const std::vector<double>& norms, double beyond) {
+  const std::vector<double> comparable = comparable_lengths(job, norms);
   const double bound = beyond * median_of(comparable);
   std::vector<std::int32_t> out;
   for (std::size_t i = 0; i < job.rows.size(); ++i) {
@@ -226,15 +233,10 @@ RowLoss row_loss(Loss loss) {
 
 /// Noise of a unit-weight component, from the median row; NaN: no more values than parameters.
 double noise_of(const Job& job, const std::vector<int>& fitted, const std::vector<double>& norms) {
-  std::vector<double> comparable;
   double values = 0.0;
-  for (const std::int32_t row : job.rows) {
-    const int components = components_of(job.data, static_cast<std::size_t>(row));
-    comparable.push_back(norms[static_cast<std::size_t>(row)] / kChiMedian[components]);
-    values += components;
-  }
+  for (const std::int32_t row : job.rows) values += components_of(job.data, static_cast<std::size_t>(row));
   const double free_values = values - static_cast<double>(fitted.size());
-  return free_values > 0.0 ? median_of(std::move(comparable)) * std::sqrt(values / free_values) : kNaN;
+  return free_values > 0.0 ? median_of(comparable_lengths(job, norms)) * std::sqrt(values / free_values) : kNaN;
 }
 
 /// The options' priors of the fitted parameters about the nominal robot, against rows with this noise.
@@ -250,6 +252,11 @@ Prior prior_of(const Job& job, const std::vector<int>& fitted, double noise) {
   out.weight = weight(fitted);
   return out;
 }
+
+/// Beyond so many medians of what the robot as drawn leaves, a row is no measurement of it but a fault: a comma lost, a
+/// tracker that followed another reflector. A single one of a kilometre would carry plain least squares where no later
+/// rejection finds back from. Whether the row stays out is decided by the fit that starts without it.
+constexpr double kImpossible = 20.0;
 
 /// Least squares, under priors if there are some; then, as asked, a robust loss at a scale of the residuals' own, or
 /// gross outliers found and left out.
@@ -268,15 +275,26 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
   };
   const Refit refit = refit_on(evaluator, job.rows);
   std::vector<double> norms(job.data.rows, 0.0);
+  std::vector<std::int32_t> possible = job.rows;
+  if (job.options.loss != Loss::none) {
+    evaluator.residual_norms(out.values, out.weighing, &norms);
+    possible = without(job.rows, gross_outliers(job, norms, kImpossible));
+  }
+  const bool all_possible = possible.size() == job.rows.size();
+  std::optional<Evaluator> some;
+  if (!all_possible)
+    some.emplace(job.model, job.data, job.bases, make_segments(job.data, possible), fitted, job.options.threads);
+  const Evaluator& first = some ? *some : evaluator;
+  const auto solve_possible = [&] { return solve(job, first, out.weighing, refit_on(first, possible), &out.values); };
   double noise = job.options.prior_noise;
   if (!job.options.priors.empty() && !(noise > 0.0)) {
-    solve(job, evaluator, out.weighing, refit, &out.values);
+    solve_possible();
     evaluator.residual_norms(out.values, out.weighing, &norms);
     noise = noise_of(job, fitted, norms);
     out.values = start;
   }
   if (!job.options.priors.empty()) out.weighing.prior = prior_of(job, fitted, noise);
-  out.solver = solve(job, evaluator, out.weighing, refit, &out.values);
+  out.solver = solve_possible();
   if (job.options.loss == Loss::none) return out;
 
   const auto median_norm = [&] {
@@ -303,12 +321,15 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
   }
 
   evaluator.residual_norms(out.values, out.weighing, &norms);
-  if (gross_outliers(job, &norms, job.options.reject_beyond).empty()) return out;
+  if (gross_outliers(job, norms, job.options.reject_beyond).empty()) {
+    if (!all_possible) out.solver = solve(job, evaluator, out.weighing, refit, &out.values);
+    return out;
+  }
   robust_rounds(RowLoss::cauchy, loss_medians(Loss::cauchy), 3, 1e-2);
   out.weighing.loss = RowLoss::none;
   for (int round = 0; round < 10; ++round) {
     evaluator.residual_norms(out.values, out.weighing, &norms);
-    std::vector<std::int32_t> rejected = gross_outliers(job, &norms, job.options.reject_beyond);
+    std::vector<std::int32_t> rejected = gross_outliers(job, norms, job.options.reject_beyond);
     if (round > 0 && rejected == out.rejected) break;
     out.rejected = std::move(rejected);
     const std::vector<std::int32_t> kept = without(job.rows, out.rejected);
@@ -421,6 +442,58 @@ std::vector<Predicted> predict_some(const Robot& robot, const Job& job, const Wa
   return out;
 }
 
+/// Fits a few unknowns to rows of which some may be wrong by any amount. `fit` gives a candidate of the rows with these
+/// indices, `error` the length of a row's error under it. Least squares of all rows, unless a candidate of few rows
+/// halves the median error (least median of squares: Rousseeuw, J. American Statistical Association 79 (1984) 871):
+/// then least squares of the rows that agree with that one. Nobody looks for one where no error is longer than
+/// `suspicious` medians; 0 for unknowns that a single row can bend until it fits.
+template <typename Candidate, typename FitTo, typename Error>
+Candidate agreed(std::size_t rows, std::size_t sample, double suspicious, const FitTo& fit_to, const Error& error) {
+  constexpr int kTrials = 200;
+  constexpr double kAgrees = 10.0;  // medians
+  std::vector<std::size_t> all(rows);
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  std::vector<double> errors(rows);
+  const auto median_error = [&](const Candidate& candidate) {
+    for (std::size_t i = 0; i < rows; ++i) errors[i] = error(candidate, i);
+    return median_of(errors);
+  };
+  Candidate best = fit_to(all);
+  const double of_all = median_error(best);
+  const double longest = *std::max_element(errors.begin(), errors.end());
+  if (rows <= 2 * sample || longest <= suspicious * of_all) return best;
+
+  Random random(1);
+  double least = 0.5 * of_all;
+  bool found = false;
+  std::vector<std::size_t> some(sample);
+  for (int trial = 0; trial < kTrials; ++trial) {
+    for (std::size_t& index : some) index = random.below(rows);
+    const Candidate candidate = fit_to(some);
+    const double median = median_error(candidate);
+    if (!(median < least)) continue;
+    least = median;
+    best = candidate;
+    found = true;
+  }
+  if (!found) return best;
+  std::vector<std::size_t> agreeing;
+  for (const std::size_t i : all) {
+    if (error(best, i) <= kAgrees * least) agreeing.push_back(i);
+  }
+  return fit_to(agreeing);
+}
+
+Eigen::Isometry3d register_columns(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+                                   const std::vector<std::size_t>& columns) {
+  Eigen::Matrix3Xd some_from(3, static_cast<Eigen::Index>(columns.size())), some_to = some_from;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    some_from.col(static_cast<Eigen::Index>(k)) = from.col(static_cast<Eigen::Index>(columns[k]));
+    some_to.col(static_cast<Eigen::Index>(k)) = to.col(static_cast<Eigen::Index>(columns[k]));
+  }
+  return register_points(some_from, some_to);
+}
+
 /// Base frame by registration of the nominal robot's predictions, and target orientations (where they are free) by the
 /// mean of what is left.
 void register_frames(const Job& job, bool base_free, const std::vector<bool>& turn_free, Robot* robot) {
@@ -437,7 +510,13 @@ void register_frames(const Job& job, bool base_free, const std::vector<bool>& tu
   }
   Eigen::Isometry3d correction = Eigen::Isometry3d::Identity();
   if (base_free) {
-    correction = register_points(from, to);
+    correction = agreed<Eigen::Isometry3d>(
+        predicted.size(), 4, 4.0,
+        [&](const std::vector<std::size_t>& some) { return register_columns(from, to, some); },
+        [&](const Eigen::Isometry3d& T, std::size_t i) {
+          const auto column = static_cast<Eigen::Index>(i);
+          return (T * from.col(column) - to.col(column)).norm();
+        });
     robot->T_measurement_base = correction * robot->T_measurement_base;
   }
   std::vector<Eigen::Matrix3d> turn(robot->targets.size(), Eigen::Matrix3d::Zero());
@@ -456,18 +535,28 @@ void register_frames(const Job& job, bool base_free, const std::vector<bool>& tu
 
 /// Anchor and wire zero, linear in the unknowns once p.p - d^2 = 2 p.c - 2 d z + (z^2 - c.c) is written out.
 void locate_anchor(const Job& job, Robot* robot) {
-  Eigen::Matrix<double, 5, 5> gram = Eigen::Matrix<double, 5, 5>::Zero();
-  Eigen::Matrix<double, 5, 1> right = Eigen::Matrix<double, 5, 1>::Zero();
-  for (const Predicted& predicted :
-       predict_some(*robot, job, [&](std::size_t row) { return job.data.has_distance(row); })) {
-    const Eigen::Vector3d p = predicted.frame.translation();
-    const double d = job.data.distance[predicted.row];
-    Eigen::Matrix<double, 5, 1> column;
-    column << 2.0 * p, -2.0 * d, 1.0;
-    gram += column * column.transpose();
-    right += column * (p.squaredNorm() - d * d);
-  }
-  const Eigen::Matrix<double, 5, 1> x = solve_symmetric<5, 1>(gram, right);
+  using Unknowns = Eigen::Matrix<double, 5, 1>;
+  const std::vector<Predicted> predicted =
+      predict_some(*robot, job, [&](std::size_t row) { return job.data.has_distance(row); });
+  if (predicted.empty()) return;
+  const auto solve_for = [&](const std::vector<std::size_t>& some) -> Unknowns {
+    Eigen::Matrix<double, 5, 5> gram = Eigen::Matrix<double, 5, 5>::Zero();
+    Unknowns right = Unknowns::Zero();
+    for (const std::size_t i : some) {
+      const Eigen::Vector3d p = predicted[i].frame.translation();
+      const double d = job.data.distance[predicted[i].row];
+      Unknowns column;
+      column << 2.0 * p, -2.0 * d, 1.0;
+      gram += column * column.transpose();
+      right += column * (p.squaredNorm() - d * d);
+    }
+    return solve_symmetric<5, 1>(gram, right);
+  };
+  const auto error = [&](const Unknowns& x, std::size_t i) {
+    const double d = job.data.distance[predicted[i].row];
+    return x.allFinite() ? std::abs((predicted[i].frame.translation() - x.head<3>()).norm() + x[3] - d) : 1e300;
+  };
+  const Unknowns x = agreed<Unknowns>(predicted.size(), 8, 0.0, solve_for, error);
   if (x.allFinite()) robot->anchor = Anchor{x.head<3>(), x[3]};
 }
 
@@ -491,7 +580,8 @@ void locate_points(const Model& model, const Job& job, Eigen::VectorXd* values) 
 
 struct Start {
   Robot robot;
-  Eigen::VectorXd values;  ///< of make_model(robot, …): for the fixed points, which a robot does not hold
+  std::vector<std::int32_t> rejected;  ///< rows
+  Eigen::VectorXd values;              ///< of make_model(robot, …): for the fixed points, which a robot does not hold
   double rms = 0.0;
 };
 
@@ -530,6 +620,7 @@ Start fit_instrument(const Job& nominal_job, const std::vector<std::string>& unk
   const Selection seen = select_observable(job, free, values);
   const Fit found = fit(job, seen.fitted, values);
   // Back to a robot and its own model: orientations are counted from the new frames.
+  out.rejected = found.rejected;
   out.robot = robot_with(model, found.values);
   out.values = initial_values(make_model(out.robot, job.data, options.effects, options.own_effects));
   for (std::size_t k = 0; k < model.parameters.size(); ++k) {
@@ -544,9 +635,9 @@ Start fit_instrument(const Job& nominal_job, const std::vector<std::string>& unk
   return out;
 }
 
-double spread_of(const Job& job) {
+double spread_of(const Job& job, const std::vector<std::int32_t>& rejected) {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e300), high = -low;
-  for (const std::int32_t row : job.rows) {
+  for (const std::int32_t row : without(job.rows, rejected)) {
     for (int k = 0; k < 3 && job.data.has_position(row); ++k) {
       low[k] = std::min(low[k], job.data.position[static_cast<std::size_t>(k)][row]);
       high[k] = std::max(high[k], job.data.position[static_cast<std::size_t>(k)][row]);
@@ -562,7 +653,7 @@ Start find_start(const Job& job, const std::vector<std::string>& unknown, const 
   const bool targets_free = std::any_of(unknown.begin(), unknown.end(), [&](const std::string& name) {
     return job.model.parameters[job.model.parameter_index(name)].role == Role::target;
   });
-  const bool doubtful = content.distance || (content.frame && best.rms > 0.02 * spread_of(job));
+  const bool doubtful = content.distance || (content.frame && best.rms > 0.02 * spread_of(job, best.rejected));
   if (!targets_free || !doubtful) return best;
   for (int k = 0; k < 6; ++k) {
     Robot guess = job.model.robot;
@@ -905,7 +996,7 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   report_uncertainty(uncertainty(job, found, asked.content.poses), &result);
   report_parameters(nominal_model, model, seen, found, &result);
   report_errors(job, asked.content, rows.test, start.values, found, &result);
-  result.warnings = make_warnings(result, asked.values, spread_of(job));
+  result.warnings = make_warnings(result, asked.values, spread_of(job, found.rejected));
   return result;
 }
 

@@ -211,6 +211,7 @@ def _trust_box(result: Mapping[str, Any], rows: Rows) -> str:
     checks = [
         _converged(result["solver"]),
         _unseen_poses(result["errors"], rest, bool(gross.any())),
+        *_better_than_drawn(rows, gross),
         _enough_rows(result, rows),
         *_noise(result, rows),
         _rejected_share(rows),
@@ -261,6 +262,20 @@ def _unseen_poses(errors: Mapping[str, Any], rest: Floats, without_gross: bool) 
     )[grade]
     without = " (without bad measurements)" if without_gross else ""
     return Check(grade, head, f"rms {length_text(held_out)} held out{without}, {length_text(train)} fitted")
+
+
+def _better_than_drawn(rows: Rows, gross: NDArray[np.bool_]) -> list[Check]:
+    """Whether the robot as found predicts poses never seen better than the robot as drawn."""
+    judged = rows.test & ~gross
+    before, after = rows.magnitude_before[judged], rows.magnitude_after[judged]
+    if not judged.any():
+        return []
+    sizes = [float(np.sqrt(np.nanmean(values**2))) for values in (before, after)]
+    middles = [float(np.nanmedian(values)) for values in (before, after)]
+    if sizes[1] <= sizes[0] or middles[1] <= middles[0]:
+        return []
+    text = f"rms {length_text(sizes[1])} held out, {length_text(sizes[0])} as drawn: keep the robot as drawn"
+    return [Check(BAD, "Worse than the robot as drawn", text)]
 
 
 def _enough_rows(result: Mapping[str, Any], rows: Rows) -> Check:

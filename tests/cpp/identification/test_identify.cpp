@@ -398,6 +398,55 @@ TEST_CASE("two per cent of gross outliers change nothing and are listed") {
   CHECK(fresh_rms(clean.truth, with.robot, 29) < 1.1 * fresh_rms(clean.truth, without.robot, 29));
 }
 
+/// A column with `by` added to one row.
+truing::Column with_spike(Table* table, const truing::Column& column, std::size_t row, double by) {
+  std::vector<double> values(table->data.rows);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = column[i];
+  values[row] += by;
+  return table->add(values);
+}
+
+TEST_CASE("one spike, or one row in twenty, of any size changes nothing and is listed") {
+  const Ur10Case clean(300, 3e-5, 28);
+  IdentifyOptions options;
+  options.test_share = 0.0;
+  const Identification without = truing::identify(clean.nominal, clean.table->data, options);
+  for (const std::size_t every : {300u, 20u}) {
+    for (const double size : {0.1, 1.0, 30.0, 1000.0, 5e5}) {
+      CAPTURE(every);
+      CAPTURE(size);
+      Ur10Case dirty(300, 3e-5, 28);
+      std::vector<std::size_t> bad;
+      for (std::size_t row = 7; row < 300; row += every) {
+        truing::Column& column = dirty.table->data.position[row % 3];
+        column = with_spike(dirty.table.get(), column, row, row % 2 ? size : -size);
+        bad.push_back(row);
+      }
+      const Identification with = truing::identify(dirty.nominal, dirty.table->data, options);
+      CHECK(with.solver.converged);
+      CHECK(with.rejected_rows == bad);
+      CHECK(fresh_rms(clean.truth, with.robot, 29) < 1.1 * fresh_rms(clean.truth, without.robot, 29));
+    }
+  }
+}
+
+TEST_CASE("a spike of a wire's length does not carry its anchor away") {
+  const Robot nominal = ur10();
+  Robot truth = perturbed(nominal, 5e-4, 5e-4, 38);
+  truth.anchor = truing::Anchor{{1.2, -0.8, 0.1}, 0.25};
+  for (const double spike : {10.0, -3.0, 1000.0}) {
+    CAPTURE(spike);
+    auto table = random_joints(truth, 400, 39);
+    measure(table.get(), truth, What::distance, 2e-5, 40);
+    table->data.distance = with_spike(table.get(), table->data.distance, 11, spike);
+    IdentifyOptions options;
+    options.test_share = 0.0;
+    const Identification found = truing::identify(nominal, table->data, options);
+    CHECK(found.rejected_rows == std::vector<std::size_t>{11});
+    CHECK(found.train.after.rms < 4e-5);
+  }
+}
+
 TEST_CASE("the palletizer's eighteen parameters are found to the noise floor from 50 planned poses") {
   const Robot nominal = palletizer();
   Robot truth = nominal;  // an arm wrong by millimetres, with gear ratios and zeros off

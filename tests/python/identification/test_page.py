@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from truing.cli.commands.identify import worse_than_drawn
 from truing.identification.page import identification_report, prediction_report
 from truing.identification.result import correlations
 from truing.planning.page import plan_report
@@ -108,6 +109,19 @@ class _Balance(HTMLParser):
     def handle_endtag(self, tag: str) -> None:
         assert self.stack and self.stack[-1] == tag, (tag, self.stack[-3:])
         self.stack.pop()
+
+
+def test_what_is_worse_than_the_robot_as_drawn_is_never_called_usable() -> None:
+    rows = some_rows(rejected=0)
+    good = visible(identification_report(some_result(rows), rows))
+    assert "Worse than the robot as drawn" not in good and "Do not rely on this" not in good
+    worse = dataclasses.replace(rows, error_before=rows.error_after, error_after=rows.error_before)
+    text = visible(identification_report(some_result(worse), worse))
+    assert "Worse than the robot as drawn" in text and "Do not rely on this yet" in text
+    assert "Usable" not in text
+    errors = some_result(worse)["errors"]
+    assert "worse than by the robot as drawn" in worse_than_drawn(errors)
+    assert worse_than_drawn(some_result(rows)["errors"]) == ""
 
 
 def test_the_first_screen_answers_how_accurate_it_was_and_is() -> None:

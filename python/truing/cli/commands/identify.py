@@ -128,7 +128,22 @@ class Command(run.Command["tuple[Robot, Measurements]", "Identification"]):
 
     def failure(self, result: Mapping[str, Any]) -> str:
         solver = result["solver"]
-        return "" if solver["converged"] else f"did not converge: {solver['stopped_because']}"
+        if not solver["converged"]:
+            return f"did not converge: {solver['stopped_because']}"
+        return worse_than_drawn(result["errors"])
+
+
+def worse_than_drawn(errors: Mapping[str, Any]) -> str:
+    """Why the robot as found is not to be used: it predicts held-out poses worse than the robot as drawn."""
+    if "test" not in errors:
+        return ""
+    before, after = errors["test"]["before"], errors["test"]["after"]
+    if after["rms_m"] <= before["rms_m"] or after["median_m"] <= before["median_m"]:
+        return ""
+    return (
+        f"held-out poses are predicted worse than by the robot as drawn: {mm(after['rms_m'])} rms against"
+        f" {mm(before['rms_m'])}"
+    )
 
 
 def error_lines(errors: Mapping[str, Any]) -> list[tuple[str, str, str]]:
