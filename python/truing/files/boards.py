@@ -14,6 +14,7 @@ centre of the top left pixel.
 from __future__ import annotations
 
 import math
+import os
 import re
 import warnings
 from collections.abc import Callable, Sequence
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 
 from truing._core import Camera
 from truing.errors import InputError, InputWarning
+from truing.files.output import require_whole_file
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -46,6 +48,7 @@ _BAD_PIXELS = 2.0
 _BAD_SHARE = 0.003  # of the image's width
 _WORTH_A_LOOK = 0.5  # [px] a camera whose rms is below fits well enough to start from
 _LEAST_TILT = math.radians(8)
+_MOST_PIXELS = 200_000_000
 _LARGEST_RATIO = 1e4  # of focal length and image size
 
 _FAMILIES = ("4X4", "5X5", "6X6", "7X7")
@@ -245,6 +248,9 @@ def plausible_camera(camera: Camera) -> tuple[str, str] | None:
 
 
 def _opencv() -> Any:
+    # A header of a few bytes may promise any number of pixels. OpenCV reads its limit, else a thousand
+    # million, from here when it is loaded.
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(_MOST_PIXELS))
     try:
         import cv2
     except ImportError as error:
@@ -361,10 +367,15 @@ class _Search:
 def _grey(cv: Any, image: Path | str | Image, name: str) -> Image:
     if isinstance(image, (str, Path)):
         try:
+            require_whole_file(Path(image))
             data = np.frombuffer(Path(image).read_bytes(), dtype=np.uint8)
+            grey = cv.imdecode(data, cv.IMREAD_GRAYSCALE) if data.size else None
         except OSError as error:
             raise InputError(f"{name}: cannot be read: {error.strerror}") from None
-        grey = cv.imdecode(data, cv.IMREAD_GRAYSCALE) if data.size else None
+        except cv.error:
+            raise InputError(
+                f"{name}: cannot be decoded: damaged, or more than {_MOST_PIXELS // 10**6} million pixels"
+            ) from None
         if grey is None:
             raise InputError(f"{name}: is no image that OpenCV can read (PNG, JPEG, TIFF, BMP …)")
     else:
@@ -862,9 +873,16 @@ def _calibrate(
     objects = [np.ascontiguousarray(points[k], dtype=np.float32).reshape(-1, 1, 3) for k in chosen]
     seen = [np.ascontiguousarray(pixels[k], dtype=np.float32).reshape(-1, 1, 2) for k in chosen]
     flags = cv.CALIB_FIX_K3 if len(chosen) < 10 else 0  # it bends what few images do not hold
-    rms, matrix, distortion, turns, _, sigma, _, _ = cv.calibrateCameraExtended(
-        objects, seen, size, None, None, flags=flags
-    )
+    # OpenCV adds up what its threads did in the order in which they are done: on one the bits are the same
+    # every time. Corners are found by as many as there are, each in a part of its own.
+    threads = cv.getNumThreads()
+    cv.setNumThreads(1)
+    try:
+        rms, matrix, distortion, turns, _, sigma, _, _ = cv.calibrateCameraExtended(
+            objects, seen, size, None, None, flags=flags
+        )
+    finally:
+        cv.setNumThreads(threads)
     coefficients = np.zeros(5)
     coefficients[: min(5, np.size(distortion))] = np.asarray(distortion).ravel()[:5]
     camera = Camera(

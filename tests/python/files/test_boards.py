@@ -354,3 +354,18 @@ def test_values_that_no_camera_has_are_told(changes: dict[str, float], name: str
     wrong = plausible_camera(CAMERA.replace(**changes))
     assert wrong is not None and wrong[0] == name
     assert plausible_camera(CAMERA) is None
+
+
+def test_a_camera_found_from_images_has_the_same_bits_every_time() -> None:
+    board = parse_board("chessboard:8x5:25mm")
+    images = [render(board, T, CAMERA) for T in board_poses(board, 12, seed=3)]
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(4)  # as many as a usual machine has, whatever this one has
+    try:
+        found = [find_board(images, board) for _ in range(6)]
+        assert cv2.getNumThreads() == 4
+    finally:
+        cv2.setNumThreads(threads)
+    for again in found[1:]:
+        assert again.camera.fx == found[0].camera.fx and again.camera.distortion == found[0].camera.distortion
+        assert np.array_equal(again.T_camera_board, found[0].T_camera_board)
