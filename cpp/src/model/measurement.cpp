@@ -21,6 +21,17 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument(what); }
 
+// Of lengths and angles: beyond any machine, and within what the kernel's sine and the squares of residuals can hold.
+constexpr double kLargest = 1e6;
+
+void require_usable(const Column& column, const std::string& name, std::size_t rows) {
+  if (!column) return;
+  for (std::size_t row = 0; row < rows; ++row) {
+    if (std::abs(column[row]) > kLargest)
+      refuse_row(row, name + " is " + number(column[row]) + ", expected a value between -1e6 and 1e6 (m, rad)");
+  }
+}
+
 void require_finite(const Column& column, const std::string& name, std::size_t rows) {
   if (!column) return;
   for (std::size_t row = 0; row < rows; ++row) {
@@ -103,6 +114,7 @@ void require_joints(const Measurements& data, const Robot& robot) {
     const std::string& name = robot.joints[driven[k]].name;
     if (!data.joints[k]) refuse("joint " + name + " has no column of readings");
     require_finite(data.joints[k], "reading of joint " + name, data.rows);
+    require_usable(data.joints[k], "reading of joint " + name, data.rows);
     if (!data.joint_speed.empty()) require_finite(data.joint_speed[k], "speed of joint " + name, data.rows);
     if (data.direction.empty() || !data.direction[k]) continue;
     for (std::size_t row = 0; row < data.rows; ++row) {
@@ -161,11 +173,10 @@ void validate(const Measurements& data, const Robot& robot, bool joints_only) {
   if (data.rows == 0) refuse("there are no rows");
   require_joints(data, robot);
   require_whole(data.position, "position", data.rows);
+  for (const Column& column : data.position) require_usable(column, "position", data.rows);
+  require_usable(data.distance, "distance", data.rows);
   require_whole(data.orientation, "orientation", data.rows);
   require_unit_quaternions(data);
-  for (std::size_t row = 0; data.distance && row < data.rows; ++row) {
-    if (std::isinf(data.distance[row])) refuse_row(row, "distance is infinite");
-  }
   require_integers(data.fixed_point, "fixed_point", data.rows, -1,
                    static_cast<std::int64_t>(data.fixed_point_names.size()),
                    "-1 (none) or an index into the " + std::to_string(data.fixed_point_names.size()) + " fixed points");

@@ -78,32 +78,29 @@ std::string joint_names(const Robot& robot) {
   return listed(names);
 }
 
-// Passive joints follow their drivers' corrected motions. `depth` counts the drivers followed: a path longer
-// than the robot has joints is a circle.
-void require_no_circle(const Robot& robot, std::size_t index, std::size_t depth) {
-  if (depth <= robot.joints.size()) return;
-  throw std::invalid_argument("joint '" + robot.joints[index].name + "': driven_by goes round in a circle");
+// Passive joints follow their drivers' corrected motions. Every joint is computed once, after those that drive it:
+// following each path anew would take 2^n steps where each joint is driven by the two before it.
+enum class Visit { waiting, entered, done };
+
+void visit_drivers(const Robot& robot, std::size_t index, std::vector<Visit>* state, std::vector<std::size_t>* order) {
+  Visit& own = (*state)[index];
+  if (own == Visit::done) return;
+  if (own == Visit::entered) {
+    throw std::invalid_argument("joint '" + robot.joints[index].name + "': driven_by goes round in a circle");
+  }
+  own = Visit::entered;
+  for (const auto& driver : robot.joints[index].driven_by) {
+    visit_drivers(robot, robot.joint_index(driver.first), state, order);
+  }
+  own = Visit::done;
+  order->push_back(index);
 }
 
-double motion_of(const Robot& robot, std::size_t index, const Eigen::VectorXd& all_readings, std::size_t depth) {
-  require_no_circle(robot, index, depth);
-  const Joint& joint = robot.joints[index];
-  if (!joint.passive()) return joint.ratio * all_readings[static_cast<Eigen::Index>(index)] + joint.offset;
-  double motion = joint.offset;
-  for (const auto& [driver, weight] : joint.driven_by) {
-    motion += weight * motion_of(robot, robot.joint_index(driver), all_readings, depth + 1);
-  }
-  return motion;
-}
-
-Eigen::RowVectorXd coupling_row(const Robot& robot, std::size_t index, std::size_t depth) {
-  require_no_circle(robot, index, depth);
-  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(robot.joints.size()));
-  row[static_cast<Eigen::Index>(index)] = 1.0;
-  for (const auto& [driver, weight] : robot.joints[index].driven_by) {
-    row += weight * coupling_row(robot, robot.joint_index(driver), depth + 1);
-  }
-  return row;
+std::vector<std::size_t> drivers_first(const Robot& robot) {
+  std::vector<Visit> state(robot.joints.size(), Visit::waiting);
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < robot.joints.size(); ++i) visit_drivers(robot, i, &state, &order);
+  return order;
 }
 
 [[noreturn]] void refuse(const std::string& where, const std::string& what) {
@@ -114,8 +111,19 @@ void require_finite(const std::string& where, const char* name, double value) {
   if (!std::isfinite(value)) refuse(where, std::string(name) + " is " + number(value) + ", expected a finite number");
 }
 
+// Beyond any machine, and far within what products of a few values can hold. The kernel's sine takes no larger angles.
+constexpr double kLargest = 1e6;
+constexpr std::size_t kMostJoints = 200;
+
+void require_usable(const std::string& where, const char* name, double value) {
+  require_finite(where, name, value);
+  if (std::abs(value) <= kLargest) return;
+  refuse(where, std::string(name) + " is " + number(value) + ", expected a value between -1e6 and 1e6 (m, rad, kg)");
+}
+
 void require_frame(const std::string& where, const char* name, const Isometry3d& T) {
   if (!T.matrix().allFinite()) refuse(where, std::string(name) + " has a value that is not finite");
+  if (T.translation().cwiseAbs().maxCoeff() > kLargest) refuse(where, std::string(name) + " is farther than 1e6 m");
   const Eigen::Matrix3d R = T.linear();
   const bool is_rotation = (R.transpose() * R).isIdentity(1e-6) && R.determinant() > 0.0;
   const bool is_rigid = (T.matrix().row(3) - Eigen::RowVector4d::Unit(3)).isZero(1e-12);
@@ -127,13 +135,13 @@ void require_frame(const std::string& where, const char* name, const Isometry3d&
 
 void validate_joint(const Joint& joint, Convention convention) {
   const std::string where = "joint '" + joint.name + "'";
-  require_finite(where, "theta", joint.theta);
-  require_finite(where, "d", joint.d);
-  require_finite(where, "a", joint.a);
-  require_finite(where, "alpha", joint.alpha);
-  require_finite(where, "beta", joint.beta);
-  require_finite(where, "ratio", joint.ratio);
-  require_finite(where, "offset", joint.offset);
+  require_usable(where, "theta", joint.theta);
+  require_usable(where, "d", joint.d);
+  require_usable(where, "a", joint.a);
+  require_usable(where, "alpha", joint.alpha);
+  require_usable(where, "beta", joint.beta);
+  require_usable(where, "ratio", joint.ratio);
+  require_usable(where, "offset", joint.offset);
   if (convention == Convention::urdf) {
     require_frame(where, "T_parent_joint", joint.T_parent_joint);
     const double length = joint.axis.norm();
@@ -142,17 +150,18 @@ void validate_joint(const Joint& joint, Convention convention) {
     }
   }
   for (const auto& [driver, weight] : joint.driven_by) {
-    require_finite(where, ("weight of '" + driver + "' in driven_by").c_str(), weight);
+    require_usable(where, ("weight of '" + driver + "' in driven_by").c_str(), weight);
   }
   if (std::isnan(joint.lower) || std::isnan(joint.upper)) refuse(where, "a limit is not a number");
   if (joint.lower > joint.upper) {
     refuse(where, "lower limit " + number(joint.lower) + " is above upper limit " + number(joint.upper));
   }
   if (joint.mass) {
-    require_finite(where, "mass", *joint.mass);
+    require_usable(where, "mass", *joint.mass);
     if (*joint.mass < 0.0) refuse(where, "mass is " + number(*joint.mass) + " kg, expected zero or more");
   }
-  if (!joint.center_of_mass.allFinite()) refuse(where, "center_of_mass has a value that is not finite");
+  if (!(joint.center_of_mass.cwiseAbs().maxCoeff() <= kLargest))
+    refuse(where, "center_of_mass has a value that is not finite, or beyond 1e6 m");
 }
 
 // Parameters are named after joints and targets (`J2.a`, `tool.x`, `base.rz`, `anchor.zero`), so these names
@@ -238,17 +247,23 @@ static bool is_input(const std::string& name, const Robot& robot) {
 void validate(const Robot& robot) {
   const std::string where = robot.name.empty() ? "robot" : "robot '" + robot.name + "'";
   if (robot.joints.empty()) refuse(where, "has no joints");
+  if (robot.joints.size() > kMostJoints) {
+    refuse(where,
+           "has " + std::to_string(robot.joints.size()) + " joints, expected at most " + std::to_string(kMostJoints));
+  }
   validate_names(robot);
   for (const Joint& joint : robot.joints) validate_joint(joint, robot.convention);
   std::vector<bool> done(robot.joints.size(), false);
   for (std::size_t i = 0; i < robot.joints.size(); ++i) validate_drivers(robot, i, {}, done);
-  if (!robot.gravity.allFinite()) refuse(where, "gravity has a value that is not finite");
+  if (!(robot.gravity.cwiseAbs().maxCoeff() <= kLargest))
+    refuse(where, "gravity has a value that is not finite, or beyond 1e6 m/s^2");
   require_frame(where, "T_measurement_base", robot.T_measurement_base);
   for (const Target& target : robot.targets)
     require_frame("target '" + target.name + "'", "T_last_target", target.T_last_target);
   validate_effects(robot);
-  if (robot.anchor && !(robot.anchor->point.allFinite() && std::isfinite(robot.anchor->zero))) {
-    refuse(where, "anchor has a value that is not finite");
+  if (robot.anchor &&
+      !(robot.anchor->point.cwiseAbs().maxCoeff() <= kLargest && std::abs(robot.anchor->zero) <= kLargest)) {
+    refuse(where, "anchor has a value that is not finite, or beyond 1e6 m");
   }
   for (const auto& [name, ends] : robot.fitted_range) {
     if (!(std::isfinite(ends.first) && std::isfinite(ends.second) && ends.first <= ends.second))
@@ -284,7 +299,13 @@ namespace model {
 Eigen::MatrixXd coupling_matrix(const Robot& robot) {
   const auto n = static_cast<Eigen::Index>(robot.joints.size());
   Eigen::MatrixXd coupling(n, n);
-  for (Eigen::Index i = 0; i < n; ++i) coupling.row(i) = coupling_row(robot, static_cast<std::size_t>(i), 0);
+  coupling.setIdentity();
+  for (const std::size_t index : drivers_first(robot)) {
+    for (const auto& [driver, weight] : robot.joints[index].driven_by) {
+      const auto from = static_cast<Eigen::Index>(robot.joint_index(driver));
+      coupling.row(static_cast<Eigen::Index>(index)) += weight * coupling.row(from);
+    }
+  }
   return coupling;
 }
 
@@ -299,8 +320,17 @@ Eigen::VectorXd joint_motions(const Robot& robot, const Eigen::VectorXd& reading
     all_readings[static_cast<Eigen::Index>(driven[k])] = reading[static_cast<Eigen::Index>(k)];
   }
   Eigen::VectorXd motions(all_readings.size());
-  for (Eigen::Index i = 0; i < motions.size(); ++i) {
-    motions[i] = motion_of(robot, static_cast<std::size_t>(i), all_readings, 0);
+  for (std::size_t k = 0; k < robot.joints.size(); ++k) {
+    const Joint& joint = robot.joints[k];
+    const auto i = static_cast<Eigen::Index>(k);
+    motions[i] = joint.passive() ? joint.offset : joint.ratio * all_readings[i] + joint.offset;
+  }
+  if (driven.size() == robot.joints.size()) return motions;
+  for (const std::size_t index : drivers_first(robot)) {
+    for (const auto& [driver, weight] : robot.joints[index].driven_by) {
+      const auto from = static_cast<Eigen::Index>(robot.joint_index(driver));
+      motions[static_cast<Eigen::Index>(index)] += weight * motions[from];
+    }
   }
   return motions;
 }

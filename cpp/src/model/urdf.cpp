@@ -40,7 +40,29 @@ class Listener : public console_bridge::OutputHandler {
   std::string heard;
 };
 
+// urdfdom descends by recursion, into elements and along links, and asks nobody how deep: a file of a few hundred
+// kilobytes would overrun the stack. tinyxml2 bounds the depth of what it reads (TINYXML2_MAX_ELEMENT_DEPTH, 100 or
+// 500).
+constexpr int kMostLinks = 5000;
+
+void require_bounded(const std::string& urdf_text) {
+  tinyxml2::XMLDocument document;
+  if (document.Parse(urdf_text.c_str(), urdf_text.size()) == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
+    throw std::invalid_argument("line " + std::to_string(document.ErrorLineNum()) +
+                                ": elements are nested too deeply for a URDF");
+  }
+  int links = 0;
+  const tinyxml2::XMLElement* const root = document.RootElement();
+  if (root == nullptr) return;  // urdfdom says what is wrong
+  for (const auto* link = root->FirstChildElement("link"); link != nullptr; link = link->NextSiblingElement("link")) {
+    if (++links <= kMostLinks) continue;
+    throw std::invalid_argument("line " + std::to_string(link->GetLineNum()) + ": has more than " +
+                                std::to_string(kMostLinks) + " links");
+  }
+}
+
 urdf::ModelInterfaceSharedPtr parse(const std::string& urdf_text) {
+  require_bounded(urdf_text);
   static std::mutex one_at_a_time;
   static Listener listener;  // static: console_bridge remembers the last handler that it had
   const std::lock_guard<std::mutex> lock(one_at_a_time);

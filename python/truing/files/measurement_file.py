@@ -51,6 +51,7 @@ _ORIENTATION = ("qw", "qx", "qy", "qz")
 _OF_JOINT = re.compile(r"(qr|qd|tau|dir|u|q)([1-9][0-9]*)(?:_(.*))?", re.ASCII)
 _SETS = ("train", "test")
 _LIMIT_MARGIN = 1e-3  # [rad | m]
+_LARGEST = 1e6  # of a length or an angle, in the file's own unit: no machine is larger
 
 
 @dataclass(frozen=True)
@@ -315,7 +316,9 @@ class _Reader:
         return self.column(self.plan.known[role], gaps=gaps)
 
     def column(self, source: _Source, *, gaps: bool = False, any_value: bool = False) -> Floats:
-        return _to_si(self.table.numbers(source.column, gaps=gaps, any_value=any_value), source.unit)
+        largest = _LARGEST if source.unit in _LENGTHS + _ANGLES else 1e12
+        values = self.table.numbers(source.column, gaps=gaps, any_value=any_value, largest=largest)
+        return _to_si(values, source.unit)
 
     def require(self, role: str, good: Any, expected: str) -> None:
         if not good.all():

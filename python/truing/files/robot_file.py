@@ -44,6 +44,7 @@ from truing.files.yaml_tree import (
 FORMAT = "truing-robot/1"
 _KIND = "robot file"
 _LARGEST_URDF = 64_000_000
+MOST_JOINTS = 200
 _URDF_SUFFIXES = (".urdf", ".xml")
 _TOOL = "tool"
 # Parameters are called after joints and targets (J2.a, tool.x), and these two are taken (base.x,
@@ -129,11 +130,11 @@ class _RobotFile(Strict):
 
 
 class _LinkTable(_RobotFile):
-    joints: Annotated[list[_LinkJoint], Field(min_length=1)]
+    joints: Annotated[list[_LinkJoint], Field(min_length=1, max_length=MOST_JOINTS)]
 
 
 class _UrdfChain(_RobotFile):
-    joints: Annotated[list[_UrdfJoint], Field(min_length=1)]
+    joints: Annotated[list[_UrdfJoint], Field(min_length=1, max_length=MOST_JOINTS)]
 
 
 # ---- Reading -------------------------------------------------------------------------------------

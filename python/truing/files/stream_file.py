@@ -46,6 +46,10 @@ _QUATERNION = ("qw", "qx", "qy", "qz")
 _POSITION = ("x", "y", "z")
 _OF_JOINT = re.compile(r"q([1-9][0-9]*)(?:_(.*))?", re.ASCII)
 _NOT_UNIT = 1e-3  # a quaternion's length may be off by this
+_TIMES = ("t", "arrival")
+_LARGEST_TIME = 1e11  # [s] seconds since any epoch are fewer
+_LARGEST = 1e6  # of everything else, in the file's own unit
+_LONGEST_GAP = 3600.0  # [s] between two stamps of one recording
 _SLOWEST = 10.0  # [s] a median step above this is no stream of seconds
 _FARTHEST = 100.0  # [m] no tracker sees farther, no arm reaches farther
 _FASTEST = 35.0  # [rad/s] what gyros end at: 2000 deg/s
@@ -212,7 +216,7 @@ class _Stream:
 
     def numbers(self, stem: str, *, gaps: bool = False) -> Floats:
         name = self.columns[stem]
-        values = self.table.numbers(name, gaps=gaps)
+        values = self.table.numbers(name, gaps=gaps, largest=_LARGEST_TIME if stem in _TIMES else _LARGEST)
         unit = name[len(stem) + 1 :]
         return values / 1000.0 if unit == "mm" else np.radians(values) if unit == "deg" else values
 
@@ -229,6 +233,15 @@ class _Stream:
         if step > _SLOWEST:
             self.table.refuse(
                 f"samples are {step:.4g} apart: these look like milliseconds or counts, expected seconds",
+                column="t_s",
+            )
+        gaps = np.flatnonzero(np.abs(np.diff(t)) > _LONGEST_GAP)
+        if gaps.size:
+            row = int(gaps[0]) + 1
+            self.table.refuse(
+                f"found {t[row]:.9g} after {t[row - 1]:.9g}, expected stamps of one recording: a wrong stamp,"
+                " or another recording begins here",
+                row=row,
                 column="t_s",
             )
         wrong = np.flatnonzero(np.diff(t) <= 0) if ordered else np.empty(0, dtype=np.intp)

@@ -31,6 +31,11 @@ Codes = NDArray[np.int32]
 
 _PARQUET_MAGIC = b"PAR1"
 _LONGEST_HEADER = 1_000_000
+_MOST_COLUMNS = 2000
+_MOST_CELLS = 200_000_000  # 1.6 GB of doubles
+_LARGEST_CSV = 8_000_000_000  # [bytes]
+_LARGEST_NUMBER = 1e12  # of the columns that have a meaning
+_LARGEST_COVARIATE = 1e30  # its square, and sums of such squares, are still numbers
 # What programs write for "no value"; "nan" is not among them: a number that came out as NaN is another
 # matter.
 _EMPTY = ["", "NA", "N/A", "#N/A", "null", "NULL"]
@@ -86,16 +91,24 @@ class Table:
         self._columns = dict(zip(self.names, table.columns, strict=True))
         for name in self.names:
             kind = self._columns[name].type
+            if pa.types.is_dictionary(kind):
+                kind = kind.value_type
             if name not in labels and not _is_number(kind):
                 self._refuse_text(name, str(kind), known=name in numbers)
 
     def numbers(
-        self, name: str, expected: str = "a finite number", *, gaps: bool = False, any_value: bool = False
+        self,
+        name: str,
+        expected: str = "a finite number",
+        *,
+        gaps: bool = False,
+        any_value: bool = False,
+        largest: float = _LARGEST_NUMBER,
     ) -> Floats:
         """The column as contiguous doubles, without a copy where Arrow has them so.
 
         Empty cells become NaN if `gaps`, else they are refused; NaN and infinity in the file are refused.
-        With `any_value` everything is taken.
+        With `any_value` (a column without a meaning of its own) NaN and infinity are taken.
         """
         column = self._columns[name]
         if column.type != pa.float64():
@@ -115,6 +128,11 @@ class Table:
                 wrong &= ~column.is_null().to_numpy()
             if wrong.any():
                 self.refuse_cell(int(np.argmax(wrong)), name, expected)
+        limit = _LARGEST_COVARIATE if any_value else largest
+        with np.errstate(invalid="ignore"):
+            huge = np.isfinite(values) & (np.abs(values) > limit)
+        if huge.any():
+            self.refuse_cell(int(np.argmax(huge)), name, f"a number between -{limit:g} and {limit:g}")
         if not self._is_parquet:
             del self._columns[name]  # the memory can go; what an error message needs is in the file
         return np.asarray(values, dtype=np.float64)
@@ -157,6 +175,8 @@ class Table:
                         f"{where}: columns are separated by {called}, expected commas (and points as decimal"
                         " marks)"
                     )
+        if len(self.names) > _MOST_COLUMNS:
+            raise InputError(f"{where}: has {len(self.names)} columns, expected at most {_MOST_COLUMNS}")
         first: dict[str, int] = {}
         for number, name in enumerate(self.names, 1):
             if not name:
@@ -203,7 +223,19 @@ class Table:
 
     def _read_parquet(self) -> Any:
         try:
-            return pa.parquet.read_table(self.path, partitioning=None)
+            with pa.parquet.ParquetFile(self.path) as file:
+                rows, schema = file.metadata.num_rows, file.schema_arrow
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
+        # Equal values take hardly any room in the file, and all of it in memory.
+        if rows * len(self.names) > _MOST_CELLS:
+            self.refuse(
+                f"has {rows:,} rows of {len(self.names)} columns, expected at most"
+                f" {_MOST_CELLS // len(self.names):,}: take every n-th row"
+            )
+        text = [field.name for field in schema if pa.types.is_string(field.type)]
+        try:
+            return pa.parquet.read_table(self.path, partitioning=None, read_dictionary=text)
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
 
@@ -211,6 +243,8 @@ class Table:
         types = dict.fromkeys(numbers, pa.float64()) | dict.fromkeys(
             labels, pa.dictionary(pa.int32(), pa.string())
         )
+        if self.path.stat().st_size > _LARGEST_CSV:
+            self.refuse(f"has more than {_LARGEST_CSV // 10**9} GB: take every n-th row")
         # The header is skipped, not parsed again: Arrow would leave spaces around the names.
         read = pa.csv.ReadOptions(column_names=self.names, skip_rows=1)
         convert = pa.csv.ConvertOptions(

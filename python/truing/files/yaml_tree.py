@@ -27,7 +27,9 @@ from truing.files.common import decoded, listed, read_bytes, shown
 Loc = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
 
-_LARGEST_FILE = 16_000_000
+_LARGEST_FILE = 1_000_000  # [bytes] a robot of 200 joints and 2000 targets has 0.3 million
+_LARGEST_NUMBER = Decimal("1e12")
+_MOST_DIGITS = 100
 LONGEST_NAME = 200  # characters
 NAME = f"a name of at most {LONGEST_NAME} characters"
 # YAML 1.2's numbers: 1e-3 is one (YAML 1.1 wants 1.0e-3), 1:30 is none (YAML 1.1 reads 90).
@@ -212,6 +214,10 @@ def expected(value: object, what: str) -> PydanticCustomError:
 def _number(value: object) -> Decimal:
     if not isinstance(value, Decimal) or not value.is_finite():
         raise expected(value, "a finite number")
+    if abs(value) > _LARGEST_NUMBER:
+        raise expected(value, f"a number between -{_LARGEST_NUMBER:.0e} and {_LARGEST_NUMBER:.0e}")
+    if len(value.as_tuple().digits) > _MOST_DIGITS:
+        raise expected(value, f"a number of at most {_MOST_DIGITS} digits")
     return value
 
 
@@ -291,6 +297,11 @@ def _explained(complaint: Any, model: type[BaseModel]) -> tuple[Loc, str]:
         return loc, f"found {found(complaint['input'])}, expected {what}"
     if kind == "list_type":
         return loc, f"found {found(complaint['input'])}, expected a list"
+    if kind == "too_long":
+        return (
+            loc,
+            f"has {len(complaint['input'])} entries, expected at most {complaint['ctx']['max_length']}",
+        )
     if kind == "too_short":
         return loc, "is empty, expected at least one entry"
     return loc, str(complaint["msg"])
