@@ -241,6 +241,22 @@ TEST_CASE("validate accepts a robot that can be used") {
   CHECK(complaint(palletizing_arm()) == "");
 }
 
+TEST_CASE("validate refuses what no machine has: angles of 1e50, thousands of joints") {
+  Robot robot = palletizing_arm();
+  robot.joints[1].theta = 1e50;
+  CHECK(contains(complaint(robot), "theta is 1e+50"));
+  robot = palletizing_arm();
+  robot.joints[0].d = -2e6;
+  CHECK(contains(complaint(robot), "d is -2e+06"));
+  robot = palletizing_arm();
+  robot.targets = {{"tool", Isometry3d(Eigen::Translation3d(0.0, 1e7, 0.0))}};
+  CHECK(contains(complaint(robot), "T_last_target is farther than 1e6 m"));
+  robot = palletizing_arm();
+  robot.joints.assign(3000, Joint());
+  for (std::size_t k = 0; k < robot.joints.size(); ++k) robot.joints[k].name = "K" + std::to_string(k);
+  CHECK(contains(complaint(robot), "has 3000 joints, expected at most 200"));
+}
+
 TEST_CASE("validate refuses ranges that are none, and of what is no input") {
   Robot robot = oblique_arm();
   robot.fitted_range = {{"q1", {-1.0, 1.0}}, {"payload", {0.0, 0.0}}, {"temp", {18.0, 25.0}}};
