@@ -336,7 +336,7 @@ def test_the_reports_answer_first_and_open_offline() -> None:
         and 'id="distribution"' in other
     )
     for text in (page, other):
-        body = text[: text.index("<script>")]
+        body = text[text.index("<body>") : text.index("<script>")]
         assert "http" not in body and "nan" not in body.lower().replace("finance", "") and "None" not in body
 
 
