@@ -21,7 +21,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -237,147 +237,134 @@ def time_csv(folder: Path, rows: int) -> dict[str, float]:
 # ---- The table -----------------------------------------------------------------------------------
 
 
-def collect(
-    cpp: dict[str, Any],
-    avx2: dict[str, Any],
-    python: dict[str, Any],
-    csv: dict[str, float],
-    blas: list[dict[str, Any]],
-    peers: list[dict[str, Any]],
-) -> list[Row]:
+@dataclass(frozen=True)
+class Timings:
+    """What was timed in one run."""
+
+    cpp: dict[str, Any]
+    avx2: dict[str, Any]  # empty where the widest kernel of this machine is AVX2
+    python: dict[str, Any]
+    csv: dict[str, float]
+    blas: list[dict[str, Any]]
+    peers: list[dict[str, Any]]
+
+    def kernels(self) -> list[tuple[dict[str, Any], str]]:
+        """Figures of each kernel with the command that they are from, the widest first."""
+        second = [(self.avx2, AVX2)] if self.avx2 and self.cpp["kernel"] != "avx2" else []
+        return [(self.cpp, CPP), *second]
+
+
+def collect(timings: Timings) -> list[Row]:
+    """The rows of the table, in its order."""
+    rows = [
+        *kernel_rows(timings),
+        *fit_rows(timings),
+        *iteration_rows(timings),
+        *large_rows(timings.cpp, timings.csv),
+    ]
     here = machine()
-    rows: list[Row] = []
+    return [replace(row, machine=here) for row in rows]
 
-    def add(name: str, value: float, unit: str, reach: str = "", command: str = CPP, note: str = "") -> None:
-        rows.append(Row(name, value, unit, reach, machine=here, command=command, note=note))
 
-    def against(
-        name: str,
-        value: float,
-        unit: str,
-        reach: str,
-        command: str,
-        task: str,
-        wanted: tuple[str, ...],
-        scale: float,
-    ) -> None:
-        """A row for every peer, those without a figure included."""
-        there = [r for r in peers if r["peer"] in wanted and r.get("task", task) == task]
-        for r in there or [{"peer": "", "error": "no peer was run"}]:
-            theirs = r["seconds"] * scale if "seconds" in r else None
-            note = r.get("note", r.get("error", r.get("skipped", "")))
-            rows.append(
-                Row(
-                    name,
-                    value,
-                    unit,
-                    reach,
-                    r["peer"],
-                    theirs,
-                    theirs and theirs / value,
-                    here,
-                    command,
-                    note,
-                )
-            )
+def against(ours: Row, peers: list[dict[str, Any]], task: str, wanted: tuple[str, ...]) -> list[Row]:
+    """A row for every peer, those without a figure included."""
+    scale = {"us": 1e6, "ms": 1e3}[ours.unit]
+    there = [r for r in peers if r["peer"] in wanted and r.get("task", task) == task]
+    rows = []
+    for r in there or [{"peer": "", "error": "no peer was run"}]:
+        theirs = r["seconds"] * scale if "seconds" in r else None
+        note = r.get("note", r.get("error", r.get("skipped", "")))
+        ratio = theirs and theirs / ours.value
+        rows.append(replace(ours, peer=r["peer"], peer_value=theirs, ratio=ratio, note=note))
+    return rows
 
-    kernels: list[tuple[dict[str, Any], str]] = [(cpp, CPP)] + (
-        [(avx2, AVX2)] if avx2 and cpp["kernel"] != "avx2" else []
-    )
-    for figures, command in kernels:
+
+def kernel_rows(timings: Timings) -> list[Row]:
+    rows = []
+    for figures, command in timings.kernels():
         kernel = figures["kernel"]
-        reach = {"avx512": "<= 40", "avx2": "<= 80"}.get(kernel, "")
-        against(
-            f"FK and position Jacobian, {cpp['jacobian_columns']:g} columns, 1000 poses, one core, {kernel}",
+        ours = Row(
+            f"FK and position Jacobian, {timings.cpp['jacobian_columns']:g} columns, 1000 poses, one core,"
+            f" {kernel}",
             figures["fk_jacobian_1000"],
             "us",
-            reach,
-            command,
-            "fk+regressor",
-            ("pinocchio",),
-            1e6,
+            {"avx512": "<= 40", "avx2": "<= 80"}.get(kernel, ""),
+            command=command,
         )
-        against(
-            rows[-1].name, figures["fk_jacobian_1000"], "us", reach, command, "fk+jacobian", ("numpy",), 1e6
-        )
+        rows += against(ours, timings.peers, "fk+regressor", ("pinocchio",))
+        rows += against(ours, timings.peers, "fk+jacobian", ("numpy",))
+    return rows
+
+
+def fit_rows(timings: Timings) -> list[Row]:
+    """Whole fits: how long, and how well."""
+    cpp, python = timings.cpp, timings.python
     what = (
         f"identification, 1000 poses, {cpp['identify_1000_rank']:g} parameters of"
         f" {cpp['identify_1000_columns']:g}, rank and covariance"
     )
-    against(f"{what}, C++, {cpp['kernel']}", cpp["identify_1000"], "ms", "<= 2", CPP, "fit", FIT_PEERS, 1e3)
-    if len(kernels) == 2:
-        add(f"{what}, C++, avx2", avx2["identify_1000"], "ms", "", AVX2)
+    ours = Row(f"{what}, C++, {cpp['kernel']}", cpp["identify_1000"], "ms", "<= 2", command=CPP)
+    rows = against(ours, timings.peers, "fit", FIT_PEERS)
+    for figures, command in timings.kernels()[1:]:
+        rows.append(Row(f"{what}, C++, avx2", figures["identify_1000"], "ms", command=command))
     what = (
         f"identification, 1000 poses, {python['rank']} parameters of {python['columns']}, from NumPy arrays"
     )
-    against(what, 1e3 * python["seconds"], "ms", "<= 5", PYTHON, "fit", FIT_PEERS, 1e3)
+    ours = Row(what, 1e3 * python["seconds"], "ms", "<= 5", command=PYTHON)
+    rows += against(ours, timings.peers, "fit", FIT_PEERS)
     for poses in (200, 1000):
-        add(
-            f"rms error on fresh noise-free poses, median of 20 seeds, {poses} poses",
-            cpp[f"accuracy_{poses}"],
-            "sigma sqrt(p/N)",
-            "<= 1.1",
-        )
-    grams = [r for r in blas if "seconds" in r]
-    for figures, command in kernels:
+        what = f"rms error on fresh noise-free poses, median of 20 seeds, {poses} poses"
+        rows.append(Row(what, cpp[f"accuracy_{poses}"], "sigma sqrt(p/N)", "<= 1.1", command=CPP))
+    return rows
+
+
+def iteration_rows(timings: Timings) -> list[Row]:
+    """One iteration over many poses, and beside BLAS on a matrix of that size."""
+    grams = [r for r in timings.blas if "seconds" in r]
+    rows = []
+    for figures, command in timings.kernels():
         iteration = figures["iteration_1000000_threads_2"]
         name = (
-            f"one iteration, 1 000 000 poses x {cpp['jacobian_columns']:g} columns, 2 threads,"
+            f"one iteration, 1 000 000 poses x {timings.cpp['jacobian_columns']:g} columns, 2 threads,"
             f" {figures['kernel']}"
         )
-        add(name, iteration, "ms", "", command)
+        rows.append(Row(name, iteration, "ms", command=command))
+        name += ", over BLAS dsyrk of 3 000 000 x 39"
         if not grams:
-            rows.append(
-                Row(
-                    f"{name}, over BLAS dsyrk of 3 000 000 x 39",
-                    float("nan"),
-                    "x",
-                    "<= 0.4",
-                    "blas",
-                    None,
-                    None,
-                    here,
-                    command,
-                    "; ".join(str(r.get("error", r.get("skipped"))) for r in blas),
-                )
-            )
+            note = "; ".join(str(r.get("error", r.get("skipped"))) for r in timings.blas)
+            rows.append(Row(name, float("nan"), "x", "<= 0.4", "blas", command=command, note=note))
             continue
         best = min(grams, key=lambda r: float(r["seconds"]))
         dsyrk = 1e3 * float(best["seconds"])
-        # the reach is stated for the widest kernel; the narrower one is shown beside it
-        rows.append(
-            Row(
-                f"{name}, over BLAS dsyrk of 3 000 000 x 39",
-                iteration / dsyrk,
-                "x",
-                "<= 0.4" if command == CPP else "",
-                "blas",
-                1.0,
-                dsyrk / iteration,
-                here,
-                command,
-                f"dsyrk {dsyrk:.0f} ms: {best['note']}; the better of {len(grams)} timings before and after"
-                " ours",
-            )
+        note = (
+            f"dsyrk {dsyrk:.0f} ms: {best['note']}; the better of {len(grams)} timings before and after ours"
         )
-    add(
-        "identification, 1 000 000 poses",
-        cpp["identify_1000000"],
-        "s",
-        "<= 1",
-        note=f"{cpp['identify_1000000_iterations']:g} iterations",
-    )
-    add("memory above the data, 1 000 000 poses", cpp["identify_1000000_memory"], "MB", "<= 50")
-    add("two threads against one, 100 000 poses", cpp["threads_speedup_100000"], "x", ">= 1.8")
-    add(
-        "CSV of 1 000 000 rows",
-        csv["megabytes"] / csv["seconds"],
-        "MB/s",
-        ">= 50",
-        PYTHON,
-        f"{csv['megabytes']:.0f} MB in {csv['seconds']:.2f} s, all checks included",
-    )
+        # the reach is stated for the widest kernel; the narrower one is shown beside it
+        reach = "<= 0.4" if command == CPP else ""
+        rows.append(
+            Row(name, iteration / dsyrk, "x", reach, "blas", 1.0, dsyrk / iteration, "", command, note)
+        )
     return rows
+
+
+def large_rows(cpp: dict[str, Any], csv: dict[str, float]) -> list[Row]:
+    iterations = f"{cpp['identify_1000000_iterations']:g} iterations"
+    read = f"{csv['megabytes']:.0f} MB in {csv['seconds']:.2f} s, all checks included"
+    memory, speedup = cpp["identify_1000000_memory"], cpp["threads_speedup_100000"]
+    poses = "identification, 1 000 000 poses"
+    return [
+        Row(poses, cpp["identify_1000000"], "s", "<= 1", command=CPP, note=iterations),
+        Row("memory above the data, 1 000 000 poses", memory, "MB", "<= 50", command=CPP),
+        Row("two threads against one, 100 000 poses", speedup, "x", ">= 1.8", command=CPP),
+        Row(
+            "CSV of 1 000 000 rows",
+            csv["megabytes"] / csv["seconds"],
+            "MB/s",
+            ">= 50",
+            command=PYTHON,
+            note=read,
+        ),
+    ]
 
 
 def number(value: float | None) -> str:
@@ -414,9 +401,20 @@ def print_table(rows: list[Row]) -> None:
             print(f"{'':8}{row.peer:20} {row.note}")
 
 
-def markdown(
-    rows: list[Row], python: dict[str, Any], peers: list[dict[str, Any]], about: dict[str, Any]
-) -> str:
+def markdown(rows: list[Row], timings: Timings, about: dict[str, Any]) -> str:
+    """The page."""
+    return "\n".join(
+        [
+            *introduction(about),
+            *reach_table(rows),
+            *peer_table(rows),
+            *fit_table(timings.python, timings.peers),
+            *commands(timings.peers),
+        ]
+    )
+
+
+def introduction(about: dict[str, Any]) -> list[str]:
     lines = [
         "# Benchmarks",
         "",
@@ -442,18 +440,19 @@ def markdown(
         ]
     if about["quick"]:
         lines += ["`--quick`: peers that take more than 20 s were left out.", ""]
-    lines += [
+    return [
+        *lines,
         (
             "The robot is a UR10: modified DH with Hayati's beta, base and tool unknown. Times are the best"
             " of several runs, ours, and those of peers that take less than a second. Files, peers and their"
             " fairness: [bench/peers](../../bench/peers/README.md)."
         ),
         "",
-        "## What we set out to reach",
-        "",
-        "| | measured | reach | |",
-        "| --- | --- | --- | --- |",
     ]
+
+
+def reach_table(rows: list[Row]) -> list[str]:
+    lines = ["## What we set out to reach", "", "| | measured | reach | |", "| --- | --- | --- | --- |"]
     seen = set()
     for row in rows:
         if row.reach and row.name not in seen:
@@ -462,8 +461,11 @@ def markdown(
                 f"| {row.name} | {shown(row.value, row.unit)} | {bound(row)} |"
                 f" {'reached' if row.met else '**missed**'} |"
             )
-    lines += [
-        "",
+    return [*lines, ""]
+
+
+def peer_table(rows: list[Row]) -> list[str]:
+    lines = [
         "## Beside others",
         "",
         "| | truing | | peer | times ours | |",
@@ -476,8 +478,12 @@ def markdown(
                 f"| {row.name} | {shown(row.value, row.unit)} | {row.peer} | {theirs} | {number(row.ratio)} |"
                 f" {row.note} |"
             )
-    lines += [
-        "",
+    return [*lines, ""]
+
+
+def fit_table(python: dict[str, Any], peers: list[dict[str, Any]]) -> list[str]:
+    """The same file fitted by all, with errors against the truth."""
+    lines = [
         "## The same file, fitted by all",
         "",
         (
@@ -505,11 +511,14 @@ def markdown(
                 f"| {r['peer']} | – | – | – | – |"
                 f" {'failed: ' + r['error'] if 'error' in r else 'left out: ' + r['skipped']} |"
             )
+    return [*lines, ""]
+
+
+def commands(peers: list[dict[str, Any]]) -> list[str]:
     versions = sorted(
         {f"{name} {version}" for r in peers for name, version in r.get("versions", {}).items() if version}
     )
-    lines += [
-        "",
+    return [
         f"Versions: {', '.join(versions)}." if versions else "No peer ran.",
         "",
         "## Again",
@@ -520,10 +529,12 @@ def markdown(
         f"    {AVX2}",
         "",
     ]
-    return "\n".join(lines)
 
 
-def main() -> None:
+# ---- The run -------------------------------------------------------------------------------------
+
+
+def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="leave out peers that take more than 20 s")
     parser.add_argument(
@@ -543,9 +554,11 @@ def main() -> None:
     args = parser.parse_args()
     if not args.cpp.exists():
         raise SystemExit(f"{args.cpp} is missing: run scripts/bench.sh, which builds it")
-    folder = ROOT / "build/run/bench"
-    folder.mkdir(parents=True, exist_ok=True)
-    load_before = os.getloadavg()[0]
+    return args
+
+
+def time_all(args: argparse.Namespace, folder: Path) -> tuple[Timings, float | None]:
+    """Times everything, in an order that is fair to all; and how many cores others kept busy meanwhile."""
     data = make(seed=1)
     np.savez(folder / "ur10.npz", **data)
 
@@ -573,8 +586,25 @@ def main() -> None:
     print("peers ...", flush=True)
     names = ",".join(("pinocchio", *FIT_PEERS))
     others = peers("--only", names, *(("--quick",) if args.quick else ()))
+    return Timings(cpp, avx2, python, csv, blas, others), busy
 
-    rows = collect(cpp, avx2, python, csv, blas, others)
+
+def results_text(rows: list[Row]) -> str:
+    """The rows as JSON; what is no number is null."""
+    plain = [
+        {k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in asdict(row).items()}
+        for row in rows
+    ]
+    return json.dumps(plain, indent=1, ensure_ascii=False) + "\n"
+
+
+def main() -> None:
+    args = arguments()
+    folder = ROOT / "build/run/bench"
+    folder.mkdir(parents=True, exist_ok=True)
+    load_before = os.getloadavg()[0]
+    timings, busy = time_all(args, folder)
+    rows = collect(timings)
     about = {
         "command": " ".join(["scripts/bench.sh", *sys.argv[1:]]),
         "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
@@ -585,23 +615,9 @@ def main() -> None:
     }
     print()
     print_table(rows)
-    args.results.write_text(
-        json.dumps(
-            [
-                {
-                    k: None if isinstance(v, float) and not np.isfinite(v) else v
-                    for k, v in asdict(row).items()
-                }
-                for row in rows
-            ],
-            indent=1,
-            ensure_ascii=False,
-        )
-        + "\n",
-        encoding="utf-8",
-    )
+    args.results.write_text(results_text(rows), encoding="utf-8")
     args.page.parent.mkdir(parents=True, exist_ok=True)
-    args.page.write_text(markdown(rows, python, others, about), encoding="utf-8")
+    args.page.write_text(markdown(rows, timings, about), encoding="utf-8")
     if busy is not None:
         print(
             f"\nwhile truing and BLAS were timed, other programs kept {busy:.1f} of {os.cpu_count()} cores"

@@ -151,112 +151,156 @@ ModesResult modes_of(const SimulatedStreams& recording, const TrackOptions& opti
   return identify_modes(rows, options.deviation);
 }
 
-ModalModel with_error(ModalModel model, double share) {
+ModalModel with_error(ModalModel model, double fraction) {
   for (std::size_t k = 0; k < static_cast<std::size_t>(model.count); ++k)
-    model.frequency[k] *= k % 2 == 0 ? 1.0 + share : 1.0 - share;
+    model.frequency[k] *= k % 2 == 0 ? 1.0 + fraction : 1.0 - fraction;
   return model;
 }
 
 // ---- Rows -----------------------------------------------------------------------------------------------------------
 
-/// Predictions of the tool, ours and others', over seeds.
-void predictions(SimulatedMotion motion, double horizon, int seeds, double frequency_error) {
-  enum { kHold, kNow, kDifference, kVelocity, kAcceleration, kNoModes, kOurs, kMethods };
+enum PredictionMethod { kHold, kNow, kDifference, kVelocity, kAcceleration, kNoModes, kOurs, kMethods };
+
+/// What predictions of the tool are worth, over seeds.
+struct PredictionScore {
   Sum errors[kMethods], frequency;
   double worst_ratio = 0.0, used_modes = 0.0, made = 0.0, nees = 0.0;
+
+  double millimetres(PredictionMethod method) const { return 1e3 * errors[method].rms(); }
+};
+
+/// How far each identified frequency is from the nearest true one, as a fraction of it.
+void add_frequency_errors(const ModalModel& found, const std::vector<FlexibleMode>& modes, Sum* frequency) {
+  for (std::size_t k = 0; k < static_cast<std::size_t>(found.count); ++k) {
+    double nearest = 1e9;
+    for (const FlexibleMode& mode : modes)
+      nearest = std::min(nearest, std::abs(found.frequency[k] / mode.frequency - 1.0));
+    frequency->add(nearest);
+  }
+}
+
+/// What others do, fed in the order of arrival.
+class OtherPredictors {
+ public:
+  OtherPredictors(const SimulatedStreams& streams, const TrackOptions& options)
+      : without_modes(streams.setup, options),
+        replay(streams.setup, options.filter),
+        late(streams.setup, options.filter),
+        streams_(streams) {}
+
+  void push(const ImuSample& sample) {
+    for (; plan_ < streams_.plan.size() && streams_.plan[plan_].arrival < sample.arrival; ++plan_)
+      without_modes.push_plan(streams_.plan[plan_].t, streams_.plan[plan_].T_base_frame);
+    for (; flange_ < streams_.flange.size() && streams_.flange[flange_].arrival < sample.arrival; ++flange_)
+      without_modes.push_joints(streams_.flange[flange_].t, streams_.flange[flange_].T_base_frame);
+    for (; pose_ < streams_.tracker.size() && streams_.tracker[pose_].arrival < sample.arrival; ++pose_) {
+      replay.push_pose(streams_.tracker[pose_]);
+      without_modes.push_pose(streams_.tracker[pose_]);
+      difference.push(streams_.tracker[pose_], streams_.setup);
+      PoseSample as_if_now = streams_.tracker[pose_];
+      as_if_now.t = sample.t - 1e-6;
+      late.push_pose(as_if_now);
+    }
+    replay.push_imu(sample);
+    late.push_imu(sample);
+    without_modes.push_imu(sample);
+  }
+
+  Tracker without_modes;
+  PoseFilter replay;
+  PoseFilter late;  ///< takes a late pose as if it were of now
+  FiniteDifference difference;
+
+ private:
+  const SimulatedStreams& streams_;
+  std::size_t pose_ = 0, flange_ = 0, plan_ = 0;
+};
+
+/// Errors of all methods along one recording, by a tracker that carries the identified modes.
+void score_predictions(const SimulatedStreams& streams, const TrackOptions& options, const ModalModel& modes,
+                       double seconds, PredictionScore* score) {
+  const Isometry3d T_imu_tool = streams.setup.T_flange_imu.inverse() * streams.setup.T_flange_tool;
+  const double horizon = options.deviation.horizon;
+  OtherPredictors others(streams, options);
+  TrackOptions with_modes = options;
+  with_modes.modes = modes;
+  Tracker tracker(streams.setup, with_modes);
+  Sum own, acceleration;
+  int k = 0;
+  play(streams, &tracker, [&](const ImuSample& sample) {
+    others.push(sample);
+    if (++k % 10 != 0) return;
+    others.replay.update();
+    others.late.update();
+    const double t = sample.t + horizon;
+    const PosePrediction ours = tracker.predict(t), no_modes = others.without_modes.predict(t);
+    if (sample.t < kWarmUp || t > seconds) return;
+    const Isometry3d truth = streams.tool_at(t);
+    const auto add = [&](PredictionMethod method, const Isometry3d& T) {
+      const double error = (truth.translation() - T.translation()).norm();
+      score->errors[method].add(error);
+      return error;
+    };
+    const Motion replayed = others.replay.motion_at(sample.t);
+    add(kHold, others.difference.held() * streams.setup.T_flange_tool);
+    add(kNow, extrapolated(others.late.motion_at(sample.t), horizon, false, T_imu_tool));
+    add(kDifference, others.difference.at(t) * streams.setup.T_flange_tool);
+    add(kVelocity, extrapolated(replayed, horizon, false, T_imu_tool));
+    acceleration.add(add(kAcceleration, extrapolated(replayed, horizon, true, T_imu_tool)));
+    add(kNoModes, no_modes.T_base_tool);
+    own.add(add(kOurs, ours.T_base_tool));
+    const Vector6d e = error_of(truth, ours.T_base_tool);
+    score->nees += e.dot(ours.covariance.ldlt().solve(e));
+    score->used_modes += ours.predictor == Predictor::modes ? 1.0 : 0.0;
+    score->made += 1.0;
+  });
+  score->worst_ratio = std::max(score->worst_ratio, own.rms() / acceleration.rms());
+}
+
+void print_predictions(const PredictionScore& score, SimulatedMotion motion, double horizon, double frequency_error) {
+  line("hold: the last tracker sample", score.millimetres(kHold), "mm");
+  line("filter, late pose used as if now, constant velocity", score.millimetres(kNow), "mm");
+  line("tracker and finite-difference velocity", score.millimetres(kDifference), "mm");
+  line("filter with replay, constant velocity", score.millimetres(kVelocity), "mm");
+  line("filter with replay, constant acceleration", score.millimetres(kAcceleration), "mm");
+  line("truing without modes (plan, deviation at constant acceleration)", score.millimetres(kNoModes), "mm");
+  char what[120];
+  std::snprintf(what, sizeof what, "truing, identified modes%s",
+                frequency_error > 0.0 ? " with 5 % frequency error" : "");
+  const bool gentle = motion == SimulatedMotion::gentle;
+  const double ours = score.millimetres(kOurs), made = std::max(1.0, score.made);
+  if (gentle && horizon < 0.05)
+    row(what, ours, "mm", "<= 0.5 mm", ours <= 0.5);
+  else if (!gentle && horizon > 0.05)
+    row(what, ours, "mm", "<= 1.0 mm", ours <= 1.0);
+  else
+    line(what, ours, "mm");
+  row("worst seed against constant acceleration", score.worst_ratio, "", "<= 1.10", score.worst_ratio <= 1.1);
+  line("predictions by modes", 100.0 * score.used_modes / made, "%");
+  line("mean NEES of predictions (6 expected, below: cautious)", score.nees / made, "");
+  line("identified frequencies, rms error", 100.0 * score.frequency.rms(), "%");
+}
+
+/// Predictions of the tool, ours and others', over seeds.
+void predictions(SimulatedMotion motion, double horizon, int seeds, double frequency_error) {
+  PredictionScore score;
   for (int seed = first_seed; seed < first_seed + seeds; ++seed) {
     StreamSimulationOptions simulation = arm(motion, static_cast<std::uint64_t>(seed), 60.0);
     const SimulatedStreams recording = simulate_streams(large_boom(), simulation);
     TrackOptions options;
     options.deviation.horizon = horizon;
     const ModesResult found = modes_of(recording, options);
-    for (std::size_t k = 0; k < static_cast<std::size_t>(found.model.count); ++k) {
-      double nearest = 1e9;
-      for (const FlexibleMode& mode : recording.modes)
-        nearest = std::min(nearest, std::abs(found.model.frequency[k] / mode.frequency - 1.0));
-      frequency.add(nearest);
-    }
+    add_frequency_errors(found.model, recording.modes, &score.frequency);
     simulation.modes = recording.modes;
     simulation.frequency_spread = 0.0;
     simulation.seed = static_cast<std::uint64_t>(1000 + seed);
     simulation.seconds = 45.0;
     const SimulatedStreams streams = simulate_streams(large_boom(), simulation);
-    const Isometry3d T_imu_tool = streams.setup.T_flange_imu.inverse() * streams.setup.T_flange_tool;
-
-    Tracker without(streams.setup, options);
-    options.modes = with_error(found.model, frequency_error);
-    Tracker tracker(streams.setup, options);
-    PoseFilter replay(streams.setup, options.filter), late(streams.setup, options.filter);
-    FiniteDifference difference;
-    std::size_t pose = 0, flange = 0, plan = 0;
-    Sum own, acceleration;
-    int k = 0;
-    play(streams, &tracker, [&](const ImuSample& sample) {
-      for (; plan < streams.plan.size() && streams.plan[plan].arrival < sample.arrival; ++plan)
-        without.push_plan(streams.plan[plan].t, streams.plan[plan].T_base_frame);
-      for (; flange < streams.flange.size() && streams.flange[flange].arrival < sample.arrival; ++flange)
-        without.push_joints(streams.flange[flange].t, streams.flange[flange].T_base_frame);
-      for (; pose < streams.tracker.size() && streams.tracker[pose].arrival < sample.arrival; ++pose) {
-        replay.push_pose(streams.tracker[pose]);
-        without.push_pose(streams.tracker[pose]);
-        difference.push(streams.tracker[pose], streams.setup);
-        PoseSample as_if_now = streams.tracker[pose];
-        as_if_now.t = sample.t - 1e-6;
-        late.push_pose(as_if_now);
-      }
-      replay.push_imu(sample);
-      late.push_imu(sample);
-      without.push_imu(sample);
-      if (++k % 10 != 0) return;
-      replay.update();
-      late.update();
-      const double t = sample.t + horizon;
-      const PosePrediction ours = tracker.predict(t), no_modes = without.predict(t);
-      if (sample.t < kWarmUp || t > simulation.seconds) return;
-      const Isometry3d truth = streams.tool_at(t);
-      const auto add = [&](int method, const Isometry3d& T) {
-        errors[method].add((truth.translation() - T.translation()).norm());
-      };
-      add(kHold, difference.held() * streams.setup.T_flange_tool);
-      add(kNow, extrapolated(late.motion_at(sample.t), horizon, false, T_imu_tool));
-      add(kDifference, difference.at(t) * streams.setup.T_flange_tool);
-      add(kVelocity, extrapolated(replay.motion_at(sample.t), horizon, false, T_imu_tool));
-      add(kAcceleration, extrapolated(replay.motion_at(sample.t), horizon, true, T_imu_tool));
-      acceleration.add(
-          (truth.translation() - extrapolated(replay.motion_at(sample.t), horizon, true, T_imu_tool).translation())
-              .norm());
-      add(kNoModes, no_modes.T_base_tool);
-      add(kOurs, ours.T_base_tool);
-      const Vector6d e = error_of(truth, ours.T_base_tool);
-      own.add(e.head<3>().norm());
-      nees += e.dot(ours.covariance.ldlt().solve(e));
-      used_modes += ours.predictor == Predictor::modes ? 1.0 : 0.0;
-      made += 1.0;
-    });
-    worst_ratio = std::max(worst_ratio, own.rms() / acceleration.rms());
+    score_predictions(streams, options, with_error(found.model, frequency_error), simulation.seconds, &score);
   }
-  const bool gentle = motion == SimulatedMotion::gentle;
   std::printf("%s motion, %.0f ms ahead, position error of the tool, rms over %d seeds\n",
-              gentle ? "gentle" : "stop-and-go", 1e3 * horizon, seeds);
-  line("hold: the last tracker sample", 1e3 * errors[kHold].rms(), "mm");
-  line("filter, late pose used as if now, constant velocity", 1e3 * errors[kNow].rms(), "mm");
-  line("tracker and finite-difference velocity", 1e3 * errors[kDifference].rms(), "mm");
-  line("filter with replay, constant velocity", 1e3 * errors[kVelocity].rms(), "mm");
-  line("filter with replay, constant acceleration", 1e3 * errors[kAcceleration].rms(), "mm");
-  line("truing without modes (plan, deviation at constant acceleration)", 1e3 * errors[kNoModes].rms(), "mm");
-  char what[120];
-  std::snprintf(what, sizeof what, "truing, identified modes%s",
-                frequency_error > 0.0 ? " with 5 % frequency error" : "");
-  if (gentle && horizon < 0.05)
-    row(what, 1e3 * errors[kOurs].rms(), "mm", "<= 0.5 mm", errors[kOurs].rms() <= 0.5e-3);
-  else if (!gentle && horizon > 0.05)
-    row(what, 1e3 * errors[kOurs].rms(), "mm", "<= 1.0 mm", errors[kOurs].rms() <= 1.0e-3);
-  else
-    line(what, 1e3 * errors[kOurs].rms(), "mm");
-  row("worst seed against constant acceleration", worst_ratio, "", "<= 1.10", worst_ratio <= 1.1);
-  line("predictions by modes", 100.0 * used_modes / std::max(1.0, made), "%");
-  line("mean NEES of predictions (6 expected, below: cautious)", nees / std::max(1.0, made), "");
-  line("identified frequencies, rms error", 100.0 * frequency.rms(), "%");
+              motion == SimulatedMotion::gentle ? "gentle" : "stop-and-go", 1e3 * horizon, seeds);
+  print_predictions(score, motion, horizon, frequency_error);
 }
 
 /// NEES of the filter and of its clock offset over seeds, one instant of each run.

@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 
 import truing
 from truing.rotations import interpolated, quaternions_from_rotations, rotation_vectors
-from truing.tracking import InertialResult, ReplayResult, TrackCalibration, calibrate_inertial
+from truing.tracking import InertialResult, TrackCalibration, calibrate_inertial
 from truing.tracking.result import BASELINES, horizon_errors
 
 Floats = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parent.parent
 BEGIN, END = "<!-- track: written by bench/track_real.py -->", "<!-- end of track -->"
-FITTED = 0.5  # share of the tracker's time that clocks and frames are found from
+FITTED = 0.5  # fraction of the tracker's time that clocks and frames are found from
 # what the sensor's data sheet allows its scale to be off: the recording does not show it apart from gravity
 IMU_SCALE = 0.015
 HORIZONS = [0.02, 0.04, 0.08]
@@ -51,7 +51,7 @@ def cut(data: Any, keep: NDArray[np.bool_]) -> Any:
 
 def with_tracker(
     folder: Path,
-) -> tuple[TrackCalibration, list[dict[str, Any]], ReplayResult]:
+) -> tuple[TrackCalibration, list[dict[str, Any]]]:
     """What was found on the first part, and errors of predictions on the rest."""
     robot = truing.load_robot(folder / "robot.yaml")
     imu, tracker, joints = (
@@ -79,7 +79,7 @@ def with_tracker(
         robot, where, imu=cut(imu, later[0]), tracker=cut(tracker, later[1]), joints=cut(joints, later[2])
     )
     played = truing.replay(streams, where.setup, where.options(), horizons=HORIZONS)
-    return found, horizon_errors(played.graded), played
+    return found, horizon_errors(played.graded)
 
 
 def low_passed(values: Floats, rate: float) -> Floats:
@@ -139,132 +139,146 @@ def section(data: Path) -> str:
     lines = [BEGIN, "## Track", ""]
     folder = data / "aubo_i5_run0_60hz"
     if folder.is_dir():
-        found, errors, played = with_tracker(folder)
-        clock, frames, inertial = found.joints_clock, found.frames, found.inertial
-        assert clock is not None and inertial is not None
-        sigma = (
-            np.sqrt(np.diag(frames.T_tracker_base.covariance)),
-            np.sqrt(np.diag(frames.T_flange_receiver.covariance)),
-        )
-        setup, covariance = found.where.setup, found.where.covariance["T_flange_imu"]
-        lines += [
-            (
-                "**Aubo i5 with inertial sensor and Polaris tracker, three clocks.** Clocks and frames from"
-                f" the first {100 * FITTED:.0f} % of the time, and nothing was told beforehand:"
-            ),
-            "",
-            "| | found | standard error | told by the recording's notes |",
-            "| --- | --- | --- | --- |",
-            (
-                f"| joints against tracker | t_joints = t_tracker {clock.offset:+.4f} s |"
-                f" {1e3 * clock.sigma:.1f} ms | −6.9 s |"
-            ),
-            (
-                f"| drift of the tracker's clock | {1e6 * found.where.clock_drift:+.0f} ppm: its stamps say"
-                f" 60 Hz, it ran at {60.0 * (1.0 + found.where.clock_drift):.2f} Hz | | not mentioned |"
-            ),
-            (
-                f"| inertial sensor against joints | t_imu = t_joints {-setup.controller_clock_offset:+.4f} s"
-                f" | {1e3 * np.hypot(clock.sigma, inertial.clock_offset_sigma):.1f} ms | lags by 0.13 s |"
-            ),
-            (
-                f"| inertial sensor against tracker | t_imu = t_tracker {-setup.clock_offset:+.4f} s |"
-                f" {1e3 * inertial.clock_offset_sigma:.1f} ms | |"
-            ),
-            (
-                "| base in the tracker frame |"
-                f" {', '.join(f'{1e3 * v:.1f}' for v in np.asarray(setup.T_tracker_base)[:3, 3])} mm |"
-                f" {', '.join(f'{1e3 * v:.2f}' for v in sigma[0][:3])} mm;"
-                f" {', '.join(f'{1e3 * v:.2f}' for v in sigma[0][3:])} mrad | |"
-            ),
-            (
-                "| receiver on the flange |"
-                f" {', '.join(f'{1e3 * v:.1f}' for v in np.asarray(setup.T_flange_receiver)[:3, 3])} mm |"
-                f" {', '.join(f'{1e3 * v:.2f}' for v in sigma[1][:3])} mm;"
-                f" {', '.join(f'{1e3 * v:.2f}' for v in sigma[1][3:])} mrad | |"
-            ),
-            (
-                "| inertial sensor on the flange |"
-                f" {', '.join(f'{1e3 * v:.1f}' for v in np.asarray(setup.T_flange_imu)[:3, 3])} mm |"
-                f" {', '.join(f'{1e3 * v:.1f}' for v in np.sqrt(np.diag(covariance))[:3])}"
-                " mm | |"
-            ),
-            (
-                f"| gravity in the base | {', '.join(f'{v:.3f}' for v in np.asarray(setup.gravity))} m/s² | |"
-                " along −z |"
-            ),
-            (
-                f"| encoders against tracker, with these frames | {1e3 * frames.position_sigma:.2f} mm a"
-                " component | | 4.3 mm |"
-            ),
-            "",
-            (
-                "Predictions of the receiver on the rest of the time, against the tracker's own later"
-                " samples, position error in mm:"
-            ),
-            "",
-            "| ahead | | rms | median | 95 % | max | samples |",
-            "| --- | --- | --- | --- | --- | --- | --- |",
-        ]
-        names = {
-            "truing": "truing",
-            "hold": "hold: the last tracker sample",
-            "velocity": "tracker, finite-difference velocity",
-            "fk": "forward kinematics with fitted frames",
-            "fk_velocity": "the same at constant velocity",
-        }
-        for row in errors:
-            for name, words in names.items():
-                e = row[name]
-                lines.append(
-                    f"| {1e3 * row['horizon_s']:.0f} ms | {words} | "
-                    + " | ".join(f"{1e3 * e[key]:.2f}" for key in ("rms_m", "median_m", "p95_m", "max_m"))
-                    + f" | {e['n']} |"
-                )
-        at = next(row for row in errors if row["horizon_s"] == 0.04)
-        best = min(BASELINES, key=lambda name: at[name]["rms_m"])
-        verdict = "better" if at["truing"]["rms_m"] < at[best]["rms_m"] else "no better"
-        lines += [
-            "",
-            (
-                "There is no plan in this recording, so what will be commanded is not known to any of them."
-                f" 40 ms ahead truing is {verdict} than the best of the others ({names[best]}):"
-                f" {1e3 * at['truing']['rms_m']:.2f} against {1e3 * at[best]['rms_m']:.2f} mm rms. Errors"
-                f" squared are {at['squares_per_dimension']:.2g} of what was predicted; samples of tracker"
-                " and inertial sensor arrive at their stamps, as the recording has no others."
-            ),
-            "",
-        ]
+        found, errors = with_tracker(folder)
+        lines += [*setup_table(found), *prediction_table(errors)]
     else:
         lines += ["Not there: `aubo_i5_run0_60hz`.", ""]
     folder = data / "aubo_i5_run1"
-    if folder.is_dir():
-        inertial, offset, misfit, rates = without_tracker(folder)
-        T = np.asarray(inertial.T_receiver_imu.T)
-        lines += [
-            (
-                "**Aubo i5 without tracker, 600 s.** The flange by forward kinematics stands in for the"
-                f" tracker: t_imu = t_joints {-inertial.clock_offset:+.4f} s, standard error"
-                f" {1e3 * inertial.clock_offset_sigma:.1f} ms;"
-            ),
-            (
-                f"by turning rates alone {-offset:+.4f} s (told: the inertial sensor lags by about 0.08 s):"
-                " accelerometer and gyro of this sensor have filters of their own, and one offset cannot"
-                " serve both. The sensor is at"
-            ),
-            (
-                f"{', '.join(f'{1e3 * v:.0f}' for v in T[:3, 3])} mm on the flange; gravity"
-                f" {np.linalg.norm(inertial.gravity):.3f} m/s². Gyro against the model's angular velocity"
-                f" below {LOW_PASS:.0f} Hz, offset, one rotation and one bias found on the"
-            ),
-            (
-                f"first {100 * TRAINED:.0f} % of the time, on the rest: **{misfit:.4f} rad/s** rms of"
-                f" {rates:.2f} (baseline 0.0140, without the offset 0.0827)."
-            ),
-        ]
-    else:
-        lines += ["Not there: `aubo_i5_run1`."]
+    lines += inertial_paragraph(folder) if folder.is_dir() else ["Not there: `aubo_i5_run1`."]
     return "\n".join([*lines, END])
+
+
+def in_millimetres(lengths: Floats, decimals: int = 1) -> str:
+    return ", ".join(f"{1e3 * v:.{decimals}f}" for v in lengths)
+
+
+def frame_row(what: str, frame: Any, covariance: Floats) -> str:
+    """Where a frame is, with the standard errors of its position and orientation."""
+    sigma = np.sqrt(np.diag(covariance))
+    return (
+        f"| {what} | {in_millimetres(np.asarray(frame)[:3, 3])} mm |"
+        f" {in_millimetres(sigma[:3], 2)} mm; {in_millimetres(sigma[3:], 2)} mrad | |"
+    )
+
+
+def setup_table(found: TrackCalibration) -> list[str]:
+    """Clocks and frames, beside what the recording's notes say."""
+    clock, frames, inertial = found.joints_clock, found.frames, found.inertial
+    assert clock is not None and inertial is not None
+    setup, covariance = found.where.setup, found.where.covariance["T_flange_imu"]
+    between = np.hypot(clock.sigma, inertial.clock_offset_sigma)
+    drift = found.where.clock_drift
+    return [
+        (
+            "**Aubo i5 with inertial sensor and Polaris tracker, three clocks.** Clocks and frames from"
+            f" the first {100 * FITTED:.0f} % of the time, and nothing was told beforehand:"
+        ),
+        "",
+        "| | found | standard error | told by the recording's notes |",
+        "| --- | --- | --- | --- |",
+        (
+            f"| joints against tracker | t_joints = t_tracker {clock.offset:+.4f} s |"
+            f" {1e3 * clock.sigma:.1f} ms | −6.9 s |"
+        ),
+        (
+            f"| drift of the tracker's clock | {1e6 * drift:+.0f} ppm: its stamps say"
+            f" 60 Hz, it ran at {60.0 * (1.0 + drift):.2f} Hz | | not mentioned |"
+        ),
+        (
+            f"| inertial sensor against joints | t_imu = t_joints {-setup.controller_clock_offset:+.4f} s"
+            f" | {1e3 * between:.1f} ms | lags by 0.13 s |"
+        ),
+        (
+            f"| inertial sensor against tracker | t_imu = t_tracker {-setup.clock_offset:+.4f} s |"
+            f" {1e3 * inertial.clock_offset_sigma:.1f} ms | |"
+        ),
+        frame_row("base in the tracker frame", setup.T_tracker_base, frames.T_tracker_base.covariance),
+        frame_row("receiver on the flange", setup.T_flange_receiver, frames.T_flange_receiver.covariance),
+        (
+            "| inertial sensor on the flange |"
+            f" {in_millimetres(np.asarray(setup.T_flange_imu)[:3, 3])} mm |"
+            f" {in_millimetres(np.sqrt(np.diag(covariance))[:3])} mm | |"
+        ),
+        (
+            f"| gravity in the base | {', '.join(f'{v:.3f}' for v in np.asarray(setup.gravity))} m/s² | |"
+            " along −z |"
+        ),
+        (
+            f"| encoders against tracker, with these frames | {1e3 * frames.position_sigma:.2f} mm a"
+            " component | | 4.3 mm |"
+        ),
+        "",
+    ]
+
+
+def prediction_table(errors: list[dict[str, Any]]) -> list[str]:
+    """Errors of predictions on the rest of the time, and what they say 40 ms ahead."""
+    names = {
+        "truing": "truing",
+        "hold": "hold: the last tracker sample",
+        "velocity": "tracker, finite-difference velocity",
+        "fk": "forward kinematics with fitted frames",
+        "fk_velocity": "the same at constant velocity",
+    }
+    lines = [
+        (
+            "Predictions of the receiver on the rest of the time, against the tracker's own later"
+            " samples, position error in mm:"
+        ),
+        "",
+        "| ahead | | rms | median | 95 % | max | samples |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in errors:
+        for name, words in names.items():
+            e = row[name]
+            lines.append(
+                f"| {1e3 * row['horizon_s']:.0f} ms | {words} | "
+                + " | ".join(f"{1e3 * e[key]:.2f}" for key in ("rms_m", "median_m", "p95_m", "max_m"))
+                + f" | {e['n']} |"
+            )
+    at = next(row for row in errors if row["horizon_s"] == 0.04)
+    best = min(BASELINES, key=lambda name: at[name]["rms_m"])
+    verdict = "better" if at["truing"]["rms_m"] < at[best]["rms_m"] else "no better"
+    return [
+        *lines,
+        "",
+        (
+            "There is no plan in this recording, so what will be commanded is not known to any of them."
+            f" 40 ms ahead truing is {verdict} than the best of the others ({names[best]}):"
+            f" {1e3 * at['truing']['rms_m']:.2f} against {1e3 * at[best]['rms_m']:.2f} mm rms. Errors"
+            f" squared are {at['squares_per_dimension']:.2g} of what was predicted; samples of tracker"
+            " and inertial sensor arrive at their stamps, as the recording has no others."
+        ),
+        "",
+    ]
+
+
+def inertial_paragraph(folder: Path) -> list[str]:
+    """What the recording without a tracker says."""
+    inertial, offset, misfit, rates = without_tracker(folder)
+    T = np.asarray(inertial.T_receiver_imu.T)
+    return [
+        (
+            "**Aubo i5 without tracker, 600 s.** The flange by forward kinematics stands in for the"
+            f" tracker: t_imu = t_joints {-inertial.clock_offset:+.4f} s, standard error"
+            f" {1e3 * inertial.clock_offset_sigma:.1f} ms;"
+        ),
+        (
+            f"by turning rates alone {-offset:+.4f} s (told: the inertial sensor lags by about 0.08 s):"
+            " accelerometer and gyro of this sensor have filters of their own, and one offset cannot"
+            " serve both. The sensor is at"
+        ),
+        (
+            f"{', '.join(f'{1e3 * v:.0f}' for v in T[:3, 3])} mm on the flange; gravity"
+            f" {np.linalg.norm(inertial.gravity):.3f} m/s². Gyro against the model's angular velocity"
+            f" below {LOW_PASS:.0f} Hz, offset, one rotation and one bias found on the"
+        ),
+        (
+            f"first {100 * TRAINED:.0f} % of the time, on the rest: **{misfit:.4f} rad/s** rms of"
+            f" {rates:.2f} (baseline 0.0140, without the offset 0.0827)."
+        ),
+    ]
 
 
 def main() -> None:
