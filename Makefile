@@ -14,7 +14,7 @@ help:
 	@echo "make format      format C++ and Python in place"
 	@echo "make tidy        clang-tidy over cpp/ (some minutes)"
 	@echo "make bench       the benchmarks"
-	@echo "make stubs       write python/truing/_core.pyi from the built module"
+	@echo "make stubs       write python/truing/_core.pyi and _keywords.pyi from the built module"
 	@echo "make docs-check  check the links in *.md"
 	@echo "make clean       remove build/ and demo/ (distclean: .venv as well)"
 	@echo ""

@@ -115,10 +115,10 @@ def ours_refined(scene: HandEyeScene) -> Found:
         truing.handeye(
             poses_of(scene),
             setup=scene.setup,
-            hand_m=scene.hand_m,
-            hand_rad=scene.hand_rad,
-            camera_m=scene.camera_m,
-            camera_rad=scene.camera_rad,
+            hand_position_sigma=scene.hand_m,
+            hand_rotation_sigma=scene.hand_rad,
+            camera_position_sigma=scene.camera_m,
+            camera_rotation_sigma=scene.camera_rad,
             raise_if_undecided=False,
         )
     )
@@ -137,9 +137,9 @@ def ours_pixels(scene: HandEyeScene) -> Found:
         truing.handeye(
             poses_of(scene, with_pixels=True),
             setup=scene.setup,
-            hand_m=scene.hand_m,
-            hand_rad=scene.hand_rad,
-            pixel=scene.pixel,
+            hand_position_sigma=scene.hand_m,
+            hand_rotation_sigma=scene.hand_rad,
+            pixel_sigma=scene.pixel,
             raise_if_undecided=False,
         )
     )

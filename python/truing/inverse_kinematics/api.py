@@ -13,7 +13,7 @@ made.solutions.joints, made.T_command
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,32 +32,31 @@ from truing._core import (
 )
 from truing.errors import InputError
 from truing.files import TargetData, Uncertainty
+from truing.keywords import made, takes
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from truing._keywords import InverseKeywords, PathKeywords
 
 Kind = Literal["pose", "torch", "point"]
-Choose = Literal["nearest", "limits_margin", "manipulability", "rail_travel"]
 Targets = Sequence[Task] | TargetData | ArrayLike
 GivenConditions = Conditions | Sequence[Conditions] | None
 Progress = Callable[[int], object]
 
-_USUAL = _core.InverseOptions()  # the defaults stand in inverse.hpp alone
-_USUAL_PATH = _core.PathOptions()
 
-
+@takes(_core.InverseOptions)
 def inverse(
     robot: Robot,
     targets: Targets,
     *,
     kind: Kind = "pose",
     seeds: ArrayLike | None = None,
-    choose: Choose = _USUAL.choose,
-    scene: Scene | None = None,
     conditions: GivenConditions = None,
     target: int = 0,
-    position_tolerance: float = _USUAL.position_tolerance,
-    rotation_tolerance: float = _USUAL.rotation_tolerance,
-    max_restarts: int = _USUAL.max_restarts,
     threads: int = 0,
     progress: Progress | None = None,
+    **options: Unpack[InverseKeywords],
 ) -> Solutions:
     """Joint readings that bring the robot's tool to each target, effects included. The result says which
     targets are not reached, and why.
@@ -68,29 +67,18 @@ def inverse(
     alone).
     seeds: shape=(driven joints,) or (n, driven joints) [rad | m], where the robot comes from; None: those of
     the file, or the middle of the joints' ranges.
-    choose: which of several solutions: "nearest" to the seed, "limits_margin", "manipulability" or
-    "rail_travel".
-    scene: obstacles, and capsules around links, that must not collide.
     conditions: payload, approach direction …, one or one per target; None: those of the file.
     target: which of the robot's targets is brought there, its index.
-    position_tolerance: [m], rotation_tolerance: [rad] largest error of a solution. max_restarts: descents
-    before a target counts as not reached.
     threads: 0: as many as the machine has; the solutions are the same for any number. progress: called with
     targets done, now and then.
+    options: fields of `InverseOptions`.
 
     For many calls with one robot make an `InverseSolver` once. Raises InputError on robots, targets or
     options that cannot be used.
     """
     tasks = _tasks(targets)
     given = _conditions(targets, conditions)
-    options = _core.InverseOptions(
-        position_tolerance=position_tolerance,
-        rotation_tolerance=rotation_tolerance,
-        choose=choose,
-        max_restarts=max_restarts,
-        scene=scene or Scene(),
-    )
-    solver = InverseSolver(robot, options, _first(given), target=target)
+    solver = InverseSolver(robot, made(_core.InverseOptions, options), _first(given), target=target)
     return solver.solve_batch(
         tasks,
         _seeds(targets, seeds),
@@ -101,6 +89,7 @@ def inverse(
     )
 
 
+@takes(_core.PathOptions)
 def inverse_path(
     robot: Robot,
     targets: Targets,
@@ -110,12 +99,8 @@ def inverse_path(
     scene: Scene | None = None,
     conditions: Conditions | None = None,
     target: int = 0,
-    longest_turn: float = _USUAL_PATH.longest_turn,
-    longest_slide: float = _USUAL_PATH.longest_slide,
-    rolls: int = _USUAL_PATH.rolls,
-    rail_places: int = _USUAL_PATH.rail_places,
-    smoothing: int = _USUAL_PATH.smoothing,
     progress: Progress | None = None,
+    **options: Unpack[PathKeywords],
 ) -> JointPath:
     """Joints along a sequence of targets, in the shortest steps. Where no step keeps within the bounds, the
     result lists a gap.
@@ -123,8 +108,7 @@ def inverse_path(
     robot, targets, kind, scene, target, progress: as in `inverse`. seed: shape=(driven joints,) [rad | m],
     where the robot comes from.
     conditions: of the whole path; None: those of the file, whose rows must agree.
-    longest_turn: [rad], longest_slide: [m] of a joint between neighbouring targets. A larger step is a gap.
-    rolls: samples of a torch's free roll. rail_places: samples of each rail. smoothing: rounds of smoothing.
+    options: fields of `PathOptions`.
 
     Raises InputError as `inverse` does.
     """
@@ -133,18 +117,13 @@ def inverse_path(
         targets.path_conditions() if conditions is None and isinstance(targets, TargetData) else conditions
     )
     solver = InverseSolver(robot, _core.InverseOptions(scene=scene or Scene()), given, target=target)
-    options = _core.PathOptions(
-        longest_turn=longest_turn,
-        longest_slide=longest_slide,
-        rolls=rolls,
-        rail_places=rail_places,
-        smoothing=smoothing,
-    )
+    steps = made(_core.PathOptions, options)
     seeds = _seeds(targets, seed)
     first = None if seeds is None else seeds if seeds.ndim == 1 else seeds[0]
-    return solver.path(tasks, first, options, given, like=Task(np.eye(4), kind=kind), progress=progress)
+    return solver.path(tasks, first, steps, given, like=Task(np.eye(4), kind=kind), progress=progress)
 
 
+@takes(_core.InverseOptions)
 def compensate(
     nominal: Robot,
     calibrated: Robot,
@@ -153,33 +132,30 @@ def compensate(
     program: bool = False,
     kind: Kind = "pose",
     seeds: ArrayLike | None = None,
-    choose: Choose = _USUAL.choose,
-    scene: Scene | None = None,
     conditions: GivenConditions = None,
     target: int = 0,
     in_base: bool = False,
     uncertainty: Uncertainty | None = None,
     threads: int = 0,
     progress: Progress | None = None,
+    **options: Unpack[InverseKeywords],
 ) -> Compensations:
     """Commands for a controller that has the nominal model, so that the calibrated robot reaches the targets.
 
     nominal: the controller's model. calibrated: what `identify` found. targets: as in `inverse`; or, with
     `program`, joint positions, shape=(n, driven joints) [rad | m], at which the nominal robot's poses are the
     targets. A file with joints and no poses is a program.
-    kind, seeds, choose, scene, conditions, target, threads, progress: as in `inverse`. The seed decides the
-    configuration.
+    kind, seeds, conditions, target, threads, progress: as in `inverse`. The seed decides the configuration.
     in_base: poses and commands are in each robot's own base frame, as programs have them; else in the
     measurement frame.
     uncertainty: what `load_uncertainty` read, for the standard error of where the tool will be.
+    options: fields of `InverseOptions`.
 
     Raises InputError as `inverse` does, and when the robots have different joints.
     """
     given = _conditions(targets, conditions)
-    options = _core.CompensateOptions(
-        inverse=_core.InverseOptions(choose=choose, scene=scene or Scene()), in_base=in_base
-    )
-    maker = Compensator(nominal, calibrated, options, _first(given), target=target)
+    chosen = _core.CompensateOptions(inverse=made(_core.InverseOptions, options), in_base=in_base)
+    maker = Compensator(nominal, calibrated, chosen, _first(given), target=target)
     if uncertainty is not None:
         maker.set_uncertainty(uncertainty.names, uncertainty.values, uncertainty.covariance)
     if program or isinstance(targets, TargetData) and targets.is_program:

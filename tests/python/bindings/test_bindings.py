@@ -17,8 +17,12 @@ import pytest
 
 import truing
 from truing import _core
+from truing.diagnosis import DiagnoseOptions
 from truing.effects import Inputs, parse_effects
+from truing.hand_eye import HandEyeOptions
 from truing.identification import Identification, IdentifyOptions
+from truing.inverse_kinematics import InverseOptions, PathOptions
+from truing.keywords import fields, made
 from truing.model import (
     Anchor,
     AppliedEffect,
@@ -108,18 +112,33 @@ def test_an_unknown_word_lists_the_choices(make: Any, choices: str) -> None:
         make()
 
 
-def test_the_wrappers_defaults_are_those_of_the_core() -> None:
-    for function, options in (
+@pytest.mark.parametrize(
+    ("function", "options"),
+    [
         (truing.identify, IdentifyOptions()),
         (truing.plan, PlanOptions()),
         (truing.distinguish, DistinguishOptions()),
-    ):
-        for name, parameter in inspect.signature(function).parameters.items():
-            if not hasattr(options, name):
-                assert name in {"robot", "data", "joints", "effects", "raise_if_not_converged"}
-                continue
-            default = {} if parameter.default is None else parameter.default
-            assert default == getattr(options, name), name
+        (truing.diagnose, DiagnoseOptions()),
+        (truing.handeye, HandEyeOptions()),
+        (truing.inverse, InverseOptions()),
+        (truing.inverse_path, PathOptions()),
+        (truing.compensate, InverseOptions()),
+    ],
+)
+def test_functions_take_the_fields_of_their_options_and_say_what_they_mean(
+    function: Any, options: Any
+) -> None:
+    taken, names = inspect.signature(function).parameters, fields(type(options))
+    assert names and "options" not in taken
+    for name in names:
+        assert taken[name].default == getattr(options, name) or name == "scene", name
+        first = (getattr(type(options), name).__doc__ or "").split()[0]
+        assert f"\n{name} = " in function.__doc__ and first in function.__doc__, name
+
+
+def test_names_may_be_one_text() -> None:
+    made_of = made(IdentifyOptions, {"free": "J2.*, tool.x", "hold": ["base.*"], "loss": "none"})
+    assert made_of.free == ("J2.*", "tool.x") and made_of.hold == ("base.*",) and made_of.loss == "none"
 
 
 def test_what_is_set_on_a_joint_reaches_the_robot(robot: truing.Robot) -> None:

@@ -78,7 +78,7 @@ def default_of(command: str, field: str) -> Any:
     [
         ("identify", "solver", _core.IdentifyOptions().solver),
         ("identify", "loss", _core.IdentifyOptions().loss),
-        ("identify", "frame", _core.IdentifyOptions().frame_by),
+        ("identify", "frame_by", _core.IdentifyOptions().frame_by),
         ("identify", "test_share", _core.IdentifyOptions().test_share),
         ("identify", "rotation_length", _core.IdentifyOptions().rotation_length),
         ("diagnose", "false_alarm", _core.DiagnoseOptions().false_alarm),

@@ -258,11 +258,11 @@ class Command(run.Command[Loaded, "Solved | None"]):
             "reading": self.reading,
         }
         if self.hand_sigma:
-            keywords["hand_m"], keywords["hand_rad"] = self.hand_sigma
+            keywords["hand_position_sigma"], keywords["hand_rotation_sigma"] = self.hand_sigma
         if self.camera_sigma:
-            keywords["camera_m"], keywords["camera_rad"] = self.camera_sigma
+            keywords["camera_position_sigma"], keywords["camera_rotation_sigma"] = self.camera_sigma
         given = {
-            "pixel": self.pixel_sigma,
+            "pixel_sigma": self.pixel_sigma,
             "working_point": self.working_point,
             "known_height": self.known_height,
             "refine_camera": self.refine_camera or None,

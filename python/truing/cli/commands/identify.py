@@ -56,7 +56,7 @@ class Command(run.Command["tuple[Robot, Measurements]", "Identification"]):
         Literal["lm", "ceres"],
         Choice("Levenberg-Marquardt of the palletizer method, or Ceres.", panel=FIT),
     ] = core("IdentifyOptions", "solver")
-    frame: Annotated[
+    frame_by: Annotated[
         Literal["parameters", "svd"],
         Choice("Measurement frame: six more parameters, or registered after every step.", panel=FIT),
     ] = core("IdentifyOptions", "frame_by")
@@ -84,7 +84,7 @@ class Command(run.Command["tuple[Robot, Measurements]", "Identification"]):
             effects=self.effects,
             solver=self.solver,
             loss=self.loss,
-            frame_by=self.frame,
+            frame_by=self.frame_by,
             rotation_length=self.rotation_length,
             test_share=self.test_share,
             seed=self.seed,
