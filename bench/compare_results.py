@@ -297,7 +297,7 @@ def is_number(value: Any) -> bool:
 
 
 def distance(before: Leaf, after: Leaf) -> float:
-    """Of two numbers, in standard errors, or as a share of their size where there is none."""
+    """Of two numbers, in standard errors, or as a fraction of their size where there is none."""
     a, b = float(before.value), float(after.value)
     if a == b or (math.isnan(a) and math.isnan(b)):
         return 0.0

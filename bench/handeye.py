@@ -406,7 +406,7 @@ def ratios(results: Mapping[int, Mapping[str, Tally]], name: str) -> str:
 
 
 def outliers(quick: bool) -> Iterator[str]:
-    """10 degrees and 30 mm in a share of the boards; the oracle knows which."""
+    """10 degrees and 30 mm in a fraction of the boards; the oracle knows which."""
     methods = {**OPENCV, **ORACLE, **OURS}
     trials = {name: 20 if quick else 100 for name in methods}
     results = {share: tally(methods, trials, scenes(poses=30, outliers=share)) for share in (0.0, 0.1, 0.3)}
@@ -424,8 +424,8 @@ def outliers(quick: bool) -> Iterator[str]:
     yield from (
         "",
         (
-            "Eye-to-hand, 30 poses; that share of the boards is seen 10 deg and 30 mm off. The oracle is told"
-            " which."
+            "Eye-to-hand, 30 poses; that fraction of the boards is seen 10 deg and 30 mm off. The oracle is"
+            " told which."
         ),
     )
 

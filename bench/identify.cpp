@@ -223,7 +223,7 @@ void time_identify(const Robot& nominal, const Robot& truth, std::mt19937_64* ra
   report("identify_1000_iterations", result.solver.iterations, "1");
 }
 
-/// Median over 20 seeds of the rms error on fresh poses, as a share of sigma sqrt(p / N).
+/// Median over 20 seeds of the rms error on fresh poses, as a fraction of sigma sqrt(p / N).
 void accuracy(const Robot& nominal) {
   for (const std::size_t rows : {200u, 1000u}) {
     std::vector<double> ratios;

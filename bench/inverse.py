@@ -42,7 +42,7 @@ from inverse_peers import PEERS  # noqa: E402
 Floats = NDArray[np.float64]
 METRES = RADIANS = 1e-6
 BEYOND = 1e-6  # of limits, before an answer is called wrong [rad | m]
-ROUNDING = 1e-9  # a share of the tolerances
+ROUNDING = 1e-9  # a fraction of the tolerances
 JUMP = 0.1  # on a path whose steps are a tenth of it [rad | m]
 SAME = 1e-4  # branches that differ by less are one [rad]
 NEAR = 1e-2  # and rough ones are near one [rad]
@@ -68,7 +68,7 @@ class Result:
     targets: int
     median_us: float = math.nan
     p99_us: float = math.nan
-    reached: float = math.nan  # share of the targets with an answer that holds
+    reached: float = math.nan  # fraction of the targets with an answer that holds
     wrong: int = 0  # answers that were said to hold and do not
     worst: float = 0.0  # error of the worst of these [m | rad]
     note: str = ""
@@ -420,7 +420,7 @@ def rails(results: list[Result]) -> Iterator[str]:
 
 
 def compare(one: Result) -> tuple[int, float, int]:
-    """Targets on which the grid's merit is larger, by which share at most, and targets on which it is
+    """Targets on which the grid's merit is larger, by which fraction at most, and targets on which it is
     smaller.
     """
     ours, grid = one.raw["answers"][:, -2], one.raw["answers"][:, -1]
@@ -598,7 +598,7 @@ def reaches(results: list[Result]) -> Iterator[str]:
             for why, bad in (
                 ("median", median > reach.median_us),
                 ("p99", p99 > reach.p99_us),
-                ("share", reached < reach.share),
+                ("fraction", reached < reach.share),
                 ("wrong claims", mistaken > 0),
                 (reach.more, not all(reach.holds(one) for one in ours)),
             )

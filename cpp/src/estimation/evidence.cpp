@@ -21,7 +21,7 @@ std::vector<double> scales_of(std::size_t columns) {
   if (columns > kManyColumns) return {1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001};
   return {1.0, 0.1, 0.01, 0.001};
 }
-/// A nuisance column that the others explain but for this share of its square is held at zero.
+/// A nuisance column that the others explain but for this fraction of its square is held at zero.
 constexpr double kFlat = 1e-9;
 
 Eigen::MatrixXd block(const Eigen::MatrixXd& m, const std::vector<int>& rows, const std::vector<int>& columns) {

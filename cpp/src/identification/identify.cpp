@@ -36,7 +36,7 @@ std::string count_of(std::size_t n, const char* what) { return std::to_string(n)
 
 // --- which rows, which parameters ------------------------------------------------------------------------------------
 
-/// 0 train, 1 test for every row: the data's own split, or a share of the pose groups drawn with the seed.
+/// 0 train, 1 test for every row: the data's own split, or a fraction of the pose groups drawn with the seed.
 std::vector<std::int8_t> split(const Measurements& data, const IdentifyOptions& options) {
   const std::vector<std::int32_t> group = pose_groups(data);
   const std::size_t groups =

@@ -21,7 +21,7 @@ struct Rank {
 
 /// Cholesky of the Gram of unit columns, leaving out columns that those kept already explain. Columns of lower
 /// `priority` number come first; within one number the clearly visible, then the order of the columns. A Gram cannot
-/// tell shares below about 1e-7.
+/// tell fractions below about 1e-7.
 Rank find_rank(const Eigen::MatrixXd& gram, const std::vector<int>& priority, double tolerance);
 
 /// Inverse of a Gram matrix through its unit-column scaling.

@@ -29,7 +29,7 @@ namespace {
 /// Pairs to be told apart get poses until less than this is shared: the size needed is then three times what it takes
 /// to be seen.
 constexpr double kGoal = 0.9;
-/// A pose that tells less than this share of an effect does not tell.
+/// A pose that tells less than this fraction of an effect does not tell.
 constexpr double kTellsNothing = 1e-6;
 /// Nor does one after which R2 falls by less than this, on average.
 constexpr double kProgress = 1e-4;

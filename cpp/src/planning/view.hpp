@@ -52,7 +52,7 @@ struct View {
   double values = 0.0;
 
   bool is_visible(std::size_t group) const { return seen[group].basis.cols() > 0; }
-  /// Share of group a's motion of the tip that group b explains.
+  /// Fraction of group a's motion of the tip that group b explains.
   double r2(std::size_t a, std::size_t b) const;
   /// What is left of a parameter's square beyond base, tool and the rival.
   double visible_beside(std::size_t rival, Eigen::Index column) const;

@@ -24,7 +24,7 @@ _DEGREE = math.pi / 180.0
 _SPREAD_ROWS = 20_000  # rows to judge a spread from
 _POSE_ROWS = 200  # rows to run forward kinematics on
 _ROBOT_REACHES = 20.0  # positions spread over more than this many reaches are in another unit
-_ALIKE = 0.8  # share of the positions' variance that the model must explain before it counts as a witness
+_ALIKE = 0.8  # fraction of the positions' variance that the model must explain before it counts as a witness
 
 
 def check_units_look_right(
@@ -281,7 +281,7 @@ class _Match:
         size_a, size_b = float((a * a).sum()), float((b * b).sum())
         self.scale = self.explained = 0.0
         if size_a > 0.0 and size_b > 0.0 and math.isfinite(size_a * size_b):
-            # Umeyama 1991, eq. 40 to 42; `explained` is the share of the measured variance.
+            # Umeyama 1991, eq. 40 to 42; `explained` is the fraction of the measured variance.
             u, singular, vt = np.linalg.svd(b.T @ a)
             singular[2] *= np.sign(np.linalg.det(u) * np.linalg.det(vt))
             self.scale = float(singular.sum()) / size_a

@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 CLOUD_POINTS = 4000
 PATH_POINTS = 2000
 LISTED = 200
-NEAR_LIMIT = 0.02  # share of a joint's range
+NEAR_LIMIT = 0.02  # fraction of a joint's range
 # In the order of the core's reasons: what is said of a target, and its colour.
 REASONS: Mapping[str, tuple[str, str]] = {
     "reached": ("reached", AFTER),
@@ -381,7 +381,7 @@ def _ranges(page: Page, result: Mapping[str, Any]) -> None:
         {
             "barmode": "overlay",
             "bargap": 0.35,
-            "xaxis": {"title": {"text": "share of the joint's range [%]"}, "range": [0, 100]},
+            "xaxis": {"title": {"text": "fraction of the joint's range [%]"}, "range": [0, 100]},
             "yaxis": {"autorange": "reversed", "type": "category", "dtick": 1, "ticks": ""},
             "margin": {"l": 60, "r": 12, "t": 4, "b": 42},
             "height": 70 + 26 * len(names),

@@ -284,7 +284,7 @@ def _check_scene(setup: str, poses: int, outliers: float, sizes: Sequence[float]
     if poses < 1:
         raise InputError(f"poses: found {poses}, expected at least 1")
     if not 0 <= outliers < 1:
-        raise InputError(f"share of outliers: found {outliers:g}, expected 0 to 1")
+        raise InputError(f"fraction of outliers: found {outliers:g}, expected 0 to 1")
     if min(sizes) < 0:
         raise InputError("noise and the size of outliers must not be negative")
 
