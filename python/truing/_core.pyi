@@ -2174,7 +2174,9 @@ class FoundEffect:
     @property
     def share(self) -> float:
         """
-        Fraction of the gap's mean square; those of all effects and unknowns add up to what was closed.
+        Fraction of the gap's mean square: its fall when the effect is added with the size found, averaged
+        over the orders in which effects may be added; those of all effects and unknowns add up to what was
+        closed.
         """
     @property
     def share_alone(self) -> float:
@@ -2190,6 +2192,11 @@ class FoundEffect:
     def shrink(self) -> Share:
         """
         Of the held-out rms: 1 - after / before.
+        """
+    @property
+    def size_at_tip(self) -> float:
+        """
+        [m] rms motion of the tip that it makes, beyond what base and tool could do as well.
         """
 class UnknownEffect:
     """
@@ -2242,6 +2249,11 @@ class UnknownEffect:
     def shrink(self) -> Share:
         """
         Of the held-out rms: 1 - after / before.
+        """
+    @property
+    def size_at_tip(self) -> float:
+        """
+        [m] rms motion of the tip, as that of an effect.
         """
 class Detectable:
     """
@@ -2485,6 +2497,17 @@ class Diagnosis:
     def error_before(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Shape=(n,) [m]: of every row, as `gap`.
+        """
+    @property
+    def explained(self) -> typing.Literal['explained', 'partly explained', 'not explained', 'no gap', 'does not hold']:
+        """
+        How much is left.
+        
+        'explained': no more than the noise itself
+        'partly explained': more than the noise, and at most half of the gap
+        'not explained': more than half of the gap; or nothing was named
+        'no gap': there was none beyond noise
+        'does not hold': held-out errors are no less with what was found
         """
     @property
     def gap(self) -> ErrorStatistics:

@@ -46,6 +46,15 @@ enum class Verdict {
   does_not_hold,        ///< what was found does not make the error of held-out poses less: nothing of it is in `robot`
 };
 
+/// How much of the gap the named effects leave, as mean squares of held-out errors beyond the noise.
+enum class Explained {
+  explained,         ///< no more than the noise itself
+  partly_explained,  ///< "partly explained": more than the noise, and at most half of the gap
+  not_explained,     ///< "not explained": more than half of the gap; or nothing was named
+  no_gap,            ///< "no gap": there was none beyond noise
+  does_not_hold,     ///< "does not hold": held-out errors are no less with what was found
+};
+
 /// A fraction and its 90 % interval.
 struct Share {
   double value = 0.0;  ///< 1: all of it
@@ -83,10 +92,12 @@ struct FoundEffect {
   ErrorStatistics held_out_before;    ///< held-out errors without this effect, all others in
   ErrorStatistics held_out_after;     ///< held-out errors with all named effects
   Share shrink;                       ///< of the held-out rms: 1 - after / before
-  /// Fraction of the gap's mean square; those of all effects and unknowns add up to what was closed.
+  /// Fraction of the gap's mean square: its fall when the effect is added with the size found, averaged over the orders
+  /// in which effects may be added; those of all effects and unknowns add up to what was closed.
   double share = 0.0;
   double share_alone = 0.0;  ///< fraction of the gap's mean square that it closes when it is the only one
   double share_last = 0.0;   ///< fraction that it closes when all others are in already
+  double size_at_tip = 0.0;  ///< [m] rms motion of the tip that it makes, beyond what base and tool could do as well
   std::vector<Alternative> confounded_with;  ///< effects that would explain these data as well
   std::string note;  ///< what else is to be known of it: 'not linear in the torque' …; may be empty
   /// What `effects` of `identify` and `truing identify --effects` take for it: 'backlash:J3'; empty for a frame that
@@ -105,6 +116,7 @@ struct UnknownEffect {
   ErrorStatistics held_out_after;   ///< held-out errors with it
   Share shrink;                     ///< of the held-out rms: 1 - after / before
   double share = 0.0;               ///< fraction of the gap's mean square, as that of an effect
+  double size_at_tip = 0.0;         ///< [m] rms motion of the tip, as that of an effect
   std::vector<Curve> curves;  ///< along the first input; of two inputs, one for each of three ranges of the second
   std::string looks_like;     ///< in words: 'a step at q4 = 0.41 rad'
 };
@@ -166,12 +178,13 @@ struct NextPose {
 
 /// What `diagnose` found.
 struct Diagnosis {
-  Verdict verdict = Verdict::none;  ///< whether there is a gap, and whether the effects named explain it
-  std::string sentence;             ///< the verdict in words
-  ErrorStatistics gap;              ///< held-out errors with base, targets (and anchor) fitted only
-  double noise_floor = 0.0;         ///< [m] rms length of a row's error that is noise
-  bool noise_from_repeats = false;  ///< the noise is that of repeated poses, not what a flexible fit leaves
-  Share shrink;                     ///< of the held-out rms, by `robot`: 1 - its error / gap
+  Verdict verdict = Verdict::none;          ///< whether there is a gap, and whether the effects named explain it
+  Explained explained = Explained::no_gap;  ///< how much is left
+  std::string sentence;                     ///< the verdict in words
+  ErrorStatistics gap;                      ///< held-out errors with base, targets (and anchor) fitted only
+  double noise_floor = 0.0;                 ///< [m] rms length of a row's error that is noise
+  bool noise_from_repeats = false;          ///< the noise is that of repeated poses, not what a flexible fit leaves
+  Share shrink;                             ///< of the held-out rms, by `robot`: 1 - its error / gap
   double closable = 0.0;  ///< fraction of the gap's mean square above the noise floor that the named effects close
   double p_gap = 1.0;     ///< p-value of the gap: probability of a gain as large under noise alone
   ErrorStatistics after;  ///< held-out errors with all named effects, corrections of their laws and drifts included

@@ -344,6 +344,9 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   }
   out.confounded_with = class_of(work, e, sure, probability);
   for (Alternative& mimic : untested_mimics(work, e)) out.confounded_with.push_back(std::move(mimic));
+  std::vector<int> columns;
+  for (const std::size_t c : columns_of_law(work, decision, g)) columns.push_back(decision.state.columns[c]);
+  out.size_at_tip = size_at_tip(work, decision.state, columns);
   draw_law(work, decision, g, &out);
   return out;
 }
@@ -378,6 +381,8 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   out.held_out_after = shrinkage.after;
   out.shrink = shrinkage.shrink;
   if (shrinkage.gap > 0.0) out.share = std::max(0.0, shrinkage.closed_by_last) / shrinkage.gap;
+  out.size_at_tip =
+      size_at_tip(work, decision.state, work.design.candidates.groups[static_cast<std::size_t>(g)].columns);
   const Evidence::State less = evidence.evaluate(without(decision.state.choice, work.design.candidates.groups, at));
   const double loss = decision.state.score - less.score;
   out.probability = std::clamp(0.5 + 0.49 * std::min(1.0, loss / 30.0), 0.0, 0.99);
@@ -531,31 +536,15 @@ static std::string would_have_shown(const std::vector<Detectable>& detectable) {
                         [&](const Detectable& a, const Detectable& b) { return rank(a) < rank(b); });
   const ReportUnit& shown = model::traits_of(easiest.effect, {}).reported;
   const bool converted = easiest.unit == shown.of;
-  return " A " + easiest.effect + (easiest.joint.empty() ? "" : " at " + easiest.joint) + " above " +
+  return " A " + plain(easiest.effect) + (easiest.joint.empty() ? "" : " at " + easiest.joint) + " above " +
          number(converted ? shown.factor * easiest.size : easiest.size, 2) + " " +
          (converted ? shown.unit : easiest.unit) + " would have shown.";
-}
-
-/// "backlash at J3, harmonic at J2 and 3 more", with what the data cannot tell from them.
-static std::string names_in_words(const Diagnosis& d) {
-  constexpr std::size_t kMost = 4;
-  std::string text;
-  const std::size_t shown = std::min(d.effects.size(), kMost);
-  for (std::size_t k = 0; k < shown; ++k) {
-    const FoundEffect& effect = d.effects[k];
-    text += (k == 0 ? "" : k + 1 == shown ? " and " : ", ") + effect.effect + at_joints(effect.joints);
-    if (effect.confounded_with.empty() || !(effect.confounded_with[0].probability > 0.0)) continue;
-    const Alternative& other = effect.confounded_with[0];
-    text += " (or " + other.effect + at_joints(other.joints) + ": these data cannot tell)";
-  }
-  if (d.effects.size() > kMost) text += " and " + std::to_string(d.effects.size() - kMost) + " more";
-  return text;
 }
 
 static std::string causes_in_words(const Diagnosis& d) {
   if (d.effects.empty())
     return "There is a gap of " + millimetres(d.gap.rms) + " that no effect of the catalogue explains.";
-  return "The gap of " + millimetres(d.gap.rms) + " shrinks to " + millimetres(d.after.rms) + ": " + names_in_words(d) +
+  return "The gap of " + millimetres(d.gap.rms) + " shrinks to " + millimetres(d.after.rms) + ": " + largest_causes(d) +
          ".";
 }
 
@@ -563,7 +552,7 @@ static std::string failure_in_words(const Diagnosis& d) {
   const double after = d.effects.empty() ? d.after_unknown.rms : d.after.rms;
   return "The model found does not hold on poses that it never saw: their error of " + millimetres(d.gap.rms) +
          " would be " + millimetres(after) + " with " +
-         (d.effects.empty() ? std::string("the functions found") : names_in_words(d)) +
+         (d.effects.empty() ? std::string("the functions found") : largest_causes(d)) +
          ". Nothing of it is in the robot's file: measure more poses, spread over the whole range.";
 }
 
@@ -582,8 +571,12 @@ static std::string unknown_in_words(const Diagnosis& d) {
          (u.looks_like.empty() || of_two || u.joint == "base" ? "" : " (" + u.looks_like + ")") + ".";
 }
 
+bool too_few_poses(const Diagnosis& d) {
+  return d.verdict == Verdict::none && d.gap.rms > kMoreThanNoise * d.noise_floor;
+}
+
 std::string sentence_of(const Diagnosis& d) {
-  if (d.verdict == Verdict::none && d.gap.rms > kMoreThanNoise * d.noise_floor) {
+  if (too_few_poses(d)) {
     return "These poses are too few to tell a gap from noise: with base and tool fitted, held-out poses are off by " +
            millimetres(d.gap.rms) + " rms, and a fit of everything at once leaves " + millimetres(d.noise_floor) +
            ". Measure more of them.";

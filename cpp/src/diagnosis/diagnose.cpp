@@ -17,6 +17,7 @@
 #include "diagnosis/sanity.hpp"
 #include "diagnosis/where.hpp"
 #include "math/statistics.hpp"
+#include "math/text.hpp"
 #include "model/effects/traits.hpp"
 #include "rooms.hpp"
 
@@ -31,6 +32,7 @@ constexpr double kCorrectionShare = 0.05;  ///< of the gap, from which on a law'
 constexpr double kLackOfFit = 4.0;         ///< standard errors beyond repeats, from which on what is left is no noise
 constexpr double kEnoughRepeats = 20.0;    ///< degrees of freedom, for the noise to be taken from repeats
 constexpr double kHardlyLess = 0.98;       ///< of the gap: what is left of it where nothing was explained
+constexpr double kManyOutliers = 0.05;     ///< of the rows, from which on they are no exceptions
 constexpr double kNamed = 0.5;             ///< a name is given to what is more likely right than wrong
 
 void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
@@ -135,10 +137,15 @@ void say_outliers(const Work& work, const std::vector<std::int32_t>& rows, Diagn
     outliers.insert(static_cast<std::size_t>(rows[static_cast<std::size_t>(row)]));
   out->outliers.assign(outliers.begin(), outliers.end());
   if (outliers.empty()) return;
-  out->sanity.push_back({"outliers",
-                         std::to_string(outliers.size()) +
-                             " rows stand so far out that they count for little: look at them first if they are many.",
-                         outliers.size() <= 50 ? out->outliers : std::vector<std::size_t>{}});
+  const std::size_t count = outliers.size(), of = std::max<std::size_t>(1, rows.size());
+  const bool many = static_cast<double>(count) >= kManyOutliers * static_cast<double>(of);
+  const std::string fraction = number(100.0 * static_cast<double>(count) / static_cast<double>(of), 2) + " %";
+  std::string text = std::to_string(count) + (count == 1 ? " row of " : " rows of ") + std::to_string(of);
+  text += many ? " (" + fraction +
+                     ") stand so far out that they count for little: what was found is said of the others. "
+                     "Either these rows are wrong, or something happens in them that nothing found describes."
+               : " stand so far out that they count for little.";
+  out->sanity.push_back({"outliers", text, count <= 50 ? out->outliers : std::vector<std::size_t>{}});
 }
 
 /// How sure a named group is, and that as a probability.
@@ -255,6 +262,7 @@ void merge_the_same(Diagnosis* out) {
       first.probability = std::max(first.probability, second.probability);
       first.share_alone = std::max(first.share_alone, second.share_alone);
       first.share_last += second.share_last;
+      first.share += second.share;
       first.parameters.insert(first.parameters.end(), second.parameters.begin(), second.parameters.end());
       if (first.curves.empty()) first.curves = second.curves;
       out->effects.erase(out->effects.begin() + static_cast<std::ptrdiff_t>(m));
@@ -269,16 +277,17 @@ void merge_the_same(Diagnosis* out) {
   }
 }
 
-/// Shares that add up: between alone and last, scaled to what all together close.
+/// Shares that add up to what all together close in the exact fit. One below zero, by the held-out poses' noise, is
+/// none.
 void share_the_gap(Diagnosis* out) {
   const double closed =
       std::max(0.0, 1.0 - std::pow(out->gap.rms > 0.0 ? out->after_unknown.rms / out->gap.rms : 1.0, 2.0));
   double total = 0.0;
-  for (const FoundEffect& effect : out->effects) total += 0.5 * (effect.share_alone + effect.share_last);
-  for (const UnknownEffect& unknown : out->unknown) total += unknown.share;
-  for (FoundEffect& effect : out->effects)
-    effect.share = total > 0.0 ? closed * 0.5 * (effect.share_alone + effect.share_last) / total : 0.0;
-  for (UnknownEffect& unknown : out->unknown) unknown.share = total > 0.0 ? closed * unknown.share / total : 0.0;
+  for (FoundEffect& effect : out->effects) total += effect.share = std::max(0.0, effect.share);
+  for (UnknownEffect& unknown : out->unknown) total += unknown.share = std::max(0.0, unknown.share);
+  const double factor = total > 0.0 ? closed / total : 0.0;
+  for (FoundEffect& effect : out->effects) effect.share *= factor;
+  for (UnknownEffect& unknown : out->unknown) unknown.share *= factor;
   std::stable_sort(out->effects.begin(), out->effects.end(),
                    [](const FoundEffect& a, const FoundEffect& b) { return a.share > b.share; });
   std::stable_sort(out->unknown.begin(), out->unknown.end(),
@@ -287,19 +296,43 @@ void share_the_gap(Diagnosis* out) {
 
 void describe_all(const Work& work, const Evidence& evidence, const Decision& decision, const Resampled& resampled,
                   const std::map<int, Named>& names, const Identification& refitted, Diagnosis* out) {
-  for (std::size_t at = 0; at < decision.state.choice.groups.size(); ++at) {
-    const int g = decision.state.choice.groups[at];
-    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
-    if (e.kind == Kind::free || e.kind == Kind::law) {
-      UnknownEffect unknown = describe_unknown(work, evidence, decision, at, resampled);
-      // A small correction of a law is a remark; a large one is something that nobody has named.
-      if (!corrects_a_law(decision, g) || unknown.share > kCorrectionShare) out->unknown.push_back(std::move(unknown));
-    } else {
-      const Named& named = names.at(g);
-      out->effects.push_back(
-          describe(work, evidence, decision, at, named.sure, named.probability, refitted, resampled));
+  const std::vector<int>& chosen = decision.state.choice.groups;
+  const std::vector<double> shares = order_averaged_shares(work, evidence, decision.state);
+  std::map<int, double> by_corrections;  // of the effects whose law is corrected
+  for (std::size_t at = 0; at < chosen.size(); ++at) {
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(chosen[at])];
+    if (e.kind != Kind::free && e.kind != Kind::law) continue;
+    UnknownEffect unknown = describe_unknown(work, evidence, decision, at, resampled);
+    // A small correction of a law is a remark; a large one is something that nobody has named.
+    if (corrects_a_law(decision, chosen[at]) && unknown.share <= kCorrectionShare) {
+      by_corrections[decision.corrects.at(chosen[at])] += shares[at];
+      continue;
     }
+    unknown.share = shares[at];
+    out->unknown.push_back(std::move(unknown));
   }
+  for (std::size_t at = 0; at < chosen.size(); ++at) {
+    const auto named = names.find(chosen[at]);
+    if (named == names.end()) continue;
+    out->effects.push_back(
+        describe(work, evidence, decision, at, named->second.sure, named->second.probability, refitted, resampled));
+    out->effects.back().share = shares[at] + by_corrections[chosen[at]];
+  }
+}
+
+/// Errors without each cause come from the linearised search: by their ratio they are brought to the exact fit's error,
+/// which the sentence states.
+void scale_to_exact(Diagnosis* out) {
+  const auto scale = [&](auto* found) {
+    const double searched = found->held_out_after.rms;
+    if (!(searched > 0.0)) return;
+    const double factor = out->after_unknown.rms / searched;
+    for (ErrorStatistics* one : {&found->held_out_before, &found->held_out_after}) {
+      for (double* value : {&one->rms, &one->mean, &one->median, &one->p95, &one->max}) *value *= factor;
+    }
+  };
+  for (FoundEffect& effect : out->effects) scale(&effect);
+  for (UnknownEffect& unknown : out->unknown) scale(&unknown);
 }
 
 /// A gap that nothing has a shape for, as far as repeats can tell it from noise.
@@ -386,7 +419,8 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   const Fitted fitted = fit_exactly(whole, work, inputs, robot, decision, resampled, &result);
   const Repeats repeats = noise_of_repeats(whole.data);
   judge_noise(repeats, work, decision, &result);
-  describe_all(work, evidence, decision, resampled, names, fitted.by_all.found, &result);
+  describe_all(work, evidence, decision, resampled, names, fitted.by_catalogue.found, &result);
+  scale_to_exact(&result);
   merge_the_same(&result);
   question_noise(repeats, whole.data, &result);
   share_the_gap(&result);
@@ -400,6 +434,8 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   share_out(work.design, work.inputs, robot, work.noise.design_effect, options.seed + 17, &result);
   map_workspace(whole.frames.robot, whole.data, result.residuals_before, &result);
   result.neighbour_share = neighbour_share(whole.data, result.set, fitted.after_all, &result.neighbour_p95);
+
+  result.explained = explained_by(result, too_few_poses(result));
 
   // 9. What next.
   add_next_poses(work, whole.data, options, decision, &result);

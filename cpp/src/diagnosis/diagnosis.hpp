@@ -178,6 +178,19 @@ std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidenc
 std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidence, const Decision& decision);
 void add_next_poses(const Work& work, const Measurements& data, const DiagnoseOptions& options,
                     const Decision& decision, Diagnosis* out);
+/// Errors well above the noise of a fit of everything, and yet no gap that could be told from it.
+bool too_few_poses(const Diagnosis& d);
 std::string sentence_of(const Diagnosis& d);
+
+// --- headline.cpp ----------------------------------------------------------------------------------------------------
+
+std::string plain(const std::string& effect);
+std::string largest_causes(const Diagnosis& d);
+
+// --- shares.cpp: how much each cause counts --------------------------------------------------------------------------
+
+std::vector<double> order_averaged_shares(const Work& work, const Evidence& evidence, const Evidence::State& state);
+double size_at_tip(const Work& work, const Evidence::State& state, const std::vector<int>& columns);
+Explained explained_by(const Diagnosis& d, bool too_few_poses);
 
 }  // namespace truing::diagnosis

@@ -46,12 +46,16 @@ LONG_TABLE = 6  # parameters; more are folded away
 LISTED = 60  # candidates and rows of other long tables
 BAND = 2  # standard errors
 STRUCTURE = 0.05  # where the test of what is left finds structure below it
-_VERDICTS = {
-    "none": ("good", "no gap beyond noise"),
-    "effects": ("found", "cause found"),
-    "unknown": ("open", "cause unknown"),
-    "effects+unknown": ("open", "causes found, and something is left"),
-    "does_not_hold": ("bad", "does not hold"),
+MANY_OUTLIERS = 0.05  # of the rows: so many are no exceptions
+CONTENDER = 0.25  # of a cause's probability: an alternative that must be reckoned with
+FEW_PARAMETERS = 3  # more are no size that one can look at
+ALIKE = 0.05  # of the gap: inputs that explain as much as each other, within this
+_TONES = {
+    "no gap": "good",
+    "explained": "found",
+    "partly explained": "open",
+    "not explained": "open",
+    "does not hold": "bad",
 }
 
 
@@ -86,11 +90,10 @@ def diagnosis_report(result: Mapping[str, Any], rows: Rows) -> str:
 
 # ---- First screen --------------------------------------------------------------------------------
 def _headline(result: Mapping[str, Any], rows: Rows) -> str:
-    tone, label = _VERDICTS[result["verdict"]]
-    if result["verdict"] == "effects":
-        label = f"cause{'s' if len(result['effects']) > 1 else ''} found"
+    label = result["explained"]
+    tone = _TONES[label]
     first, *rest = re.split(
-        r"(?<=[.!?])\s+(?=[A-Z])", _in_words(result, str(result["sentence"]).strip()), maxsplit=1
+        r"(?<=[.!?])\s+(?=[A-Z])", in_words(result, str(result["sentence"]).strip()), maxsplit=1
     )
     more = f'<p class="more">{escaped(rest[0])}</p>' if rest else ""
     size = ' class="long"' if len(first) > 75 else ""
@@ -162,13 +165,16 @@ def trouble(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Findings about the data that make conclusions doubtful; the others of `sanity` say how the data were
     read.
     """
-    return [
-        f
-        for f in result["sanity"]
-        if not (
-            f["kind"] == "direction" or (f["kind"] == "joint_record" and result["joint_record"] in ("", "q"))
-        )
-    ]
+    calm = {"direction"}
+    if result["joint_record"] in ("", "q"):
+        calm.add("joint_record")
+    if not _many_outliers(result):
+        calm.add("outliers")
+    return [f for f in result["sanity"] if f["kind"] not in calm]
+
+
+def _many_outliers(result: Mapping[str, Any]) -> bool:
+    return len(result["outliers"]) >= MANY_OUTLIERS * max(1, result["rows"])
 
 
 def _sanity(result: Mapping[str, Any]) -> str:
@@ -209,30 +215,39 @@ def _finding(finding: Mapping[str, Any]) -> str:
     return f"<li>{escaped(_capital(finding['text']))}{which}</li>"
 
 
+_COLUMNS = 4  # of the table of causes, after name and fraction
+
+
+def _cause_pieces(result: Mapping[str, Any]) -> list[tuple[float, str, str, str]]:
+    """Fraction, colour, name and the rest of the line of what was found, largest first."""
+    parts = result["gap"]["parts"]
+    pieces = []
+    for number, (effect, share) in enumerate(zip(result["effects"], parts["effects"], strict=True)):
+        line = _cause_cells(effect, " ".join(filter(None, (escaped(size_text(effect)), _or(effect)))))
+        pieces.append((share, _colour(number), _name(effect), line))
+    for unknown, share in zip(result["unknown"], parts["unknown"], strict=True):
+        looks = escaped(_angles(unknown["looks_like"])) or f"over {escaped(', '.join(unknown['inputs']))}"
+        pieces.append((share, UNKNOWN, f"unknown {_at(unknown['joint'])}", _cause_cells(unknown, looks)))
+    return sorted(pieces, key=lambda piece: -piece[0])
+
+
+def _cause_cells(found: Mapping[str, Any], size: str) -> str:
+    """How far it moves the tip, the error without it, how sure, its size."""
+    seen = bool(found.get("inputs", True))  # what no function describes has no size
+    cells = (
+        length_text(found["size_at_tip_m"]) if seen else "–",
+        length_text(found["held_out"]["before_rms_m"]) if seen else "–",
+        _sure(found["probability"]),
+        size,
+    )
+    return "".join(f"<td>{cell}</td>" for cell in cells)
+
+
 def _parts(result: Mapping[str, Any]) -> str:
     """The gap as one bar, and in a line each what its pieces are."""
     parts = result["gap"]["parts"]
-    pieces: list[tuple[float, str, str, str]] = []  # share, colour, name, the rest of its line
-    for number, (effect, share) in enumerate(zip(result["effects"], parts["effects"], strict=True)):
-        pieces.append(
-            (
-                share,
-                _colour(number),
-                _name(effect),
-                f"<td>{escaped(size_text(effect))}</td><td>{_sure(effect['probability'])}</td><td>{_or(effect)}</td>",
-            )
-        )
-    for unknown, share in zip(result["unknown"], parts["unknown"], strict=True):
-        looks = escaped(_angles(unknown["looks_like"])) or f"over {escaped(', '.join(unknown['inputs']))}"
-        pieces.append(
-            (
-                share,
-                UNKNOWN,
-                f"unknown {_at(unknown['joint'])}",
-                f"<td>{looks}</td><td>{_sure(unknown['probability'])}</td><td></td>",
-            )
-        )
-    pieces.sort(key=lambda piece: -piece[0])
+    pieces = _cause_pieces(result)
+    causes = len(pieces)
     room = FIRST_SCREEN if len(pieces) > FIRST_SCREEN + 1 else len(pieces)
     more = pieces[room:]
     p, rest, noise = result["after"]["remaining_structure_p"], parts["unexplained"], parts["noise"]
@@ -247,10 +262,9 @@ def _parts(result: Mapping[str, Any]) -> str:
             if structure
             else "more than the noise, but no structure was found in it"
         )
-        pieces.append(
-            (rest, UNEXPLAINED if structure else LEFT, "not explained", f"<td>{said}</td><td></td><td></td>")
-        )
-    pieces.append((noise, NOISE, "noise", "<td>of instrument and robot</td><td></td><td></td>"))
+        colour = UNEXPLAINED if structure else LEFT
+        pieces.append((rest, colour, "not explained", f'<td colspan="{_COLUMNS}">{said}</td>'))
+    pieces.append((noise, NOISE, "noise", f'<td colspan="{_COLUMNS}">of instrument and robot</td>'))
     bar, lines = [], []
     for share, colour, name, rest in pieces:
         text = next(
@@ -276,15 +290,27 @@ def _parts(result: Mapping[str, Any]) -> str:
             room,
             f'<tr><th><i class="many"></i>{len(more)} smaller ones</th><td'
             f' class="share">{_percent(sum(share for share, _, _, _ in more))}</td><td class="names"'
-            f' colspan="3">{names}</td></tr>',
+            f' colspan="{_COLUMNS}">{names}</td></tr>',
         )
+    head, note = (_PARTS_HEAD, _PARTS_NOTE) if causes else ("", "")
     said = "; ".join(f"{name} {_percent(share)}" for share, _, name, _ in pieces)
     return (
         f'<section class="card"><h2>What the gap of {length_text(result["gap"]["rms_m"])} is made of <span'
         ' class="muted">fractions of the mean square</span></h2><div class="stack" role="img"'
         f' aria-label="{said}">{"".join(bar)}</div><div class="scroll"><table'
-        f' class="parts"><tbody>{"".join(lines)}</tbody></table></div></section>'
+        f' class="parts"><tbody>{head}{"".join(lines)}</tbody></table></div>{note}</section>'
     )
+
+
+_PARTS_HEAD = (
+    '<tr class="head"><th></th><th>of the gap</th><th>at the tip</th><th>without it</th><th></th>'
+    "<th>size</th></tr>"
+)
+_PARTS_NOTE = (
+    '<p class="note">Of the gap: fraction of the mean square that it closes, averaged over the orders in'
+    " which causes may be added. At the tip: rms motion that it makes, beyond what base and tool could do as"
+    " well. Without it: rms error on held-out poses with all others.</p>"
+)
 
 
 def _where(page: Page, result: Mapping[str, Any]) -> None:
@@ -311,19 +337,36 @@ def _where(page: Page, result: Mapping[str, Any]) -> None:
             '<p class="note">Fraction of the gap that motion of this joint alone could close, 90 % interval.'
             " What joints do alike counts for each of them.</p></section>"
         )
-        page.add('<section class="card"><h2>What it goes with</h2>')
-        inputs = sorted(where["inputs"], key=lambda w: -w["share"])[:8]
-        shares = np.array([w["share"] for w in inputs], dtype=np.float64)
-        page.chart(
-            "where_inputs",
-            [_bars([_input_name(w["input"], short=True) for w in inputs], shares, MUTED, None)],
-            _bar_layout(shares, None),
-            size="pane",
-        )
-        page.add('<p class="note">Fraction of the gap that goes with what was recorded.</p></section>')
+        _goes_with(page, where)
     page.add('<div class="column"><section class="card"><h2>Where in the workspace</h2>')
     _workspace(page, where)
     page.add(f"</section>{_not_testable(result) if calm else ''}</div></div>")
+
+
+def _goes_with(page: Page, where: Mapping[str, Any]) -> None:
+    """Which inputs stand out. Poses vary all joints at once, and flexible functions of any input explain much
+    of the gap: what tells is the difference.
+    """
+    inputs = sorted(where["inputs"], key=lambda w: -w["share"])
+    shares = np.array([w["share"] for w in inputs], dtype=np.float64)
+    floor = float(shares.min()) if len(inputs) > 1 else 0.0
+    page.add('<section class="card"><h2>What it goes with</h2>')
+    if len(inputs) > 1 and float(shares[0]) - floor < ALIKE:
+        page.add(
+            f"<p>Nothing stands out: each of the {len(inputs)} recorded inputs explains"
+            f" {_percent(floor)} to {_percent(float(shares[0]))} of the gap.</p></section>"
+        )
+        return
+    inputs, shares = inputs[:8], shares[:8]
+    beyond = shares - floor
+    page.chart(
+        "where_inputs",
+        [_bars([_input_name(w["input"], short=True) for w in inputs], beyond, MUTED, None)],
+        _bar_layout(beyond, None),
+        size="pane",
+    )
+    least = f" Each explains {_percent(floor)}; the bars show what it explains beyond that." if floor else ""
+    page.add(f'<p class="note">Fraction of the gap that goes with what was recorded.{least}</p></section>')
 
 
 def _bars(names: Sequence[str], shares: Floats, colour: str, ends: Floats | None) -> dict[str, Any]:
@@ -799,7 +842,7 @@ def _rows_that_counted_little(result: Mapping[str, Any]) -> list[Check]:
     if result["outliers"]:
         head = f"{counted(len(result['outliers']), 'row')} counted for little"
         text = f"too far from all others: {_listed(result['outliers'], 15)} (from 0)"
-        checks.append(Check(GOOD, head, text))
+        checks.append(Check(LOOK if _many_outliers(result) else GOOD, head, text))
     if result["joint_record"] not in ("", "q"):
         text = "the diagnosis went by it (columns qr1 …), and so does robot.yaml"
         checks.append(Check(LOOK, "The second joint record fits better", text))
@@ -842,7 +885,7 @@ def _not_testable(result: Mapping[str, Any]) -> str:
         return ""
     body = "".join(
         f"<tr><th>{_words(n['effect'])}</th><td>{escaped(', '.join(n['joints'])) or 'anywhere'}</td><td"
-        f' class="wrap">{escaped(_in_words(result, n["why"]))}</td></tr>'
+        f' class="wrap">{escaped(in_words(result, n["why"]))}</td></tr>'
         for n in result["not_testable"]
     )
     return (
@@ -881,7 +924,7 @@ def _next(result: Mapping[str, Any], rows: Rows) -> str:
             cells.append(
                 "<td>any</td>" if pose["payload_kg"] is None else f"<td>{pose['payload_kg']:g} kg</td>"
             )
-        cells.append(f'<td class="wrap">{escaped(_in_words(result, pose["why"]))}</td>')
+        cells.append(f'<td class="wrap">{escaped(in_words(result, pose["why"]))}</td>')
         body.append(f"<tr>{''.join(cells)}</tr>")
     more = (
         f'<p class="note">The first {LISTED} of {len(poses)}; next_poses.csv has all.</p>'
@@ -945,7 +988,7 @@ def plain_name(effect: str) -> str:
     return name.replace("_", " ") + (f" ({order} per turn)" if order else "")
 
 
-def _in_words(result: Mapping[str, Any], text: str) -> str:
+def in_words(result: Mapping[str, Any], text: str) -> str:
     """A sentence of the result with its effects, angles and lengths written as everywhere in the report."""
     named = [e for effect in result["effects"] for e in (effect, *effect["confounded_with"])]
     for name in sorted(
@@ -1010,29 +1053,72 @@ def _sure(probability: float | None) -> str:
     return "more than 99 % sure" if probability > 0.99 else f"{100 * probability:.0f} % sure"
 
 
+def contender(effect: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The effect that it cannot be told from and that is about as likely: what to repair depends on it.
+    Others, and those that lack their input, stand in the effect's own section.
+    """
+    least = CONTENDER * effect["probability"]
+    return next(
+        (o for o in effect["confounded_with"] if o["probability"] and o["probability"] >= least), None
+    )
+
+
 def _or(effect: Mapping[str, Any]) -> str:
-    """The effects it cannot be told from, in a few words."""
-    others = effect["confounded_with"]
-    if not others:
-        return ""
-    more = f" or {len(others) - 1} more" if len(others) > 1 else ""
-    return f'<span class="maybe">or {_name(others[0])}{more}</span>'
+    rival = contender(effect)
+    return f'<span class="maybe">or {_name(rival)}</span>' if rival else ""
 
 
 def size_text(effect: Mapping[str, Any]) -> str:
-    """Value and standard error of the parameter that says most; of an effect that is a curve, how far it
-    goes.
+    """Value and standard error: of a wave its amplitude, of compliance the stiffness, of few parameters the
+    one that says most; of an effect that is a curve, how far it goes.
     """
     seen = [p for p in effect["parameters"] if p["sigma"] and not p["frozen"] and p["value"] is not None]
     if not seen:
         ends = [(abs(point[1]), curve["unit"]) for curve in effect["curves"] for point in curve["points"]]
         return f"up to {_quantity(*max(ends))}" if ends else ""
+    wave = _largest_wave(seen)
+    if wave:
+        return wave
+    if len(seen) > FEW_PARAMETERS:
+        return f"{len(seen)} parameters"
     p = max(seen, key=lambda p: abs(p["value"] - (p["nominal"] or 0.0)) / p["sigma"])
+    if len(seen) == 1 and p["unit"] == "rad/Nm" and p["value"] > 2 * p["sigma"]:
+        return _stiffness(p["value"], p["sigma"])
     change = p["value"] - (p["nominal"] or 0.0)
     scale, unit = _unit_for(max(abs(change), p["sigma"]), p["unit"])
     value, sigma = _with_error(change * scale, p["sigma"] * scale)
     size = f"{value} ± {sigma} {unit}".rstrip()
     return size if len(seen) == 1 else f"{_part(p['name'], effect)} {size}, and {len(seen) - 1} more"
+
+
+def _largest_wave(parameters: Sequence[Mapping[str, Any]]) -> str:
+    """Amplitude of the largest of waves whose parameters are pairs of cos and sin, "…cos2" and "…sin2"; "" of
+    anything else.
+    """
+    values = {p["name"]: p for p in parameters}
+    waves = []
+    for name, cos in values.items():
+        sin = values.get(re.sub(r"cos(?=[^.]*$)", "sin", name))
+        if sin is None or sin is cos:
+            continue
+        amplitude = math.hypot(cos["value"], sin["value"])
+        # along the phase: the standard errors of both by how much each adds to it
+        sigma = math.hypot(cos["value"] * cos["sigma"], sin["value"] * sin["sigma"]) / (amplitude or 1.0)
+        waves.append((amplitude, sigma, cos["unit"]))
+    if not waves or 2 * len(waves) != len(parameters):
+        return ""
+    amplitude, sigma, unit = max(waves)
+    scale, unit = _unit_for(amplitude, unit)
+    value, error = _with_error(amplitude * scale, sigma * scale)
+    return f"amplitude {value.lstrip('+')} ± {error} {unit}"
+
+
+def _stiffness(compliance: float, sigma: float) -> str:
+    """ "212 ± 8 kNm/rad" of a compliance [rad/Nm]"""
+    stiffness = 1.0 / compliance
+    scale, prefix = (1e-6, "M") if stiffness >= 1e6 else (1e-3, "k") if stiffness >= 1e3 else (1.0, "")
+    value, error = _with_error(stiffness * scale, stiffness * scale * sigma / compliance)
+    return f"stiffness {value.lstrip('+')} ± {error} {prefix}Nm/rad"
 
 
 def _part(name: str, effect: Mapping[str, Any]) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from pages import charts_of, visible
-from truing.diagnosis.page import _unit_for, diagnosis_report, size_text
+from truing.diagnosis.page import _unit_for, contender, diagnosis_report, size_text
 from truing.exam.page import exam_report
 from truing.report.json_text import to_json
 from truing.report.rows import Rows, statistics
@@ -25,6 +25,12 @@ SENTENCES = {
     "effects": "Backlash at J2 causes the gap.",
     "unknown": "Something moves J1 that no known effect explains.",
     "effects+unknown": "Backlash at J2 causes most of the gap. Something at J1 is left.",
+}
+EXPLAINED = {
+    "none": "no gap",
+    "effects": "explained",
+    "unknown": "not explained",
+    "effects+unknown": "partly explained",
 }
 
 
@@ -65,6 +71,7 @@ def some_result(verdict: str, **changes: Any) -> dict[str, Any]:
         "joints": ["J2"],
         "probability": 0.997,
         "held_out": held,
+        "size_at_tip_m": 2.8e-4,
         "share": 0.8,
         "share_alone": 0.7,
         "share_last": 0.6,
@@ -98,6 +105,7 @@ def some_result(verdict: str, **changes: Any) -> dict[str, Any]:
         "inputs": ["q1"],
         "probability": 0.93,
         "held_out": held,
+        "size_at_tip_m": 1.1e-4,
         "share": 0.8,
         "curve": [[-2.0, 0.0]],
         "curves": [free],
@@ -117,6 +125,7 @@ def some_result(verdict: str, **changes: Any) -> dict[str, Any]:
         "version": "0",
         "robot": "arm",
         "verdict": verdict,
+        "explained": EXPLAINED[verdict],
         "sentence": SENTENCES[verdict],
         "gap": {
             **statistics(rows.magnitude_before),
@@ -134,7 +143,7 @@ def some_result(verdict: str, **changes: Any) -> dict[str, Any]:
         "sanity": [],
         "where": {
             "joints": [{"joint": "J2", "share": 0.7, "ci": [0.6, 0.8]}],
-            "inputs": [{"input": "dir2", "share": 0.5}],
+            "inputs": [{"input": "dir2", "share": 0.9}, {"input": "q1", "share": 0.6}],
             "workspace": [
                 {"center_m": [0.1, 0.2, 0.3], "rms_m": 2e-4, "n": 9},
                 {"center_m": [0.1, 0.2, 0.5], "rms_m": 3e-4, "n": 3},
@@ -177,6 +186,7 @@ def some_result(verdict: str, **changes: Any) -> dict[str, Any]:
         ],
         "nearest_neighbour": {"p95_m": None, "share": 0.02},
         "joint_record": "q",
+        "rows": rows.count,
         "outliers": [7],
         "seed": 0,
         "warnings": [],
@@ -280,6 +290,50 @@ def test_how_the_data_were_read_is_no_trouble() -> None:
     assert "columns dir1" in text
 
 
+@pytest.mark.parametrize(("outliers", "first"), [(3, False), (12, True)])
+def test_rows_that_count_little_are_a_warning_when_they_are_many(outliers: int, first: bool) -> None:
+    found = [{"kind": "outliers", "text": "rows stand far out.", "rows": []}]
+    result = some_result("effects", sanity=found, rows=100, outliers=list(range(outliers)))
+    text = visible(diagnosis_report(result, some_rows()))
+    assert ("Look at the data first Rows stand far out" in text) == first
+    assert ("How the data were read Rows stand far out" in text) != first
+
+
+@pytest.mark.parametrize("verdict", SENTENCES)
+def test_the_badge_says_how_much_is_left(verdict: str) -> None:
+    head = visible(diagnosis_report(some_result(verdict), some_rows())).partition("Rms error")[0]
+    assert EXPLAINED[verdict] in head.partition(SENTENCES[verdict][:20])[0]
+
+
+def test_what_the_gap_goes_with_is_shown_as_differences() -> None:
+    result = some_result("effects")
+    page = diagnosis_report(result, some_rows())
+    assert charts_of(page)["where_inputs"]["data"][0]["x"] == pytest.approx([30.0, 0.0])
+    assert "Each explains 60 %; the bars show what it explains beyond that." in visible(page)
+    result["where"]["inputs"] = [{"input": f"q{k}", "share": 0.9 + 0.01 * k} for k in range(1, 5)]
+    page = diagnosis_report(result, some_rows())
+    assert "where_inputs" not in charts_of(page)
+    assert "Nothing stands out: each of the 4 recorded inputs explains 91 % to 94 % of the gap." in visible(
+        page
+    )
+
+
+def test_causes_have_their_size_at_the_tip_and_the_error_without_them() -> None:
+    text = visible(diagnosis_report(some_result("effects"), some_rows()))
+    held = some_result("effects")["effects"][0]["held_out"]
+    assert "of the gap at the tip without it" in text
+    line = text[text.index("backlash at J2 80 %") :].partition("sure")[0]
+    assert "0.28 mm" in line and f"{1e3 * held['before_rms_m']:.2g}" in line
+
+
+def test_a_rival_is_on_the_first_screen_where_it_must_be_reckoned_with() -> None:
+    result = some_result("effects")
+    (effect,) = result["effects"]
+    assert contender(effect) is None  # 20 % of 99.7 %
+    effect["confounded_with"][0]["probability"] = 0.4
+    assert "or windup at J2" in visible(diagnosis_report(result, some_rows())).partition("Where in the")[0]
+
+
 def test_trouble_with_the_data_comes_first() -> None:
     result = some_result(
         "effects", sanity=[{"kind": "duplicates", "text": "Rows 3 and 4 are equal.", "rows": [3, 4]}]
@@ -378,6 +432,14 @@ def test_the_size_is_that_of_the_clearest_parameter() -> None:
         {"name": "b", "nominal": 0.0, "value": 1e-3, "sigma": 1e-3, "unit": "rad", "frozen": False}
     )
     assert size_text(effect) == "backlash.J2 +0.400 ± 0.005 mrad, and 1 more"
+    pair = [
+        dict(effect["parameters"][0], name=f"wave.J2.{part}2", value=value)
+        for part, value in (("cos", 3e-4), ("sin", -4e-4))
+    ]
+    assert size_text(effect | {"parameters": pair}) == "amplitude 0.500 ± 0.005 mrad"
+    spring = dict(effect["parameters"][0], value=5e-6, sigma=1e-7, unit="rad/Nm")
+    assert size_text(effect | {"parameters": [spring]}) == "stiffness 200 ± 4 kNm/rad"
+    assert size_text(effect | {"parameters": [effect["parameters"][0]] * 4}) == "4 parameters"
     drift = {
         "effect": "drift",
         "joints": [],

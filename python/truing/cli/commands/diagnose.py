@@ -105,19 +105,20 @@ class Command(run.Command["tuple[Robot, Measurements]", "Diagnosis"]):
         )
 
     def table(self, result: Mapping[str, Any], found: Diagnosis) -> None:
-        from truing.diagnosis.page import at_joints, trouble
+        from truing.diagnosis.page import plain_name, trouble
 
         for finding in trouble(result):
             say(f"look at the data first: {finding['text']}")
+        say(f"{result['robot']}: {result['explained']}")
         say(result["sentence"])
         print_errors(result)
         causes = cause_lines(result)
         if causes:
-            head = ("what", "probability", "size", "off the error", "not told from")
-            table("what causes it", head, causes, words=True)
+            head = ("", "of gap", "at tip", "without", "sure", "size")
+            table("what causes it: rms at the tip, rms error without it", head, causes, words=True)
         if result["not_testable"]:
-            words = [f"{at_joints(n)} ({n['why']})" for n in result["not_testable"]]
-            say(f"not testable with these data: {joined(words, 6)}")
+            words = list(dict.fromkeys(plain_name(n["effect"]) for n in result["not_testable"]))
+            say(f"not testable with these data (why: report.html): {joined(words, 12)}")
         for finding in result["sanity"]:
             if finding not in trouble(result):
                 say(f"note: {finding['text']}")
@@ -147,25 +148,27 @@ def print_errors(result: Mapping[str, Any]) -> None:
 
 
 def cause_lines(result: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """What was named, and what is unknown."""
-    from truing.diagnosis.page import at_joints, size_text
+    """What was named, and what is unknown: as in the report's first table."""
+    from truing.diagnosis.page import at_joints, contender, size_text
 
-    lines: list[tuple[str, ...]] = []
+    lines: list[tuple[float, tuple[str, ...]]] = []
     for effect in result["effects"]:
-        others = ", ".join(at_joints(other) for other in effect["confounded_with"])
-        probability = f"{100 * effect['probability']:.0f} %"
-        lines.append(
-            (at_joints(effect), probability, size_text(effect), shrink_text(effect["held_out"]), others)
-        )
+        rival = contender(effect)
+        name = at_joints(effect) + (f" or {at_joints(rival)}" if rival else "")
+        lines.append((effect["share"], cause_line(effect, name, size_text(effect))))
     for unknown in result["unknown"]:
-        place = f"at {unknown['joint']}" if unknown["joint"] else "somewhere"
+        place = f"unknown at {unknown['joint']}" if unknown["joint"] else "unknown somewhere"
         shape = unknown["looks_like"] or f"over {', '.join(unknown['inputs'])}"
-        off = shrink_text(unknown["held_out"]) if unknown["inputs"] else ""
-        lines.append((f"unknown {place}", f"{100 * unknown['probability']:.0f} %", shape, off, ""))
-    return lines
+        lines.append((unknown["share"], cause_line(unknown, place, shape)))
+    return [line for _, line in sorted(lines, key=lambda line: -line[0])]
 
 
-def shrink_text(held: Mapping[str, Any]) -> str:
-    """ "46 % [43, 48]": off the error, and the 90 % interval."""
-    value, low, high = (round(100 * part) for part in (held["shrink"], *held["ci"]))
-    return f"{value} % [{low}, {high}]"
+def cause_line(found: Mapping[str, Any], name: str, size: str) -> tuple[str, ...]:
+    """Fraction of the gap, rms motion of the tip, rms error without it, how sure, size."""
+    from truing.report.words import length_text
+
+    sure = f"{100 * found['probability']:.0f} %"
+    if not found.get("inputs", True):  # what no function describes has no size
+        return name, "–", "–", "–", sure, size
+    without = length_text(found["held_out"]["before_rms_m"])
+    return name, f"{100 * found['share']:.0f} %", length_text(found["size_at_tip_m"]), without, sure, size
