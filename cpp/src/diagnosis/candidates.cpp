@@ -44,13 +44,11 @@ class Builder {
   Candidates build() {
     geometry();
     for (const Effect& effect : catalogue()) {
-      const bool searched =
-          effect.traits.search == Search::always || (effect.traits.search == Search::if_asked && is_asked(effect.name));
-      if (searched && effect.traits.stands_for != StandsFor::link_geometry && !left_out(effect.name))
+      if (is_searched(effect) && effect.traits.stands_for != StandsFor::link_geometry && !left_out(effect.name))
         add_effect(effect, {});
     }
     for (const Effect& effect : task_.options.own_effects) {
-      if (!left_out(effect.name)) add_effect(effect, task_.options.own_effects);
+      if (is_searched(effect) && !left_out(effect.name)) add_effect(effect, task_.options.own_effects);
     }
     drifts();
     law_tests();
@@ -60,9 +58,10 @@ class Builder {
  private:
   bool left_out(const std::string& name) const { return is_left_out(task_.options, name); }
 
-  bool is_asked(const std::string& name) const {
+  bool is_searched(const Effect& effect) const {
     const std::vector<std::string>& also = task_.options.also;
-    return std::find(also.begin(), also.end(), name) != also.end();
+    return effect.traits.search == Search::always ||
+           (effect.traits.search == Search::if_asked && std::find(also.begin(), also.end(), effect.name) != also.end());
   }
 
   const InputColumn* input(const std::string& name) const {
@@ -119,7 +118,7 @@ class Builder {
       return;
     }
     NotTestable first;
-    bool any = false;
+    bool any = effect.terms_of_robot && try_terms(effect, own, {}, &first);
     for (std::size_t k = 0; k < task_.at.joints.size(); ++k) {
       if (!moves_[k] && effect.traits.stands_for != StandsFor::joint_offset) continue;
       NotTestable obstacle;
@@ -149,8 +148,9 @@ class Builder {
     }
     if (e.parameters.empty()) return false;
     const std::size_t joint = joints.empty() ? 0 : joints[0];
-    // Of the whole robot only time is one input.
-    if (!joints.empty() || effect.traits.driver == Driver::time) e.driver = input_name(effect.traits.driver, joint);
+    // Of the whole robot only time and temperature are one input.
+    const bool one_for_all = effect.traits.driver == Driver::time || effect.traits.driver == Driver::temperature;
+    if (!joints.empty() || one_for_all) e.driver = input_name(effect.traits.driver, joint);
     ColumnGroup group;
     group.law_at = joints.empty() ? -1 : law_number(effect.traits, joint);
     if (effect.traits.driver == Driver::direction && task_.inferred_direction)
@@ -160,8 +160,20 @@ class Builder {
       if (effect.traits.driver == Driver::time) return false;
       shadow_of_constant_input(effect, e, joint, &group);
     }
-    add(std::move(e), std::move(group));
-    return true;
+    if (joints.empty() || !effect.forms) {
+      add(std::move(e), std::move(group));
+      return true;
+    }
+    const std::vector<EffectForm> forms = effect.forms(task_.nominal, joint, task_.data);
+    for (const EffectForm& form : forms) add_form(form, e, group);
+    return !forms.empty();
+  }
+
+  /// One form of an effect. A mover that stands still moves nothing.
+  void add_form(const EffectForm& form, Explanation e, const ColumnGroup& group) {
+    e.parameters = form.parameters;
+    e.constants = form.constants;
+    add(std::move(e), group);
   }
 
   /// What `identify` is to be asked for, and the names of the parameters. Throws what effect_terms throws.
@@ -207,7 +219,7 @@ class Builder {
     }
     if (effect.traits.driver == Driver::temperature) {
       group->shadow = true;
-      if (joint == 0)
+      if (joint == 0 && (e.joints.empty() || !effect.terms_of_robot))
         out_.not_testable.push_back(
             {effect.name, {}, "the temperature is constant: the same as geometry", Untestable::input_constant});
     }
@@ -298,8 +310,7 @@ class Builder {
       for (const LawTest test : {LawTest::of_driver, LawTest::times_direction, LawTest::times_the_lengths}) {
         for (const std::vector<Effect>* effects : {&catalogue(), &task_.options.own_effects}) {
           for (const Effect& effect : *effects) {
-            const bool searched = effect.traits.search == Search::always || is_asked(effect.name);
-            if (effect.traits.law_test == test && searched) add_law_test(effect, joint);
+            if (effect.traits.law_test == test && is_searched(effect)) add_law_test(effect, joint);
           }
         }
       }

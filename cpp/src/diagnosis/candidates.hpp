@@ -25,9 +25,10 @@ struct Explanation {
   Kind kind = Kind::catalogue;
   std::string effect;
   std::vector<std::string> joints;
-  std::vector<std::string> parameters;  ///< names of its columns
-  std::vector<std::string> model_free;  ///< parameters of the model to free
-  std::vector<EffectRequest> requests;  ///< effects to ask for
+  std::vector<std::string> parameters;        ///< names of its columns
+  std::vector<std::string> model_free;        ///< parameters of the model to free
+  std::vector<EffectRequest> requests;        ///< effects to ask for
+  std::map<std::string, double> constants{};  ///< of the effect's form (EffectForm), which the robot is to carry
   std::string note;
   std::string driver;  ///< the input that its law is a function of, if one
   // kind drift, law, free: hats of inputs at a site

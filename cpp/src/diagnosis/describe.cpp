@@ -416,7 +416,8 @@ std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidenc
   // Everything at once, under a wide prior: what "fit all and read the table" would show.
   Choice everything;
   for (std::size_t g = 0; g < first.size(); ++g) {
-    if (named[g].kind != Kind::catalogue || groups[g].shadow) continue;
+    // Of forms with constants of their own none: the parameters are the same ones.
+    if (named[g].kind != Kind::catalogue || groups[g].shadow || !named[g].constants.empty()) continue;
     everything.groups.push_back(static_cast<int>(g));
     everything.scales.push_back(1.0);
   }
@@ -447,7 +448,14 @@ std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidenc
         c.largest_z = std::max(
             c.largest_z, std::abs(all.solution[static_cast<Eigen::Index>(k)]) / sigma[static_cast<Eigen::Index>(k)]);
     }
-    out.push_back(std::move(c));
+    // Of an effect's forms the one that explains most.
+    const auto same = std::find_if(out.begin(), out.end(), [&](const Candidate& other) {
+      return named[g].kind == Kind::catalogue && other.effect == c.effect && other.joints == c.joints;
+    });
+    if (same == out.end())
+      out.push_back(std::move(c));
+    else if (c.evidence > same->evidence)
+      *same = std::move(c);
   }
   return out;
 }
@@ -458,11 +466,13 @@ std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidenc
   const auto& groups = work.design.candidates.groups;
   const auto& named = work.design.candidates.named;
   std::vector<Detectable> out;
+  std::set<std::pair<std::string, std::vector<std::string>>> said;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const Explanation& e = named[g];
     if (e.kind != Kind::catalogue || groups[g].columns.empty() || groups[g].shadow ||
         effect_traits(work, e).search == Search::by_order)
       continue;
+    if (!said.insert({e.effect, e.joints}).second) continue;  // of an effect's forms the first: the usual one
     const std::vector<int>& chosen = state.choice.groups;
     if (std::find(chosen.begin(), chosen.end(), static_cast<int>(g)) != chosen.end()) continue;
     // The single column that shows best.

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <stdexcept>
 
 #include "estimation/evaluate.hpp"
 #include "estimation/selection.hpp"
@@ -101,7 +102,8 @@ class Designer {
   }
 
  private:
-  bool is_product(const Explanation& e) const { return e.kind == Kind::drift || e.kind == Kind::law; }
+  static bool is_form(const Explanation& e) { return !e.constants.empty(); }
+  bool is_product(const Explanation& e) const { return e.kind == Kind::drift || e.kind == Kind::law || is_form(e); }
   bool is_without_frame(const Explanation& e) const { return e.kind == Kind::drift && !content_.frame; }
 
   /// Core columns: what is always unknown, joint motions, and every parameter of a candidate.
@@ -122,7 +124,7 @@ class Designer {
       out_.joint_column.push_back({want(model_.parameter_index(parameter_of(StandsFor::joint_offset, joint.name)))});
     for (std::size_t g = 0; g < out_.candidates.named.size(); ++g) {
       const Explanation& e = out_.candidates.named[g];
-      if (e.kind != Kind::catalogue && e.kind != Kind::all_geometry) continue;
+      if ((e.kind != Kind::catalogue && e.kind != Kind::all_geometry) || is_form(e)) continue;
       for (const std::string& name : e.parameters)
         out_.candidates.groups[g].columns.push_back(want(model_.parameter_index(name)));
     }
@@ -239,12 +241,12 @@ class Designer {
         continue;
       }
       const auto count = static_cast<Eigen::Index>(e.parameters.size());
-      const Design::Rows columns = products(e);
+      const Design::Rows columns = is_form(e) ? columns_of_form(e, next) : products(e);
       group.shadow = group.shadow || columns.size() == 0;
       for (Eigen::Index k = 0; k < count; ++k) {
         if (columns.size() != 0) group.columns.push_back(static_cast<int>(next + k));
         out_.column_names.push_back(e.parameters[static_cast<std::size_t>(k)]);
-        out_.column_units.push_back("rad");
+        out_.column_units.push_back("rad");  // a form at a joint, as well
       }
       if (columns.size() == 0)
         out_.x.middleCols(next, count).setZero();
@@ -267,6 +269,45 @@ class Designer {
         free_columns(out_, out_.joint_column[task_.at.joint_index(e.site)], task_.inputs, e.inputs, e.knots);
     if (e.law_test == LawTest::times_direction) multiply_by_direction(e, &columns);
     return columns;
+  }
+
+  /// Columns of an effect with constants of its own, at joints: its bases times the joint's column. They are the ones
+  /// from `first` on, and get their priors.
+  Design::Rows columns_of_form(const Explanation& e, Eigen::Index first) {
+    Robot carrying = task_.at;
+    carrying.effects.push_back({e.effect, e.joints, e.constants});
+    Design::Rows columns = Design::Rows::Zero(out_.x.rows(), static_cast<Eigen::Index>(e.parameters.size()));
+    for (const Term& term : effect_terms(e.requests, carrying, task_.data, task_.options.own_effects)) {
+      const auto at = std::find(e.parameters.begin(), e.parameters.end(), term.parameter) - e.parameters.begin();
+      if (at == static_cast<std::ptrdiff_t>(e.parameters.size())) continue;
+      if (term.needs_gravity) throw std::logic_error(e.effect + ": a form with constants must not need gravity");
+      const std::vector<double> basis = values_of(term);
+      const int joint = out_.joint_column[task_.at.joint_index(term.site)][0];
+      for (Eigen::Index i = 0; i < columns.rows(); ++i)
+        columns(i, at) += basis[static_cast<std::size_t>(out_.row[static_cast<std::size_t>(i)])] * out_.x(i, joint);
+      const double size = root_mean_square(basis, task_.rows);
+      if (size > 0.0) out_.prior[first + at] = traits_of(e.effect, task_.options.own_effects).prior / size;
+    }
+    return columns;
+  }
+
+  /// A basis that is a function of the joints, on every row.
+  std::vector<double> values_of(const Term& term) const {
+    std::vector<const std::vector<double>*> motions(task_.at.joints.size(), nullptr);
+    for (const InputColumn& input : task_.inputs) {
+      if (input.joint >= 0 && input.name == input_name(Driver::angle, static_cast<std::size_t>(input.joint)))
+        motions[static_cast<std::size_t>(input.joint)] = &input.values;
+    }
+    std::vector<double> out(task_.data.rows);
+    Inputs in;
+    in.data = &task_.data;
+    in.joints = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(motions.size()));
+    for (in.row = 0; in.row < out.size(); ++in.row) {
+      for (std::size_t k = 0; k < motions.size(); ++k)
+        if (motions[k]) in.joints[static_cast<Eigen::Index>(k)] = (*motions[k])[in.row];
+      out[in.row] = term.basis(in);
+    }
+    return out;
   }
 
   Design::Rows times_the_lengths(const Explanation& e) const {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <set>
 
@@ -103,6 +104,25 @@ static std::vector<EffectRequest> merged(const std::vector<EffectRequest>& reque
   return out;
 }
 
+/// Parameters of the forms that were not chosen of the effects that were.
+static std::vector<std::string> other_forms(const Design& design, const Evidence::State& state,
+                                            const std::vector<int>& groups) {
+  std::set<std::string> chosen, others;
+  for (const int g : state.choice.groups) {
+    if (std::find(groups.begin(), groups.end(), g) == groups.end()) continue;
+    const Explanation& e = design.candidates.named[static_cast<std::size_t>(g)];
+    if (e.kind != Kind::catalogue) continue;
+    chosen.insert(e.parameters.begin(), e.parameters.end());
+    for (const Explanation& other : design.candidates.named) {
+      if (other.kind == Kind::catalogue && other.constants.empty() && same_name(other, e))
+        others.insert(other.parameters.begin(), other.parameters.end());
+    }
+  }
+  std::vector<std::string> out;
+  std::set_difference(others.begin(), others.end(), chosen.begin(), chosen.end(), std::back_inserter(out));
+  return out;
+}
+
 static RefitTask refit_task(const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
                             const Evidence::State& state, const std::vector<int>& groups) {
   const Design& design = work.design;
@@ -120,6 +140,7 @@ static RefitTask refit_task(const Work& work, const std::vector<InputColumn>& in
     if (std::find(groups.begin(), groups.end(), g) == groups.end()) continue;
     const Explanation& e = design.candidates.named[static_cast<std::size_t>(g)];
     out.options.free.insert(out.options.free.end(), e.model_free.begin(), e.model_free.end());
+    if (!e.constants.empty()) out.start.effects.push_back({e.effect, e.joints, e.constants});
     for (const EffectRequest& request : e.requests) {
       if (model::traits_of(request.effect, {}).stands_for != StandsFor::terms) continue;
       if (asked.insert({request.effect, request.joints.empty() ? "" : request.joints[0]}).second)
@@ -133,6 +154,7 @@ static RefitTask refit_task(const Work& work, const std::vector<InputColumn>& in
       add_priors(design, g, state.choice.scales[at], parameters_at(robot, e, work.given), &out.options.priors);
     }
   }
+  out.options.hold = other_forms(design, state, groups);
   out.options.effects = merged(out.options.effects);
   return out;
 }

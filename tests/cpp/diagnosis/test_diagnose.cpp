@@ -542,25 +542,6 @@ TEST_CASE("diagnose refuses a handful of poses") {
                        std::invalid_argument);
 }
 
-TEST_CASE("diagnose finds unequal bars of a palletizer's parallelograms" * doctest::skip(kSanitized)) {
-  const std::map<std::string, double> between = {{"linkage.J4.cos", 1.5e-3}, {"linkage.J4.sin", -8e-4}};
-  const std::map<std::string, double> fixed_to_base_and_wrist = {{"linkage.J4.sin_first", 1.5e-3},
-                                                                 {"linkage.J4.cos_sum", -1.5e-3}};
-  for (const auto& bars : {between, fixed_to_base_and_wrist}) {
-    Robot truth = palletizer();
-    truth.effects = {{"linkage", {"J4"}, bars}};
-    const auto table = measured(truth, 160, 800);
-    const Diagnosis d = diagnose(palletizer(), table->data);
-    INFO(names(d));
-    REQUIRE(!d.effects.empty());
-    CHECK(d.effects[0].effect == "linkage");
-    CHECK(d.effects[0].joints == std::vector<std::string>{"J4"});
-    CHECK(d.effects[0].identify_as == "linkage:J4");
-    CHECK(d.effects.size() == 1);
-    CHECK(d.unknown.empty());
-  }
-}
-
 TEST_CASE("diagnose takes a first axis of a DH robot that tilts, wherever its base stands") {
   Robot truth = palletizer();
   truth.joints[0].lower = -2.8;

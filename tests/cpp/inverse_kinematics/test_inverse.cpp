@@ -527,8 +527,11 @@ TEST_CASE("effects at a second target, and with rails and passive joints, are th
     j.lower = -1.5;
     j.upper = 1.5;
   }
-  robot.effects = {{"joint_compliance", {"J2"}, {{"joint_compliance.J2", 1e-6}}},
-                   {"linkage", {"J4"}, {{"linkage.J4.cos", 1e-3}, {"linkage.J4.sin", 5e-4}}}};
+  robot.effects = {
+      {"joint_compliance", {"J2"}, {{"joint_compliance.J2", 1e-6}}},
+      {"linkage",
+       {"J4"},
+       {{"linkage.J4.rods_first", 1e-3}, {"linkage.J4.arms_first", 5e-4}, {"linkage.J4.phase_first", 1.5}}}};
   const InverseSolver solver(robot);
   Sampler sampler(robot, 33);
   for (int k = 0; k < 20; ++k) {

@@ -8,6 +8,8 @@
 #include <cmath>
 
 #include "support/arms.hpp"
+#include "support/contains.hpp"
+#include "support/four_bar.hpp"
 
 namespace {
 
@@ -41,18 +43,113 @@ TEST_CASE("an axis that wobbles twice per turn does at q what one that wobbles o
   CHECK(truing::find_effect("axis_wobble_twice").traits.search == Search::if_asked);
 }
 
-TEST_CASE("a joint is turned by the joints on both sides of it in the chain, each by its own ratio") {
+TEST_CASE("a joint is turned by every other joint with a reading, each by its own ratio and each a form of its own") {
   const truing::Measurements data;
   Inputs in;
   in.data = &data;
   in.joints = Eigen::VectorXd::LinSpaced(6, 0.1, 0.6);
-  const auto inner = values_at("neighbour_coupling", {"J3"}, arms::ur10(), in);
-  REQUIRE(inner.size() == 2);
+  const truing::Robot robot = arms::ur10();
+  const auto inner = values_at("neighbour_coupling", {"J3"}, robot, in);
+  REQUIRE(inner.size() == 5);
   CHECK(inner.at("neighbour_coupling.J3.J2") == doctest::Approx(0.2));
   CHECK(inner.at("neighbour_coupling.J3.J4") == doctest::Approx(0.4));
-  CHECK(values_at("neighbour_coupling", {"J1"}, arms::ur10(), in).size() == 1);
-  // Of the palletizer's fifth joint the neighbour is passive: its motion is that of others.
-  CHECK_THROWS_AS(truing::effect_terms({{"neighbour_coupling", {"J5"}}}, arms::palletizer(), data), truing::Unsuited);
+  CHECK(inner.at("neighbour_coupling.J3.J6") == doctest::Approx(0.6));
+  // What concentric shafts do in the wrist is joint_coupling's.
+  CHECK(values_at("neighbour_coupling", {"J6"}, robot, in).count("neighbour_coupling.J6.J5") == 0);
+  CHECK(values_at("neighbour_coupling", {"J5"}, robot, in).count("neighbour_coupling.J5.J6") == 1);
+  const auto forms = truing::find_effect("neighbour_coupling").forms(robot, 2, data);
+  REQUIRE(forms.size() == 5);
+  for (const truing::EffectForm& form : forms) {
+    REQUIRE(form.parameters.size() == 1);
+    CHECK(inner.count(form.parameters[0]) == 1);
+    CHECK(form.constants.empty());
+  }
+  // The palletizer's fourth joint has no reading.
+  CHECK(values_at("neighbour_coupling", {"J5"}, arms::palletizer(), in).count("neighbour_coupling.J5.J4") == 0);
+  CHECK_THROWS_AS(truing::effect_terms({{"neighbour_coupling", {"J4"}}}, arms::palletizer(), data), truing::Unsuited);
+}
+
+/// Readings of a palletizer's joints, one row each.
+struct Crank {
+  std::vector<double> first, last, others;
+  truing::Measurements data;
+
+  explicit Crank(const std::vector<std::pair<double, double>>& angles) : others(angles.size(), 0.0) {
+    for (const auto& [a, b] : angles) {
+      first.push_back(a);
+      last.push_back(b);
+    }
+    data.rows = angles.size();
+    data.joints = {{others.data(), 1}, {first.data(), 1}, {last.data(), 1}, {others.data(), 1}};
+  }
+  Crank(const Crank&) = delete;
+
+  Inputs row(std::size_t at) const {
+    Inputs in;
+    in.row = at;
+    in.data = &data;
+    in.joints = Eigen::VectorXd::Zero(5);
+    in.joints << 0.0, first[at], last[at], -first[at] - last[at], 0.0;
+    return in;
+  }
+};
+
+TEST_CASE("the law of unequal bars is the exact closure of the linkage, to first order") {
+  const double length = 0.4, crank = 0.25, phase = 1.3;
+  const Crank readings({{-0.6, 0.1}, {-0.2, 0.1}, {0.1, -0.3}, {0.5, 0.0}, {0.8, -0.4}});
+  truing::Robot robot = arms::palletizer();
+  robot.effects = {{"linkage", {"J4"}, {{"linkage.J4.phase_first", phase}}}};
+  const std::vector<four_bar::Bars> changes = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}, {3, -2, 1, 2}};
+  for (const four_bar::Bars& d : changes) {
+    for (std::size_t row = 0; row < 5; ++row) {
+      const auto law = values_at("linkage", {"J4"}, robot, readings.row(row));
+      REQUIRE(law.size() == 2);
+      const double rods = (d.base - d.coupler) / crank, arms = (d.rocker - d.crank) / crank;
+      const double first_order = rods * law.at("linkage.J4.rods_first") + arms * law.at("linkage.J4.arms_first");
+      const double theta = phase + readings.first[row];
+      const auto exact = [&](double size) {
+        const four_bar::Bars bars = {length + size * d.base, crank + size * d.crank, length + size * d.coupler,
+                                     crank + size * d.rocker};
+        return four_bar::rocker_angle(bars, theta) - theta;
+      };
+      const double step = 1e-6;
+      CHECK((exact(step) - exact(-step)) / (2.0 * step) == doctest::Approx(first_order).epsilon(1e-6));
+    }
+  }
+}
+
+TEST_CASE("a parallelogram is square in the middle of its range, unless the robot carries its phase") {
+  const Crank readings({{-0.5, 0.1}, {0.1, -0.3}, {0.9, -0.4}});
+  truing::Robot robot = arms::palletizer();
+  const auto terms = truing::effect_terms({{"linkage", {"J4"}}}, robot, readings.data);
+  REQUIRE(terms.size() == 6);  // by the difference of the drivers, by the first and by their sum
+  CHECK(terms[2].parameter == "linkage.J4.rods_first");
+  CHECK(terms[3].parameter == "linkage.J4.arms_first");
+  CHECK(terms[2].constants.at("linkage.J4.phase_first") == doctest::Approx(M_PI / 2.0 - 0.2));
+  CHECK(terms[2].basis(readings.row(0)) == doctest::Approx(terms[2].basis(readings.row(2))));
+  CHECK(terms[3].basis(readings.row(0)) == doctest::Approx(-terms[3].basis(readings.row(2))));
+  robot.effects = {{"linkage", {"J4"}, {{"linkage.J4.phase_sum", 1.0}}}};
+  const auto carried = truing::effect_terms({{"linkage", {"J4"}}}, robot, readings.data);
+  REQUIRE(carried.size() == 2);
+  CHECK(carried[0].parameter == "linkage.J4.rods_sum");
+  CHECK(carried[0].basis(readings.row(1)) == doctest::Approx(1.0 / std::sin(1.0 - 0.2)));
+}
+
+TEST_CASE("no crank turns through its dead centres") {
+  const Crank readings({{-1.0, -1.2}, {0.0, 0.0}, {1.0, 1.2}});  // the sum of the drivers does
+  const auto terms = truing::effect_terms({{"linkage", {"J4"}}}, arms::palletizer(), readings.data);
+  REQUIRE(terms.size() == 4);
+  CHECK(terms[0].parameter == "linkage.J4.rods");
+  CHECK(terms[2].parameter == "linkage.J4.rods_first");
+  for (const truing::EffectForm& form : truing::find_effect("linkage").forms(arms::palletizer(), 3, readings.data)) {
+    REQUIRE(form.constants.size() == 1);
+    CHECK(form.constants.count("linkage.J4.phase_sum") == 0);
+    if (form.constants.count("linkage.J4.phase_first") == 0) continue;
+    for (const double angle : readings.first)
+      CHECK(std::sin(angle + form.constants.at("linkage.J4.phase_first")) > 0.19);
+  }
+  const Crank all_around({{-2.0, -2.0}, {2.0, -2.0}, {-2.0, 2.0}, {2.0, 2.0}});
+  CHECK_THROWS_AS(truing::effect_terms({{"linkage", {"J4"}}}, arms::palletizer(), all_around.data), truing::Unsuited);
 }
 
 TEST_CASE("loaded play changes side with the direction and grows with the torque") {

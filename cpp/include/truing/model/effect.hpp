@@ -157,7 +157,9 @@ struct EffectTraits {
   Law law = Law::none;
   LawTest law_test = LawTest::none;
   Search search = Search::always;
-  bool of_instrument = false;      ///< not a motion of the robot: instrument, frames, clocks
+  bool of_instrument = false;  ///< not a motion of the robot: instrument, frames, clocks
+  /// What causes it at one joint is likely at others too (gears of one make, one load): it is tried at several at once.
+  bool on_several_joints = false;
   bool wanders = false;            ///< what it moves may also wander: it is tried as a free function of time
   bool needs_masses = false;       ///< to be searched it needs the links' masses: the payload alone is not enough
   std::string weights_found_by{};  ///< the effect that finds the weights where no mass is known
@@ -172,6 +174,12 @@ struct EffectTraits {
   EffectDocumentation documentation{};
 };
 
+/// A narrower form of an effect, which a diagnosis tries by itself: some of its parameters, at these constants.
+struct EffectForm {
+  std::vector<std::string> parameters;        ///< full names, as the effect's terms have them
+  std::map<std::string, double> constants{};  ///< by full name, as in Term::constants; none: what the terms have
+};
+
 /// A named effect: the terms that it puts on one joint, or (per_joint = false) on the robot as a whole.
 struct Effect {
   std::string name;
@@ -181,6 +189,10 @@ struct Effect {
   std::function<std::vector<Term>(const Robot& robot, std::size_t joint, const Measurements& data)> terms;
   bool per_joint = true;  ///< false: `terms` is called once, with joint 0, and a request must not name joints
   EffectTraits traits{};
+  /// Of an effect per joint: what a request without joints means. None: `terms` at every joint that suits.
+  std::function<std::vector<Term>(const Robot& robot, const Measurements& data)> terms_of_robot{};
+  /// Forms at a joint that a diagnosis chooses from, each with the same name. None: the effect as it is.
+  std::function<std::vector<EffectForm>(const Robot& robot, std::size_t joint, const Measurements& data)> forms{};
 };
 
 /// The effects that truing knows by name (docs/reference/effects.md has their laws). gear_ratio, joint_offset,
@@ -195,8 +207,8 @@ Effect transmission_error(double order);
 /// Catalogue plus the caller's own, by name; throws std::invalid_argument that lists the names there are.
 const Effect& find_effect(const std::string& name, const std::vector<Effect>& own = {});
 
-/// An effect asked for: its name, and joints ({}: every driven joint that suits, or every passive one if only those
-/// do).
+/// An effect asked for: its name, and joints ({}: every driven joint that suits, or every passive one if only those do;
+/// of an effect that has Effect::terms_of_robot, the robot as a whole).
 struct EffectRequest {
   std::string effect;               ///< name, as in `catalogue()`
   std::vector<std::string> joints;  ///< names of joints; none: every driven one

@@ -22,7 +22,9 @@ constexpr std::size_t kRobot = std::numeric_limits<std::size_t>::max();  // in p
 
 // Terms of one effect at one joint, or of the robot as a whole.
 std::vector<Term> terms_at(const Effect& effect, const Robot& robot, std::size_t joint, const Measurements& data) {
-  std::vector<Term> terms = effect.terms(robot, joint == kRobot ? 0 : joint, data);
+  std::vector<Term> terms = joint == kRobot && effect.terms_of_robot
+                                ? effect.terms_of_robot(robot, data)
+                                : effect.terms(robot, joint == kRobot ? 0 : joint, data);
   for (Term& term : terms) {
     if (term.parameter.empty() || !term.basis) {
       throw std::invalid_argument("effect '" + effect.name + "' gives a term without parameter name or basis");
@@ -62,6 +64,7 @@ std::vector<Place> requested_places(const EffectRequest& request, const Effect& 
     }
     return {{kRobot, terms_at(effect, robot, kRobot, data)}};
   }
+  if (request.joints.empty() && effect.terms_of_robot) return {{kRobot, terms_at(effect, robot, kRobot, data)}};
   if (request.joints.empty()) return suitable_places(effect, robot, data);
   std::vector<Place> places;
   for (const std::string& name : request.joints) {

@@ -5,7 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <limits>
+#include <utility>
 
 #include "model/effects/families.hpp"
 #include "model/effects/terms.hpp"
@@ -13,12 +14,17 @@
 namespace truing::model {
 namespace {
 
+bool is_wrist(const Robot& robot) {
+  return robot.joints.size() >= 3 && std::all_of(robot.joints.end() - 3, robot.joints.end(), [](const Joint& joint) {
+           return is_revolute(joint) && !joint.passive();
+         });
+}
+
 // Concentric shafts of a wrist: turning one joint turns the next ones a little. dq5 = c q4, dq6 = c' q4 + c"
 // q5, for the last three joints, each ratio on its own.
 std::vector<Term> joint_coupling(const Robot& robot, std::size_t, const Measurements&) {
   const std::size_t n = robot.joints.size();
-  const auto is_wrist = [](const Joint& joint) { return is_revolute(joint) && !joint.passive(); };
-  if (n < 3 || !std::all_of(robot.joints.end() - 3, robot.joints.end(), is_wrist)) {
+  if (!is_wrist(robot)) {
     throw Unsuited("joint_coupling needs a wrist: the last three joints revolute and with readings");
   }
   std::vector<Term> terms;
@@ -32,49 +38,143 @@ std::vector<Term> joint_coupling(const Robot& robot, std::size_t, const Measurem
   return terms;
 }
 
-// Four-bar linkages whose opposite bars are not quite equal: to first order the passive joint errs by a cos u + b sin
-// u, u an angle between two bars: the difference of its first and last driver (q3 - q2 of a palletizer), or, where one
-// bar is fixed to the base or the wrist, the first driver's angle or their sum.
-std::vector<Term> linkage(const Robot& robot, std::size_t joint, const Measurements&) {
-  const Joint& at = robot.joints.at(joint);
+// The angle of a parallelogram's crank against its base bar, but for the phase: the difference of the passive joint's
+// first and last driver (q3 - q2 of a palletizer), or, where the base bar is fixed to the base or to the wrist's plate,
+// the first driver's angle or their sum.
+struct CrankAngle {
+  std::string suffix;
+  Eigen::Index first, last;
+  double of_first, of_last;
+
+  double operator()(const Eigen::VectorXd& joints) const { return of_first * joints[first] + of_last * joints[last]; }
+};
+
+std::vector<CrankAngle> crank_angles(const Robot& robot, const Joint& at) {
   if (!at.passive()) unsuited("linkage", at, "needs a passive joint; " + at.name + " has a reading of its own");
   std::vector<Eigen::Index> drivers;
   for (const auto& driver : at.driven_by) drivers.push_back(static_cast<Eigen::Index>(robot.joint_index(driver.first)));
   const auto [first, last] = std::minmax_element(drivers.begin(), drivers.end());
-  std::vector<std::tuple<std::string, double, double>> angles = {
-      {"", -1.0, 1.0}, {"_first", 1.0, 0.0}, {"_sum", 1.0, 1.0}};
-  if (*first == *last) angles = {{"", 0.0, 1.0}};
+  if (*first == *last) return {{"", *first, *last, 0.0, 1.0}};
+  return {{"", *first, *last, -1.0, 1.0}, {"_first", *first, *last, 1.0, 0.0}, {"_sum", *first, *last, 1.0, 1.0}};
+}
+
+// Least and largest crank angle in the data [rad]; without data: 0 and 0.
+std::pair<double, double> range_of(const CrankAngle& angle, const Robot& robot, const Measurements& data) {
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  Eigen::VectorXd joints = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.joints.size()));
+  for (std::size_t row = 0; row < data.rows && data.joints.size() == driven.size(); ++row) {
+    for (std::size_t k = 0; k < driven.size(); ++k) joints[static_cast<Eigen::Index>(driven[k])] = data.joints[k][row];
+    low = std::min(low, angle(joints));
+    high = std::max(high, angle(joints));
+  }
+  return low <= high ? std::make_pair(low, high) : std::make_pair(0.0, 0.0);
+}
+
+// No parallelogram comes nearer to its dead centres, where all bars lie in line [rad].
+constexpr double kDeadCentre = 0.2;
+
+std::string phase_name(const Joint& at, const CrankAngle& angle) {
+  return "linkage." + at.name + ".phase" + angle.suffix;
+}
+
+std::vector<Term> terms_of_linkage(const Joint& at, const CrankAngle& angle, double phase) {
+  const auto law = [angle, phase](const Inputs& in, bool rods) {
+    const double theta = angle(in.joints) + phase;
+    const double sine = std::copysign(std::max(std::abs(std::sin(theta)), std::sin(kDeadCentre)), std::sin(theta));
+    return (rods ? 1.0 : std::cos(theta)) / sine;
+  };
   std::vector<Term> terms;
-  for (const auto& [suffix, of_first, of_last] : angles) {
-    const auto angle = [a = *first, b = *last, of_first = of_first, of_last = of_last](const Inputs& in) {
-      return of_first * in.joints[a] + of_last * in.joints[b];
-    };
-    terms.push_back(make_term("linkage." + at.name + ".cos" + suffix, motion_unit(at), at.name,
-                              [angle](const Inputs& in) { return std::cos(angle(in)); }));
-    terms.push_back(make_term("linkage." + at.name + ".sin" + suffix, motion_unit(at), at.name,
-                              [angle](const Inputs& in) { return std::sin(angle(in)); }));
+  for (const bool rods : {true, false}) {
+    terms.push_back(make_term("linkage." + at.name + (rods ? ".rods" : ".arms") + angle.suffix, motion_unit(at),
+                              at.name, [law, rods](const Inputs& in) { return law(in, rods); }));
+    terms.back().constants = {{phase_name(at, angle), phase}};
   }
   return terms;
 }
 
-// The motor of one joint is carried by the one beside it, or a belt runs over it: turning that one turns this one a
-// little. dq_k = c q_(k-1) + c' q_(k+1), each ratio on its own.
+// A parallelogram whose opposite bars are not quite equal: base bar l + dl, coupler l + dc, crank r + dr_crank, rocker
+// r
+// + dr_rocker. With the crank at theta against the base bar, and the rocker at theta + delta, the coupler's length says
+//   | (l + dl, 0) + (r + dr_rocker) e(theta + delta) - (r + dr_crank) e(theta) | = l + dc,   e(x) = (cos x, sin x),
+// which is, to first order, l + dl + (dr_rocker - dr_crank) cos theta - r delta sin theta = l + dc, so that
+//   delta = (dl - dc + (dr_rocker - dr_crank) cos theta) / (r sin theta).
+// Two parameters: `rods` = (dl - dc) / r and `arms` = (dr_rocker - dr_crank) / r. theta is a sum of readings plus a
+// phase, where the base bar points. Nobody says it: the middle of the range is taken for square, as it is built, unless
+// the robot carries the phases of some parallelograms, which then are all there are.
+std::vector<Term> linkage(const Robot& robot, std::size_t joint, const Measurements& data) {
+  const Joint& at = robot.joints.at(joint);
+  std::vector<Term> known, usual;
+  for (const CrankAngle& angle : crank_angles(robot, at)) {
+    const double phase =
+        remembered(robot, "linkage", phase_name(at, angle), [] { return std::numeric_limits<double>::quiet_NaN(); });
+    const auto [low, high] = range_of(angle, robot, data);
+    const bool passes_dead_centre = high - low > M_PI - 2.0 * kDeadCentre;
+    if (!std::isfinite(phase) && passes_dead_centre) continue;  // no crank turns that far
+    const std::vector<Term> terms =
+        terms_of_linkage(at, angle, std::isfinite(phase) ? phase : M_PI / 2.0 - 0.5 * (low + high));
+    (std::isfinite(phase) ? known : usual)
+        .insert((std::isfinite(phase) ? known : usual).end(), terms.begin(), terms.end());
+  }
+  if (known.empty() && usual.empty())
+    unsuited("linkage", at,
+             "needs a crank that stays clear of its dead centres; every angle of the drivers passes one");
+  return known.empty() ? usual : known;
+}
+
+// Every phase that keeps the crank clear of its dead centres, in steps that a law hardly changes over.
+std::vector<EffectForm> phases_of_linkage(const Robot& robot, std::size_t joint, const Measurements& data) {
+  constexpr double kStep = 0.13;  // [rad]
+  const Joint& at = robot.joints.at(joint);
+  std::vector<EffectForm> forms;
+  for (const CrankAngle& angle : crank_angles(robot, at)) {
+    const std::string prefix = "linkage." + at.name;
+    const auto [low, high] = range_of(angle, robot, data);
+    const double least = kDeadCentre - low, most = M_PI - kDeadCentre - high;
+    if (least > most) continue;
+    const int steps = std::max(2, 2 * static_cast<int>(std::ceil(0.5 * (most - least) / kStep)));
+    for (int k = 0; k <= steps; ++k) {  // from square outwards
+      const int step = steps / 2 + (k % 2 ? 1 : -1) * ((k + 1) / 2);
+      forms.push_back({{prefix + ".rods" + angle.suffix, prefix + ".arms" + angle.suffix},
+                       {{phase_name(at, angle), least + (most - least) * step / steps}}});
+    }
+  }
+  return forms;
+}
+
+// The motor of one joint is carried by another, or its belt runs over that one: turning that one turns this one a
+// little. dq_k = c q_j, each ratio on its own; those that a wrist's concentric shafts make are joint_coupling's.
 std::vector<Term> neighbour_coupling(const Robot& robot, std::size_t joint, const Measurements&) {
   const Joint& at = robot.joints.at(joint);
   require_driven("neighbour_coupling", at);
   std::vector<Term> terms;
-  for (const int step : {-1, 1}) {
-    const auto beside = static_cast<std::size_t>(static_cast<int>(joint) + step);  // of the first: past the end
-    if (beside >= robot.joints.size() || robot.joints[beside].passive()) continue;
-    const Joint& mover = robot.joints[beside];
+  for (std::size_t other = 0; other < robot.joints.size(); ++other) {
+    const Joint& mover = robot.joints[other];
+    const bool by_wrist = is_wrist(robot) && other + 3 >= robot.joints.size() && other < joint;
+    if (other == joint || mover.passive() || by_wrist) continue;
     const bool same_kind = mover.type == at.type;
     const std::string unit = same_kind ? "-" : std::string(motion_unit(at)) + "/" + motion_unit(mover);
     terms.push_back(
         make_term("neighbour_coupling." + at.name + "." + mover.name, unit, at.name,
-                  [index = static_cast<Eigen::Index>(beside)](const Inputs& in) { return in.joints[index]; }));
+                  [index = static_cast<Eigen::Index>(other)](const Inputs& in) { return in.joints[index]; }));
   }
-  if (terms.empty()) unsuited("neighbour_coupling", at, "needs a joint with a reading beside it");
+  if (terms.empty()) unsuited("neighbour_coupling", at, "needs another joint with a reading");
   return terms;
+}
+
+// One joint that moves it, each by itself, the nearest first.
+std::vector<EffectForm> pairs_of_coupling(const Robot& robot, std::size_t joint, const Measurements& data) {
+  const std::vector<Term> terms = neighbour_coupling(robot, joint, data);
+  std::vector<EffectForm> forms;
+  for (std::size_t away = 1; away < robot.joints.size(); ++away) {
+    for (const std::size_t other : {joint - away, joint + away}) {
+      if (other >= robot.joints.size()) continue;  // before the first as well: it wraps around
+      const std::string name = "neighbour_coupling." + robot.joints[joint].name + "." + robot.joints[other].name;
+      if (std::any_of(terms.begin(), terms.end(), [&](const Term& term) { return term.parameter == name; }))
+        forms.push_back({{name}});
+    }
+  }
+  return forms;
 }
 
 Effect joint_coupling_effect() {
@@ -94,23 +194,29 @@ Effect linkage_effect() {
   traits.driver = Driver::other_angles;
   traits.usual = 5e-4;
   traits.plausible = 1e-2;
-  traits.main_part = "cos";
+  traits.main_part = "rods_first";
   traits.documentation = {
-      "a cos u + b sin u on the joint that q2 and q3 drive, for u = q3 − q2, q2 (`_first`) and q2 + q3 (`_sum`): "
-      "whichever bars are unequal",
-      "`linkage.J4.cos`, `.sin`, `.cos_first` … [rad]", "a passive joint"};
+      "(a + b cos θ) / sin θ on the joint that q2 and q3 drive, θ a crank against its base bar: a phase and q3 − q2, "
+      "q2 "
+      "(`_first`) or q2 + q3 (`_sum`); a = `rods`, base bar less coupler, b = `arms`, rocker less crank, by the "
+      "crank's "
+      "length",
+      "`linkage.J4.rods`, `.arms`, `.rods_first` … [rad]",
+      "a passive joint; a crank that stays clear of its dead centres"};
+  effect.forms = phases_of_linkage;
   return effect;
 }
 
 Effect neighbour_coupling_effect() {
-  Effect effect{"neighbour_coupling", "the joints beside it in the chain turn the joint", neighbour_coupling};
+  Effect effect{"neighbour_coupling", "another joint of the chain turns the joint: its motor or belt is carried along",
+                neighbour_coupling};
   EffectTraits& traits = effect.traits;
   traits.driver = Driver::other_angles;
-  traits.search = Search::if_asked;
   traits.usual = 2e-4;
   traits.plausible = 5e-2;
-  traits.documentation = {"c · motion of the joint before, c′ · motion of the joint after",
-                          "`neighbour_coupling.J3.J2` [-, rad/m, m/rad]", "a joint with a reading beside another"};
+  traits.documentation = {"c · motion of another joint, for each of them; not what `joint_coupling` has",
+                          "`neighbour_coupling.J3.J2` [-, rad/m, m/rad]", "two joints with a reading"};
+  effect.forms = pairs_of_coupling;
   return effect;
 }
 

@@ -1,0 +1,188 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Laws that machines have, hidden in data in another form than the catalogue's: what the diagnosis calls them.
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "support/arms.hpp"
+#include "support/four_bar.hpp"
+#include "support/sanitized.hpp"
+
+using namespace arms;
+using truing::diagnose;
+using truing::DiagnoseOptions;
+using truing::Diagnosis;
+using truing::Effect;
+using truing::Inputs;
+using truing::Term;
+using truing::Verdict;
+
+namespace machines {
+namespace {
+
+constexpr double kNoise = 3e-5;  // [m] of one coordinate
+
+/// What happens while measuring, by row.
+struct Conditions {
+  bool directions = false;
+  std::function<double(std::size_t)> temperature{}, payload{};
+};
+
+/// A joint that moves by `law`, which is in no catalogue; of a passive joint as well.
+Effect hidden(const std::string& joint, const std::function<double(const Inputs&)>& law) {
+  Effect effect;
+  effect.name = "hidden " + joint;
+  effect.terms = [joint, law, name = effect.name](const Robot&, std::size_t, const truing::Measurements&) {
+    Term term;
+    term.parameter = name + ".size";
+    term.unit = "rad";
+    term.site = joint;
+    term.basis = law;
+    term.needs_gravity = true;
+    return std::vector<Term>{term};
+  };
+  effect.per_joint = false;
+  return effect;
+}
+
+/// Random poses of `truth` with hidden effects of size 1, measured.
+std::unique_ptr<Table> measured(Robot truth, const std::vector<Effect>& own, std::size_t rows, unsigned seed,
+                                const Conditions& conditions = {}) {
+  truth.T_measurement_base = somewhere();
+  for (const Effect& effect : own) truth.effects.push_back({effect.name, {}, {{effect.name + ".size", 1.0}}});
+  auto table = random_joints(truth, rows, seed);
+  std::mt19937_64 random(seed + 1);
+  for (std::size_t k = 0; conditions.directions && k < table->data.joints.size(); ++k) {
+    std::vector<double> side(rows);
+    for (double& one : side) one = random() & 1 ? 1.0 : -1.0;
+    table->data.direction.push_back(table->add(side));
+  }
+  const auto by_row = [&](const std::function<double(std::size_t)>& f) {
+    std::vector<double> values(rows);
+    for (std::size_t row = 0; row < rows; ++row) values[row] = f(row);
+    return table->add(values);
+  };
+  if (conditions.temperature) table->data.temperature = by_row(conditions.temperature);
+  if (conditions.payload) table->data.payload = by_row(conditions.payload);
+  const truing::Prediction predicted = truing::predict(truth, table->data, own, 1);
+  std::normal_distribution<double> normal(0.0, kNoise);
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    table->data.position[static_cast<std::size_t>(k)] =
+        by_row([&](std::size_t row) { return predicted.position(static_cast<Eigen::Index>(row), k) + normal(random); });
+  }
+  return table;
+}
+
+std::string names(const Diagnosis& d) {
+  std::string out;
+  for (const truing::FoundEffect& e : d.effects) {
+    out += e.effect;
+    for (const std::string& joint : e.joints) out += " " + joint;
+    out += " " + std::to_string(e.probability) + "; ";
+  }
+  for (const truing::UnknownEffect& u : d.unknown) {
+    out += "unknown " + u.joint;
+    for (const std::string& input : u.inputs) out += " " + input;
+    out += "; ";
+  }
+  return out;
+}
+
+bool is_named(const Diagnosis& d, const std::string& effect, const std::vector<std::string>& joints) {
+  return std::any_of(d.effects.begin(), d.effects.end(),
+                     [&](const truing::FoundEffect& e) { return e.effect == effect && e.joints == joints; });
+}
+
+/// A palletizer whose cranks stay clear of their dead centres.
+Robot linked() {
+  Robot robot = palletizer();
+  for (const int k : {1, 2}) {
+    robot.joints[k].lower = -0.6;
+    robot.joints[k].upper = 0.6;
+  }
+  return robot;
+}
+
+/// Elbow and wrist turn as far as a robot's do.
+Robot arm() {
+  Robot robot = ur10();
+  for (Joint& j : robot.joints) {
+    j.lower = -2.0;
+    j.upper = 2.0;
+  }
+  return robot;
+}
+
+}  // namespace
+
+TEST_CASE("diagnose names a parallelogram with unequal bars by its exact closure, wherever its base bar points") {
+  const four_bar::Bars bars = {0.4, 0.2503, 0.4005, 0.25};
+  for (const double phase : {1.1, 1.57, 2.0}) {
+    const auto rods = hidden("J4", [bars, phase](const Inputs& in) {
+      const double theta = phase + in.joints[1];
+      return four_bar::rocker_angle(bars, theta) - theta;
+    });
+    const auto table = measured(linked(), {rods}, 160, 900);
+    const Diagnosis d = diagnose(linked(), table->data);
+    CAPTURE(phase);
+    INFO(names(d));
+    CHECK(is_named(d, "linkage", {"J4"}));
+    CHECK(d.effects.size() == 1);
+    CHECK(d.unknown.empty());
+    CHECK(d.after.rms < 1.2 * d.noise_floor);
+  }
+}
+
+TEST_CASE("diagnose takes two unequal parallelograms for what they are" * doctest::skip(kSanitized)) {
+  const auto rods = hidden("J4", [](const Inputs& in) {
+    const double lower = 1.3 + in.joints[1], upper = 1.8 + in.joints[1] + in.joints[2];
+    return four_bar::rocker_angle({0.4, 0.25, 0.4004, 0.25}, lower) - lower +
+           four_bar::rocker_angle({0.4, 0.2503, 0.4, 0.25}, upper) - upper;
+  });
+  const auto table = measured(linked(), {rods}, 200, 910);
+  const Diagnosis d = diagnose(linked(), table->data);
+  INFO(names(d));
+  CHECK(is_named(d, "linkage", {"J4"}));
+  CHECK(d.unknown.empty());
+  CHECK(d.after.rms < 1.2 * d.noise_floor);
+}
+
+TEST_CASE("diagnose names the coupling of joints that are no wrist's, the moved joint and the mover") {
+  for (const auto& [moved, mover] : {std::make_pair(3, 2), std::make_pair(2, 1), std::make_pair(1, 3)}) {
+    const std::string at = "J" + std::to_string(moved + 1), by = "J" + std::to_string(mover + 1);
+    const auto drag = hidden(at, [k = mover](const Inputs& in) { return 4e-4 * in.joints[k]; });
+    const auto table = measured(arm(), {drag}, 160, 930);
+    const Diagnosis d = diagnose(arm(), table->data);
+    CAPTURE(at);
+    INFO(names(d));
+    CHECK(is_named(d, "neighbour_coupling", {at}));
+    CHECK(d.effects.size() == 1);
+    CHECK(d.unknown.empty());
+    REQUIRE(!d.effects.empty());
+    REQUIRE(d.effects[0].parameters.size() == 1);
+    CHECK(d.effects[0].parameters[0].name == "neighbour_coupling." + at + "." + by);
+    CHECK(d.effects[0].parameters[0].value == doctest::Approx(4e-4).scale(0).epsilon(0.1));
+  }
+}
+
+TEST_CASE("diagnose finds none of the laws of machines in noise" * doctest::skip(kSanitized)) {
+  const auto warm = [](std::size_t row) { return 26.0 - 4.0 * std::cos(0.03 * static_cast<double>(row)); };
+  const auto heavy = [](std::size_t row) { return row % 2 ? 3.0 : 0.0; };
+  for (unsigned seed = 1000; seed < 1100; seed += 10) {
+    for (const Robot& robot : {arm(), linked()}) {
+      const auto table = measured(robot, {}, 120, seed, {true, warm, heavy});
+      const Diagnosis d = diagnose(robot, table->data);
+      CAPTURE(seed);
+      CAPTURE(robot.name);
+      INFO(names(d));
+      CHECK(d.verdict == Verdict::none);
+    }
+  }
+}
+
+}  // namespace machines
