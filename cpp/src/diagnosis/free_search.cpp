@@ -97,14 +97,23 @@ class TrialMaker {
     }
   }
 
-  /// Any two joints; this joint's own motion, direction or torque with anything else.
+  /// Any two joints; this joint's own motion, direction or torque with anything else; its direction with the load.
   void add_two_inputs(const std::string& site, std::size_t joint) {
     for (int a = 0; a < count(); ++a) {
-      if (input(a).constant || !is_motion(input(a))) continue;
+      if (input(a).constant) continue;
       for (int b = 0; b < count(); ++b) {
-        if (b != a && goes_with(a, b, static_cast<int>(joint))) add(site, design_.joint_column[joint], {a, b});
+        const bool go_together = is_motion(input(a)) ? b != a && goes_with(a, b, static_cast<int>(joint))
+                                                     : is_load_from_a_side(a, b, static_cast<int>(joint));
+        if (go_together) add(site, design_.joint_column[joint], {a, b});
       }
     }
+  }
+
+  /// Belts and gears with friction give way by the side that the joint came from and by the load.
+  bool is_load_from_a_side(int a, int b, int joint) const {
+    const InputColumn& load = input(b);
+    if (!is_direction(input(a)) || input(a).joint != joint || load.constant) return false;
+    return load.name == "payload" || (is_torque(load) && load.joint == joint);
   }
 
   bool goes_with(int a, int b, int joint) const {

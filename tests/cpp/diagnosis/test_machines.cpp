@@ -152,6 +152,18 @@ TEST_CASE("diagnose takes two unequal parallelograms for what they are" * doctes
   CHECK(d.after.rms < 1.2 * d.noise_floor);
 }
 
+TEST_CASE("diagnose names bearings out of round, and the joint's axis") {
+  // The axis leans about a line that turns twice as fast as the joint: oval, not along the catalogue's two directions.
+  Effect oval = hidden("J3.alpha", [](const Inputs& in) { return 4e-4 * std::cos(2.0 * in.joints[2] + 0.7); });
+  const Effect across = hidden("J3.beta", [](const Inputs& in) { return 3e-4 * std::sin(2.0 * in.joints[2] + 1.1); });
+  const auto table = measured(arm(), {oval, across}, 200, 920);
+  const Diagnosis d = diagnose(arm(), table->data);
+  INFO(names(d));
+  CHECK(is_named(d, "axis_wobble_twice", {"J3"}));
+  CHECK(d.unknown.empty());
+  CHECK(d.after.rms < 1.2 * d.noise_floor);
+}
+
 TEST_CASE("diagnose names the coupling of joints that are no wrist's, the moved joint and the mover") {
   for (const auto& [moved, mover] : {std::make_pair(3, 2), std::make_pair(2, 1), std::make_pair(1, 3)}) {
     const std::string at = "J" + std::to_string(moved + 1), by = "J" + std::to_string(mover + 1);
@@ -168,6 +180,53 @@ TEST_CASE("diagnose names the coupling of joints that are no wrist's, the moved 
     CHECK(d.effects[0].parameters[0].name == "neighbour_coupling." + at + "." + by);
     CHECK(d.effects[0].parameters[0].value == doctest::Approx(4e-4).scale(0).epsilon(0.1));
   }
+}
+
+TEST_CASE("diagnose names play that grows with the load") {
+  const auto belt =
+      hidden("J3", [](const Inputs& in) { return 1.5e-5 * in.data->direction[2][in.row] * in.gravity_torque[2]; });
+  const auto heavy = [](std::size_t row) { return row % 2 ? 3.0 : 0.0; };
+  const auto table = measured(arm(), {belt}, 160, 960, {true, {}, heavy});
+  const Diagnosis d = diagnose(arm(), table->data);
+  INFO(names(d));
+  CHECK(is_named(d, "loaded_play", {"J3"}));
+  CHECK(d.unknown.empty());
+}
+
+TEST_CASE("diagnose says of a belt without known weights that it gives way by direction and payload") {
+  Robot light = arm();
+  for (Joint& j : light.joints) j.mass.reset();
+  const auto belt =
+      hidden("J4", [](const Inputs& in) { return 4e-4 * in.data->direction[3][in.row] * in.data->payload[in.row]; });
+  const auto heavy = [](std::size_t row) { return static_cast<double>(row % 3); };
+  const auto table = measured(light, {belt}, 200, 970, {true, {}, heavy});
+  const Diagnosis d = diagnose(light, table->data);
+  INFO(names(d));
+  const bool said = std::any_of(d.unknown.begin(), d.unknown.end(), [](const truing::UnknownEffect& u) {
+    return u.joint == "J4" && std::count(u.inputs.begin(), u.inputs.end(), "dir4") == 1 &&
+           std::count(u.inputs.begin(), u.inputs.end(), "payload") == 1;
+  });
+  CHECK(said);
+}
+
+TEST_CASE("diagnose says of a cable pack and of an end stop which joint they hold, and by which angles") {
+  const auto pack = hidden("J4", [](const Inputs& in) {  // stiffens as the wrist winds it up
+    const double wound = in.joints[3] + in.joints[4];
+    return 2.5e-4 * wound * std::abs(wound);
+  });
+  const auto packed = measured(arm(), {pack}, 300, 980);
+  const Diagnosis d = diagnose(arm(), packed->data);
+  INFO(names(d));
+  CHECK(std::any_of(d.unknown.begin(), d.unknown.end(), [](const truing::UnknownEffect& u) {
+    return u.joint == "J4" && u.inputs == std::vector<std::string>{"q4", "q5"};
+  }));
+  const auto stop = hidden("J3", [](const Inputs& in) { return -3e-3 * std::max(0.0, in.joints[2] - 1.4); });
+  const auto stopped = measured(arm(), {stop}, 200, 990);
+  const Diagnosis at_stop = diagnose(arm(), stopped->data);
+  INFO(names(at_stop));
+  CHECK(std::any_of(at_stop.unknown.begin(), at_stop.unknown.end(), [](const truing::UnknownEffect& u) {
+    return u.joint == "J3" && u.inputs == std::vector<std::string>{"q3"};
+  }));
 }
 
 TEST_CASE("diagnose finds none of the laws of machines in noise" * doctest::skip(kSanitized)) {

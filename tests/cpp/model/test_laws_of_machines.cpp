@@ -40,7 +40,7 @@ TEST_CASE("an axis that wobbles twice per turn does at q what one that wobbles o
     CHECK(twice.at(std::string("axis_wobble_twice.J2.") + part) ==
           doctest::Approx(once.at(std::string("axis_wobble.J2.") + part)));
   }
-  CHECK(truing::find_effect("axis_wobble_twice").traits.search == Search::if_asked);
+  CHECK(truing::find_effect("axis_wobble_twice").traits.search == Search::always);
 }
 
 TEST_CASE("a joint is turned by every other joint with a reading, each by its own ratio and each a form of its own") {

@@ -91,7 +91,6 @@ Effect axis_wobble_twice_effect() {
   EffectTraits& traits = effect.traits;
   traits.driver = Driver::angle;
   traits.moves = Moves::axis;
-  traits.search = Search::if_asked;
   traits.separated_by = {{Experiment::orientations}};
   traits.usual = 1e-4;
   traits.plausible = 2e-3;

@@ -186,7 +186,6 @@ Effect windup_effect() {
 Effect loaded_play_effect() {
   Effect effect{"loaded_play", "play that grows with the load: belts, gears with friction", loaded_play};
   EffectTraits& traits = effect.traits;
-  traits.search = Search::if_asked;
   traits.mimicked_by = {"windup"};
   traits.separated_by = {{Experiment::both_directions}, {Experiment::another_payload}};
   traits.usual = 2e-6;
