@@ -61,16 +61,34 @@ truing::Effect jump() {
 TEST_CASE("an effect that is searched only if asked is a candidate when it is asked for") {
   const Robot robot = arms::ur10();
   const auto table = a_table(robot, 60, 11);
+  truing::Effect rare = jump();
+  rare.traits.search = truing::Search::if_asked;
   DiagnoseOptions options;
+  options.own_effects = {rare};
   options.resamples = 2;
   options.threads = 1;
   const Diagnosis usual = truing::diagnose(robot, table->data, options);
   CHECK(is_candidate(usual, "axis_wobble"));
-  CHECK(!is_candidate(usual, "axis_wobble_twice"));
-  options.also = {"axis_wobble_twice"};
-  const Diagnosis asked = truing::diagnose(robot, table->data, options);
-  CHECK(is_candidate(asked, "axis_wobble_twice"));
-  CHECK(!is_candidate(asked, "neighbour_coupling"));
+  CHECK(is_candidate(usual, "axis_wobble_twice"));
+  CHECK(!is_candidate(usual, "jump"));
+  options.also = {"jump"};
+  CHECK(is_candidate(truing::diagnose(robot, table->data, options), "jump"));
+}
+
+TEST_CASE("of an effect's forms at a joint one line is shown, and the whole robot's effect beside the joints'") {
+  const Robot robot = arms::ur10();
+  const auto table = a_table(robot, 60, 13);
+  DiagnoseOptions options;
+  options.resamples = 2;
+  options.threads = 1;
+  const Diagnosis d = truing::diagnose(robot, table->data, options);
+  const auto count = [&](const std::string& effect, const std::vector<std::string>& joints) {
+    return std::count_if(d.candidates.begin(), d.candidates.end(),
+                         [&](const Candidate& c) { return c.effect == effect && c.joints == joints; });
+  };
+  CHECK(count("neighbour_coupling", {"J3"}) == 1);
+  CHECK(count("thermal", {}) == 1);
+  CHECK(count("thermal", {"J3"}) == 1);
 }
 
 TEST_CASE("an own effect is found at its joint and drawn over the input that drives it") {

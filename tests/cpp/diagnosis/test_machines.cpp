@@ -182,6 +182,37 @@ TEST_CASE("diagnose names the coupling of joints that are no wrist's, the moved 
   }
 }
 
+TEST_CASE("diagnose calls a warm arm warm, not too long and then link by link") {
+  const auto warm = [](std::size_t row) {  // 28 to 34 deg C, and the robot was right at 20
+    return 31.0 - 3.0 * std::cos(0.03 * static_cast<double>(row));
+  };
+  // Every link grows by the same coefficient: the chain and its lengths, written as lengths of the true robot.
+  std::vector<Effect> growth;
+  for (const Joint& joint : arm().joints) {
+    if (joint.a == 0.0 && joint.d == 0.0) continue;
+    const bool along_x = joint.a != 0.0;
+    growth.push_back(
+        hidden(joint.name + (along_x ? ".a" : ".d"), [length = along_x ? joint.a : joint.d](const Inputs& in) {
+          return 2.3e-5 * length * (in.data->temperature[in.row] - 20.0);
+        }));
+    if (along_x && joint.d != 0.0)
+      growth.push_back(hidden(joint.name + ".d", [length = joint.d](const Inputs& in) {
+        return 2.3e-5 * length * (in.data->temperature[in.row] - 20.0);
+      }));
+  }
+  const auto table = measured(arm(), growth, 200, 940, {false, warm});
+  const Diagnosis d = diagnose(arm(), table->data);
+  INFO(names(d));
+  REQUIRE(!d.effects.empty());
+  CHECK(is_named(d, "thermal", {}));
+  CHECK(d.effects.size() == 1);
+  CHECK(d.unknown.empty());
+  CHECK(d.after.rms < 1.2 * d.noise_floor);
+  REQUIRE(!d.effects[0].parameters.empty());
+  CHECK(d.effects[0].parameters[0].name == "thermal");
+  CHECK(d.effects[0].parameters[0].value == doctest::Approx(2.3e-5).scale(0).epsilon(0.1));
+}
+
 TEST_CASE("diagnose names play that grows with the load") {
   const auto belt =
       hidden("J3", [](const Inputs& in) { return 1.5e-5 * in.data->direction[2][in.row] * in.gravity_torque[2]; });

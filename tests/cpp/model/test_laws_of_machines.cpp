@@ -152,6 +152,38 @@ TEST_CASE("no crank turns through its dead centres") {
   CHECK_THROWS_AS(truing::effect_terms({{"linkage", {"J4"}}}, arms::palletizer(), all_around.data), truing::Unsuited);
 }
 
+TEST_CASE(
+    "a warm robot is longer by one coefficient on all of its links, and right at 20 degrees unless it says else") {
+  const std::vector<double> temperature = {20.0, 32.0};
+  truing::Measurements data;
+  data.rows = 2;
+  data.temperature = {temperature.data(), 1};
+  truing::Robot robot = arms::ur10();
+  std::map<std::string, double> lengths;
+  Inputs in;
+  in.data = &data;
+  in.row = 1;
+  for (const Term& term : truing::effect_terms({{"thermal", {}}}, robot, data)) {
+    CHECK(term.parameter == "thermal");
+    CHECK(term.joint.empty());
+    CHECK(term.constants.at("thermal.reference_C") == 20.0);
+    lengths[term.site] = term.basis(in);
+    in.row = 0;
+    CHECK(term.basis(in) == 0.0);
+    in.row = 1;
+  }
+  REQUIRE(lengths.size() == 6);
+  CHECK(lengths.at("J3.a") == doctest::Approx(12.0 * -0.612));
+  CHECK(lengths.at("J1.d") == doctest::Approx(12.0 * 0.1273));
+  const auto link = truing::effect_terms({{"thermal", {"J3"}}}, robot, data);
+  REQUIRE(link.size() == 1);
+  CHECK(link[0].parameter == "thermal.J3");
+  robot.effects = {{"thermal", {}, {{"thermal.reference_C", 26.0}}}};
+  for (const Term& term : truing::effect_terms({{"thermal", {}}}, robot, data)) {
+    if (term.site == "J3.a") CHECK(term.basis(in) == doctest::Approx(6.0 * -0.612));
+  }
+}
+
 TEST_CASE("loaded play changes side with the direction and grows with the torque") {
   const truing::Robot robot = arms::ur10();
   const std::vector<double> directions = {1.0, -1.0};

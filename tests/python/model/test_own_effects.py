@@ -19,7 +19,7 @@ def creep(joint: str) -> truing.Effect:
     return truing.Effect(
         "creep",
         site=joint,
-        basis=lambda d: d.temperature - d.temperature.mean(),
+        basis=lambda d: d.temperature - 20.0,
         unit="rad/K",
         traits=EffectTraits(
             driver="temperature", law="of_warmth", separated_by={"": COOL}, usual=3e-5, plausible=2e-4
