@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "diagnosis/free_search.hpp"
 #include "math/text.hpp"
@@ -483,6 +484,50 @@ static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
   return true;
 }
 
+/// The same effect at every joint where it would win by itself, if what causes it is likely at several. Fewer than two:
+/// none.
+static Choice at_several_joints(const Work& work, const Decision& so_far, const Effect& effect) {
+  Choice out;
+  for (std::size_t g = 0; g < so_far.first.size(); ++g) {
+    const Explanation& e = work.design.candidates.named[g];
+    const ColumnGroup& group = work.design.candidates.groups[g];
+    if (e.effect != effect.name || e.kind != Kind::catalogue || group.shadow || so_far.first[g].score < 0.0) continue;
+    out.groups.push_back(static_cast<int>(g));
+    out.scales.push_back(so_far.first[g].scale);
+  }
+  return out.groups.size() < 2 ? Choice{} : out;
+}
+
+/// A score in which an effect that is likely at several joints pays for the choice among all candidates once, and then
+/// for that among the joints.
+static double score_of_causes(const Work& work, const Evidence::State& state) {
+  const double joints = std::log(static_cast<double>(work.design.joint_column.size()));
+  double score = state.score;
+  std::set<std::string> seen;
+  for (const int g : state.choice.groups) {
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
+    if (e.kind != Kind::catalogue || !effect_traits(work, e).on_several_joints || seen.insert(e.effect).second)
+      continue;
+    score += std::max(0.0, work.design.candidates.groups[static_cast<std::size_t>(g)].cost - joints);
+  }
+  return score;
+}
+
+/// One cause on several joints: step by step something else at one of them can stand in its way.
+static Evidence::State search_causes(const Work& work, const Evidence& evidence, const Decision& so_far,
+                                     Evidence::State best) {
+  for (const std::vector<Effect>* effects : {&catalogue(), &work.given.options.own_effects}) {
+    for (const Effect& effect : *effects) {
+      if (!effect.traits.on_several_joints) continue;
+      const Choice start = at_several_joints(work, so_far, effect);
+      if (start.groups.empty()) continue;
+      Evidence::State other = keep_what_predicts(work, evidence.search(so_far.search, start));
+      if (score_of_causes(work, other) > score_of_causes(work, best)) best = std::move(other);
+    }
+  }
+  return best;
+}
+
 /// Named effects, from nothing on; and, where all links together are not among them, from those on: step by step a few
 /// single effects can stand in the way of many small errors of the links.
 static Evidence::State search_named(const Work& work, const Decision& so_far) {
@@ -496,7 +541,7 @@ static Evidence::State search_named(const Work& work, const Decision& so_far) {
     const Evidence::State other = keep_what_predicts(work, evidence.search(so_far.search, links));
     if (other.score > best.score) best = other;
   }
-  return best;
+  return search_causes(work, evidence, so_far, std::move(best));
 }
 
 /// All links together, and the size of their errors: what predicts other poses better than the choice does, beside it

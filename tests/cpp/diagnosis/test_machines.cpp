@@ -213,6 +213,23 @@ TEST_CASE("diagnose calls a warm arm warm, not too long and then link by link") 
   CHECK(d.effects[0].parameters[0].value == doctest::Approx(2.3e-5).scale(0).epsilon(0.1));
 }
 
+TEST_CASE("diagnose names springs at two joints that harden a little as springs at two joints") {
+  const auto spring = [](const std::string& joint, Eigen::Index k, double compliance, double largest) {
+    return hidden(joint, [=](const Inputs& in) {
+      const double torque = in.gravity_torque[k], part = std::min(1.0, std::abs(torque) / largest);
+      return compliance * torque * (1.0 - 0.2 * part);
+    });
+  };
+  const std::vector<Effect> springs = {spring("J2", 1, 1.2e-5, 60.0), spring("J3", 2, 2e-5, 20.0)};
+  const auto heavy = [](std::size_t row) { return row % 2 ? 3.0 : 0.0; };
+  const auto table = measured(arm(), springs, 160, 950, {false, {}, heavy});
+  const Diagnosis d = diagnose(arm(), table->data);
+  INFO(names(d));
+  for (const char* joint : {"J2", "J3"})
+    CHECK((is_named(d, "joint_compliance", {joint}) || is_named(d, "stiffness_zones", {joint})));
+  for (const truing::FoundEffect& e : d.effects) CHECK(e.effect != "link_compliance");
+}
+
 TEST_CASE("diagnose names play that grows with the load") {
   const auto belt =
       hidden("J3", [](const Inputs& in) { return 1.5e-5 * in.data->direction[2][in.row] * in.gravity_torque[2]; });

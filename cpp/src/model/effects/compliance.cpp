@@ -247,6 +247,7 @@ Effect joint_compliance_effect() {
   traits.driver = Driver::gravity_torque;
   traits.law = Law::of_torque;
   traits.law_test = LawTest::of_driver;
+  traits.on_several_joints = true;
   traits.weights_found_by = "gravity_moment";
   traits.mimicked_by = {"windup"};
   traits.contained_in = {
