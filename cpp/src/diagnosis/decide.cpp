@@ -21,6 +21,7 @@ constexpr double kNoBetter = 1.004;   ///< a group must lower the cross-validate
 constexpr double kSureRise = 1.5;     ///< and by so many standard errors over the folds
 constexpr double kManyValues = 10.0;  ///< for each parameter of the links: no longer few
 constexpr double kMuchBetter = 1.05;  ///< sums of squares that are worth another choice
+constexpr double kChance = 0.05;      ///< of random signs, that a free function may have at most
 constexpr double kFreeShare = 0.04;   ///< of what is left, that a free function must explain
 constexpr double kMeshNats =
     5.0;  ///< beyond the threshold, that a mesh order must win: waves this short fit anything a little
@@ -468,7 +469,7 @@ static void find_gap(const Work& work, Decision* out) {
 static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
   const SearchOptions& search = out->search;
   const bool room = static_cast<int>(out->state.choice.groups.size()) < search.most_groups;
-  if (!room || scan.best.empty() || scan.p > 0.02) return false;
+  if (!room || scan.best.empty() || scan.p > kChance) return false;
   const FreeGain& best = scan.best.front();
   if (!(best.gain.score > search.threshold + 4.0 && best.gain.share > kFreeShare)) return false;
   append_free(work, best, scan.tried);

@@ -244,7 +244,8 @@ Design::Rows right_sides(const Design& design, const Left& left, int flips, std:
     }
     // A fit would have taken its share of this noise, too.
     flipped -= left.columns * left.factor.solve(left.columns.transpose() * flipped);
-    out.col(p + 1 + f) = flipped;
+    // Projected twice, it has become shorter than what it is compared with.
+    out.col(p + 1 + f) = flipped * (left.residual.norm() / std::max(flipped.norm(), 1e-300));
   }
   return out;
 }
@@ -258,17 +259,18 @@ Evidence::State seen_on(const Left& left, const Evidence& evidence, const Eviden
   return out;
 }
 
-/// Scores of sign-flipped residuals, each the largest of those so far. `flipped`: X^T v of each; `a`: X^T X beyond the
-/// state.
+constexpr double kScalesOfChance[] = {0.1, 0.01, 0.001};  ///< of functions: the same for the data and for random signs
+
+/// Scores of residuals, each the largest of those so far. `seen`: X^T v of each; `a`: X^T X beyond the state.
 void raise_scores(const Evidence& evidence, const Evidence::State& state, const Eigen::MatrixXd& a,
-                  const Eigen::MatrixXd& flipped, double scale, double cost, std::vector<double>* largest) {
+                  const Eigen::MatrixXd& seen, double scale, double cost, std::vector<double>* largest) {
   Eigen::MatrixXd m = a;
   const double ridge = state.sigma2 / std::pow(scale * kLargest, 2.0);
   m.diagonal().array() += ridge;
   const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(m));
   const double determinants =
       static_cast<double>(a.rows()) * std::log(ridge) - 2.0 * factor.matrixLLT().diagonal().array().log().sum();
-  Eigen::MatrixXd half = flipped;
+  Eigen::MatrixXd half = seen;
   factor.matrixL().solveInPlace(half);
   for (std::size_t f = 0; f < largest->size(); ++f) {
     const double fall = std::min(half.col(static_cast<Eigen::Index>(f)).squaredNorm(), 0.999 * state.rss);
@@ -278,11 +280,10 @@ void raise_scores(const Evidence& evidence, const Evidence::State& state, const 
   }
 }
 
-/// How often random signs reach the best score, the data's own signs counted in.
-double chance_of(const std::vector<double>& largest, double best) {
-  int above = 1;
-  for (const double score : largest) above += score >= best ? 1 : 0;
-  return static_cast<double>(above) / (static_cast<double>(largest.size()) + 1.0);
+/// How often a score is as high as the first, which is the data's own: that one counted in, this is uniform for noise.
+double chance_of(const std::vector<double>& largest) {
+  const auto above = std::count_if(largest.begin(), largest.end(), [&](double score) { return score >= largest[0]; });
+  return static_cast<double>(above) / static_cast<double>(largest.size());
 }
 
 // --- mesh orders -----------------------------------------------------------------------------------------------------
@@ -406,7 +407,7 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
   const Evidence::State seen = seen_on(left, evidence, state, times);
   FreeScan out;
   out.tried = trials.size();
-  std::vector<double> largest(static_cast<std::size_t>(options.flips), -1e300);
+  std::vector<double> largest(static_cast<std::size_t>(options.flips) + 1, -1e300);  // the data's own first
   const double cost = std::log(static_cast<double>(std::max<std::size_t>(1, out.tried)));
   for (const Trial& trial : trials) {
     const Sums sums = sums_of(trial, design, inputs, left.at, right);
@@ -418,10 +419,8 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
     FreeGain found;
     found.gain = evidence.gain_of(seen, a, sums.right.col(p) * times, Eigen::VectorXd::Constant(k, kLargest), cost);
     if (options.flips > 0) {
-      // At the scale that the data chose, or noise's own: the smallest.
-      const Eigen::MatrixXd flipped = sums.right.rightCols(options.flips) * times;
-      for (const double scale : {found.gain.scale, 0.001})
-        raise_scores(evidence, seen, a, flipped, scale, cost, &largest);
+      const Eigen::MatrixXd all = sums.right.rightCols(options.flips + 1) * times;
+      for (const double scale : kScalesOfChance) raise_scores(evidence, seen, a, all, scale, cost, &largest);
     }
     found.what = trial.what;
     found.site_columns = trial.sites;
@@ -429,7 +428,7 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
   }
   std::sort(out.best.begin(), out.best.end(),
             [](const FreeGain& a, const FreeGain& b) { return a.gain.score > b.gain.score; });
-  if (!out.best.empty() && options.flips > 0) out.p = chance_of(largest, out.best[0].gain.score);
+  if (!out.best.empty() && options.flips > 0) out.p = chance_of(largest);
   if (out.best.size() > 200) out.best.resize(200);
   return out;
 }

@@ -843,3 +843,20 @@ TEST_CASE("diagnose searches a part of many poses and judges all of them") {
   CHECK(std::any_of(d.warnings.begin(), d.warnings.end(),
                     [](const std::string& w) { return w.find("120 of 300") != std::string::npos; }));
 }
+
+TEST_SUITE("slow") {
+  // Seeds 2000 to 2049. Bounds: 1 in 1000 of a binomial with 50 draws.
+  TEST_CASE("the p-value of remaining structure is uniform in white noise" * doctest::skip(kSanitized)) {
+    constexpr unsigned kSets = 50;
+    int small = 0, half = 0;
+    for (unsigned seed = 2000; seed < 2000 + kSets; ++seed) {
+      const auto table = measured(light_arm(), 60, seed);
+      const double p = diagnose(light_arm(), table->data).remaining_structure_p;
+      small += p <= 0.05 ? 1 : 0;
+      half += p <= 0.5 ? 1 : 0;
+    }
+    CHECK(small <= 8);
+    CHECK(half >= 14);
+    CHECK(half <= 36);
+  }
+}
