@@ -89,9 +89,9 @@ struct FoundEffect {
   std::vector<std::string> joints;    ///< where
   double probability = 0.0;           ///< posterior of the class: this effect or one of `confounded_with`
   std::vector<Parameter> parameters;  ///< values and standard errors
-  ErrorStatistics held_out_before;    ///< held-out errors without this effect, all others in
+  ErrorStatistics held_out_before;    ///< errors of poses that the fit did not see, without this effect, all others in
   ErrorStatistics held_out_after;     ///< held-out errors with all named effects
-  Share shrink;                       ///< of the held-out rms: 1 - after / before
+  Share shrink;                       ///< of the rms, rotations counted by their noise: 1 - after / before
   /// Fraction of the gap's mean square: its fall when the effect is added with the size found, averaged over the orders
   /// in which effects may be added; those of all effects and unknowns add up to what was closed.
   double share = 0.0;

@@ -18,7 +18,6 @@ namespace truing::diagnosis {
 using Kind = Explanation::Kind;
 constexpr int kNullDraws = 200;
 constexpr double kNoBetter = 1.004;   ///< a group must lower the cross-validated sum of squares by more than this
-constexpr double kSureRise = 1.5;     ///< and by so many standard errors over the folds
 constexpr double kManyValues = 10.0;  ///< for each parameter of the links: no longer few
 constexpr double kMuchBetter = 1.05;  ///< sums of squares that are worth another choice
 constexpr double kChance = 0.05;      ///< of random signs, that a free function may have at most
@@ -120,43 +119,6 @@ Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std
     out.scales.push_back(choice.scales[k]);
   }
   return out;
-}
-
-/// Sum of squares on every fold, of the fit to the others.
-static Eigen::VectorXd squares_of_folds(const Work& work, const Choice& choice) {
-  const auto& groups = work.design.candidates.groups;
-  std::vector<int> columns = work.design.nuisance;
-  for (const int g : choice.groups)
-    columns.insert(columns.end(), groups[static_cast<std::size_t>(g)].columns.begin(),
-                   groups[static_cast<std::size_t>(g)].columns.end());
-  const Evidence whole(work.grams.train, groups, work.design.nuisance, work.design.prior);
-  const Evidence::State state = whole.evaluate(choice);
-  const Gram all = work.grams.train.of(columns);
-  Eigen::VectorXd out(static_cast<Eigen::Index>(work.grams.train_folds.size()));
-  for (Eigen::Index k = 0; k < out.size(); ++k) {
-    const Gram held = work.grams.train_folds[static_cast<std::size_t>(k)].of(columns);
-    Eigen::MatrixXd d = all.xx - held.xx;
-    d.diagonal() += state.precision;
-    const Eigen::VectorXd solution = factorised(std::move(d)).solve(all.xy - held.xy);
-    out[k] = held.yy - 2.0 * solution.dot(held.xy) + solution.dot(held.xx * solution);
-  }
-  return out;
-}
-
-double cross_validated(const Work& work, const Choice& choice) { return squares_of_folds(work, choice).sum(); }
-
-/// Standard errors by which the folds' sums of squares rise from one choice to another; of their roots, or a single
-/// fold could decide.
-static double sure_rise(const Eigen::VectorXd& from, const Eigen::VectorXd& to) {
-  const Eigen::VectorXd rise = (to - from).unaryExpr([](double d) { return std::copysign(std::sqrt(std::abs(d)), d); });
-  const auto n = static_cast<double>(rise.size());
-  const double spread = (rise.array() - rise.mean()).matrix().norm() / std::sqrt(n - 1.0);
-  return rise.mean() / std::max(spread / std::sqrt(n), 1e-300);
-}
-
-/// Does one choice predict the folds better than another, by this factor and for sure?
-static bool predicts_better(const Eigen::VectorXd& one, const Eigen::VectorXd& other, double factor) {
-  return other.sum() >= factor * one.sum() && sure_rise(one, other) >= kSureRise;
 }
 
 /// Groups that do not help, for sure, on poses they were not fitted to go, however well they fit.

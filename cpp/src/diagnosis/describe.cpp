@@ -21,6 +21,7 @@ namespace truing::diagnosis {
 
 using Kind = Explanation::Kind;
 
+constexpr double kUnconfirmed = 0.6;    ///< at most so likely is what may gain nothing on poses that the fit did not see
 constexpr double kMoreThanNoise = 2.0;  ///< times the noise: an error that noise does not make
 
 /// What a curve is drawn of: motion of a site against an input, for a range of a second one if there is one.
@@ -218,30 +219,28 @@ static std::vector<Parameter> parameters_of(const Work& work, const Evidence::St
   return out;
 }
 
-/// How far the held-out error shrinks by one group, the last one in.
+/// How far the error of unseen poses shrinks by one group, the last one in.
 struct Shrinkage {
   ErrorStatistics before, after;
   Share shrink;
-  double gap = 0.0;       ///< held-out sum of squares with no group
-  double closed_by_last;  ///< and what the group closes of it
+  double gap = 0.0;             ///< held-out sum of squares with no group
+  double closed_by_last = 0.0;  ///< and what the group closes of it
 };
 
-static Shrinkage shrinkage_by(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
-                              const Resampled& resampled) {
+static Shrinkage shrinkage_by(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at) {
   const Evidence::State& state = decision.state;
   const auto squares = [&](const Evidence::State& s) {
     return held_out_squares(work.grams.test, s.columns, s.solution);
   };
-  const Evidence::State less = evidence.evaluate(without(state.choice, work.design.candidates.groups, at));
+  const Choice less = without(state.choice, work.design.candidates.groups, at);
+  const UnseenErrors before = unseen_errors(work, less), after = unseen_errors(work, state.choice);
+  const DiagnoseOptions& options = work.given.options;
   Shrinkage out;
-  out.before = error_statistics(held_out_lengths(work.design, less));
-  out.after = error_statistics(held_out_lengths(work.design, state));
-  const double shrink = out.before.rms > 0.0 ? 1.0 - out.after.rms / out.before.rms : 0.0;
-  const auto spread = resampled.shrink_of.find(state.choice.groups[at]);
-  out.shrink =
-      percentile_interval(spread == resampled.shrink_of.end() ? std::vector<double>{} : spread->second, shrink);
+  out.before = error_statistics(before.length);
+  out.after = error_statistics(after.length);
+  out.shrink = shrinkage(before, after, options.resamples, options.seed + 7);
   out.gap = squares(evidence.evaluate({}));
-  out.closed_by_last = squares(less) - squares(state);
+  out.closed_by_last = squares(evidence.evaluate(less)) - squares(state);
   return out;
 }
 
@@ -323,8 +322,7 @@ static void draw_law(const Work& work, const Decision& decision, int g, FoundEff
 
 /// What the user reads of one group.
 FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
-                     const Sureness& sure, double probability, const Identification& refitted,
-                     const Resampled& resampled) {
+                     const Sureness& sure, double probability, const Identification& refitted) {
   const int g = decision.state.choice.groups[at];
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
   FoundEffect out;
@@ -334,10 +332,11 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   out.identify_as = identify_as(e);
   out.probability = probability;
   out.parameters = parameters_of(work, decision.state, e, refitted);
-  const Shrinkage shrinkage = shrinkage_by(work, evidence, decision, at, resampled);
+  const Shrinkage shrinkage = shrinkage_by(work, evidence, decision, at);
   out.held_out_before = shrinkage.before;
   out.held_out_after = shrinkage.after;
   out.shrink = shrinkage.shrink;
+  if (!(out.shrink.low > 0.0)) out.probability = std::min(out.probability, kUnconfirmed);
   if (shrinkage.gap > 0.0) {
     out.share_alone = share_alone(work, evidence, decision.state.choice, at, shrinkage.gap);
     out.share_last = std::max(0.0, shrinkage.closed_by_last / shrinkage.gap);
@@ -369,14 +368,13 @@ static std::vector<Curve> curves_of_function(const Work& work, const Decision& d
   return out;
 }
 
-UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
-                               const Resampled& resampled) {
+UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at) {
   const int g = decision.state.choice.groups[at];
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
   UnknownEffect out;
   out.joint = e.site;
   for (const int input : e.inputs) out.inputs.push_back(work.inputs[static_cast<std::size_t>(input)].name);
-  const Shrinkage shrinkage = shrinkage_by(work, evidence, decision, at, resampled);
+  const Shrinkage shrinkage = shrinkage_by(work, evidence, decision, at);
   out.held_out_before = shrinkage.before;
   out.held_out_after = shrinkage.after;
   out.shrink = shrinkage.shrink;

@@ -33,6 +33,7 @@ constexpr double kLackOfFit = 4.0;         ///< standard errors beyond repeats, 
 constexpr double kEnoughRepeats = 20.0;    ///< degrees of freedom, for the noise to be taken from repeats
 constexpr double kHardlyLess = 0.98;       ///< of the gap: what is left of it where nothing was explained
 constexpr double kManyOutliers = 0.05;     ///< of the rows, from which on they are no exceptions
+constexpr double kSmallGain = 0.02;        ///< of the error, that is not worth a line if it may be none
 constexpr double kNamed = 0.5;             ///< a name is given to what is more likely right than wrong
 
 void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
@@ -181,6 +182,31 @@ std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evide
   }
 }
 
+/// Takes back, one at a time, small gains that poses which the fit did not see do not confirm: their interval holds
+/// none.
+void keep_what_is_confirmed(const Work& work, const Evidence& evidence, Decision* decision) {
+  const DiagnoseOptions& options = work.given.options;
+  for (;;) {
+    const Choice& choice = decision->state.choice;
+    const UnseenErrors with = unseen_errors(work, choice);
+    double least = 1e300;
+    Choice better;
+    for (std::size_t at = 0; at < choice.groups.size(); ++at) {
+      if (links_predict(work, choice, at)) continue;
+      const Choice less = without(choice, work.design.candidates.groups, at);
+      const Share gain = shrinkage(unseen_errors(work, less), with, options.resamples, options.seed + 7);
+      if (gain.low > 0.0 || gain.value >= least) continue;
+      least = gain.value;
+      better = less;
+    }
+    if (least > kSmallGain) return;
+    for (auto& [correction, corrected] : decision->corrects) {
+      if (std::find(better.groups.begin(), better.groups.end(), corrected) == better.groups.end()) corrected = -1;
+    }
+    decision->state = evidence.evaluate(better);
+  }
+}
+
 /// What a robot file can hold.
 bool is_in_catalogue(const Explanation& e) { return e.kind == Kind::catalogue || e.kind == Kind::all_geometry; }
 
@@ -294,7 +320,7 @@ void share_the_gap(Diagnosis* out) {
                    [](const UnknownEffect& a, const UnknownEffect& b) { return a.probability > b.probability; });
 }
 
-void describe_all(const Work& work, const Evidence& evidence, const Decision& decision, const Resampled& resampled,
+void describe_all(const Work& work, const Evidence& evidence, const Decision& decision,
                   const std::map<int, Named>& names, const Identification& refitted, Diagnosis* out) {
   const std::vector<int>& chosen = decision.state.choice.groups;
   const std::vector<double> shares = order_averaged_shares(work, evidence, decision.state);
@@ -302,7 +328,7 @@ void describe_all(const Work& work, const Evidence& evidence, const Decision& de
   for (std::size_t at = 0; at < chosen.size(); ++at) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(chosen[at])];
     if (e.kind != Kind::free && e.kind != Kind::law) continue;
-    UnknownEffect unknown = describe_unknown(work, evidence, decision, at, resampled);
+    UnknownEffect unknown = describe_unknown(work, evidence, decision, at);
     // A small correction of a law is a remark; a large one is something that nobody has named.
     if (corrects_a_law(decision, chosen[at]) && unknown.share <= kCorrectionShare) {
       by_corrections[decision.corrects.at(chosen[at])] += shares[at];
@@ -315,7 +341,7 @@ void describe_all(const Work& work, const Evidence& evidence, const Decision& de
     const auto named = names.find(chosen[at]);
     if (named == names.end()) continue;
     out->effects.push_back(
-        describe(work, evidence, decision, at, named->second.sure, named->second.probability, refitted, resampled));
+        describe(work, evidence, decision, at, named->second.sure, named->second.probability, refitted));
     out->effects.back().share = shares[at] + by_corrections[chosen[at]];
   }
 }
@@ -407,6 +433,7 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   // 3. to 6. What explains it, and 7. how sure that is.
   Decision decision = decide(&work, robot);
   const Evidence evidence(work.grams.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
+  keep_what_is_confirmed(work, evidence, &decision);
   const Resampled resampled = resample(work, decision);
   const std::map<int, Named> names = keep_what_is_likely(work, evidence, resampled, &decision);
   result.p_gap = decision.p_gap;
@@ -419,7 +446,7 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   const Fitted fitted = fit_exactly(whole, work, inputs, robot, decision, resampled, &result);
   const Repeats repeats = noise_of_repeats(whole.data);
   judge_noise(repeats, work, decision, &result);
-  describe_all(work, evidence, decision, resampled, names, fitted.by_catalogue.found, &result);
+  describe_all(work, evidence, decision, names, fitted.by_catalogue.found, &result);
   scale_to_exact(&result);
   merge_the_same(&result);
   question_noise(repeats, whole.data, &result);

@@ -87,11 +87,16 @@ struct Sureness {
   double removal_loss = 0.0;  ///< nats lost without it
 };
 
+/// Errors that a choice leaves of poses that its fit did not see, times the root of their weight.
+struct UnseenErrors {
+  std::vector<double> length;          ///< [m] of position (or distance), by row
+  std::vector<double> square_of_fold;  ///< [m^2] sum of squares; rotations in it by their noise
+};
+
 /// The selection repeated on resampled poses: which groups come back, and how far the held-out error shrinks each time.
 struct Resampled {
   std::vector<std::vector<int>> chosen;
-  std::vector<double> shrink;                    ///< of the held-out rms, all groups
-  std::map<int, std::vector<double>> shrink_of;  ///< by group of the decision: against all others
+  std::vector<double> shrink;  ///< of the held-out rms, all groups
 };
 
 // --- weigh.cpp: what noise is ----------------------------------------------------------------------------------------
@@ -110,6 +115,19 @@ Grams make_grams(const Design& design, double design_effect, int threads);
 /// After columns were appended: their part of every Gram, nothing else.
 void extend_grams(const Design& design, double design_effect, Grams* grams);
 
+// --- unseen.cpp: errors of poses that a fit did not see
+// ---------------------------------------------------------------
+
+/// Sum of squares on every training fold, of the fit to the others.
+Eigen::VectorXd squares_of_folds(const Work& work, const Choice& choice);
+double cross_validated(const Work& work, const Choice& choice);
+/// Does one choice predict the folds better than another, by this factor and for sure?
+bool predicts_better(const Eigen::VectorXd& one, const Eigen::VectorXd& other, double factor);
+/// Of every training fold by a fit to the others, and of the poses held out by the fit to all training folds.
+UnseenErrors unseen_errors(const Work& work, const Choice& choice);
+/// Fraction by which the root mean square shrinks, and its 90 % interval over draws of the folds.
+Share shrinkage(const UnseenErrors& before, const UnseenErrors& after, int draws, std::uint64_t seed);
+
 // --- decide.cpp: what explains the gap -------------------------------------------------------------------------------
 
 inline bool is_named(const Explanation& e) {
@@ -123,8 +141,6 @@ const EffectTraits& effect_traits(const Work& work, const Explanation& e);
 int input_named(const Work& work, const std::string& name);
 /// A choice less one group, and less what corrects its law.
 Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std::size_t at);
-/// Sum of squares on every fold of the fit to the others.
-double cross_validated(const Work& work, const Choice& choice);
 
 /// The groups that may enter first, on a Gram of their columns only: corrections of laws and fine drifts are many
 /// columns.
@@ -154,7 +170,6 @@ double calibrated(double posterior, double selection_frequency, double removal_l
 
 // --- refit.cpp: how far the error shrinks ----------------------------------------------------------------------------
 
-std::vector<double> held_out_lengths(const Design& design, const Evidence::State& state);
 Share percentile_interval(std::vector<double> values, double center);
 /// The chosen `groups` fitted without linearisation on the training rows of `whole`, under the search's priors.
 /// `inputs` are those of the whole.
@@ -167,10 +182,8 @@ double lack_of_fit(const Measurements& data, const std::vector<double>& lengths,
 // --- describe.cpp: what the user reads -------------------------------------------------------------------------------
 
 FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
-                     const Sureness& sure, double probability, const Identification& refitted,
-                     const Resampled& resampled);
-UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
-                               const Resampled& resampled);
+                     const Sureness& sure, double probability, const Identification& refitted);
+UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at);
 /// A gap beyond the noise of repeats that nothing describes; `excess`: in standard errors.
 UnknownEffect describe_lack_of_fit(const Diagnosis& d, double excess);
 std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidence,

@@ -18,26 +18,6 @@ namespace truing::diagnosis {
 
 using Kind = Explanation::Kind;
 
-/// Lengths of the position (or distance) errors that a linear model leaves on the design's held-out rows, in order.
-std::vector<double> held_out_lengths(const Design& design, const Evidence::State& state) {
-  std::vector<double> out;
-  std::int32_t last = -1;
-  for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
-    if (design.fold[static_cast<std::size_t>(i)] < design.folds ||
-        kind_of(design.component[static_cast<std::size_t>(i)]) == 1)
-      continue;
-    double e = design.y[i];
-    for (std::size_t c = 0; c < state.columns.size(); ++c)
-      e -= design.x(i, state.columns[c]) * state.solution[static_cast<Eigen::Index>(c)];
-    const std::int32_t row = design.row[static_cast<std::size_t>(i)];
-    if (row != last) out.push_back(0.0);
-    last = row;
-    out.back() += e * e;
-  }
-  for (double& length : out) length = std::sqrt(length);
-  return out;
-}
-
 Share percentile_interval(std::vector<double> values, double center) {
   Share out{center, center, center};
   if (values.size() < 5) return out;

@@ -204,11 +204,6 @@ Resampled resample(const Work& work, const Decision& decision) {
     const double before = std::max(held_out_squares(test, nothing.columns, nothing.solution), 1e-300);
     const double after = std::max(0.0, held_out_squares(test, refitted.columns, refitted.solution));
     out.shrink.push_back(1.0 - std::sqrt(after / before));
-    for (std::size_t at = 0; at < few.choice.groups.size(); ++at) {
-      const Evidence::State less = evidence.evaluate(without(few.choice, few.groups, at));
-      const double lesser = std::max(held_out_squares(test, less.columns, less.solution), 1e-300);
-      out.shrink_of[decision.state.choice.groups[at]].push_back(1.0 - std::sqrt(after / lesser));
-    }
   }
   return out;
 }

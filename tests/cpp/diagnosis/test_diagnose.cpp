@@ -624,6 +624,22 @@ TEST_CASE("diagnose takes several targets") {
   CHECK(found(d, "backlash", "J3"));
 }
 
+TEST_CASE("diagnose names no small gain that unseen poses do not confirm" * doctest::skip(kSanitized)) {
+  for (const unsigned seed : {210u, 220u, 230u}) {
+    Robot truth = perturbed(light_arm(), 1e-3, 1e-3, seed);
+    truth.effects = {backlash("J3", 8e-4)};
+    const auto table = measured(truth, 80, seed);
+    const Diagnosis d = diagnose(light_arm(), table->data);
+    CAPTURE(seed);
+    INFO(names(d));
+    CHECK(found(d, "backlash", "J3"));
+    for (const truing::FoundEffect& effect : d.effects) {
+      CHECK((effect.shrink.low > 0.0 || effect.shrink.value > 0.02));
+      CHECK((effect.shrink.low > 0.0 || effect.probability <= 0.6));
+    }
+  }
+}
+
 TEST_CASE("diagnose recognises exchanged and turned joint columns") {
   auto table = measured(light_arm(), 120, 900);
   std::swap(table->data.joints[2], table->data.joints[4]);
