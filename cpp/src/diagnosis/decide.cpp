@@ -547,6 +547,10 @@ Decision decide(Work* work, const Robot& robot) {
   Decision out;
   out.search.most_groups = options.max_effects;
   find_gap(*work, &out);
+  if (work->given.mistaken) {
+    out.state = evidence_now(*work).evaluate({});
+    return out;
+  }
   // Named effects; then free functions on what they leave; then mesh orders.
   out.state = search_named(*work, out);
   for (int round = 0; round < 6; ++round) {

@@ -21,7 +21,7 @@ namespace truing::diagnosis {
 
 using Kind = Explanation::Kind;
 
-constexpr double kUnconfirmed = 0.6;    ///< at most so likely is what may gain nothing on poses that the fit did not see
+constexpr double kUnconfirmed = 0.6;  ///< at most so likely is what may gain nothing on poses that the fit did not see
 constexpr double kMoreThanNoise = 2.0;  ///< times the noise: an error that noise does not make
 
 /// What a curve is drawn of: motion of a site against an input, for a range of a second one if there is one.
@@ -407,6 +407,14 @@ UnknownEffect describe_lack_of_fit(const Diagnosis& d, double excess) {
   return out;
 }
 
+UnknownEffect describe_mistake(const Diagnosis& d, const SanityFinding& mistake) {
+  UnknownEffect out;
+  out.held_out_before = out.held_out_after = d.gap;
+  out.probability = 0.99;
+  out.looks_like = mistake.text;
+  return out;
+}
+
 std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidence,
                                        const std::vector<Evidence::Gain>& first) {
   const auto& groups = work.design.candidates.groups;
@@ -583,7 +591,15 @@ bool too_few_poses(const Diagnosis& d) {
   return d.verdict == Verdict::none && d.gap.rms > kMoreThanNoise * d.noise_floor;
 }
 
+static const SanityFinding* mistake_in(const Diagnosis& d) {
+  const auto found =
+      std::find_if(d.sanity.begin(), d.sanity.end(), [](const SanityFinding& finding) { return finding.mistake; });
+  return found == d.sanity.end() ? nullptr : &*found;
+}
+
 std::string sentence_of(const Diagnosis& d) {
+  if (const SanityFinding* mistake = mistake_in(d))
+    return "The robot file and the measurements do not go together: " + mistake->text;
   if (too_few_poses(d)) {
     return "These poses are too few to tell a gap from noise: with base and tool fitted, held-out poses are off by " +
            millimetres(d.gap.rms) + " rms, and a fit of everything at once leaves " + millimetres(d.noise_floor) +

@@ -72,6 +72,8 @@ Registered register_data(const Robot& robot, const Checked& checked, const Diagn
   out.options = options;
   out.data = checked.data;
   out.inferred_direction = checked.inferred_direction;
+  out.mistaken = std::any_of(checked.findings.begin(), checked.findings.end(),
+                             [](const SanityFinding& finding) { return finding.mistake; });
   out.cluster = pose_groups(out.data);
   out.frames = fit_frames(robot, out.data, options);
   out.set = out.frames.set;
@@ -450,6 +452,9 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   scale_to_exact(&result);
   merge_the_same(&result);
   question_noise(repeats, whole.data, &result);
+  for (const SanityFinding& finding : checked.findings) {
+    if (finding.mistake) result.unknown = {describe_mistake(result, finding)};
+  }
   share_the_gap(&result);
   result.verdict = verdict_of(result);
   if (result.verdict == Verdict::does_not_hold || result.shrink.value < 0.0) {  // no robot worse than nothing

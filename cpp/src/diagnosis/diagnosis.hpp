@@ -23,6 +23,7 @@ struct Registered {
   DiagnoseOptions options;
   Measurements data;  ///< with the better joint record, and approach directions where they could be inferred
   bool inferred_direction = false;
+  bool mistaken = false;              ///< robot file or columns are to be corrected first: nothing is named
   std::vector<std::int32_t> cluster;  ///< pose group of every row
   std::vector<std::int8_t> set;       ///< 0 train, 1 test, for every row
   Identification frames;              ///< base and targets found, everything else nominal
@@ -186,6 +187,8 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
 UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at);
 /// A gap beyond the noise of repeats that nothing describes; `excess`: in standard errors.
 UnknownEffect describe_lack_of_fit(const Diagnosis& d, double excess);
+/// A gap that comes from what was handed over.
+UnknownEffect describe_mistake(const Diagnosis& d, const SanityFinding& mistake);
 std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidence,
                                        const std::vector<Evidence::Gain>& first);
 std::vector<Detectable> smallest_sizes(const Work& work, const Evidence& evidence, const Decision& decision);

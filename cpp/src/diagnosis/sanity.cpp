@@ -148,32 +148,30 @@ void choose_record(const Robot& robot, const DiagnoseOptions& options, Checked* 
   out->findings.push_back(finding);
 }
 
-/// Would a swap of two joints, another sign or another unit explain more? Columns of the wrist cost least: they are
-/// looked at from `kWorthALook` of the measured range on, and what nothing explains is said from `kHardlyAnything` on.
-void try_orders(const Robot& robot, const DiagnoseOptions& options, double spread, Checked* out) {
-  const double as_is = median_error(robot, out->data, options, false);
-  if (!(as_is > kWorthALook * spread)) return;
-  const std::vector<std::vector<double>> columns = joint_columns(out->data);
-  const std::size_t n = columns.size();
-  double best = 0.5 * as_is;
-  SanityFinding finding;
-  const auto attempt = [&](std::vector<std::vector<double>> changed, const std::string& kind, const std::string& text) {
-    const double error = median_error(robot, with_joints(out->data, std::move(changed)), options, false);
-    if (error >= best) return;
-    best = error;
-    finding.kind = kind;
-    finding.text = text + " explains the measurements far better: median " + millimetres(error) + " against " +
-                   millimetres(as_is) + " with base and tool fitted. Correct the columns and run again.";
+/// Another reading of what was handed over.
+struct Reading {
+  Robot robot;
+  Measurements data;
+  std::string kind, text;
+};
+
+/// Two joint columns exchanged, the sign of one turned, all in another unit, the table of links read by the other
+/// convention.
+std::vector<Reading> readings_of(const Robot& robot, const Measurements& data) {
+  std::vector<Reading> out;
+  const std::vector<std::vector<double>> columns = joint_columns(data);
+  const auto add_columns = [&](std::vector<std::vector<double>> changed, const char* kind, std::string text) {
+    out.push_back({robot, with_joints(data, std::move(changed)), kind, std::move(text)});
   };
-  for (std::size_t k = 0; k < n; ++k) {
+  for (std::size_t k = 0; k < columns.size(); ++k) {
     std::vector<std::vector<double>> changed = columns;
     for (double& q : changed[k]) q = -q;
-    attempt(changed, "joint_sign", "turning the sign of joint column " + std::to_string(k + 1));
-    for (std::size_t m = k + 1; m < n; ++m) {
+    add_columns(std::move(changed), "joint_sign", "turning the sign of joint column " + std::to_string(k + 1));
+    for (std::size_t m = k + 1; m < columns.size(); ++m) {
       changed = columns;
       std::swap(changed[k], changed[m]);
-      attempt(changed, "joint_order",
-              "swapping joint columns " + std::to_string(k + 1) + " and " + std::to_string(m + 1));
+      add_columns(std::move(changed), "joint_order",
+                  "swapping joint columns " + std::to_string(k + 1) + " and " + std::to_string(m + 1));
     }
   }
   for (const double factor : {180.0 / kPi, kDegree}) {
@@ -181,16 +179,49 @@ void try_orders(const Robot& robot, const DiagnoseOptions& options, double sprea
     for (std::vector<double>& column : changed) {
       for (double& q : column) q *= factor;
     }
-    attempt(changed, "joint_unit",
-            std::string("reading the joints in ") + (factor > 1.0 ? "rad instead of deg" : "deg instead of rad"));
+    add_columns(std::move(changed), "joint_unit",
+                std::string("reading the joints in ") + (factor > 1.0 ? "rad instead of deg" : "deg instead of rad"));
   }
-  if (finding.text.empty() && !(as_is > kHardlyAnything * spread)) return;
-  if (finding.text.empty()) {
+  if (robot.convention != Convention::urdf) {
+    const bool modified = robot.convention == Convention::mdh;
+    Reading other{robot, data, "convention",
+                  std::string("reading the robot file's links as convention: ") + (modified ? "dh" : "mdh")};
+    other.robot.convention = modified ? Convention::dh : Convention::mdh;
+    out.push_back(std::move(other));
+  }
+  return out;
+}
+
+/// Does another reading explain more? Columns of the wrist cost least: they are looked at from `kWorthALook` of the
+/// measured range on, and what nothing explains is said from `kHardlyAnything` on. A mistake is what halves the error
+/// with the geometry fitted, too: then no effect can be named before it is corrected.
+void try_readings(const Robot& robot, const DiagnoseOptions& options, double spread, Checked* out) {
+  const double as_is = median_error(robot, out->data, options, false);
+  if (!(as_is > kWorthALook * spread)) return;
+  double best = 0.5 * as_is;
+  SanityFinding finding;
+  const std::vector<Reading> readings = readings_of(robot, out->data);
+  const Reading* better = nullptr;
+  for (const Reading& reading : readings) {
+    const double error = median_error(reading.robot, reading.data, options, false);
+    if (error >= best) continue;
+    best = error;
+    better = &reading;
+  }
+  if (better) {
+    finding.kind = better->kind;
+    finding.text = better->text + " explains the measurements far better: median " + millimetres(best) + " against " +
+                   millimetres(as_is) + " with base and tool fitted. Correct it and run again.";
+    finding.mistake =
+        median_error(better->robot, better->data, options, true) < 0.5 * median_error(robot, out->data, options, true);
+  } else if (as_is > kHardlyAnything * spread) {
     finding.kind = "joint_order";
     finding.text = "with base and tool fitted the median error is " + millimetres(as_is) + ", " +
                    number(100.0 * as_is / spread, 2) +
-                   " % of the measured range, and no swap, sign or unit of a joint column explains it: is it the right "
-                   "robot file?";
+                   " % of the measured range, and no swap, sign or unit of a joint column and no other convention of "
+                   "the links explains it: is it the right robot file?";
+  } else {
+    return;
   }
   out->findings.push_back(finding);
 }
@@ -237,7 +268,7 @@ Checked check(const Robot& robot, const Measurements& data, const DiagnoseOption
   find_duplicates(data, &out.findings);
   const double spread = spread_of(data);
   choose_record(robot, options, &out);
-  try_orders(robot, options, spread, &out);
+  try_readings(robot, options, spread, &out);
   infer_directions(&out);
   return out;
 }

@@ -83,7 +83,9 @@ def diagnosis_dict(found: _core.Diagnosis, *, warnings: Iterable[str] = ()) -> d
             "workspace": [{"center_m": w.center, "rms_m": w.rms, "n": w.n} for w in found.workspace],
             "direction": [{"axis": found.direction[:, k], "rms_m": found.direction_rms[k]} for k in range(3)],
         },
-        "sanity": [{"kind": s.kind, "text": s.text, "rows": list(s.rows)} for s in found.sanity],
+        "sanity": [
+            {"kind": s.kind, "text": s.text, "rows": list(s.rows), "mistake": s.mistake} for s in found.sanity
+        ],
         "not_testable": [
             {"effect": n.effect, "joints": list(n.joints), "why": n.why} for n in found.not_testable
         ],

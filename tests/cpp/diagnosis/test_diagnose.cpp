@@ -663,6 +663,24 @@ TEST_CASE("diagnose recognises exchanged columns of the wrist, which move the ti
   CHECK(finding(d, "joint_order")->text.find("joint columns 4 and 5") != std::string::npos);
 }
 
+TEST_CASE("diagnose names nothing before exchanged columns or a wrong convention are corrected") {
+  auto table = measured(light_arm(), 120, 906);
+  std::swap(table->data.joints[1], table->data.joints[2]);
+  const Diagnosis exchanged = diagnose(light_arm(), table->data);
+  REQUIRE(finding(exchanged, "joint_order"));
+  CHECK(finding(exchanged, "joint_order")->mistake);
+  CHECK(exchanged.effects.empty());
+  CHECK(exchanged.verdict == Verdict::unknown);
+  CHECK(exchanged.sentence.find("swapping joint columns 2 and 3") != std::string::npos);
+  std::swap(table->data.joints[1], table->data.joints[2]);
+  Robot other = light_arm();
+  other.convention = other.convention == Convention::dh ? Convention::mdh : Convention::dh;
+  const Diagnosis misread = diagnose(other, table->data);
+  REQUIRE(finding(misread, "convention"));
+  CHECK(finding(misread, "convention")->mistake);
+  CHECK(misread.effects.empty());
+}
+
 TEST_CASE("diagnose says that few poses cannot show a frame that wanders") {
   auto table = measured(light_arm(), 20, 908);
   std::vector<double> seconds(20);

@@ -100,6 +100,8 @@ class Command(run.Command["tuple[Robot, Measurements]", "Diagnosis"]):
         )
 
     def failure(self, result: Mapping[str, Any]) -> str:
+        if any(finding["mistake"] for finding in result["sanity"]):
+            return "the robot file or the columns are to be corrected first"
         return (
             "what was found does not hold on held-out poses" if result["verdict"] == "does_not_hold" else ""
         )
