@@ -174,7 +174,7 @@ def trouble(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _many_outliers(result: Mapping[str, Any]) -> bool:
-    return len(result["outliers"]) >= MANY_OUTLIERS * max(1, result["rows"])
+    return bool(len(result["outliers"]) >= MANY_OUTLIERS * max(1, result["rows"]))
 
 
 def _sanity(result: Mapping[str, Any]) -> str:
