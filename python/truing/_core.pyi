@@ -2080,6 +2080,11 @@ class Curve:
         Of the input.
         """
     @property
+    def period(self) -> float:
+        """
+        That the input is folded by, in its unit; 0: it is not folded.
+        """
+    @property
     def points(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Shape=(n, 3): input, value, standard error.

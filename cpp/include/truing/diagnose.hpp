@@ -78,6 +78,7 @@ struct Curve {
   double second_low = 0.0;   ///< of the second input: lower bound
   double second_high = 0.0;  ///< of the second input: upper bound
   std::string input_unit;    ///< of the input
+  double period = 0.0;       ///< that the input is folded by, in its unit; 0: it is not folded
   std::string unit;          ///< of the value and its standard error: rad or m
   std::vector<std::array<double, 3>> points;   ///< shape=(n, 3): input, value, standard error
   std::vector<std::array<double, 2>> samples;  ///< shape=(n, 2): input and value of single poses, at most 600

@@ -30,7 +30,8 @@ struct Explanation {
   std::vector<EffectRequest> requests;        ///< effects to ask for
   std::map<std::string, double> constants{};  ///< of the effect's form (EffectForm), which the robot is to carry
   std::string note;
-  std::string driver;  ///< the input that its law is a function of, if one
+  std::string driver;   ///< the input that its law is a function of, if one
+  double period = 0.0;  ///< of its law, in the motion of each of its joints [rad]; 0: it has none
   // kind drift, law, free: hats of inputs at a site
   std::string site;
   std::vector<int> inputs;  ///< indices of make_inputs

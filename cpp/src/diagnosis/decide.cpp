@@ -22,8 +22,6 @@ constexpr double kManyValues = 10.0;  ///< for each parameter of the links: no l
 constexpr double kMuchBetter = 1.05;  ///< sums of squares that are worth another choice
 constexpr double kChance = 0.05;      ///< of random signs, that a free function may have at most
 constexpr double kFreeShare = 0.04;   ///< of what is left, that a free function must explain
-constexpr double kMeshNats =
-    5.0;  ///< beyond the threshold, that a mesh order must win: waves this short fit anything a little
 
 const EffectTraits& effect_traits(const Work& work, const Explanation& e) {
   return model::traits_of(e.effect, work.given.options.own_effects);
@@ -36,8 +34,7 @@ int input_named(const Work& work, const std::string& name) {
   return -1;
 }
 
-/// Adds columns of one more candidate to the design.
-static void append(Work* work, Explanation what, const Design::Rows& columns, double cost) {
+void append(Work* work, Explanation what, const Design::Rows& columns, double cost) {
   Design& design = work->design;
   // The same function may be found again, with other knots: its parameters need names of their own.
   while (design.column(what.parameters.front()) >= 0) {
@@ -57,48 +54,6 @@ static void append(Work* work, Explanation what, const Design::Rows& columns, do
   }
   design.candidates.groups.push_back(std::move(group));
   design.candidates.named.push_back(std::move(what));
-}
-
-/// The effect of an order at a joint, as a candidate.
-static Explanation mesh_of(const Effect& effect, const MeshGain& mesh, const Robot& robot, const Measurements& data) {
-  const std::string& joint = robot.joints[mesh.joint].name;
-  Explanation e;
-  e.effect = effect.name;
-  e.joints = {joint};
-  e.requests = {{e.effect, {joint}}};
-  for (const Term& term : effect.terms(robot, mesh.joint, data)) e.parameters.push_back(term.parameter);
-  e.driver = input_name(effect.traits.driver, mesh.joint);
-  e.note = "the order " + number(mesh.order) + " per turn was found by trying " + std::to_string(mesh.tried);
-  return e;
-}
-
-/// Mesh orders that win on what is left become candidates. True: there were some.
-static bool add_meshes(Work* work, const Evidence& evidence, const Evidence::State& state, const Robot& robot,
-                       double threshold) {
-  static const Effect& family =
-      effect_that([](const EffectTraits& traits) { return traits.search == Search::by_order; });
-  if (is_left_out(work->given.options, family.name)) return false;
-  bool any = false;
-  for (const MeshGain& mesh :
-       scan_mesh(work->design, evidence, state, work->inputs, robot, work->noise.design_effect)) {
-    if (mesh.score < threshold) continue;
-    const Explanation e = mesh_of(transmission_error(mesh.order), mesh, robot, work->given.data);
-    const std::vector<Explanation>& named = work->design.candidates.named;
-    if (std::any_of(named.begin(), named.end(), [&](const Explanation& other) { return same_name(other, e); }))
-      continue;
-    const Eigen::Index n = work->design.x.rows();
-    Design::Rows columns(n, 2);
-    const InputColumn& input = work->inputs[static_cast<std::size_t>(input_named(*work, e.driver))];
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const double q = input.values[static_cast<std::size_t>(work->design.row[static_cast<std::size_t>(i)])];
-      const double d = work->design.x(i, work->design.joint_column[mesh.joint][0]);
-      columns(i, 0) = d * std::cos(mesh.order * q);
-      columns(i, 1) = d * std::sin(mesh.order * q);
-    }
-    append(work, e, columns, std::log(static_cast<double>(mesh.tried * static_cast<int>(robot.joints.size()))));
-    any = true;
-  }
-  return any;
 }
 
 /// Of a free function and what it stands beside, the part that goes in as columns of the design.
@@ -121,8 +76,7 @@ Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std
   return out;
 }
 
-/// Groups that do not help, for sure, on poses they were not fitted to go, however well they fit.
-static Evidence::State keep_what_predicts(const Work& work, Evidence::State state) {
+Evidence::State keep_what_predicts(const Work& work, Evidence::State state) {
   const auto& groups = work.design.candidates.groups;
   const Evidence evidence(work.grams.train, groups, work.design.nuisance, work.design.prior);
   for (;;) {
@@ -225,7 +179,7 @@ static int add_fine_function(Work* work, const Robot& robot, std::size_t joint, 
   return static_cast<int>(work->design.candidates.groups.size()) - 1;
 }
 
-static Evidence evidence_now(const Work& work) {
+Evidence evidence_now(const Work& work) {
   return Evidence(work.grams.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
 }
 
@@ -407,7 +361,7 @@ static void question_laws(Work* work, const Robot& robot, Decision* decision) {
 }
 
 /// Is there a gap at all? Sets what noise alone reaches, and the threshold that it passes as often as is allowed.
-static void find_gap(const Work& work, Decision* out) {
+static void find_gap(const Work& work, Gears* gears, Decision* out) {
   const DiagnoseOptions& options = work.given.options;
   const Evidence evidence = evidence_now(work);
   out->first = evidence.gains(evidence.evaluate({}));
@@ -420,6 +374,15 @@ static void find_gap(const Work& work, Decision* out) {
   int above = 1;
   for (const double score : null) above += score >= best ? 1 : 0;
   out->p_gap = static_cast<double>(above) / (static_cast<double>(null.size()) + 1.0);
+  // Orders have no columns yet. Noise reaches their best score with a chance that is known.
+  if (out->p_gap > options.false_alarm) {
+    const double score = gears->best(evidence, evidence.evaluate({})).score;
+    if (score > best) {
+      const auto reach = std::count_if(null.begin(), null.end(), [&](double s) { return s >= score; });
+      const double chance = static_cast<double>(reach + 1) / (static_cast<double>(null.size()) + 1.0);
+      out->p_gap = std::min(1.0, chance + OrderScan::chance_of(score));
+    }
+  }
   std::sort(null.begin(), null.end());
   if (null.empty()) return;
   const double at = null[static_cast<std::size_t>(std::min<double>(
@@ -546,12 +509,13 @@ Decision decide(Work* work, const Robot& robot) {
   const DiagnoseOptions& options = work->given.options;
   Decision out;
   out.search.most_groups = options.max_effects;
-  find_gap(*work, &out);
+  Gears gears(work, robot);
+  find_gap(*work, &gears, &out);
   if (work->given.mistaken) {
     out.state = evidence_now(*work).evaluate({});
     return out;
   }
-  // Named effects; then free functions on what they leave; then mesh orders.
+  // Named effects; then free functions and orders of gears on what they leave, the better one first.
   out.state = search_named(*work, out);
   for (int round = 0; round < 6; ++round) {
     const Evidence evidence = evidence_now(*work);
@@ -560,12 +524,11 @@ Decision decide(Work* work, const Robot& robot) {
     const FreeScan scan =
         scan_free(work->design, evidence, out.state, work->inputs, robot, work->noise.design_effect, scan_options);
     out.p_left = scan.p;
+    const OrderAt order = gears.best(evidence, out.state);
+    const bool order_is_better = scan.best.empty() || order.in_noise > scan.best.front().gain.score;
+    if (order_is_better && gears.take(order, &out)) continue;
     if (add_free_function(work, scan, &out)) continue;
-    if (!add_meshes(work, evidence, out.state, robot, out.search.threshold + kMeshNats)) break;
-    extend_grams(work->design, work->noise.design_effect, &work->grams);
-    Evidence::State next = keep_what_predicts(*work, evidence_now(*work).search(out.search, out.state.choice));
-    if (next.score < out.state.score + out.search.threshold) break;
-    out.state = std::move(next);
+    if (order_is_better || !gears.take(order, &out)) break;
   }
   question_laws(work, robot, &out);
   prefer_links_that_predict(*work, &out);

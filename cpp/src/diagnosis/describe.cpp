@@ -30,14 +30,17 @@ struct Along {
   int site_column = -1;
   int second = -1;
   double low = 0.0, high = 0.0;
+  double period = 0.0;         ///< the input is folded by it; 0: it is not
+  std::vector<int> columns{};  ///< of the design, that make the motion; none: all of the group's
 };
 
 static bool is_among(const std::vector<int>& values, int value) {
   return std::find(values.begin(), values.end(), value) != values.end();
 }
 
-/// Places, among the state's columns, of a group's own and of what corrects its law.
-static std::vector<std::size_t> columns_of_law(const Work& work, const Decision& decision, int group) {
+/// Places, among the state's columns, of a group's own and of what corrects its law; of some of them only, if told so.
+static std::vector<std::size_t> columns_of_law(const Work& work, const Decision& decision, int group,
+                                               const std::vector<int>& only) {
   const auto& groups = work.design.candidates.groups;
   std::vector<std::size_t> own;
   for (std::size_t c = 0; c < decision.state.columns.size(); ++c) {
@@ -45,7 +48,7 @@ static std::vector<std::size_t> columns_of_law(const Work& work, const Decision&
     bool mine = is_among(groups[static_cast<std::size_t>(group)].columns, column);
     for (const auto& [other, corrected] : decision.corrects)
       mine |= corrected == group && is_among(groups[static_cast<std::size_t>(other)].columns, column);
-    if (mine) own.push_back(c);
+    if (mine && (only.empty() || is_among(only, column))) own.push_back(c);
   }
   return own;
 }
@@ -84,15 +87,17 @@ struct Sample {
 };
 
 /// Of the poses at which the site moves the tip well, by input.
-static std::vector<Sample> samples_of(const std::map<std::int32_t, RowSum>& sums, const InputColumn& input) {
+static std::vector<Sample> samples_of(const std::map<std::int32_t, RowSum>& sums, const InputColumn& input,
+                                      double period) {
   std::vector<double> levers;
   for (const auto& [row, sum] : sums) levers.push_back(sum.dd);
   const double least = sums.empty() ? 0.0 : 0.3 * median_of(levers);
   std::vector<Sample> samples;
   for (const auto& [row, sum] : sums) {
     if (!(sum.dd > least) || !(sum.dd > 0.0)) continue;
-    samples.push_back(
-        {input.values[static_cast<std::size_t>(row)], (sum.de + sum.df) / sum.dd, sum.df / sum.dd, sum.dd});
+    const double value = input.values[static_cast<std::size_t>(row)];
+    const double x = period > 0.0 ? value - period * std::floor(value / period) : value;
+    samples.push_back({x, (sum.de + sum.df) / sum.dd, sum.df / sum.dd, sum.dd});
   }
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.x < b.x; });
   return samples;
@@ -140,17 +145,20 @@ static Curve curve_of(const Work& work, const Decision& decision, int group, con
     out.second_low = along.low;
     out.second_high = along.high;
   }
-  const std::vector<std::size_t> own = columns_of_law(work, decision, group);
-  const std::vector<Sample> samples = samples_of(sums_by_row(work, decision.state, own, along), input);
+  out.period = along.period;
+  const std::vector<std::size_t> own = columns_of_law(work, decision, group, along.columns);
+  const std::vector<Sample> samples = samples_of(sums_by_row(work, decision.state, own, along), input, along.period);
   const std::size_t step = std::max<std::size_t>(1, samples.size() / 600);
   for (std::size_t k = 0; k < samples.size(); k += step) out.samples.push_back({samples[k].x, samples[k].value});
   out.points = points_of(samples, std::sqrt(decision.state.sigma2));
   return out;
 }
 
-static std::string at_joints(const std::vector<std::string>& joints) {
+static std::string at_joints(const std::string& effect, const std::vector<std::string>& joints) {
   if (joints.empty()) return "";
-  if (joints.size() > 3) return " of " + std::to_string(joints.size()) + " links";
+  const bool of_links = model::traits_of(effect, {}).stands_for == StandsFor::link_geometry;
+  if (joints.size() > 3)
+    return (of_links ? " of " : " at ") + std::to_string(joints.size()) + (of_links ? " links" : " joints");
   return " at " + listed(joints);
 }
 
@@ -288,11 +296,27 @@ static std::vector<Alternative> untested_mimics(const Work& work, const Explanat
   return out;
 }
 
+/// A law that repeats many times per turn, at each of its joints: folded by its period, or it would be a hedge.
+static void draw_periods(const Work& work, const Decision& decision, int g, FoundEffect* out) {
+  const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
+  const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(g)].columns;
+  const std::size_t each = columns.size() / e.joints.size();
+  for (std::size_t k = 0; k < e.joints.size(); ++k) {
+    const std::size_t joint = work.given.frames.robot.joint_index(e.joints[k]);
+    Along along{input_named(work, input_name(Driver::angle, joint)), work.design.joint_column[joint][0]};
+    along.period = e.period;
+    along.columns.assign(columns.begin() + static_cast<std::ptrdiff_t>(k * each),
+                         columns.begin() + static_cast<std::ptrdiff_t>((k + 1) * each));
+    out->curves.push_back(curve_of(work, decision, g, along));
+  }
+}
+
 /// The law, drawn: over what corrects it, over its own input, or, of a wandering base, over time.
 static void draw_law(const Work& work, const Decision& decision, int g, FoundEffect* out) {
   const auto& named = work.design.candidates.named;
   const Explanation& e = named[static_cast<std::size_t>(g)];
   const EffectTraits& traits = effect_traits(work, e);
+  if (e.period > 0.0) return draw_periods(work, decision, g, out);
   const auto at_joint = [&](int input) {
     const std::size_t joint = work.given.frames.robot.joint_index(e.joints[0]);
     return Along{input, work.design.joint_column[joint][0]};
@@ -344,7 +368,7 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   out.confounded_with = class_of(work, e, sure, probability);
   for (Alternative& mimic : untested_mimics(work, e)) out.confounded_with.push_back(std::move(mimic));
   std::vector<int> columns;
-  for (const std::size_t c : columns_of_law(work, decision, g)) columns.push_back(decision.state.columns[c]);
+  for (const std::size_t c : columns_of_law(work, decision, g, {})) columns.push_back(decision.state.columns[c]);
   out.size_at_tip = size_at_tip(work, decision.state, columns);
   draw_law(work, decision, g, &out);
   return out;
@@ -528,8 +552,8 @@ void add_next_poses(const Work& work, const Measurements& data, const DiagnoseOp
                         *second = request_of(other.effect, other.joints);
       if (!first || !second) continue;
       Rivals rivals;
-      rivals.name = effect.effect + at_joints(effect.joints);
-      rivals.other_name = other.effect + at_joints(other.joints);
+      rivals.name = effect.effect + at_joints(effect.effect, effect.joints);
+      rivals.other_name = other.effect + at_joints(other.effect, other.joints);
       rivals.first = {first->parameters, first->requests};
       rivals.other = {second->parameters, second->requests};
       for (const Parameter& parameter : effect.parameters)

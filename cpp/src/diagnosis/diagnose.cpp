@@ -111,6 +111,8 @@ Work prepare(Registered given) {
   work.inputs = make_inputs(work.linear.at, data);
   work.design = make_design({robot, work.linear.at, work.linear.shift, data, work.inputs, every_row, work.given.set,
                              work.given.cluster, options, work.given.inferred_direction});
+  work.samplings = samplings(work.design, work.inputs, robot);
+  say_what_angles_cannot_show(work.samplings, robot, &work.design.candidates.not_testable);
   Weighted weighted = weigh(work.design, data);
   work.design.weight = std::move(weighted.weight);
   work.noise = std::move(weighted.noise);

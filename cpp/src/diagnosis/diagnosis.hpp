@@ -11,6 +11,7 @@
 
 #include "diagnosis/design.hpp"
 #include "diagnosis/linearise.hpp"
+#include "diagnosis/orders.hpp"
 #include "diagnosis/rows.hpp"
 #include "estimation/evidence.hpp"
 #include "rooms.hpp"
@@ -49,6 +50,7 @@ struct Work {
   Linearisation linear;
   std::vector<InputColumn> inputs;
   Design design;
+  std::vector<Sampling> samplings;  ///< of joints whose orders can be looked for
   Noise noise;
   Grams grams;
 };
@@ -155,9 +157,53 @@ struct Shortlist {
 
 Shortlist shortlist(const Work& work, const std::vector<int>& also);
 
+/// Evidence of the work's columns as they are now.
+Evidence evidence_now(const Work& work);
+/// Adds columns of one more candidate to the design, and to nothing else.
+void append(Work* work, Explanation what, const Design::Rows& columns, double cost);
+/// Groups that do not help, for sure, on poses they were not fitted to go, however well they fit.
+Evidence::State keep_what_predicts(const Work& work, Evidence::State state);
+
 Decision decide(Work* work, const Robot& robot);
 /// The group is all links together, and poses that it was not fitted to are predicted better with it, for sure.
 bool links_predict(const Work& work, const Choice& choice, std::size_t at);
+
+// --- gears.cpp: errors that repeat with the gear --------------------------------------------------------------------
+
+/// Which orders stand for each other on the sampled angles, and which do not show.
+void say_what_angles_cannot_show(const std::vector<Sampling>& samplings, const Robot& robot,
+                                 std::vector<NotTestable>* out);
+
+/// Orders of gears as they are found, one after another.
+class Gears {
+ public:
+  Gears(Work* work, const Robot& robot);
+
+  /// The best order on what a state leaves.
+  OrderAt best(const Evidence& evidence, const Evidence::State& state);
+  /// Takes `first` and then others, as long as they win. True: at least one was taken.
+  bool take(OrderAt first, Decision* decision);
+
+ private:
+  void keep_what_is_in(const Evidence::State& state);
+  bool wins(const OrderAt& order, const SearchOptions& search) const;
+  int append_candidates(const OrderAt& order);
+  void rename(std::size_t group, const std::string& suffix);
+  void withdraw(std::size_t first, std::size_t last);
+  void withdraw_with_others(std::size_t group);
+  std::size_t others_behind(std::size_t group) const;
+  bool take_one(OrderAt order, Decision* decision);
+  void search_again(Decision* decision);
+  void choose_orders_again(Decision* decision);
+  void leave_out_joints(Decision* decision);
+  bool leave_out_joint(std::size_t known, Decision* decision);
+
+  Work* work_;
+  const Robot& robot_;
+  bool wanted_;  ///< the effect was not left out
+  std::vector<OrderAt> known_, passed_over_;
+  std::vector<int> groups_;  ///< of those known
+};
 
 // --- sureness.cpp: how sure that is ----------------------------------------------------------------------------------
 

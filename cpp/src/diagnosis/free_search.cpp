@@ -12,16 +12,6 @@
 #include "math/text.hpp"
 
 namespace truing::diagnosis {
-namespace {
-
-/// The rows that are looked at, weighted, with what the state's columns are on them.
-struct Left {
-  std::vector<Eigen::Index> at;  ///< rows of the design
-  Eigen::MatrixXd columns;       ///< weighted columns of the state, shape (rows, columns)
-  Eigen::VectorXd residual;      ///< weighted
-  Eigen::LLT<Eigen::MatrixXd> factor;
-  double share = 1.0;  ///< of the training rows
-};
 
 Left what_is_left(const Design& design, const Evidence::State& state, std::size_t most) {
   Left out;
@@ -43,6 +33,15 @@ Left what_is_left(const Design& design, const Evidence::State& state, std::size_
   out.residual -= out.columns * out.factor.solve(out.columns.transpose() * out.residual);
   return out;
 }
+
+Evidence::State seen_on(const Left& left, const Evidence& evidence, const Evidence::State& state, double times) {
+  Evidence::State out = state;
+  out.rss = std::max(left.residual.squaredNorm() * times, 1e-300);
+  out.sigma2 = out.rss / evidence.degrees_of_freedom();
+  return out;
+}
+
+namespace {
 
 /// A free function's columns, before they are multiplied by the site's: sparse, at most four values a row.
 struct Trial {
@@ -250,15 +249,6 @@ Design::Rows right_sides(const Design& design, const Left& left, int flips, std:
   return out;
 }
 
-/// The state as it stands on the rows that are looked at: as if all rows were seen, and each counted for as much as it
-/// does (`times`).
-Evidence::State seen_on(const Left& left, const Evidence& evidence, const Evidence::State& state, double times) {
-  Evidence::State out = state;
-  out.rss = std::max(left.residual.squaredNorm() * times, 1e-300);
-  out.sigma2 = out.rss / evidence.degrees_of_freedom();
-  return out;
-}
-
 constexpr double kScalesOfChance[] = {0.1, 0.01, 0.001};  ///< of functions: the same for the data and for random signs
 
 /// Scores of residuals, each the largest of those so far. `seen`: X^T v of each; `a`: X^T X beyond the state.
@@ -284,113 +274,6 @@ void raise_scores(const Evidence& evidence, const Evidence::State& state, const 
 double chance_of(const std::vector<double>& largest) {
   const auto above = std::count_if(largest.begin(), largest.end(), [&](double score) { return score >= largest[0]; });
   return static_cast<double>(above) / static_cast<double>(largest.size());
-}
-
-// --- mesh orders -----------------------------------------------------------------------------------------------------
-
-constexpr double kLowestOrder = 20.0, kHighestOrder = 240.0;  // per turn
-constexpr std::size_t kOrdersAtATime = 16;
-constexpr double kOneAngle = 0.01;  // angles that lie closer are one [rad]
-
-/// What is left, seen through one joint: so that an order costs two products.
-struct JointView {
-  std::vector<double> angle;  ///< of every row
-  Design::Rows right;         ///< the state's columns and the residual, times the joint's column
-  Eigen::VectorXd dd;         ///< the joint's column squared
-};
-
-std::vector<double> angles_of(const Design& design, const std::vector<Eigen::Index>& at, const InputColumn& input) {
-  std::vector<double> out;
-  for (const Eigen::Index i : at)
-    out.push_back(input.values[static_cast<std::size_t>(design.row[static_cast<std::size_t>(i)])]);
-  return out;
-}
-
-/// Angles that crowd at a few places cannot show a short wave: any order would do.
-bool are_crowded(const Design& design, const std::vector<Eigen::Index>& at, std::vector<double> angles) {
-  std::sort(angles.begin(), angles.end());
-  angles.erase(std::unique(angles.begin(), angles.end(), [](double a, double b) { return b - a < kOneAngle; }),
-               angles.end());
-  std::size_t poses = 0;
-  for (std::size_t n = 0; n < at.size(); ++n) {
-    const bool first = n == 0 || design.cluster[static_cast<std::size_t>(at[n])] !=
-                                     design.cluster[static_cast<std::size_t>(at[n - 1])];
-    poses += first ? 1 : 0;
-  }
-  return static_cast<double>(angles.size()) < std::min(0.3 * static_cast<double>(poses), 100.0);
-}
-
-JointView view_of(const Design& design, const Left& left, std::size_t joint, std::vector<double> angles) {
-  Eigen::VectorXd d(static_cast<Eigen::Index>(left.at.size()));
-  for (Eigen::Index n = 0; n < d.size(); ++n) {
-    const Eigen::Index i = left.at[static_cast<std::size_t>(n)];
-    d[n] = design.weight[i] * design.x(i, design.joint_column[joint][0]);
-  }
-  JointView out;
-  out.angle = std::move(angles);
-  out.right.resize(left.columns.rows(), left.columns.cols() + 1);
-  out.right.leftCols(left.columns.cols()) = d.asDiagonal() * left.columns;
-  out.right.col(left.columns.cols()) = d.cwiseProduct(left.residual);
-  out.dd = d.cwiseAbs2();
-  return out;
-}
-
-/// Cosine and sine of every order, a column each.
-Eigen::MatrixXd waves_of(const std::vector<double>& angle, const double* orders, std::size_t count) {
-  Eigen::MatrixXd out(static_cast<Eigen::Index>(angle.size()), static_cast<Eigen::Index>(2 * count));
-  for (std::size_t k = 0; k < count; ++k) {
-    double last = kNaN, c = 0.0, s = 0.0;
-    for (std::size_t n = 0; n < angle.size(); ++n) {
-      if (angle[n] != last) {
-        last = angle[n];
-        c = std::cos(orders[k] * last);
-        s = std::sin(orders[k] * last);
-      }
-      out(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(2 * k)) = c;
-      out(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(2 * k + 1)) = s;
-    }
-  }
-  return out;
-}
-
-std::vector<double> orders_of(const std::vector<double>& angles) {
-  const auto [low, high] = std::minmax_element(angles.begin(), angles.end());
-  const double step = *high - *low > 6.6 ? 0.5 : 1.0;
-  std::vector<double> out;
-  for (double order = kLowestOrder; order <= kHighestOrder; order += step) out.push_back(order);
-  return out;
-}
-
-MeshGain best_order(const Left& left, const JointView& view, const Evidence& evidence, const Evidence::State& state,
-                    double times, std::size_t joints) {
-  const Eigen::Index p = left.columns.cols();
-  const std::vector<double> orders = orders_of(view.angle);
-  const double cost = std::log(static_cast<double>(orders.size()) * static_cast<double>(joints));
-  MeshGain best;
-  best.score = -1e300;
-  best.tried = static_cast<int>(orders.size());
-  for (std::size_t first = 0; first < orders.size(); first += kOrdersAtATime) {
-    const std::size_t count = std::min(kOrdersAtATime, orders.size() - first);
-    const Eigen::MatrixXd waves = waves_of(view.angle, &orders[first], count);
-    const Eigen::MatrixXd sums = waves.transpose() * view.right;
-    for (std::size_t k = 0; k < count; ++k) {
-      const auto at = static_cast<Eigen::Index>(2 * k);
-      Eigen::Matrix2d xx;
-      const auto c = waves.col(at).array(), s = waves.col(at + 1).array();
-      xx(0, 0) = (c.square() * view.dd.array()).sum();
-      xx(1, 1) = (s.square() * view.dd.array()).sum();
-      xx(0, 1) = xx(1, 0) = (c * s * view.dd.array()).sum();
-      const Eigen::MatrixXd half = left.factor.matrixL().solve(sums.block(at, 0, 2, p).transpose());
-      const Eigen::MatrixXd a = (xx - half.transpose() * half) * times;
-      const Eigen::VectorXd b = sums.block(at, p, 2, 1) * times;
-      const Evidence::Gain gain = evidence.gain_of(state, a, b, Eigen::VectorXd::Constant(2, kLargest), cost);
-      if (gain.score > best.score) {
-        best.score = gain.score;
-        best.order = orders[first + k];
-      }
-    }
-  }
-  return best;
 }
 
 }  // namespace
@@ -430,28 +313,6 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
             [](const FreeGain& a, const FreeGain& b) { return a.gain.score > b.gain.score; });
   if (!out.best.empty() && options.flips > 0) out.p = chance_of(largest);
   if (out.best.size() > 200) out.best.resize(200);
-  return out;
-}
-
-std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, const Evidence::State& state,
-                                const std::vector<InputColumn>& inputs, const Robot& robot, double design_effect,
-                                std::size_t most_values) {
-  const Left left = what_is_left(design, state, most_values);
-  const double times = 1.0 / (left.share * design_effect);
-  const Evidence::State seen = seen_on(left, evidence, state, times);
-  std::vector<MeshGain> out;
-  if (left.at.empty()) return out;
-  for (const InputColumn& input : inputs) {
-    if (input.joint < 0 || input.constant || input.name != "q" + std::to_string(input.joint + 1)) continue;
-    const auto joint = static_cast<std::size_t>(input.joint);
-    if (robot.joints[joint].type != JointType::revolute || robot.joints[joint].passive()) continue;
-    std::vector<double> angles = angles_of(design, left.at, input);
-    if (are_crowded(design, left.at, angles)) continue;
-    const JointView view = view_of(design, left, joint, std::move(angles));
-    MeshGain best = best_order(left, view, evidence, seen, times, robot.joints.size());
-    best.joint = joint;
-    if (best.score > 0.0) out.push_back(best);
-  }
   return out;
 }
 

@@ -22,6 +22,22 @@ struct SomeRows {
 /// Of more than `most` values, whole folds are left out.
 SomeRows some_training_rows(const Design& design, std::size_t most);
 
+/// The rows that are looked at, weighted, with what the state's columns are on them.
+struct Left {
+  std::vector<Eigen::Index> at;  ///< rows of the design
+  Eigen::MatrixXd columns;       ///< weighted columns of the state, shape (rows, columns)
+  Eigen::VectorXd residual;      ///< weighted
+  Eigen::LLT<Eigen::MatrixXd> factor;
+  double share = 1.0;  ///< of the training rows
+};
+
+/// Of more than `most` training values, whole folds are left out.
+Left what_is_left(const Design& design, const Evidence::State& state, std::size_t most);
+
+/// The state as it stands on the rows that are looked at: as if all rows were seen, and each counted for as much as it
+/// does (`times`).
+Evidence::State seen_on(const Left& left, const Evidence& evidence, const Evidence::State& state, double times);
+
 /// One free function tried.
 struct FreeGain {
   Explanation what;
@@ -45,17 +61,6 @@ struct FreeScanOptions {
 FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidence::State& state,
                    const std::vector<InputColumn>& inputs, const Robot& robot, double design_effect,
                    const FreeScanOptions& options);
-
-/// Mesh orders of every revolute joint scanned on what is left: the best order of each joint [per turn], if any wins.
-struct MeshGain {
-  std::size_t joint = 0;
-  double order = 0.0;
-  double score = 0.0;
-  int tried = 0;
-};
-std::vector<MeshGain> scan_mesh(const Design& design, const Evidence& evidence, const Evidence::State& state,
-                                const std::vector<InputColumn>& inputs, const Robot& robot, double design_effect,
-                                std::size_t most_values = 20000);
 
 /// "a step at q4 = 0.41 rad", "linear in temp", … from points (input, value, standard error).
 std::string shape_of(const Curve& curve);

@@ -642,9 +642,7 @@ def _curves(page: Page, name: str, curves: Sequence[Mapping[str, Any]], colour: 
             "name": "band",
         }
         xaxis: dict[str, Any] = {
-            "title": {
-                "text": _input_name(curve["input"], short="row" in size) + (f" [{over}]" if over else "")
-            }
+            "title": {"text": _over(curve, "row" in size) + (f" [{over}]" if over else "")}
         }
         if approach:
             xaxis |= {
@@ -668,6 +666,16 @@ def _curves(page: Page, name: str, curves: Sequence[Mapping[str, Any]], colour: 
                 "text": f"{_input_name(second['input'], short=True)} from {low} to {high} {unit}".rstrip()
             }
         page.chart(f"{name}_{k}", [dots, around, law], layout, size=size)
+
+
+def _over(curve: Mapping[str, Any], short: bool) -> str:
+    """What a curve is drawn over: "q4", or, of a law that repeats, "q4, one period of 3.6 deg"."""
+    name = _input_name(curve["input"], short=short)
+    period = curve.get("period")
+    if not period:
+        return name
+    times, unit = _axis_unit(curve["input_unit"], np.array([period], dtype=np.float64))
+    return f"{name}, one period of {period * times:.3g} {unit}".rstrip()
 
 
 def _held_out(what: str, held: Mapping[str, Any]) -> str:

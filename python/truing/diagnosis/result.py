@@ -155,6 +155,7 @@ def _curve(c: _core.Curve, robot: _core.Robot) -> dict[str, Any]:
         "site": c.site,
         "input": c.input,
         "input_unit": c.input_unit,
+        "period": c.period or None,
         "second": second,
         "unit": c.unit,
         "points": c.points,

@@ -258,6 +258,19 @@ def test_the_order_of_a_transmission_error_is_said_in_words() -> None:
     assert "The gap shrinks: transmission error (14 per turn) at J2." in text and "@14 at" not in text
 
 
+def test_a_curve_that_is_folded_says_its_period() -> None:
+    result = some_result("effects")
+    curve = result["effects"][0]["curves"][0]
+    curve |= {
+        "input": "q2",
+        "input_unit": "rad",
+        "period": 0.0628,
+        "points": [[0.01, 1e-4, 1e-6], [0.06, -1e-4, 1e-6]],
+    }
+    charts = charts_of(diagnosis_report(result, some_rows()))
+    assert charts["effect0_0"]["layout"]["xaxis"]["title"]["text"] == "q2, one period of 3.6 ° [°]"
+
+
 def test_what_is_left_is_only_called_more_than_noise_where_it_has_structure() -> None:
     result = some_result("effects")
     assert "more than the noise, but no structure was found in it" in visible(

@@ -41,6 +41,23 @@ inline bool follows_own_angle(const EffectTraits& traits) {
   return traits.driver == Driver::constant || traits.driver == Driver::angle;
 }
 
+/// An order [1 per turn of the joint] that a gear train may make.
+struct LikelyOrder {
+  double order = 0.0;
+  double probability = 0.0;
+};
+
+/// Of an effect whose order is found by trying many (Search::by_order): every order that a ratio of 30 to 161 makes, in
+/// increasing order; their probabilities add up to one, of what is not kept for belts and several stages: kOtherOrders.
+const std::vector<LikelyOrder>& likely_orders();
+constexpr double kOtherOrders =
+    1.0 / 3.0;                           ///< probability of an order, between the two below, that no such ratio makes
+constexpr double kLowestOrder = 15.0;    ///< [1 per turn] half of the smallest ratio
+constexpr double kHighestOrder = 322.0;  ///< [1 per turn] twice the largest ratio
+
+/// Orders that the same gear makes as well: half and twice as many.
+std::vector<double> related_orders(double order);
+
 /// What is recorded and varied beside joints and tip, as far as it tells effects apart.
 struct Recorded {
   bool direction = false;  ///< poses are approached from both sides

@@ -4,6 +4,7 @@
 // Gears, encoders, belts: what stands between the motor and the joint.
 
 #include <cmath>
+#include <iterator>
 #include <locale>
 #include <map>
 #include <mutex>
@@ -12,6 +13,7 @@
 #include "math/text.hpp"
 #include "model/effects/families.hpp"
 #include "model/effects/terms.hpp"
+#include "model/effects/traits.hpp"
 
 namespace truing::model {
 namespace {
@@ -195,7 +197,49 @@ Effect loaded_play_effect() {
   return effect;
 }
 
+// Parts of the orders that a gear of ratio N makes, per turn of the joint: the motor, or the wave generator, turns N
+// times; a wave generator has two lobes, so a strain wave gear errs 2 N times as well (Tuttle and Seering 1996, A
+// nonlinear model of a harmonic drive gear transmission); the two-tooth difference of its splines makes N / 2.
+constexpr double kOncePerMotorTurn = 0.4, kTwicePerMotorTurn = 0.4, kHalfPerMotorTurn = 0.2;
+constexpr int kSmallestRatio = 30, kLargestRatio = 161;
+// Ratios in which strain wave gears are sold (Harmonic Drive, CSF and CSG: 30, 50, 80, 100, 120, 160), and one more
+// when the flexspline is held. They are as likely as all others, those of RV and planetary gears, together.
+constexpr int kStrainWaves[] = {30, 50, 80, 100, 120, 160};
+constexpr double kOfStrainWaves = 0.5;
+
+void add_orders_of(int ratio, double probability, std::map<double, double>* out) {
+  (*out)[ratio] += kOncePerMotorTurn * probability;
+  (*out)[2.0 * ratio] += kTwicePerMotorTurn * probability;
+  (*out)[0.5 * ratio] += kHalfPerMotorTurn * probability;
+}
+
+std::vector<LikelyOrder> make_likely_orders() {
+  std::map<double, double> all;
+  constexpr double kSold = 2.0 * std::size(kStrainWaves), kRatios = kLargestRatio - kSmallestRatio + 1;
+  for (const int ratio : kStrainWaves) {
+    for (const int turned : {ratio, ratio + 1}) add_orders_of(turned, kOfStrainWaves / kSold, &all);
+  }
+  for (int ratio = kSmallestRatio; ratio <= kLargestRatio; ++ratio)
+    add_orders_of(ratio, (1.0 - kOfStrainWaves) / kRatios, &all);
+  std::vector<LikelyOrder> out;
+  for (const auto& [order, probability] : all) out.push_back({order, probability});
+  return out;
+}
+
 }  // namespace
+
+const std::vector<LikelyOrder>& likely_orders() {
+  static const std::vector<LikelyOrder> orders = make_likely_orders();
+  return orders;
+}
+
+std::vector<double> related_orders(double order) {
+  std::vector<double> out;
+  for (const double related : {0.5 * order, 2.0 * order}) {
+    if (related >= kLowestOrder && related <= kHighestOrder) out.push_back(related);
+  }
+  return out;
+}
 
 std::vector<Effect> transmission_effects() {
   return {harmonic_effect(), transmission_error_family(), backlash_effect(), gravity_backlash_effect(),
