@@ -16,13 +16,14 @@ namespace {
 std::atomic<long> g_taken{0};
 }
 
-void* operator new(std::size_t size) {
+// Not inlined: GCC 12 else sees free() on memory of a new that it has not looked into, and warns of the mismatch.
+[[gnu::noinline]] void* operator new(std::size_t size) {
   ++g_taken;
   if (void* memory = std::malloc(size ? size : 1)) return memory;
   throw std::bad_alloc();
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 using namespace inverse_arms;
 
