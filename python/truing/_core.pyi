@@ -2346,8 +2346,13 @@ class SanityFinding:
     @property
     def kind(self) -> str:
         """
-        'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'duplicates', 'direction', 'lag',
-        'moved_target', 'constant' or 'outliers'.
+        'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'convention', 'duplicates', 'direction',
+        'lag', 'moved_target', 'constant' or 'outliers'.
+        """
+    @property
+    def mistake(self) -> bool:
+        """
+        The robot file or the columns are to be corrected: until then nothing is named.
         """
     @property
     def rows(self) -> tuple[int, ...]:

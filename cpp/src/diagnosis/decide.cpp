@@ -390,6 +390,15 @@ static void find_gap(const Work& work, Gears* gears, Decision* out) {
   out->search.threshold = std::max(out->search.threshold, at);
 }
 
+/// What has no name, of a choice.
+static Choice without_names(const Work& work, const Choice& choice) {
+  std::vector<int> names;
+  for (const int g : choice.groups) {
+    if (is_named(work.design.candidates.named[static_cast<std::size_t>(g)])) names.push_back(g);
+  }
+  return without_these(choice, names);
+}
+
 /// A free function on what is left, if it wins, and what it makes needless goes. True: it was taken.
 static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
   const SearchOptions& search = out->search;
@@ -405,6 +414,9 @@ static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
   grown.scales.push_back(best.gain.scale);
   Evidence::State next = with.improve(with.evaluate(grown), search);
   next = keep_what_predicts(*work, with.search(search, next.choice));
+  // Names that were given before the function was known may stand for parts of it: once more without them.
+  Evidence::State anew = keep_what_predicts(*work, with.search(search, without_names(*work, next.choice)));
+  if (anew.score > next.score) next = std::move(anew);
   if (!(next.score > out->state.score + search.threshold)) return false;
   out->state = std::move(next);
   return true;
