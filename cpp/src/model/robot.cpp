@@ -112,18 +112,19 @@ void require_finite(const std::string& where, const char* name, double value) {
 }
 
 // Beyond any machine, and far within what products of a few values can hold. The kernel's sine takes no larger angles.
-constexpr double kLargest = 1e6;
+constexpr double kLargestNumber = 1e6;
 constexpr std::size_t kMostJoints = 200;
 
 void require_usable(const std::string& where, const char* name, double value) {
   require_finite(where, name, value);
-  if (std::abs(value) <= kLargest) return;
+  if (std::abs(value) <= kLargestNumber) return;
   refuse(where, std::string(name) + " is " + number(value) + ", expected a value between -1e6 and 1e6 (m, rad, kg)");
 }
 
 void require_frame(const std::string& where, const char* name, const Isometry3d& T) {
   if (!T.matrix().allFinite()) refuse(where, std::string(name) + " has a value that is not finite");
-  if (T.translation().cwiseAbs().maxCoeff() > kLargest) refuse(where, std::string(name) + " is farther than 1e6 m");
+  if (T.translation().cwiseAbs().maxCoeff() > kLargestNumber)
+    refuse(where, std::string(name) + " is farther than 1e6 m");
   const Eigen::Matrix3d R = T.linear();
   const bool is_rotation = (R.transpose() * R).isIdentity(1e-6) && R.determinant() > 0.0;
   const bool is_rigid = (T.matrix().row(3) - Eigen::RowVector4d::Unit(3)).isZero(1e-12);
@@ -160,7 +161,7 @@ void validate_joint(const Joint& joint, Convention convention) {
     require_usable(where, "mass", *joint.mass);
     if (*joint.mass < 0.0) refuse(where, "mass is " + number(*joint.mass) + " kg, expected zero or more");
   }
-  if (!(joint.center_of_mass.cwiseAbs().maxCoeff() <= kLargest))
+  if (!(joint.center_of_mass.cwiseAbs().maxCoeff() <= kLargestNumber))
     refuse(where, "center_of_mass has a value that is not finite, or beyond 1e6 m");
 }
 
@@ -255,14 +256,14 @@ void validate(const Robot& robot) {
   for (const Joint& joint : robot.joints) validate_joint(joint, robot.convention);
   std::vector<bool> done(robot.joints.size(), false);
   for (std::size_t i = 0; i < robot.joints.size(); ++i) validate_drivers(robot, i, {}, done);
-  if (!(robot.gravity.cwiseAbs().maxCoeff() <= kLargest))
+  if (!(robot.gravity.cwiseAbs().maxCoeff() <= kLargestNumber))
     refuse(where, "gravity has a value that is not finite, or beyond 1e6 m/s^2");
   require_frame(where, "T_measurement_base", robot.T_measurement_base);
   for (const Target& target : robot.targets)
     require_frame("target '" + target.name + "'", "T_last_target", target.T_last_target);
   validate_effects(robot);
-  if (robot.anchor &&
-      !(robot.anchor->point.cwiseAbs().maxCoeff() <= kLargest && std::abs(robot.anchor->zero) <= kLargest)) {
+  if (robot.anchor && !(robot.anchor->point.cwiseAbs().maxCoeff() <= kLargestNumber &&
+                        std::abs(robot.anchor->zero) <= kLargestNumber)) {
     refuse(where, "anchor has a value that is not finite, or beyond 1e6 m");
   }
   for (const auto& [name, ends] : robot.fitted_range) {
