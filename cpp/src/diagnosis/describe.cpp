@@ -435,7 +435,7 @@ UnknownEffect describe_mistake(const Diagnosis& d, const SanityFinding& mistake)
   UnknownEffect out;
   out.held_out_before = out.held_out_after = d.gap;
   out.probability = 0.99;
-  out.looks_like = mistake.text;
+  out.looks_like = "the robot file or the columns: " + mistake.kind;
   return out;
 }
 
@@ -623,7 +623,7 @@ static const SanityFinding* mistake_in(const Diagnosis& d) {
 
 std::string sentence_of(const Diagnosis& d) {
   if (const SanityFinding* mistake = mistake_in(d))
-    return "The robot file and the measurements do not go together: " + mistake->text;
+    return "Robot file and measurements do not go together: " + mistake->text;
   if (too_few_poses(d)) {
     return "These poses are too few to tell a gap from noise: with base and tool fitted, held-out poses are off by " +
            millimetres(d.gap.rms) + " rms, and a fit of everything at once leaves " + millimetres(d.noise_floor) +

@@ -278,6 +278,7 @@ void judge_noise(const Repeats& repeats, const Work& work, const Decision& decis
   out->noise_floor =
       std::sqrt(components) *
       (out->noise_from_repeats ? repeats.sigma : work.noise.position_sigma * std::sqrt(decision.state.sigma2));
+  if (work.given.mistaken && !out->noise_from_repeats) out->noise_floor = 0.0;  // nothing was fitted that could tell
   const double gap2 = std::pow(out->gap.rms, 2.0), floor2 = std::pow(out->noise_floor, 2.0),
                after2 = std::pow(out->after.rms, 2.0);
   out->closable = gap2 > floor2 ? std::clamp((gap2 - after2) / (gap2 - floor2), 0.0, 1.0) : 0.0;

@@ -210,8 +210,8 @@ void try_readings(const Robot& robot, const DiagnoseOptions& options, double spr
   }
   if (better) {
     finding.kind = better->kind;
-    finding.text = better->text + " explains the measurements far better: median " + millimetres(best) + " against " +
-                   millimetres(as_is) + " with base and tool fitted. Correct it and run again.";
+    finding.text = better->text + " leaves a median error of " + millimetres(best) + " in place of " +
+                   millimetres(as_is) + ". Correct it and run again.";
     finding.mistake =
         median_error(better->robot, better->data, options, true) < 0.5 * median_error(robot, out->data, options, true);
   } else if (as_is > kHardlyAnything * spread) {

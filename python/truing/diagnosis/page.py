@@ -101,6 +101,8 @@ def _headline(result: Mapping[str, Any], rows: Rows) -> str:
     floor = (
         f"{length_text(gap['noise_floor_m'])} is noise"
         f" ({'from repeated poses' if gap['noise_from_repeats'] else 'what a flexible fit leaves'})"
+        if gap["noise_floor_m"]
+        else "of it what is noise is not known"
     )
     if result["verdict"] == "none":
         numbers = (
@@ -170,7 +172,8 @@ def trouble(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
         calm.add("joint_record")
     if not _many_outliers(result):
         calm.add("outliers")
-    return [f for f in result["sanity"] if f["kind"] not in calm]
+    # A mistake is said by the headline.
+    return [f for f in result["sanity"] if f["kind"] not in calm and not f.get("mistake")]
 
 
 def _many_outliers(result: Mapping[str, Any]) -> bool:

@@ -139,7 +139,8 @@ def print_errors(result: Mapping[str, Any]) -> None:
     lines = [
         [label, *(mm(e[key]) for _, e in columns)] for label, key in (("rms", "rms_m"), ("95 %", "p95_m"))
     ]
-    lines.append(["noise", mm(gap["noise_floor_m"]), *[""] * (len(columns) - 1)])
+    if gap["noise_floor_m"]:
+        lines.append(["noise", mm(gap["noise_floor_m"]), *[""] * (len(columns) - 1)])
     table(f"{result['robot']}: error of held-out poses", ["", *(name for name, _ in columns)], lines)
     if result["effects"]:
         low, high = shrink["ci"]
