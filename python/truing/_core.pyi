@@ -2148,7 +2148,7 @@ class FoundEffect:
     @property
     def held_out_before(self) -> ErrorStatistics:
         """
-        Held-out errors without this effect, all others in.
+        Errors of poses that the fit did not see, without this effect, all others in.
         """
     @property
     def identify_as(self) -> str:
@@ -2196,7 +2196,7 @@ class FoundEffect:
     @property
     def shrink(self) -> Share:
         """
-        Of the held-out rms: 1 - after / before.
+        Of the rms, rotations counted by their noise: 1 - after / before.
         """
     @property
     def size_at_tip(self) -> float:
