@@ -12,6 +12,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "estimation/clustered.hpp"
 #include "estimation/evaluate.hpp"
 #include "estimation/selection.hpp"
 #include "estimation/solvers.hpp"
@@ -708,8 +709,27 @@ struct Uncertainty {
   double rotation_noise = kNaN;
 };
 
-/// Covariance with positions and rotations each at the noise they show: H^-1 (s_p^2 H_p + s_r^2 H_r) H^-1; for
-/// positions alone, s^2 H^-1. With a robust loss the weighted rows stand for the rows: good to a few per cent.
+/// Fewer poses than so many times the parameters cannot say how their scores scatter.
+constexpr std::size_t kPosesPerParameter = 2;
+
+/// Covariance with every pose's residuals as one observation, H^-1 M H^-1 (Liang and Zeger 1986); priors scatter as
+/// the noise does that they are weighed against. Nothing is known where poses are too few.
+std::optional<Eigen::MatrixXd> clustered_by_pose(const Job& job, const Fit& found,
+                                                 const std::vector<std::int32_t>& rows, const Eigen::MatrixXd& inverse,
+                                                 double sigma2) {
+  const std::vector<std::int32_t> pose = pose_groups(job.data);
+  if (clusters_in(rows, pose) < kPosesPerParameter * found.fitted.size()) return std::nullopt;
+  Weighing weighing = found.weighing;
+  weighing.prior = {};
+  Eigen::MatrixXd middle =
+      clustered_scores({job.model, job.data, job.bases, found.fitted, rows}, found.values, weighing, inverse, pose);
+  if (found.weighing.prior.weight.size() > 0) middle.diagonal() += sigma2 * found.weighing.prior.weight;
+  return inverse * middle * inverse;
+}
+
+/// Covariance clustered by pose. Where poses are few, with positions and rotations each at the noise they show: H^-1
+/// (s_p^2 H_p + s_r^2 H_r) H^-1; for positions alone, s^2 H^-1. With a robust loss the weighted rows stand for the
+/// rows: good to a few per cent.
 Uncertainty uncertainty(const Job& job, const Fit& found, bool poses) {
   Uncertainty out;
   const std::vector<std::int32_t> rows = without(job.rows, found.rejected);
@@ -743,6 +763,7 @@ Uncertainty uncertainty(const Job& job, const Fit& found, bool poses) {
     out.covariance = inverse * (sigma2 * position.gram + sigma2_rotation * rotation_gram) * inverse;
     out.rotation_noise = std::sqrt(sigma2_rotation) / found.weighing.rotation_scale;
   }
+  if (auto clustered = clustered_by_pose(job, found, rows, inverse, sigma2)) out.covariance = std::move(*clustered);
   out.noise = std::sqrt(sigma2);
   if (job.data.position_sigma || job.data.weight) {  // unit-weight residuals are not metres then
     const ErrorLengths errors = error_lengths(job, evaluator, found.values, poses);

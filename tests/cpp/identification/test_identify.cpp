@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "math/observability.hpp"
+#include "math/random.hpp"
 #include "math/registration.hpp"
 #include "support/arms.hpp"
 #include "support/contains.hpp"
@@ -344,6 +345,57 @@ TEST_CASE("standard errors match the scatter over 200 seeds within 10 per cent")
   CHECK(ratio.mean() == doctest::Approx(1.0).scale(0).epsilon(0.1));
   CHECK(ratio.minCoeff() > 0.8);
   CHECK(ratio.maxCoeff() < 1.2);
+}
+
+TEST_CASE("standard errors take repeats of a pose for one observation where the model misses something") {
+  // 100 poses, each measured four times: an error of the pose, ten times the noise, that no parameter explains.
+  const int seeds = 60, poses = 100, repeats = 4;
+  const Robot nominal = palletizer();
+  Robot truth = perturbed(nominal, 1e-3, 1e-3, 31);
+  truth.T_measurement_base = somewhere();
+  IdentifyOptions options;
+  options.test_share = 0.0;
+  options.loss = truing::Loss::none;
+  std::vector<Eigen::VectorXd> values;
+  Eigen::VectorXd mean_variance;
+  for (unsigned seed = 0; seed < seeds; ++seed) {
+    auto table = random_joints(truth, poses, 3200 + seed);
+    truing::math::Random random(3300 + seed);
+    measure(table.get(), truth, What::position, 0.0, 1);
+    auto repeated = std::make_unique<Table>(static_cast<std::size_t>(poses * repeats));
+    const auto repeat = [&](const truing::Column& column) {
+      std::vector<double> out;
+      for (int i = 0; i < poses; ++i) out.insert(out.end(), repeats, column[static_cast<std::size_t>(i)]);
+      return out;
+    };
+    for (const truing::Column& joint : table->data.joints)
+      repeated->data.joints.push_back(repeated->add(repeat(joint)));
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::vector<double> position = repeat(table->data.position[k]);
+      for (std::size_t i = 0; i < static_cast<std::size_t>(poses); ++i) {
+        const double of_pose = 5e-4 * random.normal();
+        for (std::size_t r = 0; r < static_cast<std::size_t>(repeats); ++r)
+          position[repeats * i + r] += of_pose + 5e-5 * random.normal();
+      }
+      repeated->data.position[k] = repeated->add(position);
+    }
+    const Identification result = truing::identify(nominal, repeated->data, options);
+    std::vector<double> v;
+    for (const truing::Parameter& p : result.parameters) {
+      if (!p.frozen) v.push_back(p.value);
+    }
+    values.push_back(Eigen::Map<Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
+    const Eigen::VectorXd variance = result.covariance.diagonal();
+    mean_variance = seed ? Eigen::VectorXd(mean_variance + variance) : variance;
+  }
+  mean_variance /= seeds;
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(mean_variance.size()), scatter = mean;
+  for (const Eigen::VectorXd& v : values) mean += v / seeds;
+  for (const Eigen::VectorXd& v : values) scatter += (v - mean).cwiseAbs2() / (seeds - 1);
+  // Taken for 400 rows the standard errors would be half of the scatter.
+  const Eigen::ArrayXd ratio = (scatter.array() / mean_variance.array()).sqrt();
+  CHECK(ratio.mean() > 0.85);
+  CHECK(ratio.mean() < 1.2);
 }
 
 TEST_CASE("standard errors of poses match the scatter, whatever weight rotations are given") {

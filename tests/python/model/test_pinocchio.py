@@ -89,7 +89,7 @@ def test_jacobian_by_differences_is_pinocchios(both: Both) -> None:
 
 @pytest.mark.parametrize("name", sorted(ROBOTS))
 def test_analytic_jacobian_gives_pinocchios_covariance(name: str) -> None:
-    """`identify` of joint zeros: its covariance is that of Pinocchio's columns, and of the frame's six.
+    """`identify` of joint zeros: its covariance, clustered by pose, is that of Pinocchio's columns.
 
     Residuals are far below where curvature matters, so both Jacobians stand at the same point.
     """
@@ -113,9 +113,13 @@ def test_analytic_jacobian_gives_pinocchios_covariance(name: str) -> None:
         **{f"base.{axis}": frame[:, :, k] for k, axis in enumerate(("x", "y", "z", "rx", "ry", "rz"))},
     }
     # A joint that does nothing but what others do is frozen: both columns leave it out.
-    jacobian = np.stack([columns[parameter] for parameter in fitted], axis=2).reshape(3 * len(q), -1)
     # The base was found where it is, at the origin: it turns about that.
-    expected = found.noise_sigma**2 * np.linalg.inv(jacobian.T @ jacobian)
+    jacobian = np.stack([columns[parameter] for parameter in fitted], axis=2)  # shape=(poses, 3, parameters)
+    inverse = np.linalg.inv(np.einsum("nca,ncb->ab", jacobian, jacobian))
+    found_by_fit = inverse @ np.einsum("nca,nc->a", jacobian, noise)
+    score = np.einsum("nca,nc->na", jacobian, noise - jacobian @ found_by_fit)
+    leverage = np.einsum("nca,ab,ncb->n", jacobian, inverse, jacobian) / 3
+    expected = inverse @ (score.T / (1 - leverage) @ score) @ inverse
     size = np.sqrt(np.diag(expected))
     np.testing.assert_allclose(
         found.covariance / size[:, None] / size, expected / size[:, None] / size, rtol=0, atol=1e-5

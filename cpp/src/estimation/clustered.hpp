@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Rows of one pose share what the model leaves there: they count as one observation when standard errors are made.
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "estimation/evaluate.hpp"
+#include "model/model.hpp"
+#include "rooms.hpp"
+#include "truing/model/measurement.hpp"
+
+namespace truing::estimation {
+
+/// The rows of a fit, as an Evaluator takes them.
+struct FittedRows {
+  const Model& model;
+  const Measurements& data;
+  const std::vector<std::vector<double>>& bases;
+  const std::vector<int>& free;
+  const std::vector<std::int32_t>& rows;
+};
+
+/// Number of clusters (`cluster[row]`, for every row of the data) that these rows are of.
+std::size_t clusters_in(const std::vector<std::int32_t>& rows, const std::vector<std::int32_t>& cluster);
+
+/// sum over clusters c of g_c g_c^T / (1 - h_c), with the score g_c = J_c^T W_c r_c and the leverage h_c of the mean of
+/// c's rows: the middle of the sandwich H^-1 M H^-1 (Liang and Zeger 1986, (3); the factor is that of HC2, MacKinnon
+/// and White 1985, on clusters). `inverse` is H^-1.
+Eigen::MatrixXd clustered_scores(const FittedRows& fitted, const Eigen::VectorXd& values, const Weighing& weighing,
+                                 const Eigen::MatrixXd& inverse, const std::vector<std::int32_t>& cluster);
+
+}  // namespace truing::estimation
