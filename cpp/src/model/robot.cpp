@@ -115,6 +115,9 @@ void require_finite(const std::string& where, const char* name, double value) {
 constexpr double kLargestNumber = 1e6;
 constexpr std::size_t kMostJoints = 200;
 
+/// False of a number that is none, too.
+bool is_bounded(const Eigen::Vector3d& v) { return (v.array().abs() <= kLargestNumber).all(); }
+
 void require_usable(const std::string& where, const char* name, double value) {
   require_finite(where, name, value);
   if (std::abs(value) <= kLargestNumber) return;
@@ -123,8 +126,7 @@ void require_usable(const std::string& where, const char* name, double value) {
 
 void require_frame(const std::string& where, const char* name, const Isometry3d& T) {
   if (!T.matrix().allFinite()) refuse(where, std::string(name) + " has a value that is not finite");
-  if (T.translation().cwiseAbs().maxCoeff() > kLargestNumber)
-    refuse(where, std::string(name) + " is farther than 1e6 m");
+  if (!is_bounded(T.translation())) refuse(where, std::string(name) + " is farther than 1e6 m");
   const Eigen::Matrix3d R = T.linear();
   const bool is_rotation = (R.transpose() * R).isIdentity(1e-6) && R.determinant() > 0.0;
   const bool is_rigid = (T.matrix().row(3) - Eigen::RowVector4d::Unit(3)).isZero(1e-12);
@@ -161,7 +163,7 @@ void validate_joint(const Joint& joint, Convention convention) {
     require_usable(where, "mass", *joint.mass);
     if (*joint.mass < 0.0) refuse(where, "mass is " + number(*joint.mass) + " kg, expected zero or more");
   }
-  if (!(joint.center_of_mass.cwiseAbs().maxCoeff() <= kLargestNumber))
+  if (!is_bounded(joint.center_of_mass))
     refuse(where, "center_of_mass has a value that is not finite, or beyond 1e6 m");
 }
 
@@ -256,14 +258,12 @@ void validate(const Robot& robot) {
   for (const Joint& joint : robot.joints) validate_joint(joint, robot.convention);
   std::vector<bool> done(robot.joints.size(), false);
   for (std::size_t i = 0; i < robot.joints.size(); ++i) validate_drivers(robot, i, {}, done);
-  if (!(robot.gravity.cwiseAbs().maxCoeff() <= kLargestNumber))
-    refuse(where, "gravity has a value that is not finite, or beyond 1e6 m/s^2");
+  if (!is_bounded(robot.gravity)) refuse(where, "gravity has a value that is not finite, or beyond 1e6 m/s^2");
   require_frame(where, "T_measurement_base", robot.T_measurement_base);
   for (const Target& target : robot.targets)
     require_frame("target '" + target.name + "'", "T_last_target", target.T_last_target);
   validate_effects(robot);
-  if (robot.anchor && !(robot.anchor->point.cwiseAbs().maxCoeff() <= kLargestNumber &&
-                        std::abs(robot.anchor->zero) <= kLargestNumber)) {
+  if (robot.anchor && !(is_bounded(robot.anchor->point) && std::abs(robot.anchor->zero) <= kLargestNumber)) {
     refuse(where, "anchor has a value that is not finite, or beyond 1e6 m");
   }
   for (const auto& [name, ends] : robot.fitted_range) {
