@@ -5,11 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
+#include "math/constants.hpp"
 #include "model/effects/families.hpp"
 #include "model/effects/terms.hpp"
+#include "model/motion.hpp"
 
 namespace truing::model {
 namespace {
@@ -61,12 +62,15 @@ std::vector<CrankAngle> crank_angles(const Robot& robot, const Joint& at) {
 // Least and largest crank angle in the data [rad]; without data: 0 and 0.
 std::pair<double, double> range_of(const CrankAngle& angle, const Robot& robot, const Measurements& data) {
   const std::vector<std::size_t> driven = robot.driven_joints();
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  Eigen::VectorXd joints = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.joints.size()));
+  const Eigen::MatrixXd coupling = coupling_matrix(robot);
+  double low = kInfinity, high = -kInfinity;
+  Eigen::VectorXd readings = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.joints.size()));
   for (std::size_t row = 0; row < data.rows && data.joints.size() == driven.size(); ++row) {
-    for (std::size_t k = 0; k < driven.size(); ++k) joints[static_cast<Eigen::Index>(driven[k])] = data.joints[k][row];
-    low = std::min(low, angle(joints));
-    high = std::max(high, angle(joints));
+    for (std::size_t k = 0; k < driven.size(); ++k)
+      readings[static_cast<Eigen::Index>(driven[k])] = data.joints[k][row];
+    const double now = angle(coupling * readings);
+    low = std::min(low, now);
+    high = std::max(high, now);
   }
   return low <= high ? std::make_pair(low, high) : std::make_pair(0.0, 0.0);
 }
@@ -106,13 +110,12 @@ std::vector<Term> linkage(const Robot& robot, std::size_t joint, const Measureme
   const Joint& at = robot.joints.at(joint);
   std::vector<Term> known, usual;
   for (const CrankAngle& angle : crank_angles(robot, at)) {
-    const double phase =
-        remembered(robot, "linkage", phase_name(at, angle), [] { return std::numeric_limits<double>::quiet_NaN(); });
+    const double phase = remembered(robot, "linkage", phase_name(at, angle), [] { return kNaN; });
     const auto [low, high] = range_of(angle, robot, data);
-    const bool passes_dead_centre = high - low > M_PI - 2.0 * kDeadCentre;
+    const bool passes_dead_centre = high - low > kPi - 2.0 * kDeadCentre;
     if (!std::isfinite(phase) && passes_dead_centre) continue;  // no crank turns that far
     const std::vector<Term> terms =
-        terms_of_linkage(at, angle, std::isfinite(phase) ? phase : M_PI / 2.0 - 0.5 * (low + high));
+        terms_of_linkage(at, angle, std::isfinite(phase) ? phase : kPi / 2.0 - 0.5 * (low + high));
     (std::isfinite(phase) ? known : usual)
         .insert((std::isfinite(phase) ? known : usual).end(), terms.begin(), terms.end());
   }
@@ -130,7 +133,7 @@ std::vector<EffectForm> phases_of_linkage(const Robot& robot, std::size_t joint,
   for (const CrankAngle& angle : crank_angles(robot, at)) {
     const std::string prefix = "linkage." + at.name;
     const auto [low, high] = range_of(angle, robot, data);
-    const double least = kDeadCentre - low, most = M_PI - kDeadCentre - high;
+    const double least = kDeadCentre - low, most = kPi - kDeadCentre - high;
     if (least > most) continue;
     const int steps = std::max(2, 2 * static_cast<int>(std::ceil(0.5 * (most - least) / kStep)));
     for (int k = 0; k <= steps; ++k) {  // from square outwards
