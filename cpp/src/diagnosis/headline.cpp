@@ -51,11 +51,12 @@ static std::vector<Cause> causes_of(const Diagnosis& d) {
   return out;
 }
 
-static std::string with_joints(const std::string& effect, const std::vector<std::string>& joints) {
+static std::string effect_at(const std::string& effect, const std::vector<std::string>& joints) {
   if (joints.empty()) return plain(effect);
   if (joints.size() > kJoints) {
     const bool of_links = model::traits_of(effect, {}).stands_for == StandsFor::link_geometry;
-    return plain(effect) + (of_links ? "" : " at " + std::to_string(joints.size()) + " joints");
+    return plain(effect) + (of_links ? " of " : " at ") + std::to_string(joints.size()) +
+           (of_links ? " links" : " joints");
   }
   std::string text = plain(effect) + " at " + joints[0];
   for (std::size_t k = 1; k < joints.size(); ++k) text += (k + 1 < joints.size() ? ", " : " and ") + joints[k];
@@ -63,15 +64,15 @@ static std::string with_joints(const std::string& effect, const std::vector<std:
 }
 
 static std::string in_words(const Cause& cause) {
-  std::string text = with_joints(cause.effect, cause.joints);
+  std::string text = effect_at(cause.effect, cause.joints);
   if (!cause.only || cause.only->confounded_with.empty()) return text;
   const Alternative& other = cause.only->confounded_with[0];
   if (other.probability > 0.0 && other.probability >= kContender * cause.only->probability)
-    text += " (or " + with_joints(other.effect, other.joints) + ": these data cannot tell)";
+    text += " (or " + effect_at(other.effect, other.joints) + ": these data cannot tell)";
   return text;
 }
 
-/// "link geometry at 6 joints, joint compliance at J2 and J3, backlash at J6 and 2 smaller".
+/// "link geometry of 6 links, joint compliance at J2 and J3, backlash at J6 and 2 smaller".
 std::string largest_causes(const Diagnosis& d) {
   const std::vector<Cause> causes = causes_of(d);
   const std::size_t shown = std::min(causes.size(), kCauses);

@@ -116,8 +116,8 @@ TEST_CASE("the headline names the three largest causes, an effect at several joi
                cause("joint_compliance", {"J3"}, 0.1), cause("transmission_error@81", {"J4"}, 0.05),
                cause("harmonic", {"J5"}, 0.01)};
   CHECK(largest_causes(d) ==
-        "joint compliance at J2 and J3, link geometry, transmission error (81 per turn) at J4 and 1 "
-        "smaller");
+        "joint compliance at J2 and J3, link geometry of 4 links, transmission error (81 per turn) at J4 and "
+        "1 smaller");
   d.effects.resize(1);
   d.effects[0].confounded_with = {{"harmonic", {"J3"}, 0.1, ""}};
   CHECK(largest_causes(d) == "joint compliance at J2");  // nine to one is no question
