@@ -78,7 +78,7 @@ Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std
 
 Evidence::State keep_what_predicts(const Work& work, Evidence::State state) {
   const auto& groups = work.design.candidates.groups;
-  const Evidence evidence(work.grams.train, groups, work.design.nuisance, work.design.prior);
+  const Evidence evidence = evidence_now(work);
   for (;;) {
     const Eigen::VectorXd with = squares_of_folds(work, state.choice);
     double best = 1e300;
@@ -376,11 +376,11 @@ static void find_gap(const Work& work, Gears* gears, Decision* out) {
   out->p_gap = static_cast<double>(above) / (static_cast<double>(null.size()) + 1.0);
   // Orders have no columns yet. Noise reaches their best score with a chance that is known.
   if (out->p_gap > options.false_alarm) {
-    const double score = gears->best(evidence, evidence.evaluate({})).score;
-    if (score > best) {
-      const auto reach = std::count_if(null.begin(), null.end(), [&](double s) { return s >= score; });
+    const OrderAt order = gears->best(evidence, evidence.evaluate({}));
+    if (order.score > best) {
+      const auto reach = std::count_if(null.begin(), null.end(), [&](double s) { return s >= order.score; });
       const double chance = static_cast<double>(reach + 1) / (static_cast<double>(null.size()) + 1.0);
-      out->p_gap = std::min(1.0, chance + OrderScan::chance_of(score));
+      out->p_gap = std::min(1.0, chance + OrderScan::chance_of(order));
     }
   }
   std::sort(null.begin(), null.end());

@@ -187,9 +187,10 @@ std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evide
 }
 
 /// Takes back, one at a time, small gains that poses which the fit did not see do not confirm: their interval holds
-/// none.
-void keep_what_is_confirmed(const Work& work, const Evidence& evidence, Decision* decision) {
+/// none. True: something was.
+bool keep_what_is_confirmed(const Work& work, const Evidence& evidence, Decision* decision) {
   const DiagnoseOptions& options = work.given.options;
+  bool any = false;
   for (;;) {
     const Choice& choice = decision->state.choice;
     const UnseenErrors with = unseen_errors(work, choice);
@@ -203,7 +204,8 @@ void keep_what_is_confirmed(const Work& work, const Evidence& evidence, Decision
       least = gain.value;
       better = less;
     }
-    if (least > kSmallGain) return;
+    if (least > kSmallGain) return any;
+    any = true;
     for (auto& [correction, corrected] : decision->corrects) {
       if (std::find(better.groups.begin(), better.groups.end(), corrected) == better.groups.end()) corrected = -1;
     }
@@ -437,10 +439,12 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
 
   // 3. to 6. What explains it, and 7. how sure that is.
   Decision decision = decide(&work, robot);
-  const Evidence evidence(work.grams.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
+  const Evidence evidence = evidence_now(work);
   keep_what_is_confirmed(work, evidence, &decision);
   const Resampled resampled = resample(work, decision);
-  const std::map<int, Named> names = keep_what_is_likely(work, evidence, resampled, &decision);
+  std::map<int, Named> names = keep_what_is_likely(work, evidence, resampled, &decision);
+  while (keep_what_is_confirmed(work, evidence, &decision))  // without what was not likely
+    names = keep_what_is_likely(work, evidence, resampled, &decision);
   result.p_gap = decision.p_gap;
   result.remaining_structure_p = decision.p_left;
 

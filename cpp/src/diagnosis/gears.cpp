@@ -19,7 +19,6 @@ constexpr double kFirstNats = 5.0;          // beyond the threshold, that the fi
 constexpr int kMostOrders = 12;             // taken or tried in one go
 constexpr std::size_t kMostPassedOver = 6;  // in one go: then what is left is no order
 constexpr std::size_t kColumnsOfOthers = 12;
-constexpr double kMuchWorse = 3.0;  // nats: orders that lose less fit about as well
 
 const Effect& family() {
   return effect_that([](const EffectTraits& traits) { return traits.search == Search::by_order; });
@@ -293,7 +292,7 @@ void Gears::choose_orders_again(Decision* decision) {
     rest.scales.push_back(scale);
     const Evidence::State now = evidence_now(*work_).evaluate(rest);
     // The scan has weighed it against the old one by what is known now; what remains is that it fits.
-    if (now.evidence < decision->state.evidence - kMuchWorse) {
+    if (now.evidence < decision->state.evidence - kAsWell) {
       withdraw(before, groups.size());
       continue;
     }
@@ -333,6 +332,7 @@ bool Gears::leave_out_joint(std::size_t known, Decision* decision) {
   if (worst == columns.size()) return false;
   known_[known].joints.erase(known_[known].joints.begin() + static_cast<std::ptrdiff_t>(worst));
   for (std::size_t g = group; g <= group + others_behind(group); ++g) {
+    if (candidates.groups[g].columns.empty()) continue;  // withdrawn
     Explanation& e = candidates.named[g];
     for (std::size_t c = 2 * worst; c < 2 * worst + 2; ++c)
       work_->design.column_names[static_cast<std::size_t>(candidates.groups[g].columns[c])] += "-";

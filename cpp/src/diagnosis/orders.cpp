@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "math/constants.hpp"
+#include "math/random.hpp"
 #include "math/statistics.hpp"
 #include "model/effects/traits.hpp"
 
@@ -19,7 +20,6 @@ namespace {
 constexpr std::size_t kOrdersAtATime = 16;
 constexpr double kWaves = 2.0;      // at least, in a joint's travel: of less, any bent curve is a part
 constexpr double kOneAngle = 3e-4;  // angles that lie closer are one [rad]: a tenth of a radian of the shortest wave
-constexpr double kAsWell = 3.0;     // nats: what loses less fits about as well
 constexpr double kJointIsIn = 3.0;  // nats that a joint must win to be among those that share an order
 constexpr std::size_t kMostOthers = 6;
 constexpr double kInvisible = 1e-6;  // share of a wave beyond the state's columns, that rounding may have made
@@ -185,15 +185,17 @@ std::vector<double> distinct_angles(const Design& design, const InputColumn& inp
 }
 
 /// The smallest t at which |mean of exp(i t q)| is one again: cos and sin of k q and of (t - k) q are then the same on
-/// these angles, as are those of (t + k) q. 0: there is none up to the sum of two orders.
+/// these angles, as are those of (t + k) q. 0: there is none up to the sum of two orders. Of many angles some are
+/// drawn: every n-th of an even grid would be a coarser grid.
 double repeat_of(const std::vector<double>& angles, double travel) {
   constexpr std::size_t kEnough = 128;
   constexpr double kTheSame = 0.98;
-  const std::size_t stride = angles.size() / kEnough + 1;
+  Random random(1);
   const double step = kPi / (8.0 * travel), first = 4.0 * kPi / travel;
-  Eigen::ArrayXcd wave(static_cast<Eigen::Index>((angles.size() + stride - 1) / stride)), turn(wave.size());
+  Eigen::ArrayXcd wave(static_cast<Eigen::Index>(std::min(kEnough, angles.size()))), turn(wave.size());
   for (Eigen::Index n = 0; n < wave.size(); ++n) {
-    const double angle = angles[static_cast<std::size_t>(n) * stride] - angles.front();
+    const std::size_t at = angles.size() > kEnough ? random.below(angles.size()) : static_cast<std::size_t>(n);
+    const double angle = angles[at] - angles.front();
     wave[n] = std::polar(1.0, first * angle);
     turn[n] = std::polar(1.0, step * angle);
   }
@@ -272,8 +274,9 @@ OrderScan::OrderScan(const Design& design, const Evidence& evidence, const Evide
   }
 }
 
-double OrderScan::chance_of(double score) {
-  return std::min(1.0, static_cast<double>(std::size(kScales)) * std::exp(-score));  // the best of the sizes counted
+double OrderScan::chance_of(const OrderAt& order) {
+  const double sizes = std::pow(static_cast<double>(std::size(kScales)), static_cast<double>(order.joints.size()));
+  return std::min(1.0, sizes * std::exp(-order.score));
 }
 
 /// Of every order, before the data: any may be; those that a gear makes are likelier; and those that a gear of this

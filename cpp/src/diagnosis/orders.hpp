@@ -38,6 +38,7 @@ struct Sampling {
 };
 
 constexpr std::size_t kFewAngles = 4;  ///< of so many, any function is a wave of any order
+constexpr double kAsWell = 3.0;        ///< nats: an order that loses less fits about as well
 
 /// Of every driven revolute joint that moves, on the design's training rows.
 std::vector<Sampling> samplings(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot);
@@ -66,8 +67,9 @@ class OrderScan {
   OrderAt again(const OrderAt& one, const std::vector<OrderAt>& known) const;
 
   /// Chance, at most, that noise alone scores as high: a Bayes factor averaged over all that was looked at exceeds
-  /// 1 / alpha with a probability below alpha (Markov's inequality, as in Ville 1939).
-  static double chance_of(double score);
+  /// 1 / alpha with a probability below alpha (Markov's inequality, as in Ville 1939). At every joint the best of
+  /// several sizes counts.
+  static double chance_of(const OrderAt& order);
 
  private:
   std::vector<double> log_prior(const std::vector<OrderAt>& known) const;

@@ -34,7 +34,7 @@ struct Fits {
 };
 
 Fits fits_of(const Work& work, const Choice& choice) {
-  const Evidence evidence(work.grams.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
+  const Evidence evidence = evidence_now(work);
   const Evidence::State state = evidence.evaluate(choice);
   Fits out;
   out.columns = columns_of(work, choice);
