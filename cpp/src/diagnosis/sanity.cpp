@@ -9,6 +9,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "diagnosis/diagnosis.hpp"
 #include "diagnosis/linearise.hpp"
 #include "diagnosis/rows.hpp"
 #include "math/constants.hpp"
@@ -83,7 +84,38 @@ double median_error(const Robot& robot, const Measurements& data, const Diagnose
   return median_of(lengths);
 }
 
+/// The decimal step that all of these are multiples of [m]; 0: there is none down to a nanometre.
+double resolution_of(const std::vector<double>& values) {
+  for (const double step : {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
+    const auto is_multiple = [&](double v) { return std::abs(v / step - std::round(v / step)) < 1e-3; };
+    if (std::all_of(values.begin(), values.end(), is_multiple)) return step;
+  }
+  return 0.0;
+}
+
+/// Rows that coincide with another row although they were measured anew: noise that is not much larger than what the
+/// instrument can show. Two normal numbers of one mean fall into one cell with the chance step / (2 sigma sqrt(pi)).
+double expected_coincidences(const Measurements& data) {
+  const double sigma = noise_of_repeats(data).sigma;
+  if (!(sigma > 0.0)) return 0.0;
+  double chance = 1.0;
+  for (const Column& column : data.distance ? std::vector<Column>{data.distance}
+                                            : std::vector<Column>(data.position.begin(), data.position.end())) {
+    std::vector<double> values;
+    for (std::size_t row = 0; column && row < data.rows; ++row) {
+      if (std::isfinite(column[row])) values.push_back(column[row]);
+    }
+    if (!values.empty()) chance *= std::min(1.0, resolution_of(values) / (2.0 * sigma * std::sqrt(kPi)));
+  }
+  std::map<std::int32_t, double> repeats;
+  for (const std::int32_t pose : pose_groups(data)) repeats[pose] += 1.0;
+  double pairs = 0.0;
+  for (const auto& [pose, count] : repeats) pairs += 0.5 * count * (count - 1.0);
+  return pairs * chance;
+}
+
 void find_duplicates(const Measurements& data, std::vector<SanityFinding>* findings) {
+  constexpr double kBeyondChance = 4.0;  // standard deviations of a count
   std::map<std::vector<double>, std::size_t> seen;
   std::vector<std::size_t> twice;
   for (std::size_t row = 0; row < data.rows; ++row) {
@@ -95,6 +127,8 @@ void find_duplicates(const Measurements& data, std::vector<SanityFinding>* findi
     if (!seen.emplace(std::move(key), row).second) twice.push_back(row);
   }
   if (twice.empty()) return;
+  const double expected = expected_coincidences(data);
+  if (static_cast<double>(twice.size()) <= expected + kBeyondChance * std::sqrt(expected)) return;
   SanityFinding finding;
   finding.kind = "duplicates";
   finding.text = std::to_string(twice.size()) +

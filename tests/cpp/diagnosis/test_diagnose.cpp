@@ -10,6 +10,7 @@
 #include <functional>
 #include <map>
 #include <numeric>
+#include <set>
 #include <string>
 
 #include "support/arms.hpp"
@@ -727,6 +728,28 @@ TEST_CASE("diagnose points at copies of rows") {
   const Diagnosis d = diagnose(light_arm(), twice.data);
   REQUIRE(finding(d, "duplicates"));
   CHECK(finding(d, "duplicates")->rows == std::vector<std::size_t>{100, 101, 102});
+}
+
+TEST_CASE("diagnose expects repeats to coincide where the instrument is coarse") {
+  Table repeated(300);  // 100 poses three times, to 0.1 mm: twice the noise
+  const auto once = random_joints(light_arm(), 100, 921);
+  for (const Column& column : once->data.joints) {
+    std::vector<double> values;
+    for (std::size_t row = 0; row < 300; ++row) values.push_back(column[row % 100]);
+    repeated.data.joints.push_back(repeated.add(values));
+  }
+  measure(&repeated, light_arm(), What::position, 5e-5, 922);
+  std::set<std::vector<double>> different;
+  std::vector<std::vector<double>> coarse(3, std::vector<double>(300));
+  for (std::size_t row = 0; row < 300; ++row) {
+    std::vector<double> all = {static_cast<double>(row % 100)};
+    for (std::size_t k = 0; k < 3; ++k)
+      all.push_back(coarse[k][row] = 1e-4 * std::round(1e4 * repeated.data.position[k][row]));
+    different.insert(all);
+  }
+  REQUIRE(different.size() < 300);  // some coincide
+  for (std::size_t k = 0; k < 3; ++k) repeated.data.position[k] = repeated.add(coarse[k]);
+  CHECK(!finding(diagnose(light_arm(), repeated.data), "duplicates"));
 }
 
 TEST_CASE("diagnose infers approach directions from the order of the poses, and says so" * doctest::skip(kSanitized)) {
