@@ -517,7 +517,8 @@ bool links_predict(const Work& work, const Choice& choice, std::size_t at) {
                          kMuchBetter);
 }
 
-Decision decide(Work* work, const Robot& robot) {
+/// Of the candidates that there are.
+static Decision explain(Work* work, const Robot& robot) {
   const DiagnoseOptions& options = work->given.options;
   Decision out;
   out.search.most_groups = options.max_effects;
@@ -551,6 +552,22 @@ Decision decide(Work* work, const Robot& robot) {
     if (only_named && !out.state.choice.groups.empty()) out.state = evidence_now(*work).evaluate({});
   }
   return out;
+}
+
+Decision decide(Work* work, const Robot& robot) {
+  const std::size_t groups = work->design.candidates.groups.size();
+  const Grams grams = work->grams;
+  std::vector<TooLarge> aside;
+  for (;;) {
+    Decision out = explain(work, robot);
+    const std::vector<TooLarge> more = too_large_in(*work, out.state);
+    if (more.empty()) {
+      out.too_large = std::move(aside);
+      return out;
+    }
+    set_aside(more, groups, grams, work);
+    aside.insert(aside.end(), more.begin(), more.end());
+  }
 }
 
 }  // namespace truing::diagnosis

@@ -10,6 +10,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "diagnosis/rows.hpp"
 #include "estimation/evaluate.hpp"
 #include "estimation/selection.hpp"
 #include "math/random.hpp"
@@ -192,12 +193,40 @@ class Designer {
     }
   }
 
+  /// Rms of every term's basis under the full weight: with gravity along that axis of the base where it is largest. As
+  /// it stands a joint may carry next to nothing, and is no softer for it. 0: it needs no gravity.
+  std::vector<double> sizes_under_full_weight() const {
+    std::vector<double> out(model_.terms.size(), 0.0);
+    if (std::none_of(model_.terms.begin(), model_.terms.end(), [](const Term& t) { return t.needs_gravity; }))
+      return out;
+    constexpr std::size_t kRows = 200;
+    std::vector<std::int32_t> some, every;
+    for (std::size_t k = 0; k < task_.rows.size(); k += task_.rows.size() / kRows + 1) {
+      every.push_back(static_cast<std::int32_t>(some.size()));
+      some.push_back(task_.rows[k]);
+    }
+    const Measurements few = subset_of(task_.data, some);
+    const std::vector<Effect> own = mapped(task_.options.own_effects, task_.data, some);
+    for (int axis = 0; axis < 3; ++axis) {
+      Robot turned = task_.at;
+      turned.gravity = task_.at.gravity.norm() * Eigen::Vector3d::Unit(axis);
+      const Model model = make_model(turned, few, requests_of(out_.candidates), own);
+      if (model.terms.size() != out.size()) continue;
+      const std::vector<std::vector<double>> bases = make_bases(model, few);
+      for (std::size_t t = 0; t < out.size(); ++t)
+        if (model.terms[t].needs_gravity) out[t] = std::max(out[t], root_mean_square(bases[t], every));
+    }
+    return out;
+  }
+
   /// Rms of what multiplies a parameter on its way to the site.
-  double size_of_basis(const ParameterInfo& info) const {
+  double size_of_basis(const ParameterInfo& info, const std::vector<double>& under_full_weight) const {
     double size = 0.0;
     for (const ColumnTerm& column : info.columns) {
-      if (column.term >= 0)
-        size = std::max(size, root_mean_square(bases_[static_cast<std::size_t>(column.term)], task_.rows));
+      if (column.term >= 0) {
+        const auto term = static_cast<std::size_t>(column.term);
+        size = std::max({size, root_mean_square(bases_[term], task_.rows), under_full_weight[term]});
+      }
       if (column.reading >= 0) {
         std::vector<double> reading(task_.data.rows);
         for (std::size_t row = 0; row < reading.size(); ++row)
@@ -218,11 +247,12 @@ class Designer {
   /// Names, units and the sizes that parameters may have.
   void name_core() {
     out_.prior = Eigen::VectorXd::Constant(out_.x.cols(), kLargest);
+    const std::vector<double> under_full_weight = sizes_under_full_weight();
     for (Eigen::Index k = 0; k < core(); ++k) {
       const ParameterInfo& info = model_.parameters[static_cast<std::size_t>(core_[static_cast<std::size_t>(k)])];
       out_.column_names.push_back(info.name);
       out_.column_units.push_back(info.unit);
-      const double size = size_of_basis(info);
+      const double size = size_of_basis(info, under_full_weight);
       if (size > 0.0) out_.prior[k] = largest_motion(info) / size;
       const auto shift = task_.shift.find(info.name);
       if (shift != task_.shift.end()) out_.y += shift->second * out_.x.col(k);

@@ -55,6 +55,14 @@ struct Work {
   Grams grams;
 };
 
+/// An effect that fits, and would have to be larger than any machine has.
+struct TooLarge {
+  int group = -1;
+  int column = -1;  ///< of the design, that is beyond
+  double size = 0.0;
+  ColumnGroup candidate{};  ///< as it was
+};
+
 /// Everything that was decided.
 struct Decision {
   Evidence::State state;  ///< named, laws and free functions
@@ -63,6 +71,7 @@ struct Decision {
   double p_left = 1.0;
   std::vector<Evidence::Gain> first;  ///< every group alone
   std::map<int, int> corrects;  ///< a law's correction, or a free function that is one: the group whose law it corrects
+  std::vector<TooLarge> too_large{};  ///< set aside: the rest was decided without them
 };
 
 struct Refit {
@@ -204,6 +213,15 @@ class Gears {
   std::vector<OrderAt> known_, passed_over_;
   std::vector<int> groups_;  ///< of those known
 };
+
+// --- plausible.cpp: what no machine has ------------------------------------------------------------------------------
+
+/// Chosen effects of the catalogue that are, for sure, larger than plausible.
+std::vector<TooLarge> too_large_in(const Work& work, const Evidence::State& state);
+/// They are candidates no more. Columns that were appended since there were `groups` of them go as well.
+void set_aside(const std::vector<TooLarge>& too_large, std::size_t groups, const Grams& grams, Work* work);
+/// What looks like an effect that no machine has: said of the unknown at its joint, or as one of its own.
+void describe_what_is_too_large(const Work& work, const Evidence& evidence, const Decision& decision, Diagnosis* out);
 
 // --- sureness.cpp: how sure that is ----------------------------------------------------------------------------------
 

@@ -180,7 +180,7 @@ Effect windup_effect() {
   EffectTraits& traits = effect.traits;
   traits.driver = Driver::motor_torque;
   traits.usual = 2e-6;
-  traits.plausible = 1e-4;
+  traits.plausible = 5e-3;
   traits.documentation = {"c · motor torque", "`windup.J2` [rad/Nm]", "`tau1_Nm …`"};
   return effect;
 }
@@ -191,7 +191,7 @@ Effect loaded_play_effect() {
   traits.mimicked_by = {"windup"};
   traits.separated_by = {{Experiment::both_directions}, {Experiment::another_payload}};
   traits.usual = 2e-6;
-  traits.plausible = 1e-4;
+  traits.plausible = 5e-3;
   traits.documentation = {"c · direction · τ", "`loaded_play.J2` [rad/Nm, m/N]",
                           "`dir1 … dirn`; masses or `payload_kg`"};
   return effect;
