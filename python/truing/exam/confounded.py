@@ -37,13 +37,9 @@ def _plan(specimen: Specimen, chain: Chain, rng: Generator, payloads: bool = Fal
     )
 
 
-def _revolute(chain: Chain) -> list[int]:
-    return [j for j in chain.driven if not chain.prismatic[j]]
-
-
 def _arms(chain: Chain) -> tuple[int, int]:
     """Shoulder and elbow: the second and third turning joints, which carry the weight."""
-    return _revolute(chain)[1], _revolute(chain)[2]
+    return chain.revolute[1], chain.revolute[2]
 
 
 def _with_range(plan: Plan, column: int, low: float, high: float) -> Plan:
@@ -54,7 +50,7 @@ def _with_range(plan: Plan, column: int, low: float, high: float) -> Plan:
 
 def one_sided(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
     """Backlash at a joint that is always approached from below is its zero."""
-    joint = int(rng.choice(_revolute(chain)[1:-1]))
+    joint = int(rng.choice(chain.revolute[1:-1]))
     plan = replace(_plan(specimen, chain, rng), one_sided=(chain.driven.index(joint),))
     return Twin(laws.backlash(joint, rng), "joint_offset", joint, plan, frozenset({"dir"}))
 
@@ -74,7 +70,7 @@ def long_metre(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
 
 def short_range(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
     """Over a few degrees the joint's zero is a harmonic."""
-    joint = int(rng.choice(_revolute(chain)[1:-1]))
+    joint = int(rng.choice(chain.revolute[1:-1]))
     plan = _plan(specimen, chain, rng)
     column = chain.driven.index(joint)
     center = float(rng.uniform(plan.low[column] + 0.3, plan.high[column] - 0.3))
@@ -155,7 +151,7 @@ def no_friction(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None
 
 def one_speed(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
     """One joint moves, always as fast: a late clock is its backlash."""
-    joint = int(rng.choice(_revolute(chain)[1:-1]))
+    joint = int(rng.choice(chain.revolute[1:-1]))
     plan = replace(_plan(specimen, chain, rng), equal_speed=True, moving=(chain.driven.index(joint),))
     return Twin(laws.backlash(joint, rng), "time_offset", -1, plan, frozenset({"dir", "speed"}))
 

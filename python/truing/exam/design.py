@@ -29,7 +29,7 @@ COVARIATES = {
 class Plan:
     """A way of measuring; the same plan gives the poses handed over and the fresh ones."""
 
-    low: Floats
+    low: Floats  # (driven,) [rad | m]
     high: Floats
     poses: int
     repeats: float = 0.0  # share of the poses that are approached again
@@ -75,6 +75,7 @@ def usual_plan(specimen: Specimen, chain: Chain, rng: Generator, poses: int, pay
 
 
 def limits(specimen: Specimen, chain: Chain) -> tuple[Floats, Floats]:
+    """Lowest and highest reading of each driven joint, shape=(driven,) [rad | m]."""
     joints = [specimen.robot.joints[j] for j in chain.driven]
     return np.array([joint.lower for joint in joints]), np.array([joint.upper for joint in joints])
 
@@ -160,7 +161,9 @@ def _times(plan: Plan, rng: Generator, count: int, fresh: bool) -> Floats:
 
 
 def temperature(plan: Plan, time: Floats) -> Floats:
-    """Warms up while working, cools down when the work gets light; swings a little with the hall."""
+    """Temperature at times [s], shape=(n,) [deg C]: warms up while working, cools down when the work gets
+    light; swings a little with the hall.
+    """
     total = plan.seconds * plan.poses * (1.0 + plan.repeats)
     share = time / total
     if plan.steady_warming:

@@ -7,6 +7,7 @@ poses.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -25,6 +26,7 @@ from truing.exam.scenes import (
     TRIES,
     Case,
     Request,
+    Scene,
     acceptable_for,
     draw_effect,
     draw_name,
@@ -274,28 +276,35 @@ def _dead_band(request: Request) -> Case:
 
 def _unlisted(request: Request) -> Case:
     """An effect that stands in no catalogue, and that no listed one explains."""
-    rng = request.rng
     kinds = surprises(request.which)
     kind = kinds[request.number % len(kinds)]
     for _ in range(TRIES):
         needs = surprise_needs(request, kind)
         scene = make_scene(request, "departures", needs=needs)
-        chain = scene.chain
-        places = [j for j in chain.driven if not chain.prismatic[j]]
-        hidden = kind(chain, int(rng.choice(places)), rng)
-        view = View(scene.context)
-        drawn = sized(scene, hidden, view, draw_size(rng, 1.0))
-        if drawn and beyond(view, drawn[1], scene.handed):
-            joint = chain.names[hidden.joints[0]] if hidden.joints else "base"
-            return make_case(
-                scene,
-                [drawn[0]],
-                [view.rms(drawn[1]) / scene.sigma],
-                unlisted=hidden.effect,
-                unlisted_joint=joint,
-                unlisted_inputs=list(hidden.inputs),
-            )
+        case = unlisted_effect(scene, kind, View(scene.context))
+        if case:
+            return case
     raise RuntimeError(f"{request.id}: no unlisted effect fits")
+
+
+def unlisted_effect(scene: Scene, make: Surprise, view: View, **more: Any) -> Case | None:
+    """An unlisted effect at some joint that turns. None: it is not of its size, or a listed one explains it.
+    more: goes into the label.
+    """
+    chain, rng = scene.chain, scene.request.rng
+    hidden = make(chain, int(rng.choice(chain.revolute)), rng)
+    drawn = sized(scene, hidden, view, draw_size(rng, 1.0))
+    if drawn is None or not beyond(view, drawn[1], scene.handed):
+        return None
+    return make_case(
+        scene,
+        [drawn[0]],
+        [view.rms(drawn[1]) / scene.sigma],
+        unlisted=hidden.effect,
+        unlisted_joint=chain.names[hidden.joints[0]] if hidden.joints else "base",
+        unlisted_inputs=list(hidden.inputs),
+        **more,
+    )
 
 
 def surprise_needs(request: Request, kind: Surprise) -> frozenset[str]:

@@ -16,7 +16,7 @@ from numpy.random import Generator
 
 from truing.exam import laws, machine_laws
 from truing.exam.design import Plan
-from truing.exam.families import apart, beyond, clash, needs_of, one_effect, surprise_needs
+from truing.exam.families import apart, clash, needs_of, one_effect, surprise_needs, unlisted_effect
 from truing.exam.kinematics import Chain, Floats, chain_of
 from truing.exam.laws import Hidden
 from truing.exam.names import accepted
@@ -123,22 +123,7 @@ def _few_unlisted(request: Request, poses: int) -> Case | None:
     kind = kinds[int(rng.integers(len(kinds)))]
     needs = surprise_needs(request, kind)
     scene = make_scene(request, "departures", poses=poses, needs=needs, geometry=True)
-    places = [j for j in scene.chain.driven if not scene.chain.prismatic[j]]
-    view = View(scene.context, True)
-    drawn = sized(scene, kind(scene.chain, int(rng.choice(places)), rng), view, draw_size(rng, 1.0))
-    if drawn is None or not beyond(view, drawn[1], scene.handed):
-        return None
-    size = view.rms(drawn[1]) / scene.sigma
-    return make_case(scene, [drawn[0]], [size], kind="unlisted", **_unlisted_label(scene, drawn[0]))
-
-
-def _unlisted_label(scene: Scene, hidden: Hidden) -> dict[str, Any]:
-    joint = scene.chain.names[hidden.joints[0]] if hidden.joints else "base"
-    return {
-        "unlisted": hidden.effect,
-        "unlisted_joint": joint,
-        "unlisted_inputs": list(hidden.inputs),
-    }
+    return unlisted_effect(scene, kind, View(scene.context, True), kind="unlisted")
 
 
 # ---- Mistakes in what is handed over -------------------------------------------------------------
@@ -242,7 +227,7 @@ def _places_of(scene: Scene, hidden: Hidden) -> list[tuple[str, list[str]]]:
 def _machine_law(scene: Scene, kind: str, rng: Generator) -> Hidden | None:
     """None: not on this robot."""
     chain = scene.chain
-    turning = [j for j in chain.driven if not chain.prismatic[j]]
+    turning = chain.revolute
     if kind == "rods":
         passive = [j for j in range(chain.joints) if j not in chain.driven]
         if not passive:
@@ -273,7 +258,7 @@ def _machine_law(scene: Scene, kind: str, rng: Generator) -> Hidden | None:
 
 def _short_elbow(plan: Plan, chain: Chain, rng: Generator) -> Plan:
     """An elbow that rods drive stays away from where crank and base bar are in line."""
-    column = chain.driven.index([j for j in chain.driven if not chain.prismatic[j]][2])
+    column = chain.driven.index(chain.revolute[2])
     low, high = plan.low.copy(), plan.high.copy()
     middle = 0.5 * (low[column] + high[column])
     low[column], high[column] = max(low[column], middle - _TRAVEL), min(high[column], middle + _TRAVEL)
@@ -338,7 +323,7 @@ def _units(scene: Scene, kind: str, rng: Generator) -> list[Hidden]:
     """
     context = scene.context
     if kind == "play":
-        joints = [j for j in scene.chain.driven if not scene.chain.prismatic[j]]
+        joints = scene.chain.revolute
         return [laws.backlash(j, rng).sized(float(rng.uniform(0.5, 1.0))) for j in joints]
     most = float(np.abs(context.torque).max())
     joints = [j for j in places_of("joint_compliance", scene) if context.largest(j) > 0.05 * most]
@@ -393,7 +378,7 @@ def _teeth_of(request: Request, where: str) -> Case | None:
     reshape = None if where == "anywhere" else grid
     scene = make_scene(request, "departures", poses=request.poses(200, 300, 400), reshape=reshape)
     view = View(scene.context)
-    turning = [j for j in scene.chain.driven if not scene.chain.prismatic[j]]
+    turning = scene.chain.revolute
     gear, order = machine_laws.tooth_order(int(rng.choice(machine_laws.RATIOS[request.which])), rng)
     joints = sorted(int(j) for j in rng.choice(turning, int(rng.integers(1, 4)), replace=False))
     units = [machine_laws.teeth(j, order, rng).sized(float(rng.uniform(0.6, 1.0))) for j in joints]

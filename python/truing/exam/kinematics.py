@@ -29,25 +29,32 @@ class Chain:
     """A robot as arrays over its joints."""
 
     names: tuple[str, ...]
-    mdh: bool
-    prismatic: NDArray[np.bool_]
-    theta: Floats
+    mdh: bool  # modified Denavit-Hartenberg convention; else the standard one
+    prismatic: NDArray[np.bool_]  # shape=(joints,)
+    theta: Floats  # shape=(joints,): of the joint at reading zero [rad]
     links: Floats  # shape=(joints, 4): d, a [m], alpha, beta [rad]
     coupling: Floats  # shape=(joints, driven): motion = coupling @ reading
     drivers: tuple[tuple[tuple[int, float], ...], ...]  # of passive joints; empty: driven
     gravity: Floats  # in the base frame [m/s^2]
-    base: Floats
-    targets: tuple[Floats, ...]
-    mass: Floats
-    com: Floats
+    base: Floats  # shape=(4, 4): T_measurement_base [m]
+    targets: tuple[Floats, ...]  # shape=(4, 4) each: T_last_target [m]
+    mass: Floats  # shape=(joints,): of the link behind each joint [kg]
+    com: Floats  # shape=(joints, 3): its centre of mass in the frame behind the joint [m]
 
     @property
     def joints(self) -> int:
+        """Number of joints, those that follow rods included."""
         return len(self.names)
 
     @property
     def driven(self) -> list[int]:
+        """Joints with a motor, by their place in `names`; the others follow rods."""
         return [j for j, drivers in enumerate(self.drivers) if not drivers]
+
+    @property
+    def revolute(self) -> list[int]:
+        """Joints with a motor that turn, by their place in `names`."""
+        return [j for j in self.driven if not self.prismatic[j]]
 
     def number(self, joint: int) -> int:
         """Place of a driven joint among the columns q1 ..., counted from 1."""
@@ -125,7 +132,9 @@ def no_changes(n: int, joints: int) -> Changes:
 
 @dataclass
 class Sweep:
-    """Frames of all poses, and the axis and origin of every elementary transform met on the way."""
+    """Frames of all poses in the measurement frame, lengths in m, and the axis and origin of every elementary
+    transform met on the way.
+    """
 
     tip: Floats  # (n, 3)
     rotation: Floats  # (n, 3, 3)
@@ -169,7 +178,7 @@ class _Frame:
 
 
 def rotations(vectors: Floats) -> Floats:
-    """Rotation matrices of rotation vectors, shape=(n, 3) -> (n, 3, 3)."""
+    """Rotation matrices of rotation vectors [rad], shape=(n, 3) -> (n, 3, 3)."""
     angle = np.linalg.norm(vectors, axis=1)
     x, y, z = vectors.T
     zero = np.zeros_like(x)
@@ -180,7 +189,9 @@ def rotations(vectors: Floats) -> Floats:
 
 
 def motions(chain: Chain, readings: Floats, changes: Changes | None = None) -> Floats:
-    """Motion of every joint, shape=(n, J). Passive joints follow the true motions of their drivers."""
+    """Motion of every joint, shape=(n, J) [rad | m], at `readings`, shape=(n, driven) [rad | m]. Passive
+    joints follow the true motions of their drivers.
+    """
     every = readings @ chain.coupling.T
     if changes is not None:
         every = every + changes.motion
@@ -197,7 +208,11 @@ def sweep(
     target: Ints | None = None,
     every_site: bool = False,
 ) -> Sweep:
-    """Where target, links and axes are, in the measurement frame."""
+    """Where target, links and axes are, in the measurement frame.
+
+    readings: shape=(n, driven) [rad | m]. target: shape=(n,), which target was measured; None: the first.
+    every_site: also notes axis and origin of every elementary transform, for `site_columns`.
+    """
     n = len(readings)
     change = changes if changes is not None else no_changes(n, chain.joints)
     motion = motions(chain, readings, change)
@@ -285,8 +300,8 @@ class _Walk:
 
 
 def site_columns(state: Sweep) -> dict[tuple[str, int, int], Floats]:
-    """What each elementary value does to the tip, shape=(n, 3) each. The sweep must have been made with
-    `every_site`.
+    """What each elementary value does to the tip, shape=(n, 3) each [m/rad | m/m]. The sweep must have been
+    made with `every_site`.
     """
     columns = {}
     for key, (turns, axis, origin) in state.sites.items():
@@ -296,7 +311,7 @@ def site_columns(state: Sweep) -> dict[tuple[str, int, int], Floats]:
 
 def gravity_torques(chain: Chain, state: Sweep, payload: Floats) -> Floats:
     """Torque [Nm] or force [N] of weight on every joint coordinate, its passive followers included, shape=(n,
-    J).
+    J). payload: shape=(n,) [kg], at the first target.
     """
     down = chain.base[:3, :3] @ chain.gravity
     centers = state.link_origin + np.einsum("jnab,jb->jna", state.link_rotation, chain.com)
@@ -326,7 +341,9 @@ def _tool_points(chain: Chain, state: Sweep) -> Floats:
 
 
 def quaternions(matrices: Floats) -> Floats:
-    """w x y z with w >= 0 of rotation matrices: eigenvector of the largest eigenvalue (Bar-Itzhack 2000)."""
+    """Quaternions w x y z with w >= 0, shape=(n, 4), of rotation matrices, shape=(n, 3, 3): eigenvector of
+    the largest eigenvalue (Bar-Itzhack 2000).
+    """
     r = matrices
     k = np.empty((len(r), 4, 4))
     k[:, 0, 0] = r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2]

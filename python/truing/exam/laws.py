@@ -39,17 +39,17 @@ from truing.exam.kinematics import (
 class Inputs:
     """What happens while measuring: one row per measurement, whether or not it is told to the candidate."""
 
-    readings: Floats  # (n, driven)
-    previous: Floats  # (n, driven) where the robot came from
+    readings: Floats  # (n, driven) [rad | m]
+    previous: Floats  # (n, driven) where the robot came from [rad | m]
     direction: Floats  # (n, driven) -1 or 1
     speed: Floats  # (n, driven) [rad/s | m/s]
-    payload: Floats  # [kg]
-    temperature: Floats  # [deg C]
+    payload: Floats  # (n,) [kg]
+    temperature: Floats  # (n,) [deg C]
     reference: float  # temperature at which the nominal robot is right [deg C]
-    time: Floats  # [s]
-    covariates: Mapping[str, Floats]
-    target: Ints
-    pose: Ints
+    time: Floats  # (n,) [s]
+    covariates: Mapping[str, Floats]  # (n,) each, in the unit of the name
+    target: Ints  # (n,) which target was measured
+    pose: Ints  # (n,) rows of one approach share a number
 
     @property
     def rows(self) -> int:
@@ -76,6 +76,7 @@ class Context:
 
     @cached_property
     def motion(self) -> Floats:
+        """Motion of every joint, shape=(n, J) [rad | m]."""
         return motions(self.chain, self.inputs.readings)
 
     @cached_property
@@ -84,10 +85,12 @@ class Context:
 
     @cached_property
     def torque(self) -> Floats:
+        """Of weight and payload on every joint, shape=(n, J) [Nm | N]."""
         return gravity_torques(self.chain, self.state, self.inputs.payload)
 
     @cached_property
     def warmth(self) -> Floats:
+        """Temperature above where the nominal robot is right, shape=(n,) [K]."""
         return self.inputs.temperature - self.inputs.reference
 
     def column(self, joint: int) -> int:
@@ -99,7 +102,7 @@ class Context:
 
     @property
     def hours(self) -> Floats:
-        """Share of the measurement's time that has passed."""
+        """Share of the measurement's time that has passed, shape=(n,)."""
         time = self.of.inputs.time
         return np.asarray((self.inputs.time - time.min()) / max(float(np.ptp(time)), 1.0))
 
@@ -132,7 +135,7 @@ class Hidden:
 
 
 def at_joint(joint: int, values: Callable[[Context], Floats]) -> Law:
-    """The joint moves by `values` on top of what it should."""
+    """The joint moves by `values`, shape=(n,) [rad | m], on top of what it should."""
 
     def law(context: Context) -> Changes:
         changes = context.still()

@@ -282,16 +282,12 @@ def places_of(name: str, scene: Scene) -> list[int]:
         return list(chain.driven)
     if name in ("joint_compliance", "gravity_backlash", "windup"):
         return _loaded(scene, both_sides=name == "gravity_backlash")
-    return _revolute(chain)
-
-
-def _revolute(chain: Chain) -> list[int]:
-    return [j for j in chain.driven if not chain.prismatic[j]]
+    return chain.revolute
 
 
 def _turning(scene: Scene) -> list[int]:
     """Revolute joints that turn far enough for what changes with the angle."""
-    return [j for j in _revolute(scene.chain) if float(np.ptp(scene.context.motion[:, j])) > _TURN]
+    return [j for j in scene.chain.revolute if float(np.ptp(scene.context.motion[:, j])) > _TURN]
 
 
 def _loaded(scene: Scene, both_sides: bool) -> list[int]:
@@ -336,6 +332,9 @@ def draw_effect(
 
 
 def sized(scene: Scene, hidden: Hidden, view: View, over_noise: float) -> tuple[Hidden, Floats] | None:
+    """An effect so large that what is seen of it is `over_noise` times the noise, and how it moves the tips,
+    shape=(n, 3) [m]. None: frames absorb it, or no machine has it so large.
+    """
     unit = hidden.law(scene.context)
     first = view.displaced(unit)
     seen, raw = view.rms(first), _spread(first)
@@ -368,6 +367,7 @@ def _changes_enough(scene: Scene, hidden: Hidden, view: View, moved: Floats) -> 
 
 
 def moved_by(scene: Scene, hidden: Hidden) -> Floats:
+    """How an effect moves the tips, shape=(n, 3) [m]."""
     truth = scene.truth()
     return np.asarray(truth.observe(scene.inputs, [hidden])[0] - truth.observe(scene.inputs, [])[0])
 
@@ -396,6 +396,7 @@ _MOST_SCALE = 5e-4
 
 
 def sensible(scene: Scene, hidden: Hidden) -> bool:
+    """Whether machines have the effect so large."""
     changes = hidden.changes(scene.context)
     if hidden.effect in ("thermal", "warm_robot"):
         return hidden.size < _MOST_EXPANSION
@@ -412,6 +413,7 @@ def sensible(scene: Scene, hidden: Hidden) -> bool:
 
 
 def draw_size(rng: Generator, low: float = SMALLEST, high: float = LARGEST) -> float:
+    """A size over noise, its logarithm uniform."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 

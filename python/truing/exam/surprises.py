@@ -207,7 +207,7 @@ def loaded_belt(chain: Chain, joint: int, rng: Generator) -> Hidden:
 
 def leaning_base(chain: Chain, joint: int, rng: Generator) -> Hidden:
     """The pedestal leans towards where the arm carries its payload: q1 and payload together."""
-    turning = next(j for j in chain.driven if not chain.prismatic[j])
+    turning = chain.revolute[0]
 
     def law(context: Context) -> Changes:
         changes = context.still()
