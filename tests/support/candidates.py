@@ -43,10 +43,36 @@ def sleeping(robot: truing.Robot, data: truing.Measurements) -> Any:
 
 
 def leaving(name: str) -> str:
-    """A job that returns its name, divides by zero, or takes its process down."""
+    """A job that returns its name, divides by zero, does not end, or takes its process down."""
     if name == "down":
         os._exit(1)
+    if name == "endless":
+        time.sleep(600.0)
     return name if name != "zero" else str(1 // 0)
+
+
+def environment(name: str) -> str:
+    """A job that returns a variable of its process's environment."""
+    return os.environ.get(name, "")
+
+
+def endless(robot: truing.Robot, data: truing.Measurements) -> Any:
+    time.sleep(600.0)
+
+
+def misnaming(robot: truing.Robot, data: truing.Measurements) -> Any:
+    """A candidate whose teeth have an order that is no number."""
+    diagnosis = silent(robot, data)
+    diagnosis.effects = [
+        SimpleNamespace(
+            effect="transmission_error@many",
+            joints=["J1"],
+            probability=0.9,
+            share=0.5,
+            confounded_with=[],
+        )
+    ]
+    return diagnosis
 
 
 def crashing(robot: truing.Robot, data: truing.Measurements) -> Any:

@@ -21,6 +21,10 @@ _SURE = 4.0
 BASELINES = ("gain", "bic", "z")
 
 
+class UnreadableAnswerError(ValueError):
+    """What a candidate answered cannot be read. That is the candidate's error, and a wrong answer."""
+
+
 @dataclass(frozen=True)
 class Named:
     """An effect that was named, and those said to look the same."""
@@ -88,16 +92,30 @@ def _pair(item: Sequence[Any]) -> tuple[str, tuple[str, ...]]:
     return str(item[0]), tuple(item[1])
 
 
+def failed(why: str, seconds: float = math.nan) -> Answer:
+    """Of a diagnosis that ended in an error, or did not end."""
+    return Answer("error", error=why, seconds=seconds)
+
+
 def answer_of(diagnosis: Any) -> Answer:
-    """From a `Diagnosis`, or whatever has its attributes."""
+    """From a `Diagnosis`, or whatever has its attributes. Raises UnreadableAnswerError."""
+    try:
+        return _answer_of(diagnosis)
+    except UnreadableAnswerError:
+        raise
+    except (AttributeError, TypeError, ValueError) as error:
+        raise UnreadableAnswerError(f"{type(error).__name__}: {error}") from error
+
+
+def _answer_of(diagnosis: Any) -> Answer:
     share = diagnosis.shrink
     return Answer(
         verdict=str(diagnosis.verdict),
         effects=_once(_named(found) for found in diagnosis.effects if _plain(found.effect) not in _FRAMES),
         unknown=tuple(
-            Unknown(str(u.joint), tuple(u.inputs), float(u.probability)) for u in diagnosis.unknown
+            Unknown(str(u.joint), tuple(u.inputs), _probability(u.probability)) for u in diagnosis.unknown
         ),
-        not_testable=tuple((_plain(item.effect), tuple(item.joints)) for item in diagnosis.not_testable),
+        not_testable=tuple(_known(item) for item in diagnosis.not_testable),
         shrink=(float(share.value), float(share.low), float(share.high)),
         sentence=str(diagnosis.sentence),
         findings=tuple(str(finding.kind) for finding in diagnosis.sanity),
@@ -118,23 +136,39 @@ def _plain(effect: str) -> str:
 
 
 def _named(found: Any) -> Named:
-    same = tuple((_plain(other.effect), tuple(other.joints)) for other in found.confounded_with)
-    return Named(
-        _plain(found.effect),
-        tuple(found.joints),
-        float(found.probability),
-        same,
-        float(found.share),
-        _order(found.effect),
-    )
+    effect, joints = _known(found)
+    same = tuple(_known(other) for other in found.confounded_with)
+    probability = _probability(found.probability)
+    return Named(effect, joints, probability, same, float(found.share), _order(found.effect))
+
+
+def _known(item: Any) -> tuple[str, tuple[str, ...]]:
+    """Effect and joints; an order that comes with the effect must be one."""
+    _order(item.effect)
+    return _plain(item.effect), tuple(item.joints)
 
 
 def _order(effect: str) -> float:
-    """transmission_error@96 -> 96."""
-    try:
-        return float(str(effect).partition("@")[2])
-    except ValueError:
+    """transmission_error@96 -> 96; NaN: none is said."""
+    name, at, text = str(effect).partition("@")
+    if not at:
         return math.nan
+    try:
+        order = float(text)
+    except ValueError:
+        order = math.nan
+    if not (math.isfinite(order) and order > 0.0):
+        raise UnreadableAnswerError(
+            f"effect {effect!r}: found the order {text!r}, expected a number above 0, as in {name}@96"
+        )
+    return order
+
+
+def _probability(said: Any) -> float:
+    value = float(said)
+    if not 0.0 <= value <= 1.0:
+        raise UnreadableAnswerError(f"found the probability {said!r}, expected a number from 0 to 1")
+    return value
 
 
 def realised_shrink(diagnosis: Any, fresh: Mapping[str, float]) -> float | None:

@@ -34,6 +34,7 @@ from truing.exam.scenes import (
     make_case,
     make_scene,
     named_effect,
+    other_names,
     places_of,
     sized,
     true_chain,
@@ -150,11 +151,22 @@ def _double(request: Request) -> Case:
             continue
         sizes = apart(view, [moved for _, moved in complete], scene.sigma)
         if min(sizes) >= 1.0:
-            acceptable = [
-                item for hidden, moved in complete for item in acceptable_for(scene, view, hidden, moved)
-            ]
+            acceptable = acceptable_for_each(scene, view, complete)
             return make_case(scene, [hidden for hidden, _ in complete], sizes, acceptable=acceptable)
     raise RuntimeError(f"{request.id}: no two effects fit")
+
+
+def acceptable_for_each(
+    scene: Scene, view: View, drawn: Sequence[tuple[Hidden, Floats]]
+) -> list[dict[str, Any]]:
+    """Other answers that are as right, each of them for its own effect. drawn: effects in the label's
+    order, and how each moves the tips, shape=(n, 3) [m].
+    """
+    return [
+        item
+        for of, (hidden, moved) in enumerate(drawn)
+        for item in acceptable_for(scene, view, hidden, moved, of)
+    ]
 
 
 def clash(hidden: Sequence[Hidden]) -> bool:
@@ -194,10 +206,11 @@ def _confounded(request: Request) -> Case:
         if drawn:
             hidden, moved = drawn
             rival = named_effect(scene.chain, twin.rival, (twin.rival_joint,))
-            acceptable = [
-                rival,
-                *(item for item in acceptable_for(scene, view, hidden, moved) if item != rival),
-            ]
+            # What looks like one of them looks like the other: it stands for none of the two.
+            looks = acceptable_for(scene, view, hidden, moved, None)
+            told = {"of": None, **rival}
+            own = [{**item, "of": 0} for item in other_names(scene, hidden)]
+            acceptable = [told, *own, *(item for item in looks if item != told)]
             return make_case(
                 scene,
                 [hidden],
@@ -205,8 +218,16 @@ def _confounded(request: Request) -> Case:
                 acceptable=acceptable,
                 twin=kind.__name__.strip("_"),
                 rival=rival,
+                rival_names=_other_names_of_rival(scene, twin),
             )
     raise RuntimeError(f"{request.id}: no twins fit")
+
+
+def _other_names_of_rival(scene: Scene, twin: Twin) -> list[dict[str, Any]]:
+    """What the twin may be called besides its own name."""
+    if twin.rival_joint < 0:
+        return []
+    return other_names(scene, LISTED[twin.rival](twin.rival_joint, np.random.default_rng(0)))
 
 
 def _too_small_to_tell(view: View, moved: Floats, twin: Twin) -> float:

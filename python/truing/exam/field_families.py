@@ -16,7 +16,15 @@ from numpy.random import Generator
 
 from truing.exam import laws, machine_laws
 from truing.exam.design import Plan
-from truing.exam.families import apart, clash, needs_of, one_effect, surprise_needs, unlisted_effect
+from truing.exam.families import (
+    acceptable_for_each,
+    apart,
+    clash,
+    needs_of,
+    one_effect,
+    surprise_needs,
+    unlisted_effect,
+)
 from truing.exam.kinematics import Chain, Floats, chain_of
 from truing.exam.laws import Hidden
 from truing.exam.names import accepted
@@ -112,7 +120,7 @@ def _few_of(request: Request, kind: str) -> Case | None:
     found = [item for item in drawn if item is not None]
     if len(found) < count or clash([hidden for hidden, _ in found]):
         return None
-    acceptable = [item for hidden, moved in found for item in acceptable_for(scene, view, hidden, moved)]
+    acceptable = acceptable_for_each(scene, view, found)
     sizes = [view.rms(moved) / scene.sigma for _, moved in found]
     return make_case(scene, [hidden for hidden, _ in found], sizes, acceptable=acceptable, kind=kind)
 
@@ -204,7 +212,7 @@ def _machine(request: Request, kind: str) -> Case | None:
         return None
     acceptable = acceptable_for(scene, view, *drawn)
     if kind == "neighbour" and _drags_the_wrist(scene, drawn[0]):
-        acceptable.append(named_effect(scene.chain, "joint_coupling", ()))
+        acceptable.append({**named_effect(scene.chain, "joint_coupling", ()), "of": 0})
     size = view.rms(drawn[1]) / scene.sigma
     places = _places_of(scene, drawn[0])
     return make_case(scene, [drawn[0]], [size], acceptable=acceptable, kind=kind, places=places)
@@ -348,9 +356,10 @@ def _joints_case(
     if len(plain) < least:
         return None
     told = [named_effect(scene.chain, accepted(hidden.effect)[0], hidden.joints) for hidden, _ in drawn]
-    acceptable = [told[k] for k in range(len(told)) if k not in plain]
-    for hidden, moved in drawn:
-        acceptable += [item for item in acceptable_for(scene, view, hidden, moved) if item not in acceptable]
+    acceptable = [{**told[k], "of": None} for k in range(len(told)) if k not in plain]
+    for k, (hidden, moved) in enumerate(drawn):
+        of = plain.index(k) if k in plain else None
+        acceptable += acceptable_for(scene, view, hidden, moved, of)
     return make_case(
         scene,
         [hidden for hidden, _ in drawn],
@@ -436,9 +445,9 @@ def _companion_of(request: Request) -> Case | None:
     (main, moved), (extra, little) = found
     if explained(view, little, [moved]) > 0.5:
         return None
-    acceptable = [named_effect(scene.chain, extra.effect, extra.joints)]
-    for hidden, own in found:
-        acceptable += acceptable_for(scene, view, hidden, own)
+    acceptable = [{**named_effect(scene.chain, extra.effect, extra.joints), "of": None}]
+    for of, (hidden, own) in zip((0, None), found, strict=True):
+        acceptable += acceptable_for(scene, view, hidden, own, of)
     label = named_effect(scene.chain, main.effect, main.joints)
     size = view.rms(moved) / scene.sigma
     return make_case(scene, [main, extra], [size], acceptable=acceptable, effects=[label], small=small)

@@ -17,11 +17,19 @@ import mujoco  # noqa: F401  (what is not installed is said here, not by a worke
 
 import truing
 from truing.exam import sets
-from truing.exam.answers import Answer, answer_from, answer_of, baselines, fresh_errors, realised_shrink
+from truing.exam.answers import (
+    Answer,
+    answer_from,
+    answer_of,
+    baselines,
+    failed,
+    fresh_errors,
+    realised_shrink,
+)
 from truing.exam.scenes import Case
 from truing.exam.score import Scores, Sheet, markdown, score
 from truing.exam.sealing import BrokenSealError, Envelope, fingerprint, opened, resealed, sealed
-from truing.exam.workers import dealt
+from truing.exam.workers import Lost, dealt
 
 Candidate = Callable[[truing.Robot, truing.Measurements], Any]
 """Who sits the examination: gets robot and data, returns a Diagnosis or what has its attributes."""
@@ -62,6 +70,7 @@ def run_exam(
     workers: int = 2,
     out: Path | str | None = None,
     progress: Progress | None = None,
+    timeout: float | None = 600.0,
     candidate: Candidate = diagnose,
 ) -> Scores:
     """Makes the sets, has them answered, opens the labels, and scores.
@@ -70,16 +79,18 @@ def run_exam(
     unlisted effects. quick: some 60 sets that take a minute. families: only these, see `sets.COUNTS`. only:
     only these sets, "single/12". limit: at most so many sets of each family. build: what tells this candidate
     from others. resume: answers that the same build has stored in `out` are kept, and their sets not asked
-    again. workers: processes; 1: none but this one. candidate: a function at the top of a module if there are
-    more workers than one. out: folder for sealed.jsonl (written before the answers), salts.jsonl,
-    answers.jsonl, labels.jsonl (after them), scores.json and scores.md.
+    again. workers: processes, beside this one; sets are the same bits whatever their number. timeout: a
+    diagnosis that takes longer [s], the making of its set included, has failed; None: it may take for ever.
+    candidate: a function at the top of a module. A diagnosis that fails counts as wrong in every score.
+    out: folder for sealed.jsonl (written before the answers), salts.jsonl, answers.jsonl, labels.jsonl (after
+    them), scores.json and scores.md.
     """
     names = _limited(sets.ids(which, quick=quick, families=families, only=only, seed=seed), limit)
     folder, stored = _folder(out, build, resume)
     left_out = dict(sets.skipped(which, names))
     names = [name for name in names if name not in left_out]
     papers = []
-    for paper in _sat(names, candidate, workers, folder, stored):
+    for paper in _sat(names, candidate, workers, timeout, folder, stored):
         papers.append(paper)
         if progress:
             progress(len(papers), len(names))
@@ -105,16 +116,22 @@ def sit(
     started = time.perf_counter()
     try:
         diagnosis = candidate(case.robot, case.data)
+        seconds = time.perf_counter() - started
+        said = answer_of(diagnosis)
+        others = baselines(diagnosis.candidates, case.data.rows, bool(case.label["geometry_underneath"]))
     except Exception as error:  # a candidate that fails has answered wrongly, the others still sit
-        return _answered(id, envelope, Answer("error", error=f"{type(error).__name__}: {error}"), {}, folder)
-    seconds = time.perf_counter() - started
+        seconds = time.perf_counter() - started
+        return _answered(id, envelope, failed(f"{type(error).__name__}: {error}", seconds), {}, folder)
     alone = case.label["family"] in _AGAINST_GEOMETRY
     fresh = fresh_errors(diagnosis, case.robot, case.data, case.fresh(), alone)
-    answer = replace(
-        answer_of(diagnosis), seconds=seconds, fresh=fresh, realised=realised_shrink(diagnosis, fresh)
-    )
-    others = baselines(diagnosis.candidates, case.data.rows, bool(case.label["geometry_underneath"]))
+    answer = replace(said, seconds=seconds, fresh=fresh, realised=realised_shrink(diagnosis, fresh))
     return _answered(id, envelope, answer, others, folder)
+
+
+def _give_up(id: str, lost: Lost, folder: Path | None) -> Paper:
+    """A set whose process is gone, and its envelope with it: it is sealed again, and counts as wrong."""
+    envelope = _seal(id, sets.build(id), folder)
+    return _answered(id, envelope, failed(lost.why, lost.seconds), {}, folder)
 
 
 def _seal(id: str, case: Case, folder: Path | None) -> Envelope:
@@ -162,22 +179,25 @@ def _sat(
     names: Sequence[str],
     candidate: Candidate,
     workers: int,
+    timeout: float | None,
     folder: Path | None,
     stored: Mapping[str, Mapping[str, Any]],
 ) -> Iterator[Paper]:
-    if workers <= 1:
-        for name in names:
-            yield sit(name, candidate, folder, stored.get(name))
-        return
+    """Papers as they come. Every set is made by a worker, be it the only one: one thread of linear algebra
+    makes the same bits as another one, several do not.
+    """
     jobs = {name: functools.partial(sit, name, candidate, folder, stored.get(name)) for name in names}
-    for name, paper in dealt(jobs, workers):
-        yield _crashed(name, folder) if paper is None else paper
-
-
-def _crashed(name: str, folder: Path | None) -> Paper:
-    """The first envelope went down with the process; its set is sealed again, and counts as wrong."""
-    envelope = _seal(name, sets.build(name), folder)
-    return _answered(name, envelope, Answer("error", error="the process crashed"), {}, folder)
+    lost: dict[str, Lost] = {}
+    for name, paper in dealt(jobs, max(workers, 1), timeout):
+        if isinstance(paper, Lost):
+            lost[name] = paper
+        else:
+            yield paper
+    again = {name: functools.partial(_give_up, name, why, folder) for name, why in lost.items()}
+    for name, paper in dealt(again, max(workers, 1)):
+        if isinstance(paper, Lost):
+            raise RuntimeError(f"{name}: the examiner cannot make this set: {paper.why}")
+        yield paper
 
 
 _FILES = ("sealed.jsonl", "salts.jsonl", "answers.jsonl", "labels.jsonl", "build.txt")

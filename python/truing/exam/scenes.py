@@ -562,21 +562,31 @@ def _fresh(scene: Scene, truth: Truth, seed: int) -> truing.Measurements:
     return _measured(scene, truth, recordings.rows_of(recording.inputs, rows), rng, recording.noise[rows])
 
 
-def acceptable_for(scene: Scene, view: View, hidden: Hidden, moved: Floats) -> list[dict[str, Any]]:
-    """Other answers that are as right."""
+def acceptable_for(
+    scene: Scene, view: View, hidden: Hidden, moved: Floats, of: int | None = 0
+) -> list[dict[str, Any]]:
+    """Other answers that are as right. of: place among the label's effects of the one that they stand
+    for; None: they may be named, and stand for none.
+    """
     found = [
         named_effect(scene.chain, effect, (joint,))
         for effect, joint in lookalikes(view, moved, hidden, scene.handed)
     ]
-    found += [named_effect(scene.chain, name, hidden.joints) for name in accepted(hidden.effect)[1:]]
+    found += other_names(scene, hidden)
+    return [{**item, "of": of} for k, item in enumerate(found) if item not in found[:k]]
+
+
+def other_names(scene: Scene, hidden: Hidden) -> list[dict[str, Any]]:
+    """What the effect may be called besides its own name, however it looks."""
+    names = list(accepted(hidden.effect)[1:])
     if hidden.effect == "joint_offset":
-        found.append(named_effect(scene.chain, "link_geometry", hidden.joints))
+        names.append("link_geometry")
     if hidden.effect == "joint_compliance" and "masses" not in scene.handed:
-        found.append(named_effect(scene.chain, "gravity_moment", hidden.joints))
+        names.append("gravity_moment")
     if hidden.effect == "joint_compliance" and (
         hidden.detail.get("depart", 0.0) > 0.3 or "dead_band" in hidden.detail
     ):
-        found.append(named_effect(scene.chain, "stiffness_zones", hidden.joints))
+        names.append("stiffness_zones")
     if hidden.effect == "linkage":
-        found.append(named_effect(scene.chain, "harmonic", hidden.joints))
-    return [item for k, item in enumerate(found) if item not in found[:k]]
+        names.append("harmonic")
+    return [named_effect(scene.chain, name, hidden.joints) for name in names]

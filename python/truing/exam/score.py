@@ -103,6 +103,18 @@ def right(named: Named, label: Label) -> bool:
     )
 
 
+def stands_for(named: Named, label: Label, place: int) -> bool:
+    """Whether a name is the true effect at this place in the label, or one of those that the examiner holds
+    for the same as this one. What looks like another effect does not stand for it.
+    """
+    own = [_pairs(label["effects"])[place]]
+    own += _pairs(item for item in label["acceptable"] if item.get("of") == place)
+    if any(holds(named, one) for one in own):
+        return True
+    parts = [part for member in named.members() for part in _parts(member)]
+    return right(named, label) and any(same(part, one) for part in parts for one in own)
+
+
 def _parts(said: Effect) -> list[Effect]:
     """An effect of several joints, joint by joint."""
     return [(said[0], (joint,)) for joint in said[1]] or [said]
@@ -137,6 +149,12 @@ def first_right(sheet: Sheet) -> bool:
     return bool(named) and right(named[0], sheet.label)
 
 
+def main_first(sheet: Sheet) -> bool:
+    """The label's first effect is named first, or what looks the same as this one."""
+    named = counted(sheet)
+    return bool(named) and stands_for(named[0], sheet.label, 0)
+
+
 def exact_set(sheet: Sheet) -> bool:
     named = counted(sheet)
     return (
@@ -148,15 +166,20 @@ def exact_set(sheet: Sheet) -> bool:
 
 
 def both_present(sheet: Sheet) -> bool:
-    """Every true effect is named, or one that looks like it, each by another name."""
-    named = counted(sheet)
-    truths = _pairs(sheet.label["effects"])
-    strict = [true for true in truths if any(among(item, sheet.label, true) for item in named)]
-    if len(strict) == len(truths):
+    """Every true effect is named, or one that looks like this one, each by another name."""
+    named, label = counted(sheet), sheet.label
+    truths = _pairs(label["effects"])
+    missed = [k for k, true in enumerate(truths) if not any(among(item, label, true) for item in named)]
+    rest = [item for item in named if not any(among(item, label, true) for true in truths)]
+    return _all_taken([{n for n, item in enumerate(rest) if stands_for(item, label, k)} for k in missed])
+
+
+def _all_taken(choices: Sequence[set[int]]) -> bool:
+    """Whether each can be given one of its choices, and none is given twice."""
+    if not choices:
         return True
-    rest = [item for item in named if not any(among(item, sheet.label, true) for true in truths)]
-    stand_in = [item for item in rest if right(item, sheet.label)]
-    return len(strict) + len(stand_in) >= len(truths)
+    first, *others = choices
+    return any(_all_taken([choice - {taken} for choice in others]) for taken in first)
 
 
 def _not_testable(sheet: Sheet, true: Effect) -> bool:
@@ -170,10 +193,15 @@ def class_returned(sheet: Sheet) -> bool:
     """Effect and twin are both there: named, listed as the same, or declared untestable, and one of them is
     named.
     """
-    true, rival = _pairs(sheet.label["effects"])[0], _pairs([sheet.label["rival"]])[0]
-    named = sheet.answer.effects
-    met = [any(_covers(item, one) for item in named) for one in (true, rival)]
-    told = [hit or _not_testable(sheet, one) for hit, one in zip(met, (true, rival), strict=True)]
+    label, named = sheet.label, sheet.answer.effects
+    others = [item for item in label["acceptable"] if item.get("of") == 0]
+    true = _pairs([label["effects"][0], *others])
+    rival = _pairs([label["rival"], *label.get("rival_names", [])])
+    met = [any(_covers(item, one) for item in named for one in names) for names in (true, rival)]
+    told = [
+        hit or any(_not_testable(sheet, one) for one in names)
+        for hit, names in zip(met, (true, rival), strict=True)
+    ]
     return any(met) and all(told)
 
 
@@ -285,15 +313,24 @@ Test = Callable[[Sheet], bool]
 
 @dataclass(frozen=True)
 class Line:
-    """A row that is a share: of the sets chosen, those that pass."""
+    """A row that is a share: of the sets chosen, those that pass. A failed diagnosis is a failure in each."""
 
     key: str
     text: str
-    chosen: Test
+    chosen: Test  # by the label
     passed: Test
     at_least: float = math.nan
     at_most: float = math.nan
     good: bool = True  # whether a set that passes is a success (else a failure)
+    given: Test | None = None  # of the chosen only those with such an answer, or with none at all
+
+    def of(self, sheets: Sequence[Sheet]) -> list[Sheet]:
+        """The sets that count."""
+        chosen = [sheet for sheet in sheets if self.chosen(sheet)]
+        return [sheet for sheet in chosen if sheet.answer.error or self.given is None or self.given(sheet)]
+
+    def passes(self, sheet: Sheet) -> bool:
+        return not self.good if sheet.answer.error else self.passed(sheet)
 
 
 def _family(*families: str) -> Test:
@@ -318,10 +355,6 @@ def _many(count: int) -> Test:
 
 def _unlisted(s: Sheet) -> bool:
     return bool(s.label["family"] == "unlisted" and s.label["size_over_noise"] >= 3.0)
-
-
-def _placed(s: Sheet) -> bool:
-    return s.label["family"] in ("single", "double") and bool(counted(s)) and _called(s)
 
 
 def _known_background(s: Sheet) -> bool:
@@ -351,7 +384,7 @@ def _known_truth(s: Sheet) -> bool:
 
 
 def _called(s: Sheet) -> bool:
-    return called_right(counted(s)[0], s.label) and counted(s)[0].effect not in _WHOLE
+    return bool(counted(s)) and called_right(counted(s)[0], s.label) and counted(s)[0].effect not in _WHOLE
 
 
 LINES = (
@@ -372,9 +405,10 @@ LINES = (
     Line(
         "joint",
         "joint right given the effect",
-        _placed,
+        _family("single", "double"),
         lambda s: right(counted(s)[0], s.label),
         at_least=0.98,
+        given=_called,
     ),
     Line("two_exact", "two effects: exact set", _many(2), exact_set, at_least=0.88),
     Line("two_present", "two effects: both present", _many(2), both_present, at_least=0.96),
@@ -416,9 +450,10 @@ LINES = (
     Line(
         "unlisted_place",
         "joint and input of the unlisted effect right",
-        lambda s: _unlisted(s) and bool(s.answer.unknown),
+        _unlisted,
         place_right,
         at_least=0.90,
+        given=lambda s: bool(s.answer.unknown),
     ),
     Line(
         "unlisted_wrong",
@@ -576,8 +611,9 @@ MORE = (
     Line(
         "teeth_order",
         "teeth: order per turn right, where an order is said",
-        lambda s: _family("teeth")(s) and any(math.isfinite(item.order) for item in s.answer.effects),
+        _family("teeth"),
         order_right,
+        given=lambda s: any(math.isfinite(item.order) for item in s.answer.effects),
     ),
     Line("teeth_wrong", "teeth: confident wrong name", _family("teeth"), confidently_wrong, good=False),
     Line("several_first", "one cause on several joints: first-named right", _family("several"), first_right),
@@ -608,11 +644,11 @@ MORE = (
         "companion_main",
         "beside a small companion: the large effect first",
         _family("companion"),
-        first_right,
+        main_first,
     ),
     Line(
         "failed",
-        "the diagnosis failed with an error",
+        "the diagnosis failed with an error, or did not end",
         lambda s: True,
         lambda s: bool(s.answer.error),
         good=False,
@@ -693,14 +729,19 @@ def score(sheets: Sequence[Sheet], which: str = "", skipped: dict[str, int] | No
     )
     others = {}
     for name in names:
-        theirs = [Sheet(s.id, s.label, s.others[name]) for s in sheets if name in s.others]
+        # They choose among the candidates of a diagnosis: where it failed, they have none to choose from.
+        theirs = [
+            Sheet(s.id, s.label, s.others.get(name, s.answer))
+            for s in sheets
+            if name in s.others or s.answer.error
+        ]
         others[name] = [_share(line, theirs) for line in (*LINES, *MORE) if line.key in single]
     return Scores(rows, others, _failures(sheets), len(sheets), which, dict(skipped or {}))
 
 
 def _share(line: Line, sheets: Sequence[Sheet]) -> Row:
-    chosen = [sheet for sheet in sheets if line.chosen(sheet)]
-    hits = sum(line.passed(sheet) for sheet in chosen)
+    chosen = line.of(sheets)
+    hits = sum(line.passes(sheet) for sheet in chosen)
     value = hits / len(chosen) if chosen else math.nan
     target, met = "", None
     if math.isfinite(line.at_least):
@@ -710,21 +751,44 @@ def _share(line: Line, sheets: Sequence[Sheet]) -> Row:
     return Row(line.key, line.text, target, hits, len(chosen), value, met if chosen else None)
 
 
-def _values(sheets: Sequence[Sheet]) -> list[Row]:
+def _shrinks(sheets: Sequence[Sheet]) -> list[Row]:
     # Fresh poses are measured by a quiet instrument: heavy tails and gross errors of the set would be
     # compared with none.
     told = [s for s in sheets if s.label["family"] != "unlisted" and s.label["noise"] in ("white", "real")]
-    pairs = [
-        (s.answer.shrink, s.answer.realised)
-        for s in told
-        if s.answer.shrink and s.answer.realised is not None
+    wrong, covered = [], 0
+    for sheet in told:
+        shrink, real = sheet.answer.shrink, sheet.answer.realised
+        if sheet.answer.error and sheet.label["effects"]:  # there was something to shrink
+            wrong.append(math.inf)
+        elif shrink and real is not None:
+            wrong.append(abs(shrink[0] - real))
+            covered += shrink[1] <= real <= shrink[2]
+    n = len(wrong)
+    median = 100.0 * float(np.median(wrong)) if n else math.nan
+    share = covered / n if n else math.nan
+    return [
+        Row(
+            "shrink",
+            "predicted shrink against realised: median difference [points]",
+            "≤ 2",
+            n=n,
+            value=median,
+            met=_met(median <= 2.0, wrong),
+            percent=False,
+        ),
+        Row(
+            "shrink_covered",
+            "predicted shrink: 90 % interval covers",
+            "85-95 %",
+            covered,
+            n,
+            share,
+            _met(0.85 <= share <= 0.95, wrong),
+        ),
     ]
-    wrong = np.array([abs(shrink[0] - real) for shrink, real in pairs if shrink and real is not None])
-    covered = sum(
-        bool(shrink and real is not None and shrink[1] <= real <= shrink[2]) for shrink, real in pairs
-    )
-    median = 100.0 * float(np.median(wrong)) if len(wrong) else math.nan
-    share = covered / len(pairs) if pairs else math.nan
+
+
+def _values(sheets: Sequence[Sheet]) -> list[Row]:
     error, n = calibration_error(sheets)
     seconds = np.array([s.answer.seconds for s in sheets if math.isfinite(s.answer.seconds)])
     typical, slow = (
@@ -733,24 +797,7 @@ def _values(sheets: Sequence[Sheet]) -> list[Row]:
         else (math.nan, math.nan)
     )
     return [
-        Row(
-            "shrink",
-            "predicted shrink against realised: median difference [points]",
-            "≤ 2",
-            n=len(pairs),
-            value=median,
-            met=_met(median <= 2.0, pairs),
-            percent=False,
-        ),
-        Row(
-            "shrink_covered",
-            "predicted shrink: 90 % interval covers",
-            "85-95 %",
-            covered,
-            len(pairs),
-            share,
-            _met(0.85 <= share <= 0.95, pairs),
-        ),
+        *_shrinks(sheets),
         Row(
             "calibration",
             "stated confidence against frequency (ECE)",
@@ -807,6 +854,9 @@ def calibration_error(sheets: Sequence[Sheet]) -> tuple[float, int]:
     for sheet in sheets:
         if sheet.label["source"] == "spike":
             continue
+        if sheet.answer.error:  # as wrong as can be: no answer, for certain
+            said.append(1.0)
+            true.append(0.0)
         for item in sheet.answer.effects:
             said.append(item.probability)
             drifts = sheet.label.get("kind") == "drift" and item.effect == "drift"
@@ -828,7 +878,7 @@ def _failures(sheets: Sequence[Sheet]) -> list[dict[str, Any]]:
     found = []
     for sheet in sheets:
         failed = [
-            line.key for line in (*LINES, *MORE) if line.chosen(sheet) and line.passed(sheet) != line.good
+            line.key for line in (*LINES, *MORE) if line.of([sheet]) and line.passes(sheet) != line.good
         ]
         if failed or sheet.answer.error:
             found.append(
@@ -841,10 +891,10 @@ def _failures(sheets: Sequence[Sheet]) -> list[dict[str, Any]]:
 
 
 def _cell(row: Row) -> str:
-    if row.n == 0 or not math.isfinite(row.value):
+    if row.n == 0 or math.isnan(row.value):
         return "–"
     if not row.percent:
-        return f"{row.value:.3g}"
+        return f"{row.value:.3g}" if math.isfinite(row.value) else "∞"
     low, high = row.interval()
     return f"{100 * row.value:.1f} % ({100 * low:.0f}–{100 * high:.0f})"
 

@@ -14,6 +14,20 @@ import numpy as np
 
 import truing
 
+_COLUMNS = (
+    "joints",
+    "positions",
+    "orientations",
+    "directions",
+    "payload",
+    "temperature",
+    "time",
+    "joint_speeds",
+    "targets",
+    "pose",
+)
+"""What `scenes` hands over, besides covariates."""
+
 
 @dataclass(frozen=True)
 class Envelope:
@@ -49,7 +63,11 @@ def opened(envelope: Envelope, seal: str) -> dict[str, Any]:
 
 
 def fingerprint(data: truing.Measurements) -> str:
-    """Of joints and positions: says which data were handed over."""
-    digest = hashlib.sha256(np.ascontiguousarray(data.joints).tobytes())
-    digest.update(np.ascontiguousarray(data.positions).tobytes())
+    """Of all columns: says which data were handed over."""
+    digest = hashlib.sha256()
+    for name in _COLUMNS:
+        column = getattr(data, name)
+        digest.update(name.encode() if column is None else np.ascontiguousarray(column).tobytes())
+    for name, column in sorted(data.covariates.items()):
+        digest.update(name.encode() + np.ascontiguousarray(column).tobytes())
     return digest.hexdigest()

@@ -30,17 +30,35 @@ import truing
 pytest.importorskip("mujoco")
 
 import candidates
-from candidates import crashing, leaving, silent
-from truing.exam import laws, machine_laws, names, sealing, sets, surprises
-from truing.exam.answers import Answer, Named, Unknown, answer_from, baseline
+from candidates import crashing, endless, environment, leaving, misnaming, silent
+from truing.exam import laws, machine_laws, names, recordings, sealing, sets, surprises
+from truing.exam.answers import (
+    Answer,
+    Named,
+    Unknown,
+    UnreadableAnswerError,
+    answer_from,
+    answer_of,
+    baseline,
+)
 from truing.exam.design import draw, usual_plan
 from truing.exam.kinematics import Chain, Floats, chain_of, gravity_torques, no_changes, sweep
 from truing.exam.physics import Mechanism, Parts, Play, link_frames
 from truing.exam.robots import Specimen, specimens
 from truing.exam.run import run_exam, sit
-from truing.exam.score import Scores, Sheet, calibration_error, markdown, score, wilson, write_markdown
+from truing.exam.score import (
+    LINES,
+    MORE,
+    Scores,
+    Sheet,
+    calibration_error,
+    markdown,
+    score,
+    wilson,
+    write_markdown,
+)
 from truing.exam.sizing import View
-from truing.exam.workers import dealt
+from truing.exam.workers import Lost, dealt
 from truing.exam.worlds import Truth
 
 # What the quick development examination must reach at least (shares), or at most: measured, with room for a
@@ -549,7 +567,48 @@ def test_a_family_or_set_that_is_not_there_is_said(words: str) -> None:
 
 def test_a_job_that_takes_its_process_down_costs_itself_only() -> None:
     jobs = {name: functools.partial(leaving, name) for name in ("a", "down", "b", "c")}
-    assert dict(dealt(jobs, 2)) == {"a": "a", "down": None, "b": "b", "c": "c"}
+    found = dict(dealt(jobs, 2))
+    down = found.pop("down")
+    assert isinstance(down, Lost) and "crashed" in down.why
+    assert found == {"a": "a", "b": "b", "c": "c"}
+
+
+def test_a_job_that_does_not_end_is_ended() -> None:
+    ((name, lost),) = dealt({"a": functools.partial(leaving, "endless")}, 1, timeout=0.5)
+    assert name == "a" and isinstance(lost, Lost) and "0.5 s" in lost.why and lost.seconds >= 0.5
+
+
+def test_a_diagnosis_that_does_not_end_has_failed(tmp_path: Path) -> None:
+    scores = run_exam(
+        "development", only=["single/0"], timeout=0.5, workers=1, out=tmp_path, candidate=endless
+    )
+    assert scores.sets == 1 and scores.row("failed").hits == 1 and scores.row("first_physics").n == 1
+    assert "no answer after" in scores.failures[0]["answer"]["error"]
+
+
+def test_linear_algebra_has_one_thread_in_every_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    jobs = {
+        name: functools.partial(environment, name) for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
+    }
+    assert set(dict(dealt(jobs, 1)).values()) == {"1"}
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "3" and "OMP_NUM_THREADS" not in os.environ
+
+
+def test_sets_are_the_same_bits_whatever_the_number_of_workers(tmp_path: Path) -> None:
+    made = []
+    spike = [] if recordings.missing("development") else ["single/3"]  # a large fit of a real recording
+    for workers in (1, 2):
+        folder = tmp_path / str(workers)
+        only = ["double/1", "confounded/4", *spike]
+        run_exam("development", only=only, workers=workers, out=folder, candidate=silent)
+        sealed, labels = (
+            {line["id"]: line for line in map(json.loads, (folder / name).read_text().splitlines())}
+            for name in ("sealed.jsonl", "labels.jsonl")
+        )
+        made.append({id: (sealed[id]["data"], labels[id]["label"]) for id in sealed})
+    assert made[0] == made[1] and len(made[0]) == 2 + len(spike)
 
 
 def test_what_a_job_raises_reaches_the_dealer() -> None:
@@ -623,6 +682,76 @@ def test_a_candidate_that_fails_has_answered_wrongly() -> None:
 # ---- Scoring -------------------------------------------------------------------------------------
 
 
+def failing_sheet(family: str, **more: Any) -> Sheet:
+    made = sheet([("backlash", "J2")], [], family=family, **more)
+    return replace(made, answer=Answer("error", error="ValueError: no idea"))
+
+
+def test_a_failed_diagnosis_fails_every_score_that_asks_for_its_set() -> None:
+    """No name is no false alarm: of whom nothing is heard is not praised for it."""
+    teeth = {"kind": "even_grid", "order": 100.0, "spacing": {}}
+    sheets = [
+        *(failing_sheet("single", source=source) for source in ("physics", "departures", "spike")),
+        *(failing_sheet("none", kind=kind) for kind in ("white", "drift")),
+        *(failing_sheet(family) for family in ("double", "confounded", "few", "companion", "several")),
+        failing_sheet("unlisted", size_over_noise=5.0),
+        failing_sheet("mistaken", mistake="sign", kind="sign"),
+        failing_sheet("teeth", **teeth),
+        failing_sheet("machines", kind="rods"),
+    ]
+    scores = score(sheets)
+    for line in (*LINES, *MORE):
+        row = scores.row(line.key)
+        assert row.hits == (0 if line.good else row.n), line.key
+        if line.at_least == line.at_least or line.at_most == line.at_most:
+            assert row.met is (False if row.n else None), line.key
+    for key in ("joint", "unlisted_place", "teeth_order", "alarm_white", "small_false", "class_wrong"):
+        assert scores.row(key).n, f"{key}: a failed diagnosis is no absent one"
+    assert scores.row("shrink").met is False and scores.row("shrink_covered").value == 0.0
+    assert scores.row("calibration").value == 1.0
+    assert len(scores.failures) == len(sheets)
+    assert "∞" in markdown(scores) and "Infinity" not in json.dumps(scores.to_dict())
+
+
+def test_simple_methods_fail_where_there_are_no_candidates() -> None:
+    said = {"gain": Answer("effects", (Named("backlash", ("J2",)),))}
+    good = replace(sheet([("backlash", "J2")], [Named("backlash", ("J2",))]), others=said)
+    (row,) = (
+        row for row in score([good, failing_sheet("single")]).others["gain"] if row.key == "first_physics"
+    )
+    assert (row.hits, row.n) == (1, 2)
+
+
+def named(effect: str, probability: float = 0.9) -> Any:
+    return SimpleNamespace(
+        effect=effect, joints=["J1"], probability=probability, share=0.5, confounded_with=[]
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"effects": [named("transmission_error@many")]}, "order 'many'"),
+        ({"effects": [named("transmission_error@")]}, "order ''"),
+        ({"effects": [named("transmission_error@nan")]}, "order 'nan'"),
+        ({"not_testable": [named("transmission_error@-3")]}, "order '-3'"),
+        ({"effects": [named("backlash", math.nan)]}, "probability nan"),
+        ({"effects": [named("backlash", 1.5)]}, r"probability 1\.5"),
+        ({"effects": [None]}, "AttributeError"),
+        ({"shrink": None}, "AttributeError"),
+    ],
+)
+def test_an_answer_that_cannot_be_read_is_the_candidates_error(change: dict[str, Any], said: str) -> None:
+    diagnosis = silent(specimens("development")[0].robot, sets.make("development/none/0")[1])
+    with pytest.raises(UnreadableAnswerError, match=said):
+        answer_of(SimpleNamespace(**{**diagnosis.__dict__, **change}))
+
+
+def test_an_order_that_is_no_number_fails_its_set_and_not_the_examination() -> None:
+    paper = sit("development/none/0", misnaming)
+    assert "transmission_error@many" in paper.answer.error and paper.answer.seconds >= 0.0
+
+
 def sheet(effects: Sequence[tuple[str, str]], named: Sequence[Named], **more: Any) -> Sheet:
     told = ("unknown", "not_testable", "shrink", "realised", "fresh", "findings")
     answer = {key: more.pop(key) for key in told if key in more}
@@ -682,6 +811,57 @@ def test_a_twin_alone_and_for_certain_is_wrong() -> None:
     assert share([sheet(truth, [honest], **twin)], "class") == 1.0
     told = sheet(truth, [alone], not_testable=(("backlash", ("J2",)),), **twin)
     assert share([told], "class") == 1.0 and share([told], "class_wrong") == 0.0
+
+
+def test_a_twin_may_go_by_another_name_of_its_own() -> None:
+    """Of a zero the examiner itself says that it is part of its link's geometry."""
+    geometry = {"effect": "link_geometry", "joints": ["J2"]}
+    twin = {
+        "family": "confounded",
+        "rival": {"effect": "joint_offset", "joints": ["J2"]},
+        "rival_names": [geometry],
+        "acceptable": [{**geometry, "of": None}],
+    }
+    truth = [("backlash", "J2")]
+    both = Named("link_geometry", ("J2",), 0.99, (("backlash", ("J2",)),))
+    assert share([sheet(truth, [both], **twin)], "class") == 1.0
+    assert share([sheet(truth, [replace(both, same=())], **twin)], "class") == 0.0
+
+
+def test_what_looks_like_one_effect_does_not_stand_for_another() -> None:
+    truth = [("harmonic", "J2"), ("backlash", "J3")]
+    looks = [{"effect": "gear_ratio", "joints": ["J2"], "of": 0}]
+    kind = {"family": "double", "acceptable": looks}
+    harmonic, gap, ratio = (Named(effect, (joint,)) for effect, joint in (*truth, ("gear_ratio", "J2")))
+    assert share([sheet(truth, [harmonic, ratio], **kind)], "two_present") == 0.0
+    assert share([sheet(truth, [ratio, gap], **kind)], "two_present") == 1.0
+    assert share([sheet(truth, [ratio, gap], **kind)], "two_exact") == 1.0
+    of_both = [*looks, {**looks[0], "of": 1}]
+    assert share([sheet(truth, [ratio], family="double", acceptable=of_both)], "two_present") == 0.0
+
+
+def test_a_companion_is_not_the_large_effect() -> None:
+    small = {"effect": "gear_ratio", "joints": ["J5"], "of": None}
+    looks = {"effect": "joint_offset", "joints": ["J2"], "of": 0}
+    kind = {"family": "companion", "acceptable": [small, looks]}
+    for effect, joint, right in (
+        ("backlash", "J2", 1.0),
+        ("joint_offset", "J2", 1.0),
+        ("gear_ratio", "J5", 0.0),
+    ):
+        assert (
+            share([sheet([("backlash", "J2")], [Named(effect, (joint,))], **kind)], "companion_main") == right
+        )
+
+
+@pytest.mark.parametrize(
+    "family", ["double", "confounded", "few", "machines", "several", "teeth", "companion"]
+)
+def test_every_look_alike_says_which_effect_it_stands_for(family: str) -> None:
+    for number in range(3):
+        label = sets.build(f"development/{family}/{number}").label
+        for item in label["acceptable"]:
+            assert item["of"] is None or 0 <= item["of"] < len(label["effects"])
 
 
 def test_an_effect_said_of_several_joints_is_said_of_each() -> None:

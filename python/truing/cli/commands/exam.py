@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from truing.cli import run
-from truing.cli.options import Choice, Count, Flag, Seed, Words
+from truing.cli.options import Choice, Count, Flag, Seed, Time, Words
 from truing.cli.tables import table
 from truing.errors import InputError
 
@@ -45,6 +45,10 @@ class Command(run.Command[None, "Scores"]):
     sets: Annotated[list[str], Words("Only these data sets: 'single/12,grid/3'. Default: all.")] = ()  # type: ignore[assignment]
     resume: Annotated[bool, Flag("Keep the answers of a sitting that was ended, if by this build.")] = False
     workers: Annotated[int, Count("Processes at a time. 0: as many as the machine has.")] = 0
+    timeout: Annotated[
+        float,
+        Time("A diagnosis that takes longer, the making of its set included, has failed. 0: none.", least=0),
+    ] = 600.0
     limit: Annotated[int, Count("No more sets of each family than this. 0: all.")] = 0
     seed: Seed = 0
 
@@ -72,6 +76,7 @@ class Command(run.Command[None, "Scores"]):
             build=self._build(),
             resume=self.resume,
             workers=self.workers or os.cpu_count() or 1,
+            timeout=self.timeout or None,
             out=self.out / SITTING,
             progress=progress.of,
         )
