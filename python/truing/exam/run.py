@@ -26,6 +26,7 @@ from truing.exam.answers import (
     fresh_errors,
     realised_shrink,
 )
+from truing.exam.builds import package_build
 from truing.exam.scenes import Case
 from truing.exam.score import Scores, Sheet, markdown, score
 from truing.exam.sealing import BrokenSealError, Envelope, fingerprint, opened, resealed, sealed
@@ -78,15 +79,16 @@ def run_exam(
     which: "development" is there to be looked at and learned from, "examination" is not: other robots, seeds,
     unlisted effects. quick: some 60 sets that take a minute. families: only these, see `sets.COUNTS`. only:
     only these sets, "single/12". limit: at most so many sets of each family. build: what tells this candidate
-    from others. resume: answers that the same build has stored in `out` are kept, and their sets not asked
-    again. workers: processes, beside this one; sets are the same bits whatever their number. timeout: a
-    diagnosis that takes longer [s], the making of its set included, has failed; None: it may take for ever.
-    candidate: a function at the top of a module. A diagnosis that fails counts as wrong in every score.
+    from others, beside the code of the package. resume: answers stored in `out` are kept, and their sets not
+    asked again; InputError, and nothing is written, if they are of another set, seed or build. workers:
+    processes, beside this one; sets are the same bits whatever their number. timeout: a diagnosis that takes
+    longer [s], the making of its set included, has failed; None: it may take for ever. candidate: a function
+    at the top of a module. A diagnosis that fails counts as wrong in every score.
     out: folder for sealed.jsonl (written before the answers), salts.jsonl, answers.jsonl, labels.jsonl (after
     them), scores.json and scores.md.
     """
     names = _limited(sets.ids(which, quick=quick, families=families, only=only, seed=seed), limit)
-    folder, stored = _folder(out, build, resume)
+    folder, stored = _folder(out, {"set": which, "seed": seed, "build": f"{package_build()} {build}"}, resume)
     left_out = dict(sets.skipped(which, names))
     names = [name for name in names if name not in left_out]
     papers = []
@@ -200,32 +202,52 @@ def _sat(
         yield paper
 
 
-_FILES = ("sealed.jsonl", "salts.jsonl", "answers.jsonl", "labels.jsonl", "build.txt")
+_ANSWERED = ("sealed.jsonl", "salts.jsonl", "answers.jsonl")
+_AFTERWARDS = ("labels.jsonl", "scores.json", "scores.md")
+_SITTING = "sitting.json"
+"""Of which set, seed and build the answers are."""
 
 
 def _folder(
-    out: Path | str | None, build: str, resume: bool
+    out: Path | str | None, sitting: Mapping[str, Any], resume: bool
 ) -> tuple[Path | None, dict[str, dict[str, Any]]]:
-    """Where files go, and what the same build has answered there already."""
+    """Where files go, and what was answered there in the same sitting. Of another one nothing is touched."""
     if out is None:
         return None, {}
     folder = Path(out)
+    if resume:
+        _refuse_another(folder, sitting)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "labels.jsonl").unlink(missing_ok=True)
+        for name in _AFTERWARDS if resume else (*_ANSWERED, *_AFTERWARDS):
+            (folder / name).unlink(missing_ok=True)
+        (folder / _SITTING).write_text(json.dumps(sitting), encoding="utf-8")
     except OSError as error:
         raise truing.InputError(f"{folder}: cannot be written: {error.strerror}") from None
-    before = _text(folder / "build.txt")
-    if resume and before and before != build:
+    return folder, _stored(folder) if resume else {}
+
+
+def _refuse_another(folder: Path, sitting: Mapping[str, Any]) -> None:
+    """InputError if the answers in a folder are of another sitting."""
+    if not any((folder / name).is_file() for name in _ANSWERED):
+        return
+    try:
+        before = json.loads(_text(folder / _SITTING))
+        differ = [name for name, value in sitting.items() if before[name] != value]
+    except (ValueError, KeyError, TypeError):
         raise truing.InputError(
-            f"{folder}: holds the answers of another build, and a sitting is of one: sit it from the start"
+            f"{folder}: holds answers, but no {_SITTING} that says whose they are: sit it from the start,"
+            " without --resume"
+        ) from None
+    told = [
+        f"another {name}" + ("" if name == "build" else f" ({before[name]}, expected {sitting[name]})")
+        for name in differ
+    ]
+    if told:
+        raise truing.InputError(
+            f"{folder}: holds the answers of {' and '.join(told)}, and a sitting is of one: sit it from the"
+            " start, without --resume, or in another folder"
         )
-    stored = _stored(folder) if resume else {}
-    if not resume:
-        for name in _FILES:
-            (folder / name).unlink(missing_ok=True)
-    (folder / "build.txt").write_text(build, encoding="utf-8")
-    return folder, stored
 
 
 def _text(file: Path) -> str:

@@ -67,6 +67,7 @@ FLOORS = {
         "score",
         "sealing",
         "workers",
+        "builds",
         "run",
         "page",
         "result",

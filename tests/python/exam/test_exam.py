@@ -41,6 +41,7 @@ from truing.exam.answers import (
     answer_of,
     baseline,
 )
+from truing.exam.builds import package_build
 from truing.exam.design import draw, usual_plan
 from truing.exam.kinematics import Chain, Floats, chain_of, gravity_torques, no_changes, sweep
 from truing.exam.physics import Mechanism, Parts, Play, link_frames
@@ -519,8 +520,43 @@ def test_a_sitting_that_was_ended_goes_on(tmp_path: Path) -> None:
     ]
     fresh = run_exam("development", families=["none"], limit=4, workers=1, candidate=silent)
     assert [row.hits for row in second.rows] == [row.hits for row in fresh.rows]
-    with pytest.raises(truing.InputError, match="another build"):
-        run_exam("development", families=["none"], out=tmp_path, candidate=silent, build="b", resume=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"build": "b"}, "another build"),
+        ({"seed": 1}, r"another seed \(0, expected 1\)"),
+        ({"which": "examination"}, r"another set \(development, expected examination\)"),
+    ],
+)
+def test_another_sitting_is_refused_before_anything_is_written(
+    tmp_path: Path, change: dict[str, Any], said: str
+) -> None:
+    options: dict[str, Any] = {"families": ["none"], "limit": 1, "out": tmp_path, "candidate": silent}
+    run_exam("development", build="a", **options)
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    with pytest.raises(truing.InputError, match=said):
+        run_exam(**{"which": "development", "build": "a", "resume": True, **options, **change})
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+    (tmp_path / "sitting.json").unlink()
+    with pytest.raises(truing.InputError, match="no sitting.json"):
+        run_exam("development", build="a", resume=True, **options)
+    assert not (tmp_path / "sitting.json").exists()
+
+
+@pytest.mark.parametrize("changed", ["exam/score.py", "diagnosis/words.py", "_core.abi3.so"])
+def test_any_file_of_code_makes_another_build(tmp_path: Path, changed: str) -> None:
+    for name in ("__init__.py", "exam/score.py", "diagnosis/words.py", "_core.abi3.so", "_core.pyi"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(name)
+    before = package_build(tmp_path)
+    (tmp_path / "_core.pyi").write_text("only for editors")
+    assert package_build(tmp_path) == before
+    (tmp_path / changed).write_text("changed")
+    other = package_build(tmp_path)
+    (tmp_path / changed).rename(tmp_path / f"other{Path(changed).suffix}")
+    assert len({before, other, package_build(tmp_path), package_build()}) == 4
 
 
 def test_a_label_that_is_made_otherwise_than_it_was_sealed_is_not_taken(tmp_path: Path) -> None:

@@ -7,8 +7,6 @@ Writes result.json (the score table) and report.html. Needs MuJoCo: pip install 
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -43,7 +41,7 @@ class Command(run.Command[None, "Scores"]):
     quick: Annotated[bool, Flag("A few data sets of every family.")] = False
     families: Annotated[list[str], Words("Only these families of data sets: 'none,one'. Default: all.")] = ()  # type: ignore[assignment]
     sets: Annotated[list[str], Words("Only these data sets: 'single/12,grid/3'. Default: all.")] = ()  # type: ignore[assignment]
-    resume: Annotated[bool, Flag("Keep the answers of a sitting that was ended, if by this build.")] = False
+    resume: Annotated[bool, Flag("Keep the answers of a sitting that was ended.")] = False
     workers: Annotated[int, Count("Processes at a time. 0: as many as the machine has.")] = 0
     timeout: Annotated[
         float,
@@ -73,22 +71,12 @@ class Command(run.Command[None, "Scores"]):
             families=self.families or None,
             only=self.sets or None,
             limit=self.limit or None,
-            build=self._build(),
             resume=self.resume,
             workers=self.workers or os.cpu_count() or 1,
             timeout=self.timeout or None,
             out=self.out / SITTING,
             progress=progress.of,
         )
-
-    def _build(self) -> str:
-        """The version and what was compiled: answers of another build are another candidate's."""
-        import truing
-
-        compiled = importlib.util.find_spec("truing._core")
-        if compiled is None or compiled.origin is None:
-            raise RuntimeError("truing is installed without its compiled core")
-        return f"{truing.__version__} {hashlib.sha256(Path(compiled.origin).read_bytes()).hexdigest()}"
 
     def write(self, folder: Path, loaded: None, found: Scores, warnings: list[str]) -> Mapping[str, Any]:
         from truing.exam.result import write_exam
