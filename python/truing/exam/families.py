@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from truing.exam import laws, recordings
+from truing.exam import laws
 from truing.exam.confounded import Twin, twins
 from truing.exam.design import Plan
 from truing.exam.kinematics import Chain, Floats, chain_of
@@ -25,6 +25,7 @@ from truing.exam.scenes import (
     SMALLEST,
     TRIES,
     Case,
+    NoSetError,
     Request,
     Scene,
     acceptable_for,
@@ -58,7 +59,7 @@ def _none(request: Request) -> Case:
         drawn = sized(scene, hidden, view, draw_size(request.rng, 0.7, 5.0))
         if drawn:
             return make_case(scene, [drawn[0]], [view.rms(drawn[1]) / scene.sigma], kind=kind)
-    raise RuntimeError(f"{request.id}: no drift fits")
+    raise NoSetError(f"no drift fits in {TRIES} draws")
 
 
 def source_of_single(number: int) -> str:
@@ -116,7 +117,7 @@ def one_effect(
             acceptable=acceptable,
             **({"withheld": sorted(needs)} if withheld else {}),
         )
-    raise RuntimeError(f"{request.id}: no effect fits")
+    raise NoSetError(f"no effect fits in {TRIES} draws")
 
 
 def needs_of(name: str, rng: Generator) -> frozenset[str]:
@@ -153,7 +154,8 @@ def _double(request: Request) -> Case:
         if min(sizes) >= 1.0:
             acceptable = acceptable_for_each(scene, view, complete)
             return make_case(scene, [hidden for hidden, _ in complete], sizes, acceptable=acceptable)
-    raise RuntimeError(f"{request.id}: no two effects fit")
+        request.throw_away("one effect hides another")
+    raise NoSetError(f"no two effects fit in {TRIES} draws")
 
 
 def acceptable_for_each(
@@ -220,7 +222,7 @@ def _confounded(request: Request) -> Case:
                 rival=rival,
                 rival_names=_other_names_of_rival(scene, twin),
             )
-    raise RuntimeError(f"{request.id}: no twins fit")
+    raise NoSetError(f"no twins fit in {TRIES} draws")
 
 
 def _other_names_of_rival(scene: Scene, twin: Twin) -> list[dict[str, Any]]:
@@ -292,7 +294,7 @@ def _dead_band(request: Request) -> Case:
                 [view.rms(drawn[1]) / scene.sigma],
                 acceptable=acceptable_for(scene, view, *drawn),
             )
-    raise RuntimeError(f"{request.id}: no effect fits")
+    raise NoSetError(f"no effect fits in {TRIES} draws")
 
 
 def _unlisted(request: Request) -> Case:
@@ -305,7 +307,7 @@ def _unlisted(request: Request) -> Case:
         case = unlisted_effect(scene, kind, View(scene.context))
         if case:
             return case
-    raise RuntimeError(f"{request.id}: no unlisted effect fits")
+    raise NoSetError(f"no unlisted effect fits in {TRIES} draws")
 
 
 def unlisted_effect(scene: Scene, make: Surprise, view: View, **more: Any) -> Case | None:
@@ -315,7 +317,10 @@ def unlisted_effect(scene: Scene, make: Surprise, view: View, **more: Any) -> Ca
     chain, rng = scene.chain, scene.request.rng
     hidden = make(chain, int(rng.choice(chain.revolute)), rng)
     drawn = sized(scene, hidden, view, draw_size(rng, 1.0))
-    if drawn is None or not beyond(view, drawn[1], scene.handed):
+    if drawn is None:
+        return None
+    if not beyond(view, drawn[1], scene.handed):
+        scene.request.throw_away("a listed effect explains the unlisted one")
         return None
     return make_case(
         scene,
@@ -338,15 +343,19 @@ def beyond(view: View, moved: Floats, handed: frozenset[str]) -> bool:
     return all(explained(view, moved, rival.columns) < 0.75 for rival in rivals(view, handed))
 
 
+def source_of_missing(number: int) -> str:
+    return "spike" if number % 8 == 0 else "physics"
+
+
 def _missing(request: Request) -> Case:
     """The column that the effect needs is withheld."""
     names = (("backlash",), ("thermal_zero", "thermal"), ("windup",), ("time_offset", "backlash"))[
         request.number % 4
     ]
-    spike = request.number % 8 == 0 and not recordings.missing(request.which)
+    spike = source_of_missing(request.number) == "spike"
     return one_effect(
         request,
-        "spike" if spike else "physics",
+        source_of_missing(request.number),
         names=names if not spike else ["backlash"],
         sizes=(1.5, 10.0),
         withheld=True,

@@ -34,6 +34,7 @@ from truing.exam.scenes import (
     NEED_MASSES,
     TRIES,
     Case,
+    NoSetError,
     Request,
     Scene,
     acceptable_for,
@@ -62,7 +63,7 @@ def _once_per_try(request: Request, attempt: Callable[[], Case | None]) -> Case:
         case = attempt()
         if case is not None:
             return case
-    raise RuntimeError(f"{request.id}: nothing fits")
+    raise NoSetError(f"nothing fits in {TRIES} draws")
 
 
 def gridded(
@@ -164,6 +165,7 @@ def _mistake(request: Request, kind: str, geometry: bool) -> Case | None:
         scene.robot = scene.robot.replace(convention=said)
     scene.columns_from = tuple(zip(columns, signs, strict=True))
     if _mistake_leaves(scene) < _PLAIN_MISTAKE * scene.sigma:
+        request.throw_away("the mistake leaves nothing to see")
         return None
     joints = sorted({scene.chain.names[scene.chain.driven[k]] for k in (one, other) if k >= 0})
     return make_case(scene, [], [], kind=kind, mistake=kind, mistake_joints=joints)
@@ -298,6 +300,7 @@ def _together(
     factor = over_noise * scene.sigma / seen
     scaled = [hidden.sized(hidden.size * factor) for hidden in units]
     if not all(sensible(scene, hidden) for hidden in scaled):
+        scene.request.throw_away("no machine has the effect so large")
         return None
     moved = [moved_by(scene, hidden) for hidden in scaled]
     return list(zip(scaled, moved, strict=True)), apart(view, moved, scene.sigma)
@@ -354,6 +357,7 @@ def _joints_case(
     """What is as large as the noise by itself must be named, the rest may be."""
     plain = [k for k, size in enumerate(sizes) if size >= 1.0]
     if len(plain) < least:
+        scene.request.throw_away("one effect hides another")
         return None
     told = [named_effect(scene.chain, accepted(hidden.effect)[0], hidden.joints) for hidden, _ in drawn]
     acceptable = [{**told[k], "of": None} for k in range(len(told)) if k not in plain]
@@ -444,6 +448,7 @@ def _companion_of(request: Request) -> Case | None:
         return None
     (main, moved), (extra, little) = found
     if explained(view, little, [moved]) > 0.5:
+        request.throw_away("one effect hides another")
         return None
     acceptable = [{**named_effect(scene.chain, extra.effect, extra.joints), "of": None}]
     for of, (hidden, own) in zip((0, None), found, strict=True):

@@ -7,6 +7,7 @@ from __future__ import annotations
 import functools
 import json
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,8 +28,8 @@ from truing.exam.answers import (
     realised_shrink,
 )
 from truing.exam.builds import package_build
-from truing.exam.scenes import Case
-from truing.exam.score import Scores, Sheet, markdown, score
+from truing.exam.scenes import Case, NoSetError
+from truing.exam.score import Scores, Sheet, markdown, score, told_left_out
 from truing.exam.sealing import BrokenSealError, Envelope, fingerprint, opened, resealed, sealed
 from truing.exam.workers import Lost, dealt
 
@@ -51,6 +52,14 @@ class Paper:
     envelope: Envelope
     answer: Answer
     others: dict[str, Answer]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A set that cannot be made, and why: nobody is asked, and no other set takes its place."""
+
+    id: str
+    why: str
 
 
 def diagnose(robot: truing.Robot, data: truing.Measurements) -> Any:
@@ -92,13 +101,18 @@ def run_exam(
     left_out = dict(sets.skipped(which, names))
     names = [name for name in names if name not in left_out]
     papers = []
-    for paper in _sat(names, candidate, workers, timeout, folder, stored):
-        papers.append(paper)
+    for done, paper in enumerate(_sat(names, candidate, workers, timeout, folder, stored), 1):
+        if isinstance(paper, LeftOut):
+            left_out[paper.id] = paper.why
+        else:
+            papers.append(paper)
         if progress:
-            progress(len(papers), len(names))
+            progress(done, len(names))
     papers.sort(key=lambda paper: names.index(paper.id))
     sheets = [Sheet(p.id, opened(p.envelope, p.seal), p.answer, p.others) for p in papers]
-    scores = score(sheets, which, dict(Counter(left_out.values())))
+    scores = score(sheets, which, left_out)
+    for text in told_left_out(left_out):
+        warnings.warn(text, truing.InputWarning, stacklevel=2)
     if folder:
         _write(folder, papers, sheets, scores)
     return scores
@@ -109,9 +123,12 @@ def sit(
     candidate: Candidate = diagnose,
     folder: Path | None = None,
     stored: Mapping[str, Any] | None = None,
-) -> Paper:
+) -> Paper | LeftOut:
     """One set: made, sealed, answered. stored: its seal, salt and answer of an earlier sitting."""
-    case = sets.build(id)
+    try:
+        case = sets.build(id)
+    except NoSetError as error:
+        return LeftOut(id, str(error))
     if stored:
         return _again(id, case.label, stored)
     envelope = _seal(id, case, folder)
@@ -184,7 +201,7 @@ def _sat(
     timeout: float | None,
     folder: Path | None,
     stored: Mapping[str, Mapping[str, Any]],
-) -> Iterator[Paper]:
+) -> Iterator[Paper | LeftOut]:
     """Papers as they come. Every set is made by a worker, be it the only one: one thread of linear algebra
     makes the same bits as another one, several do not.
     """

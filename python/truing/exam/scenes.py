@@ -6,6 +6,7 @@ label.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -28,9 +29,14 @@ SMALL = 1000  # numbers from here on are those of small sets
 _FEW = (100, 150)  # their poses
 SMALLEST, LARGEST = 0.5, 10.0  # effect over noise
 _RETAINED = 0.25  # of an effect must remain once base and tool are fitted
+_TOO_LARGE = "no machine has the effect so large"
 _OPTIONAL = ("dir", "payload", "temp", "t")
 
 Label = dict[str, Any]
+
+
+class NoSetError(Exception):
+    """A set cannot be made as its family wants it. It is left out, and nothing takes its place."""
 
 
 @dataclass
@@ -51,6 +57,12 @@ class Request:
     family: str
     number: int
     rng: Generator
+    anew: Counter[str] = field(default_factory=Counter, compare=False)
+    """Why draws were thrown away, and how many."""
+
+    def throw_away(self, why: str) -> None:
+        """Notes that a draw is made anew."""
+        self.anew[why] += 1
 
     @property
     def small(self) -> bool:
@@ -182,6 +194,9 @@ def _nominal(specimen: Specimen, chain: Chain, rng: Generator, targets: int, mas
 
 def _spike_scene(request: Request, needs: frozenset[str], poses: int | None) -> Scene:
     rng = request.rng
+    why = recordings.missing(request.which)
+    if why:
+        raise NoSetError(why)
     sources = recordings.recordings(request.which)
     recording = sources[int(rng.integers(len(sources)))]
     every = np.unique(recording.inputs.pose)
@@ -326,6 +341,7 @@ def draw_effect(
     rng = scene.request.rng
     places = places_of(name, scene)
     if not places:
+        scene.request.throw_away("no joint of this robot has the effect")
         return None
     place = int(rng.choice(places))
     return sized(scene, LISTED[name](place, rng, depart), view, over_noise)
@@ -338,22 +354,27 @@ def sized(scene: Scene, hidden: Hidden, view: View, over_noise: float) -> tuple[
     unit = hidden.law(scene.context)
     first = view.displaced(unit)
     seen, raw = view.rms(first), _spread(first)
+    thrown = scene.request.throw_away
     if raw < 1e-12 or seen < _RETAINED * raw:
-        return None
+        return thrown("fitted frames absorb the effect")
     target = over_noise * scene.sigma
     hidden = hidden.sized(target / seen)
     if not sensible(scene, hidden):
-        return None
+        return thrown(_TOO_LARGE)
     moved = moved_by(scene, hidden)
     if scene.physics and hidden.effect in MECHANICAL:
         found = view.rms(moved)
         if found < 0.05 * target:
-            return None
+            return thrown("the simulated effect is below its size")
         hidden = hidden.sized(hidden.size * target / found)
         moved = moved_by(scene, hidden)
-    if abs(view.rms(moved) / target - 1.0) > 0.1 or not sensible(scene, hidden):
-        return None
-    return (hidden, moved) if _changes_enough(scene, hidden, view, moved) else None
+    if abs(view.rms(moved) / target - 1.0) > 0.1:
+        return thrown("the simulated effect is not of its size")
+    if not sensible(scene, hidden):
+        return thrown(_TOO_LARGE)
+    if not _changes_enough(scene, hidden, view, moved):
+        return thrown("a warm robot does nothing but wrong link values")
+    return hidden, moved
 
 
 def _changes_enough(scene: Scene, hidden: Hidden, view: View, moved: Floats) -> bool:
@@ -528,6 +549,7 @@ def make_case(scene: Scene, hidden: Sequence[Hidden], sizes: Sequence[float], **
         "rows": scene.inputs.rows,
         "columns": sorted(scene.handed),
         "parameters": [_parameter(h) for h in hidden],
+        "drawn_anew": dict(sorted(scene.request.anew.items())),
     }
     label.update(more)
     if scene.recording:

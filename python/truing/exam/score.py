@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ _SHARED = frozenset({"several", "teeth"})  # one cause on several joints: the sm
 _WHOLE = frozenset({"drift", "scale", "joint_coupling", "time_offset"})
 _BINS = 10
 _SMALL_SHARE = 0.02
+_TOLD = 5  # sets that a message names
 _FEWEST = 20  # names of a family from which its ECE is judged: of fewer, ten bins show chance
 MARKER = ("<!-- scores -->", "<!-- /scores -->")
 
@@ -669,7 +671,8 @@ class Scores:
     failures: list[dict[str, Any]]
     sets: int
     which: str = ""
-    skipped: dict[str, int] = field(default_factory=dict)  # why: number of sets
+    left_out: dict[str, str] = field(default_factory=dict)  # sets that could not be made, and why
+    drawn_anew: dict[str, dict[str, int]] = field(default_factory=dict)  # family: why, and how often
 
     def row(self, key: str) -> Row:
         return next(row for row in self.rows if row.key == key)
@@ -679,7 +682,8 @@ class Scores:
             "format": "truing-exam/1",
             "which": self.which,
             "sets": self.sets,
-            "skipped": self.skipped,
+            "left_out": self.left_out,
+            "drawn_anew": self.drawn_anew,
             "rows": [_row_dict(row) for row in self.rows],
             "others": {name: [_row_dict(row) for row in rows] for name, rows in self.others.items()},
             "failures": self.failures,
@@ -707,8 +711,8 @@ def _none_if_nan(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def score(sheets: Sequence[Sheet], which: str = "", skipped: dict[str, int] | None = None) -> Scores:
-    """Every row of the table, from all sheets."""
+def score(sheets: Sequence[Sheet], which: str = "", left_out: Mapping[str, str] | None = None) -> Scores:
+    """Every row of the table, from all sheets. left_out: sets that could not be made, and why."""
     rows = (
         [_share(line, sheets) for line in LINES] + _values(sheets) + [_share(line, sheets) for line in MORE]
     )
@@ -736,7 +740,38 @@ def score(sheets: Sequence[Sheet], which: str = "", skipped: dict[str, int] | No
             if name in s.others or s.answer.error
         ]
         others[name] = [_share(line, theirs) for line in (*LINES, *MORE) if line.key in single]
-    return Scores(rows, others, _failures(sheets), len(sheets), which, dict(skipped or {}))
+    failures = _failures(sheets)
+    return Scores(rows, others, failures, len(sheets), which, dict(left_out or {}), _drawn_anew(sheets))
+
+
+def _drawn_anew(sheets: Sequence[Sheet]) -> dict[str, dict[str, int]]:
+    """Draws that the examiner threw away while it made the sets of each family, by the reason."""
+    found: dict[str, Counter[str]] = {}
+    for sheet in sheets:
+        found.setdefault(sheet.label["family"], Counter()).update(sheet.label.get("drawn_anew", {}))
+    return {family: dict(sorted(reasons.items())) for family, reasons in found.items() if reasons}
+
+
+def told_left_out(left_out: Mapping[str, str]) -> list[str]:
+    """A line for each reason: how many sets it left out, and which."""
+    reasons = dict.fromkeys(left_out.values())
+    lines = []
+    for why in reasons:
+        names = [name for name, of in left_out.items() if of == why]
+        some = ", ".join(names[:_TOLD]) + (f" and {len(names) - _TOLD} more" if len(names) > _TOLD else "")
+        lines.append(f"left out: {len(names)} of the sets: {why} ({some})")
+    return lines
+
+
+def told_drawn_anew(drawn_anew: Mapping[str, Mapping[str, int]]) -> list[str]:
+    """A line for each reason: how many draws were thrown away for it, and in which families."""
+    reasons = sorted({why for of_family in drawn_anew.values() for why in of_family})
+    lines = []
+    for why in reasons:
+        counts = {family: of[why] for family, of in drawn_anew.items() if why in of}
+        places = ", ".join(f"{family} {count}" for family, count in counts.items())
+        lines.append(f"drawn anew: {sum(counts.values())} times, {why} ({places})")
+    return lines
 
 
 def _share(line: Line, sheets: Sequence[Sheet]) -> Row:
@@ -944,9 +979,8 @@ def table(scores: Scores) -> list[dict[str, Any]]:
 def plain(scores: Scores) -> str:
     """The same for a terminal."""
     width = max(len(row.text) for row in scores.rows)
-    lines = [f"{scores.which}: {scores.sets} sets"] + [
-        f"left out: {count} sets, {why}" for why, count in scores.skipped.items()
-    ]
+    lines = [f"{scores.which}: {scores.sets} sets", *told_left_out(scores.left_out)]
+    lines += told_drawn_anew(scores.drawn_anew)
     for row in scores.rows:
         mark = {True: "met", False: "MISSED", None: ""}[row.met]
         lines.append(f"{row.text:{width}}  {row.target:8} {row.n:5}  {_cell(row):22} {mark}")

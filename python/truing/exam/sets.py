@@ -105,6 +105,10 @@ def build(id: str) -> Case:
     return FAMILIES[family](Request(id, which, family, int(number), rng))
 
 
+_SOURCES = {"single": families.source_of_single, "missing": families.source_of_missing}
+"""Families that take real recordings, and of which numbers."""
+
+
 def skipped(which: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Sets that cannot be made here, and why."""
     why = recordings.missing(which)
@@ -112,5 +116,6 @@ def skipped(which: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
         return
     for name in names:
         _, family, number = name.partition("@")[0].split("/")
-        if family == "single" and families.source_of_single(int(number)) == "spike":
+        source_of = _SOURCES.get(family)
+        if source_of and source_of(int(number)) == "spike":
             yield name, why

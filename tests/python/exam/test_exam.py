@@ -31,7 +31,7 @@ pytest.importorskip("mujoco")
 
 import candidates
 from candidates import crashing, endless, environment, leaving, misnaming, silent
-from truing.exam import laws, machine_laws, names, recordings, sealing, sets, surprises
+from truing.exam import families, laws, machine_laws, names, recordings, run, sealing, sets, surprises
 from truing.exam.answers import (
     Answer,
     Named,
@@ -46,7 +46,8 @@ from truing.exam.design import draw, usual_plan
 from truing.exam.kinematics import Chain, Floats, chain_of, gravity_torques, no_changes, sweep
 from truing.exam.physics import Mechanism, Parts, Play, link_frames
 from truing.exam.robots import Specimen, specimens
-from truing.exam.run import run_exam, sit
+from truing.exam.run import LeftOut, Paper, run_exam
+from truing.exam.scenes import NoSetError
 from truing.exam.score import (
     LINES,
     MORE,
@@ -54,6 +55,7 @@ from truing.exam.score import (
     Sheet,
     calibration_error,
     markdown,
+    plain,
     score,
     wilson,
     write_markdown,
@@ -409,7 +411,7 @@ def test_a_set_is_the_same_every_time(family: str) -> None:
 
 def test_what_is_handed_over_does_not_tell() -> None:
     for family in sets.COUNTS:
-        robot, _, _ = sets.make(f"examination/{family}/0")
+        robot, _, _ = sets.make(f"examination/{family}/2")
         assert not robot.effects and all(joint.offset == 0.0 and joint.ratio == 1.0 for joint in robot.joints)
 
 
@@ -471,6 +473,13 @@ def test_a_changed_label_breaks_its_seal() -> None:
     assert (
         sealing.sealed({"family": "none"}).seal != envelope.seal
     )  # salted: equal labels have different seals
+
+
+def sit(id: str, candidate: Any) -> Paper:
+    """One set, which can be made."""
+    paper = run.sit(id, candidate)
+    assert isinstance(paper, Paper)
+    return paper
 
 
 def failing(robot: truing.Robot, data: truing.Measurements) -> Any:
@@ -596,6 +605,38 @@ def test_a_family_or_set_that_is_not_there_is_said(words: str) -> None:
     chosen: Any = {"families": [words]} if "/" not in words else {"only": [words]}
     with pytest.raises(truing.InputError, match=r"no (family|set)"):
         sets.ids("development", **chosen)
+
+
+# ---- Sets that cannot be made --------------------------------------------------------------------
+
+
+def test_a_set_without_its_recording_is_left_out_and_nothing_takes_its_place(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv("TRUING_REALDATA", raising=False)
+    only = ["missing/0", "single/3", "none/0"]
+    with pytest.warns(truing.InputWarning, match="left out: 2 of the sets: TRUING_REALDATA"):
+        scores = run_exam("development", only=only, workers=1, out=tmp_path, candidate=silent)
+    assert scores.sets == 1 and set(scores.left_out) == {"development/missing/0", "development/single/3"}
+    assert json.loads((tmp_path / "scores.json").read_text())["left_out"] == scores.left_out
+    assert "left out: 2 of the sets" in plain(scores)
+    with pytest.raises(NoSetError, match="TRUING_REALDATA"):
+        sets.build("development/missing/0")
+
+
+def test_a_set_of_which_no_draw_fits_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(families, "TRIES", 0)
+    left_out = run.sit("development/single/0", silent)
+    assert isinstance(left_out, LeftOut) and "no effect fits" in left_out.why
+
+
+def test_draws_that_are_thrown_away_are_counted() -> None:
+    labels = [sets.build(f"development/single/{number}").label for number in (0, 1, 2, 4, 5)]
+    assert any(label["drawn_anew"] for label in labels)
+    label = {"drawn_anew": {"fitted frames absorb the effect": 2}}
+    scores = score([sheet([], [], **label), sheet([], [], **label), sheet([], [], drawn_anew={})])
+    assert scores.drawn_anew == {"single": {"fitted frames absorb the effect": 4}}
+    assert "drawn anew: 4 times, fitted frames absorb the effect (single 4)" in plain(scores)
 
 
 # ---- Workers -------------------------------------------------------------------------------------
