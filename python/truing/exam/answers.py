@@ -61,7 +61,10 @@ class Answer:
         default_factory=dict
     )  # rms error there [m] of "frames", "robot", "geometry"
     findings: tuple[str, ...] = ()  # kinds of what was said of the data themselves
-    seconds: float = math.nan
+    seconds: float = (
+        math.nan
+    )  # of the diagnosis, by the clock; with the making of its set where it did not end
+    processor_seconds: float = math.nan  # of its process; NaN where that is gone
     sentence: str = ""
     error: str = ""
 
@@ -92,9 +95,9 @@ def _pair(item: Sequence[Any]) -> tuple[str, tuple[str, ...]]:
     return str(item[0]), tuple(item[1])
 
 
-def failed(why: str, seconds: float = math.nan) -> Answer:
+def failed(why: str, seconds: float = math.nan, processor_seconds: float = math.nan) -> Answer:
     """Of a diagnosis that ended in an error, or did not end."""
-    return Answer("error", error=why, seconds=seconds)
+    return Answer("error", error=why, seconds=seconds, processor_seconds=processor_seconds)
 
 
 def answer_of(diagnosis: Any) -> Answer:

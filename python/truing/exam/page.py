@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from truing.report.page import Page, footer, part_of_page, warnings_card
@@ -15,7 +15,7 @@ def exam_report(result: Mapping[str, Any]) -> str:
     """The report of ``truing exam``: its score table.
 
     Args:
-        result: What ``result.json`` holds; `scores` is a list of mappings, one per line of the table.
+        result: What ``result.json`` holds; `scores` and `costs` are lists of mappings, one per line.
     """
     page = Page("Examination of the diagnosis", part_of_page("exam"))
     scores = result["scores"]
@@ -27,21 +27,28 @@ def exam_report(result: Mapping[str, Any]) -> str:
         " recorded data; the diagnosis saw robot and data only, and its answers were stored before the"
         " labels were opened.</p></header>"
     )
-    names = list(dict.fromkeys(name for score in scores for name in score))
-    body = []
-    for score in scores:
-        cells = "".join(f"<td>{escaped(plain(score.get(name)))}</td>" for name in names[1:])
-        tone = ' class="missed"' if score.get("passed") is False else ""
-        body.append(f"<tr{tone}><th>{escaped(plain(score.get(names[0])))}</th>{cells}</tr>")
-    heading = "".join(f"<th>{escaped(name.replace('_', ' '))}</th>" for name in names)
-    page.add(
-        '<section class="card"><h2>Scores</h2><div'
-        f' class="scroll"><table><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table>'
-        "</div></section>"
-    )
+    page.add(_card("Scores", scores))
+    if result.get("costs"):
+        page.add(_card("Cost of a diagnosis", result["costs"]))
     page.add(warnings_card(result))
     page.add(footer(result))
     return page.html()
+
+
+def _card(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
+    """A table with a line per row; a row that did not pass is shown so."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    body = []
+    for row in rows:
+        cells = "".join(f"<td>{escaped(plain(row.get(name)))}</td>" for name in names[1:])
+        tone = ' class="missed"' if row.get("passed") is False else ""
+        body.append(f"<tr{tone}><th>{escaped(plain(row.get(names[0])))}</th>{cells}</tr>")
+    heading = "".join(f"<th>{escaped(name.replace('_', ' '))}</th>" for name in names)
+    return (
+        f'<section class="card"><h2>{escaped(title)}</h2><div'
+        f' class="scroll"><table><thead><tr>{heading}</tr></thead><tbody>{"".join(body)}</tbody></table>'
+        "</div></section>"
+    )
 
 
 def plain(value: object) -> str:

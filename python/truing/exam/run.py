@@ -29,7 +29,7 @@ from truing.exam.answers import (
 )
 from truing.exam.builds import package_build
 from truing.exam.scenes import Case, NoSetError
-from truing.exam.score import Scores, Sheet, markdown, score, told_left_out
+from truing.exam.score import Scores, Sheet, cost_markdown, markdown, score, told_left_out
 from truing.exam.sealing import BrokenSealError, Envelope, fingerprint, opened, resealed, sealed
 from truing.exam.workers import Lost, dealt
 
@@ -132,19 +132,36 @@ def sit(
     if stored:
         return _again(id, case.label, stored)
     envelope = _seal(id, case, folder)
-    started = time.perf_counter()
+    clock = _Clock()
     try:
         diagnosis = candidate(case.robot, case.data)
-        seconds = time.perf_counter() - started
+        seconds, processor = clock.spent()
         said = answer_of(diagnosis)
         others = baselines(diagnosis.candidates, case.data.rows, bool(case.label["geometry_underneath"]))
     except Exception as error:  # a candidate that fails has answered wrongly, the others still sit
-        seconds = time.perf_counter() - started
-        return _answered(id, envelope, failed(f"{type(error).__name__}: {error}", seconds), {}, folder)
+        why = f"{type(error).__name__}: {error}"
+        return _answered(id, envelope, failed(why, *clock.spent()), {}, folder)
     alone = case.label["family"] in _AGAINST_GEOMETRY
     fresh = fresh_errors(diagnosis, case.robot, case.data, case.fresh(), alone)
-    answer = replace(said, seconds=seconds, fresh=fresh, realised=realised_shrink(diagnosis, fresh))
+    answer = replace(
+        said,
+        seconds=seconds,
+        processor_seconds=processor,
+        fresh=fresh,
+        realised=realised_shrink(diagnosis, fresh),
+    )
     return _answered(id, envelope, answer, others, folder)
+
+
+class _Clock:
+    """What a diagnosis costs, from when this is made."""
+
+    def __init__(self) -> None:
+        self.began = time.perf_counter(), time.process_time()
+
+    def spent(self) -> tuple[float, float]:
+        """By the clock, and by the processor [s]."""
+        return time.perf_counter() - self.began[0], time.process_time() - self.began[1]
 
 
 def _give_up(id: str, lost: Lost, folder: Path | None) -> Paper:
@@ -305,4 +322,4 @@ def _write(folder: Path, papers: Sequence[Paper], sheets: Sequence[Sheet], score
             {"id": sheet.id, "seal": paper.seal, "salt": paper.envelope.salt, "label": paper.envelope.text},
         )
     (folder / "scores.json").write_text(json.dumps(scores.to_dict(), indent=1), encoding="utf-8")
-    (folder / "scores.md").write_text(markdown(scores), encoding="utf-8")
+    (folder / "scores.md").write_text(markdown(scores) + "\n" + cost_markdown(scores), encoding="utf-8")

@@ -53,6 +53,8 @@ class Row:
     value: float = math.nan
     met: bool | None = None
     percent: bool = True
+    brier: float = math.nan  # beside a calibration error
+    note: str = ""  # why it is not judged
 
     def interval(self) -> tuple[float, float]:
         return wilson(self.hits, self.n) if self.percent and self.n else (math.nan, math.nan)
@@ -673,6 +675,7 @@ class Scores:
     which: str = ""
     left_out: dict[str, str] = field(default_factory=dict)  # sets that could not be made, and why
     drawn_anew: dict[str, dict[str, int]] = field(default_factory=dict)  # family: why, and how often
+    costs: dict[str, Cost] = field(default_factory=dict)  # of each family, and "all"
 
     def row(self, key: str) -> Row:
         return next(row for row in self.rows if row.key == key)
@@ -684,6 +687,7 @@ class Scores:
             "sets": self.sets,
             "left_out": self.left_out,
             "drawn_anew": self.drawn_anew,
+            "costs": {family: _cost_dict(cost) for family, cost in self.costs.items()},
             "rows": [_row_dict(row) for row in self.rows],
             "others": {name: [_row_dict(row) for row in rows] for name, rows in self.others.items()},
             "failures": self.failures,
@@ -699,12 +703,25 @@ def _row_dict(row: Row) -> dict[str, Any]:
         "n": row.n,
         "met": row.met,
         "value": _none_if_nan(row.value),
+        "note": row.note,
     }
+    if math.isfinite(row.brier):
+        told["brier"] = row.brier
     return (
         {**told, "hits": row.hits, "low": _none_if_nan(low), "high": _none_if_nan(high)}
         if row.percent
         else told
     )
+
+
+def _cost_dict(cost: Cost) -> dict[str, Any]:
+    return {
+        "sets": cost.sets,
+        "median_s": _none_if_nan(cost.median),
+        "p95_s": _none_if_nan(cost.slow),
+        "total_s": cost.total,
+        "processor_s": cost.processor,
+    }
 
 
 def _none_if_nan(value: float) -> float | None:
@@ -740,8 +757,16 @@ def score(sheets: Sequence[Sheet], which: str = "", left_out: Mapping[str, str] 
             if name in s.others or s.answer.error
         ]
         others[name] = [_share(line, theirs) for line in (*LINES, *MORE) if line.key in single]
-    failures = _failures(sheets)
-    return Scores(rows, others, failures, len(sheets), which, dict(left_out or {}), _drawn_anew(sheets))
+    return Scores(
+        rows,
+        others,
+        _failures(sheets),
+        len(sheets),
+        which,
+        left_out=dict(left_out or {}),
+        drawn_anew=_drawn_anew(sheets),
+        costs={family: cost_of(of) for family, of in {**_by_family(sheets), "all": sheets}.items()},
+    )
 
 
 def _drawn_anew(sheets: Sequence[Sheet]) -> dict[str, dict[str, int]]:
@@ -824,67 +849,89 @@ def _shrinks(sheets: Sequence[Sheet]) -> list[Row]:
 
 
 def _values(sheets: Sequence[Sheet]) -> list[Row]:
-    error, n = calibration_error(sheets)
-    seconds = np.array([s.answer.seconds for s in sheets if math.isfinite(s.answer.seconds)])
-    typical, slow = (
-        (float(np.median(seconds)), float(np.quantile(seconds, 0.95)))
-        if len(seconds)
-        else (math.nan, math.nan)
-    )
+    told = [("calibration", "stated confidence against frequency", 0.03, sheets)]
+    told += [
+        (f"calibration_{family}", f"the same within {family}", 0.08, of_family)
+        for family, of_family in _by_family(sheets).items()
+    ]
+    cost = cost_of(sheets)
     return [
         *_shrinks(sheets),
-        Row(
-            "calibration",
-            "stated confidence against frequency (ECE)",
-            "≤ 0.03",
-            n=n,
-            value=error,
-            met=_met(error <= 0.03, range(n)),
-            percent=False,
-        ),
-        *_calibrations(sheets),
+        *(_calibration_row(*one) for one in told),
         Row(
             "seconds",
             "seconds per set, median",
             "≤ 0.6",
-            n=len(seconds),
-            value=typical,
-            met=_met(typical <= 0.6, seconds),
+            n=cost.sets,
+            value=cost.median,
+            met=cost.median <= 0.6 if cost.sets else None,
             percent=False,
         ),
-        Row("seconds_p95", "seconds per set, 95th percentile", "", n=len(seconds), value=slow, percent=False),
+        Row("seconds_p95", "seconds per set, 95th percentile", n=cost.sets, value=cost.slow, percent=False),
     ]
 
 
-def _calibrations(sheets: Sequence[Sheet]) -> list[Row]:
-    """The same within each family."""
-    rows = []
-    for family in dict.fromkeys(sheet.label["family"] for sheet in sheets):
-        error, n = calibration_error([sheet for sheet in sheets if sheet.label["family"] == family])
-        if n >= _FEWEST:
-            text = f"ECE within {family}"
-            rows.append(
-                Row(
-                    f"calibration_{family}",
-                    text,
-                    "≤ 0.08",
-                    n=n,
-                    value=error,
-                    met=error <= 0.08,
-                    percent=False,
-                )
-            )
-    return rows
+def _by_family(sheets: Sequence[Sheet]) -> dict[str, list[Sheet]]:
+    found: dict[str, list[Sheet]] = {}
+    for sheet in sheets:
+        found.setdefault(sheet.label["family"], []).append(sheet)
+    return found
+
+
+def _calibration_row(key: str, text: str, most: float, sheets: Sequence[Sheet]) -> Row:
+    """Few names are said to be few, and not judged: ten bins of them show chance."""
+    found = calibration(sheets)
+    few = found.n < _FEWEST
+    return Row(
+        key,
+        f"{text}, of names (ECE, Brier score)",
+        f"≤ {most:g}",
+        n=found.n,
+        value=found.error,
+        met=None if few else found.error <= most,
+        percent=False,
+        brier=found.brier,
+        note=f"too few to judge: {found.n} names, {_FEWEST} needed" if few else "",
+    )
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What diagnoses took [s]."""
+
+    sets: int
+    median: float
+    slow: float  # 95th percentile
+    total: float
+    processor: float  # of their processes, together
+
+
+def cost_of(sheets: Sequence[Sheet]) -> Cost:
+    """By the clock; of failed ones what they took until then."""
+    seconds = np.array([s.answer.seconds for s in sheets if math.isfinite(s.answer.seconds)])
+    processor = np.array([s.answer.processor_seconds for s in sheets])
+    known = float(processor[np.isfinite(processor)].sum())
+    if not len(seconds):
+        return Cost(0, math.nan, math.nan, 0.0, known)
+    middle, slow = (float(np.quantile(seconds, share)) for share in (0.5, 0.95))
+    return Cost(len(seconds), middle, slow, float(seconds.sum()), known)
 
 
 def _met(passed: bool, of: Sequence[Any] | Any) -> bool | None:
     return bool(passed) if len(of) else None
 
 
-def calibration_error(sheets: Sequence[Sheet]) -> tuple[float, int]:
-    """Expected calibration error of all named effects, in ten bins, and their number. Not of recordings: what
-    else is in these nobody knows.
-    """
+@dataclass(frozen=True)
+class Calibration:
+    """How stated probabilities of names agree with how often they were right."""
+
+    error: float  # expected calibration error, in ten bins
+    brier: float  # mean squared difference of a probability from 1 (right) or 0 (wrong); Brier 1950
+    n: int  # names
+
+
+def calibration(sheets: Sequence[Sheet]) -> Calibration:
+    """Of all named effects. Not of recordings: what else is in these nobody knows."""
     said, true = [], []
     for sheet in sheets:
         if sheet.label["source"] == "spike":
@@ -897,7 +944,7 @@ def calibration_error(sheets: Sequence[Sheet]) -> tuple[float, int]:
             drifts = sheet.label.get("kind") == "drift" and item.effect == "drift"
             true.append(float(drifts or _excusable(sheet, item)))
     if not said:
-        return math.nan, 0
+        return Calibration(math.nan, math.nan, 0)
     p, hit = np.clip(np.array(said), 0.0, 1.0), np.array(true)
     bins = np.minimum((p * _BINS).astype(int), _BINS - 1)
     error = sum(
@@ -905,7 +952,7 @@ def calibration_error(sheets: Sequence[Sheet]) -> tuple[float, int]:
         for b in range(_BINS)
         if (bins == b).any()
     )
-    return error, len(p)
+    return Calibration(error, float(np.mean((p - hit) ** 2)), len(p))
 
 
 def _failures(sheets: Sequence[Sheet]) -> list[dict[str, Any]]:
@@ -929,7 +976,8 @@ def _cell(row: Row) -> str:
     if row.n == 0 or math.isnan(row.value):
         return "–"
     if not row.percent:
-        return f"{row.value:.3g}" if math.isfinite(row.value) else "∞"
+        beside = f", Brier {row.brier:.3g}" if math.isfinite(row.brier) else ""
+        return (f"{row.value:.3g}" if math.isfinite(row.value) else "∞") + beside
     low, high = row.interval()
     return f"{100 * row.value:.1f} % ({100 * low:.0f}–{100 * high:.0f})"
 
@@ -946,7 +994,7 @@ def markdown(scores: Scores) -> str:
     lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
     theirs = {name: {row.key: row for row in rows} for name, rows in scores.others.items()}
     for row in scores.rows:
-        mark = {True: "met", False: "**missed**", None: ""}[row.met]
+        mark = {True: "met", False: "**missed**", None: row.note}[row.met]
         cells = [row.text, row.target, str(row.n), _cell(row), mark] + [
             _cell(theirs[n][row.key]) if row.key in theirs[n] else "" for n in names
         ]
@@ -965,6 +1013,7 @@ def table(scores: Scores) -> list[dict[str, Any]]:
             "sets": row.n,
             "truing": _cell(row),
             "passed": row.met,
+            "note": row.note,
         }
         cells.update(
             {
@@ -976,14 +1025,46 @@ def table(scores: Scores) -> list[dict[str, Any]]:
     return rows
 
 
+def cost_table(scores: Scores) -> list[dict[str, Any]]:
+    """What diagnoses took, family by family, as rows of text."""
+    return [
+        {
+            "family": family,
+            "sets": cost.sets,
+            "median [s]": f"{cost.median:.2f}",
+            "p95 [s]": f"{cost.slow:.2f}",
+            "total [s]": f"{cost.total:.1f}",
+            "processor [s]": f"{cost.processor:.1f}",
+        }
+        for family, cost in scores.costs.items()
+        if cost.sets
+    ]
+
+
+def cost_markdown(scores: Scores) -> str:
+    """The same as a table of markdown."""
+    rows = cost_table(scores)
+    head = list(rows[0]) if rows else ["family"]
+    lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
+    return (
+        "\n".join(lines + ["| " + " | ".join(str(cell) for cell in row.values()) + " |" for row in rows])
+        + "\n"
+    )
+
+
 def plain(scores: Scores) -> str:
     """The same for a terminal."""
     width = max(len(row.text) for row in scores.rows)
     lines = [f"{scores.which}: {scores.sets} sets", *told_left_out(scores.left_out)]
     lines += told_drawn_anew(scores.drawn_anew)
     for row in scores.rows:
-        mark = {True: "met", False: "MISSED", None: ""}[row.met]
+        mark = {True: "met", False: "MISSED", None: row.note}[row.met]
         lines.append(f"{row.text:{width}}  {row.target:8} {row.n:5}  {_cell(row):22} {mark}")
+    for cost in cost_table(scores):
+        lines.append(
+            f"{cost['family']}: {cost['sets']} sets, {cost['median [s]']} s each, 95 % within"
+            f" {cost['p95 [s]']} s, {cost['total [s]']} s together, {cost['processor [s]']} s of processors"
+        )
     return "\n".join(lines)
 
 

@@ -53,7 +53,9 @@ from truing.exam.score import (
     MORE,
     Scores,
     Sheet,
-    calibration_error,
+    calibration,
+    cost_markdown,
+    cost_table,
     markdown,
     plain,
     score,
@@ -826,7 +828,8 @@ def test_an_answer_that_cannot_be_read_is_the_candidates_error(change: dict[str,
 
 def test_an_order_that_is_no_number_fails_its_set_and_not_the_examination() -> None:
     paper = sit("development/none/0", misnaming)
-    assert "transmission_error@many" in paper.answer.error and paper.answer.seconds >= 0.0
+    assert "transmission_error@many" in paper.answer.error
+    assert paper.answer.seconds >= 0.0 and paper.answer.processor_seconds >= 0.0
 
 
 def sheet(effects: Sequence[tuple[str, str]], named: Sequence[Named], **more: Any) -> Sheet:
@@ -1027,8 +1030,38 @@ def test_joint_and_input_of_an_unlisted_effect() -> None:
 def test_stated_confidence_is_compared_with_frequency() -> None:
     truth = [("backlash", "J2")]
     sheets = [sheet(truth, [Named("backlash", ("J2" if k < 7 else "J3",), 0.7)]) for k in range(10)]
-    assert calibration_error(sheets)[0] == pytest.approx(0.0, abs=1e-12)
-    assert calibration_error([sheet(truth, [Named("backlash", ("J3",), 0.7)])])[0] == pytest.approx(0.7)
+    found = calibration(sheets)
+    assert found.error == pytest.approx(0.0, abs=1e-12) and found.n == 10
+    assert found.brier == pytest.approx(0.7 * 0.3**2 + 0.3 * 0.7**2)
+    wrong = calibration([sheet(truth, [Named("backlash", ("J3",), 0.7)])])
+    assert wrong.error == pytest.approx(0.7) and wrong.brier == pytest.approx(0.49)
+    assert math.isnan(calibration([sheet([], [])]).brier)
+
+
+def test_a_family_with_few_names_is_said_to_have_few() -> None:
+    few = [sheet([("backlash", "J2")], [Named("backlash", ("J3",), 0.95)], family="grid") for _ in range(19)]
+    row = score(few).row("calibration_grid")
+    assert row.met is None and row.value == pytest.approx(0.95) and "too few to judge: 19 names" in row.note
+    assert row.brier == pytest.approx(0.95**2)
+    assert "too few to judge: 19 names" in markdown(score(few)) and "Brier 0.90" in plain(score(few))
+    judged = score(few + few[:1]).row("calibration_grid")
+    assert judged.met is False and not judged.note
+    silent_family = score([sheet([], [], family="twenty")]).row("calibration_twenty")
+    assert silent_family.n == 0 and silent_family.met is None and "0 names" in silent_family.note
+
+
+def test_cost_is_summed_up_family_by_family() -> None:
+    def took(family: str, seconds: float) -> Sheet:
+        made = sheet([], [], family=family)
+        return replace(made, answer=replace(made.answer, seconds=seconds, processor_seconds=seconds / 2))
+
+    scores = score([*(took("grid", k) for k in (1.0, 2.0, 6.0)), took("few", 4.0), sheet([], [])])
+    assert scores.costs["grid"].median == 2.0 and scores.costs["grid"].total == 9.0
+    assert scores.costs["all"].processor == 6.5 and scores.costs["all"].sets == 4
+    assert scores.to_dict()["costs"]["few"]["median_s"] == 4.0 and scores.costs["single"].sets == 0
+    assert [row["family"] for row in cost_table(scores)] == ["grid", "few", "all"]
+    assert "| grid | 3 | 2.00 |" in cost_markdown(scores)
+    assert "NaN" not in json.dumps(scores.to_dict()["costs"])
 
 
 def test_intervals_are_wilson_s() -> None:

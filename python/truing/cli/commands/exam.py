@@ -80,7 +80,7 @@ class Command(run.Command[None, "Scores"]):
 
     def write(self, folder: Path, loaded: None, found: Scores, warnings: list[str]) -> Mapping[str, Any]:
         from truing.exam.result import write_exam
-        from truing.exam.score import table as score_table
+        from truing.exam.score import cost_table, table as score_table
 
         return write_exam(
             folder,
@@ -92,6 +92,7 @@ class Command(run.Command[None, "Scores"]):
                 "drawn_anew": found.drawn_anew,
                 "warnings": warnings,
                 "scores": score_table(found),
+                "costs": cost_table(found),
                 "failures": found.failures,
             },
         )
@@ -102,3 +103,8 @@ class Command(run.Command[None, "Scores"]):
         names = list(dict.fromkeys(name for score in result["scores"] for name in score))
         head = [name.replace("_", " ") for name in names]
         table("examination", head, [[plain(score.get(name)) for name in names] for score in result["scores"]])
+        costs = result["costs"]
+        if costs:
+            table(
+                "cost of a diagnosis", list(costs[0]), [[str(cell) for cell in row.values()] for row in costs]
+            )
