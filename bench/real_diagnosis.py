@@ -4,18 +4,30 @@
 docs/benchmarks/real-diagnosis.md.
 
     python bench/real_diagnosis.py [--data FOLDER]
+    python bench/real_diagnosis.py --splits 10 --json AFTER.json [--before BEFORE.json] [--only WORD]
 
-FOLDER as for bench/real_data.py. Every figure is of the rows that the recording itself holds out.
+FOLDER as for bench/real_data.py. Without --splits every figure is of the rows that the recording itself holds
+out.
+
+With --splits each recording is parted so many times at random (--seed), with as many rows held out as it
+holds out itself; the rows of one pose stay together. Printed are mean and worst rms error on held-out
+rows, and --json stores those of every split. With --before, what another build stored for the same splits
+stands beside. One split is luck: what changes a figure by less than its splits differ has changed
+nothing.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 import truing
 
@@ -23,6 +35,20 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from real_data import RECORDINGS, ROOT, Recording, default_folder, fit, load
 
 MOST = 6  # names in a cell
+FORMAT = "truing-real-splits/1"
+COLUMNS = {
+    "gap": "base and tool",
+    "geometry": "geometry",
+    "named": "named effects",
+    "unknown": "and unknown ones",
+}
+"""Of a split: rms errors on its held-out rows [mm]."""
+JUDGED = ("named", "unknown")
+"""Those that a change of the diagnosis changes."""
+PLAIN = 1.05  # so many times better or worse is a difference
+
+Split = dict[str, Any]
+"""Errors of one split, None where there are none, and `error`, why."""
 
 
 def millimetres(statistics: truing.common.ErrorStatistics) -> str:
@@ -81,14 +107,133 @@ def one(folder: Path, recording: Recording) -> str:
     )
 
 
+# ---- Random splits -------------------------------------------------------------------------------
+
+
+def parted(group: Any, held: int, number: int, seed: int) -> Any:
+    """The split of a number: 0 train, 1 held out, shape=(n,). group: rows of one pose share a value; held: so
+    many rows, or a few more.
+    """
+    rng = np.random.default_rng([seed, number])
+    names, count = np.unique(group, return_counts=True)
+    order = rng.permutation(len(names))
+    enough = int(np.searchsorted(np.cumsum(count[order]), held)) + 1
+    return np.isin(group, names[order[:enough]]).astype(np.int8)
+
+
+def errors_of(robot: truing.Robot, data: truing.Measurements) -> Split:
+    """Of one split. What cannot be diagnosed has no errors."""
+    started = time.perf_counter()
+    try:
+        found = truing.diagnose(robot, data)
+    except (truing.InputError, ValueError, RuntimeError) as error:
+        return {**dict.fromkeys(COLUMNS), "error": f"{type(error).__name__}: {error}"}
+    seconds = time.perf_counter() - started
+    geometry = fit(robot, data).test
+    figures = (found.gap, geometry.after if geometry else None, found.after, found.after_unknown)
+    rms = {name: 1e3 * of.rms if of else None for name, of in zip(COLUMNS, figures, strict=True)}
+    return {**rms, "seconds": seconds, "verdict": str(found.verdict), "names": named(found)}
+
+
+def splits_of(folder: Path, recording: Recording, splits: int, seed: int) -> list[Split]:
+    robot, data = load(folder, recording)
+    held = int(np.count_nonzero(data.set)) if data.set is not None else round(0.3 * data.rows)
+    group = truing.model.pose_groups(data)
+    found = []
+    for number in range(splits):
+        found.append(errors_of(robot, data.replace(set=parted(group, held, number, seed))))
+        print(f"{recording.name}, split {number}: {found[-1]}", file=sys.stderr, flush=True)
+    return found
+
+
+def column(splits: Sequence[Split], name: str) -> Any:
+    """Errors of all splits [mm]; infinite where the diagnosis failed."""
+    return np.array([np.inf if split[name] is None else split[name] for split in splits])
+
+
+def mean_and_worst(splits: Sequence[Split], name: str) -> str:
+    errors = column(splits, name)
+    return f"{errors.mean():.3f} / {errors.max():.3f}".replace("inf", "∞")
+
+
+def beside(before: Sequence[Split], after: Sequence[Split], name: str) -> str:
+    """Mean and worst of both, and in how many splits the later one is better or worse by more than 5 %."""
+    old, new = column(before, name), column(after, name)
+    better, worse = int(np.sum(old > PLAIN * new)), int(np.sum(new > PLAIN * old))
+    return f"{mean_and_worst(before, name)} | {mean_and_worst(after, name)} | {better} : {worse}"
+
+
+def split_table(after: Mapping[str, list[Split]], before: Mapping[str, list[Split]] | None) -> list[str]:
+    """Lines of markdown, one per recording: mean / worst [mm]."""
+    head = ["set", "splits", "failed", *(text for name, text in COLUMNS.items() if name not in JUDGED)]
+    for name in JUDGED:
+        text = COLUMNS[name]
+        head += [text] if before is None else [f"{text}, before", "after", "better : worse"]
+    lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
+    for recording, splits in after.items():
+        cells = [recording, str(len(splits)), str(sum("error" in split for split in splits))]
+        cells += [mean_and_worst(splits, name) for name in COLUMNS if name not in JUDGED]
+        for name in JUDGED:
+            if before is None:
+                cells.append(mean_and_worst(splits, name))
+            else:
+                cells.append(beside(before[recording], splits, name))
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
+def stored(file: Path, seed: int, splits: int, names: Sequence[str]) -> dict[str, list[Split]]:
+    """What another build found for the same splits; ends the program if it is of others."""
+    try:
+        told = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise SystemExit(f"{file}: cannot be read: {error}") from None
+    wanted = {"format": FORMAT, "seed": seed, "splits": splits}
+    for name, value in wanted.items():
+        if not isinstance(told, dict) or told.get(name) != value:
+            raise SystemExit(
+                f"{file}: expected {name} {value}: store it by --splits {splits} --seed {seed} --json"
+            )
+    absent = [name for name in names if name not in told["recordings"]]
+    if absent:
+        raise SystemExit(f"{file}: has no {absent[0]}: store it with all recordings that are compared")
+    found: dict[str, list[Split]] = told["recordings"]
+    return found
+
+
+def judge_splits(arguments: argparse.Namespace) -> None:
+    chosen = [
+        one for one in RECORDINGS if arguments.only in one.name and (arguments.data / one.folder).is_dir()
+    ]
+    names = [one.name for one in chosen]
+    before = None
+    if arguments.before:
+        before = stored(arguments.before, arguments.seed, arguments.splits, names)
+    after = {one.name: splits_of(arguments.data, one, arguments.splits, arguments.seed) for one in chosen}
+    if arguments.json:
+        told = {"format": FORMAT, "seed": arguments.seed, "splits": arguments.splits, "recordings": after}
+        arguments.json.write_text(json.dumps(told, indent=1), encoding="utf-8")
+    print("\n".join(split_table(after, before)))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", type=Path, default=default_folder())
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "benchmarks" / "real-diagnosis.md")
+    parser.add_argument("--splits", type=int, default=0, help="random splits; 0: the recording's own")
+    parser.add_argument("--seed", type=int, default=0, help="of the splits")
+    parser.add_argument("--only", default="", help="recordings with this word in their name")
+    parser.add_argument("--json", type=Path, help="where the errors of every split go")
+    parser.add_argument("--before", type=Path, help="what --json wrote by another build")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
+    if arguments.splits < 1 and (arguments.json or arguments.before or arguments.only or arguments.seed):
+        parser.error("--json, --before, --only and --seed are of --splits")
+    if arguments.splits >= 1:
+        judge_splits(arguments)
+        return
     table = "\n".join(rows(arguments.data))
     page = arguments.out.read_text(encoding="utf-8")
     start, end = page.index("<!-- table -->") + len("<!-- table -->"), page.index("<!-- end -->")
