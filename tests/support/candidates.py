@@ -75,6 +75,13 @@ def misnaming(robot: truing.Robot, data: truing.Measurements) -> Any:
     return diagnosis
 
 
+def without_robot(robot: truing.Robot, data: truing.Measurements) -> Any:
+    """A candidate whose robot is none."""
+    diagnosis = silent(robot, data)
+    diagnosis.robot = "robot.yaml"
+    return diagnosis
+
+
 def crashing(robot: truing.Robot, data: truing.Measurements) -> Any:
     if data.rows == sets.make("development/none/1")[1].rows:
         os._exit(1)

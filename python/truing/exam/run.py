@@ -141,8 +141,12 @@ def sit(
     except Exception as error:  # a candidate that fails has answered wrongly, the others still sit
         why = f"{type(error).__name__}: {error}"
         return _answered(id, envelope, failed(why, *clock.spent()), {}, folder)
-    alone = case.label["family"] in _AGAINST_GEOMETRY
-    fresh = fresh_errors(diagnosis, case.robot, case.data, case.fresh(), alone)
+    alone, poses = case.label["family"] in _AGAINST_GEOMETRY, case.fresh()
+    try:
+        fresh = fresh_errors(diagnosis, case.robot, case.data, poses, alone)
+    except Exception as error:  # a robot that cannot be evaluated is part of the answer
+        why = f"robot: {type(error).__name__}: {error}"
+        return _answered(id, envelope, failed(why, seconds, processor), {}, folder)
     answer = replace(
         said,
         seconds=seconds,

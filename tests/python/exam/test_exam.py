@@ -30,7 +30,7 @@ import truing
 pytest.importorskip("mujoco")
 
 import candidates
-from candidates import crashing, endless, environment, leaving, misnaming, silent
+from candidates import crashing, endless, environment, leaving, misnaming, silent, without_robot
 from truing.exam import families, laws, machine_laws, names, recordings, run, sealing, sets, surprises
 from truing.exam.answers import (
     Answer,
@@ -830,6 +830,11 @@ def test_an_order_that_is_no_number_fails_its_set_and_not_the_examination() -> N
     paper = sit("development/none/0", misnaming)
     assert "transmission_error@many" in paper.answer.error
     assert paper.answer.seconds >= 0.0 and paper.answer.processor_seconds >= 0.0
+
+
+def test_a_robot_that_cannot_be_evaluated_fails_its_set_and_not_the_examination() -> None:
+    paper = sit("development/none/0", without_robot)
+    assert paper.answer.error.startswith("robot: TypeError") and paper.answer.verdict == "error"
 
 
 def sheet(effects: Sequence[tuple[str, str]], named: Sequence[Named], **more: Any) -> Sheet:
