@@ -35,6 +35,7 @@ constexpr double kHardlyLess = 0.98;       ///< of the gap: what is left of it w
 constexpr double kManyOutliers = 0.05;     ///< of the rows, from which on they are no exceptions
 constexpr double kSmallGain = 0.02;        ///< of the error, that is not worth a line if it may be none
 constexpr double kNamed = 0.5;             ///< a name is given to what is more likely right than wrong
+constexpr double kLawInQuestion = 0.7;     ///< at most so likely is a law that a function of its input does as well as
 
 void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
   std::string error;
@@ -168,7 +169,8 @@ std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evide
       const int g = decision->state.choice.groups[at];
       if (!is_named(work.design.candidates.named[static_cast<std::size_t>(g)])) continue;
       const Sureness sure = how_sure(work, evidence, decision->state, at);
-      const double probability = calibrated(sure.raw, selection_frequency(work, resampled, sure, g), sure.removal_loss);
+      double probability = calibrated(sure.raw, selection_frequency(work, resampled, sure, g), sure.removal_loss);
+      if (sure.law_in_question) probability = std::min(probability, kLawInQuestion);
       // Resampled folds of few poses hardly find all links again, though each fold is predicted better with them.
       const bool holds = links_predict(work, decision->state.choice, at);
       out[g] = {sure, holds ? std::max(probability, kNamed) : probability};

@@ -97,6 +97,7 @@ struct Sureness {
   std::vector<Rival> rivals;  ///< those in the class first, by loss
   double raw = 0.0;           ///< posterior of the class
   double removal_loss = 0.0;  ///< nats lost without it
+  bool law_in_question = false;  ///< any function of its input does as well, or finds something beside it
 };
 
 /// Errors that a choice leaves of poses that its fit did not see, times the root of their weight.

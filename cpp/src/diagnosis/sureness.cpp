@@ -60,6 +60,7 @@ class Contest {
         like_geometry_(looks_like_geometry(work, name())) {}
 
   double removal_loss() const { return loss_; }
+  const Evidence::State& less() const { return less_; }
   std::vector<Evidence::Gain> gains() const { return evidence_.gains(less_); }
 
   bool is_rival(int group) const {
@@ -107,11 +108,36 @@ class Contest {
   bool like_geometry_;
 };
 
+/// A law against any function of its input at the joint, with knots. Where the law is right, the function pays for its
+/// many columns and finds nothing beside it.
+static bool is_law_in_question(const Work& work, const Evidence& evidence, const Evidence::State& state,
+                               const Contest& contest, int group) {
+  const auto& groups = work.design.candidates.groups;
+  const ColumnGroup& law = groups[static_cast<std::size_t>(group)];
+  const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(group)];
+  const std::vector<int>& in = state.choice.groups;
+  for (std::size_t g = 0; g < groups.size() && law.law_at >= 0; ++g) {
+    const Explanation& other = work.design.candidates.named[g];
+    const bool is_in = std::find(in.begin(), in.end(), static_cast<int>(g)) != in.end();
+    const bool is_free = other.kind == Kind::free && std::vector<std::string>{other.site} == name.joints &&
+                         other.inputs.size() == 1 &&
+                         work.inputs[static_cast<std::size_t>(other.inputs[0])].name == name.driver;
+    const bool is_function = groups[g].corrects_law_at == law.law_at && !groups[g].columns.empty();
+    if (is_in && (is_free || is_function)) return true;
+    if (is_in || !is_function) continue;
+    const double beside = evidence.gain(state, groups[g].columns, groups[g].cost).score;
+    const double in_its_place = evidence.gain(contest.less(), groups[g].columns, 0.0).score;
+    if (beside > 0.0 || in_its_place > contest.removal_loss() + law.cost - kClassNats) return true;
+  }
+  return false;
+}
+
 Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at) {
   constexpr double kTempered = 0.5;  // no model is exact: half a nat counts for one
   const Contest contest(work, evidence, state, at);
   Sureness out;
   out.removal_loss = contest.removal_loss();
+  out.law_in_question = is_law_in_question(work, evidence, state, contest, state.choice.groups[at]);
   double all = 1.0 + std::exp(-kTempered * std::max(0.0, out.removal_loss)), of_class = 1.0;
   for (const Evidence::Gain& gain : contest.gains()) {
     if (!contest.is_rival(gain.group)) continue;
