@@ -3005,7 +3005,7 @@ class HandEyeResidual:
     @property
     def position_left_out(self) -> float:
         """
-        [m] when the pose is left out of the fit (held-out poses: the same as `position`).
+        [m] when the pose is left out of the fit, of the lens too where that was found from the images (held-out poses: the same as `position`). NaN where the other poses do not hold the answer.
         """
     @property
     def rejected(self) -> bool:
@@ -3363,7 +3363,7 @@ class HandEyeResult:
     @property
     def left_out(self) -> HandEyeErrors:
         """
-        The same, each predicted without itself.
+        The same, each predicted without itself; NaN where one cannot be.
         """
     @property
     def message(self) -> str:

@@ -94,7 +94,8 @@ struct HandEyeOptions {
 struct HandEyeResidual {
   double position = 0.0;  ///< [m] length
   double rotation = 0.0;  ///< [rad] angle
-  /// [m] when the pose is left out of the fit (held-out poses: the same as `position`).
+  /// [m] when the pose is left out of the fit, of the lens too where that was found from the images (held-out poses:
+  /// the same as `position`). NaN where the other poses do not hold the answer.
   double position_left_out = 0.0;
   double rotation_left_out = 0.0;       ///< [rad] likewise
   double pixels = kEstimate;            ///< [px] rms with the robot pose as reported; NaN without images
@@ -190,7 +191,7 @@ struct HandEyeResult {
   HandEyeNoise noise;                      ///< as given or estimated
   std::vector<HandEyeResidual> residuals;  ///< one per pose
   HandEyeErrors train;                     ///< poses fitted, without rejected ones
-  HandEyeErrors left_out;                  ///< the same, each predicted without itself
+  HandEyeErrors left_out;                  ///< the same, each predicted without itself; NaN where one cannot be
   std::optional<HandEyeErrors> test;       ///< held-out poses, all of them, if any
   std::vector<std::size_t> rejected;       ///< poses (counted from 0) that do not fit the others
   std::vector<Unobservable> unobservable;  ///< what the motions cannot show

@@ -24,6 +24,7 @@ HandEyeErrors errors_of(const std::vector<HandEyeResidual>& residuals, const Row
     position.push_back(p);
     squares += p * p, turns += t * t, pixels += r.pixels * r.pixels;
   }
+  if (!std::isfinite(squares)) return out;  // a pose that the others cannot predict: nothing is known
   const double n = static_cast<double>(rows.size());
   out.position_rms = std::sqrt(squares / n), out.rotation_rms = std::sqrt(turns / n),
   out.pixel_rms = std::sqrt(pixels / n);

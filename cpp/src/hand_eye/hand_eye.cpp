@@ -11,6 +11,7 @@
 #include "hand_eye/consensus.hpp"
 #include "hand_eye/errors.hpp"
 #include "hand_eye/images.hpp"
+#include "hand_eye/left_out.hpp"
 #include "hand_eye/readings.hpp"
 #include "hand_eye/refine.hpp"
 #include "hand_eye/words.hpp"
@@ -174,6 +175,7 @@ struct Work {
   Rows fitted, held_out;
   LoopEstimate fit;
   bool lens_stays = false;  // asked to be refined, but poses are not good enough for that
+  bool by_pixels = false;   // the fit is that of pixels, not of boards found from them
 };
 
 /// Board poses anew from the pixels, with what they weigh.
@@ -231,6 +233,7 @@ void question_noise(const HandEyeOptions& options, Work* work, HandEyeResult* re
   const LoopEstimate& fit = work->fit;
   if (!fit.noise.estimate[0] || !fit.noise.estimate[1] || !fit.noise.estimate[2] || !work->problem.pixel_shape.empty())
     return;
+  if (work->fitted.size() < 4) return;  // two poses predict no third
   const auto [position, rotation] = left_out_closures(work->problem, work->fitted, fit);
   if (position < kExact && rotation < kExact) return;
   LoopNoise plain;
@@ -319,20 +322,31 @@ void refine_lens(const HandEyeOptions& options, Work* work, HandEyeResult* resul
   result->camera_model.reset(), result->camera_model_sigma.clear(), result->T_base_hand.clear();
 }
 
+double left_out_pixels(const Work& work, const LeftOut& left_out) {
+  double squares = 0.0;
+  for (const std::size_t i : work.fitted)
+    squares += std::pow(left_out.pixels(i, *work.poses.camera, work.poses.images[i]), 2);
+  return std::sqrt(squares / static_cast<double>(work.fitted.size()));
+}
+
 void describe_poses(const HandEyeOptions& options, const Agreement& agreement, const Work& work,
                     HandEyeResult* result) {
   const std::size_t n = work.problem.A.size();
   result->residuals.resize(n);
   const double position_noise = std::max(agreement.position, 1e-6), rotation_noise = std::max(agreement.rotation, 1e-6);
+  LoopNoise weights = work.fit.noise;
+  if (work.by_pixels) weights.variance[2] = 0.0;  // what boards scatter beyond their pixels takes no part in that fit
+  std::optional<LensData> lens;
+  if (result->camera_model) lens.emplace(LensData{*work.poses.camera, work.poses.images});
+  const LeftOut left_out(work.problem, work.fitted, work.fit, weights, lens);
   for (std::size_t i = 0; i < n; ++i) {
     HandEyeResidual& r = result->residuals[i];
     const bool fitted = std::binary_search(work.fitted.begin(), work.fitted.end(), i);
     const bool held_out = std::binary_search(work.held_out.begin(), work.held_out.end(), i);
-    const LoopRow row = loop_row(work.problem, i, work.fit.X, work.fit.Y, work.fit.noise);
-    const Vector6d out = fitted ? left_out(row, work.fit.covariance) : row.e;
-    r.position = row.e.head<3>().norm(), r.rotation = row.e.tail<3>().norm();
+    const Vector6d e = loop_row(work.problem, i, work.fit.X, work.fit.Y, work.fit.noise).e, out = left_out.closure(i);
+    r.position = e.head<3>().norm(), r.rotation = e.tail<3>().norm();
     r.position_left_out = out.head<3>().norm(), r.rotation_left_out = out.tail<3>().norm();
-    r.distance = standardised(row, work.fit.covariance, fitted);
+    r.distance = left_out.standardised(i);
     r.rejected = !fitted && !held_out;
     if (r.rejected || (held_out && r.distance > options.reject_beyond))
       r.cause = likely_cause(work.problem.A, work.problem.B, options.setup, i, work.fitted, work.fit.X, work.fit.Y,
@@ -348,6 +362,7 @@ void describe_poses(const HandEyeOptions& options, const Agreement& agreement, c
   }
   result->train = errors_of(result->residuals, work.fitted, false);
   result->left_out = errors_of(result->residuals, work.fitted, true);
+  if (!work.poses.images.empty()) result->left_out.pixel_rms = left_out_pixels(work, left_out);
   if (!work.held_out.empty()) result->test = errors_of(result->residuals, work.held_out, true);
 }
 
@@ -506,7 +521,9 @@ bool closes(const HandEyeOptions& options, const Work& work, const Rows& rows, c
 /// Pixels are what was measured, where they scatter as they say.
 void use_images(const HandEyeOptions& options, Work* work, HandEyeResult* result) {
   if (options.refine_camera) refine_lens(options, work, result);
-  if (!beyond_pixels(work->problem, work->fitted, work->fit.noise, result)) fit_images(options, work, result);
+  if (beyond_pixels(work->problem, work->fitted, work->fit.noise, result)) return;
+  work->by_pixels = true;
+  fit_images(options, work, result);
 }
 
 /// What was found, how well it is known and what is odd about it.

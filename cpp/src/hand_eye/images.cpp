@@ -19,7 +19,7 @@
 namespace truing::hand_eye {
 namespace {
 
-using Intrinsics = std::array<double, 9>;  // fx fy cx cy k1 k2 p1 p2 k3
+using Intrinsics = std::array<double, kLens>;  // fx fy cx cy k1 k2 p1 p2 k3
 
 Intrinsics intrinsics_of(const Camera& c) {
   return {c.fx, c.fy, c.cx, c.cy, c.distortion[0], c.distortion[1], c.distortion[2], c.distortion[3], c.distortion[4]};
@@ -47,6 +47,19 @@ Eigen::Vector2d project_with_jacobian(const Intrinsics& k, const Eigen::Vector3d
   const std::array<Jet, 3> p{Jet(point.x(), 0), Jet(point.y(), 1), Jet(point.z(), 2)};
   std::array<Jet, 2> pixel;
   project_point(k.data(), p.data(), pixel.data());
+  for (int r = 0; r < 2; ++r) J->row(r) = pixel[static_cast<std::size_t>(r)].v.transpose();
+  return {pixel[0].a, pixel[1].a};
+}
+
+/// Pixel and its derivative by the lens.
+Eigen::Vector2d project_with_lens_jacobian(const Intrinsics& k, const Eigen::Vector3d& point,
+                                           Eigen::Matrix<double, 2, kLens>* J) {
+  using Jet = ceres::Jet<double, kLens>;
+  std::array<Jet, kLens> lens;
+  for (std::size_t i = 0; i < lens.size(); ++i) lens[i] = Jet(k[i], static_cast<int>(i));
+  const std::array<Jet, 3> p{Jet(point.x()), Jet(point.y()), Jet(point.z())};
+  std::array<Jet, 2> pixel;
+  project_point(lens.data(), p.data(), pixel.data());
   for (int r = 0; r < 2; ++r) J->row(r) = pixel[static_cast<std::size_t>(r)].v.transpose();
   return {pixel[0].a, pixel[1].a};
 }
@@ -182,6 +195,36 @@ Matrix6d inverse_of(const Matrix6d& H) {
 Matrix6d board_covariance(const Camera& camera, const Eigen::Matrix3Xd& points,
                           const Eigen::Isometry3d& T_camera_board) {
   return inverse_of(sum_pixels(camera, points, nullptr, T_camera_board).H);
+}
+
+Camera with_lens_moved(const Camera& camera, const Eigen::Matrix<double, kLens, 1>& change) {
+  Intrinsics k = intrinsics_of(camera);
+  for (std::size_t i = 0; i < k.size(); ++i) k[i] += change(static_cast<Eigen::Index>(i));
+  return with_intrinsics(camera, k);
+}
+
+LensShare lens_share(const Camera& camera, const BoardImage& image, const Eigen::Isometry3d& T_camera_board) {
+  const Intrinsics k = intrinsics_of(camera);
+  const PixelSums sums = sum_pixels(camera, image.points, nullptr, T_camera_board);
+  Eigen::Matrix<double, 6, kLens> cross = Eigen::Matrix<double, 6, kLens>::Zero();
+  LensShare out;
+  out.gram.setZero(), out.gradient.setZero();
+  for (Eigen::Index i = 0; i < image.points.cols(); ++i) {
+    const Eigen::Vector3d arm = T_camera_board.linear() * image.points.col(i);
+    const Eigen::Vector3d point = arm + T_camera_board.translation();
+    Eigen::Matrix<double, 2, 3> Jp;
+    project_with_jacobian(k, point, &Jp);
+    Eigen::Matrix<double, 2, 6> Jb;
+    Jb << Jp, -Jp * cross_matrix(arm);
+    Eigen::Matrix<double, 2, kLens> Jk;
+    const Eigen::Vector2d pixel = project_with_lens_jacobian(k, point, &Jk);
+    cross.noalias() += Jb.transpose() * Jk;
+    out.gram.noalias() += Jk.transpose() * Jk;
+    out.gradient.noalias() += Jk.transpose() * (pixel - image.pixels.col(i));  // the board's own is 0 where it fits
+  }
+  out.board.noalias() = -inverse_of(sums.H) * cross;
+  out.gram.noalias() += cross.transpose() * out.board;  // Schur complement
+  return out;
 }
 
 BoardFit fit_board(const Camera& camera, const BoardImage& image, const Eigen::Isometry3d& start) {

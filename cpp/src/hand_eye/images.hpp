@@ -25,6 +25,20 @@ BoardFit fit_board(const Camera& camera, const BoardImage& image, const Eigen::I
 /// Root mean square pixel error of the board at a pose; infinite where points lie behind the camera.
 double pixel_rms(const Camera& camera, const BoardImage& image, const Eigen::Isometry3d& T_camera_board);
 
+/// Number of a lens' values: fx fy cx cy k1 k2 p1 p2 k3.
+constexpr int kLens = 9;
+
+/// What one image says of the lens, beside its board's pose; for pixels of unit noise, at a pose that fits its pixels.
+struct LensShare {
+  Eigen::Matrix<double, 6, kLens> board;     ///< move of the board that fits, by each value of the lens
+  Eigen::Matrix<double, kLens, kLens> gram;  ///< information on the lens, the board's pose being free
+  Eigen::Matrix<double, kLens, 1> gradient;  ///< of half the squared pixel errors
+};
+LensShare lens_share(const Camera& camera, const BoardImage& image, const Eigen::Isometry3d& T_camera_board);
+
+/// The camera with its lens' values changed by so much.
+Camera with_lens_moved(const Camera& camera, const Eigen::Matrix<double, kLens, 1>& change);
+
 /// The same shape at a pose, of points that are yet to be seen.
 Matrix6d board_covariance(const Camera& camera, const Eigen::Matrix3Xd& points,
                           const Eigen::Isometry3d& T_camera_board);

@@ -143,14 +143,19 @@ def _headline(result: Mapping[str, Any]) -> str:
             f" {length_text(both['before']['rms_m'])} with the nominal one."
         )
     else:
-        errors = result["errors"]["left_out"]
-        sub += (
-            f"A pose that was left out of the fit is predicted to {length_text(errors['rms_m'])} and"
-            f" {_mrad(errors['rotation_rms_rad'])} rms"
-            + (f", {_pixels_text(errors['rms_px'])}" if errors.get("rms_px") is not None else "")
-            + "."
-        )
+        sub += _left_out_sentence(result["errors"]["left_out"])
     return f'<header>{kicker}<h1>{first}</h1><p class="sub">{sub}</p></header>'
+
+
+def _left_out_sentence(errors: Mapping[str, Any]) -> str:
+    if errors["rms_m"] is None:
+        return "With so few poses none can be left out: what a new one would show is not known."
+    return (
+        f"A pose that was left out of the fit is predicted to {length_text(errors['rms_m'])} and"
+        f" {_mrad(errors['rotation_rms_rad'])} rms"
+        + (f", {_pixels_text(errors['rms_px'])}" if errors.get("rms_px") is not None else "")
+        + "."
+    )
 
 
 def _what_to_do(result: Mapping[str, Any]) -> str:
@@ -368,7 +373,8 @@ def _different_axes(seen: Mapping[str, Any]) -> Check:
 def _held_out(errors: Mapping[str, Any]) -> list[Check]:
     if "test" not in errors or not errors["test"]["n"]:
         return []
-    reference = errors.get("left_out", errors["train"])
+    known = errors.get("left_out", {}).get("rms_m") is not None
+    reference = errors["left_out" if known else "train"]
     ratio = errors["test"]["rms_m"] / reference["rms_m"] if reference["rms_m"] else 1.0
     grade = grade_of(ratio, WORSE_THAN_NOISE, 3)
     head = (
@@ -378,7 +384,7 @@ def _held_out(errors: Mapping[str, Any]) -> list[Check]:
     )[grade]
     text = (
         f"{length_text(errors['test']['rms_m'])} rms over {counted(errors['test']['n'], 'held-out pose')},"
-        f" {length_text(reference['rms_m'])} {'left out' if 'left_out' in errors else 'fitted'}"
+        f" {length_text(reference['rms_m'])} {'left out' if known else 'fitted'}"
     )
     return [Check(grade, head, text)]
 

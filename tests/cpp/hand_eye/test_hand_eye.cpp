@@ -95,9 +95,9 @@ double rotation_error(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
 
 const HandEyeSetup kSetups[] = {HandEyeSetup::eye_in_hand, HandEyeSetup::eye_to_hand};
 
-/// A 9 x 6 board of 25 mm seen by a camera with distortion; pixel noise as told.
+/// A 9 x 6 board of 25 mm seen by a camera with distortion; pixel noise and largest tilt [rad] as told.
 Scene make_pixel_scene(int n, double hand_position, double hand_rotation, double pixel, std::uint64_t seed,
-                       const Camera& camera) {
+                       const Camera& camera, double tilt = 0.6) {
   Random random(seed);
   Scene s;
   s.setup = HandEyeSetup::eye_in_hand;
@@ -108,7 +108,7 @@ Scene make_pixel_scene(int n, double hand_position, double hand_rotation, double
   s.poses.camera = camera;
   while (static_cast<int>(s.poses.images.size()) < n) {
     Eigen::Isometry3d B = make({random.uniform(-0.08, 0.08), random.uniform(-0.06, 0.06), random.uniform(0.35, 0.55)},
-                               {random.uniform(-0.6, 0.6), random.uniform(-0.6, 0.6), random.uniform(-1.0, 1.0)});
+                               {random.uniform(-tilt, tilt), random.uniform(-tilt, tilt), random.uniform(-1.0, 1.0)});
     BoardImage image{points, Eigen::Matrix2Xd(2, 54)};
     bool inside = true;
     for (int i = 0; i < 54; ++i) {
@@ -335,6 +335,83 @@ TEST_CASE("a pose left out is the fit without it") {
     CHECK(without.residuals[i].position == doctest::Approx(all.residuals[i].position_left_out).scale(0).epsilon(0.02));
     CHECK(without.residuals[i].rotation == doctest::Approx(all.residuals[i].rotation_left_out).scale(0).epsilon(0.02));
   }
+}
+
+namespace {
+
+/// Root mean squares over the poses, each left out: as the result has them, and by a fit without the pose.
+struct LeftOutBothWays {
+  double position = 0.0, rotation = 0.0, pixels = 0.0, direct_position = 0.0, direct_rotation = 0.0,
+         direct_pixels = 0.0;
+};
+
+LeftOutBothWays leave_each_out(const HandEyePoses& poses, const HandEyeOptions& options) {
+  const HandEyeResult all = handeye(poses, options);
+  REQUIRE(all.status == HandEyeStatus::done);
+  REQUIRE(all.rejected.empty());
+  LeftOutBothWays out{all.left_out.position_rms, all.left_out.rotation_rms, all.left_out.pixel_rms, 0.0, 0.0, 0.0};
+  const std::size_t n = poses.T_base_hand.size();
+  HandEyeOptions keep = options;
+  keep.reject = false;
+  for (std::size_t i = 0; i < n; ++i) {
+    HandEyePoses rest = poses;
+    rest.set.assign(n, 0);
+    rest.set[i] = 1;
+    const HandEyeResult without = handeye(rest, keep);
+    REQUIRE(without.test);
+    out.direct_position += std::pow(without.test->position_rms, 2);
+    out.direct_rotation += std::pow(without.test->rotation_rms, 2);
+    out.direct_pixels += std::pow(without.test->pixel_rms, 2);
+  }
+  const double count = static_cast<double>(n);
+  out.direct_position = std::sqrt(out.direct_position / count);
+  out.direct_rotation = std::sqrt(out.direct_rotation / count);
+  out.direct_pixels = std::sqrt(out.direct_pixels / count);
+  return out;
+}
+
+void check_agreement(const LeftOutBothWays& e, double tolerance) {
+  CHECK(e.position == doctest::Approx(e.direct_position).scale(0).epsilon(tolerance));
+  CHECK(e.rotation == doctest::Approx(e.direct_rotation).scale(0).epsilon(tolerance));
+  if (std::isfinite(e.direct_pixels)) CHECK(e.pixels == doctest::Approx(e.direct_pixels).scale(0).epsilon(tolerance));
+}
+
+}  // namespace
+
+TEST_CASE("left out of images with an unknown lens, poses are predicted as by a fit without them") {
+  for (const int n : {6, 10, 16})
+    for (std::uint64_t seed = 1; seed <= (kSanitized ? 1 : 2); ++seed)
+      for (const double tilt : {0.6, 0.15}) {
+        CAPTURE(n);
+        CAPTURE(seed);
+        CAPTURE(tilt);
+        Scene s = make_pixel_scene(n, 1e-4, 0.05 * kDegree, 0.1, seed, kCamera, tilt);
+        s.poses.camera->fx *= 1.01, s.poses.camera->cx += 3.0;
+        HandEyeOptions o = options_for(s);
+        o.refine_camera = true;
+        check_agreement(leave_each_out(s.poses, o), n < 10 ? 0.15 : 0.03);  // few: without one the noise found differs
+      }
+}
+
+TEST_CASE("left out, poses are predicted as by a fit without them also where noise is told too small") {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Scene s = make_scene(HandEyeSetup::eye_to_hand, 10, kUsual, seed);
+    HandEyeOptions o = options_for(s);
+    o.hand_position_sigma = 1e-5, o.hand_rotation_sigma = 1e-5, o.camera_position_sigma = 5e-5,
+    o.camera_rotation_sigma = 2e-4, o.reject = false;
+    check_agreement(leave_each_out(s.poses, o), 0.01);
+    check_agreement(leave_each_out(make_pixel_scene(10, 1e-4, 0.05 * kDegree, 0.1, seed, kCamera).poses, {}), 0.03);
+  }
+}
+
+TEST_CASE("of three poses none can be left out, and that is not a number") {
+  const Scene s = make_pixel_scene(3, 1e-4, 0.05 * kDegree, 0.1, 3, kCamera);
+  const HandEyeResult r = handeye(s.poses, options_for(s));
+  REQUIRE(r.status == HandEyeStatus::done);
+  CHECK(r.left_out.n == 3);
+  CHECK(std::isnan(r.left_out.position_rms));
+  CHECK(std::isnan(r.residuals[0].position_left_out));
+  CHECK(std::isfinite(r.train.position_rms));
 }
 
 TEST_CASE("noise told too small is said, and standard errors are widened") {

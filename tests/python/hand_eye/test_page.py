@@ -232,6 +232,20 @@ def test_what_a_run_may_come_to_is_all_said(good: tuple[dict[str, Any], Scene | 
     assert {"reprojection", "places"} <= set(charts_of(page))
 
 
+def test_where_no_pose_can_be_left_out_the_headline_says_so(
+    good: tuple[dict[str, Any], Scene | None],
+) -> None:
+    result, scene = good
+    full = copy.deepcopy(result)
+    left_out = full["errors"]["left_out"]
+    full["errors"]["left_out"] = {**dict.fromkeys(left_out), "n": left_out["n"]}
+    for r in full["residuals"]:
+        r |= {"position_left_out_m": None, "rotation_left_out_rad": None}
+    text = visible(handeye_report(full, scene))
+    assert "With so few poses none can be left out" in text[:700]
+    assert "predicted to" not in text[:700]
+
+
 def test_with_the_robot_found_as_well_nothing_is_called_left_out(
     good: tuple[dict[str, Any], Scene | None],
 ) -> None:
