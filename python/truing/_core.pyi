@@ -3005,7 +3005,8 @@ class HandEyeResidual:
     @property
     def position_left_out(self) -> float:
         """
-        [m] when the pose is left out of the fit, of the lens too where that was found from the images (held-out poses: the same as `position`). NaN where the other poses do not hold the answer.
+        [m] when the pose is left out of the fit, of the lens too where that was found from the images (held-out poses:
+        the same as `position`). NaN where the other poses do not hold the answer.
         """
     @property
     def rejected(self) -> bool:
@@ -3272,7 +3273,7 @@ class ClockOffset:
     @property
     def correlation(self) -> float:
         """
-        Of the two angular speeds at that offset.
+        Of the two angular velocities, smoothed, at that offset.
         """
     @property
     def found(self) -> bool:

@@ -276,15 +276,17 @@ std::vector<NextHandPose> handeye_plan(const HandEyePoses& poses, const HandEyeR
 struct ClockOffset {
   double offset = 0.0;                         ///< [s] t_hand = t_camera + offset
   double sigma = 0.0;                          ///< [s]
-  double correlation = 0.0;                    ///< of the two angular speeds at that offset
+  double correlation = 0.0;                    ///< of the two angular velocities, smoothed, at that offset
   bool found = false;                          ///< false: `message` says why
   std::string message;                         ///< why not, or how sure
   std::vector<std::size_t> rows;               ///< camera rows (counted from 0) inside the hand's record
   std::vector<Eigen::Isometry3d> T_base_hand;  ///< shape=(rows, 4, 4): hand poses at the times of those rows
 };
 
-/// Angular speeds of hand and board are equal whatever the frames; the offset makes them agree, then the loop closes
-/// best. Times in s, increasing. Throws std::invalid_argument.
+/// Angular velocities of hand and board differ by one turn, that between their frames: they are smoothed until noise is
+/// a small share, then the offset is looked for at which they agree, and that at which the loop closes best. Not found
+/// where other offsets are nearly as likely, or the loop stays open. Times in s, increasing. Throws
+/// std::invalid_argument.
 ClockOffset handeye_clock(const std::vector<double>& hand_time, const std::vector<Eigen::Isometry3d>& T_base_hand,
                           const std::vector<double>& camera_time, const std::vector<Eigen::Isometry3d>& T_camera_board,
                           HandEyeSetup setup, double search = 10.0);

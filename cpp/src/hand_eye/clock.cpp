@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
-/// Two clocks: hand and board turn at the same speed whatever the frames; then the loop closes best.
+/// Two clocks: hand and board turn alike, but for one turn between their frames; then the loop closes best.
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +10,7 @@
 #include "hand_eye/closed_form.hpp"
 #include "hand_eye/refine.hpp"
 #include "math/frame.hpp"
+#include "math/linear_algebra.hpp"
 #include "math/statistics.hpp"
 #include "math/text.hpp"
 #include "rooms.hpp"
@@ -20,10 +21,15 @@ using namespace hand_eye;
 
 namespace {
 
-constexpr double kOneMotion = 0.6;    // least correlation of two angular speeds that are of one motion
-constexpr double kStandsOut = 0.05;   // by which it must exceed the next peak
-constexpr std::size_t kFitted = 400;  // camera poses in the fit
-constexpr double kGap = 5.0;          // median steps: holes in the hand's record that are not bridged
+constexpr double kSure = 10.0;    // [log of likelihood] by which one offset must be more likely than others
+constexpr double kModel = 0.003;  // share of the velocities' squares that is no noise: lag, bending, times that jitter
+constexpr double kNoiseShare = 0.1;     // velocities are smoothed until noise is no more of their squares
+constexpr double kWiden = 1.4;          // from window to window
+constexpr double kLongestWindow = 2.0;  // [s] before and after
+constexpr double kWindows = 12.0;       // at least so many in the camera's record
+constexpr double kCloses = 0.2;         // of the turning's rms: a loop that stays open further is not one motion's
+constexpr std::size_t kFitted = 400;    // camera poses in the fit
+constexpr double kGap = 5.0;            // median steps: holes in the hand's record that are not bridged
 
 struct Record {
   const std::vector<double>& time;
@@ -63,73 +69,139 @@ bool pose_at(const Record& r, double t, double largest_gap, Eigen::Isometry3d* o
   return true;
 }
 
-/// Angular speed [rad/s] on a grid from `begin`, by differences over about `step`; NaN outside the record.
-std::vector<double> angular_speed(const Record& r, double begin, double step, std::size_t count) {
-  std::vector<double> out(count, std::numeric_limits<double>::quiet_NaN());
+// ---- A start: angular velocities -----------------------------------------------------------------------------------
+
+/// Angular velocities [rad/s] on a grid; NaN where they are not known. From frame to frame they differ by one turn.
+using Velocities = std::vector<Eigen::Vector3d>;
+
+/// From `begin`: slopes of the rotation vectors within `window` before and after; NaN where rows are not on both sides.
+Velocities angular_velocity(const Record& r, double begin, double step, std::size_t count, double window) {
+  Velocities out(count, Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  const double reach = window * (1.0 + 1e-9);
   for (std::size_t k = 0; k < count; ++k) {
     const double t = begin + step * static_cast<double>(k);
-    Eigen::Isometry3d a, b;
-    if (pose_at(r, t - step, 1e300, &a) && pose_at(r, t + step, 1e300, &b))
-      out[k] = vector_from_rotation(b.linear() * a.linear().transpose()).norm() / (2.0 * step);
+    const auto first = std::lower_bound(r.time.begin(), r.time.end(), t - reach) - r.time.begin();
+    const auto end = std::upper_bound(r.time.begin(), r.time.end(), t + reach) - r.time.begin();
+    const auto from = static_cast<std::size_t>(first), to = static_cast<std::size_t>(end);
+    if (to < from + 2 || r.time[from] > t - 0.5 * window || r.time[to - 1] < t + 0.5 * window) continue;
+    const Eigen::Matrix3d middle = r.pose[(from + to) / 2].linear().transpose();
+    double mean = 0.0;
+    for (std::size_t i = from; i < to; ++i) mean += (r.time[i] - t) / static_cast<double>(to - from);
+    double squares = 0.0;
+    Eigen::Vector3d products = Eigen::Vector3d::Zero();
+    for (std::size_t i = from; i < to; ++i) {
+      const double off = r.time[i] - t - mean;
+      squares += off * off, products += off * vector_from_rotation(r.pose[i].linear() * middle);
+    }
+    out[k] = products / squares;
   }
   return out;
 }
 
-/// Correlation of hand[k + shift] with camera[k] where both are; -1 where that is less than two fifths of the shorter.
-double correlation(const std::vector<double>& hand, const std::vector<double>& camera, std::ptrdiff_t shift,
-                   std::size_t shorter) {
-  double n = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
-  for (std::size_t k = 0; k < camera.size(); ++k) {
-    const std::ptrdiff_t j = static_cast<std::ptrdiff_t>(k) + shift;
-    if (j < 0 || j >= static_cast<std::ptrdiff_t>(hand.size())) continue;
-    const double x = hand[static_cast<std::size_t>(j)], y = camera[k];
-    if (!std::isfinite(x) || !std::isfinite(y)) continue;
-    n += 1.0, a += x, b += y, aa += x * x, bb += y * y, ab += x * y;
-  }
-  const double spread = std::sqrt(std::max(0.0, aa - a * a / n) * std::max(0.0, bb - b * b / n));
-  return n >= 0.4 * static_cast<double>(shorter) && spread > 0.0 ? (ab - a * b / n) / spread : -1.0;
+/// Noise of the orientations [rad], per component, by third differences, which motion hardly reaches: the variance of
+/// one is 1 + 9 + 9 + 1 times theirs, and the median of a sum of three squares 2.366 times their variance.
+double orientation_noise(const Record& r) {
+  std::vector<double> squares;
+  const auto turn = [&](std::size_t i) {
+    return vector_from_rotation(r.pose[i + 1].linear() * r.pose[i].linear().transpose());
+  };
+  for (std::size_t i = 0; i + 3 < r.time.size(); ++i)
+    squares.push_back((turn(i + 2) - 2.0 * turn(i + 1) + turn(i)).squaredNorm());
+  return std::sqrt(median_of(squares) / 2.366 / 20.0);
 }
 
-// ---- A start: angular speeds ---------------------------------------------------------------------------------------
+std::size_t known(const Velocities& v) {
+  return static_cast<std::size_t>(
+      std::count_if(v.begin(), v.end(), [](const Eigen::Vector3d& x) { return x.allFinite(); }));
+}
 
-/// Where the angular speeds of the two records agree best.
+/// Is noise of orientations a small share of velocities within this window? It makes of a slope of m rows the variance
+/// 12 noise^2 / (step^2 m (m^2 - 1)).
+bool is_quiet(const Record& r, double noise, const Velocities& v, double window) {
+  const double step = median_step(r.time), rows = std::max(2.0, 2.0 * std::floor(window / step + 1e-6) + 1.0);
+  double squares = 0.0;
+  for (const Eigen::Vector3d& x : v)
+    if (x.allFinite()) squares += x.squaredNorm() / static_cast<double>(known(v));
+  return 3.0 * 12.0 * noise * noise / (step * step * rows * (rows * rows - 1.0)) <= kNoiseShare * squares;
+}
+
+/// Both on one grid of the slower clock's step; the hand's begins `reach` steps earlier.
+struct Motions {
+  Velocities hand, camera;
+  double window;  ///< [s] before and after
+};
+
+/// Smoothed until noise is a small share of either, or as far as the record allows.
+Motions smoothed_motions(const Record& hand, const Record& camera, double step, std::size_t reach) {
+  const double begin = camera.time.front(), length = camera.time.back() - begin;
+  const auto count = static_cast<std::size_t>(length / step) + 1;
+  const double hand_noise = orientation_noise(hand), camera_noise = orientation_noise(camera);
+  const double longest = std::max(step, std::min(kLongestWindow, 0.5 * length / kWindows));
+  Motions out;
+  for (double steps = 1.0;; steps = std::ceil(kWiden * steps)) {
+    out.window = steps * step;
+    out.camera = angular_velocity(camera, begin, step, count, out.window);
+    out.hand = angular_velocity(hand, begin - step * static_cast<double>(reach), step, count + 2 * reach, out.window);
+    if (out.window >= longest ||
+        (is_quiet(camera, camera_noise, out.camera, out.window) && is_quiet(hand, hand_noise, out.hand, out.window)))
+      return out;
+  }
+}
+
+/// Correlation of hand[k + shift] with camera[k], turned as fits best (Umeyama 1991), where both are known; 0 where
+/// that is less than two fifths of the shorter.
+double correlation(const Motions& motions, std::size_t shift, std::size_t shorter) {
+  double n = 0.0, hands = 0.0, cameras = 0.0;
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+  for (std::size_t k = 0; k < motions.camera.size(); ++k) {
+    const Eigen::Vector3d &x = motions.hand[k + shift], &y = motions.camera[k];
+    if (!x.allFinite() || !y.allFinite()) continue;
+    n += 1.0, hands += x.squaredNorm(), cameras += y.squaredNorm(), products.noalias() += y * x.transpose();
+  }
+  if (!(n >= 0.4 * static_cast<double>(shorter) && hands > 0.0 && cameras > 0.0)) return 0.0;
+  const SingularValues s = singular_values(products);
+  const double mirrored = s.U.determinant() * s.V.determinant() < 0.0 ? -1.0 : 1.0;
+  return (s.values(0) + s.values(1) + mirrored * s.values(2)) / std::sqrt(hands * cameras);
+}
+
+/// Where the two motions agree best.
 struct Peak {
   double step;         ///< of the grid [s]
   double offset;       ///< [s]
   double correlation;  ///< there
-  double next;         ///< the largest one away from its slopes
+  double next;         ///< the largest one that is no neighbour
+  bool certain;        ///< one motion, and no other offset shows it as well
 };
 
-std::size_t known(const std::vector<double>& speed) {
-  return static_cast<std::size_t>(std::count_if(speed.begin(), speed.end(), [](double v) { return std::isfinite(v); }));
-}
-
-/// The largest value that is not on the slopes of the one `at`; -1: there is none.
-double next_peak(const std::vector<double>& values, std::size_t at) {
+/// The largest value beyond the neighbours of the one `at`, those that are above `level` or lie on its slopes; 0: there
+/// is none.
+double next_peak(const std::vector<double>& values, std::size_t at, double level) {
   std::size_t left = at, right = at;
-  while (left > 0 && values[left - 1] < values[left]) --left;
-  while (right + 1 < values.size() && values[right + 1] < values[right]) ++right;
-  double next = -1.0;
+  while (left > 0 && (values[left - 1] >= level || values[left - 1] < values[left])) --left;
+  while (right + 1 < values.size() && (values[right + 1] >= level || values[right + 1] < values[right])) ++right;
+  double next = 0.0;
   for (std::size_t k = 0; k < values.size(); ++k)
     if (k < left || k > right) next = std::max(next, values[k]);
   return next;
 }
 
-/// Both speeds on one grid of the slower clock's step; the hand's grid begins `search` earlier.
+/// The logarithm of the likelihood of two motions with a correlation is -n/2 log(1 - correlation^2), up to a constant:
+/// n counts what windows that do not overlap hold, three components each less the turn that was fitted.
 Peak find_peak(const Record& hand, const Record& camera, double search) {
   const double step = std::max(median_step(hand.time), median_step(camera.time));
-  const auto reach = static_cast<std::ptrdiff_t>(std::ceil(search / step));
-  const auto count = static_cast<std::size_t>((camera.time.back() - camera.time.front()) / step) + 1;
-  const std::vector<double> camera_speed = angular_speed(camera, camera.time.front(), step, count);
-  const std::vector<double> hand_speed = angular_speed(hand, camera.time.front() - step * static_cast<double>(reach),
-                                                       step, count + 2 * static_cast<std::size_t>(reach));
-  const std::size_t shorter = std::max<std::size_t>(10, std::min(known(camera_speed), known(hand_speed)));
+  const auto reach = static_cast<std::size_t>(std::ceil(search / step));
+  const Motions motions = smoothed_motions(hand, camera, step, reach);
+  const std::size_t shorter = std::max<std::size_t>(10, std::min(known(motions.camera), known(motions.hand)));
   std::vector<double> values;
-  for (std::ptrdiff_t shift = 0; shift <= 2 * reach; ++shift)
-    values.push_back(correlation(hand_speed, camera_speed, shift, shorter));
-  const std::ptrdiff_t at = std::max_element(values.begin(), values.end()) - values.begin();
-  return {step, step * static_cast<double>(at - reach), values[static_cast<std::size_t>(at)],
-          next_peak(values, static_cast<std::size_t>(at))};
+  for (std::size_t shift = 0; shift <= 2 * reach; ++shift) values.push_back(correlation(motions, shift, shorter));
+  const auto at = static_cast<std::size_t>(std::max_element(values.begin(), values.end()) - values.begin());
+  const auto left = [](double c) { return std::max(0.0, 1.0 - c * c) + kModel; };
+  const double windows = step * static_cast<double>(shorter) / (2.0 * motions.window);
+  const double half = 0.5 * std::max(1e-3, 3.0 * windows - 3.0), best = left(values[at]);
+  const double level = std::sqrt(std::max(0.0, 1.0 + kModel - best * std::exp(kSure / half)));
+  const double next = next_peak(values, at, level);
+  return {step, step * (static_cast<double>(at) - static_cast<double>(reach)), values[at], next,
+          half * std::log(left(next) / best) > kSure};
 }
 
 // ---- The loop closes best ------------------------------------------------------------------------------------------
@@ -172,10 +244,27 @@ OneMore offset_change(const Paired& pairs, const LoopEstimate& fit) {
   });
 }
 
+/// Rms angle by which the loop stays open, over that of the camera poses about their mean.
+double open_share(const Paired& pairs, const LoopEstimate& fit) {
+  const LoopProblem& problem = pairs.problem;
+  double open = 0.0, turned = 0.0;
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const Eigen::Isometry3d& B : problem.B) sum += B.linear();
+  const SingularValues s = singular_values(sum);
+  const double mirrored = s.U.determinant() * s.V.determinant() < 0.0 ? -1.0 : 1.0;
+  const Eigen::Matrix3d mean = s.U * Eigen::Vector3d(1.0, 1.0, mirrored).asDiagonal() * s.V.transpose();
+  for (const std::size_t i : pairs.rows) {
+    open += closure(predicted_board(fit.X, problem.M[i], fit.Y), problem.B[i]).tail<3>().squaredNorm();
+    turned += vector_from_rotation(problem.B[i].linear() * mean.transpose()).squaredNorm();
+  }
+  return std::sqrt(open / std::max(turned, 1e-300));
+}
+
 /// Camera, board and offset together, from the offset on; `step` bounds its changes. Empty, or why there is no answer.
 std::string close_loop(const Record& hand, const Record& camera, HandEyeSetup setup, double step, double gap,
                        ClockOffset* out) {
   LoopEstimate fit;
+  double closing = 0.0;
   for (int iteration = 0; iteration < 20; ++iteration) {
     const Paired pairs = pair_at(hand, camera, setup, out->offset, gap);
     const LoopProblem& problem = pairs.problem;
@@ -184,6 +273,7 @@ std::string close_loop(const Record& hand, const Record& camera, HandEyeSetup se
     const Eigen::Isometry3d Y = iteration == 0 ? mean_board(problem.M, problem.B, pairs.rows, X) : fit.Y;
     fit = refine_loop(problem, pairs.rows, X, Y, iteration == 0 ? LoopNoise{} : fit.noise, 50);
     if (fit.singular) return "camera and board are not observable: turn the hand about two axes";
+    closing = open_share(pairs, fit);
     const OneMore offset = offset_change(pairs, fit);
     if (!std::isfinite(offset.value))
       return "the offset cannot be told from where camera and board are: turn the hand back and forth";
@@ -191,7 +281,9 @@ std::string close_loop(const Record& hand, const Record& camera, HandEyeSetup se
     out->offset += change, out->sigma = offset.sigma;
     if (std::abs(change) < 1e-3 * out->sigma) break;
   }
-  return {};
+  if (!(closing > kCloses)) return {};
+  return "at the offset where hand and board turn alike, " + number(out->offset, 4) + " s, the loop stays open by " +
+         number(100.0 * closing, 2) + " % of what they turn: are both records of one motion, and the set-up as told?";
 }
 
 }  // namespace
@@ -202,15 +294,18 @@ ClockOffset handeye_clock(const std::vector<double>& hand_time, const std::vecto
   const Record hand{hand_time, T_base_hand}, camera{camera_time, T_camera_board};
   check(hand, "the hand's record"), check(camera, "the camera's record");
   if (!(search > 0.0)) throw std::invalid_argument("search must be greater than 0 s");
-  const Peak peak = find_peak(hand, camera, search);
+  const Frames moving = moving_frames(T_base_hand, setup);
+  const Peak peak = find_peak({hand_time, moving}, camera, search);
   ClockOffset out;
   out.offset = peak.offset;
   out.correlation = peak.correlation;
-  if (peak.correlation < kOneMotion || peak.correlation - peak.next < kStandsOut) {
-    out.message = "the turning of hand and board do not show which times belong together (correlation " +
-                  number(out.correlation, 3) + " at " + number(out.offset, 4) + " s, " + number(peak.next, 3) +
-                  " elsewhere): turn the hand back and forth, at 1 rad/s or more, unevenly, within " +
-                  number(search, 3) + " s of both records' common time";
+  if (!peak.certain) {
+    out.message =
+        "the turning of hand and board does not show which times belong together (correlation of their smoothed "
+        "angular velocities " +
+        number(out.correlation, 3) + " at " + number(out.offset, 4) + " s, " + number(peak.next, 3) +
+        " elsewhere): turn the hand back and forth about several axes, unevenly and for longer, within " +
+        number(search, 3) + " s of both records' common time";
     return out;
   }
   const double gap = kGap * median_step(hand_time);

@@ -876,6 +876,49 @@ TEST_CASE("the offset between two clocks is found within three standard errors, 
                        doctest::Contains("goes back in time at row 5"), std::invalid_argument);
 }
 
+namespace {
+
+/// Two records of 20 and 17 s that turn about three axes with frequencies of `seed`; `same`: of one motion.
+ClockOffset clock_of_noisy_boards(std::uint64_t seed, double rotation_noise, bool same) {
+  Random random(seed);
+  Eigen::Vector3d speed[2], phase[2];
+  for (int m = 0; m < 2; ++m)
+    for (int k = 0; k < 3; ++k) speed[m](k) = random.uniform(0.4, 3.0), phase[m](k) = random.uniform(0.0, 2.0 * kPi);
+  const auto hand_at = [&](int m, double t) {
+    const Eigen::Vector3d turn = (speed[m] * t + phase[m]).array().sin();
+    return make({0.6 + 0.1 * std::sin(0.9 * t), 0.1 * std::cos(1.3 * t), 0.3}, 0.5 * turn);
+  };
+  const Scene s = make_scene(HandEyeSetup::eye_to_hand, 3, {}, 1);
+  std::vector<double> hand_time, camera_time;
+  Frames hand, board;
+  for (int i = 0; i < 2500; ++i) {
+    hand_time.push_back(100.0 + 0.008 * i);
+    hand.push_back(disturbed(hand_at(0, hand_time.back()), 1e-4, 5e-4, &random));
+  }
+  for (int i = 0; i < 500; ++i) {
+    camera_time.push_back(7.0 + i / 30.0);  // t_hand = t_camera + 94.037
+    const Eigen::Isometry3d A = hand_at(same ? 0 : 1, camera_time.back() + 94.037);
+    board.push_back(disturbed(predicted_board(s.X, A, s.Y), 5e-4, rotation_noise, &random));
+  }
+  return handeye_clock(hand_time, hand, camera_time, board, s.setup, 120.0);
+}
+
+}  // namespace
+
+TEST_CASE("noisy orientations are smoothed until they show the offset, and two motions are not taken for one") {
+  int found = 0, count = 0;
+  for (std::uint64_t seed = 1; seed <= (kSanitized ? 1 : 8); ++seed)
+    for (const double noise : {0.002, 0.01, 0.03}) {
+      CAPTURE(seed);
+      CAPTURE(noise);
+      const ClockOffset c = clock_of_noisy_boards(seed, noise, true);
+      if (c.found) CHECK(std::abs(c.offset - 94.037) < 5.0 * c.sigma);
+      found += c.found, ++count;
+      CHECK_FALSE(clock_of_noisy_boards(seed, noise, false).found);
+    }
+  CHECK(found >= count - 2);  // slow turning that nearly repeats is refused
+}
+
 TEST_CASE("with the robot's kinematics a wrong link is found, and the camera with it") {
   for (const HandEyeSetup setup : kSetups) {
     Robot nominal;
