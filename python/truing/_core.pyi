@@ -3119,7 +3119,7 @@ class Reading:
     @property
     def name(self) -> str:
         """
-        To be given as `reading`; empty: as given.
+        To be given as `reading`; empty: as given. "other-setup": the set-up is to be given as the other one.
         """
     @property
     def position_rms(self) -> float:

@@ -136,7 +136,8 @@ struct Unobservable {
 
 /// Another reading of the numbers: what it would mean, and how well the loop then closes.
 struct Reading {
-  std::string name;           ///< to be given as `reading`; empty: as given
+  /// To be given as `reading`; empty: as given. "other-setup": the set-up is to be given as the other one.
+  std::string name;
   std::string explanation;    ///< in words: 'hand poses are base in hand (inverted)'
   double position_rms = 0.0;  ///< [m] median closure
   double rotation_rms = 0.0;  ///< [rad]

@@ -401,6 +401,14 @@ void look_behind(const Frames& B, const Rows& rows, HandEyeResult* result) {
     warn(result, {HandEyeConcernKind::behind_camera, static_cast<double>(behind), static_cast<double>(rows.size())});
 }
 
+/// The other set-up is proposed as a reading, but asked for by the set-up: else frames would have the wrong parents.
+void check_reading(const HandEyeOptions& options) {
+  if (!scope_of(options.reading).setup) return;
+  throw std::invalid_argument("reading '" + options.reading + "' is about the set-up: leave '" + kOtherSetup +
+                              "' out, and give the set-up " +
+                              (options.setup == HandEyeSetup::eye_in_hand ? "eye-to-hand" : "eye-in-hand"));
+}
+
 /// With images the boards are what was found in them.
 void check_with_images(const HandEyePoses& poses, const HandEyeOptions& options) {
   if (poses.images.empty()) return;
@@ -514,7 +522,7 @@ bool closes(const HandEyeOptions& options, const Work& work, const Rows& rows, c
   if (result->readings.empty() && !(open > kHopeless)) return true;
   result->status = HandEyeStatus::not_closing;
   result->as_given = {"", "", agreement.position, agreement.rotation};
-  result->message = not_closing_message(*result);
+  result->message = not_closing_message(*result, options.setup);
   return false;
 }
 
@@ -571,6 +579,7 @@ HandEyeResult handeye(const HandEyePoses& given, const HandEyeOptions& options) 
   std::string error;
   if (!options.is_valid(&error)) throw std::invalid_argument(error);
   check(given);
+  check_reading(options);
   check_with_images(given, options);
   Work work = read_poses(given, options);
   const Rows rows = rows_of(given, false);

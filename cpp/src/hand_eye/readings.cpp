@@ -24,12 +24,14 @@ namespace {
 constexpr double kClearlyBetter = 0.3;               // of the closure as given
 constexpr double kAsGood = 1.5;                      // times the best closure: the simpler reading is preferred
 constexpr double kShortest = 0.01, kLongest = 20.0;  // [m] of positions that make sense
-constexpr std::size_t kPoses = 30;                   // that readings are judged by
-constexpr std::size_t kKept = 10;                    // readings of the rotations that are tried with positions
+constexpr double kInside = 0.02;                     // [m] a camera no further from the flange's origin is inside it
+constexpr double kOnHand = 2.0;     // times as far from the hand as the other is from the base: not on the hand
+constexpr std::size_t kPoses = 30;  // that readings are judged by
+constexpr std::size_t kKept = 10;   // readings of the rotations that are tried with positions
 
 using Change = std::function<Eigen::Isometry3d(const Eigen::Isometry3d&)>;
 
-enum class Part { rotation, inversion, position, rows };
+enum class Part { rotation, inversion, position, rows, setup };
 
 /// A reading of one side's poses.
 struct Atom {
@@ -154,9 +156,7 @@ void add_side(bool hand, std::vector<Atom>* out) {
   const auto add = [&](const std::string& name, const std::string& text, Part part, Change change) {
     out->push_back({side + "-" + name, "{" + side + "} " + text, part, hand, std::move(change)});
   };
-  add("inverted",
-      hand ? "poses are inverted (base in {hand}), or the set-up is the other one (eye-in-hand, eye-to-hand)"
-           : "poses are inverted ({camera} in {board})",
+  add("inverted", hand ? "poses are inverted (base in {hand})" : "poses are inverted ({camera} in {board})",
       Part::inversion, [](const Eigen::Isometry3d& T) { return T.inverse(Eigen::Isometry); });
   add("millimetres", "positions are in mm and were read as m", Part::position, [](Eigen::Isometry3d T) {
     T.translation() *= 1e-3;
@@ -207,6 +207,10 @@ const std::vector<Atom>& atoms() {
     std::vector<Atom> out;
     add_side(true, &out);
     add_side(false, &out);
+    // The same equation as with the hand's poses inverted, but what moves with the hand is the other of the two.
+    out.push_back({kOtherSetup,
+                   "the set-up is the other one, {camera} and {board} in each other's place (eye-in-hand, eye-to-hand)",
+                   Part::setup, true, [](const Eigen::Isometry3d& T) { return T.inverse(Eigen::Isometry); }});
     out.push_back(
         {"board-one-later", "every {board} belongs to the {hand} pose of the next row", Part::rows, false, nullptr});
     out.push_back({"board-one-earlier", "every {board} belongs to the {hand} pose of the row before", Part::rows, false,
@@ -236,15 +240,22 @@ std::vector<std::string> parts_of(const std::string& name) {
   return out;
 }
 
-/// Median closure after twice keeping the better half; [m], [rad] and the length that makes them one number.
-Reading close_up(const std::string& name, const Frames& hand, const Frames& board, HandEyeSetup setup,
-                 double* distance) {
+/// How well the loop closes, and with what.
+struct Closed {
+  double position = 0.0, rotation = 0.0;  ///< [m], [rad] medians
+  double distance = 0.0;                  ///< both as one number
+  double camera = 0.0, board = 0.0;       ///< [m] how far they are from the frames that carry them
+};
+
+/// Medians after twice keeping the better two thirds.
+Closed close_up(const Frames& hand, const Frames& board, HandEyeSetup setup) {
   const Frames M = moving_frames(hand, setup);
   Rows rows(M.size());
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = i;
   const double length = make_screws(M, board, rows).length;
   std::vector<double> position(M.size()), rotation(M.size());
   std::vector<std::pair<double, std::size_t>> order(M.size());
+  Closed out;
   for (int round = 0; round < 3; ++round) {
     const Eigen::Isometry3d X = solve_camera(M, board, rows).X, Y = mean_board(M, board, rows, X);
     for (std::size_t i = 0; i < M.size(); ++i) {
@@ -252,13 +263,14 @@ Reading close_up(const std::string& name, const Frames& hand, const Frames& boar
       position[i] = e.head<3>().norm(), rotation[i] = e.tail<3>().norm();
       order[i] = {std::hypot(position[i] / length, rotation[i]), i};
     }
+    out.camera = X.translation().norm(), out.board = Y.translation().norm();
     std::sort(order.begin(), order.end());
     rows.clear();
     for (std::size_t k = 0; k < std::max<std::size_t>(3, (2 * M.size()) / 3); ++k) rows.push_back(order[k].second);
   }
-  *distance = order[order.size() / 2].first;
-  const std::size_t middle = order[order.size() / 2].second;
-  return {name, explain_reading(name), position[middle], rotation[middle]};
+  const auto [distance, middle] = order[order.size() / 2];
+  out.distance = distance, out.position = position[middle], out.rotation = rotation[middle];
+  return out;
 }
 
 /// Median difference of the angles by which hand and board turn between poses: zero in the right reading of the
@@ -312,7 +324,7 @@ std::string in_words(std::string text, const HandEyeNouns& nouns) {
 /// A reading and how well the loop closes in it.
 struct Found {
   double distance;
-  std::size_t changes;  ///< one more where lengths are not those of an arm in its cell
+  std::size_t changes;  ///< one more for each thing about the outcome that is hardly so
   Reading reading;
 };
 
@@ -341,31 +353,47 @@ std::vector<std::string> readings_of_rotations(const Frames& hand, const Frames&
   return kept;
 }
 
-/// Each with every reading of the positions and every inversion. Both inverted close as well as none: camera and board
-/// change places. Positions are put right before poses are inverted.
+/// Each with every reading of the positions. Both inverted close as well as none: camera and board change places.
+/// Positions are put right before poses are inverted.
 std::vector<std::string> worth_trying(const std::vector<std::string>& rotations) {
-  std::vector<std::string> positions{""};
-  for (const Atom& atom : atoms())
-    if (atom.part == Part::position) positions.push_back(atom.name);
   std::vector<std::string> names;
-  for (const std::string& turn : rotations)
-    for (const std::string& inversion : {std::string(), std::string("hand-inverted"), std::string("board-inverted")})
-      for (const std::string& position : positions) {
-        const std::string name = joined(joined(turn, position), inversion);
-        if (!name.empty()) names.push_back(name);
-      }
+  for (const std::string& turn : rotations) {
+    names.push_back(turn);
+    for (const Atom& atom : atoms())
+      if (atom.part == Part::position) names.push_back(joined(turn, atom.name));
+  }
   return names;
+}
+
+/// What carries the camera in a reading: with the other set-up not what carries it in the one that was told.
+bool camera_on_hand(HandEyeSetup setup, bool other) { return (setup == HandEyeSetup::eye_in_hand) != other; }
+
+/// What is hardly so: lengths that are not those of an arm in its cell, boards behind the lens, a camera inside the
+/// flange, and on the hand what is further from it than the other is from the base.
+std::size_t oddities(const Frames& hand, const Frames& board, const Closed& closed, bool on_hand) {
+  const double moves = on_hand ? closed.camera : closed.board, stands = on_hand ? closed.board : closed.camera;
+  return (plausible(hand) && plausible(board) && in_front(board) ? 0 : 1) + (on_hand && moves < kInside ? 1 : 0) +
+         (moves > kOnHand * stands ? 1 : 0);
 }
 
 Found close_in(const std::string& name, Frames hand, Frames board, HandEyeSetup setup) {
   apply_reading(name, &hand, &board);
-  Found found;
-  found.reading = close_up(name, hand, board, setup, &found.distance);
-  found.changes = parts_of(name).size() + (plausible(hand) && plausible(board) && in_front(board) ? 0 : 1);
-  return found;
+  const Closed closed = close_up(hand, board, setup);
+  const bool on_hand = camera_on_hand(setup, scope_of(name).setup);
+  return {closed.distance,
+          parts_of(name).size() + oddities(hand, board, closed, on_hand),
+          {name, explain_reading(name), closed.position, closed.rotation}};
 }
 
-/// Of those that close about as well as the best the simplest first, then the others.
+/// Hand poses inverted, board poses inverted and the other set-up are one equation, that closes at one end of the loop
+/// or at the other: none of them closes better.
+void close_alike(std::vector<Found>::iterator first, std::vector<Found>::iterator last) {
+  double least = std::numeric_limits<double>::infinity();
+  for (auto f = first; f != last; ++f) least = std::min(least, f->distance);
+  for (auto f = first; f != last; ++f) f->distance = least;
+}
+
+/// Of those that close about as well as the best the simplest first, the set-up before the poses; then the others.
 void sort_readings(std::vector<Found>* found) {
   double best = std::numeric_limits<double>::infinity();
   for (const Found& f : *found) best = std::min(best, f.distance);
@@ -373,8 +401,9 @@ void sort_readings(std::vector<Found>* found) {
     const bool a_good = a.distance <= kAsGood * best, b_good = b.distance <= kAsGood * best;
     if (a_good != b_good) return a_good;
     if (!a_good) return a.distance < b.distance;
-    const bool a_hand = scope_of(a.reading.name).hand_first,
-               b_hand = scope_of(b.reading.name).hand_first;  // a mirror may be on either side
+    const ReadingScope in_a = scope_of(a.reading.name), in_b = scope_of(b.reading.name);
+    if (a.changes == b.changes && in_a.setup != in_b.setup) return in_a.setup;
+    const bool a_hand = in_a.hand_first, b_hand = in_b.hand_first;  // a mirror may be on either side
     return a.changes != b.changes ? a.changes < b.changes : a_hand != b_hand ? a_hand : a.distance < b.distance;
   });
 }
@@ -405,6 +434,7 @@ ReadingScope scope_of(const std::string& name) {
     const Atom& atom = find_atom(part);
     scope.board = scope.board || !atom.hand;
     scope.rows = scope.rows || atom.part == Part::rows;
+    scope.setup = scope.setup || atom.part == Part::setup;
   }
   scope.hand_first = find_atom(parts_of(name)[0]).hand;
   return scope;
@@ -419,9 +449,13 @@ std::vector<Reading> find_readings(const Frames& T_base_hand, const Frames& T_ca
   const double as_given = std::hypot(position / length_of(hand, board, setup), rotation);
   std::vector<Found> found;
   for (const std::string& name : worth_trying(readings_of_rotations(hand, board, stride == 1))) {
-    const Found here = close_in(name, hand, board, setup);
-    if (std::isfinite(here.distance) && here.distance < kClearlyBetter * as_given && here.distance < 0.1)
-      found.push_back(here);
+    std::vector<Found> here;
+    if (!name.empty()) here.push_back(close_in(name, hand, board, setup));
+    for (const char* inversion : {kOtherSetup, "hand-inverted", "board-inverted"})
+      here.push_back(close_in(joined(name, inversion), hand, board, setup));
+    close_alike(here.end() - 3, here.end());
+    for (const Found& f : here)
+      if (std::isfinite(f.distance) && f.distance < kClearlyBetter * as_given && f.distance < 0.1) found.push_back(f);
   }
   sort_readings(&found);
   std::vector<Reading> out;

@@ -17,11 +17,15 @@ namespace truing::hand_eye {
 /// are.
 void apply_reading(const std::string& name, Frames* hand, Frames* board);
 
+/// The set-up is not the one that was told: proposed, but not a way to read poses.
+constexpr const char* kOtherSetup = "other-setup";
+
 /// What a reading, or several joined by "+", is about.
 struct ReadingScope {
   bool hand_first = false;  ///< the first of them is of the hand's poses
   bool board = false;       ///< one is of the boards, or of the rows they belong to
   bool rows = false;        ///< one is of the rows
+  bool setup = false;       ///< one is of the set-up
 };
 ReadingScope scope_of(const std::string& name);
 

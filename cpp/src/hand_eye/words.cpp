@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "hand_eye/readings.hpp"
 #include "math/direction.hpp"
 #include "math/text.hpp"
 
@@ -64,7 +65,7 @@ std::string unobservable_message(const std::vector<Unobservable>& all) {
   return text;
 }
 
-std::string not_closing_message(const HandEyeResult& result) {
+std::string not_closing_message(const HandEyeResult& result, HandEyeSetup setup) {
   const std::string given = "The loop does not close as given (median " + millimetres(result.as_given.position_rms) +
                             ", " + degrees(result.as_given.rotation_rms) + ").";
   if (result.readings.empty())
@@ -72,8 +73,14 @@ std::string not_closing_message(const HandEyeResult& result) {
            " No other reading of the poses that was tried closes it: check that every board belongs to its hand pose, "
            "and how orientations are written.";
   const Reading& best = result.readings.front();
-  return given + " It closes to " + millimetres(best.position_rms) + ", " + degrees(best.rotation_rms) + " if " +
-         best.explanation + ": reading \"" + best.name + "\".";
+  const std::string closes =
+      given + " It closes to " + millimetres(best.position_rms) + ", " + degrees(best.rotation_rms) + " if ";
+  if (!scope_of(best.name).setup) return closes + best.explanation + ": reading \"" + best.name + "\".";
+  const std::string other = setup == HandEyeSetup::eye_in_hand ? "eye-to-hand" : "eye-in-hand",
+                    told = setup == HandEyeSetup::eye_in_hand ? "eye-in-hand" : "eye-to-hand";
+  const std::string rest = best.name.substr(0, best.name.find(kOtherSetup));  // and what is to be read otherwise
+  return closes + "the set-up is " + other + ", not " + told + ": set-up " + other +
+         (rest.empty() ? "" : ", reading \"" + rest.substr(0, rest.size() - 1) + "\"") + ".";
 }
 
 std::string text_of(const HandEyeConcern& concern) {

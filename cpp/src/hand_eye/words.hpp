@@ -24,7 +24,7 @@ Unobservable unobservable(UnobservableReason reason, const Eigen::Vector3d& dire
 std::string unobservable_message(const std::vector<Unobservable>& all);
 
 /// Of a result whose loop does not close: as given, and in the reading that closes it, if there is one.
-std::string not_closing_message(const HandEyeResult& result);
+std::string not_closing_message(const HandEyeResult& result, HandEyeSetup setup);
 
 std::string text_of(const HandEyeConcern& concern);
 

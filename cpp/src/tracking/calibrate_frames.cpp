@@ -280,7 +280,10 @@ FramesResult calibrate_frames(const std::vector<Isometry3d>& T_base_flange,
   poses.T_camera_board = T_tracker_receiver;
   HandEyeOptions options;
   options.setup = HandEyeSetup::eye_to_hand;
-  const HandEyeResult start = handeye(poses, options);
+  HandEyeResult start = handeye(poses, options);
+  const auto is_of_setup = [](const Reading& r) { return r.name.find("other-setup") != std::string::npos; };
+  start.readings.erase(std::remove_if(start.readings.begin(), start.readings.end(), is_of_setup),
+                       start.readings.end());  // a tracker does not ride on the flange
   FramesResult out;
   for (const HandEyeConcern& concern : start.concerns) {
     const std::string text = concern_text(concern);

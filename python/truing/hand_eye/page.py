@@ -175,7 +175,7 @@ def _what_to_do(result: Mapping[str, Any]) -> str:
         best = readings[0]
         items.append(
             f"<li><b>The loop closes to {length_text(best['rms_m'])} if {escaped(best['explanation'])}.</b>"
-            f" If that is so, run again with <code>--reading {escaped(best['reading'])}</code>, or correct"
+            f" If that is so, run again with <code>{escaped(best['option'])}</code>, or correct"
             " the file.</li>"
         )
     elif result["status"] == "not closing":
@@ -194,7 +194,7 @@ def _readings(result: Mapping[str, Any]) -> str:
     if not readings:
         return ""
     body = "".join(
-        f"<tr><th><code>--reading {escaped(r['reading'])}</code></th><td"
+        f"<tr><th><code>{escaped(r['option'])}</code></th><td"
         f' class="wrap">{escaped(r["explanation"])}</td>'
         f"{table_cell(r['rms_m'] or 0, length_text(r['rms_m']))}"
         f"{table_cell(r['rotation_rms_rad'] or 0, _mrad(r['rotation_rms_rad']))}</tr>"

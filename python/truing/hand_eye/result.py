@@ -25,6 +25,7 @@ from truing.report.json_text import to_json, without_nan
 HANDEYE_FORMAT = "truing-handeye/1"
 AXES = ("x", "y", "z")
 INTRINSICS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+OTHER_SETUP = "other-setup"
 CHI3_95 = 2.7955  # [-] 95 % of the lengths of a vector of three unit normals are below
 _PIXELS_DRAWN = 4000
 
@@ -279,6 +280,7 @@ def _convention(solved: Solved) -> dict[str, Any]:
         "other_readings": [
             {
                 "reading": o.name,
+                "option": _option(o.name, solved.options.setup),
                 "explanation": o.explanation,
                 "rms_m": o.position_rms,
                 "rotation_rms_rad": o.rotation_rms,
@@ -286,6 +288,16 @@ def _convention(solved: Solved) -> dict[str, Any]:
             for o in solved.result.readings
         ],
     }
+
+
+def _option(reading: str, setup: str) -> str:
+    """What is to be given on the command line: the set-up is an option of its own."""
+    parts = reading.split("+")
+    read = "+".join(part for part in parts if part != OTHER_SETUP)
+    options = [f"--reading {read}"] if read else []
+    if OTHER_SETUP in parts:
+        options.insert(0, f"--setup {'eye-to-hand' if setup == 'eye-in-hand' else 'eye-in-hand'}")
+    return " ".join(options)
 
 
 def _images(solved: Solved) -> dict[str, Any]:

@@ -605,6 +605,46 @@ TEST_CASE("a wrong reading is recognised, named, and closes when it is applied")
     }
 }
 
+TEST_CASE("the set-up exchanged is proposed first, and closes when it is told so") {
+  int sets = 0;
+  for (const HandEyeSetup setup : kSetups)
+    for (std::uint64_t seed = 1; seed <= (kSanitized ? 2 : 20); ++seed)
+      for (const bool facing : {false, true}) {  // z of the board away from the camera, and towards it
+        CAPTURE(seed);
+        CAPTURE(facing);
+        const int n = 6 + static_cast<int>(seed);
+        Scene s = make_scene(setup, n, kUsual, seed);
+        if (facing)
+          for (Eigen::Isometry3d& B : s.poses.T_camera_board) B = B * make({0, 0, 0}, {kPi, 0, 0});
+        HandEyeOptions o;
+        o.setup = setup == HandEyeSetup::eye_in_hand ? HandEyeSetup::eye_to_hand : HandEyeSetup::eye_in_hand;
+        const HandEyeResult refused = handeye(s.poses, o);
+        REQUIRE(refused.status == HandEyeStatus::not_closing);
+        REQUIRE_FALSE(refused.readings.empty());
+        CHECK(refused.readings[0].name == "other-setup");
+        CHECK(refused.message.find(setup == HandEyeSetup::eye_in_hand ? "set-up eye-in-hand."
+                                                                      : "set-up eye-to-hand.") != std::string::npos);
+        const HandEyeResult told = handeye(s.poses, options_for(s));
+        CHECK(told.status == HandEyeStatus::done);
+        CHECK(position_error(told.camera.T, s.X) < 0.01);
+        ++sets;
+      }
+  CHECK(sets >= (kSanitized ? 8 : 40));
+}
+
+TEST_CASE("what is wrong beside the set-up is proposed with it, and the set-up is no way to read poses") {
+  Scene s = make_scene(HandEyeSetup::eye_to_hand, 15, kUsual, 4);
+  for (Eigen::Isometry3d& A : s.poses.T_base_hand) A.translation() *= 1e3;
+  const HandEyeResult r = handeye(s.poses, {});
+  REQUIRE(r.status == HandEyeStatus::not_closing);
+  REQUIRE_FALSE(r.readings.empty());
+  CHECK(r.readings[0].name == "hand-millimetres+other-setup");
+  CHECK(r.message.find("set-up eye-to-hand, reading \"hand-millimetres\".") != std::string::npos);
+  HandEyeOptions o;
+  o.reading = "other-setup";
+  CHECK_THROWS_WITH_AS(handeye(s.poses, o), doctest::Contains("give the set-up eye-to-hand"), std::invalid_argument);
+}
+
 TEST_CASE("poses that belong to nothing are refused without a reading") {
   Scene s = make_scene(HandEyeSetup::eye_in_hand, 20, {}, 61);
   const Scene other = make_scene(HandEyeSetup::eye_in_hand, 20, {}, 62);
@@ -631,7 +671,7 @@ TEST_CASE("a board of another size is said") {
 
 TEST_CASE("a reading is explained in the caller's nouns") {
   CHECK(explain_reading("hand-inverted+board-millimetres", {"flange", "tracker", "receiver"}) ==
-        "flange poses are inverted (base in flange), or the set-up is the other one (eye-in-hand, eye-to-hand); "
+        "flange poses are inverted (base in flange); "
         "receiver positions are in mm and were read as m");
   CHECK_THROWS_AS(explain_reading("board-upside-down"), std::invalid_argument);
   for (const Reading& reading : handeye_readings()) {

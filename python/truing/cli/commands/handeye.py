@@ -349,9 +349,7 @@ def print_what_is_missing(result: Mapping[str, Any]) -> None:
     for u in result["observability"]["unobservable"]:
         say(f"{u['what']} cannot be seen: {u['advice'].replace('(known height)', '(--known-height)')}")
     for other in result["convention"]["other_readings"]:
-        say(
-            f"the loop closes to {mm(other['rms_m'])} if {other['explanation']}: --reading {other['reading']}"
-        )
+        say(f"the loop closes to {mm(other['rms_m'])} if {other['explanation']}: {other['option']}")
 
 
 def print_camera(result: Mapping[str, Any]) -> None:
