@@ -3005,8 +3005,8 @@ class HandEyeResidual:
     @property
     def position_left_out(self) -> float:
         """
-        [m] when the pose is left out of the fit, of the lens too where that was found from the images (held-out poses:
-        the same as `position`). NaN where the other poses do not hold the answer.
+        [m] when the pose is left out of the fit, of the lens too where that was found from the images
+        (held-out poses: the same as `position`). NaN where the other poses do not hold the answer.
         """
     @property
     def rejected(self) -> bool:
@@ -3119,7 +3119,8 @@ class Reading:
     @property
     def name(self) -> str:
         """
-        To be given as `reading`; empty: as given. "other-setup": the set-up is to be given as the other one.
+        To be given as `reading`; empty: as given. "other-setup": the set-up is to be given as the other
+        one.
         """
     @property
     def position_rms(self) -> float:
