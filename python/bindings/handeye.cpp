@@ -272,17 +272,6 @@ void bind_result(py::module_& m) {
 
 // ---- Functions
 
-TupleOf<NextHandPose> planned(const HandEyePlanOptions& plan, const HandEyePoses& poses, const HandEyeResult& result,
-                              const std::optional<HandEyeOptions>& given) {
-  const HandEyeOptions options = given.value_or(HandEyeOptions{});
-  std::vector<NextHandPose> next;
-  {
-    const py::gil_scoped_release unlocked;
-    next = handeye_plan(poses, result, options, plan);
-  }
-  return tuple_of(next);
-}
-
 void bind_solving(py::module_& m) {
   m.def(
       "project",
@@ -322,10 +311,24 @@ Raises InputError on data that cannot be used.)");
 }
 
 void bind_more(py::module_& m) {
-  define_function<HandEyePlanOptions>(m, "handeye_plan", &planned,
-                                      "Robot poses, one after the other, that shrink the covariance of the working "
-                                      "point most. Raises InputError.",
-                                      py::arg("poses"), py::arg("result"), py::arg("options") = py::none());
+  define_options<HandEyePlanOptions>(m, "HandEyePlanOptions");
+  m.def(
+      "handeye_plan",
+      [](const HandEyePoses& poses, const HandEyeResult& result, const std::optional<HandEyeOptions>& given,
+         const std::optional<HandEyePlanOptions>& given_plan) {
+        const HandEyeOptions options = given.value_or(HandEyeOptions{});
+        const HandEyePlanOptions plan = given_plan.value_or(HandEyePlanOptions{});
+        std::vector<NextHandPose> next;
+        {
+          const py::gil_scoped_release unlocked;
+          next = handeye_plan(poses, result, options, plan);
+        }
+        return tuple_of(next);
+      },
+      py::arg("poses"), py::arg("result"), py::arg("options") = py::none(), py::arg("plan") = py::none(),
+      R"(Robot poses, one after the other, that shrink the covariance of the working point most.
+
+Raises InputError.)");
   m.def(
       "handeye_clock",
       [](const std::vector<double>& hand_time, const FrameArray& T_base_hand, const std::vector<double>& camera_time,

@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -3514,6 +3514,70 @@ class HandEyeKinematics:
         """
         Shape=(3, 3) [m^2] of that point in the frame that carries the camera.
         """
+class HandEyePlanOptions:
+    """
+    How `handeye_plan` chooses.
+    
+    count = 5: Number of poses.
+    candidates = 400: Candidates tried for each.
+    tilt = 0.7853981633974483: [rad] the board is seen at no more than this from its normal, beyond what was seen (45 deg).
+    reach = 0.15: [m] hands stay this close to a measured one.
+    seed = 0: Of the candidates.
+    """
+    def __init__(self, *, count: typing.SupportsInt | typing.SupportsIndex = 5, candidates: typing.SupportsInt | typing.SupportsIndex = 400, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.7853981633974483, reach: typing.SupportsFloat | typing.SupportsIndex = 0.15, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> HandEyePlanOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> HandEyePlanOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def candidates(self) -> int:
+        """
+        Candidates tried for each.
+        """
+    @candidates.setter
+    def candidates(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def count(self) -> int:
+        """
+        Number of poses.
+        """
+    @count.setter
+    def count(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reach(self) -> float:
+        """
+        [m] hands stay this close to a measured one.
+        """
+    @reach.setter
+    def reach(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of the candidates.
+        """
+    @seed.setter
+    def seed(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tilt(self) -> float:
+        """
+        [rad] the board is seen at no more than this from its normal, beyond what was seen (45 deg).
+        """
+    @tilt.setter
+    def tilt(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
 class Task:
     """
     What is wanted of one target; `replace(...)` makes another one.
@@ -6370,15 +6434,11 @@ def handeye_closed_form(poses: HandEyePoses, setup: typing.Literal['eye-in-hand'
     
     Raises InputError on data that cannot be used.
     """
-def handeye_plan(poses: HandEyePoses, result: HandEyeResult, options: HandEyeOptions | None = None, *, count: typing.SupportsInt | typing.SupportsIndex = 5, candidates: typing.SupportsInt | typing.SupportsIndex = 400, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.7853981633974483, reach: typing.SupportsFloat | typing.SupportsIndex = 0.15, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> tuple[NextHandPose, ...]:
+def handeye_plan(poses: HandEyePoses, result: HandEyeResult, options: HandEyeOptions | None = None, plan: HandEyePlanOptions | None = None) -> tuple[NextHandPose, ...]:
     """
-    Robot poses, one after the other, that shrink the covariance of the working point most. Raises InputError.
+    Robot poses, one after the other, that shrink the covariance of the working point most.
     
-    count = 5: Number of poses.
-    candidates = 400: Candidates tried for each.
-    tilt = 0.7853981633974483: [rad] the board is seen at no more than this from its normal, beyond what was seen (45 deg).
-    reach = 0.15: [m] hands stay this close to a measured one.
-    seed = 0: Of the candidates.
+    Raises InputError.
     """
 def handeye_readings() -> tuple[Reading, ...]:
     """

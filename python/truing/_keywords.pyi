@@ -201,6 +201,18 @@ class HandEyeKeywords(TypedDict, total=False):
     max_iterations: int
     """The fit stops here at the latest."""
 
+class HandEyePlanKeywords(TypedDict, total=False):
+    count: int
+    """Number of poses."""
+    candidates: int
+    """Candidates tried for each."""
+    tilt: float
+    """[rad] the board is seen at no more than this from its normal, beyond what was seen (45 deg)."""
+    reach: float
+    """[m] hands stay this close to a measured one."""
+    seed: int
+    """Of the candidates."""
+
 class InverseKeywords(TypedDict, total=False):
     position_tolerance: float
     """[m] a solution misses the task by no more."""

@@ -259,6 +259,7 @@ struct NextHandPose {
   double working_point_sigma = 0.0;
 };
 
+/// How `handeye_plan` chooses.
 struct HandEyePlanOptions {
   int count = 5;         ///< number of poses
   int candidates = 400;  ///< candidates tried for each

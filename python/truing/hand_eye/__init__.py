@@ -10,6 +10,7 @@ from truing._core import (
     HandEyeKinematics as HandEyeKinematics,
     HandEyeNoise as HandEyeNoise,
     HandEyeOptions as HandEyeOptions,
+    HandEyePlanOptions as HandEyePlanOptions,
     HandEyePoses as HandEyePoses,
     HandEyeResidual as HandEyeResidual,
     HandEyeResult as HandEyeResult,

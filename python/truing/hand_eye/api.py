@@ -33,7 +33,7 @@ from truing.keywords import made, takes
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from truing._keywords import HandEyeKeywords, IdentifyKeywords
+    from truing._keywords import HandEyeKeywords, HandEyePlanKeywords, IdentifyKeywords
 
 Setup = Literal["eye-in-hand", "eye-to-hand"]
 
@@ -77,40 +77,27 @@ def handeye_options(poses: HandEyePoses | HandEyeData, **options: Unpack[HandEye
     return made(HandEyeOptions, {"refine_camera": found_from_images, **options})
 
 
+@takes(_core.HandEyePlanOptions)
 def handeye_plan(
     poses: HandEyePoses | HandEyeData,
     result: HandEyeResult,
     *,
-    count: int = 5,
     options: HandEyeOptions | None = None,
     setup: Setup = "eye-in-hand",
-    candidates: int | None = None,
-    tilt: float | None = None,
-    reach: float | None = None,
-    seed: int = 0,
+    **plan: Unpack[HandEyePlanKeywords],
 ) -> tuple[NextHandPose, ...]:
     """Robot poses to measure next, each the one that reduces the covariance at the working point most.
 
+        truing.handeye_plan(data, found, setup="eye-to-hand", count=3)
+
     poses, result: what was measured, and what `handeye` made of it. options: those of `handeye`; None: the
-    usual ones with `setup`.
-    count: how many. candidates: tried for each. seed: of them.
-    tilt: [rad] the board is seen at no more than this from its normal, beyond what was seen. reach: [m] hands
-    stay this close to a measured one.
-    None: the usual ones, see `HandEyePlanOptions` in handeye.hpp.
+    usual ones with `setup`. plan: fields of `HandEyePlanOptions`.
 
     Raises InputError.
     """
     if options is None:
         options = handeye_options(poses, setup=setup)
-    usual = {"candidates": candidates, "tilt": tilt, "reach": reach}
-    return _core.handeye_plan(
-        _poses(poses),
-        result,
-        options,
-        count=count,
-        seed=seed,
-        **{name: value for name, value in usual.items() if value is not None},
-    )
+    return _core.handeye_plan(_poses(poses), result, options, made(_core.HandEyePlanOptions, plan))
 
 
 def handeye_clock(

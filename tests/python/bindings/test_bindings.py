@@ -19,7 +19,7 @@ import truing
 from truing import _core
 from truing.diagnosis import DiagnoseOptions
 from truing.effects import Inputs, parse_effects
-from truing.hand_eye import HandEyeOptions
+from truing.hand_eye import HandEyeOptions, HandEyePlanOptions, handeye_plan
 from truing.identification import Identification, IdentifyOptions
 from truing.inverse_kinematics import InverseOptions, PathOptions
 from truing.keywords import fields, made
@@ -134,6 +134,13 @@ def test_functions_take_the_fields_of_their_options_and_say_what_they_mean(
         assert taken[name].default == getattr(options, name) or name == "scene", name
         first = (getattr(type(options), name).__doc__ or "").split()[0]
         assert f"\n{name} = " in function.__doc__ and first in function.__doc__, name
+
+
+def test_the_plan_of_hand_poses_takes_the_fields_of_its_options() -> None:
+    taken, names = inspect.signature(handeye_plan).parameters, fields(HandEyePlanOptions)
+    assert names == ["count", "candidates", "tilt", "reach", "seed"]
+    assert [taken[name].default for name in names] == [getattr(HandEyePlanOptions(), name) for name in names]
+    assert all(f"\n{name} = " in (handeye_plan.__doc__ or "") for name in names)
 
 
 def test_names_may_be_one_text() -> None:
