@@ -27,7 +27,7 @@ constexpr double kShortest = 0.01, kLongest = 20.0;  // [m] of positions that ma
 constexpr double kInside = 0.02;                     // [m] a camera no further from the flange's origin is inside it
 constexpr double kOnHand = 2.0;     // times as far from the hand as the other is from the base: not on the hand
 constexpr std::size_t kPoses = 30;  // that readings are judged by
-constexpr std::size_t kKept = 10;   // readings of the rotations that are tried with positions
+constexpr std::size_t kKept = 16;   // readings of the rotations that are tried with positions
 
 using Change = std::function<Eigen::Isometry3d(const Eigen::Isometry3d&)>;
 
@@ -334,17 +334,28 @@ double length_of(const Frames& hand, const Frames& board, HandEyeSetup setup) {
   return make_screws(moving_frames(hand, setup), board, all).length;
 }
 
+/// Readings of the rotations: of one side, and the same mistake on both, as where one program wrote both. Mirrored on
+/// both sides the loop closes as it does on none.
+std::vector<std::string> rotations_or_rows(bool with_rows) {
+  std::vector<std::string> names;
+  for (const Atom& atom : atoms()) {
+    if (atom.part == Part::rotation || (atom.part == Part::rows && with_rows)) names.push_back(atom.name);
+    if (atom.part == Part::rotation && atom.hand && atom.name != "hand-left-handed")
+      names.push_back(atom.name + "+board" + atom.name.substr(std::string("hand").size()));
+  }
+  return names;
+}
+
 /// As given, and the readings that bring the angles of hand and board together: how far a motion turns does not depend
-/// on frames or inversions. Those that keep every angle (transposed, left-handed) tie with the given one.
+/// on frames or inversions. Those that keep every angle (transposed, left-handed, another order of the quaternion) tie
+/// with the given one.
 std::vector<std::string> readings_of_rotations(const Frames& hand, const Frames& board, bool with_rows) {
   const double given = incongruence(hand, board);
   std::vector<std::pair<double, std::string>> turns;
-  for (const Atom& atom : atoms()) {
-    if (atom.part != Part::rotation && atom.part != Part::rows) continue;
-    if (atom.part == Part::rows && !with_rows) continue;
+  for (const std::string& name : rotations_or_rows(with_rows)) {
     Frames h = hand, b = board;
-    apply_reading(atom.name, &h, &b);
-    turns.emplace_back(incongruence(h, b), atom.name);
+    apply_reading(name, &h, &b);
+    turns.emplace_back(incongruence(h, b), name);
   }
   std::stable_sort(turns.begin(), turns.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<std::string> kept{""};

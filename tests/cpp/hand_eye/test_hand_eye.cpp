@@ -645,6 +645,40 @@ TEST_CASE("what is wrong beside the set-up is proposed with it, and the set-up i
   CHECK_THROWS_WITH_AS(handeye(s.poses, o), doctest::Contains("give the set-up eye-to-hand"), std::invalid_argument);
 }
 
+TEST_CASE("the same mistake on hand and board is recognised, as where one program wrote both") {
+  const auto as_xyzw = [](const Eigen::Matrix3d& R) {
+    const Eigen::Quaterniond q(R);
+    return Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()).toRotationMatrix();
+  };
+  const auto as_xyz = [](const Eigen::Matrix3d& R) {  // Rz(c) Ry(b) Rx(a) written, Rx(a) Ry(b) Rz(c) read
+    const Eigen::Vector3d a = R.eulerAngles(2, 1, 0);
+    return (Eigen::AngleAxisd(a(2), Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(a(1), Eigen::Vector3d::UnitY()) *
+            Eigen::AngleAxisd(a(0), Eigen::Vector3d::UnitZ()))
+        .toRotationMatrix();
+  };
+  const auto transposed = [](const Eigen::Matrix3d& R) -> Eigen::Matrix3d { return R.transpose(); };
+  const std::pair<std::string, std::function<Eigen::Matrix3d(const Eigen::Matrix3d&)>> mistakes[] = {
+      {"xyzw", as_xyzw}, {"zyx-as-xyz", as_xyz}, {"transposed", transposed}};
+  for (const HandEyeSetup setup : kSetups)
+    for (const Noise& noise : {Noise{}, kUsual})
+      for (const auto& [name, mistake] : mistakes) {
+        if (kSanitized && setup == HandEyeSetup::eye_in_hand) continue;
+        CAPTURE(name);
+        Scene s = make_scene(setup, 25, noise, 55, {1.2, 1.0, 2.0});
+        for (Frames* frames : {&s.poses.T_base_hand, &s.poses.T_camera_board})
+          for (Eigen::Isometry3d& T : *frames) T.linear() = mistake(T.linear());
+        HandEyeOptions o = options_for(s);
+        const HandEyeResult refused = handeye(s.poses, o);
+        REQUIRE(refused.status == HandEyeStatus::not_closing);
+        REQUIRE(!refused.readings.empty());
+        o.reading = "hand-" + name + "+board-" + name;
+        CHECK(refused.readings[0].name == o.reading);
+        const HandEyeResult r = handeye(s.poses, o);
+        CHECK(r.status == HandEyeStatus::done);
+        CHECK(position_error(r.camera.T, s.X) < 5e-3);
+      }
+}
+
 TEST_CASE("poses that belong to nothing are refused without a reading") {
   Scene s = make_scene(HandEyeSetup::eye_in_hand, 20, {}, 61);
   const Scene other = make_scene(HandEyeSetup::eye_in_hand, 20, {}, 62);
