@@ -39,6 +39,10 @@ constexpr double kExact = 1e-8;    // [m], [rad] closures below this are roundin
 constexpr double kBeyondPixels = 3.0;  // times what pixels can tell of a board's orientation: more is not theirs
 constexpr double kBentLens = 1.2;  // a lens whose pixels scatter with no more than this times the variance fits as well
 constexpr int kRejectRounds = 10;
+constexpr double kCertainScale = 4.0;  // standard errors from 1: a factor on the board's lengths is said
+constexpr double kLikelyScale = 2.5;   // said where the loop then closes to kScaledCloses of the closure as given
+constexpr double kScaledCloses = 0.8;
+constexpr double kLeastScale = 0.002;  // and no smaller one
 constexpr double kPlainGain =
     16.0;  // over the poses: by how much more plain weights must predict better, as a fraction
 
@@ -387,10 +391,27 @@ void widen(const LoopNoise& noise, const Rows& rows, LoopEstimate* fit, HandEyeR
     warn(result, {HandEyeConcernKind::noise_too_small, std::sqrt(per_degree)});
 }
 
-void look_at_board_scale(HandEyeResult* result) {
-  const double off = result->board_scale - 1.0;
-  if (!(std::abs(off) > std::max(4.0 * result->board_scale_sigma, 0.002))) return;
-  warn(result, {HandEyeConcernKind::board_scale, result->board_scale, result->board_scale_sigma});
+/// [m] root mean square of the closures with the board's lengths times `scale`, fitted anew.
+double closure_with_lengths_times(double scale, const HandEyeOptions& options, const Work& work) {
+  LoopProblem problem = work.problem;
+  for (Eigen::Isometry3d& T : problem.B) T.translation() *= scale;
+  const LoopEstimate fit =
+      refine_loop(problem, work.fitted, work.fit.X, work.fit.Y, work.fit.noise, options.max_iterations);
+  double sum = 0.0;
+  for (const std::size_t i : work.fitted)
+    sum += loop_row(problem, i, fit.X, fit.Y, fit.noise).e.head<3>().squaredNorm();
+  return std::sqrt(sum / static_cast<double>(work.fitted.size()));
+}
+
+/// A factor that is beyond doubt is said, and one that is likely where it does much for the closure.
+void look_at_board_scale(const HandEyeOptions& options, const Work& work, HandEyeResult* result) {
+  const double off = std::abs(result->board_scale - 1.0), sigma = result->board_scale_sigma;
+  if (!(off > std::max(kLikelyScale * sigma, kLeastScale))) return;
+  const bool certain = off > kCertainScale * sigma;
+  if (!certain && !(closure_with_lengths_times(result->board_scale, options, work) <
+                    kScaledCloses * closure_with_lengths_times(1.0, options, work)))
+    return;
+  warn(result, {HandEyeConcernKind::board_scale, result->board_scale, sigma});
 }
 
 /// Hand and board poses both inverted close the loop as well, with camera and board in each other's place.
@@ -543,7 +564,7 @@ void describe(const HandEyeOptions& options, const Agreement& agreement, double 
   describe_noise(options, work.problem, work.fit.noise, result);
   describe_poses(options, agreement, work, result);
   find_board_scale(work.problem, work.fitted, work.fit, result);
-  look_at_board_scale(result);
+  look_at_board_scale(options, work, result);
   look_behind(work.problem.B, work.fitted, result);
   look_at_errors(options, std::max(result->working_point.norm(), size), result);
   if (result->status != HandEyeStatus::done) return;

@@ -703,6 +703,40 @@ TEST_CASE("a board of another size is said") {
   CHECK(scale->value == r.board_scale);
 }
 
+TEST_CASE("a board that is likely of another size is said where that does much for the closure") {
+  const auto says_scale = [](const HandEyeResult& r) {
+    return std::any_of(r.concerns.begin(), r.concerns.end(),
+                       [](const HandEyeConcern& concern) { return concern.kind == HandEyeConcernKind::board_scale; });
+  };
+  const auto standard_errors = [](const HandEyeResult& r) {
+    return std::abs(r.board_scale - 1.0) / r.board_scale_sigma;
+  };
+  const std::uint64_t seeds = kSanitized ? 3 : 30;
+  const auto with_lengths_times = [](double factor, Scene s) {
+    for (Eigen::Isometry3d& T : s.poses.T_camera_board) T.translation() *= factor;
+    return handeye(s.poses, options_for(s));
+  };
+  int likely = 0, said = 0, false_alarms = 0;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    // A few poses: the misfit passes for noise, so that no factor is many standard errors from 1.
+    const Scene few = make_scene(HandEyeSetup::eye_in_hand, 7, kUsual, 700 + seed, {0.3, 0.3, 0.3});
+    false_alarms += says_scale(handeye(few.poses, options_for(few)));
+    const HandEyeResult r = with_lengths_times(0.985, few);
+    if (standard_errors(r) > 2.5 && standard_errors(r) < 4.0) ++likely, said += says_scale(r);
+  }
+  CHECK(likely > 0.8 * static_cast<double>(seeds));
+  CHECK(said == likely);
+  CHECK(false_alarms == 0);
+  // More poses: three standard errors do little for the closure.
+  const Scene many = make_scene(HandEyeSetup::eye_in_hand, 20, kUsual, 760, {0.1, 0.1, 0.1});
+  const HandEyeResult right = handeye(many.poses, options_for(many));
+  const HandEyeResult r = with_lengths_times(right.board_scale - 3.0 * right.board_scale_sigma, many);
+  REQUIRE(r.board_scale - 1.0 > 0.002);
+  REQUIRE(standard_errors(r) > 2.5);
+  REQUIRE(standard_errors(r) < 4.0);
+  CHECK_FALSE(says_scale(r));
+}
+
 TEST_CASE("a reading is explained in the caller's nouns") {
   CHECK(explain_reading("hand-inverted+board-millimetres", {"flange", "tracker", "receiver"}) ==
         "flange poses are inverted (base in flange); "
