@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rotations and frames of many rows at once: quaternions (w x y z), rotation vectors, interpolation."""
+"""Rotations and frames of many rows: quaternions (w x y z), angles, rotation vectors, interpolation."""
 
 from __future__ import annotations
 
@@ -19,6 +19,33 @@ def rotations_from_quaternions(q: Floats) -> Floats:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(rows), 2, 0)
+
+
+def rotations_from_angles(angles: Floats, convention: str) -> Floats:
+    """shape=(n, 3, 3) of three angles a row [rad].
+
+    convention: "rotation-vector" (axis times angle, as Universal Robots), or the order in which rotations
+    about turned axes are multiplied: "zyx" is Rz(rz) Ry(ry) Rx(rx). Where an axis comes twice ("zyz"), the
+    columns rx, ry, rz hold first, second and third angle.
+    """
+    if convention == "rotation-vector":
+        angle = np.linalg.norm(angles, axis=1)
+        half = 0.5 * angle
+        # sin(a/2)/a, also where a is 0
+        scale = np.where(angle > 0, np.sin(half) / np.where(angle > 0, angle, 1.0), 0.5)
+        return rotations_from_quaternions(np.column_stack([np.cos(half), scale[:, None] * angles]))
+    out = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+    twice = len(set(convention)) < 3
+    for place, letter in enumerate(convention):
+        axis = "xyz".index(letter)
+        turn = angles[:, place if twice else axis]
+        c, s = np.cos(turn), np.sin(turn)
+        step = np.zeros((len(angles), 3, 3))
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        step[:, axis, axis] = 1.0
+        step[:, j, j], step[:, j, k], step[:, k, j], step[:, k, k] = c, -s, s, c
+        out = out @ step
+    return out
 
 
 def quaternions_from_rotations(rotations: Floats) -> Floats:

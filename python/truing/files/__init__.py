@@ -23,6 +23,7 @@ from truing.files.handeye_file import (
     load_camera as load_camera,
     load_handeye as load_handeye,
     load_stream as load_stream,
+    pair_rows as pair_rows,
     save_camera as save_camera,
 )
 from truing.files.measurement_file import (

@@ -247,7 +247,8 @@ def plausible_camera(camera: Camera) -> tuple[str, str] | None:
 # ---- Finding -------------------------------------------------------------------------------------
 
 
-def _opencv() -> Any:
+def opencv(purpose: str) -> Any:
+    """OpenCV; InputError where it is not there. purpose: what needs it, for the message."""
     # A header of a few bytes may promise any number of pixels. OpenCV reads its limit, else a thousand
     # million, from here when it is loaded.
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(_MOST_PIXELS))
@@ -257,8 +258,7 @@ def _opencv() -> Any:
         missing = error.name == "cv2"
         why = "which is not installed" if missing else f"which cannot be imported ({error})"
         raise InputError(
-            f'finding a board in images needs OpenCV, {why}: pip install "truing[images]" (or'
-            " opencv-python-headless)"
+            f'{purpose} needs OpenCV, {why}: pip install "truing[images]" (or opencv-python-headless)'
         ) from None
     return cv2
 
@@ -283,7 +283,7 @@ def find_board(
     says which board they do show), when images differ in size, when the camera is not theirs, or OpenCV is
     not there.
     """
-    cv = _opencv()
+    cv = opencv("finding a board in images")
     called = (
         [str(name) for name in names]
         if names is not None

@@ -25,9 +25,10 @@ from truing import _core
 from truing.errors import InputError, InputWarning
 from truing.files.boards import Board, BoardViews, find_board, parse_board, plausible_camera
 from truing.files.common import PathLike, atomic_write, listed
+from truing.files.other_poses import OtherPoses, Setup, Side, read_other_poses
 from truing.files.table import Floats, Table
 from truing.files.yaml_tree import Document, FreeMapping, Number, Strict, Text, choice, expected, found
-from truing.rotations import rotations_from_quaternions
+from truing.rotations import rotations_from_angles, rotations_from_quaternions
 
 CAMERA_FORMAT = "truing-camera/1"
 _CAMERA = "camera file"
@@ -65,7 +66,7 @@ class HandEyeData:
     board: Board | None = None
     camera_given: bool = True  # False: the camera's values were found from the images
     unused: tuple[str, ...] = ()  # rows that are not used, in words
-    convention: str = "quaternion"
+    convention: str = "quaternion"  # of the orientations, or which program wrote the poses
 
     @property
     def count(self) -> int:
@@ -75,41 +76,14 @@ class HandEyeData:
 
 @dataclass(frozen=True)
 class Stream:
-    """Poses with times, from one side alone."""
+    """Poses of one side alone, with their times where the file has them."""
 
     path: Path
-    time: Floats  # shape=(n,) [s], increasing
+    time: Floats | None  # shape=(n,) [s], increasing
     T: Floats  # shape=(n, 4, 4)
 
 
 # ---- Rotations -----------------------------------------------------------------------------------
-
-
-def rotations_from_angles(angles: Floats, convention: str) -> Floats:
-    """shape=(n, 3, 3) of three angles a row [rad].
-
-    convention: "rotation-vector" (axis times angle, as Universal Robots), or the order in which rotations
-    about turned axes are multiplied: "zyx" is Rz(rz) Ry(ry) Rx(rx). Where an axis comes twice ("zyz"), the
-    columns rx, ry, rz hold first, second and third angle.
-    """
-    if convention == "rotation-vector":
-        angle = np.linalg.norm(angles, axis=1)
-        half = 0.5 * angle
-        # sin(a/2)/a, also where a is 0
-        scale = np.where(angle > 0, np.sin(half) / np.where(angle > 0, angle, 1.0), 0.5)
-        return rotations_from_quaternions(np.column_stack([np.cos(half), scale[:, None] * angles]))
-    out = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
-    twice = len(set(convention)) < 3
-    for place, letter in enumerate(convention):
-        axis = "xyz".index(letter)
-        turn = angles[:, place if twice else axis]
-        c, s = np.cos(turn), np.sin(turn)
-        step = np.zeros((len(angles), 3, 3))
-        j, k = (axis + 1) % 3, (axis + 2) % 3
-        step[:, axis, axis] = 1.0
-        step[:, j, j], step[:, j, k], step[:, k, j], step[:, k, k] = c, -s, s, c
-        out = out @ step
-    return out
 
 
 def check_angles(convention: str | None, *, needed_by: str = "") -> str | None:
@@ -462,9 +436,11 @@ def load_handeye(
     board: str | Board | None = None,
     camera: PathLike | _core.Camera | None = None,
     angles: str | None = None,
+    setup: Setup | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> HandEyeData:
-    """Read robot poses, and what the camera saw of the board at each, from CSV or Parquet.
+    """Read robot poses, and what the camera saw of the board at each, from CSV or Parquet, or from a file of
+    easy_handeye, easy_handeye2, MoveIt or OpenCV that holds both.
 
     Columns, with their unit in the name: hand_x_m hand_y_m hand_z_m (or _mm) and hand_qw hand_qx hand_qy
     hand_qz, the flange in the robot base as the controller reports it; then board_x_m … board_qz, the board
@@ -477,10 +453,15 @@ def load_handeye(
     needs OpenCV. camera: file, or `Camera`; None: its values are found from the same images.
     angles: convention of angle columns: "rotation-vector" (UR), or the order of turned axes, "zyx" for Rz Ry
     Rx (KUKA, Fanuc), "xyz", "zyz" …
+    setup: of samples of easy_handeye, which writes the robot's poses the other way round where the camera
+    stands in the cell; None: as the samples say, else eye-in-hand.
     progress: called with images done, and images in all.
 
     Raises InputError that names the line, the column, what was found and what was expected.
     """
+    other = read_other_poses(Path(path), setup)
+    if other is not None:
+        return _of_other_program(other, board)
     table = Table(Path(path))
     plan = _Plan(table, ("hand", "board"))
     angles = check_angles(angles)
@@ -502,7 +483,7 @@ def load_handeye(
     )
     rows, views = seen.rows, seen.views
     _check_count(table, len(rows), "with a board")
-    _check_poses(table, hand[rows], seen.T_camera_board, views is not None)
+    _check_poses(table.path, hand[rows], seen.T_camera_board, images=views is not None, columns=True)
     poses = _core.HandEyePoses(
         hand[rows],
         seen.T_camera_board,
@@ -611,12 +592,17 @@ def _seen_in_file(table: Table, reader: _Reader, kind: str) -> _Seen:
     return _Seen(rows, seen[rows], [f"row {row} (from 0) has no board pose" for row in absent])
 
 
-def load_stream(path: PathLike, side: Literal["hand", "board"], *, angles: str | None = None) -> Stream:
+def load_stream(path: PathLike, side: Side, *, angles: str | None = None) -> Stream:
     """Read poses with times: t_s and hand_x_m … hand_qz, or board_x_m … board_qz. Columns as in
-    `load_handeye`; times increase.
+    `load_handeye`; times increase. Or poses as other programs write them: lines of 16 or 12 numbers and
+    matrices of OpenCV, which have no times, lines of 8 (time, position, quaternion x y z w), and CSV exports
+    of the ROS messages PoseStamped and TransformStamped.
 
     Raises InputError that names the line, the column, what was found and what was expected.
     """
+    other = read_other_poses(Path(path))
+    if other is not None:
+        return _stream_of_other_program(other, side)
     table = Table(Path(path))
     plan = _Plan(table, ("hand", "board"))
     if not plan.has(side):
@@ -639,28 +625,77 @@ def load_stream(path: PathLike, side: Literal["hand", "board"], *, angles: str |
     return Stream(table.path, time[there], frames[there])
 
 
+def pair_rows(hand: Stream, board: Stream) -> HandEyeData:
+    """Poses of two files that belong together row by row. Raises InputError."""
+    if len(hand.T) != len(board.T):
+        raise InputError(
+            f"{board.path}: has {len(board.T)} poses, expected {len(hand.T)} as in {hand.path}: without times"
+            " they belong together row by row"
+        )
+    _check_poses(hand.path, hand.T, board.T)
+    poses = _core.HandEyePoses(hand.T, board.T)
+    return HandEyeData(hand.path, poses, np.arange(len(hand.T)), convention="matrices")
+
+
+def _of_other_program(other: OtherPoses, board: str | Board | None) -> HandEyeData:
+    if board is not None:
+        raise InputError(
+            f"{other.path}: a board was named, but {other.tool} name no images; a table with the columns"
+            " hand_x_m … hand_qz and image does"
+        )
+    if other.either is not None:
+        raise InputError(
+            f"{other.path}: {other.tool} hold the poses of one side, expected those of the hand, and those"
+            " of the board in a second file: --board-poses (in Python: load_stream and pair_rows)"
+        )
+    hand, seen = other.of("hand"), other.of("board")
+    if len(hand) != len(seen):
+        raise InputError(f"{other.path}: has {len(hand)} poses of the hand, but {len(seen)} of the board")
+    _require_enough(other.path, len(hand))
+    _check_poses(other.path, hand, seen)
+    poses = _core.HandEyePoses(hand, seen)
+    return HandEyeData(other.path, poses, np.arange(len(hand)), convention=other.tool)
+
+
+def _stream_of_other_program(other: OtherPoses, side: Side) -> Stream:
+    frames, time = other.of(side), other.time
+    _require_enough(other.path, len(frames))
+    if time is not None:
+        later = np.diff(time) > 0
+        if not later.all():
+            row = int(np.argmin(later)) + 1
+            raise InputError(
+                f"{other.path}: the time of pose {row} (from 0), {time[row]:.6f} s, is not later than that"
+                f" before it, {time[row - 1]:.6f} s; expected times that increase"
+            )
+    return Stream(other.path, time, frames)
+
+
 def _check_count(table: Table, count: int, what: str = "") -> None:
+    _require_enough(table.path, count, what)
+
+
+def _require_enough(path: Path, count: int, what: str = "") -> None:
     if count < _FEWEST:
-        table.refuse(
-            f"has {count} {'pose' if count == 1 else 'poses'}{f' {what}' if what else ''}, expected at least"
-            f" {_FEWEST} (better 15 or more, turned about different axes)"
+        raise InputError(
+            f"{path}: has {count} {'pose' if count == 1 else 'poses'}{f' {what}' if what else ''}, expected"
+            f" at least {_FEWEST} (better 15 or more, turned about different axes)"
         )
 
 
-def _check_poses(table: Table, hand: Floats, board: Floats, images: bool) -> None:
-    """Values that no hand-eye data has."""
-    if max(np.ptp(hand[:, :3, 3], axis=0).max(), np.abs(hand[:, :3, :3] - hand[0, :3, :3]).max()) < _EQUAL:
-        table.refuse(
-            f"all {len(hand)} robot poses are equal: nothing moved, or one pose was written again and again"
+def _check_poses(
+    path: Path, hand: Floats, board: Floats, *, images: bool = False, columns: bool = False
+) -> None:
+    """Values that no hand-eye data has. columns: the file's columns have names with units."""
+    if _spread_of_poses(hand) < _EQUAL:
+        raise InputError(
+            f"{path}: all {len(hand)} robot poses are equal: nothing moved, or one pose was written again and"
+            " again"
         )
-    if (
-        not images
-        and max(np.ptp(board[:, :3, 3], axis=0).max(), np.abs(board[:, :3, :3] - board[0, :3, :3]).max())
-        < _EQUAL
-    ):
-        table.refuse(
-            f"all {len(board)} board poses are equal: the camera did not see the hand move, or one pose was"
-            " written again and again"
+    if not images and _spread_of_poses(board) < _EQUAL:
+        raise InputError(
+            f"{path}: all {len(board)} board poses are equal: the camera did not see the hand move, or one"
+            " pose was written again and again"
         )
 
     def spread(frames: Floats) -> float:
@@ -672,10 +707,17 @@ def _check_poses(table: Table, hand: Floats, board: Floats, images: bool) -> Non
     if spread(hand) > _FARTHEST and (images or spread(board) > _FARTHEST):
         sides = ("hand",) if images else ("hand", "board")
         names = [f"{side}_x_mm …" for side in sides]
-        table.refuse(
-            f"the hand's positions spread over {spread(hand):.4g} m: these look like millimetres; call the"
-            f" columns {listed(names)}, or convert them"
+        what = f"call the columns {listed(names)}, or convert them" if columns else "expected m: convert them"
+        raise InputError(
+            f"{path}: the hand's positions spread over {spread(hand):.4g} m: these look like millimetres;"
+            f" {what}"
         )
+
+
+def _spread_of_poses(frames: Floats) -> float:
+    """The largest difference of a coordinate [m] or of an entry of a rotation."""
+    positions = np.ptp(frames[:, :3, 3], axis=0).max()
+    return float(max(positions, np.abs(frames[:, :3, :3] - frames[0, :3, :3]).max()))
 
 
 # ---- Cameras -------------------------------------------------------------------------------------

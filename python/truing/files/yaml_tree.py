@@ -47,11 +47,14 @@ _WORDS: dict[str, bool | None] = {
 
 
 class Document:
-    """A YAML file: its values, and the line of every key and list entry."""
+    """A YAML file: its values, and the line of every key and list entry.
 
-    def __init__(self, path: Path, text: str, kind: str) -> None:
+    kind: what the user was asked for, "robot file". lists: it may be a list instead of a mapping.
+    """
+
+    def __init__(self, path: Path, text: str, kind: str, *, lists: bool = False) -> None:
         self.path = path
-        self.kind = kind  # "robot file": what the user was asked for
+        self.kind = kind
         self._lines: dict[Loc, int] = {}
         self._seen: set[int] = set()
         try:
@@ -66,14 +69,14 @@ class Document:
             raise InputError(f"{path}: is not YAML: {error}") from None
         if self.value is None:
             raise InputError(f"{path}: is empty, expected a {kind}")
-        if not isinstance(self.value, dict):
+        if not isinstance(self.value, (dict, list) if lists else dict):
             raise InputError(
                 f"{path}, line 1: found {found(self.value)}, expected a {kind}: keys and values in YAML"
             )
 
     @classmethod
-    def read(cls, path: Path, kind: str) -> Document:
-        return cls(path, decoded(path, read_bytes(path, _LARGEST_FILE)), kind)
+    def read(cls, path: Path, kind: str, *, lists: bool = False) -> Document:
+        return cls(path, decoded(path, read_bytes(path, _LARGEST_FILE)), kind, lists=lists)
 
     def line(self, loc: Loc) -> int | None:
         """The line of `loc`, or of the nearest thing around it."""

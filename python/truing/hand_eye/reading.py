@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading hand-eye data whose hand and camera may have clocks of their own."""
+"""Reading hand-eye data whose hand and camera may have files, and clocks, of their own."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 from truing._core import ClockOffset, HandEyePoses
 from truing.errors import InputError
-from truing.files import HandEyeData, load_handeye, load_stream
+from truing.files import HandEyeData, load_handeye, load_stream, pair_rows
 from truing.hand_eye.api import handeye_clock
 
 Floats = NDArray[np.float64]
 Setup = Literal["eye-in-hand", "eye-to-hand"]
 _FEWEST = 3
+_PAUSE = 0.5  # [s] between poses: nobody moves so far between two samples of a motion
+_TOGETHER = 0.1  # of the pause
 
 
 def load_on_one_clock(
@@ -39,7 +41,12 @@ def load_on_one_clock(
     """
     if board_poses is None:
         data = load_handeye(
-            poses, board=board or None, camera=camera, angles=angles or None, progress=progress
+            poses,
+            board=board or None,
+            camera=camera,
+            angles=angles or None,
+            setup=setup,
+            progress=progress,
         )
         if data.board_time is None or data.time is None:
             return data, None
@@ -49,11 +56,23 @@ def load_on_one_clock(
         return (_at_camera_times(data, clock) if clock.found else None), clock
     hand = load_stream(poses, "hand", angles=angles or None)
     seen = load_stream(board_poses, "board", angles=angles or None)
+    if hand.time is None or seen.time is None or _taken_together(hand.time, seen.time):
+        return pair_rows(hand, seen), None
     clock = handeye_clock(hand.time, hand.T, seen.time, seen.T, setup=setup)
     if not clock.found:
         return None, clock
     rows = _rows(clock, board_poses)
     return HandEyeData(poses, HandEyePoses(clock.T_base_hand, seen.T[rows]), np.asarray(rows)), clock
+
+
+def _taken_together(hand: Floats, camera: Floats) -> bool:
+    """Poses at rest, one after the other: as many on both sides, with pauses much longer than their times
+    differ.
+    """
+    if len(hand) != len(camera):
+        return False
+    pause = min(np.median(np.diff(hand)), np.median(np.diff(camera)))
+    return bool(pause > _PAUSE and np.abs(hand - camera).max() < _TOGETHER * pause)
 
 
 def _rows(clock: ClockOffset, file: Path) -> list[int]:

@@ -24,9 +24,13 @@ from fuzzing import mutated, quick
 from handeye_scenes import columns_of, scene, write_csv, write_scene
 from truing import InputError, InputWarning, load_camera, load_handeye, save_camera
 from truing.files import load_stream
-from truing.files.handeye_file import EULER_ORDERS, rotations_from_angles
+from truing.files.handeye_file import EULER_ORDERS
 from truing.hand_eye import HandEyePoses
-from truing.rotations import quaternions_from_rotations, rotations_from_quaternions
+from truing.rotations import (
+    quaternions_from_rotations,
+    rotations_from_angles,
+    rotations_from_quaternions,
+)
 
 SCENE = scene(6)
 

@@ -90,7 +90,8 @@ class Command(run.Command[Loaded, "Solved | None"]):
     poses: Annotated[
         Path,
         File(
-            "CSV or Parquet: hand poses, and board poses or images, one row per robot pose.",
+            "Hand poses, and board poses or images, one row per robot pose: CSV or Parquet; or a file of"
+            " easy_handeye, MoveIt, OpenCV, ROS messages or lines of matrices.",
             argument=True,
             metavar="POSES",
         ),
@@ -114,8 +115,8 @@ class Command(run.Command[Loaded, "Solved | None"]):
     board_poses: Annotated[
         Path | None,
         File(
-            "Board poses with times of their own (t_s); POSES then has times and hand poses. The offset of"
-            " the clocks is found."
+            "Board poses in a file of their own; POSES then has hand poses. With times (t_s) in both the"
+            " offset of the clocks is found; without they belong together row by row."
         ),
     ] = None
     working_point: Annotated[
