@@ -46,6 +46,24 @@ ROOMS["__main__"] = {"cli"}
 
 # Rooms in which every module has its place, from the ground up: each may import those before it.
 FLOORS = {
+    "files": [
+        "output",
+        "common",
+        "table",
+        "yaml_tree",
+        "plausibility",
+        "rigid",
+        "boards",
+        "opencv_file",
+        "other_poses",
+        "handeye_file",
+        "robot_file",
+        "measurement_file",
+        "scene_file",
+        "stream_file",
+        "target_file",
+        "uncertainty_file",
+    ],
     "exam": [
         "robots",
         "kinematics",
