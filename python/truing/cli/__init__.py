@@ -12,18 +12,19 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from truing.cli.interrupts import was_interrupted
+from truing.cli.interrupts import none_lost, was_interrupted
 
 __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line; the exit status."""
-    try:
-        from truing.cli.app import main as run  # late: Ctrl-C ends imports, too, with a line
-    except (KeyboardInterrupt, ImportError) as error:
-        if not was_interrupted(error):
-            raise
-        sys.stderr.write("truing: interrupted\n")
-        return 130
-    return run(arguments)
+    with none_lost():
+        try:
+            from truing.cli.app import main as run  # late: Ctrl-C ends imports, too, with a line
+        except (KeyboardInterrupt, ImportError) as error:
+            if not was_interrupted(error):
+                raise
+            sys.stderr.write("truing: interrupted\n")
+            return 130
+        return run(arguments)

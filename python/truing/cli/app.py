@@ -14,6 +14,7 @@ import inspect
 import io
 import os
 import re
+import signal
 import sys
 import threading
 from collections.abc import Sequence
@@ -299,8 +300,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = _usage(error)
     except (KeyboardInterrupt, typer.Abort):
         code = _fail("interrupted", 130)
-    except (BrokenPipeError, SystemExit):
-        code = 0  # the reader of our output went away: not our trouble (SystemExit: while typer printed help)
+    except BrokenPipeError:
+        code = 0  # the reader of our output went away: not our trouble
+    except SystemExit as error:  # rich makes one of a broken pipe, too
+        code = 0 if isinstance(error.__context__, BrokenPipeError) else _code_of(error)
     except OSError as error:  # a full disk, say: no fault of the input, nor of the program
         code = _fail(_words_of(error), 1)
     except MemoryError:
@@ -310,10 +313,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         code = _fail("interrupted", 130)
     _empty_streams()
+    if arguments is None:  # all is done: Ctrl-C while Python puts itself away would only be a traceback
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     if code == 130 and threading.active_count() > 1:
         # The core is still computing in its thread, and cannot be asked to stop; all of ours is put away.
         os._exit(130)
     return code
+
+
+def _code_of(error: SystemExit) -> int:
+    """As Python takes it: nothing is 0, a text is printed and 1."""
+    if error.code is None or isinstance(error.code, int):
+        return error.code or 0
+    return _fail(str(error.code), 1)
 
 
 def _prepare_streams() -> bool:

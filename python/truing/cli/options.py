@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from truing.errors import InputError
+from truing.limits import LARGEST_NUMBER
 
 # ---- Defaults that stand elsewhere -------------------------------------------------------------------------
 
@@ -108,6 +109,15 @@ def refused(option: str, text: str, expected: str) -> InputError:
     return InputError(f"{option}: found {text!r}, expected {expected}")
 
 
+def too_large(option: str, text: str) -> InputError:
+    return refused(option, text, f"a number between -{LARGEST_NUMBER:.0e} and {LARGEST_NUMBER:.0e}")
+
+
+def is_too_large(value: float) -> bool:
+    """Infinity is no number at all, and is said to be none."""
+    return math.isfinite(value) and abs(value) > LARGEST_NUMBER
+
+
 class Flag(Kind):
     """On or off."""
 
@@ -155,6 +165,8 @@ class Count(Kind):
             value = int(text)
         except ValueError:
             value = self.least - 1
+        if abs(value) > LARGEST_NUMBER:
+            raise too_large(option, text)
         if value < self.least or (self.most is not None and value > self.most):
             upper = "or more" if self.most is None else f"to {self.most}"
             raise refused(option, text, f"a whole number, {self.least} {upper}")
@@ -183,6 +195,8 @@ class Number(Kind):
             value = float(text)
         except ValueError:
             value = math.nan
+        if is_too_large(value):
+            raise too_large(option, text)
         if not (math.isfinite(value) and value >= self.least):
             bound = "" if math.isinf(self.least) else f", {self.least:g} or more"
             raise refused(option, text, f"{self.noun}{bound}, such as {self.example}")
@@ -251,6 +265,8 @@ class Quantity(Kind):
             value *= self.units[unit]
         elif unit or value != 0:
             value = math.nan
+        if is_too_large(value):
+            raise too_large(option, text)
         if not math.isfinite(value):
             units = ", ".join(unit for unit in self.units if unit.isascii())
             raise refused(option, text, f"{self.noun} with its unit ({units}), such as {self.example}")

@@ -111,30 +111,32 @@ class Command(Generic[Loaded, Found]):
 
     def run(self) -> int:
         """Reads, solves, writes and prints; the exit status."""
-        from truing.files import atomic_output_dir
+        from truing.files.output import atomic_output_dir, files_read
 
-        with warnings_heard() as heard:
+        with warnings_heard() as heard, files_read() as read:
             loaded = working("reading", self.load)
             found = working(
                 self.doing, lambda progress: self.solve(loaded, progress), in_thread=not self.own_processes
             )
             obsolete = [name for name in self.sometimes if not self.keeps(self.out / name)]
             with (
-                atomic_output_dir(self.out, inputs=self.inputs(), obsolete=obsolete) as folder,
+                atomic_output_dir(self.out, inputs=[*self.inputs(), *read], obsolete=obsolete) as folder,
                 bar_of(Progress("writing")),
             ):
                 result = self.write(folder, loaded, found, heard)
                 written = {path.name for path in folder.iterdir()}
         tables.warn([text for text in result.get("warnings", ()) if text not in heard])
-        if self.json:
-            from truing.report.json_text import to_json
-
-            sys.stdout.write(to_json(result))
-        else:
-            self.table(result, found)
-            if "report.html" in written:
-                tables.say(f"report: {self.out / 'report.html'}")
         failure = self.failure(result)
+        with contextlib.suppress(BrokenPipeError):  # nobody reads on: the exit status still says how it ended
+            if self.json:
+                from truing.report.json_text import to_json
+
+                sys.stdout.write(to_json(result))
+            else:
+                self.table(result, found)
+                if "report.html" in written:
+                    tables.say(f"report: {self.out / 'report.html'}")
+            sys.stdout.flush()
         if failure:
             tables.fail(failure)
         return 1 if failure else 0

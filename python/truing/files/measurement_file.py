@@ -20,6 +20,7 @@ from truing.errors import InputError, InputWarning
 from truing.files.common import PathLike, Units, listed, write_table
 from truing.files.plausibility import check_units_look_right
 from truing.files.table import Codes, Floats, Table
+from truing.limits import LARGEST_NUMBER
 
 _LENGTHS = ("m", "mm")
 _ANGLES = ("rad", "deg")
@@ -316,7 +317,7 @@ class _Reader:
         return self.column(self.plan.known[role], gaps=gaps)
 
     def column(self, source: _Source, *, gaps: bool = False, any_value: bool = False) -> Floats:
-        largest = _LARGEST if source.unit in _LENGTHS + _ANGLES else 1e12
+        largest = _LARGEST if source.unit in _LENGTHS + _ANGLES else LARGEST_NUMBER
         values = self.table.numbers(source.column, gaps=gaps, any_value=any_value, largest=largest)
         return _to_si(values, source.unit)
 

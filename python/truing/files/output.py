@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import json
 import os
 import re
 import secrets
@@ -26,6 +27,7 @@ from truing.errors import InputError
 
 PathLike = str | os.PathLike[str]
 
+RESULT = "result.json"
 MANIFEST = ".truing-unfinished"
 """Names the files of its folder that are being replaced."""
 
@@ -41,10 +43,26 @@ def reason(error: BaseException) -> str:
     return str(error).strip().split("\n")[0] or type(error).__name__
 
 
+_noting: list[list[Path]] = []  # of every `files_read` that is open, in whichever thread
+
+
+@contextlib.contextmanager
+def files_read() -> Iterator[list[Path]]:
+    """The files that are read in the block, those included that other files name."""
+    read: list[Path] = []
+    _noting.append(read)
+    try:
+        yield read
+    finally:
+        _noting[:] = [other for other in _noting if other is not read]
+
+
 def require_whole_file(path: Path) -> None:
     """Raises InputError for what cannot be read to its end (a pipe, a device), and for a file that a run was
-    replacing when it was ended.
+    replacing when it was ended. Every reader asks this first: `files_read` knows them all from here.
     """
+    for read in _noting:
+        read.append(path)
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError):
@@ -104,34 +122,48 @@ def atomic_output_dir(
 
     Yields a temporary folder on the same disk. When the block ends well its content moves to `path` (made if
     needed; files of the same names are replaced, others stay); when it raises, Ctrl-C included, nothing is
-    left behind. inputs: files that were read; none of them is replaced. obsolete: names of an earlier run's
+    left behind. inputs: files that were read; none of them is replaced or removed, nor is the result.json
+    beside them, unless the same command wrote it. obsolete: names of an earlier run's
     files that go unless they were written anew. Raises InputError when `path` cannot be written, OSError when
     the disk is full.
     """
     path = Path(path)
     if path.exists() and not path.is_dir():
         raise InputError(f"{path}: is a file, expected a folder to write to")
+    made: list[tuple[Path, int]] = []
     try:
-        # Inside the folder if it exists (it may be a disk of its own), else as near to it as there is one.
-        home = path.absolute()
-        while not home.is_dir():
-            home = home.parent
-        for folder in {home, path.absolute().parent}:
-            _clear(folder)
-        temporary, lock = _locked_folder(home)
-    except (OSError, ValueError) as error:
-        raise _not_written(path, error) from None
-    try:
-        yield temporary
-        _require_no_input(temporary, path, inputs)
         with _interrupts_held_back():
             try:
-                _move_content(temporary, path, obsolete)
+                made.append(_locked_folder(_cleared_home(path)))
+            except (OSError, ValueError) as error:
+                raise _not_written(path, error) from None
+        temporary = made[0][0]
+        yield temporary
+        _require_no_input(temporary, path, inputs)
+        _require_same_command(temporary, path, inputs)
+        with _interrupts_held_back():
+            try:
+                _move_content(
+                    temporary, path, [name for name in obsolete if not _is_any(path / name, inputs)]
+                )
             except OSError as error:
                 raise _not_written(path, error) from None
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        os.close(lock)
+        with _interrupts_held_back():
+            for folder, lock in made:
+                shutil.rmtree(folder, ignore_errors=True)
+                os.close(lock)
+
+
+def _cleared_home(path: Path) -> Path:
+    """Where a temporary folder is on the same disk as `path`; what killed runs left there is removed."""
+    # Inside the folder if it exists (it may be a disk of its own), else as near to it as there is one.
+    home = path.absolute()
+    while not home.is_dir():
+        home = home.parent
+    for folder in {home, path.absolute().parent}:
+        _clear(folder)
+    return home
 
 
 def _locked_folder(home: Path) -> tuple[Path, int]:
@@ -164,16 +196,44 @@ def _clear(home: Path) -> None:
                 os.close(lock)
 
 
+def _is_any(file: Path, others: Sequence[Path]) -> bool:
+    """Whether a file is one of these, by whatever name."""
+    for other in others:
+        with contextlib.suppress(OSError, ValueError):
+            if file.samefile(other):
+                return True
+    return False
+
+
 def _require_no_input(source: Path, destination: Path, inputs: Sequence[Path]) -> None:
     for file in source.rglob("*"):
         target = destination / file.relative_to(source)
-        for read in inputs:
-            with contextlib.suppress(OSError):
-                if target.samefile(read):
-                    raise InputError(
-                        f"{target}: is an input of this run, and would be replaced by its result: write to"
-                        " another folder (--out)"
-                    )
+        if _is_any(target, inputs):
+            raise InputError(
+                f"{target}: is an input of this run, and would be replaced by its result: write to another"
+                " folder (--out)"
+            )
+
+
+def _require_same_command(source: Path, destination: Path, inputs: Sequence[Path]) -> None:
+    """A result that was read from belongs together: no other command's result.json replaces its own."""
+    if not _is_any(destination, [file.parent for file in inputs if file.is_file()]):
+        return
+    there, new = _format_of(destination / RESULT), _format_of(source / RESULT)
+    if there and new and there != new:
+        raise InputError(
+            f"{destination}: this run reads files of the result there ({there}), and would replace a part of"
+            f" it ({new}): write to another folder (--out)"
+        )
+
+
+def _format_of(file: Path) -> str:
+    """What a result.json says of itself; "" if it is none."""
+    try:
+        found = json.loads(file.read_text(encoding="utf-8")).get("format", "")
+    except (OSError, ValueError, AttributeError, RecursionError):
+        return ""
+    return found if isinstance(found, str) else ""
 
 
 def _move_content(source: Path, destination: Path, obsolete: Collection[str]) -> None:

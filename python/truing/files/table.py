@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from truing.errors import InputError
 from truing.files.common import PARQUET_SUFFIXES, decoded, listed, reason, shown
 from truing.files.output import require_whole_file
+from truing.limits import LARGEST_NUMBER
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int32]
@@ -34,7 +35,6 @@ _LONGEST_HEADER = 1_000_000
 _MOST_COLUMNS = 2000
 _MOST_CELLS = 200_000_000  # 1.6 GB of doubles
 _LARGEST_CSV = 8_000_000_000  # [bytes]
-_LARGEST_NUMBER = 1e12  # of the columns that have a meaning
 _LARGEST_COVARIATE = 1e30  # its square, and sums of such squares, are still numbers
 # What programs write for "no value"; "nan" is not among them: a number that came out as NaN is another
 # matter.
@@ -103,7 +103,7 @@ class Table:
         *,
         gaps: bool = False,
         any_value: bool = False,
-        largest: float = _LARGEST_NUMBER,
+        largest: float = LARGEST_NUMBER,
     ) -> Floats:
         """The column as contiguous doubles, without a copy where Arrow has them so.
 

@@ -23,12 +23,12 @@ from pydantic_core import PydanticCustomError
 
 from truing.errors import InputError
 from truing.files.common import decoded, listed, read_bytes, shown
+from truing.limits import LARGEST_NUMBER
 
 Loc = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
 
 _LARGEST_FILE = 1_000_000  # [bytes] a robot of 200 joints and 2000 targets has 0.3 million
-_LARGEST_NUMBER = Decimal("1e12")
 _MOST_DIGITS = 100
 LONGEST_NAME = 200  # characters
 NAME = f"a name of at most {LONGEST_NAME} characters"
@@ -217,8 +217,8 @@ def expected(value: object, what: str) -> PydanticCustomError:
 def _number(value: object) -> Decimal:
     if not isinstance(value, Decimal) or not value.is_finite():
         raise expected(value, "a finite number")
-    if abs(value) > _LARGEST_NUMBER:
-        raise expected(value, f"a number between -{_LARGEST_NUMBER:.0e} and {_LARGEST_NUMBER:.0e}")
+    if abs(value) > LARGEST_NUMBER:
+        raise expected(value, f"a number between -{LARGEST_NUMBER:.0e} and {LARGEST_NUMBER:.0e}")
     if len(value.as_tuple().digits) > _MOST_DIGITS:
         raise expected(value, f"a number of at most {_MOST_DIGITS} digits")
     return value

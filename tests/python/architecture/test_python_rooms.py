@@ -19,17 +19,18 @@ PACKAGE = Path(__file__).resolve().parents[3] / "python" / "truing"
 
 # Which rooms a room may import, besides itself. A room is a folder or a single file of the package; "truing"
 # stands for the names of the package itself.
-BASIC = {"_core", "_keywords", "errors", "effects", "keywords", "rotations", "files", "report"}
+BASIC = {"_core", "_keywords", "errors", "effects", "keywords", "rotations", "files", "report", "limits"}
 ROOMS: dict[str, set[str]] = {
     "errors": {"_core"},
     "effects": {"_core", "errors"},
     "keywords": {"effects"},
     "rotations": set(),
+    "limits": set(),
     "common": {"_core"},
     "model": {"_core"},
     "examples": set(),
     "report": set(),
-    "files": {"_core", "errors", "rotations"},
+    "files": {"_core", "errors", "limits", "rotations"},
     "identification": BASIC,
     "planning": BASIC | {"identification"},
     "diagnosis": BASIC | {"identification"},

@@ -24,6 +24,7 @@ from truing.cli import main
 from truing.errors import InputError
 from truing.examples import example
 from truing.files import atomic_output_dir, load_robot
+from truing.files.output import files_read, require_whole_file
 
 ROBOT = str(example("irb120"))
 TRUING = Path(sys.executable).with_name("truing")
@@ -133,6 +134,33 @@ def test_an_input_is_never_replaced_by_the_result(capsys: pytest.CaptureFixture[
         assert {path.name: path.read_bytes() for path in Path("sim").iterdir()} == before
 
 
+def test_the_result_of_another_command_is_not_mixed_with_what_was_read_from_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(SIMULATE) == 0 and main(IDENTIFY) == 0
+    before = {path.name: path.read_bytes() for path in Path("found").iterdir()}
+    predict = ["predict", "found/robot.yaml", "sim/measurements.csv", "--out"]
+    assert main([*predict, "found"]) == 2
+    assert "reads files of the result there (truing-identification/1)" in capsys.readouterr().err
+    assert {path.name: path.read_bytes() for path in Path("found").iterdir()} == before
+    for _ in range(2):  # its own result may be replaced
+        assert main([*predict, "predicted"]) == 0
+
+
+def test_a_file_that_another_file_names_is_an_input_too() -> None:
+    Path("named.csv").write_text("read")
+    with files_read() as read:
+        require_whole_file(Path("named.csv"))
+    with pytest.raises(InputError, match="is an input"), atomic_output_dir(".", inputs=read) as folder:
+        (folder / "named.csv").write_text("written")
+    with atomic_output_dir(".", inputs=read, obsolete=["named.csv"]) as folder:
+        (folder / "other.csv").write_text("written")
+    assert Path("named.csv").read_text() == "read" and Path("other.csv").exists()
+    with files_read() as nothing:
+        pass
+    assert read == [Path("named.csv")] and nothing == []
+
+
 def test_what_a_killed_run_left_is_cleared_by_the_next(tmp_path: Path) -> None:
     program = (
         "import sys, time; from truing.files import atomic_output_dir\n"
@@ -239,6 +267,70 @@ def test_a_terminal_without_utf_8_gets_escapes() -> None:
         assert done.returncode == 0 and b"Gr\\xf6\\xdfe" in done.stdout and done.stderr == b""
         assert call("simulate", "机.yaml", env=plain).returncode == 2
         assert call("effects", "--help", env=plain).returncode == 0
+
+
+def test_ctrl_c_that_meets_a_finaliser_is_a_line(tmp_path: Path) -> None:
+    """Nothing can be raised there: Python prints a traceback and goes on."""
+    assert main(SIMULATE) == 0
+    before = sorted(tmp_path.iterdir())
+    program = (
+        "import os, signal, sys, time\n"
+        "from truing.cli import main\n"
+        "from truing.cli.commands import identify\n"
+        "class Dropped:\n"
+        "    def __del__(self):\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "        time.sleep(5)\n"
+        "write = identify.Command.write\n"
+        "def interrupted(self, folder, *rest):\n"
+        "    written = write(self, folder, *rest)\n"
+        "    Dropped()\n"
+        "    time.sleep(5)\n"
+        "    return written\n"
+        "identify.Command.write = interrupted\n"
+        "sys.exit(main())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, *IDENTIFY], capture_output=True, check=False, timeout=120
+    )
+    assert done.returncode == 130
+    assert done.stderr == b"truing: interrupted\n", done.stderr.decode()
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_ctrl_c_twice_leaves_nothing_behind(tmp_path: Path) -> None:
+    program = (
+        "import os, shutil, signal\n"
+        "from truing.files import output\n"
+        "remove = shutil.rmtree\n"
+        "def slow(*arguments, **options):\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+        "    remove(*arguments, **options)\n"
+        "output.shutil.rmtree = slow\n"
+        "with output.atomic_output_dir('out') as folder:\n"
+        "    (folder / 'a').write_text('half')\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False, timeout=60)
+    assert b"KeyboardInterrupt" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("code", "status"), [("", 0), ("0", 0), ("3", 3), ("'a line'", 1)])
+def test_a_program_that_exits_inside_keeps_its_status(code: str, status: int) -> None:
+    program = (
+        "import sys\n"
+        "from truing.cli import main\n"
+        "from truing.cli.commands import effects\n"
+        f"def leaves(self): raise SystemExit({code})\n"
+        "effects.Command.run = leaves\n"
+        "sys.exit(main())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, "effects"], capture_output=True, check=False, timeout=60
+    )
+    assert done.returncode == status
+    assert done.stderr == (b"truing: a line\n" if status == 1 else b"")
 
 
 @pytest.mark.slow
