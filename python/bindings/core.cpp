@@ -29,6 +29,7 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_urdf(m);
   truing::python::bind_scene(m);
   truing::python::bind_identify(m);
+  truing::python::bind_review(m);
   truing::python::bind_plan(m);
   truing::python::bind_diagnose(m);
   truing::python::bind_handeye(m);

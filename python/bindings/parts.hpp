@@ -15,6 +15,7 @@ void bind_effect(py::module_& m);
 void bind_urdf(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_identify(py::module_& m);
+void bind_review(py::module_& m);
 void bind_plan(py::module_& m);
 void bind_diagnose(py::module_& m);
 void bind_handeye(py::module_& m);

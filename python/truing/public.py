@@ -51,6 +51,7 @@ from truing.identification import (
     identify as identify,
     predict as predict,
     residuals as residuals,
+    review as review,
 )
 from truing.inverse_kinematics import (
     compensate as compensate,

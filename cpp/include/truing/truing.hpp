@@ -14,6 +14,7 @@
 #include "truing/model/scene.hpp"
 #include "truing/model/urdf.hpp"
 #include "truing/plan.hpp"
+#include "truing/review.hpp"
 #include "truing/tracking/calibrate.hpp"
 #include "truing/tracking/replay.hpp"
 #include "truing/tracking/simulation.hpp"

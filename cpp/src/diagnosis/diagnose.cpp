@@ -30,7 +30,6 @@ namespace {
 using Kind = Explanation::Kind;
 constexpr double kCorrectionShare = 0.05;  ///< of the gap, from which on a law's correction is something unknown
 constexpr double kLackOfFit = 4.0;         ///< standard errors beyond repeats, from which on what is left is no noise
-constexpr double kEnoughRepeats = 20.0;    ///< degrees of freedom, for the noise to be taken from repeats
 constexpr double kHardlyLess = 0.98;       ///< of the gap: what is left of it where nothing was explained
 constexpr double kManyOutliers = 0.05;     ///< of the rows, from which on they are no exceptions
 constexpr double kSmallGain = 0.02;        ///< of the error, that is not worth a line if it may be none
@@ -278,7 +277,7 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
 /// closed.
 void judge_noise(const Repeats& repeats, const Work& work, const Decision& decision, Diagnosis* out) {
   const double components = work.given.data.distance ? 1.0 : 3.0;
-  out->noise_from_repeats = repeats.degrees_of_freedom >= kEnoughRepeats;
+  out->noise_from_repeats = repeats.enough();
   out->noise_floor =
       std::sqrt(components) *
       (out->noise_from_repeats ? repeats.sigma : work.noise.position_sigma * std::sqrt(decision.state.sigma2));

@@ -14,6 +14,7 @@
 #include "diagnosis/orders.hpp"
 #include "diagnosis/rows.hpp"
 #include "estimation/evidence.hpp"
+#include "model/repeats.hpp"
 #include "rooms.hpp"
 #include "truing/diagnose.hpp"
 
@@ -77,12 +78,6 @@ struct Decision {
 struct Refit {
   Identification found;
   std::vector<Effect> own;
-};
-
-/// Noise of one value [m], as rows measured again at the same pose show it.
-struct Repeats {
-  double sigma = 0.0;
-  double degrees_of_freedom = 0.0;  ///< that it rests on
 };
 
 /// What may stand in a named group's place.
@@ -241,7 +236,6 @@ Share percentile_interval(std::vector<double> values, double center);
 /// `inputs` are those of the whole.
 Refit refit(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
             const Evidence::State& state, const std::vector<int>& groups);
-Repeats noise_of_repeats(const Measurements& data);
 double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set,
                    const Repeats& repeats);
 

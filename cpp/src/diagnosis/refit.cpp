@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// How far the error shrinks: the exact refit, errors of rows, noise from repeats.
+// How far the error shrinks: the exact refit, errors of rows, and by how much they exceed the noise of repeats.
 
 #include "diagnosis/diagnosis.hpp"
 
@@ -167,39 +167,6 @@ Refit refit(const Registered& whole, const Work& work, const std::vector<InputCo
   Refit out{identify(task.start, data, task.options), task.options.own_effects};
   for (int k = 0; k < kWidenings && widen(usual, out.found, &task.options.priors); ++k)
     out.found = identify(task.start, data, task.options);
-  return out;
-}
-
-/// Rows of one target at equal joints, directions and payload; copies of a row are no repeats.
-Repeats noise_of_repeats(const Measurements& data) {
-  using Measured = std::vector<double>;
-  std::map<std::vector<double>, std::set<Measured>> same;
-  for (std::size_t row = 0; row < data.rows; ++row) {
-    if (!data.has_position(row) && !data.has_distance(row)) continue;
-    std::vector<double> key;
-    for (const Column& column : data.joints) key.push_back(column[row]);
-    for (const Column& column : data.direction) key.push_back(column ? column[row] : 0.0);
-    key.push_back(data.payload ? data.payload[row] : 0.0);
-    key.push_back(data.target.empty() ? 0.0 : data.target[row]);
-    key.push_back(data.has_distance(row) ? 1.0 : 3.0);
-    if (data.has_distance(row))
-      same[std::move(key)].insert({data.distance[row]});
-    else
-      same[std::move(key)].insert({data.position[0][row], data.position[1][row], data.position[2][row]});
-  }
-  Repeats out;
-  double sum = 0.0;
-  for (const auto& [key, repeats] : same) {
-    const auto count = static_cast<double>(repeats.size());
-    const std::size_t components = repeats.begin()->size();
-    for (std::size_t c = 0; c < components && repeats.size() > 1; ++c) {
-      double mean = 0.0;
-      for (const Measured& one : repeats) mean += one[c] / count;
-      for (const Measured& one : repeats) sum += (one[c] - mean) * (one[c] - mean);
-      out.degrees_of_freedom += count - 1.0;
-    }
-  }
-  if (out.degrees_of_freedom > 0.0) out.sigma = std::sqrt(sum / out.degrees_of_freedom);
   return out;
 }
 

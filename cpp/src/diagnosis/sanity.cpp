@@ -7,64 +7,27 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
-#include "diagnosis/diagnosis.hpp"
 #include "diagnosis/linearise.hpp"
 #include "diagnosis/rows.hpp"
 #include "math/constants.hpp"
 #include "math/statistics.hpp"
 #include "math/text.hpp"
+#include "model/readings.hpp"
+#include "model/repeats.hpp"
 
 namespace truing::diagnosis {
 namespace {
 
 constexpr double kWorthALook = 0.001, kHardlyAnything = 0.02;
-constexpr std::size_t kPoses = 400;  ///< that the quick comparisons look at
-
-/// Joint columns of one's own beside the rest of the data.
-struct Owned {
-  std::shared_ptr<const void> rest;
-  std::vector<std::vector<double>> columns;
-};
-
-/// The data with other joint columns (null: as they are), thinned to so many rows.
-Measurements with_joints(const Measurements& data, std::vector<std::vector<double>> columns) {
-  Measurements out = data;
-  auto owned = std::make_shared<Owned>(Owned{data.owner, std::move(columns)});
-  for (std::size_t k = 0; k < owned->columns.size(); ++k) out.joints[k] = {owned->columns[k].data(), 1};
-  out.owner = owned;
-  return out;
-}
-
-std::vector<std::vector<double>> joint_columns(const Measurements& data) {
-  std::vector<std::vector<double>> out(data.joints.size(), std::vector<double>(data.rows));
-  for (std::size_t k = 0; k < out.size(); ++k) {
-    for (std::size_t row = 0; row < data.rows; ++row) out[k][row] = data.joints[k][row];
-  }
-  return out;
-}
-
-/// Every so many rows, the others with weight zero. The weights must outlive it.
-struct Sample {
-  std::vector<std::int32_t> rows;
-  std::vector<double> weights;
-};
-
-Sample sample_of(const Measurements& data) {
-  Sample out;
-  out.weights.assign(data.rows, 0.0);
-  const std::size_t step = data.rows / (3 * kPoses) + 1;
-  for (std::size_t row = 0; row < data.rows; row += step) {
-    out.weights[row] = data.weight ? data.weight[row] : 1.0;
-    if (out.weights[row] > 0.0) out.rows.push_back(static_cast<std::int32_t>(row));
-  }
-  return out;
-}
+constexpr std::size_t kRows = 1200;  ///< that the quick comparisons look at
 
 /// Median error with base and targets fitted and, if wanted, the geometry under its prior: a few hundred rows will do.
 double median_error(const Robot& robot, const Measurements& data, const DiagnoseOptions& options, bool geometry) {
-  const Sample sample = sample_of(data);
+  const Sample sample = sample_of(data, kRows);
   Measurements some = data;
   some.weight = {sample.weights.data(), 1};
   some.set.assign(data.rows, 0);
@@ -182,50 +145,6 @@ void choose_record(const Robot& robot, const DiagnoseOptions& options, Checked* 
   out->findings.push_back(finding);
 }
 
-/// Another reading of what was handed over.
-struct Reading {
-  Robot robot;
-  Measurements data;
-  std::string kind, text;
-};
-
-/// Two joint columns exchanged, the sign of one turned, all in another unit, the table of links read by the other
-/// convention.
-std::vector<Reading> readings_of(const Robot& robot, const Measurements& data) {
-  std::vector<Reading> out;
-  const std::vector<std::vector<double>> columns = joint_columns(data);
-  const auto add_columns = [&](std::vector<std::vector<double>> changed, const char* kind, std::string text) {
-    out.push_back({robot, with_joints(data, std::move(changed)), kind, std::move(text)});
-  };
-  for (std::size_t k = 0; k < columns.size(); ++k) {
-    std::vector<std::vector<double>> changed = columns;
-    for (double& q : changed[k]) q = -q;
-    add_columns(std::move(changed), "joint_sign", "turning the sign of joint column " + std::to_string(k + 1));
-    for (std::size_t m = k + 1; m < columns.size(); ++m) {
-      changed = columns;
-      std::swap(changed[k], changed[m]);
-      add_columns(std::move(changed), "joint_order",
-                  "swapping joint columns " + std::to_string(k + 1) + " and " + std::to_string(m + 1));
-    }
-  }
-  for (const double factor : {180.0 / kPi, kDegree}) {
-    std::vector<std::vector<double>> changed = columns;
-    for (std::vector<double>& column : changed) {
-      for (double& q : column) q *= factor;
-    }
-    add_columns(std::move(changed), "joint_unit",
-                std::string("reading the joints in ") + (factor > 1.0 ? "rad instead of deg" : "deg instead of rad"));
-  }
-  if (robot.convention != Convention::urdf) {
-    const bool modified = robot.convention == Convention::mdh;
-    Reading other{robot, data, "convention",
-                  std::string("reading the robot file's links as convention: ") + (modified ? "dh" : "mdh")};
-    other.robot.convention = modified ? Convention::dh : Convention::mdh;
-    out.push_back(std::move(other));
-  }
-  return out;
-}
-
 /// Does another reading explain more? Columns of the wrist cost least: they are looked at from `kWorthALook` of the
 /// measured range on, and what nothing explains is said from `kHardlyAnything` on. A mistake is what halves the error
 /// with the geometry fitted, too: then no effect can be named before it is corrected.
@@ -234,25 +153,25 @@ void try_readings(const Robot& robot, const DiagnoseOptions& options, double spr
   if (!(as_is > kWorthALook * spread)) return;
   double best = 0.5 * as_is;
   SanityFinding finding;
-  const std::vector<Reading> readings = readings_of(robot, out->data);
-  const Reading* better = nullptr;
-  for (const Reading& reading : readings) {
-    const double error = median_error(reading.robot, reading.data, options, false);
-    if (error >= best) continue;
+  std::optional<Reading> better;
+  for (const auto& make_reading : readings_of(robot, out->data)) {
+    Reading reading = make_reading();
+    const double error = median_error(reading.robot, reading.data, options, false) / reading.length_scale;
+    if (!(error < best)) continue;
     best = error;
-    better = &reading;
+    better = std::move(reading);
   }
   if (better) {
     finding.kind = better->kind;
     finding.text = better->text + " leaves a median error of " + millimetres(best) + " in place of " +
                    millimetres(as_is) + ". Correct it and run again.";
-    finding.mistake =
-        median_error(better->robot, better->data, options, true) < 0.5 * median_error(robot, out->data, options, true);
+    finding.mistake = median_error(better->robot, better->data, options, true) <
+                      0.5 * better->length_scale * median_error(robot, out->data, options, true);
   } else if (as_is > kHardlyAnything * spread) {
     finding.kind = "joint_order";
     finding.text = "with base and tool fitted the median error is " + millimetres(as_is) + ", " +
                    number(100.0 * as_is / spread, 2) +
-                   " % of the measured range, and no swap, sign or unit of a joint column and no other convention of "
+                   " % of the measured range, and no swap, sign or unit of columns and no other convention of "
                    "the links explains it: is it the right robot file?";
   } else {
     return;

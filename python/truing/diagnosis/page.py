@@ -194,7 +194,7 @@ def _sanity(result: Mapping[str, Any]) -> str:
 def _remarks(result: Mapping[str, Any]) -> str:
     """How the data were read."""
     troubles = trouble(result)
-    items = [_finding(f) for f in result["sanity"] if f not in troubles]
+    items = [_finding(f) for f in result["sanity"] if f not in troubles and not f.get("mistake")]
     if any(f["kind"] == "direction" for f in result["sanity"]):
         items.append(
             "<li>What was inferred is in residuals.csv, columns dir1 …; where robot.yaml has backlash,"

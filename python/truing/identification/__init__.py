@@ -6,6 +6,7 @@ from truing._core import (
     BeforeAfter as BeforeAfter,
     Identification as Identification,
     IdentifyOptions as IdentifyOptions,
+    Mistake as Mistake,
     Prediction as Prediction,
     Residuals as Residuals,
 )
@@ -13,4 +14,5 @@ from truing.identification.api import (
     identify as identify,
     predict as predict,
     residuals as residuals,
+    review as review,
 )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truing import _core
-from truing._core import Identification, Measurements, Prediction, Residuals, Robot
+from truing._core import Identification, Measurements, Mistake, Prediction, Residuals, Robot
 from truing.effects import Effect, evaluated, own_effects, split_effects
 from truing.errors import InputWarning, NotConvergedError
 from truing.keywords import made, takes
@@ -41,16 +41,45 @@ def identify(
     options: fields of `IdentifyOptions`. `free` and `hold` may be one text, "J2.*,*.ratio"; `effects` one
     text, "backlash,harmonic:J2+J3", or a list of such words, `EffectRequest` and `Effect`.
 
+    `review` says whether what was found can be believed: a joint with the wrong sign is fitted as well.
+
     Raises InputError on data or options that cannot be used, and NotConvergedError (it carries the result),
     unless `raise_if_not_converged` is False.
     """
-    asked, own = split_effects(options.get("effects", ()))
-    requests = [item.request(robot) if isinstance(item, Effect) else item for item in asked]
-    fit = made(_core.IdentifyOptions, {**options, "effects": requests})
-    result = _core.identify(robot, data, fit, evaluated(own, robot, data))
+    result = _core.identify(robot, data, *_core_options(robot, data, options))
     if raise_if_not_converged and not result.solver.converged:
         raise NotConvergedError(result)
     return result
+
+
+@takes(_core.IdentifyOptions)
+def review(
+    robot: Robot, data: Measurements, found: Identification, **options: Unpack[IdentifyKeywords]
+) -> Mistake | None:
+    """What speaks against the robot file or the columns that `found` was identified from; None: nothing.
+
+        mistake = truing.review(robot, data, truing.identify(robot, data))
+
+    A joint with the wrong sign is fitted as well by turning two links round. So where a link changed by more
+    than a workshop makes (10 mm or 2 % of the reach, 3 degrees), or much is left over, the usual mistakes are
+    tried: the sign of a joint, the order of joint columns, units of angles and lengths, the convention of
+    the links. One that explains the data is named.
+
+    robot, data, options: those of `identify`. found: what it found.
+
+    Raises InputError on data or options that cannot be used.
+    """
+    return _core.review(robot, data, found, *_core_options(robot, data, options))
+
+
+def _core_options(
+    robot: Robot, data: Measurements, options: IdentifyKeywords
+) -> tuple[_core.IdentifyOptions, list[_core.OwnEffect]]:
+    """Options as the core takes them, and effects of one's own."""
+    asked, own = split_effects(options.get("effects", ()))
+    requests = [item.request(robot) if isinstance(item, Effect) else item for item in asked]
+    fit = made(_core.IdentifyOptions, {**options, "effects": requests})
+    return fit, evaluated(own, robot, data)
 
 
 def predict(

@@ -38,6 +38,7 @@ Floats = NDArray[np.float64]
 CLOUD_POINTS = 1200  # shown in the 3-D plot
 SMALL_POINTS = 500  # shown in each small plot
 LISTED_REJECTED = 200
+STRUCTURE = 1.5  # times the noise of repeats: more is left than noise
 GROSS = 10  # times the median error: what no noise does
 _SAID_BY_CHECKS = (
     "left out as gross outliers",
@@ -161,6 +162,8 @@ def _headline(result: Mapping[str, Any], errors: Mapping[str, Any], held_out: bo
         )
     else:
         sentence = f"Calibration made {name} worse: off by {was} on average before, {now} after."
+    if result.get("mistake"):
+        return _mistake_headline(result, sentence)
     n = after["n"]
     where = (
         f"Measured on {counted(n, 'row')} that the fit never saw"
@@ -202,6 +205,21 @@ def _headline(result: Mapping[str, Any], errors: Mapping[str, Any], held_out: bo
     )
 
 
+def _mistake_headline(result: Mapping[str, Any], sentence: str) -> str:
+    """A mistake is said first: numbers of a fit to it mean nothing."""
+    mistake = result["mistake"]
+    head = (
+        "Links changed by more than a workshop makes."
+        if mistake["kind"] == "unexplained"
+        else "Robot file and measurements do not go together."
+    )
+    text = escaped(mistake["text"][:1].upper() + mistake["text"][1:])
+    return (
+        f'<header><p class="kicker">truing identify · look at the robot file and the columns first</p>'
+        f'<h1>{head}</h1><p class="sub">{text} As it is: {sentence}</p></header>'
+    )
+
+
 def _trust_box(result: Mapping[str, Any], rows: Rows) -> str:
     """Checks in words, each good, worth a look, or bad; the worst of them is the verdict."""
     # Held-out rows are never rejected. A few gross outliers among them say nothing about the fit, so they are
@@ -209,6 +227,7 @@ def _trust_box(result: Mapping[str, Any], rows: Rows) -> str:
     gross = _gross_held_out(result, rows)
     rest = rows.magnitude_after[rows.test & ~gross]
     checks = [
+        *_mistake(result),
         _converged(result["solver"]),
         _unseen_poses(result["errors"], rest, bool(gross.any())),
         *_better_than_drawn(rows, gross),
@@ -227,6 +246,16 @@ def _trust_box(result: Mapping[str, Any], rows: Rows) -> str:
             "Do not rely on this yet",
         ),
     )
+
+
+def _mistake(result: Mapping[str, Any]) -> list[Check]:
+    mistake = result.get("mistake")
+    if mistake is None:
+        return []
+    head = "Links changed by more than a workshop makes"
+    if mistake["kind"] != "unexplained":
+        head = "Robot file and measurements do not go together"
+    return [Check(BAD, head, "see the top of this page")]
 
 
 def _converged(solver: Mapping[str, Any]) -> Check:
@@ -288,12 +317,26 @@ def _enough_rows(result: Mapping[str, Any], rows: Rows) -> Check:
 
 
 def _noise(result: Mapping[str, Any], rows: Rows) -> list[Check]:
-    noise = result.get("noise_sigma_m")
-    if noise is None:
+    left, repeats = result.get("noise_sigma_m"), result.get("noise_from_repeats_m")
+    if left is None:
         return []
     per = "reading" if rows.what == "distance" else "axis"
-    text = f"{length_text(noise)} per {per}: measurement noise and what the robot cannot repeat"
-    return [Check(GOOD, "What the model leaves", text)]
+    if repeats is None:
+        text = (
+            f"{length_text(left)} per {per}: measurement noise, and structure that the model does not"
+            " explain. Repeated poses would tell which"
+        )
+        return [Check(GOOD, "What the model leaves", text)]
+    structure = math.sqrt(max(0.0, left**2 - repeats**2))
+    if left < STRUCTURE * repeats:
+        text = f"{length_text(left)} per {per}; repeats of a pose scatter by {length_text(repeats)}"
+        return [Check(GOOD, "The model leaves noise alone", text)]
+    text = (
+        f"{length_text(repeats)} per {per} is noise, as repeats of a pose show it;"
+        f" {length_text(structure)} is structure that the model does not explain: standard errors are too"
+        " small. <code>truing diagnose</code> looks for its cause"
+    )
+    return [Check(LOOK, "The model leaves more than noise", text)]
 
 
 def _rejected_share(rows: Rows) -> Check:

@@ -38,16 +38,22 @@ def correlations(covariance: Floats) -> Floats:
 
 
 def identification_dict(
-    result: _core.Identification, *, seed: int, warnings: Iterable[str] = ()
+    result: _core.Identification,
+    *,
+    seed: int,
+    warnings: Iterable[str] = (),
+    mistake: _core.Mistake | None = None,
+    noise_from_repeats: float | None = None,
 ) -> dict[str, Any]:
     """What ``result.json`` of ``truing identify`` holds. `seed`: of the split; `warnings`: more of them,
-    first.
+    first; `mistake`: what `review` said; `noise_from_repeats`: of one component [m].
     """
     errors = {"train": result.train} if result.test is None else {"train": result.train, "test": result.test}
     return {
         "format": IDENTIFICATION_FORMAT,
         "version": _core.version(),
         "robot": result.robot.name,
+        "mistake": mistake_dict(mistake),
         "errors": {
             name: {"before": statistics_dict(e.before), "after": statistics_dict(e.after)}
             for name, e in errors.items()
@@ -66,11 +72,12 @@ def identification_dict(
             "stopped_because": result.solver.stopped_because,
         },
         "noise_sigma_m": result.noise_sigma,
+        "noise_from_repeats_m": noise_from_repeats,
         "rotation_noise_sigma_rad": result.rotation_noise_sigma,
         "rank": result.rank,
         "columns": result.columns,
         "seed": seed,
-        "warnings": [*warnings, *result.warnings],
+        "warnings": [*warnings, *_warnings_of(result, mistake)],
     }
 
 
@@ -86,6 +93,21 @@ def statistics_dict(e: _core.ErrorStatistics) -> dict[str, Any]:
     if math.isfinite(e.rotation_rms):
         values["rotation_rms_rad"] = e.rotation_rms
     return values
+
+
+def _warnings_of(result: _core.Identification, mistake: _core.Mistake | None) -> Sequence[str]:
+    """A mistake is said once: warnings of a fit to it say the same in other words, or nothing."""
+    return result.warnings if mistake is None or mistake.kind == "unexplained" else ()
+
+
+def mistake_dict(mistake: _core.Mistake | None) -> dict[str, Any] | None:
+    if mistake is None:
+        return None
+    return {
+        "kind": mistake.kind,
+        "text": mistake.text,
+        "changes": [parameter_dict(p) for p in mistake.changes],
+    }
 
 
 def parameter_dict(p: _core.Parameter) -> dict[str, Any]:
@@ -262,16 +284,25 @@ def write_identification(
     seed: int,
     source: str,
     warnings: Iterable[str] = (),
+    mistake: _core.Mistake | None = None,
     nominal_file: Path | None = None,
     base_link: str = "",
     tip_link: str = "",
 ) -> dict[str, Any]:
     """Writes everything that ``truing identify`` found into `folder`, and returns what result.json holds.
 
-    `source` names the data in the calibrated robot file. A `nominal_file` in URDF is also written calibrated,
-    as URDF.
+    `source` names the data in the calibrated robot file; `mistake` is what `review` said. A `nominal_file` in
+    URDF is also written calibrated, as URDF.
     """
-    found: dict[str, Any] = without_nan(identification_dict(result, seed=seed, warnings=warnings))
+    found: dict[str, Any] = without_nan(
+        identification_dict(
+            result,
+            seed=seed,
+            warnings=warnings,
+            mistake=mistake,
+            noise_from_repeats=_core.noise_from_repeats(data),
+        )
+    )
     assert result.set is not None
     rows = rows_of(
         result.before, result.robot, data, test=np.asarray(result.set) == 1, rejected=result.rejected_rows

@@ -34,7 +34,7 @@ PUBLIC_OF = {
     "math": COMMON,
     "model": (*COMMON, MODEL),
     "estimation": (*COMMON, MODEL),
-    "identification": (*COMMON, MODEL, "truing/identify.hpp"),
+    "identification": (*COMMON, MODEL, "truing/identify.hpp", "truing/review.hpp"),
     "planning": (*COMMON, MODEL, "truing/identify.hpp", "truing/diagnose.hpp", "truing/plan.hpp"),
     "diagnosis": (*COMMON, MODEL, "truing/identify.hpp", "truing/diagnose.hpp"),
     "inverse_kinematics": (
@@ -59,6 +59,7 @@ PUBLIC_OF = {
 # A public header belongs to the room whose folder or verb it names.
 ROOM_OF_PUBLIC = {
     "truing/identify.hpp": "identification",
+    "truing/review.hpp": "identification",
     "truing/diagnose.hpp": "diagnosis",
     "truing/plan.hpp": "planning",
     "truing/inverse.hpp": "inverse_kinematics",

@@ -6,6 +6,7 @@ half-written.
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import os
@@ -261,6 +262,76 @@ def test_a_fit_that_does_not_converge_exits_1_and_says_why(
     assert not result["solver"]["converged"] and result["solver"]["stopped_because"]
     assert result["solver"]["stopped_because"] in capsys.readouterr().err
     assert "did not converge" in Path("found/report.html").read_text()
+
+
+def with_turned_column(folder: Path) -> str:
+    """The measurements with the sign of J3 turned."""
+    with (folder / "measurements.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    with Path("turned.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows({**row, "q3_rad": repr(-float(row["q3_rad"]))} for row in rows)
+    return "turned.csv"
+
+
+def test_a_mistake_is_said_first_and_once_and_exits_1(
+    simulated: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    identify = ["identify", str(simulated / "robot.yaml"), with_turned_column(simulated), "--out", "found"]
+    capsys.readouterr()
+    assert main(identify) == 1
+    said = capsys.readouterr()
+    assert said.out.startswith(
+        "look at the robot file and the columns first: turning the sign of joint column 3"
+    )
+    assert (said.out + said.err).count("joint column") == 1
+    assert "--large-errors" in said.err
+    mistake = json.loads(Path("found/result.json").read_text())["mistake"]
+    assert mistake["kind"] == "joint_sign" and mistake["changes"]
+    page = Path("found/report.html").read_text()
+    head = page[page.index("<h1>") : page.index("</header>")]
+    assert "do not go together" in head and "sign of joint column 3" in head
+    assert page.count("sign of joint column") == 1
+    assert main([*identify, "--large-errors"]) == 0
+    assert json.loads(Path("found/result.json").read_text())["mistake"] == mistake
+
+    cut = subprocess.run(
+        [
+            "bash",
+            "-c",
+            f"set -o pipefail; {sys.executable} -m truing {' '.join(identify)} --json | head -c 1",
+        ],
+        capture_output=True,
+        check=False,
+    )
+    assert cut.returncode == 1  # that nobody reads on does not make a success of it
+
+
+def test_diagnose_says_a_mistake_once(simulated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    turned = with_turned_column(simulated)
+    capsys.readouterr()
+    assert main(["diagnose", str(simulated / "robot.yaml"), turned, "--out", "found"]) == 1
+    said = capsys.readouterr()
+    assert (said.out + said.err).count("turning the sign of joint column 3") == 1
+    assert Path("found/report.html").read_text().lower().count("turning the sign of joint column 3") == 1
+
+
+def test_noise_is_what_repeats_show(simulated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot = truing.load_robot(simulated / "true_robot.yaml")
+    rng = np.random.default_rng(7)
+    joints = np.repeat(rng.uniform(-1.0, 1.0, (60, 6)), 3, axis=0)
+    exact = truing.predict(robot, truing.Measurements(joints=joints)).position
+    structure = 2e-4 * np.sin(40.0 * joints[:, :3])  # that no parameter of the robot makes
+    positions = exact + structure + rng.normal(0.0, 1e-6, exact.shape)
+    truing.save_measurements("repeats.csv", truing.Measurements(joints=joints, positions=positions), robot)
+    capsys.readouterr()
+    assert main(["identify", ROBOT, "repeats.csv", "--out", "found"]) == 0
+    result = json.loads(Path("found/result.json").read_text())
+    assert result["noise_from_repeats_m"] == pytest.approx(1e-6, rel=0.15)
+    assert result["noise_sigma_m"] > 5e-5
+    assert "noise of repeats 0.0010 mm" in capsys.readouterr().out
+    assert "structure that the model does not explain" in Path("found/report.html").read_text()
 
 
 BAD = [

@@ -122,7 +122,7 @@ class Command(run.Command["tuple[Robot, Measurements]", "Diagnosis"]):
             words = list(dict.fromkeys(plain_name(n["effect"]) for n in result["not_testable"]))
             say(f"not testable with these data (why: report.html): {joined(words, 12)}")
         for finding in result["sanity"]:
-            if finding not in trouble(result):
+            if finding not in trouble(result) and not finding["mistake"]:  # that is the sentence
                 say(f"note: {finding['text']}")
         if result["next_measurements"]:
             say(f"measure next: {self.out / 'next_poses.csv'} ({len(result['next_measurements'])} poses)")

@@ -18,6 +18,7 @@ from truing.cli.options import (
     Choice,
     DataFile,
     Effects,
+    Flag,
     Fraction,
     Free,
     Length,
@@ -32,15 +33,17 @@ from truing.cli.reading import robot_and_measurements
 from truing.cli.tables import mm, say, table
 
 if TYPE_CHECKING:
-    from truing.identification import Identification
+    from truing.identification import Identification, Mistake
     from truing.model import Measurements, Robot
+
+    Found = tuple[Identification, Mistake | None]
 
 PANEL = "Calibrate"
 FIT = "Fit"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["tuple[Robot, Measurements]", "Identification"]):
+class Command(run.Command["tuple[Robot, Measurements]", "Found"]):
     doing = "identifying"
 
     robot: RobotFile
@@ -66,6 +69,9 @@ class Command(run.Command["tuple[Robot, Measurements]", "Identification"]):
     test_share: Annotated[
         float, Fraction("Fraction of the poses held out, when the data has no `set` column.", panel=FIT)
     ] = core("IdentifyOptions", "test_share")
+    large_errors: Annotated[
+        bool, Flag("The robot is known to be far from its file: links may change by any amount.")
+    ] = False
     seed: Seed = core("IdentifyOptions", "seed")
     threads: Threads = core("IdentifyOptions", "threads")
     base_link: BaseLink = ""
@@ -74,42 +80,45 @@ class Command(run.Command["tuple[Robot, Measurements]", "Identification"]):
     def load(self, progress: run.Progress) -> tuple[Robot, Measurements]:
         return robot_and_measurements(self.robot, self.data, self.base_link, self.tip_link)
 
-    def solve(self, loaded: tuple[Robot, Measurements], progress: run.Progress) -> Identification:
+    def solve(self, loaded: tuple[Robot, Measurements], progress: run.Progress) -> Found:
         import truing
 
-        return truing.identify(
-            *loaded,
-            free=self.free,
-            hold=self.hold,
-            effects=self.effects,
-            solver=self.solver,
-            loss=self.loss,
-            frame_by=self.frame_by,
-            rotation_length=self.rotation_length,
-            test_share=self.test_share,
-            seed=self.seed,
-            threads=self.threads,
-            raise_if_not_converged=False,
-        )
+        options: dict[str, Any] = {
+            "free": self.free,
+            "hold": self.hold,
+            "effects": self.effects,
+            "solver": self.solver,
+            "loss": self.loss,
+            "frame_by": self.frame_by,
+            "rotation_length": self.rotation_length,
+            "test_share": self.test_share,
+            "seed": self.seed,
+            "threads": self.threads,
+        }
+        found = truing.identify(*loaded, raise_if_not_converged=False, **options)
+        return found, truing.review(*loaded, found, **options)
 
     def write(
-        self, folder: Path, loaded: tuple[Robot, Measurements], found: Identification, warnings: list[str]
+        self, folder: Path, loaded: tuple[Robot, Measurements], found: Found, warnings: list[str]
     ) -> Mapping[str, Any]:
         from truing.identification.result import write_identification
 
         return write_identification(
             folder,
-            found,
+            found[0],
             loaded[1],
             seed=self.seed,
             source=self.data.name,
             warnings=warnings,
+            mistake=found[1],
             nominal_file=self.robot,
             base_link=self.base_link,
             tip_link=self.tip_link,
         )
 
-    def table(self, result: Mapping[str, Any], found: Identification) -> None:
+    def table(self, result: Mapping[str, Any], found: Found) -> None:
+        if result["mistake"]:
+            say(f"look at the robot file and the columns first: {result['mistake']['text']}")
         table(
             f"{result['robot']}: errors before and after",
             ("", "before", "after"),
@@ -117,8 +126,8 @@ class Command(run.Command["tuple[Robot, Measurements]", "Identification"]):
         )
         solver, frozen = result["solver"], result["frozen"]
         say(
-            f"{result['rank']} of {result['columns']} parameters found; noise {mm(result['noise_sigma_m'])}"
-            f" (1 sigma); {len(result['rejected_rows'])} rows rejected; {solver['iterations']} iterations:"
+            f"{result['rank']} of {result['columns']} parameters found; {noise_text(result)};"
+            f" {len(result['rejected_rows'])} rows rejected; {solver['iterations']} iterations:"
             f" {solver['stopped_because']}"
         )
         if frozen:
@@ -130,7 +139,17 @@ class Command(run.Command["tuple[Robot, Measurements]", "Identification"]):
         solver = result["solver"]
         if not solver["converged"]:
             return f"did not converge: {solver['stopped_because']}"
+        if result["mistake"] and not self.large_errors:
+            return "the robot file or the columns are to be corrected first (--large-errors: the robot is so)"
         return worse_than_drawn(result["errors"])
+
+
+def noise_text(result: Mapping[str, Any]) -> str:
+    """What the model leaves, and what of it is noise, of one component (1 sigma)."""
+    left, repeats = result["noise_sigma_m"], result["noise_from_repeats_m"]
+    if repeats is None:
+        return f"noise and what no parameter explains {mm(left)} (1 sigma)"
+    return f"noise of repeats {mm(repeats)} (1 sigma); with structure not explained {mm(left)}"
 
 
 def worse_than_drawn(errors: Mapping[str, Any]) -> str:

@@ -1,0 +1,260 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Whether what was found can be believed, and which mistake of the robot file or the columns would explain it.
+
+#include "truing/review.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "math/constants.hpp"
+#include "math/text.hpp"
+#include "model/model.hpp"
+#include "model/readings.hpp"
+#include "model/repeats.hpp"
+#include "rooms.hpp"
+
+namespace truing {
+using namespace identification;
+
+namespace identification {
+namespace {
+
+// What a workshop makes: links differ from the drawing by less.
+constexpr double kLength = 0.01;          ///< [m]
+constexpr double kShareOfReach = 0.02;    ///< of the robot's reach, if that is more
+constexpr double kAngle = 3.0 * kDegree;  ///< [rad]
+constexpr double kRatio = 0.05;           ///< of a gear ratio
+constexpr double kSigmas = 3.0;           ///< a parameter that the data hardly see may wander
+
+constexpr double kWorthALook = 0.001;  ///< of the measured range: more left than this, and readings are tried
+constexpr double kBetter = 0.5;        ///< a reading that leaves less than this fraction explains the data
+constexpr double kAsGood = 1.5;        ///< times the error of the fit as it is, that a reading's own fit may leave
+constexpr std::size_t kTried = 3;      ///< readings refitted, the best first
+constexpr std::size_t kRows = 400;     ///< that readings are compared on
+constexpr int kIterations = 30;        ///< a reading that needs more explains nothing
+
+/// A link that is another one's misses by a good part of its change, whatever base and tool do: where the robot as
+/// drawn misses by less than this part, it is the fit that went astray, and not the drawing.
+constexpr double kMissed = 0.05;
+
+double reach(const Robot& robot) {
+  double out = 0.0;
+  for (const Joint& joint : robot.joints)
+    out += std::hypot(joint.a, joint.d) + joint.T_parent_joint.translation().norm();
+  return out;
+}
+
+/// Diagonal of the box around all measured points, or the range of distances. [m]
+double measured_range(const Measurements& data) {
+  Eigen::Vector4d low = Eigen::Vector4d::Constant(1e300), high = -low;
+  for (std::size_t row = 0; row < data.rows; ++row) {
+    for (int k = 0; k < 4; ++k) {
+      if (k < 3 ? !data.has_position(row) : !data.has_distance(row)) continue;
+      const double value = k < 3 ? data.position[static_cast<std::size_t>(k)][row] : data.distance[row];
+      low[k] = std::min(low[k], value);
+      high[k] = std::max(high[k], value);
+    }
+  }
+  const Eigen::Vector4d range = (high - low).cwiseMax(0.0);
+  return range.head<3>().norm() > 0.0 ? range.head<3>().norm() : range[3];
+}
+
+/// By how much a parameter changed; whole turns are none.
+double change_of(const Parameter& p) {
+  const double change = p.value - p.nominal;
+  return std::abs(p.unit == "rad" ? std::remainder(change, kTwoPi) : change);
+}
+
+/// The value of a link that its joint's motion adds to; of joint origins, the one most along the axis.
+std::string zero_of(const Joint& joint, Convention convention) {
+  const bool turns = joint.type == JointType::revolute;
+  if (convention != Convention::urdf) return turns ? "theta" : "d";
+  int along = 0;
+  (joint.T_parent_joint.linear() * joint.axis).cwiseAbs().maxCoeff(&along);
+  return (turns ? "r" : "") + std::string(1, "xyz"[along]);
+}
+
+/// Which changes of the robot exceed what a workshop makes.
+class Workshop {
+ public:
+  Workshop(const Robot& nominal, const Measurements& data)
+      : reach_(reach(nominal)), length_(std::max(kLength, kShareOfReach * reach_)) {
+    for (const ParameterInfo& info : make_model(nominal, data).parameters) {
+      if (info.role == Role::geometry || info.role == Role::offset || info.role == Role::ratio)
+        robot_.insert(info.name);
+      if (info.role == Role::offset) zeros_.insert(info.name);
+    }
+    for (const Joint& joint : nominal.joints) zeros_.insert(joint.name + "." + zero_of(joint, nominal.convention));
+  }
+
+  /// By how many times a change exceeds it; 0: it does not.
+  double excess(const Parameter& p) const {
+    if (p.frozen || !robot_.count(p.name)) return 0.0;
+    const double limit = p.unit == "m" ? length_ : p.unit == "rad" ? kAngle : kRatio;
+    const double change = change_of(p) - (p.sigma > 0.0 ? kSigmas * p.sigma : 0.0);
+    return change > limit ? change / limit : 0.0;
+  }
+
+  /// Zeros of joints among them: a sign is fitted by one that turns half round, too.
+  std::vector<Parameter> changes(const Identification& found) const {
+    std::vector<Parameter> out;
+    for (const Parameter& p : found.parameters) {
+      if (excess(p) > 0.0) out.push_back(p);
+    }
+    std::stable_sort(out.begin(), out.end(),
+                     [&](const Parameter& a, const Parameter& b) { return excess(a) > excess(b); });
+    return out;
+  }
+
+  /// Those that a drawing which misses by `missed` [m] can be wrong by, without zeros of joints: a controller may count
+  /// from anywhere.
+  std::vector<Parameter> of_drawing(std::vector<Parameter> changes, double missed) const {
+    const auto is_none = [&](const Parameter& p) {
+      const double motion = change_of(p) * (p.unit == "m" ? 1.0 : reach_);
+      return zeros_.count(p.name) > 0 || missed < kMissed * motion;
+    };
+    changes.erase(std::remove_if(changes.begin(), changes.end(), is_none), changes.end());
+    return changes;
+  }
+
+ private:
+  double reach_, length_;
+  std::set<std::string> robot_, zeros_;
+};
+
+/// Base, targets and what else `identify` was asked for, fitted to a few rows of one reading.
+class Trials {
+ public:
+  Trials(const Measurements& data, const IdentifyOptions& options)
+      : sample_(sample_of(data, kRows)), options_(options) {
+    options_.test_share = 0.0;
+    options_.bounds.clear();
+    options_.solver = Solver::lm;
+    options_.frame_by = FrameBy::parameters;
+    options_.max_iterations = std::min(options_.max_iterations, 200);
+  }
+
+  Identification everything(const Robot& robot, const Measurements& data) const {
+    return identify(robot, thinned(data), options_);
+  }
+
+  /// Median error with base and targets fitted alone. [m]
+  double error(const Robot& robot, const Measurements& data) const {
+    IdentifyOptions frames = options_;
+    frames.free.clear();
+    for (const Target& target : robot.targets) frames.free.push_back(target.name + ".*");
+    if (frames.free.empty()) frames.free.push_back("tool.*");
+    frames.effects.clear();
+    frames.priors.clear();
+    frames.max_iterations = std::min(frames.max_iterations, kIterations);
+    return identify(robot, thinned(data), frames).train.after.median;
+  }
+
+ private:
+  Measurements thinned(const Measurements& data) const {
+    Measurements out = data;
+    out.weight = {sample_.weights.data(), 1};
+    out.set.assign(data.rows, 0);
+    return out;
+  }
+
+  Sample sample_;
+  IdentifyOptions options_;
+};
+
+struct Tried {
+  Reading reading;
+  double error = 0.0;  ///< [m of the data as handed over], base and targets fitted
+};
+
+/// Readings that explain far more than what was handed over, the best first. `Reading::data` are of few rows each.
+std::vector<Tried> better_readings(const Robot& robot, const Measurements& data, const Trials& trials, double as_is) {
+  std::vector<Tried> out;
+  for (const auto& make_reading : readings_of(robot, data)) {
+    Reading reading = make_reading();
+    double error = kNaN;
+    try {
+      error = trials.error(reading.robot, reading.data) / reading.length_scale;
+    } catch (const std::invalid_argument&) {
+      continue;  // nothing can be found under this reading
+    }
+    if (!(error < kBetter * as_is)) continue;
+    out.push_back({std::move(reading), error});
+    std::sort(out.begin(), out.end(), [](const Tried& a, const Tried& b) { return a.error < b.error; });
+    if (out.size() > kTried) out.pop_back();
+  }
+  return out;
+}
+
+std::string change_text(const Parameter& p) {
+  const double change = change_of(p);
+  return p.name + " by " +
+         (p.unit == "m"     ? millimetres(change)
+          : p.unit == "rad" ? degrees(change)
+                            : number(100.0 * change, 3) + " %");
+}
+
+std::string changes_text(const std::vector<Parameter>& changes) {
+  constexpr std::size_t kSaid = 4;
+  std::vector<std::string> said;
+  for (std::size_t k = 0; k < std::min(kSaid, changes.size()); ++k) said.push_back(change_text(changes[k]));
+  const std::string more = changes.size() > kSaid ? " and " + std::to_string(changes.size() - kSaid) + " more" : "";
+  return "the fit changes " + listed(said) + more + ", more than a workshop makes";
+}
+
+Mistake explained_by(const Tried& best, double as_is, std::vector<Parameter> changes) {
+  Mistake out;
+  out.kind = best.reading.kind;
+  out.text = best.reading.text + " leaves a median error of " + millimetres(best.error) + " in place of " +
+             millimetres(as_is) + " with base and tool fitted. Correct it and run again";
+  out.text += changes.empty() ? "." : ": as it is, " + changes_text(changes) + ".";
+  out.changes = std::move(changes);
+  return out;
+}
+
+Mistake unexplained(std::vector<Parameter> changes) {
+  Mistake out;
+  out.kind = "unexplained";
+  out.text =
+      changes_text(changes) +
+      ", and no sign, order or unit of columns and no other convention of the links explains it: is it the right "
+      "robot file, and is every link of it right?";
+  out.changes = std::move(changes);
+  return out;
+}
+
+}  // namespace
+}  // namespace identification
+
+std::optional<Mistake> review(const Robot& nominal, const Measurements& data, const Identification& found,
+                              const IdentifyOptions& options) {
+  const Workshop workshop(nominal, data);
+  std::vector<Parameter> changes = workshop.changes(found);
+  const bool much_left = found.train.after.median > kWorthALook * measured_range(data);
+  if (changes.empty() && !much_left) return std::nullopt;
+  const Trials trials(data, options);
+  const double as_is = trials.error(nominal, data);
+  const double fitted = found.train.after.median;
+  for (const Tried& tried : better_readings(nominal, data, trials, as_is)) {
+    const Identification other = trials.everything(tried.reading.robot, tried.reading.data);
+    const double left = other.train.after.median / tried.reading.length_scale;
+    const std::size_t still = workshop.changes(other).size();
+    if (changes.empty() ? left < kBetter * fitted : still < changes.size() && left < kAsGood * fitted)
+      return explained_by(tried, as_is, std::move(changes));
+  }
+  changes = workshop.of_drawing(std::move(changes), as_is);
+  if (changes.empty()) return std::nullopt;
+  return unexplained(std::move(changes));
+}
+
+std::optional<double> noise_from_repeats(const Measurements& data) {
+  const Repeats repeats = noise_of_repeats(data);
+  if (!repeats.enough()) return std::nullopt;
+  return repeats.sigma;
+}
+
+}  // namespace truing

@@ -1,0 +1,157 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include "model/readings.hpp"
+
+#include <memory>
+#include <utility>
+
+#include "math/constants.hpp"
+
+namespace truing::model {
+namespace {
+
+/// Columns of one's own beside the rest of the data.
+struct Owned {
+  std::shared_ptr<const void> rest;
+  std::vector<std::vector<double>> columns;
+};
+
+std::vector<double> copy_of(const Column& column, std::size_t rows, double factor = 1.0) {
+  std::vector<double> out(rows);
+  for (std::size_t row = 0; row < rows; ++row) out[row] = factor * column[row];
+  return out;
+}
+
+/// The joint columns, changed in place by `change`.
+Measurements with_changed_joints(const Measurements& data,
+                                 const std::function<void(std::vector<std::vector<double>>*)>& change) {
+  std::vector<std::vector<double>> columns;
+  for (const Column& column : data.joints) columns.push_back(copy_of(column, data.rows));
+  change(&columns);
+  return with_joints(data, std::move(columns));
+}
+
+/// The data with every measured length in another unit.
+Measurements with_lengths(const Measurements& data, double factor) {
+  Measurements out = data;
+  auto owned = std::make_shared<Owned>();
+  owned->rest = data.owner;
+  owned->columns.reserve(5);
+  for (Column* column : {&out.position[0], &out.position[1], &out.position[2], &out.distance, &out.position_sigma}) {
+    if (!*column) continue;
+    owned->columns.push_back(copy_of(*column, data.rows, factor));
+    *column = {owned->columns.back().data(), 1};
+  }
+  out.owner = owned;
+  return out;
+}
+
+using Readings = std::vector<std::function<Reading()>>;
+
+void add_joint_readings(const Robot& robot, const Measurements& data, Readings* out) {
+  using Columns = std::vector<std::vector<double>>;
+  for (std::size_t k = 0; k < data.joints.size(); ++k) {
+    out->push_back([&robot, &data, k] {
+      const auto turn = [&](Columns* columns) {
+        for (double& q : (*columns)[k]) q = -q;
+      };
+      return Reading{robot, with_changed_joints(data, turn), "joint_sign",
+                     "turning the sign of joint column " + std::to_string(k + 1)};
+    });
+    for (std::size_t m = k + 1; m < data.joints.size(); ++m) {
+      out->push_back([&robot, &data, k, m] {
+        const auto exchange = [&](Columns* columns) { std::swap((*columns)[k], (*columns)[m]); };
+        return Reading{robot, with_changed_joints(data, exchange), "joint_order",
+                       "swapping joint columns " + std::to_string(k + 1) + " and " + std::to_string(m + 1)};
+      });
+    }
+  }
+}
+
+/// What an angle is multiplied by that was read in the other unit.
+constexpr double kOtherAngles[] = {180.0 / kPi, kDegree};
+
+std::string other_angles(double factor) { return factor > 1.0 ? "rad instead of deg" : "deg instead of rad"; }
+
+void add_unit_readings(const Robot& robot, const Measurements& data, Readings* out) {
+  for (const double factor : kOtherAngles) {
+    out->push_back([&robot, &data, factor] {
+      const std::vector<std::size_t> driven = robot.driven_joints();
+      const auto convert = [&](std::vector<std::vector<double>>* columns) {
+        for (std::size_t k = 0; k < columns->size(); ++k) {
+          if (robot.joints[driven[k]].type != JointType::revolute) continue;
+          for (double& q : (*columns)[k]) q *= factor;
+        }
+      };
+      return Reading{robot, with_changed_joints(data, convert), "joint_unit",
+                     "reading the joints in " + other_angles(factor)};
+    });
+  }
+  if (!data.position[0] && !data.distance) return;
+  const std::pair<double, const char*> lengths[] = {
+      {1e-3, "mm instead of m"}, {1e3, "m instead of mm"}, {0.0254, "in instead of m"}, {25.4, "in instead of mm"}};
+  for (const auto& length : lengths) {
+    out->push_back([&robot, &data, length] {
+      return Reading{robot, with_lengths(data, length.first), "length_unit",
+                     std::string("reading the measured lengths in ") + length.second +
+                         " (or those of the robot file the other way round)",
+                     length.first};
+    });
+  }
+}
+
+/// The table of links with its angles in the other unit, or by the other convention. Joint origins as of a URDF have
+/// none.
+void add_link_readings(const Robot& robot, const Measurements& data, Readings* out) {
+  if (robot.convention == Convention::urdf) return;
+  for (const double factor : kOtherAngles) {
+    out->push_back([&robot, &data, factor] {
+      Reading other{robot, data, "link_unit", "reading the angles of the robot file in " + other_angles(factor)};
+      for (Joint& joint : other.robot.joints) {
+        joint.theta *= factor;
+        joint.alpha *= factor;
+        joint.beta *= factor;
+      }
+      return other;
+    });
+  }
+  out->push_back([&robot, &data] {
+    const bool modified = robot.convention == Convention::mdh;
+    Reading other{robot, data, "convention",
+                  std::string("reading the robot file's links as convention: ") + (modified ? "dh" : "mdh")};
+    other.robot.convention = modified ? Convention::dh : Convention::mdh;
+    return other;
+  });
+}
+
+}  // namespace
+
+Measurements with_joints(const Measurements& data, std::vector<std::vector<double>> columns) {
+  Measurements out = data;
+  auto owned = std::make_shared<Owned>(Owned{data.owner, std::move(columns)});
+  for (std::size_t k = 0; k < owned->columns.size(); ++k) out.joints[k] = {owned->columns[k].data(), 1};
+  out.owner = owned;
+  return out;
+}
+
+Sample sample_of(const Measurements& data, std::size_t most) {
+  Sample out;
+  out.weights.assign(data.rows, 0.0);
+  const std::size_t step = data.rows / most + 1;
+  for (std::size_t row = 0; row < data.rows; row += step) {
+    out.weights[row] = data.weight ? data.weight[row] : 1.0;
+    if (out.weights[row] > 0.0) out.rows.push_back(static_cast<std::int32_t>(row));
+  }
+  return out;
+}
+
+std::vector<std::function<Reading()>> readings_of(const Robot& robot, const Measurements& data) {
+  Readings out;
+  add_joint_readings(robot, data, &out);
+  add_unit_readings(robot, data, &out);
+  add_link_readings(robot, data, &out);
+  return out;
+}
+
+}  // namespace truing::model

@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "rooms.hpp"
+#include "truing/model/measurement.hpp"
+
+namespace truing::model {
+
+/// Another reading of what was handed over.
+struct Reading {
+  Robot robot;
+  Measurements data;
+  std::string kind;           ///< 'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit' or 'convention'
+  std::string text;           ///< what is read otherwise: 'turning the sign of joint column 2'
+  double length_scale = 1.0;  ///< measured lengths in `data` over those handed over
+};
+
+/// The usual mistakes, each undone: two joint columns exchanged, the sign of one turned, angles or lengths in another
+/// unit, the table of links read by the other convention. Each is made when it is called, since it copies columns;
+/// robot and data must outlive them.
+std::vector<std::function<Reading()>> readings_of(const Robot& robot, const Measurements& data);
+
+/// Rows that are enough to compare readings by: every so many, the others with weight zero. It must outlive what uses
+/// its weights.
+struct Sample {
+  std::vector<std::int32_t> rows;
+  std::vector<double> weights;  ///< of all rows
+};
+
+Sample sample_of(const Measurements& data, std::size_t most);
+
+/// The data with other joint columns.
+Measurements with_joints(const Measurements& data, std::vector<std::vector<double>> columns);
+
+}  // namespace truing::model

@@ -1,0 +1,154 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+#include "support/arms.hpp"
+#include "support/sanitized.hpp"
+
+using namespace arms;
+using truing::Identification;
+using truing::Mistake;
+
+namespace {
+
+std::vector<Robot> some_arms() { return {ur10(), palletizer(), rail_arm(), urdf_arm()}; }
+
+/// An arm wrong by a millimetre and a milliradian, somewhere, and what a tracker sees of it.
+std::unique_ptr<Table> measured(const Robot& nominal, std::size_t rows, unsigned seed, What what = What::position) {
+  Robot truth = perturbed(nominal, 1e-3, 1e-3, seed);
+  truth.T_measurement_base = somewhere();
+  auto table = random_joints(truth, rows, seed + 1);
+  measure(table.get(), truth, what, 5e-5, seed + 2);
+  return table;
+}
+
+std::optional<Mistake> reviewed(const Robot& robot, const Measurements& data) {
+  return truing::review(robot, data, truing::identify(robot, data));
+}
+
+void scale(Table* table, Column* column, double factor) {
+  std::vector<double> values;
+  for (std::size_t row = 0; row < table->data.rows; ++row) values.push_back(factor * (*column)[row]);
+  *column = table->add(values);
+}
+
+/// The kind that must be said, and the words that must be in it.
+void check_said(const Robot& robot, const Measurements& data, const std::string& kind, const std::string& words) {
+  const std::optional<Mistake> said = reviewed(robot, data);
+  CAPTURE(robot.name);
+  CAPTURE(kind);
+  CAPTURE(words);
+  REQUIRE(said);
+  CHECK(said->kind == kind);
+  INFO(said->text);
+  CHECK(said->text.find(words) != std::string::npos);
+}
+
+}  // namespace
+
+TEST_CASE("a joint column with the wrong sign is found on every arm") {
+  for (const Robot& robot : some_arms()) {
+    for (std::size_t k = 0; k < robot.driven_count(); ++k) {
+      const auto table = measured(robot, 150, 100 + static_cast<unsigned>(k));
+      scale(table.get(), &table->data.joints[k], -1.0);
+      check_said(robot, table->data, "joint_sign", "sign of joint column " + std::to_string(k + 1));
+    }
+  }
+}
+
+TEST_CASE("exchanged joint columns are found on every arm") {
+  for (const Robot& robot : some_arms()) {
+    for (std::size_t k = 0; k + 1 < robot.driven_count(); ++k) {
+      if (robot.joints[k].type == JointType::prismatic) continue;
+      const auto table = measured(robot, 150, 200 + static_cast<unsigned>(k));
+      std::swap(table->data.joints[k], table->data.joints[k + 1]);
+      check_said(robot, table->data, "joint_order",
+                 "joint columns " + std::to_string(k + 1) + " and " + std::to_string(k + 2));
+    }
+  }
+}
+
+TEST_CASE("angles and lengths in another unit are found") {
+  for (const Robot& robot : some_arms()) {
+    const auto joints = measured(robot, 150, 300);
+    for (std::size_t k = 0; k < joints->data.joints.size(); ++k) {
+      if (robot.joints[robot.driven_joints()[k]].type == JointType::revolute)
+        scale(joints.get(), &joints->data.joints[k], 180.0 / M_PI);
+    }
+    check_said(robot, joints->data, "joint_unit", "deg instead of rad");
+    const auto lengths = measured(robot, 150, 301);
+    for (Column& column : lengths->data.position) scale(lengths.get(), &column, 1e3);
+    check_said(robot, lengths->data, "length_unit", "mm instead of m");
+    if (robot.convention == Convention::urdf) continue;
+    Robot links = robot;
+    for (Joint& j : links.joints) {
+      j.theta *= 180.0 / M_PI;
+      j.alpha *= 180.0 / M_PI;
+    }
+    check_said(links, measured(robot, 150, 302)->data, "link_unit", "deg instead of rad");
+  }
+}
+
+TEST_CASE("links by the other convention are found") {
+  for (const Robot& robot : some_arms()) {
+    if (robot.convention == Convention::urdf) continue;
+    Robot other = robot;
+    const bool modified = robot.convention == Convention::mdh;
+    other.convention = modified ? Convention::dh : Convention::mdh;
+    check_said(other, measured(robot, 150, 310)->data, "convention", modified ? "mdh" : "dh");
+  }
+}
+
+TEST_CASE("a link that is another one's is said, and that no usual mistake explains it") {
+  Robot wrong = ur10();
+  wrong.joints[2].a -= 0.05;
+  const auto table = measured(ur10(), 150, 320);
+  const std::optional<Mistake> said = reviewed(wrong, table->data);
+  REQUIRE(said);
+  CHECK(said->kind == "unexplained");
+  REQUIRE(!said->changes.empty());
+  CHECK(said->changes[0].name == "J3.a");
+  CHECK(said->text.find("J3.a by ") != std::string::npos);
+}
+
+TEST_CASE("no mistake is said of arms that are as workshops make them") {
+  for (const Robot& robot : some_arms()) {
+    for (unsigned seed = 400; seed < (kSanitized ? 402u : 420u); ++seed) {
+      for (const What what : {What::position, What::pose}) {
+        const auto table = measured(robot, 40 + 10 * (seed % 7), seed, what);
+        const std::optional<Mistake> said = reviewed(robot, table->data);
+        CAPTURE(robot.name);
+        CAPTURE(seed);
+        INFO((said ? said->text : ""));
+        CHECK(!said);
+      }
+    }
+  }
+}
+
+TEST_CASE("the zero of a joint may be anywhere") {
+  const auto table = measured(ur10(), 150, 500);
+  Robot turned = ur10();
+  turned.joints[3].theta += 0.5;
+  CHECK(!reviewed(turned, table->data));
+}
+
+TEST_CASE("noise comes from repeats of a pose, not from what the model leaves") {
+  const auto poses = random_joints(ur10(), 40, 600);
+  Table table(120);
+  for (const Column& column : poses->data.joints) {
+    std::vector<double> values;
+    for (std::size_t row = 0; row < 120; ++row) values.push_back(column[row / 3]);
+    table.data.joints.push_back(table.add(values));
+  }
+  measure(&table, ur10(), What::position, 2e-6, 601);
+  CHECK(truing::noise_from_repeats(table.data).value_or(0.0) == doctest::Approx(2e-6).scale(0).epsilon(0.15));
+  measure(&table, ur10(), What::position, 0.0, 602);  // copies are no repeats
+  CHECK(!truing::noise_from_repeats(table.data));
+  CHECK(!truing::noise_from_repeats(measured(ur10(), 100, 603)->data));
+}
