@@ -179,8 +179,13 @@ class Plan {
         result_.not_testable.push_back(why_invisible(view_, groups_[g], view_.seen[g]));
         continue;
       }
+      const EffectSize size = smallest(view_, groups_[g], g, options_);
+      if (is_nobodys(size, robot_)) {
+        result_.not_testable.push_back(why_not_seen(size));
+        continue;
+      }
       shown.push_back(g);
-      result_.effects.push_back(smallest(view_, groups_[g], g, options_));
+      result_.effects.push_back(size);
     }
     say_what_was_asked_only();
     say_one_sided();

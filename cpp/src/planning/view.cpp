@@ -15,6 +15,7 @@
 #include "estimation/evidence.hpp"
 #include "estimation/selection.hpp"
 #include "math/constants.hpp"
+#include "math/text.hpp"
 
 namespace truing::planning {
 namespace {
@@ -25,6 +26,20 @@ constexpr double kSameColumn = 1e-8, kSameRival = 1e-4;
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+
+/// What moves the tip by less than this when its parameter is one is rounding: a coupling into a joint on whose axis
+/// the tool lies. [m]
+constexpr double kRounding = 1e-10;
+
+/// A parameter as large as these is nobody's: a joint that turns by a radian, a tenth of the robot's reach at the tip.
+constexpr double kWholeUnit = 1.0, kShareOfReach = 0.1;
+
+double reach_of(const Robot& robot) {
+  double reach = 0.0;
+  for (const Joint& joint : robot.joints)
+    reach += std::hypot(joint.a, joint.d) + joint.T_parent_joint.translation().norm();
+  return reach;
+}
 
 /// Length one, where there is any length.
 MatrixXd unit_columns(MatrixXd x) {
@@ -141,6 +156,10 @@ Columns make_columns(const Robot& robot, const std::vector<Planned>& poses, cons
     out.x.middleRows(row, r.size()) = j;
     row += r.size();
   }
+  const double rounding = kRounding / options.position_sigma * std::sqrt(static_cast<double>(poses.size()));
+  for (Index k = 0; k < out.x.cols(); ++k) {
+    if (out.x.col(k).norm() < rounding) out.x.col(k).setZero();
+  }
   if (carrying) *carrying = robot_with(model, values);
   return out;
 }
@@ -200,6 +219,19 @@ EffectSize smallest(const View& view, const Group& group, std::size_t g, const D
     best = {group.effect->name, group.joint, info.name, info.unit, size, size * tip, larger, larger * tip, errors};
   }
   return best;
+}
+
+bool is_nobodys(const EffectSize& size, const Robot& robot) {
+  const bool whole = size.unit == "rad" || size.unit == "m" || size.unit == "-";
+  return (whole && size.size > kWholeUnit) || size.size_at_tip > kShareOfReach * reach_of(robot);
+}
+
+NotTestable why_not_seen(const EffectSize& size) {
+  NotTestable out{size.effect, {}, "", Untestable::other};
+  if (!size.joint.empty()) out.joints = {size.joint};
+  out.why = "it would show from " + number(size.size, 2) + " " + (size.unit == "-" ? "" : size.unit + " ") +
+            "on, more than any robot has";
+  return out;
 }
 
 NotTestable why_invisible(const View& view, const Group& group, const Seen& seen) {

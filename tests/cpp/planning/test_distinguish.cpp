@@ -153,6 +153,29 @@ TEST_CASE("what no column shows is said with the column's name") {
   CHECK(size_of(truing::distinguish(light, random_poses(light, 60, 4), options), "link_compliance", "J3") != nullptr);
 }
 
+TEST_CASE("an effect that only a size beyond every robot would show is not testable there") {
+  // The tool lies on the last axis but for `off`: what turns the last joint alone moves it little or not at all.
+  for (const double off : {0.0, 1e-15, 1e-5}) {
+    CAPTURE(off);
+    truing::Robot robot = arms::ur10();
+    arms::set_tool(&robot, {off, 0.0, 0.15});
+    DistinguishOptions options;
+    options.columns = {"dir", "payload", "temp", "t"};
+    const Distinction d = truing::distinguish(robot, random_poses(robot, 40, 6), options);
+    for (const char* effect : {"backlash", "harmonic", "gear_ratio"}) {
+      CAPTURE(effect);
+      CHECK(size_of(d, effect, "J6") == nullptr);
+      CHECK(not_testable(d, effect, "J6") != nullptr);
+    }
+    for (const EffectSize& e : d.effects) {
+      CAPTURE(e.effect);
+      CAPTURE(e.joint);
+      if (e.unit == "rad" || e.unit == "-") CHECK(e.size < 1.0);
+      CHECK(e.size_at_tip < 0.15);
+    }
+  }
+}
+
 TEST_CASE("a promised smallest size is as many of identify's standard errors as it says") {
   const truing::Robot robot = arms::ur10();
   const double noise = 5e-5;
