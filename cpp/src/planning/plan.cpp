@@ -196,6 +196,7 @@ class Planner {
     const Evaluator evaluator(model_, measured.data, bases, segments, free, 1);
     NormalEquations normal;
     evaluator.normal_equations(initial_values(model_), weighing_of(options_), &normal);
+    clear_rounding(measured.rows().size(), &normal.gram);
     std::vector<int> priority;
     for (const int k : free) priority.push_back(priority_of(model_.parameters[k].role));
     selection_ = observable(model_, free, find_rank(normal.gram, priority, IdentifyOptions().rank_tolerance));
@@ -203,6 +204,16 @@ class Planner {
     if (values <= parameters()) {
       throw std::invalid_argument("plan: " + std::to_string(options_.poses) + " poses give " + std::to_string(values) +
                                   " values for " + std::to_string(parameters()) + " parameters: ask for more poses");
+    }
+  }
+
+  /// What moves the tip by rounding alone is not seen, however well the rounding can be told from everything else.
+  void clear_rounding(std::size_t rows, Eigen::MatrixXd* gram) const {
+    const double least = std::pow(kRounding / options_.position_sigma, 2.0) * static_cast<double>(rows);
+    for (Eigen::Index k = 0; k < gram->rows(); ++k) {
+      if ((*gram)(k, k) >= least) continue;
+      gram->row(k).setZero();
+      gram->col(k).setZero();
     }
   }
 

@@ -15,6 +15,10 @@
 
 namespace truing::planning {
 
+/// What moves the tip by less than this, rms, when its parameter is one is rounding: a coupling into a joint on whose
+/// axis the tool lies. [m]
+constexpr double kRounding = 1e-10;
+
 using Pose = Eigen::VectorXd;  // readings of the driven joints
 
 struct Range {

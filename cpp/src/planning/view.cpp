@@ -16,6 +16,7 @@
 #include "estimation/selection.hpp"
 #include "math/constants.hpp"
 #include "math/text.hpp"
+#include "planning/poses.hpp"
 
 namespace truing::planning {
 namespace {
@@ -26,10 +27,6 @@ constexpr double kSameColumn = 1e-8, kSameRival = 1e-4;
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-/// What moves the tip by less than this when its parameter is one is rounding: a coupling into a joint on whose axis
-/// the tool lies. [m]
-constexpr double kRounding = 1e-10;
 
 /// A parameter as large as these is nobody's: a joint that turns by a radian, a tenth of the robot's reach at the tip.
 constexpr double kWholeUnit = 1.0, kShareOfReach = 0.1;

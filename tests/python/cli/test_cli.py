@@ -157,6 +157,17 @@ def test_distances_come_back_as_distances() -> None:
     assert list(columns("without/predicted.csv")) == ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "dist_m"]
 
 
+def test_a_plan_does_not_find_what_moves_the_tip_by_rounding_alone() -> None:
+    robot = truing.load_robot(ROBOT)
+    on_axis = np.eye(4)
+    on_axis[2, 3] = 0.1
+    robot.targets[0].T_last_target = on_axis
+    truing.save_robot("arm.yaml", robot)
+    assert main(["plan", "arm.yaml", "--poses", "20", "--out", "planned"]) == 0
+    result = json.loads(Path("planned/result.json").read_text())
+    assert max(p["sigma"] for p in result["parameters"] if p["sigma"] is not None) < 0.01
+
+
 def test_a_plan_is_measured_by_the_simulator(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", ROBOT, "--poses", "20", "--out", "planned", "--min-step", "20deg"]) == 0
     table = columns("planned/poses.csv")
