@@ -276,16 +276,31 @@ struct Refusal {
   std::string message;
 };
 
-/// Units of the accelerometer that show by themselves.
+/// Units of the accelerometer that show by themselves: the median of its lengths, which a boom that accelerates by half
+/// of gravity between its stops does not move by as much.
 std::optional<Refusal> look_at_force(const std::vector<ImuSample>& imu) {
-  double force = 0.0;
-  for (const ImuSample& sample : imu) force += sample.accel.norm() / static_cast<double>(imu.size());
-  const std::string found = "The accelerometer's mean is " + number(force, 3) + " m/s^2 where 9.81 is expected: ";
+  std::vector<double> lengths;
+  for (const ImuSample& sample : imu) lengths.push_back(sample.accel.norm());
+  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::nth_element(lengths.begin(), middle, lengths.end());
+  const double force = *middle;
+  const std::string found =
+      "The accelerometer's median is " + number(force, 3) + " m/s^2 where 9.81 is expected at rest: ";
   const auto refusal = [&](const char* what) { return Refusal{CalibrationStatus::not_consistent, found + what}; };
   if (force > 0.7 && force < 1.4) return refusal("it seems to be in g; multiply by 9.80665.");
   if (force > 700.0 && force < 1400.0) return refusal("it seems to be in mg; multiply by 0.00980665.");
-  if (force < 8.0 || force > 12.0) return refusal("check its unit, and that gravity was not taken away.");
   return {};
+}
+
+/// What is left of the specific force when it is averaged in the tracker's axes: gravity, however the arm accelerates,
+/// for over a recording the speeds gained and lost make nothing.
+std::optional<Refusal> look_at_gravity(const Vector3d& mean) {
+  const double force = mean.norm();
+  if (force > 8.0 && force < 12.0) return {};
+  return Refusal{CalibrationStatus::not_consistent,
+                 "The accelerometer's mean in the tracker's axes, in which accelerations cancel, is " +
+                     number(force, 3) +
+                     " m/s^2 where 9.81 is expected: check its unit, and that gravity was not taken away."};
 }
 
 /// Units of the gyro: how much faster it turns than the tracker.
@@ -348,15 +363,18 @@ Unknowns start_of(const SpeedAlignment& aligned) {
   return x;
 }
 
-/// Up is where the mean of the accelerometer points.
-Vector3d mean_gravity(const Problem& problem, const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker,
-                      const Unknowns& x) {
-  Vector3d up = Vector3d::Zero();
+/// Mean of the specific force in the tracker's axes; it points up.
+Vector3d mean_force(const Problem& problem, const std::vector<ImuSample>& imu, const std::vector<PoseSample>& tracker,
+                    const Unknowns& x) {
+  Vector3d sum = Vector3d::Zero();
+  double count = 0.0;
   for (const PoseSample& sample : tracker) {
     std::size_t k = 0;
-    if (problem.before(sample.t - x.tau, &k)) up += sample.orientation * (x.R_receiver_imu * imu[k].accel);
+    if (!problem.before(sample.t - x.tau, &k)) continue;
+    sum += sample.orientation * (x.R_receiver_imu * imu[k].accel);
+    count += 1.0;
   }
-  return -kGravity * up.normalized();
+  return sum / std::max(1.0, count);
 }
 
 void start_segments(const std::vector<PoseSample>& tracker, const Unknowns& x, std::vector<Segment>* segments) {
@@ -525,7 +543,9 @@ InertialResult fit_as_given(const std::vector<ImuSample>& imu, const std::vector
     return refused({CalibrationStatus::not_observable,
                     "The records overlap for " + std::to_string(fit.segments.size()) + " segments of " +
                         number(options.segment, 3) + " s; 5 or more are needed: record for longer."});
-  fit.x.gravity = mean_gravity(problem, imu, tracker, fit.x);
+  const Vector3d up = mean_force(problem, imu, tracker, fit.x);
+  if (const auto refusal = look_at_gravity(up)) return refused(*refusal);
+  fit.x.gravity = -kGravity * up.normalized();
   start_segments(tracker, fit.x, &fit.segments);
   fit.systems.resize(fit.segments.size());
   fit.shared.resize(fit.segments.size());

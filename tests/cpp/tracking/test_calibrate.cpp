@@ -347,6 +347,53 @@ TEST_CASE("units and hands of inertial sensor and tracker are named: seed 3") {
   }
 }
 
+/// A sensor on the receiver that is shaken to and fro along x by `acceleration` [m/s^2] and turns about all axes.
+struct Shaken {
+  std::vector<ImuSample> imu;
+  std::vector<PoseSample> tracker;
+};
+Shaken shaken(double acceleration, double seconds) {
+  const double omega = 2.0 * M_PI * 1.5, size = acceleration / (omega * omega), h = 1e-4;
+  const auto turn = [](double t) {
+    return exp_rotation(0.4 * Vector3d(std::sin(2.1 * t), std::sin(1.3 * t), std::sin(1.7 * t)));
+  };
+  Shaken out;
+  for (int k = 0; k <= 500 * seconds; ++k) {
+    const double t = k / 500.0;
+    const Vector3d force(-size * omega * omega * std::sin(omega * t), 0.0, 9.81);
+    out.imu.push_back(
+        {t, t, log_rotation(turn(t - h).conjugate() * turn(t + h)) / (2.0 * h), turn(t).conjugate() * force});
+  }
+  for (int k = 0; k <= 100 * seconds; ++k) {
+    const double t = k / 100.0;
+    out.tracker.push_back({t, t, Vector3d(size * std::sin(omega * t), 0.0, 2.0), turn(t)});
+  }
+  return out;
+}
+
+TEST_CASE("an arm that accelerates by more than gravity between its stops is calibrated all the same") {
+  const Shaken s = shaken(13.0, 20.0);
+  double mean = 0.0;
+  for (const ImuSample& sample : s.imu) mean += sample.accel.norm() / static_cast<double>(s.imu.size());
+  REQUIRE(mean > 12.3);
+  const InertialResult r = calibrate_inertial(s.imu, s.tracker);
+  CAPTURE(r.message);
+  REQUIRE(r.status == CalibrationStatus::done);
+  CHECK((r.gravity - Vector3d(0.0, 0.0, -9.81)).norm() < 0.02);
+}
+
+TEST_CASE("an accelerometer without gravity is refused, whatever the arm's accelerations add up to") {
+  Shaken s = shaken(13.0, 20.0);
+  for (std::size_t k = 0; k < s.imu.size(); ++k) {
+    const double t = s.imu[k].t;
+    const Quaterniond turn = exp_rotation(0.4 * Vector3d(std::sin(2.1 * t), std::sin(1.3 * t), std::sin(1.7 * t)));
+    s.imu[k].accel -= turn.conjugate() * Vector3d(0.0, 0.0, 9.81);
+  }
+  const InertialResult r = calibrate_inertial(s.imu, s.tracker);
+  CHECK(r.status == CalibrationStatus::not_consistent);
+  CHECK(r.message.find("gravity was not taken away") != std::string::npos);
+}
+
 TEST_CASE("a tracker with y up, and gravity that is not along the base's z, are said and used: seed 4") {
   SimulatedStreams s = motion(4, 30.0, 0.0);
   s.tracker = in_order(s.tracker);
