@@ -237,6 +237,23 @@ def test_poses_that_are_inverted_are_recognised_and_can_be_read_so(
     assert off(frame_of(result["camera"]), s.X)[0] < 1.5e-3
 
 
+def test_the_other_set_up_is_proposed_as_the_option_that_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    s = scene(24, "eye-to-hand", seed=3)
+    path = write_scene(Path("poses.csv"), s)
+    code, result = run(path, "--setup", "eye-in-hand")
+    captured = capsys.readouterr()
+    assert code == 1 and result["status"] == "not closing" and "camera" not in result
+    best = result["convention"]["other_readings"][0]
+    assert best["reading"] == "other-setup" and best["option"] == "--setup eye-to-hand"
+    assert "the set-up is eye-to-hand, not eye-in-hand" in captured.err
+    assert (
+        "--setup eye-to-hand" in captured.out
+        and "<code>--setup eye-to-hand</code>" in Path("found/report.html").read_text()
+    )
+    assert main(["handeye", str(path), "--reading", "other-setup", "--out", "elsewhere"]) == 2
+    assert "give the set-up eye-to-hand" in capsys.readouterr().err and not Path("elsewhere").exists()
+
+
 def test_poses_that_do_not_belong_together_are_no_camera() -> None:
     s = scene(20, seed=6)
     code, result = run(dataclasses.replace(s, A=s.A[np.random.default_rng(1).permutation(20)]))

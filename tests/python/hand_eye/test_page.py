@@ -291,7 +291,7 @@ def test_names_from_files_cannot_become_markup(good: tuple[dict[str, Any], Scene
     assert "<img" not in page[page.index("<body>") : page.index("<script>")]
     undecided = {**json.loads(text), "status": "not closing", "message": evil}
     undecided["convention"]["other_readings"] = [
-        {"reading": evil, "explanation": evil, "rms_m": 1e-3, "rotation_rms_rad": 1e-3}
+        {"reading": evil, "option": evil, "explanation": evil, "rms_m": 1e-3, "rotation_rms_rad": 1e-3}
     ]
     undecided["observability"]["unobservable"] = [
         {"what": evil, "direction": [0, 0, 1], "rotation": False, "sigma": None, "advice": evil}
