@@ -312,11 +312,29 @@ TEST_CASE("both noises are found from many poses") {
   }();
   CHECK(r.noise.estimated);
   CHECK(r.noise.position == doctest::Approx(std::hypot(1e-4, 5e-4)).scale(0).epsilon(0.05));
-  // The smaller of two rotation noises hardly shows beside the larger one.
+  // The smaller of two rotation noises hardly shows beside the larger one: this seed's is the lowest of 60.
   CHECK(r.noise.hand_rotation == doctest::Approx(kUsual.hand_rotation).scale(0).epsilon(0.5));
   CHECK(r.noise.camera_rotation == doctest::Approx(kUsual.camera_rotation).scale(0).epsilon(0.1));
   CHECK(std::hypot(r.noise.hand_rotation, r.noise.camera_rotation) ==
         doctest::Approx(std::hypot(kUsual.hand_rotation, kUsual.camera_rotation)).scale(0).epsilon(0.05));
+}
+
+TEST_CASE("the smaller of two rotation noises is not found too small on the average") {
+  for (const HandEyeSetup setup : kSetups)
+    for (const int n : {30, 120}) {
+      CAPTURE(n);
+      const int seeds = kSanitized ? 2 : 80;
+      double sum = 0.0, squares = 0.0;
+      for (int seed = 1; seed <= seeds; ++seed) {
+        const Scene s = make_scene(setup, n, kUsual, static_cast<std::uint64_t>(seed));
+        const double ratio = std::pow(handeye(s.poses, options_for(s)).noise.hand_rotation / kUsual.hand_rotation, 2);
+        sum += ratio, squares += ratio * ratio;
+      }
+      if (kSanitized) continue;
+      const double mean = sum / seeds, error = std::sqrt((squares / seeds - mean * mean) / seeds);
+      CHECK(mean > 1.0 - 3.0 * error);
+      CHECK(mean < (n < 100 ? 1.5 : 1.0 + 3.0 * error));  // of few poses the prior draws it towards an even split
+    }
 }
 
 TEST_CASE("a pose left out is the fit without it") {
