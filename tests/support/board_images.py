@@ -90,8 +90,60 @@ def texture(board: Board, x: Floats, y: Floats) -> Floats:
     return np.where(dark, 25.0, np.where(paper, 230.0, 128.0))
 
 
+def tags_texture(border: int = 2, squares: bool = True, turn: int = 0) -> Any:
+    """A texture of AprilTags, y up: black cells around each, black squares that touch their corners (Kalibr's
+    boards have two and these), and quarter turns in which they are printed.
+    """
+
+    def paint(board: Board, x: Floats, y: Floats) -> Floats:
+        import cv2
+
+        grid = board.tags
+        step, gap = (1 + grid.spacing) * grid.size, grid.spacing * grid.size
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_APRILTAG_{grid.family}"))
+        cells = {"36h11": 6, "25h9": 5, "16h5": 4}[grid.family] + 2 * border
+        printed = np.array(
+            [
+                np.rot90(
+                    cv2.aruco.generateImageMarker(
+                        dictionary, (grid.first or 0) + k, cells, borderBits=border
+                    ),
+                    turn,
+                )
+                for k in range(grid.count)
+            ]
+        )
+        column, row = np.floor(x / step).astype(np.intp), np.floor(y / step).astype(np.intp)
+        u, v = (x - step * column) / grid.size, 1 - (y - step * row) / grid.size
+        inside = (column >= 0) & (column < grid.columns) & (row >= 0) & (row < grid.rows) & (u < 1) & (v >= 0)
+        number = row[inside] * grid.columns + column[inside]
+        dark = np.zeros(x.shape, dtype=bool)
+        place = number, (v[inside] * cells).astype(np.intp), (u[inside] * cells).astype(np.intp)
+        dark[inside] = printed[place] < 128
+        if squares:
+            across, up = x + gap, y + gap
+            at_corner = (across % step < gap) & (up % step < gap)
+            dark |= (
+                at_corner
+                & (across < step * grid.columns + gap)
+                & (up < step * grid.rows + gap)
+                & ((across > 0) & (up > 0))
+            )
+        edge = 0.5 * grid.size
+        width, height = step * grid.columns - gap, step * grid.rows - gap
+        paper = (x > -edge) & (x < width + edge) & (y > -edge) & (y < height + edge)
+        return np.where(dark, 25.0, np.where(paper, 230.0, 128.0))
+
+    return paint
+
+
 def render(
-    board: Board, T_camera_board: Floats, camera: Camera = CAMERA, noise: float = 2.0, seed: int = 0
+    board: Board,
+    T_camera_board: Floats,
+    camera: Camera = CAMERA,
+    noise: float = 2.0,
+    seed: int = 0,
+    paint: Any = texture,
 ) -> NDArray[np.uint8]:
     """What the camera sees of the board."""
     direction = rays(
@@ -100,7 +152,7 @@ def render(
     R, t = T_camera_board[:3, :3], T_camera_board[:3, 3]
     depth = (R[:, 2] @ t) / (direction @ R[:2, 2] + R[2, 2])
     place = np.concatenate([direction * depth[..., None], depth[..., None]], axis=-1) - t
-    grey = np.where(depth > 0, texture(board, place @ R[:, 0], place @ R[:, 1]), 128.0)
+    grey = np.where(depth > 0, paint(board, place @ R[:, 0], place @ R[:, 1]), 128.0)
     s = SUPERSAMPLING
     grey = grey.reshape(camera.height, s, camera.width, s).mean(axis=(1, 3))
     return np.clip(np.rint(grey + np.random.default_rng(seed).normal(0, noise, grey.shape)), 0, 255).astype(
@@ -139,9 +191,11 @@ def board_poses(board: Board, count: int, seed: int = 0, distance: float = 0.0) 
             [*rng.uniform(-0.15, 0.15, 2) * size, away * rng.uniform(0.9, 1.2)],
             [*rng.uniform(-0.55, 0.55, 2), rng.uniform(-0.6, 0.6)],
         )
+        if board.kind == "apriltag":  # seen from the front, its z looks at the camera
+            T = T @ np.diag([1.0, -1.0, -1.0, 1.0])
         T[:3, 3] -= T[:3, :3] @ middle
         corners = middle + np.array([[sx, sy, 0] for sx in (-1, 1) for sy in (-1, 1)]) * (
-            np.ptp(points, axis=0) / 2 + 1.8 * board.size
+            np.ptp(points, axis=0) / 2 + (0.6 if board.kind == "apriltag" else 1.8) * board.size
         )
         seen = corners @ T[:3, :3].T + T[:3, 3]
         u, v = (
@@ -153,7 +207,9 @@ def board_poses(board: Board, count: int, seed: int = 0, distance: float = 0.0) 
     return poses
 
 
-def write_images(folder: Path, board: Board, poses: list[Floats], camera: Camera = CAMERA) -> list[str]:
+def write_images(
+    folder: Path, board: Board, poses: list[Floats], camera: Camera = CAMERA, paint: Any = texture
+) -> list[str]:
     """Renders the poses to PNG files `images/0.png` … in `folder`; their names."""
     import cv2
 
@@ -161,5 +217,5 @@ def write_images(folder: Path, board: Board, poses: list[Floats], camera: Camera
     names = []
     for k, T in enumerate(poses):
         names.append(f"images/{k}.png")
-        cv2.imwrite(str(folder / names[-1]), render(board, T, camera, seed=k))
+        cv2.imwrite(str(folder / names[-1]), render(board, T, camera, seed=k, paint=paint))
     return names

@@ -7,8 +7,8 @@ OpenCV, which is imported only then).
     views = truing.files.find_board(["0.png", "1.png", ...], board)
 
 A board's frame has its origin at the first point, x along a row, y along a column and z into the board, away
-from the camera. Pixels count from the
-centre of the top left pixel.
+from the camera; that of AprilTags is Kalibr's, origin at the bottom left, y up and z towards the camera.
+Pixels count from the centre of the top left pixel.
 """
 
 from __future__ import annotations
@@ -28,14 +28,16 @@ from numpy.typing import NDArray
 from truing._core import Camera
 from truing.errors import InputError, InputWarning
 from truing.files.output import require_whole_file
+from truing.files.tags import FAMILIES as TAG_FAMILIES, TagFinder, TagGrid
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
-Kind = Literal["chessboard", "charuco", "circles", "acircles"]
+Kind = Literal["chessboard", "charuco", "circles", "acircles", "apriltag"]
 
 _EXPECTED = (
     "chessboard:9x6:25mm (inner corners, square), charuco:5x7:40mm:30mm (squares, square, marker),"
-    " circles:10x10:25.4mm (dots, distance) or acircles:4x11:20mm (dots in a row, rows, distance of rows)"
+    " circles:10x10:25.4mm (dots, distance), acircles:4x11:20mm (dots in a row, rows, distance of rows),"
+    " apriltag:36h11:6x6:88mm:0.3 (family, tags, side, gap over side) or apriltag:36h11:88mm:5 (one tag)"
 )
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _FEWEST_VIEWS = 3
@@ -64,6 +66,8 @@ class Board:
     `size` of a square, `marker` of a marker.
     circles: `columns` x `rows` dots, `size` from dot to dot. acircles: `columns` dots in a row, `rows` rows
     (an odd number), each shifted by half; `size` from row to row (half the distance of dots in a row).
+    apriltag: `columns` x `rows` tags of the family `dictionary`, `size` of a tag, `spacing` from tag to tag
+    over it, numbered from `first` at the bottom left (None: of one tag, the one that is seen).
     """
 
     kind: Kind
@@ -75,16 +79,33 @@ class Board:
     legacy: bool | None = (
         None  # of a charuco board: pattern of OpenCV before 4.6; None: found from the images
     )
+    spacing: float = 0.0
+    first: int | None = 0
 
     def __str__(self) -> str:
+        if self.kind == "apriltag":
+            return self._name_of_tags()
         text = f"{self.kind}:{self.columns}x{self.rows}:{_length(self.size)}"
         if self.kind == "charuco":
             text += f":{_length(self.marker)}" + (f":{self.dictionary}" if self.dictionary else "")
         return text
 
+    def _name_of_tags(self) -> str:
+        text = f"{self.kind}:{self.dictionary}"
+        if self.columns * self.rows > 1:
+            return f"{text}:{self.columns}x{self.rows}:{_length(self.size)}:{self.spacing:.6g}"
+        return f"{text}:{_length(self.size)}" + (f":{self.first}" if self.first is not None else "")
+
+    @property
+    def tags(self) -> TagGrid:
+        """Of an apriltag board: its tags."""
+        return TagGrid(self.dictionary, self.columns, self.rows, self.size, self.spacing, self.first)
+
     @property
     def points(self) -> Floats:
-        """All points, row by row, shape=(n, 3) [m] in the board's frame."""
+        """All points, shape=(n, 3) [m] in the board's frame: row by row, or the corners tag by tag."""
+        if self.kind == "apriltag":
+            return self.tags.points
         if self.kind == "acircles":
             return np.array(
                 [
@@ -137,7 +158,8 @@ class BoardViews:
 
 def parse_board(text: str) -> Board:
     """A board by its name: chessboard:9x6:25mm (inner corners), charuco:5x7:40mm:30mm[:DICTIONARY] (squares),
-    circles:10x10:25.4mm, acircles:4x11:20mm.
+    circles:10x10:25.4mm, acircles:4x11:20mm, apriltag:36h11:6x6:88mm:0.3 (a grid as Kalibr's: family, tags,
+    side, gap over side), apriltag:36h11:88mm[:NUMBER] (one tag).
 
     Raises InputError that says what was expected.
     """
@@ -155,6 +177,8 @@ def _parsed_board(text: str) -> Board:
     kind, *parts = (part.strip() for part in text.split(":"))
     if kind not in get_args(Kind):
         raise _NoBoard(f"no kind of board is called {kind!r}")
+    if kind == "apriltag":
+        return _parsed_tags(parts)
     charuco = kind == "charuco"
     lengths = 2 if charuco else 1
     if len(parts) < 1 + lengths:
@@ -173,6 +197,41 @@ def _parsed_board(text: str) -> Board:
     if charuco and sizes[1] >= sizes[0]:
         raise _NoBoard("the marker is not smaller than its square")
     return Board(cast(Kind, kind), columns, rows, sizes[0], sizes[1] if charuco else 0.0, dictionary)
+
+
+def _parsed_tags(parts: Sequence[str]) -> Board:
+    """FAMILY:COLUMNSxROWS:SIDE:SPACING, or FAMILY:SIDE[:NUMBER]."""
+    family = (
+        parts[0].lower().removeprefix("dict_").removeprefix("apriltag_").removeprefix("tag") if parts else ""
+    )
+    if family not in TAG_FAMILIES:
+        raise _NoBoard(f"there is no family of AprilTags {family!r}; there are {', '.join(TAG_FAMILIES)}")
+    rest = list(parts[1:])
+    if not rest:
+        raise _NoBoard("something is missing")
+    if "x" not in rest[0]:
+        side, *number = rest
+        if len(number) > 1 or (number and not re.fullmatch(r"[0-9]{1,4}", number[0])):
+            raise _NoBoard(f"{':'.join(number)!r} is no number of a tag")
+        first = int(number[0]) if number else None
+        return Board("apriltag", 1, 1, _board_length(side), dictionary=family, first=first)
+    counts = re.fullmatch(r"([0-9]{1,3})x([0-9]{1,3})", rest[0])
+    if not counts or not 1 < int(counts[1]) * int(counts[2]) <= 600:
+        raise _NoBoard(f"{rest[0]!r} is no pair of numbers of tags such as 6x6")
+    if len(rest) != 3:
+        raise _NoBoard("expected tags, side and spacing after the family")
+    if not re.fullmatch(r"[0-9]*\.?[0-9]+", rest[2]) or not 0 < float(rest[2]) < 10:
+        raise _NoBoard(
+            f"{rest[2]!r} is no spacing: the gap between two tags over the side of one, such as 0.3"
+        )
+    return Board(
+        "apriltag",
+        int(counts[1]),
+        int(counts[2]),
+        _board_length(rest[1]),
+        dictionary=family,
+        spacing=float(rest[2]),
+    )
 
 
 def _board_counts(kind: str, text: str) -> tuple[int, int]:
@@ -291,7 +350,12 @@ def find_board(
             str(image) if isinstance(image, (str, Path)) else f"image {k}" for k, image in enumerate(images)
         ]
     )
-    search = _Search(cv, parse_board(board) if isinstance(board, str) else board, called, camera, where)
+    board = parse_board(board) if isinstance(board, str) else board
+    if camera is None and board.kind == "apriltag" and board.columns * board.rows == 1:
+        raise InputError(
+            f"one tag ({board}) has four corners, too few to find the camera's values from: give --camera"
+        )
+    search = _Search(cv, board, called, camera, where)
     if progress is not None:
         progress(0, len(images))
     for number, image in enumerate(images):
@@ -419,11 +483,14 @@ class _Finder:
         self._quick = quick
         self._points = board.points
         self._detector: Any = _charuco_detector(cv, board) if board.kind == "charuco" else None
+        self._tags = TagFinder(cv, board.tags) if board.kind == "apriltag" else None
 
     def __call__(self, grey: Image) -> tuple[Floats, Floats] | None:
         try:
             if self.board.kind == "charuco":
                 return self._charuco(grey)
+            if self._tags is not None:
+                return self._tags(grey)
             pixels = self._chessboard(grey) if self.board.kind == "chessboard" else self._circles(grey)
         except self.cv.error:  # its searches give up on odd images so
             return None
@@ -688,11 +755,11 @@ def _neighbours(board: Board) -> list[Board]:
         (r - 1, c - 1),
         (r + 1, c + 1),
     ]
-    odd = board.kind == "acircles"
+    odd, tags = board.kind == "acircles", board.kind == "apriltag"
     out = [
-        replace(board, columns=x, rows=y, legacy=None, dictionary="")
+        replace(board, columns=x, rows=y, legacy=None, dictionary=board.dictionary if tags else "")
         for x, y in dict.fromkeys(pairs)
-        if min(x, y) >= 3 and (x, y) != (c, r) and not (odd and y % 2 == 0)
+        if min(x, y) >= (1 if tags else 3) and (x, y) != (c, r) and not (odd and y % 2 == 0)
     ]
     if board.kind == "charuco":
         out = [
@@ -711,7 +778,7 @@ def _neighbours(board: Board) -> list[Board]:
             Board("chessboard", c, r, board.size),
             *([Board("acircles", c, r, board.size)] if r % 2 else []),
         ]
-    else:
+    elif board.kind == "acircles":
         out += [Board("circles", c, r, board.size)]
     return out
 
@@ -748,6 +815,8 @@ def _refuse_too_few(
         _grey(cv, images[number], called[number])
         for number in missing[:: max(1, len(missing) // _TRIED)][:_TRIED]
     ]
+    if board.kind == "apriltag":
+        raise InputError(f"{head}; {_tags_in_sight(cv, tried, board)}")
     best, most = None, (0, -math.inf)
     # Of a grid of dots, and of numbered corners, a smaller one is found as well: most points win.
     markers = "" if not hasattr(cv, "aruco") else _dictionary(cv, tried[0], 0) if tried else ""
@@ -798,6 +867,28 @@ def _refuse_too_few(
     raise InputError(
         f"{head}; not found in {which}. Boards of neighbouring counts are not there either: does every image"
         f" show the whole board, sharp and evenly lit, with {margin}? Expected {_EXPECTED}"
+    )
+
+
+def _tags_in_sight(cv: Any, images: Sequence[Image], board: Board) -> str:
+    """Which tags are there instead, of this family and of others."""
+    said = []
+    for family in dict.fromkeys((board.dictionary, *TAG_FAMILIES)):
+        finder = TagFinder(cv, replace(board, dictionary=family).tags)
+        seen = [numbers for numbers in map(finder.in_sight, images) if numbers]
+        if len(seen) >= 0.5 * len(images) and (family == board.dictionary or max(map(len, seen)) > 1):
+            lowest, highest = min(map(min, seen)), max(map(max, seen))
+            said.append(f"tags of {family} with numbers from {lowest} to {highest} in {len(seen)}")
+    if not said:
+        return (
+            f"no tags of {', '.join(TAG_FAMILIES)} are in the {len(images)} that were looked at again: are"
+            " they sharp, evenly lit and printed with their white margin?"
+        )
+    count = board.columns * board.rows
+    return (
+        f"{' and '.join(said)} of the {len(images)} that were looked at again, expected those of"
+        f" {board.dictionary} from {board.first or 0} to {(board.first or 0) + count - 1}, counted from the"
+        " bottom left row by row as Kalibr does: are family, counts and spacing right?"
     )
 
 

@@ -449,7 +449,7 @@ def load_handeye(
     `handeye_with_kinematics`). Rows whose board cells are all empty are left out, with a warning.
 
     board: what is in the images, "chessboard:9x6:25mm" (inner corners), "charuco:5x7:40mm:30mm",
-    "circles:10x10:25.4mm", "acircles:4x11:20mm";
+    "circles:10x10:25.4mm", "acircles:4x11:20mm", "apriltag:36h11:6x6:88mm:0.3";
     needs OpenCV. camera: file, or `Camera`; None: its values are found from the same images.
     angles: convention of angle columns: "rotation-vector" (UR), or the order of turned axes, "zyx" for Rz Ry
     Rx (KUKA, Fanuc), "xyz", "zyz" …

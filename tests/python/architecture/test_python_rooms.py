@@ -54,6 +54,7 @@ FLOORS = {
         "yaml_tree",
         "plausibility",
         "rigid",
+        "tags",
         "boards",
         "opencv_file",
         "other_poses",

@@ -142,7 +142,7 @@ class Command(run.Command[Loaded, "Solved | None"]):
         str,
         Kind(
             "What is in the images: chessboard:9x6:25mm (inner corners), charuco:5x7:40mm:30mm,"
-            " circles:10x10:25.4mm, acircles:4x11:20mm.",
+            " circles:10x10:25.4mm, acircles:4x11:20mm, apriltag:36h11:6x6:88mm:0.3, apriltag:36h11:88mm.",
             metavar="BOARD",
             panel=IMAGES,
         ),
