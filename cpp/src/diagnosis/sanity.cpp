@@ -27,7 +27,7 @@ constexpr std::size_t kRows = 1200;  ///< that the quick comparisons look at
 
 /// Median error with base and targets fitted and, if wanted, the geometry under its prior: a few hundred rows will do.
 double median_error(const Robot& robot, const Measurements& data, const DiagnoseOptions& options, bool geometry) {
-  const Sample sample = sample_of(data, kRows);
+  const RowSample sample = sample_of(data, kRows);
   Measurements some = data;
   some.weight = {sample.weights.data(), 1};
   some.set.assign(data.rows, 0);

@@ -162,7 +162,7 @@ class Trials {
     return out;
   }
 
-  Sample sample_;
+  RowSample sample_;
   IdentifyOptions options_;
 };
 

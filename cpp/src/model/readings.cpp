@@ -12,7 +12,7 @@ namespace truing::model {
 namespace {
 
 /// Columns of one's own beside the rest of the data.
-struct Owned {
+struct OtherColumns {
   std::shared_ptr<const void> rest;
   std::vector<std::vector<double>> columns;
 };
@@ -35,7 +35,7 @@ Measurements with_changed_joints(const Measurements& data,
 /// The data with every measured length in another unit.
 Measurements with_lengths(const Measurements& data, double factor) {
   Measurements out = data;
-  auto owned = std::make_shared<Owned>();
+  auto owned = std::make_shared<OtherColumns>();
   owned->rest = data.owner;
   owned->columns.reserve(5);
   for (Column* column : {&out.position[0], &out.position[1], &out.position[2], &out.distance, &out.position_sigma}) {
@@ -72,7 +72,7 @@ void add_joint_readings(const Robot& robot, const Measurements& data, Readings* 
 /// What an angle is multiplied by that was read in the other unit.
 constexpr double kOtherAngles[] = {180.0 / kPi, kDegree};
 
-std::string other_angles(double factor) { return factor > 1.0 ? "rad instead of deg" : "deg instead of rad"; }
+std::string units_of_angles(double factor) { return factor > 1.0 ? "rad instead of deg" : "deg instead of rad"; }
 
 void add_unit_readings(const Robot& robot, const Measurements& data, Readings* out) {
   for (const double factor : kOtherAngles) {
@@ -85,7 +85,7 @@ void add_unit_readings(const Robot& robot, const Measurements& data, Readings* o
         }
       };
       return Reading{robot, with_changed_joints(data, convert), "joint_unit",
-                     "reading the joints in " + other_angles(factor)};
+                     "reading the joints in " + units_of_angles(factor)};
     });
   }
   if (!data.position[0] && !data.distance) return;
@@ -107,7 +107,7 @@ void add_link_readings(const Robot& robot, const Measurements& data, Readings* o
   if (robot.convention == Convention::urdf) return;
   for (const double factor : kOtherAngles) {
     out->push_back([&robot, &data, factor] {
-      Reading other{robot, data, "link_unit", "reading the angles of the robot file in " + other_angles(factor)};
+      Reading other{robot, data, "link_unit", "reading the angles of the robot file in " + units_of_angles(factor)};
       for (Joint& joint : other.robot.joints) {
         joint.theta *= factor;
         joint.alpha *= factor;
@@ -129,14 +129,14 @@ void add_link_readings(const Robot& robot, const Measurements& data, Readings* o
 
 Measurements with_joints(const Measurements& data, std::vector<std::vector<double>> columns) {
   Measurements out = data;
-  auto owned = std::make_shared<Owned>(Owned{data.owner, std::move(columns)});
+  auto owned = std::make_shared<OtherColumns>(OtherColumns{data.owner, std::move(columns)});
   for (std::size_t k = 0; k < owned->columns.size(); ++k) out.joints[k] = {owned->columns[k].data(), 1};
   out.owner = owned;
   return out;
 }
 
-Sample sample_of(const Measurements& data, std::size_t most) {
-  Sample out;
+RowSample sample_of(const Measurements& data, std::size_t most) {
+  RowSample out;
   out.weights.assign(data.rows, 0.0);
   const std::size_t step = data.rows / most + 1;
   for (std::size_t row = 0; row < data.rows; row += step) {

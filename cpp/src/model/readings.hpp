@@ -28,12 +28,12 @@ std::vector<std::function<Reading()>> readings_of(const Robot& robot, const Meas
 
 /// Rows that are enough to compare readings by: every so many, the others with weight zero. It must outlive what uses
 /// its weights.
-struct Sample {
+struct RowSample {
   std::vector<std::int32_t> rows;
   std::vector<double> weights;  ///< of all rows
 };
 
-Sample sample_of(const Measurements& data, std::size_t most);
+RowSample sample_of(const Measurements& data, std::size_t most);
 
 /// The data with other joint columns.
 Measurements with_joints(const Measurements& data, std::vector<std::vector<double>> columns);
