@@ -122,7 +122,7 @@ std::vector<std::vector<double>> second_record(const Measurements& data, std::si
 void choose_record(const Robot& robot, const DiagnoseOptions& options, Checked* out) {
   std::vector<std::vector<double>> other = second_record(out->data, out->data.joints.size(), robot);
   if (other.empty()) return;
-  const Measurements alternative = with_joints(out->data, std::move(other));
+  const Measurements alternative = with_joint_columns(out->data, std::move(other));
   const double first = median_error(robot, out->data, options, true),
                second = median_error(robot, alternative, options, true);
   SanityFinding finding;

@@ -29,7 +29,7 @@ Measurements with_changed_joints(const Measurements& data,
   std::vector<std::vector<double>> columns;
   for (const Column& column : data.joints) columns.push_back(copy_of(column, data.rows));
   change(&columns);
-  return with_joints(data, std::move(columns));
+  return with_joint_columns(data, std::move(columns));
 }
 
 /// The data with every measured length in another unit.
@@ -127,7 +127,7 @@ void add_link_readings(const Robot& robot, const Measurements& data, Readings* o
 
 }  // namespace
 
-Measurements with_joints(const Measurements& data, std::vector<std::vector<double>> columns) {
+Measurements with_joint_columns(const Measurements& data, std::vector<std::vector<double>> columns) {
   Measurements out = data;
   auto owned = std::make_shared<OtherColumns>(OtherColumns{data.owner, std::move(columns)});
   for (std::size_t k = 0; k < owned->columns.size(); ++k) out.joints[k] = {owned->columns[k].data(), 1};

@@ -36,6 +36,6 @@ struct RowSample {
 RowSample sample_of(const Measurements& data, std::size_t most);
 
 /// The data with other joint columns.
-Measurements with_joints(const Measurements& data, std::vector<std::vector<double>> columns);
+Measurements with_joint_columns(const Measurements& data, std::vector<std::vector<double>> columns);
 
 }  // namespace truing::model
