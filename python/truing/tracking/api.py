@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
@@ -25,9 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.errors import InputError
+from truing.errors import InputError, InputWarning
 from truing.files.stream_file import ImuData, JointData, PoseData, SetupData, ToolPoses, TrackerData
-from truing.rotations import interpolated, rotations_from_quaternions
+from truing.rotations import interpolated, quaternions_from_rotations, rotations_from_quaternions
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +36,8 @@ PLAN_AHEAD = 1.0  # [s] a plan without arrival_s is known so long before its tim
 _FEW = 4000  # samples that checks look at
 # Of the tracker's spread (or of 1 m, if that is more): a set-up that is off by more is another one.
 _FAR_OFF = 0.25
+_COMMON = 0.1  # of the shorter of two streams: with less in common they are of other times
+_BEGUN_APART = 10.0  # [s] streams of one recording are started within this
 _FEWEST_RESTS = 6
 _FROM_MOTION = 300  # poses that stand in for test positions
 _SAME_CLOCK = 0.02  # [s]
@@ -63,12 +66,16 @@ def recorded_streams(
     A stream without arrivals is taken to have arrived at its stamps, a plan one second before. Arrivals are
     of the computer's clock: where the inertial stream has them, its fastest sample ties stamps to arrivals.
 
-    Raises InputError where streams do not overlap in time, or where the tracker, the gyro or the set-up
-    cannot be right: see `check_streams`.
+    Streams that do not overlap by the set-up's clocks, because a device's clock began anew, are aligned by
+    the turns that they saw together, and an InputWarning says so.
+
+    Raises InputError where streams do not belong together in time, or where the tracker, the gyro or the
+    set-up cannot be right: see `check_streams`.
     """
     setup = where.setup if isinstance(where, SetupData) else where
     if tracker is not None and isinstance(where, SetupData):
         tracker = replace(tracker, t=where.steady(tracker.t))
+    imu, tracker, plan, joints = _aligned(robot, setup, imu, joints, tracker, plan)
     check_streams(robot, setup, imu=imu, joints=joints, tracker=tracker)
     tied = 0.0 if imu.arrival is None else float(np.min(imu.arrival - imu.t))
     streams = _core.RecordedStreams()
@@ -89,6 +96,66 @@ def recorded_streams(
 
 def _arrival(stream: ImuData | JointData | TrackerData | PoseData, tied: float, offset: float) -> Floats:
     return stream.t - offset + tied if stream.arrival is None else stream.arrival
+
+
+def _overlap(a: Floats, b: Floats) -> bool:
+    """Whether two stamps' spans have a tenth of the shorter one in common."""
+    common = min(a.max(), b.max()) - max(a.min(), b.min())
+    return float(common) >= _COMMON * float(min(np.ptp(a), np.ptp(b)))
+
+
+def _aligned(
+    robot: _core.Robot,
+    setup: _core.TrackSetup,
+    imu: ImuData,
+    joints: JointData,
+    tracker: TrackerData | None,
+    plan: PoseData | None,
+) -> tuple[ImuData, TrackerData | None, PoseData | None, JointData]:
+    """The streams; those whose clocks do not meet the inertial sensor's by the set-up with their stamps
+    moved, where the turns that both saw tell by how much. Beginnings are taken to lie within ten seconds.
+    """
+    t = joints.t - setup.controller_clock_offset
+    if not _overlap(t, imu.t):
+        flange = _core.flange_poses(robot, joints.joints)
+        by = imu.t[0] - t[0]
+        found = _core.calibrate_inertial(
+            imu.t,
+            imu.gyro,
+            imu.accel,
+            t + by,
+            np.ascontiguousarray(flange[:, :3, 3]),
+            quaternions_from_rotations(flange[:, :3, :3]),
+            clock_search=_BEGUN_APART,
+            max_iterations=200,  # without noise of the tracker it takes long to say how much there is
+        )
+        if found.status == "done":
+            by -= found.clock_offset
+            _say_moved(joints.path, "joints", by)
+            joints = replace(joints, t=joints.t + by)
+            plan = None if plan is None else replace(plan, t=plan.t + by)
+            t = t + by
+    if (
+        tracker is not None
+        and tracker.orientation is not None
+        and not _overlap(tracker.t - setup.clock_offset, t)
+    ):
+        paired = _paired(robot, joints, tracker)
+        if paired.clock.found:  # t_controller = t_tracker + offset
+            by = paired.offset + setup.clock_offset - setup.controller_clock_offset
+            _say_moved(tracker.path, "tracker", by)
+            tracker = replace(tracker, t=tracker.t + by)
+    return imu, tracker, plan, joints
+
+
+def _say_moved(path: object, name: str, by: float) -> None:
+    warnings.warn(
+        f"{path}: {name} and the inertial sensor do not overlap by the set-up's clocks; the stamps are moved"
+        f" by {by:+.3f} s, as the turns tell that both saw: has a device been switched on anew since the"
+        " set-up was calibrated?",
+        InputWarning,
+        stacklevel=4,
+    )
 
 
 def check_streams(
@@ -115,8 +182,7 @@ def check_streams(
 
 
 def _require_overlap(name: str, stream: JointData | TrackerData, t: Floats, imu: ImuData) -> None:
-    overlap = min(t.max(), imu.t[-1]) - max(t.min(), imu.t[0])
-    if overlap < 0.1 * min(np.ptp(t), np.ptp(imu.t)):
+    if not _overlap(t, imu.t):
         raise InputError(
             f"{stream.path}: {name} from {t.min():.6g} to {t.max():.6g} s in the inertial sensor's clock, but"
             f" {imu.path} from {imu.t[0]:.6g} to {imu.t[-1]:.6g} s: expected streams of the same time; is the"
@@ -290,17 +356,10 @@ def track_calibrate(
     status, message = frames.status, frames.message
 
     inertial, found_tool = None, None
+    imu_base = 0.0
     if imu is not None and status == "done":
-        inertial = _core.calibrate_inertial(
-            imu.t,
-            imu.gyro,
-            imu.accel,
-            paired.stamps + paired.offset,
-            paired.position,
-            paired.orientation,
-            clock_wanted=clock_wanted,
-        )
-        notes += list(inertial.warnings)
+        inertial, imu_base, more = _inertial(imu, joints, paired, clock_wanted)
+        notes += more
         if inertial.status != "done":
             status, message = inertial.status, inertial.message
     if tool is not None and status == "done":
@@ -329,7 +388,33 @@ def track_calibrate(
     )
     if status != "done":
         return found
-    return _completed(found, robot, joints, tracker, imu, plan, paired)
+    return _completed(found, robot, joints, tracker, imu, plan, paired, imu_base)
+
+
+def _inertial(
+    imu: ImuData, joints: JointData, paired: _Paired, clock_wanted: float
+) -> tuple[_core.InertialResult, float, list[str]]:
+    """Inertial sensor, gravity and clock by the controller's clock; what was added to the sensor's stamps
+    first [s], to lay a record that began elsewhere upon the joints' beginning; what to know.
+    """
+    base = 0.0 if _overlap(imu.t, joints.t) else float(joints.t[0] - imu.t[0])
+    found = _core.calibrate_inertial(
+        imu.t + base,
+        imu.gyro,
+        imu.accel,
+        paired.stamps + paired.offset,
+        paired.position,
+        paired.orientation,
+        clock_wanted=clock_wanted,
+        **({"clock_search": _BEGUN_APART} if base else {}),
+    )
+    notes = list(found.warnings)
+    if base:
+        notes.append(
+            "joints and inertial sensor began at other times by their stamps: aligned by the turns that both"
+            f" saw, t_controller = t_imu {base + found.clock_offset:+.3f} s"
+        )
+    return found, base, notes
 
 
 @dataclass(frozen=True)
@@ -341,6 +426,7 @@ class _Paired:
     position: Floats  # shape=(n, 3) [m]
     orientation: Floats  # shape=(n, 4)
     clock: _core.ClockOffset
+    base: float  # [s] added to the stamps before `clock` was found: beginnings laid upon each other
     drift: float
     reference: float  # [s] where the drift counts from
     notes: tuple[str, ...]
@@ -348,7 +434,7 @@ class _Paired:
     @property
     def offset(self) -> float:
         """[s] t_controller = t_tracker + offset"""
-        return self.clock.offset if self.clock.found else 0.0
+        return self.base + (self.clock.offset if self.clock.found else 0.0)
 
 
 def _paired(robot: _core.Robot, joints: JointData, tracker: TrackerData) -> _Paired:
@@ -356,12 +442,17 @@ def _paired(robot: _core.Robot, joints: JointData, tracker: TrackerData) -> _Pai
     stamps, first = np.unique(tracker.t, return_index=True)
     position, orientation = tracker.position[first], tracker.orientation[first]
     flange = _core.flange_poses(robot, joints.joints)
-    clock, drift, reference = _joints_clock(joints.t, flange, stamps, _frames_of(position, orientation))
+    base = 0.0 if _overlap(stamps, joints.t) else float(joints.t[0] - stamps[0])
+    clock, drift, reference = _joints_clock(
+        joints.t, flange, stamps + base, _frames_of(position, orientation)
+    )
+    reference -= base
     notes = [
-        f"joints and tracker: t_controller = t_tracker {clock.offset:+.4f} s, standard error"
+        f"joints and tracker: t_controller = t_tracker {base + clock.offset:+.4f} s, standard error"
         f" {1e3 * clock.sigma:.2g} ms"
         if clock.found
-        else f"joints and tracker are taken to have one clock: {clock.message}"
+        else f"joints and tracker are taken to have {'one clock' if base == 0.0 else 'begun together'}:"
+        f" {clock.message}"
     ]
     if drift:
         rate = 1.0 / float(np.median(np.diff(stamps)))
@@ -371,7 +462,7 @@ def _paired(robot: _core.Robot, joints: JointData, tracker: TrackerData) -> _Pai
             " take it off the stamps"
         )
     stamps = stamps + drift * (stamps - reference)
-    return _Paired(flange, stamps, position, orientation, clock, drift, reference, tuple(notes))
+    return _Paired(flange, stamps, position, orientation, clock, base, drift, reference, tuple(notes))
 
 
 def _frames_of(position: Floats, orientation: Floats) -> Floats:
@@ -427,9 +518,10 @@ def _completed(
     imu: ImuData | None,
     plan: PoseData | None,
     paired: _Paired,
+    imu_base: float,
 ) -> TrackCalibration:
     """The set-up put together; the filter's noise, actuators' lag and modes of the sway."""
-    where, same_clock, notes = _assembled(robot, found.frames, found.inertial, found.tool, paired.clock)
+    where, same_clock, notes = _assembled(robot, found.frames, found.inertial, found.tool, paired, imu_base)
     where = replace(where, clock_drift=-paired.drift, clock_reference=paired.reference)
     lag, modes = None, None
     if plan is not None:
@@ -458,12 +550,13 @@ def _assembled(
     frames: _core.FramesResult,
     inertial: _core.InertialResult | None,
     tool: _core.ToolResult | None,
-    clock: _core.ClockOffset,
+    paired: _Paired,
+    imu_base: float,
 ) -> tuple[SetupData, bool, list[str]]:
     """Frames, gravity and clocks together, with covariances; whether controller and inertial sensor share a
     clock; what to know.
     """
-    offset = clock.offset if clock.found else 0.0
+    clock, offset = paired.clock, paired.offset
     T_tracker_base, T_flange_receiver = (
         np.asarray(frames.T_tracker_base.T),
         np.asarray(frames.T_flange_receiver.T),
@@ -490,7 +583,7 @@ def _assembled(
         # The tracker's stamps were shifted by `offset` first: what is left is between controller and inertial
         # sensor.
         between, sigma = (
-            inertial.clock_offset,
+            imu_base + inertial.clock_offset,
             np.hypot(inertial.clock_offset_sigma, clock.sigma if clock.found else 0.0),
         )
         same = not clock.found or abs(between) < max(3.0 * float(sigma), _SAME_CLOCK)

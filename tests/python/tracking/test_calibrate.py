@@ -161,6 +161,27 @@ def test_three_clocks_are_told_apart() -> None:
     assert found.actuator_lag == pytest.approx(TRUE.actuator_lag, abs=2e-3)
 
 
+def test_devices_that_began_at_other_times_are_aligned_and_it_is_said() -> None:
+    r = recording()
+    imu = dataclasses.replace(r.imu, t=r.imu.t + 600.0)
+    tracker = dataclasses.replace(r.tracker, t=r.tracker.t - 600.0)
+    found = truing.track_calibrate(ROBOT, r.joints, tracker, imu)
+    assert found.status == "done"
+    setup = found.where.setup
+    assert setup.controller_clock_offset == pytest.approx(TRUE.controller_clock_offset - 600.0, abs=6e-3)
+    assert setup.clock_offset == pytest.approx(TRUE.clock_offset - 1200.0, abs=3e-3)
+    assert any("began at other times" in note for note in found.notes)
+    # a set-up of the day before, when the clocks were others
+    before = calibrated().where
+    with pytest.warns(truing.InputWarning, match=r"joints.csv: joints .* moved by \+600\.\d+ s") as told:
+        streams = truing.recorded_streams(ROBOT, before, imu=imu, tracker=tracker, joints=r.joints)
+    assert any("tracker.csv: tracker" in str(w.message) for w in told)
+    inside = truing.replay(streams, before.setup, before.options(), horizons=[0.04]).graded
+    assert (inside["dimensions"] == 6).mean() > 0.8
+    settled = inside["t"] > inside["t"].min() + 5.0
+    assert np.median(np.linalg.norm(inside["position"][settled], axis=1)) < 2e-3
+
+
 def test_gravity_and_noise_are_found() -> None:
     found = calibrated()
     assert np.allclose(found.where.setup.gravity, [0, 0, -9.81], atol=0.05)
