@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -1400,30 +1400,6 @@ class Residuals:
     def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
         Shape=(n, 3) [rad]: twice the vector part of the error quaternion.
-        """
-class Mistake:
-    """
-    What speaks against the robot file or the columns that were handed to `identify`.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def changes(self) -> tuple[Parameter, ...]:
-        """
-        What changed by more than a workshop makes, most first: 10 mm or 2 % of the robot's reach if that is
-        more, 3 degrees, 5 % of a gear ratio. Three standard errors are taken off first. Zeros of joints are
-        here only beside a reading that explains them: a controller may count from anywhere.
-        """
-    @property
-    def kind(self) -> str:
-        """
-        'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit' or 'convention': reading it
-        otherwise explains the measurements; 'unexplained': no such reading does.
-        """
-    @property
-    def text(self) -> str:
-        """
-        What is wrong, and what to do, in sentences.
         """
 class PlanOptions:
     """
@@ -4510,6 +4486,9 @@ class FilterOptions:
     gap_rate = 0.2: [rad/s] likewise.
     position_sigma = 0.001: [m] noise of the tracker, one component.
     rotation_sigma = 0.001: [rad] likewise.
+    noise_time = 10.0: [s] over which the noise of the tracker is averaged, and that of the inertial sensor follows; 0: as
+        given.
+    noise_range = 10.0: Maximum ratio of a noise so found to the given one, and of the given to it.
     gate = 50.0: Tracker samples with a larger normalised innovation squared are outliers.
     reacquire_after = 25: Consecutive outliers after which the filter follows the tracker again.
     frozen_after = 3: Consecutive equal tracker samples after which they are refused.
@@ -4524,7 +4503,7 @@ class FilterOptions:
     slow_position_walk = 0.003: [m/sqrt(s)] random walk of that deviation.
     slow_rotation_walk = 0.0005: [rad/sqrt(s)] likewise.
     """
-    def __init__(self, *, window: typing.SupportsFloat | typing.SupportsIndex = 0.5, future_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, highest_imu_rate: typing.SupportsFloat | typing.SupportsIndex = 2000.0, highest_pose_rate: typing.SupportsFloat | typing.SupportsIndex = 400.0, gyro_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0001, accel_noise: typing.SupportsFloat | typing.SupportsIndex = 0.001, gyro_bias: typing.SupportsFloat | typing.SupportsIndex = 0.01, accel_bias: typing.SupportsFloat | typing.SupportsIndex = 0.1, gyro_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 2e-05, accel_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0002, imu_scale: typing.SupportsFloat | typing.SupportsIndex = 0.0005, gyro_range: typing.SupportsFloat | typing.SupportsIndex = 34.0, accel_range: typing.SupportsFloat | typing.SupportsIndex = 156.0, largest_gap: typing.SupportsFloat | typing.SupportsIndex = 0.02, restart_gap: typing.SupportsFloat | typing.SupportsIndex = 5.0, gap_acceleration: typing.SupportsFloat | typing.SupportsIndex = 2.0, gap_rate: typing.SupportsFloat | typing.SupportsIndex = 0.2, position_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001, rotation_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001, gate: typing.SupportsFloat | typing.SupportsIndex = 50.0, reacquire_after: typing.SupportsInt | typing.SupportsIndex = 25, frozen_after: typing.SupportsInt | typing.SupportsIndex = 3, clock_walk: typing.SupportsFloat | typing.SupportsIndex = 2e-05, clock_drift: typing.SupportsFloat | typing.SupportsIndex = 0.0001, clock_drift_walk: typing.SupportsFloat | typing.SupportsIndex = 1e-06, sway_position: typing.SupportsFloat | typing.SupportsIndex = 0.02, sway_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.003, sway_correlation: typing.SupportsFloat | typing.SupportsIndex = 0.5, slow_position: typing.SupportsFloat | typing.SupportsIndex = 0.05, slow_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.02, slow_position_walk: typing.SupportsFloat | typing.SupportsIndex = 0.003, slow_rotation_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0005) -> None:
+    def __init__(self, *, window: typing.SupportsFloat | typing.SupportsIndex = 0.5, future_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, highest_imu_rate: typing.SupportsFloat | typing.SupportsIndex = 2000.0, highest_pose_rate: typing.SupportsFloat | typing.SupportsIndex = 400.0, gyro_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0001, accel_noise: typing.SupportsFloat | typing.SupportsIndex = 0.001, gyro_bias: typing.SupportsFloat | typing.SupportsIndex = 0.01, accel_bias: typing.SupportsFloat | typing.SupportsIndex = 0.1, gyro_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 2e-05, accel_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0002, imu_scale: typing.SupportsFloat | typing.SupportsIndex = 0.0005, gyro_range: typing.SupportsFloat | typing.SupportsIndex = 34.0, accel_range: typing.SupportsFloat | typing.SupportsIndex = 156.0, largest_gap: typing.SupportsFloat | typing.SupportsIndex = 0.02, restart_gap: typing.SupportsFloat | typing.SupportsIndex = 5.0, gap_acceleration: typing.SupportsFloat | typing.SupportsIndex = 2.0, gap_rate: typing.SupportsFloat | typing.SupportsIndex = 0.2, position_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001, rotation_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001, noise_time: typing.SupportsFloat | typing.SupportsIndex = 10.0, noise_range: typing.SupportsFloat | typing.SupportsIndex = 10.0, gate: typing.SupportsFloat | typing.SupportsIndex = 50.0, reacquire_after: typing.SupportsInt | typing.SupportsIndex = 25, frozen_after: typing.SupportsInt | typing.SupportsIndex = 3, clock_walk: typing.SupportsFloat | typing.SupportsIndex = 2e-05, clock_drift: typing.SupportsFloat | typing.SupportsIndex = 0.0001, clock_drift_walk: typing.SupportsFloat | typing.SupportsIndex = 1e-06, sway_position: typing.SupportsFloat | typing.SupportsIndex = 0.02, sway_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.003, sway_correlation: typing.SupportsFloat | typing.SupportsIndex = 0.5, slow_position: typing.SupportsFloat | typing.SupportsIndex = 0.05, slow_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.02, slow_position_walk: typing.SupportsFloat | typing.SupportsIndex = 0.003, slow_rotation_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0005) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -4697,6 +4676,23 @@ class FilterOptions:
         """
     @largest_gap.setter
     def largest_gap(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def noise_range(self) -> float:
+        """
+        Maximum ratio of a noise so found to the given one, and of the given to it.
+        """
+    @noise_range.setter
+    def noise_range(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def noise_time(self) -> float:
+        """
+        [s] over which the noise of the tracker is averaged, and that of the inertial sensor follows; 0: as
+        given.
+        """
+    @noise_time.setter
+    def noise_time(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def position_sigma(self) -> float:
@@ -4947,8 +4943,10 @@ class WatchOptions:
     forget = 1.0: [s] after a longer gap of the tracker the averages begin anew.
     compare = 120.0: [s] after a shift, station and receiver are told apart for this time; further jumps are taken for
         its after-effect.
+    least = 1.0: A jump counts when its length or its angle is at least so many times the tracker's noise of one
+        component.
     """
-    def __init__(self, *, threshold: typing.SupportsFloat | typing.SupportsIndex = 55.0, forget: typing.SupportsFloat | typing.SupportsIndex = 1.0, compare: typing.SupportsFloat | typing.SupportsIndex = 120.0) -> None:
+    def __init__(self, *, threshold: typing.SupportsFloat | typing.SupportsIndex = 55.0, forget: typing.SupportsFloat | typing.SupportsIndex = 1.0, compare: typing.SupportsFloat | typing.SupportsIndex = 120.0, least: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -4978,6 +4976,15 @@ class WatchOptions:
         """
     @forget.setter
     def forget(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def least(self) -> float:
+        """
+        A jump counts when its length or its angle is at least so many times the tracker's noise of one
+        component.
+        """
+    @least.setter
+    def least(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def threshold(self) -> float:
@@ -5295,6 +5302,32 @@ class ClockEstimate:
         """
         [s] standard error.
         """
+class TrackerNoise:
+    """
+    Noise of the sensors as the filter has found it.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def accel_factor(self) -> float:
+        """
+        Of the accelerometer, in terms of the given.
+        """
+    @property
+    def gyro_factor(self) -> float:
+        """
+        Of the gyro, in terms of the given.
+        """
+    @property
+    def position(self) -> float:
+        """
+        [m] of the tracker, one component.
+        """
+    @property
+    def rotation(self) -> float:
+        """
+        [rad] likewise.
+        """
 class Shift:
     """
     The last jump of the tracker that was noticed.
@@ -5329,6 +5362,16 @@ class Shift:
     def odds(self) -> float:
         """
         Log odds of station against receiver.
+        """
+    @property
+    def position_noise(self) -> float:
+        """
+        [m] of the tracker then, one component.
+        """
+    @property
+    def rotation_noise(self) -> float:
+        """
+        [rad] likewise.
         """
     @property
     def t(self) -> float:
@@ -5405,6 +5448,11 @@ class Tracker:
     def frequencies(self) -> tuple[float, ...]:
         """
         [Hz] of the modes, as tracked; 0 beyond them.
+        """
+    @property
+    def noise(self) -> TrackerNoise:
+        """
+        Noise of the sensors as the filter has found it.
         """
     @property
     def now(self) -> float:
@@ -5504,6 +5552,11 @@ class ReplayResult:
     def modes_from(self) -> float:
         """
         [s] they are used from then on; 0: never.
+        """
+    @property
+    def noise(self) -> TrackerNoise:
+        """
+        At the end.
         """
     @property
     def rows(self) -> tuple[CompensationRow, ...]:
@@ -6455,10 +6508,6 @@ def nearest_contact(scene: Scene, robot: Robot, joints: typing.Annotated[numpy.t
     
     joints: shape=(driven joints,) [rad | m]. target: its index in `robot.targets`. Raises InputError.
     """
-def noise_from_repeats(data: Measurements) -> float | None:
-    """
-    Noise of one position component (or distance) [m], as rows measured again at one pose scatter. None: the repeats have fewer than 20 degrees of freedom.
-    """
 def plan(robot: Robot, options: PlanOptions | None = None) -> PlanResult:
     """
     Measurement poses by exchange on an observability index.
@@ -6495,10 +6544,6 @@ def residuals(robot: Robot, data: Measurements, own_effects: collections.abc.Seq
     Predicted minus measured, NaN where not measured. Raises InputError.
     
     Rows of a fixed point are compared with the mean of that point's predictions.
-    """
-def review(robot: Robot, data: Measurements, found: Identification, options: IdentifyOptions | None = None, own_effects: collections.abc.Sequence[OwnEffect] = []) -> Mistake | None:
-    """
-    What speaks against the robot file or the columns that `found` was identified from. None: nothing. Raises InputError.
     """
 def robot_from_urdf(urdf_text: str, base_link: str = '', tip_link: str = '') -> Robot:
     """

@@ -18,7 +18,8 @@ using Eigen::Vector3d;
 
 constexpr double kColoured =
     4.0;  // innovations come from another filter and resemble their neighbours: so many say as much as one
-constexpr double kChord = 0.02;  // frames are extrapolated by their speed over so long [s]
+constexpr double kStillLearning = 2.0;  // a variance that falls by more until a prediction is graded is still settling
+constexpr double kChord = 0.02;         // frames are extrapolated by their speed over so long [s]
 
 }  // namespace
 
@@ -236,9 +237,10 @@ void DeviationModel::update(const PoseFilter& filter, double changed) {
     tick_count_ = std::max(tick_count_, k + 1);
     if (k >= done) {
       guess(k, t);
-      settle(t);
+      settle(t, std::max(filter.newest_pose(), filter.window_start() + 2.0 * options_.period));
     }
   }
+  choose(filter);
 }
 
 void DeviationModel::run(std::int64_t k, const PoseFilter& filter) {
@@ -272,6 +274,7 @@ void DeviationModel::run(std::int64_t k, const PoseFilter& filter) {
 
   double position_variance = 0.0, velocity_variance = 0.0, age = 0.0;
   filter.sigmas_at(t, &position_variance, &velocity_variance, &age);
+  now.velocity_variance = velocity_variance;
   position_variance = std::max(position_variance, options_.position_noise * options_.position_noise);
   velocity_variance = std::max(velocity_variance, options_.velocity_noise * options_.velocity_noise);
   ModalVector gain;
@@ -394,15 +397,19 @@ void DeviationModel::guess(std::int64_t k, double) {
   Guess& guess = guesses_[static_cast<std::size_t>(k + ahead) % guesses_.size()];
   guess.t = static_cast<double>(first_index_ + k + ahead) * options_.period;
   guess.made = true;
+  guess.velocity_variance = last.velocity_variance;
   for (int p = 0; p < kPredictors; ++p) {
     auto& d = guess.d[static_cast<std::size_t>(p)];
     if (!predict(static_cast<Predictor>(p), last.t, last.z, guess.t, &d)) d.setConstant(1.0);
   }
 }
 
-/// Steps that no late sample will change: their guesses are graded, and they become rows for identification.
-void DeviationModel::settle(double now) {
-  for (; settled_ < tick_count_ && tick(settled_).t < now - options_.settle_time; ++settled_) {
+/// Steps that no late sample will change: their guesses are graded, and they become rows for identification. A tracker
+/// that is later than `settle_time` is waited for: `seen` is the time up to which its samples have come. What was
+/// guessed while the filter itself was still settling says nothing of the predictors.
+void DeviationModel::settle(double now, double seen) {
+  const double known = tick(tick_count_ - 1).velocity_variance;
+  for (; settled_ < tick_count_ && tick(settled_).t < std::min(now - options_.settle_time, seen); ++settled_) {
     const Tick& done = tick(settled_);
     if (!done.observed) continue;
     if (row_count_ < static_cast<int>(rows_.size()))
@@ -410,6 +417,7 @@ void DeviationModel::settle(double now) {
     Guess& guess = guesses_[static_cast<std::size_t>(settled_) % guesses_.size()];
     if (!guess.made || std::abs(guess.t - done.t) > 0.5 * options_.period) continue;
     guess.made = false;
+    if (guess.velocity_variance > kStillLearning * known) continue;
     for (int p = 0; p < kPredictors; ++p) {
       Grade& grade = grades_[static_cast<std::size_t>(p)];
       const Vector6d error = guess.d[static_cast<std::size_t>(p)] - done.z.d;
@@ -418,14 +426,16 @@ void DeviationModel::settle(double now) {
       grade.seconds += options_.period;
     }
   }
-  choose();
 }
 
-/// The best graded one, if it is clearly better than the one in use; with little evidence the plainer one.
-void DeviationModel::choose() {
+/// The best graded one, if it is clearly better than the one in use; before there are grades, the one that the filter
+/// expects less of: sway, or what the speed is uncertain by over the horizon.
+void DeviationModel::choose(const PoseFilter& filter) {
   const auto error = [&](Predictor p) { return grade(p).head<3>().sum(); };
   if (evidence(Predictor::acceleration) < 0.1) {
-    best_ = Predictor::acceleration;
+    if (tick_count_ == 0) return;
+    const double moved = options_.horizon * options_.horizon * tick(tick_count_ - 1).velocity_variance;
+    best_ = moved < filter.sway_variance().head<3>().mean() ? Predictor::acceleration : Predictor::slow;
     return;
   }
   for (Predictor p : {Predictor::slow, Predictor::acceleration, Predictor::modes}) {

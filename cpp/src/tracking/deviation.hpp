@@ -179,6 +179,7 @@ class DeviationModel {
     Deviation z;
     Eigen::Vector3d push = Eigen::Vector3d::Zero();  // planned acceleration over the next step
     Vector6d mean = Vector6d::Zero();                // deviation averaged over sway
+    double velocity_variance = 0.0;                  // of the filter, a component [m^2/s^2]
     ModalState<6> X;
     ModalFilter filter;
     FrequencyTracker frequencies;
@@ -186,6 +187,7 @@ class DeviationModel {
   struct Guess {
     double t = -1e300;
     std::array<Vector6d, kPredictors> d;
+    double velocity_variance = 0.0;  // when it was made
     bool made = false;
   };
   struct Grade {
@@ -197,12 +199,12 @@ class DeviationModel {
   Tick& tick(std::int64_t k) { return ticks_[static_cast<std::size_t>(k) % ticks_.size()]; }
   void run(std::int64_t k, const PoseFilter& filter);
   void guess(std::int64_t k, double now);
-  void settle(double now);
+  void settle(double now, double seen);
   /// What the plan's acceleration pushes every part with.
   using Forces = Eigen::Matrix<double, kParts, 6>;
   Forces forces_of(const Eigen::Vector3d& push) const;
   Eigen::Vector3d push_at(double t) const;
-  void choose();
+  void choose(const PoseFilter& filter);
 
   TrackSetup setup_;
   DeviationOptions options_;

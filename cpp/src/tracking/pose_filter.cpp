@@ -55,7 +55,8 @@ void inject(const Eigen::Matrix<double, kStates, 1>& delta, Nominal* x) {
 /// two would settle on a wrong pair.
 template <int N>
 bool fuse(const Eigen::Matrix<double, kStates, N>& PHt, const Eigen::Matrix<double, N, N>& S,
-          const Eigen::Matrix<double, N, 1>& r, double gate, Belief* belief, double* nis) {
+          const Eigen::Matrix<double, N, 1>& r, double gate, Belief* belief, double* nis,
+          Eigen::Matrix<double, kStates, 1>* moved = nullptr) {
   const Eigen::LLT<Eigen::Matrix<double, N, N>> factor(S);
   const Eigen::Matrix<double, N, 1> weighted = factor.solve(r);
   *nis = r.dot(weighted);
@@ -69,6 +70,7 @@ bool fuse(const Eigen::Matrix<double, kStates, N>& PHt, const Eigen::Matrix<doub
     belief->P.block<2, 2>(kClock, kClock) = clock;
   }
   inject(change, &belief->x);
+  if (moved) *moved = change;
   symmetrise(&belief->P);
   return true;
 }
@@ -377,16 +379,18 @@ void PoseFilter::transition(const Belief& from, const Nominal& to_x, double t, C
   const double turn = 4.0 * (to_x.q * from.x.q.conjugate()).vec().squaredNorm(),
                speed_up = (to_x.v - from.x.v).squaredNorm();
   const double scale = o.imu_scale * o.imu_scale * kScaleTime / dt;
-  const double accel = o.accel_noise * o.accel_noise * dt + scale * speed_up + extra(t, false) - extra(from.t, false);
-  const double gyro = o.gyro_noise * o.gyro_noise * dt + scale * turn + extra(t, true) - extra(from.t, true);
+  const double accel = from.noise.accel_factor() * (o.accel_noise * o.accel_noise * dt + scale * speed_up) +
+                       extra(t, false) - extra(from.t, false);
+  const double gyro = from.noise.gyro_factor() * (o.gyro_noise * o.gyro_noise * dt + scale * turn) + extra(t, true) -
+                      extra(from.t, true);
   for (int i = 0; i < 3; ++i) {
     M(kP + i, kP + i) += accel * dt * dt / 3.0;
     M(kP + i, kV + i) += accel * dt / 2.0;
     M(kV + i, kP + i) += accel * dt / 2.0;
     M(kV + i, kV + i) += accel;
     M(kTheta + i, kTheta + i) += gyro;
-    M(kGyroBias + i, kGyroBias + i) += o.gyro_bias_walk * o.gyro_bias_walk * dt;
-    M(kAccelBias + i, kAccelBias + i) += o.accel_bias_walk * o.accel_bias_walk * dt;
+    M(kGyroBias + i, kGyroBias + i) += from.noise.gyro_factor() * o.gyro_bias_walk * o.gyro_bias_walk * dt;
+    M(kAccelBias + i, kAccelBias + i) += from.noise.accel_factor() * o.accel_bias_walk * o.accel_bias_walk * dt;
     M(kSlowP + i, kSlowP + i) += o.slow_position_walk * o.slow_position_walk * dt;
     M(kSlowTheta + i, kSlowTheta + i) += o.slow_rotation_walk * o.slow_rotation_walk * dt;
   }
@@ -438,24 +442,28 @@ void PoseFilter::measure_pose(Event* event, Belief* belief) const {
   r.head<3>() = event->T_base_receiver.translation() - predicted;
   if (event->has_orientation)
     r.tail<3>() = log_rotation(Quaterniond(event->T_base_receiver.linear()) * predicted_q.conjugate());
-  S.diagonal().head<3>().array() += options_.position_sigma * options_.position_sigma;
-  S.diagonal().tail<3>().array() += options_.rotation_sigma * options_.rotation_sigma;
+  Vector6d R;
+  R << Vector3d::Constant(belief->noise.position_variance()), Vector3d::Constant(belief->noise.rotation_variance());
+  S.diagonal() += R;
 
   PoseGrade& grade = event->grade;
   grade.t = event->t;
   grade.dimensions = event->has_orientation ? 6 : 3;
   grade.innovation = r;
   grade.S = S;
-  grade.R << Vector3d::Constant(options_.position_sigma * options_.position_sigma),
-      Vector3d::Constant(options_.rotation_sigma * options_.rotation_sigma);
+  grade.R = R;
+  grade.noise = belief->noise.white();
   grade.T_base_receiver = event->T_base_receiver;
   grade.reacquired = false;
-  const auto apply = [&](double gate) {
-    return event->has_orientation
-               ? fuse<6>(PHt, S, r, gate, belief, &grade.nis)
-               : fuse<3>(PHt.leftCols<3>(), S.topLeftCorner<3, 3>(), r.head<3>(), gate, belief, &grade.nis);
-  };
-  grade.accepted = apply(options_.gate);
+  Eigen::Matrix<double, kStates, 1> moved = Eigen::Matrix<double, kStates, 1>::Zero();
+  // The gate is that of the noise before both sensors' were scaled down together: errors that are not white come in
+  // bursts, and what was a good sample before they were made to fit on average is one still.
+  const double position_scale = R[0] / (grade.noise[0] * grade.noise[0]),
+               rotation_scale = R[3] / (grade.noise[1] * grade.noise[1]);
+  const double gate = options_.gate / std::min({1.0, position_scale, rotation_scale});
+  grade.accepted = event->has_orientation ? fuse<6>(PHt, S, r, gate, belief, &grade.nis, &moved)
+                                          : fuse<3>(PHt.leftCols<3>(), S.topLeftCorner<3, 3>(), r.head<3>(), gate,
+                                                    belief, &grade.nis, &moved);
   if (!grade.accepted && belief->rejected + 1 >= options_.reacquire_after) {
     // Either side may be wrong by now: speed and biases are known no better than at the start.
     const FilterOptions& o = options_;
@@ -473,6 +481,8 @@ void PoseFilter::measure_pose(Event* event, Belief* belief) const {
     grade.accepted = grade.reacquired = taken;
     return;
   }
+  const Correction correction{times_H(moved.transpose()).transpose(), moved.segment<3>(kV)};
+  belief->noise.push(event->t, r, S.diagonal(), event->has_orientation, correction, options_);
   belief->rejected = grade.accepted ? 0 : belief->rejected + 1;
   if (grade.accepted) belief->last_pose = belief->t;
 }
@@ -545,12 +555,25 @@ void PoseFilter::add_marks() {
   }
 }
 
-/// So broad that the first sample itself decides.
+/// A sample without orientation needs the encoders': they turn the sensor about the vertical, its own data do not.
+bool PoseFilter::can_start_from(const Event& event) const {
+  Isometry3d fk;
+  return event.kind == Kind::pose && (event.has_orientation || flange_at(event.t, &fk));
+}
+
+/// So broad that the first sample itself decides. Without an orientation that of forward kinematics is taken, as
+/// uncertain as its slow deviation and the sway; gravity and motion show the rest.
 void PoseFilter::start_from(const Event& first) {
-  const Isometry3d T_base_imu = first.T_base_receiver * T_imu_receiver_.inverse();
+  Isometry3d T_base_imu = first.T_base_receiver * T_imu_receiver_.inverse(), fk = Isometry3d::Identity();
+  if (!first.has_orientation && flange_at(first.t, &fk)) {
+    T_base_imu.linear() = (fk * T_imu_flange_.inverse()).linear();
+    T_base_imu.translation() =
+        first.T_base_receiver.translation() - T_base_imu.linear() * T_imu_receiver_.translation();
+  }
   base_ = Belief();
   base_.t = first.t;
   base_.clock_from = first.t + kClockFrom;
+  base_.noise = NoiseEstimate(options_);
   base_.sway << Vector3d::Constant(options_.sway_position * options_.sway_position),
       Vector3d::Constant(options_.sway_rotation * options_.sway_rotation);
   base_.x.p = T_base_imu.translation();
@@ -569,6 +592,12 @@ void PoseFilter::start_from(const Event& first) {
   set(kDrift, 1, setup_.clock_offset_sigma > 0.0 ? o.clock_drift : 0.0);
   set(kSlowP, 3, o.slow_position);
   set(kSlowTheta, 3, o.slow_rotation);
+  if (!first.has_orientation) {
+    set(kTheta, 3, std::hypot(o.slow_rotation, o.sway_rotation));
+    const Matrix3d shared = o.slow_rotation * o.slow_rotation * fk.linear();
+    base_.P.block<3, 3>(kTheta, kSlowTheta) = shared;
+    base_.P.block<3, 3>(kSlowTheta, kTheta) = shared.transpose();
+  }
   // Marks stand where they would if this had been the first sample from the beginning.
   std::size_t kept = 0;
   for (int slot : order_) {
@@ -590,10 +619,14 @@ void PoseFilter::update() {
   if (imu_count_ < 2) return;
   if (!initialised_) {
     const double oldest = imu(std::max<std::int64_t>(0, imu_count_ - imu_mask_ - 1)).t;
-    int first = 0;
-    while (first < event_count() &&
-           !(event(first).kind == Kind::pose && event(first).has_orientation && event(first).t >= oldest))
-      ++first;
+    // The first sample with an orientation; where there is none, the first that the encoders give one for.
+    const auto first_that = [&](const auto& serves) {
+      int k = 0;
+      while (k < event_count() && !(event(k).t >= oldest && serves(event(k)))) ++k;
+      return k;
+    };
+    int first = first_that([](const Event& e) { return e.kind == Kind::pose && e.has_orientation; });
+    if (first == event_count()) first = first_that([&](const Event& e) { return can_start_from(e); });
     if (first == event_count() || event(first).t > newest_imu()) return;
     const Event copy = event(first);
     start_from(copy);

@@ -18,6 +18,7 @@
 
 #include "math/rotation.hpp"
 #include "rooms.hpp"
+#include "tracking/noise_estimate.hpp"
 #include "truing/tracking/streams.hpp"
 #include "truing/tracking/tracker.hpp"
 
@@ -57,6 +58,7 @@ struct Belief {
   double clock_from = 0.0;           ///< before, the clock is considered and not estimated
   Vector6d sway = Vector6d::Zero();  ///< variance of the deviation from forward kinematics and slow deviation, in the
                                      ///< flange [m^2], [rad^2]
+  NoiseEstimate noise;               ///< of the sensors
 };
 
 /// What a tracker sample came to when it was last processed.
@@ -69,6 +71,7 @@ struct PoseGrade {
   Vector6d innovation = Vector6d::Zero();  ///< measured minus predicted, base frame [m], [rad]
   Matrix6d S = Matrix6d::Identity();       ///< its covariance
   Vector6d R = Vector6d::Ones();           ///< variance of the tracker's noise in it
+  std::array<double, 2> noise{};           ///< white noise of the tracker [m], [rad]
   Eigen::Isometry3d T_base_receiver = Eigen::Isometry3d::Identity();  ///< measured
 };
 
@@ -104,6 +107,10 @@ class PoseFilter {
   void sigmas_at(double t, double* position_variance, double* velocity_variance, double* pose_age) const;
   /// Variance of the sway about the slow deviation, per component in the flange of forward kinematics.
   Vector6d sway_variance() const { return (dirty_ == 0 ? base_ : event(dirty_ - 1).after).sway; }
+  /// Place of the newest tracker sample that was taken.
+  double newest_pose() const { return (dirty_ == 0 ? base_ : event(dirty_ - 1).after).last_pose; }
+  /// Of the sensors, as found by the last event.
+  const NoiseEstimate& noise() const { return (dirty_ == 0 ? base_ : event(dirty_ - 1).after).noise; }
   /// The earliest time whose state changed since the last call of this function; +inf: none.
   double changed_since();
   /// Flange by forward kinematics at `t`; false when no samples are around it.
@@ -154,6 +161,7 @@ class PoseFilter {
   void set_dirty(int k);
   void add_marks();
   void trim();
+  bool can_start_from(const Event& event) const;
   void start_from(const Event& first);
   void propagate(Belief* belief, double t);
   void integrate(Nominal* x, std::int64_t k, double t0, double t1) const;

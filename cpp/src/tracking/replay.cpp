@@ -119,6 +119,7 @@ class Replay {
                      [](const GradedPrediction& a, const GradedPrediction& b) { return a.t < b.t; });
     result_.counters = tracker_.counters();
     result_.clock = tracker_.clock();
+    result_.noise = tracker_.noise();
     return std::move(result_);
   }
 
@@ -197,8 +198,9 @@ class Replay {
     if (out.dimensions == 6)
       out.rotation = log_rotation(Quaterniond(measured.linear() * T_base_receiver.linear().transpose()));
     Matrix6d S = carried(predicted.covariance, T_base_receiver.translation() - predicted.T_base_tool.translation());
-    S.diagonal().head<3>().array() += options_.track.filter.position_sigma * options_.track.filter.position_sigma;
-    S.diagonal().tail<3>().array() += options_.track.filter.rotation_sigma * options_.track.filter.rotation_sigma;
+    const TrackerNoise noise = tracker_.noise();
+    S.diagonal().head<3>().array() += noise.position * noise.position;
+    S.diagonal().tail<3>().array() += noise.rotation * noise.rotation;
     out.position_sigma = S.diagonal().head<3>().cwiseSqrt();
     Vector6d e;
     e << out.position, out.rotation;

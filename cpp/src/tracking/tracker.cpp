@@ -72,6 +72,8 @@ bool FilterOptions::is_valid(std::string* error) const {
     return no("rates out of range");
   if (!(gyro_noise > 0.0 && accel_noise > 0.0 && position_sigma > 0.0 && rotation_sigma > 0.0))
     return no("noises must be above 0");
+  if (!(noise_time >= 0.0 && noise_range >= 1.0))
+    return no("noise_time must not be below 0 s, noise_range not below 1");
   if (!(reacquire_after >= 2 && frozen_after >= 1))
     return no("reacquire_after must be at least 2, frozen_after at least 1");
   if (!(gate > 6.0)) return no("gate must be above 6, the mean of the innovation squared");
@@ -101,6 +103,7 @@ bool WatchOptions::is_valid(std::string* error) const {
   };
   if (!(threshold > 20.0)) return no("watch.threshold must be above 20, or it is always exceeded");
   if (!(forget > 0.0 && compare > 0.0)) return no("watch.forget and watch.compare must be above 0 s");
+  if (!(least >= 0.0)) return no("watch.least must not be below 0");
   return true;
 }
 
@@ -338,6 +341,13 @@ ClockEstimate Tracker::clock() {
   if (!in.filter.initialised()) return {in.setup.clock_offset, in.setup.clock_offset_sigma, 0.0};
   const Belief belief = in.filter.belief_at(now());
   return {belief.x.clock, std::sqrt(belief.P(kClock, kClock)), belief.x.drift};
+}
+
+TrackerNoise Tracker::noise() {
+  inside_->update();
+  const NoiseEstimate& found = inside_->filter.noise();
+  const std::array<double, 2> white = found.white();
+  return {white[0], white[1], std::sqrt(found.accel_factor()), std::sqrt(found.gyro_factor())};
 }
 
 std::array<double, ModalModel::kMost> Tracker::frequencies() const { return inside_->deviation.frequencies(); }

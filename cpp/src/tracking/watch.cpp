@@ -53,6 +53,7 @@ void ShiftWatch::push(const PoseGrade& grade, const Isometry3d* T_base_flange) {
   ++count_;
   now.t = grade.t;
   now.innovation = grade.innovation;
+  now.noise = grade.noise;
   now.T_base_receiver = grade.T_base_receiver;
   now.has_flange = T_base_flange != nullptr && grade.dimensions == 6;
   if (now.has_flange) now.T_base_flange = *T_base_flange;
@@ -148,7 +149,14 @@ void ShiftWatch::flag() {
   const std::int64_t onset = find_onset();
   const Row& first = row(onset);
   const Vector6d jump = find_jump(onset);
+  const double position = jump.head<3>().norm(), rotation = jump.tail<3>().norm();
+  if (position < options_.least * first.noise[0] && rotation < options_.least * first.noise[1]) {
+    restart();  // what is smaller than the noise of a sample is no jump: the filter does not know all
+    return;
+  }
   shift_.count += 1;
+  shift_.position_noise = first.noise[0];
+  shift_.rotation_noise = first.noise[1];
   shift_.t = first.t;
   shift_.flagged = row(count_ - 1).t;
   shift_.jump = jump;

@@ -39,6 +39,7 @@ class ShiftWatch {
     double t = 0.0;
     Vector6d u, innovation;
     Matrix6d kept;
+    std::array<double, 2> noise{};  ///< of the tracker [m], [rad]
     Eigen::Isometry3d T_base_receiver;
     bool has_flange = false;
     Eigen::Isometry3d T_base_flange;

@@ -187,6 +187,11 @@ void bind_answers(py::module_& m) {
     return "ClockEstimate(" + text(c.offset) + " s, sigma " + text(c.sigma) + " s)";
   });
 
+  auto noise = define_result<TrackerNoise>(m, "TrackerNoise");
+  noise.def("__repr__", [](const TrackerNoise& n) {
+    return "TrackerNoise(" + text(n.position) + " m, " + text(n.rotation) + " rad)";
+  });
+
   auto shift = define_result<Shift>(m, "Shift");
   shift.def("__repr__", [](const Shift& s) {
     return s.count == 0 ? std::string("Shift(none)")
@@ -266,6 +271,8 @@ void bind_asking(TrackerClass& cls) {
   cls.def_property_readonly("now", &Tracker::now, "[s] stamp of the newest inertial sample.");
   cls.def_property_readonly(
       "clock", [](Tracker& self) { return self.clock(); }, "The tracker's clock as it is now estimated.");
+  cls.def_property_readonly(
+      "noise", [](Tracker& self) { return self.noise(); }, "Noise of the sensors as the filter has found it.");
   cls.def_property_readonly(
       "frequencies", [](const Tracker& self) { return TupleOf<double>(py::cast(self.frequencies())); },
       "[Hz] of the modes, as tracked; 0 beyond them.");

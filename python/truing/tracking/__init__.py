@@ -21,6 +21,7 @@ from truing._core import (
     Shift as Shift,
     ToolResult as ToolResult,
     Tracker as Tracker,
+    TrackerNoise as TrackerNoise,
     TrackOptions as TrackOptions,
     TrackSetup as TrackSetup,
     WatchOptions as WatchOptions,

@@ -635,7 +635,9 @@ def _shifts(result: Mapping[str, Any]) -> str:
     items = "".join(
         f"<li><b>At {figures_text(s['t_s'], 4)} s the tracker jumped by {length_text(s['jump_m'])} and"
         f" {figures_text(1e3 * s['jump_rad'], 2)} mrad</b>, noticed after"
-        f" {figures_text(max(0.0, s['flagged_s'] - s['t_s']), 2)} s: {causes[s['cause']]}.</li>"
+        f" {figures_text(max(0.0, s['flagged_s'] - s['t_s']), 2)} s: {causes[s['cause']]}. The noise of a"
+        f" sample is {length_text(s['position_noise_m'])} and"
+        f" {figures_text(1e3 * s['rotation_noise_rad'], 2)} mrad.</li>"
         for s in result["shifts"]
     )
     return (

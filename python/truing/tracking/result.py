@@ -185,6 +185,12 @@ def run_dict(run: Played, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
             ),
             "innovations": int(used.sum()),
             "outliers": int((~used).sum()),
+            "noise": {
+                "position_m": p.noise.position,
+                "rotation_rad": p.noise.rotation,
+                "accel_factor": p.noise.accel_factor,
+                "gyro_factor": p.noise.gyro_factor,
+            },
         },
         "clock": {
             "offset_s": p.clock.offset,
@@ -200,6 +206,8 @@ def run_dict(run: Played, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
                 "cause": s.cause,
                 "jump_m": float(np.linalg.norm(s.jump[:3])),
                 "jump_rad": float(np.linalg.norm(s.jump[3:])),
+                "position_noise_m": s.position_noise,
+                "rotation_noise_rad": s.rotation_noise,
                 "odds": s.odds,
             }
             for s in p.shifts

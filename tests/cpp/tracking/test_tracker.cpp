@@ -149,6 +149,85 @@ TEST_CASE("the pose is known to a fraction of the tracker's noise, and the filte
   CHECK(std::sqrt(squares) < 0.6e-3);
 }
 
+/// Innovations squared over what was expected, per dimension, and errors of the position now [m, rms], from 5 s on.
+struct Consistency {
+  double nis = 0.0, error = 0.0;
+};
+Consistency consistency(const SimulatedStreams& s, const FilterOptions& filter) {
+  TrackOptions options;
+  options.filter = filter;
+  Tracker tracker(s.setup, options);
+  Player player;
+  double squares = 0.0, dimensions = 0.0, errors = 0.0, count = 0.0;
+  std::size_t k = 0;
+  for (double t = 0.1; t < s.imu.back().t; t += 0.1) {
+    k = play(s, t, &tracker, &player, k);
+    Innovation innovations[64];
+    for (int n; (n = tracker.take_innovations(innovations, 64)) > 0;) {
+      for (int i = 0; i < n; ++i) {
+        if (innovations[i].t < 5.0) continue;
+        squares += innovations[i].nis;
+        dimensions += innovations[i].dimensions;
+      }
+    }
+    if (t < 5.0) continue;
+    errors += std::pow(position_error(s, &tracker, tracker.now()), 2);
+    count += 1.0;
+  }
+  return {squares / dimensions, std::sqrt(errors / count)};
+}
+
+TEST_CASE("sensors that are three times better or worse than the options say are found out: seeds 31 to 34") {
+  for (std::uint64_t seed = 31; seed <= (kSanitized ? 31 : 34); ++seed) {
+    for (const double times : {1.0 / 3.0, 1.0, 3.0}) {
+      CAPTURE(seed);
+      CAPTURE(times);
+      StreamSimulationOptions options;
+      options.motion = seed % 2 == 0 ? SimulatedMotion::stop_and_go : SimulatedMotion::gentle;
+      options.seed = seed;
+      options.seconds = 30.0;
+      options.imu.gyro_noise *= times, options.imu.accel_noise *= times;
+      options.tracker.position_noise *= times, options.tracker.rotation_noise *= times;
+      const SimulatedStreams s = simulate_streams(large_boom(), options);
+      FilterOptions given;
+      given.noise_time = 0.0;
+      const Consistency found = consistency(s, FilterOptions()), believed = consistency(s, given);
+      CHECK(found.nis > 0.7);
+      CHECK(found.nis < 1.4);
+      if (times != 1.0) CHECK(std::abs(std::log(believed.nis)) > std::log(2.0));
+      CHECK(found.error < 1.15 * believed.error);
+    }
+  }
+}
+
+TEST_CASE("a tracker that gives no orientations starts the filter, with the encoders' orientation: seeds 41 to 43") {
+  for (std::uint64_t seed = 41; seed <= (kSanitized ? 41 : 43); ++seed) {
+    CAPTURE(seed);
+    SimulatedStreams s = boom(SimulatedMotion::stop_and_go, seed, 20.0);
+    for (PoseSample& sample : s.tracker) sample.orientation.coeffs().setZero();
+    Tracker tracker(s.setup);
+    Player player;
+    play(s, 19.9, &tracker, &player);
+    const PosePrediction now = tracker.predict(tracker.now());
+    CHECK(now.status == Status::valid);
+    const double off = (now.T_base_tool.translation() - s.tool_at(now.t).translation()).norm();
+    CAPTURE(off);
+    CHECK(off < 0.02);
+    CHECK(off < 4.0 * std::sqrt(now.covariance.diagonal().head<3>().sum()));
+  }
+}
+
+TEST_CASE("without orientations and without encoders nothing starts: seed 44") {
+  SimulatedStreams s = boom(SimulatedMotion::gentle, 44, 3.0);
+  for (PoseSample& sample : s.tracker) sample.orientation.coeffs().setZero();
+  s.flange.clear();
+  PoseFilter filter(s.setup, FilterOptions());
+  Player player;
+  play(s, 2.9, &filter, &player);
+  filter.update();
+  CHECK_FALSE(filter.initialised());
+}
+
 TEST_CASE("an unknown clock offset of 8 ms is found: seed 5") {
   StreamSimulationOptions options;
   options.seed = 5;
@@ -683,9 +762,11 @@ struct Watched {
 };
 
 /// Plays everything and asks every 0.1 s; `said` is when a shift after `start` was first told.
-Watched watch(const SimulatedStreams& s, double start) {
+Watched watch(const SimulatedStreams& s, double start, const WatchOptions& options = {}) {
   Watched out;
-  Tracker tracker(s.setup);
+  TrackOptions how;
+  how.watch = options;
+  Tracker tracker(s.setup, how);
   Player player;
   std::size_t k = 0;
   for (double t = 0.1; t < s.imu.back().t; t += 0.1) {
@@ -734,6 +815,22 @@ TEST_CASE("a base station shifted by 5 mm or by 0.1 degrees is flagged within 2 
       if (!turned) CHECK(std::abs(found.shift.jump.head<3>().norm() - 0.005) < 0.003);
     }
   }
+}
+
+TEST_CASE("a jump is judged against the tracker's noise, which is told with it: seed 2") {
+  StreamSimulationOptions options = watched(2, 24.0);
+  StationShift shift;
+  shift.start = 20.0;
+  shift.T_old_new.translation() = Vector3d(0.005, 0.0, 0.0);
+  options.shifts = {shift};
+  const SimulatedStreams s = simulate_streams(large_boom(), options);
+  const Watched found = watch(s, 20.0);
+  REQUIRE(found.said > 0.0);
+  CHECK(found.shift.position_noise == doctest::Approx(1e-3).epsilon(0.2));
+  CHECK(found.shift.rotation_noise == doctest::Approx(1e-3).epsilon(0.2));
+  WatchOptions coarse;
+  coarse.least = 20.0;  // a jump of 5 mm is 5 times the noise
+  CHECK(watch(s, 20.0, coarse).said < 0.0);
 }
 
 TEST_CASE("a slipped receiver is flagged within 2 s: seeds 1 to 6") {

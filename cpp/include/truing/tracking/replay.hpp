@@ -86,6 +86,7 @@ struct ReplayResult {
   double modes_from = 0.0;    ///< [s] they are used from then on; 0: never
   Counters counters;
   ClockEstimate clock;   ///< at the end
+  TrackerNoise noise;    ///< at the end
   bool stopped = false;  ///< `progress` said so
 };
 

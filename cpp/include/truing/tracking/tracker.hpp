@@ -65,12 +65,15 @@ struct FilterOptions {
   double gap_rate = 0.2;             ///< [rad/s] likewise
   double position_sigma = 1e-3;      ///< [m] noise of the tracker, one component
   double rotation_sigma = 1e-3;      ///< [rad] likewise
-  double gate = 50.0;                ///< tracker samples with a larger normalised innovation squared are outliers
-  int reacquire_after = 25;          ///< consecutive outliers after which the filter follows the tracker again
-  int frozen_after = 3;              ///< consecutive equal tracker samples after which they are refused
-  double clock_walk = 2e-5;          ///< [s/sqrt(s)] random walk of the tracker's clock
-  double clock_drift = 1e-4;         ///< [s/s] standard deviation of the clock's drift
-  double clock_drift_walk = 1e-6;    ///< [1/sqrt(s)] random walk of the clock's drift
+  /// [s] over which the noise of the tracker is averaged, and that of the inertial sensor follows; 0: as given.
+  double noise_time = 10.0;
+  double noise_range = 10.0;       ///< maximum ratio of a noise so found to the given one, and of the given to it
+  double gate = 50.0;              ///< tracker samples with a larger normalised innovation squared are outliers
+  int reacquire_after = 25;        ///< consecutive outliers after which the filter follows the tracker again
+  int frozen_after = 3;            ///< consecutive equal tracker samples after which they are refused
+  double clock_walk = 2e-5;        ///< [s/sqrt(s)] random walk of the tracker's clock
+  double clock_drift = 1e-4;       ///< [s/s] standard deviation of the clock's drift
+  double clock_drift_walk = 1e-6;  ///< [1/sqrt(s)] random walk of the clock's drift
   /// [m] standard deviation of the tip about its slow mean before any data; afterwards it is estimated.
   double sway_position = 0.02;
   double sway_rotation = 0.003;   ///< [rad] likewise
@@ -175,6 +178,8 @@ struct WatchOptions {
   /// [s] after a shift, station and receiver are told apart for this time; further jumps are taken for its
   /// after-effect.
   double compare = 120.0;
+  /// A jump counts when its length or its angle is at least so many times the tracker's noise of one component.
+  double least = 1.0;
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
@@ -197,6 +202,8 @@ struct Shift {
   Eigen::Matrix<double, 6, 1> jump = Eigen::Matrix<double, 6, 1>::Zero();
   ShiftCause cause = ShiftCause::station_or_receiver;  ///< what jumped
   double odds = 0.0;                                   ///< log odds of station against receiver
+  double position_noise = 0.0;                         ///< [m] of the tracker then, one component
+  double rotation_noise = 0.0;                         ///< [rad] likewise
 };
 
 /// How `Tracker` works.
@@ -256,6 +263,14 @@ struct ClockEstimate {
   double drift = 0.0;   ///< [s/s]
 };
 
+/// Noise of the sensors as the filter has found it.
+struct TrackerNoise {
+  double position = 0.0;      ///< [m] of the tracker, one component
+  double rotation = 0.0;      ///< [rad] likewise
+  double accel_factor = 1.0;  ///< of the accelerometer, in terms of the given
+  double gyro_factor = 1.0;   ///< of the gyro, in terms of the given
+};
+
 /// A tracker sample against what was expected of it.
 struct Innovation {
   double t = 0.0, nis = 0.0;
@@ -288,6 +303,7 @@ class Tracker {
   void set_modes(const ModalModel& modes);
   double now() const;  ///< stamp of the newest inertial sample
   ClockEstimate clock();
+  TrackerNoise noise();
   std::array<double, ModalModel::kMost> frequencies() const;  ///< [Hz] as tracked
   /// Settled rows since the last call for `identify_modes`, and settled innovations: the number written, at most
   /// `capacity`. Call often: few are kept.

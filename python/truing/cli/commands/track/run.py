@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from truing.cli import run
 from truing.cli.options import BaseLink, File, RobotFile, Time, TipLink, core
 from truing.cli.streams import IMU, JointsFile, TrackerFile, clock_text, frequencies
-from truing.cli.tables import mm, say, table
+from truing.cli.tables import mm, mrad, say, table
 
 if TYPE_CHECKING:
     from truing.files.stream_file import ImuData, JointData, PoseData, SetupData, TrackerData
@@ -149,11 +149,7 @@ class Command(run.Command[Loaded, "Played"]):
         fractions = [f"{name} {100 * part:.1f} %" for name, part in result["status"].items() if part > 0]
         say("status: " + ", ".join(fractions))
         for shift in result["shifts"]:
-            cause = shift["cause"].replace("_", " ")
-            say(
-                f"the tracker jumped by {mm(shift['jump_m'])} at {shift['t_s']:.2f} s ({cause}): calibrate"
-                " anew"
-            )
+            say(jump_text(shift))
 
     def failure(self, result: Mapping[str, Any]) -> str:
         if self.plan is None or result["made"]:
@@ -162,6 +158,16 @@ class Command(run.Command[Loaded, "Played"]):
             "no row of the plan could be compensated: the streams do not reach it, or the tracker was never"
             " there"
         )
+
+
+def jump_text(shift: Mapping[str, Any]) -> str:
+    """One jump of the tracker, beside the noise it was judged against."""
+    cause = shift["cause"].replace("_", " ")
+    return (
+        f"the tracker jumped by {mm(shift['jump_m'])}, {mrad(shift['jump_rad'])} at {shift['t_s']:.2f} s"
+        f" ({cause}), where its noise is {mm(shift['position_noise_m'])},"
+        f" {mrad(shift['rotation_noise_rad'])}: calibrate anew"
+    )
 
 
 def print_compensation(result: Mapping[str, Any]) -> None:
