@@ -89,9 +89,9 @@ struct Rival {
 };
 
 struct Sureness {
-  std::vector<Rival> rivals;  ///< those in the class first, by loss
-  double raw = 0.0;           ///< posterior of the class
-  double removal_loss = 0.0;  ///< nats lost without it
+  std::vector<Rival> rivals;     ///< those in the class first, by loss
+  double raw = 0.0;              ///< posterior of the class
+  double removal_loss = 0.0;     ///< nats lost without it
   bool law_in_question = false;  ///< any function of its input does as well, or finds something beside it
 };
 
