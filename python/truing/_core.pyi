@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'nearest_contact', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -1400,6 +1400,30 @@ class Residuals:
     def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
         Shape=(n, 3) [rad]: twice the vector part of the error quaternion.
+        """
+class Mistake:
+    """
+    What speaks against the robot file or the columns that were handed to `identify`.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def changes(self) -> tuple[Parameter, ...]:
+        """
+        What changed by more than a workshop makes, most first: 10 mm or 2 % of the robot's reach if that is
+        more, 3 degrees, 5 % of a gear ratio. Three standard errors are taken off first. Zeros of joints are
+        here only beside a reading that explains them: a controller may count from anywhere.
+        """
+    @property
+    def kind(self) -> str:
+        """
+        'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit' or 'convention': reading it
+        otherwise explains the measurements; 'unexplained': no such reading does.
+        """
+    @property
+    def text(self) -> str:
+        """
+        What is wrong, and what to do, in sentences.
         """
 class PlanOptions:
     """
@@ -3005,7 +3029,8 @@ class HandEyeResidual:
     @property
     def position_left_out(self) -> float:
         """
-        [m] when the pose is left out of the fit (held-out poses: the same as `position`).
+        [m] when the pose is left out of the fit, of the lens too where that was found from the images
+        (held-out poses: the same as `position`). NaN where the other poses do not hold the answer.
         """
     @property
     def rejected(self) -> bool:
@@ -3118,7 +3143,8 @@ class Reading:
     @property
     def name(self) -> str:
         """
-        To be given as `reading`; empty: as given.
+        To be given as `reading`; empty: as given. "other-setup": the set-up is to be given as the other
+        one.
         """
     @property
     def position_rms(self) -> float:
@@ -3272,7 +3298,7 @@ class ClockOffset:
     @property
     def correlation(self) -> float:
         """
-        Of the two angular speeds at that offset.
+        Of the two angular velocities, smoothed, at that offset.
         """
     @property
     def found(self) -> bool:
@@ -3363,7 +3389,7 @@ class HandEyeResult:
     @property
     def left_out(self) -> HandEyeErrors:
         """
-        The same, each predicted without itself.
+        The same, each predicted without itself; NaN where one cannot be.
         """
     @property
     def message(self) -> str:
@@ -3512,6 +3538,70 @@ class HandEyeKinematics:
         """
         Shape=(3, 3) [m^2] of that point in the frame that carries the camera.
         """
+class HandEyePlanOptions:
+    """
+    How `handeye_plan` chooses.
+    
+    count = 5: Number of poses.
+    candidates = 400: Candidates tried for each.
+    tilt = 0.7853981633974483: [rad] the board is seen at no more than this from its normal, beyond what was seen (45 deg).
+    reach = 0.15: [m] hands stay this close to a measured one.
+    seed = 0: Of the candidates.
+    """
+    def __init__(self, *, count: typing.SupportsInt | typing.SupportsIndex = 5, candidates: typing.SupportsInt | typing.SupportsIndex = 400, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.7853981633974483, reach: typing.SupportsFloat | typing.SupportsIndex = 0.15, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> HandEyePlanOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> HandEyePlanOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def candidates(self) -> int:
+        """
+        Candidates tried for each.
+        """
+    @candidates.setter
+    def candidates(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def count(self) -> int:
+        """
+        Number of poses.
+        """
+    @count.setter
+    def count(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reach(self) -> float:
+        """
+        [m] hands stay this close to a measured one.
+        """
+    @reach.setter
+    def reach(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of the candidates.
+        """
+    @seed.setter
+    def seed(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tilt(self) -> float:
+        """
+        [rad] the board is seen at no more than this from its normal, beyond what was seen (45 deg).
+        """
+    @tilt.setter
+    def tilt(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
 class Task:
     """
     What is wanted of one target; `replace(...)` makes another one.
@@ -6445,15 +6535,11 @@ def handeye_closed_form(poses: HandEyePoses, setup: typing.Literal['eye-in-hand'
     
     Raises InputError on data that cannot be used.
     """
-def handeye_plan(poses: HandEyePoses, result: HandEyeResult, options: HandEyeOptions | None = None, *, count: typing.SupportsInt | typing.SupportsIndex = 5, candidates: typing.SupportsInt | typing.SupportsIndex = 400, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.7853981633974483, reach: typing.SupportsFloat | typing.SupportsIndex = 0.15, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> tuple[NextHandPose, ...]:
+def handeye_plan(poses: HandEyePoses, result: HandEyeResult, options: HandEyeOptions | None = None, plan: HandEyePlanOptions | None = None) -> tuple[NextHandPose, ...]:
     """
-    Robot poses, one after the other, that shrink the covariance of the working point most. Raises InputError.
+    Robot poses, one after the other, that shrink the covariance of the working point most.
     
-    count = 5: Number of poses.
-    candidates = 400: Candidates tried for each.
-    tilt = 0.7853981633974483: [rad] the board is seen at no more than this from its normal, beyond what was seen (45 deg).
-    reach = 0.15: [m] hands stay this close to a measured one.
-    seed = 0: Of the candidates.
+    Raises InputError.
     """
 def handeye_readings() -> tuple[Reading, ...]:
     """
@@ -6508,6 +6594,10 @@ def nearest_contact(scene: Scene, robot: Robot, joints: typing.Annotated[numpy.t
     
     joints: shape=(driven joints,) [rad | m]. target: its index in `robot.targets`. Raises InputError.
     """
+def noise_from_repeats(data: Measurements) -> float | None:
+    """
+    Noise of one position component (or distance) [m], as rows measured again at one pose scatter. None: the repeats have fewer than 20 degrees of freedom.
+    """
 def plan(robot: Robot, options: PlanOptions | None = None) -> PlanResult:
     """
     Measurement poses by exchange on an observability index.
@@ -6544,6 +6634,10 @@ def residuals(robot: Robot, data: Measurements, own_effects: collections.abc.Seq
     Predicted minus measured, NaN where not measured. Raises InputError.
     
     Rows of a fixed point are compared with the mean of that point's predictions.
+    """
+def review(robot: Robot, data: Measurements, found: Identification, options: IdentifyOptions | None = None, own_effects: collections.abc.Sequence[OwnEffect] = []) -> Mistake | None:
+    """
+    What speaks against the robot file or the columns that `found` was identified from. None: nothing. Raises InputError.
     """
 def robot_from_urdf(urdf_text: str, base_link: str = '', tip_link: str = '') -> Robot:
     """
