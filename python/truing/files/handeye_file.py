@@ -25,6 +25,7 @@ from truing import _core
 from truing.errors import InputError, InputWarning
 from truing.files.boards import Board, BoardViews, find_board, parse_board, plausible_camera
 from truing.files.common import PathLike, atomic_write, listed
+from truing.files.opencv_file import is_opencv_file, read_opencv_camera
 from truing.files.other_poses import OtherPoses, Setup, Side, read_other_poses
 from truing.files.table import Floats, Table
 from truing.files.yaml_tree import Document, FreeMapping, Number, Strict, Text, choice, expected, found
@@ -771,10 +772,16 @@ class _CameraFile(Strict):
 
 def load_camera(path: PathLike) -> _core.Camera:
     """Read a camera file (format truing-camera/1): image size, fx fy cx cy [px], distortion k1 k2 p1 p2 k3
-    (plumb bob, as OpenCV).
+    (plumb bob, as OpenCV). Or one that OpenCV's calibration wrote (cv::FileStorage: camera_matrix,
+    distortion_coefficients, image_width, image_height).
 
-    Raises InputError that names the line, what was found and what was expected.
+    Raises InputError that names the line (or OpenCV's node), what was found and what was expected.
     """
+    if is_opencv_file(Path(path)):
+        camera = read_opencv_camera(Path(path))
+        if wrong := plausible_camera(camera):
+            raise InputError(f"{path}: {wrong[0]}: {wrong[1]}")
+        return camera
     document = Document.read(Path(path), _CAMERA)
     told = document.value.get("format")
     if told != CAMERA_FORMAT:

@@ -74,6 +74,12 @@ def read_opencv_poses(path: Path) -> dict[str, Floats]:
     return {side: _frames(path, parts) for side, parts in sides.items()}
 
 
+def is_opencv_file(path: Path) -> bool:
+    """Does the file hold matrices as cv::FileStorage writes them? Raises InputError: it cannot be read."""
+    data = read_bytes(path, _LARGEST_FILE)
+    return b"opencv-matrix" in data or b"opencv_storage" in data
+
+
 def read_opencv_camera(path: Path) -> Camera:
     """camera_matrix, distortion_coefficients, image_width and image_height, as OpenCV's calibration program
     and its samples write them. Raises InputError that names the node.

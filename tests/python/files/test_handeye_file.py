@@ -407,6 +407,36 @@ def test_a_camera_file_is_read_and_written_bit_for_bit(tmp_path: Path) -> None:
     assert (again.fx, again.distortion) == (odd.fx, odd.distortion)
 
 
+@pytest.mark.parametrize("suffix", [".yml", ".xml", ".json"])
+def test_a_camera_that_opencv_wrote_is_read(tmp_path: Path, suffix: str) -> None:
+    cv2 = pytest.importorskip("cv2")
+
+    def written(name: str, **changes: object) -> Path:
+        path = tmp_path / (name + suffix)
+        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+        nodes = {
+            "image_width": 640,
+            "image_height": 480,
+            "camera_matrix": np.array([[550.0, 0, 320], [0, 551.5, 240], [0, 0, 1]]),
+            "distortion_coefficients": np.array([[-0.1, 0.02, 0, 1e-3, 0]]),
+        } | changes
+        for node, value in nodes.items():
+            if value is not None:
+                storage.write(node, value)
+        storage.release()
+        return path
+
+    camera = load_camera(written("camera"))
+    assert (camera.width, camera.height, camera.fx, camera.fy) == (640, 480, 550.0, 551.5)
+    assert (camera.cx, camera.cy, camera.distortion) == (320.0, 240.0, (-0.1, 0.02, 0.0, 1e-3, 0.0))
+    with pytest.raises(InputError, match="there is no node image_width"):
+        load_camera(written("without", image_width=None))
+    with pytest.raises(InputError, match="found 8 coefficients, expected 5"):
+        load_camera(written("rational", distortion_coefficients=np.ones((1, 8))))
+    with pytest.raises(InputError, match="outside the image's width of 300 pixels"):
+        load_camera(written("other", image_width=300))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
