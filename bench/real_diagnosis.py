@@ -33,6 +33,7 @@ import truing
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from real_data import RECORDINGS, ROOT, Recording, default_folder, fit, load
+from small_sets import ARMS
 
 MOST = 6  # names in a cell
 FORMAT = "truing-real-splits/1"
@@ -85,7 +86,7 @@ def rows(folder: Path) -> Iterator[str]:
         " | left to a nearest neighbour | seconds |"
     )
     yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
-    for recording in RECORDINGS:
+    for recording in (*RECORDINGS, *ARMS):
         line = one(folder, recording)
         if line:
             yield line
@@ -203,7 +204,9 @@ def stored(file: Path, seed: int, splits: int, names: Sequence[str]) -> dict[str
 
 def judge_splits(arguments: argparse.Namespace) -> None:
     chosen = [
-        one for one in RECORDINGS if arguments.only in one.name and (arguments.data / one.folder).is_dir()
+        one
+        for one in (*RECORDINGS, *ARMS)
+        if arguments.only in one.name and (arguments.data / one.folder).is_dir()
     ]
     names = [one.name for one in chosen]
     before = None
