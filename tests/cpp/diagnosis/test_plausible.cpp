@@ -79,9 +79,9 @@ TEST_CASE("a bend over 40 degrees of travel is no harmonic with an amplitude bey
     CAPTURE(seed);
     for (const truing::AppliedEffect& effect : d.robot.effects) {
       const double most = truing::model::traits_of(effect.effect, {}).plausible;
-      for (const auto& [name, value] : effect.parameters) {
-        CAPTURE(name);
-        if (most > 0.0 && name.rfind("harmonic", 0) == 0) CHECK(std::abs(value) < 1.5 * most);
+      for (const auto& parameter : effect.parameters) {
+        CAPTURE(parameter.first);
+        if (most > 0.0 && parameter.first.rfind("harmonic", 0) == 0) CHECK(std::abs(parameter.second) < 1.5 * most);
       }
     }
   }

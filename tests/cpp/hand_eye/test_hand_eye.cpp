@@ -679,12 +679,13 @@ TEST_CASE("the same mistake on hand and board is recognised, as where one progra
       {"xyzw", as_xyzw}, {"zyx-as-xyz", as_xyz}, {"transposed", transposed}};
   for (const HandEyeSetup setup : kSetups)
     for (const Noise& noise : {Noise{}, kUsual})
-      for (const auto& [name, mistake] : mistakes) {
+      for (const auto& made : mistakes) {
         if (kSanitized && setup == HandEyeSetup::eye_in_hand) continue;
+        const std::string& name = made.first;
         CAPTURE(name);
         Scene s = make_scene(setup, 25, noise, 55, {1.2, 1.0, 2.0});
         for (Frames* frames : {&s.poses.T_base_hand, &s.poses.T_camera_board})
-          for (Eigen::Isometry3d& T : *frames) T.linear() = mistake(T.linear());
+          for (Eigen::Isometry3d& T : *frames) T.linear() = made.second(T.linear());
         HandEyeOptions o = options_for(s);
         const HandEyeResult refused = handeye(s.poses, o);
         REQUIRE(refused.status == HandEyeStatus::not_closing);
