@@ -35,6 +35,11 @@ namespace inverse_kinematics {
 using namespace math;
 using namespace model;
 }  // namespace inverse_kinematics
+namespace dynamics {
+using namespace math;
+using namespace model;
+using namespace estimation;
+}  // namespace dynamics
 namespace hand_eye {
 using namespace math;
 }

@@ -199,7 +199,7 @@ class Joint:
     the corrected motions of the joints in `driven_by`, a mapping or pairs of name and weight (a palletizer's J4:
     {"J2": -1, "J3": -1}).
     """
-    def __init__(self, name: str, *, type: typing.Literal['revolute', 'prismatic'] = 'revolute', theta: typing.SupportsFloat | typing.SupportsIndex = 0.0, d: typing.SupportsFloat | typing.SupportsIndex = 0.0, a: typing.SupportsFloat | typing.SupportsIndex = 0.0, alpha: typing.SupportsFloat | typing.SupportsIndex = 0.0, beta: typing.SupportsFloat | typing.SupportsIndex = 0.0, T_parent_joint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, driven_by: collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex]] | dict[str, typing.SupportsFloat | typing.SupportsIndex] = [], lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., mass: typing.SupportsFloat | typing.SupportsIndex | None = None, center_of_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ...) -> None:
+    def __init__(self, name: str, *, type: typing.Literal['revolute', 'prismatic'] = 'revolute', theta: typing.SupportsFloat | typing.SupportsIndex = 0.0, d: typing.SupportsFloat | typing.SupportsIndex = 0.0, a: typing.SupportsFloat | typing.SupportsIndex = 0.0, alpha: typing.SupportsFloat | typing.SupportsIndex = 0.0, beta: typing.SupportsFloat | typing.SupportsIndex = 0.0, T_parent_joint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, driven_by: collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex]] | dict[str, typing.SupportsFloat | typing.SupportsIndex] = [], lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., mass: typing.SupportsFloat | typing.SupportsIndex | None = None, center_of_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., inertia: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None = None, rotor_inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0, torque_per_ampere: typing.SupportsFloat | typing.SupportsIndex | None = None, speed_limit: typing.SupportsFloat | typing.SupportsIndex = ..., torque_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -278,6 +278,15 @@ class Joint:
     def driven_by(self, arg1: collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex]] | dict[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
         ...
     @property
+    def inertia(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"] | None:
+        """
+        Shape=(3, 3) [kg m^2] of the link about its centre of mass, in the axes of the frame after the link,
+        if known.
+        """
+    @inertia.setter
+    def inertia(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None) -> None:
+        ...
+    @property
     def lower(self) -> float:
         """
         [rad | m] lower limit, -inf if there is none.
@@ -323,12 +332,44 @@ class Joint:
     def ratio(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def rotor_inertia(self) -> float:
+        """
+        [kg m^2 | kg] of the motor's rotor, as the joint feels it.
+        """
+    @rotor_inertia.setter
+    def rotor_inertia(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def speed_limit(self) -> float:
+        """
+        [rad/s | m/s] inf if there is none.
+        """
+    @speed_limit.setter
+    def speed_limit(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def theta(self) -> float:
         """
         [rad] the motion of a revolute joint adds to it.
         """
     @theta.setter
     def theta(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def torque_limit(self) -> float:
+        """
+        [Nm | N] inf if there is none.
+        """
+    @torque_limit.setter
+    def torque_limit(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def torque_per_ampere(self) -> float | None:
+        """
+        [Nm/A | N/A] at the joint, of the drive, if known.
+        """
+    @torque_per_ampere.setter
+    def torque_per_ampere(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
         ...
     @property
     def type(self) -> typing.Literal['revolute', 'prismatic']:
@@ -452,7 +493,7 @@ class Robot:
     `robot.joints[1].a = 0.3` and `robot.joint("J2").a = 0.3` change the robot. The number of joints and targets is fixed:
     `robot.replace(joints=...)` makes another robot.
     """
-    def __init__(self, name: str, *, joints: collections.abc.Sequence[Joint], targets: collections.abc.Sequence[Target] = ..., convention: typing.Literal['dh', 'mdh', 'urdf'] = 'dh', gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., T_measurement_base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., effects: collections.abc.Sequence[AppliedEffect] = [], anchor: Anchor | None = None, fitted_range: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}) -> None:
+    def __init__(self, name: str, *, joints: collections.abc.Sequence[Joint], targets: collections.abc.Sequence[Target] = ..., convention: typing.Literal['dh', 'mdh', 'urdf'] = 'dh', gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., T_measurement_base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., effects: collections.abc.Sequence[AppliedEffect] = [], anchor: Anchor | None = None, fitted_range: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, torque_effects: collections.abc.Sequence[AppliedEffect] = []) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -554,6 +595,15 @@ class Robot:
         """
         The targets, the tool first; what is set on them changes the robot.
         """
+    @property
+    def torque_effects(self) -> tuple[AppliedEffect, ...]:
+        """
+        Effects on the torques of the joints with their parameters, as in `torque_catalogue()`: friction
+        that the file states, and what `truing::dynamics` found.
+        """
+    @torque_effects.setter
+    def torque_effects(self, arg1: collections.abc.Sequence[AppliedEffect]) -> None:
+        ...
 class Measurements:
     """
     One row per measurement: n rows of joint readings, and what was measured there.

@@ -69,7 +69,9 @@ the corrected motions of the joints in `driven_by`, a mapping or pairs of name a
   cls.def(py::init([](std::string name, JointType type, double theta, double d, double a, double alpha, double beta,
                       const Eigen::Isometry3d& T_parent_joint, const Eigen::Vector3d& axis, double ratio, double offset,
                       const Drives& driven_by, double lower, double upper, std::optional<double> mass,
-                      const Eigen::Vector3d& center_of_mass) {
+                      const Eigen::Vector3d& center_of_mass, const std::optional<Eigen::Matrix3d>& inertia,
+                      double rotor_inertia, std::optional<double> torque_per_ampere, double speed_limit,
+                      double torque_limit) {
             return Joint{std::move(name),
                          type,
                          theta,
@@ -85,14 +87,21 @@ the corrected motions of the joints in `driven_by`, a mapping or pairs of name a
                          lower,
                          upper,
                          mass,
-                         center_of_mass};
+                         center_of_mass,
+                         inertia,
+                         rotor_inertia,
+                         torque_per_ampere,
+                         speed_limit,
+                         torque_limit};
           }),
           py::arg("name"), py::kw_only(), py::arg("type") = usual.type, py::arg("theta") = usual.theta,
           py::arg("d") = usual.d, py::arg("a") = usual.a, py::arg("alpha") = usual.alpha, py::arg("beta") = usual.beta,
           py::arg("T_parent_joint") = usual.T_parent_joint, py::arg("axis") = array_from(usual.axis),
           py::arg("ratio") = usual.ratio, py::arg("offset") = usual.offset, py::arg("driven_by") = Drivers{},
           py::arg("lower") = usual.lower, py::arg("upper") = usual.upper, py::arg("mass") = usual.mass,
-          py::arg("center_of_mass") = array_from(usual.center_of_mass));
+          py::arg("center_of_mass") = array_from(usual.center_of_mass), py::arg("inertia") = py::none(),
+          py::arg("rotor_inertia") = usual.rotor_inertia, py::arg("torque_per_ampere") = py::none(),
+          py::arg("speed_limit") = usual.speed_limit, py::arg("torque_limit") = usual.torque_limit);
   define_attributes(cls, {"driven_by"});
   cls.def_property(
       "driven_by", [](const Joint& j) { return tuple_of(j.driven_by); },
@@ -100,8 +109,27 @@ the corrected motions of the joints in `driven_by`, a mapping or pairs of name a
       "Pairs of driving joint and weight; empty: the joint has a reading. A mapping may be set.");
   cls.def_property_readonly("passive", &Joint::passive, "Whether other joints drive it.");
   cls.def("__repr__", [](const Joint& j) { return repr(j); });
-  define_value(cls, {"name", "type", "theta", "d", "a", "alpha", "beta", "T_parent_joint", "axis", "ratio", "offset",
-                     "driven_by", "lower", "upper", "mass", "center_of_mass"});
+  define_value(cls, {"name",
+                     "type",
+                     "theta",
+                     "d",
+                     "a",
+                     "alpha",
+                     "beta",
+                     "T_parent_joint",
+                     "axis",
+                     "ratio",
+                     "offset",
+                     "driven_by",
+                     "lower",
+                     "upper",
+                     "mass",
+                     "center_of_mass",
+                     "inertia",
+                     "rotor_inertia",
+                     "torque_per_ampere",
+                     "speed_limit",
+                     "torque_limit"});
 }
 
 void bind_target(py::module_& m) {
@@ -164,15 +192,18 @@ void bind_robot_class(py::module_& m) {
   cls.def(py::init([](std::string name, std::vector<Joint> joints, std::vector<Target> targets, Convention convention,
                       const Eigen::Vector3d& gravity, const Eigen::Isometry3d& T_measurement_base,
                       std::vector<AppliedEffect> effects, std::optional<Anchor> anchor,
-                      std::map<std::string, std::pair<double, double>> fitted_range) {
-            return Robot{std::move(name),    convention,         gravity, T_measurement_base,     std::move(joints),
-                         std::move(targets), std::move(effects), anchor,  std::move(fitted_range)};
+                      std::map<std::string, std::pair<double, double>> fitted_range,
+                      std::vector<AppliedEffect> torque_effects) {
+            return Robot{
+                std::move(name),    convention,         gravity, T_measurement_base,      std::move(joints),
+                std::move(targets), std::move(effects), anchor,  std::move(fitted_range), std::move(torque_effects)};
           }),
           py::arg("name"), py::kw_only(), py::arg("joints"),
           py::arg_v("targets", std::vector<Target>{Target{"tool"}}, "[Target('tool')]"),
           py::arg("convention") = usual.convention, py::arg("gravity") = array_from(usual.gravity),
           py::arg("T_measurement_base") = usual.T_measurement_base, py::arg("effects") = usual.effects,
-          py::arg("anchor") = usual.anchor, py::arg("fitted_range") = usual.fitted_range);
+          py::arg("anchor") = usual.anchor, py::arg("fitted_range") = usual.fitted_range,
+          py::arg("torque_effects") = usual.torque_effects);
   define_attributes(cls, {"joints", "targets"});
   cls.def_property_readonly(
       "joints", [](const py::object& self) { return tuple_of_references(self.cast<Robot&>().joints, self); },
@@ -193,7 +224,7 @@ void bind_robot_class(py::module_& m) {
       "there are.");
   cls.def("__repr__", [](const Robot& r) { return repr(r); });
   define_value(cls, {"name", "joints", "targets", "convention", "gravity", "T_measurement_base", "effects", "anchor",
-                     "fitted_range"});
+                     "fitted_range", "torque_effects"});
 }
 
 }  // namespace

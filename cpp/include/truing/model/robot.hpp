@@ -47,6 +47,12 @@ struct Joint {
   double upper = std::numeric_limits<double>::infinity();    ///< [rad | m] upper limit, inf if there is none
   std::optional<double> mass;                                ///< [kg] of the link that this joint moves, if known
   Eigen::Vector3d center_of_mass = Eigen::Vector3d::Zero();  ///< shape=(3,) [m] in the frame after the link
+  /// shape=(3, 3) [kg m^2] of the link about its centre of mass, in the axes of the frame after the link, if known
+  std::optional<Eigen::Matrix3d> inertia;
+  double rotor_inertia = 0.0;               ///< [kg m^2 | kg] of the motor's rotor, as the joint feels it
+  std::optional<double> torque_per_ampere;  ///< [Nm/A | N/A] at the joint, of the drive, if known
+  double speed_limit = std::numeric_limits<double>::infinity();   ///< [rad/s | m/s] inf if there is none
+  double torque_limit = std::numeric_limits<double>::infinity();  ///< [Nm | N] inf if there is none
 
   bool passive() const { return !driven_by.empty(); }
 };
@@ -85,6 +91,9 @@ struct Robot {
   /// Smallest and largest value of the inputs that the effects were fitted on: 'q1' … [rad | m], 'payload' [kg], 'temp'
   /// [deg C]. Beyond it nobody has seen what they do. Empty: not known.
   std::map<std::string, std::pair<double, double>> fitted_range;
+  /// Effects on the torques of the joints with their parameters, as in `torque_catalogue()`: friction that the file
+  /// states, and what `truing::dynamics` found.
+  std::vector<AppliedEffect> torque_effects;
 
   /// Number of joints that have a reading.
   std::size_t driven_count() const;

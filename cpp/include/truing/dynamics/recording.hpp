@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "truing/model/robot.hpp"
+
+namespace truing {
+
+/// A recording of motion: one file, one fold. Columns of the joints that have a reading, in chain order; a table that
+/// was not recorded has no columns, a joint that was not recorded is NaN throughout.
+struct Recording {
+  std::string name;                ///< of the file, in messages and results
+  Eigen::VectorXd time;            ///< shape=(n,) [s], increasing
+  Eigen::MatrixXd position;        ///< shape=(n, joints) [rad | m] as read
+  Eigen::MatrixXd speed;           ///< shape=(n, joints) [rad/s | m/s] as recorded, if it was
+  Eigen::MatrixXd torque;          ///< shape=(n, joints) [Nm | N] of the drives, measured, if it was
+  Eigen::MatrixXd current;         ///< shape=(n, joints) [A] of the drives, measured, if it was
+  Eigen::MatrixXd command;         ///< shape=(n, joints) [rad | m] positions commanded, if they were recorded
+  Eigen::MatrixXd speed_command;   ///< shape=(n, joints) [rad/s | m/s] speeds commanded, if they were recorded
+  Eigen::MatrixXd torque_command;  ///< shape=(n, joints) [Nm | N] torques commanded, if they were recorded
+  /// shape=(n,) each, by name: 'payload_kg', 'temp1_C' … or 'temp_C', 'volt_V', 'enabled', and one's own.
+  std::map<std::string, Eigen::VectorXd> columns;
+  bool test = false;  ///< held out: it is judged on, and never fitted to
+
+  std::size_t rows() const { return static_cast<std::size_t>(time.size()); }
+};
+
+/// Throws std::invalid_argument that names the recording, the column and the row: tables of another shape, times that
+/// do not increase, values that are not finite (but for joints that are NaN throughout), fewer than 20 rows.
+void validate(const Recording& recording, const Robot& robot);
+
+}  // namespace truing

@@ -1,0 +1,182 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/regressor.hpp"
+
+#include "math/rotation.hpp"
+#include "model/motion.hpp"
+
+namespace truing::dynamics {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+Isometry3d fixed_frame(const Robot& robot, Joint joint) {
+  Robot one;
+  one.convention = robot.convention;
+  joint.driven_by.clear();
+  joint.ratio = 1.0;
+  joint.offset = 0.0;
+  one.joints.push_back(std::move(joint));
+  return forward_kinematics(one, Eigen::VectorXd::Zero(1)).front();
+}
+
+Joint only_before(const Joint& joint) {
+  Joint before = joint;
+  before.theta = before.d = 0.0;
+  return before;
+}
+
+Joint only_after(const Joint& joint) {
+  Joint after = joint;
+  after.a = after.alpha = after.beta = 0.0;
+  return after;
+}
+
+/// Motion of one link, seen from the base: what Newton and Euler need.
+struct LinkMotion {
+  Matrix3d R = Matrix3d::Identity();
+  Vector3d origin = Vector3d::Zero();
+  Vector3d w = Vector3d::Zero();      ///< angular velocity
+  Vector3d alpha = Vector3d::Zero();  ///< angular acceleration
+  Vector3d a = Vector3d::Zero();      ///< acceleration of the origin, less gravity
+
+  Vector3d acceleration_at(const Vector3d& point) const {
+    const Vector3d r = point - origin;
+    return a + alpha.cross(r) + w.cross(w.cross(r));
+  }
+};
+
+}  // namespace
+
+LinkParameters link_parameters(const Joint& joint) {
+  const double m = joint.mass.value_or(0.0);
+  const Vector3d& c = joint.center_of_mass;
+  // Steiner: from the centre of mass to the origin of the frame.
+  const Matrix3d I =
+      joint.inertia.value_or(Matrix3d::Zero()) + m * (c.squaredNorm() * Matrix3d::Identity() - c * c.transpose());
+  LinkParameters out;
+  out << m, m * c, I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
+  return out;
+}
+
+void set_link_parameters(const LinkParameters& p, Joint* joint) {
+  joint->mass = p[0];
+  joint->center_of_mass = p[0] != 0.0 ? Vector3d(p.segment<3>(1) / p[0]) : Vector3d(Vector3d::Zero());
+  const Vector3d& c = joint->center_of_mass;
+  Matrix3d I;
+  I << p[4], p[7], p[8], p[7], p[5], p[9], p[8], p[9], p[6];
+  joint->inertia = I - p[0] * (c.squaredNorm() * Matrix3d::Identity() - c * c.transpose());
+}
+
+Eigen::VectorXd link_parameters(const Robot& robot) {
+  Eigen::VectorXd out(kLinkParameters * static_cast<Eigen::Index>(robot.joints.size()));
+  for (std::size_t i = 0; i < robot.joints.size(); ++i)
+    out.segment<kLinkParameters>(kLinkParameters * static_cast<Eigen::Index>(i)) = link_parameters(robot.joints[i]);
+  return out;
+}
+
+RigidChain::RigidChain(const Robot& robot) : gravity_(robot.gravity) {
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(driven.size()));
+  zero_ = joint_motions(robot, rest);
+  coupling_.resize(static_cast<Eigen::Index>(robot.joints.size()), rest.size());
+  for (Eigen::Index k = 0; k < rest.size(); ++k)
+    coupling_.col(k) = joint_motions(robot, Eigen::VectorXd::Unit(rest.size(), k)) - zero_;
+  for (const Joint& joint : robot.joints) {
+    Link link;
+    link.revolute = joint.type == JointType::revolute;
+    link.axis = robot.convention == Convention::urdf ? joint.axis : Vector3d(Vector3d::UnitZ());
+    // The motion about (along) z commutes with theta and d: all of a DH link comes after it, of a modified-DH link
+    // theta and d.
+    link.before = link.after = Isometry3d::Identity();
+    switch (robot.convention) {
+      case Convention::dh:
+        link.after = fixed_frame(robot, joint);
+        break;
+      case Convention::mdh:
+        link.before = fixed_frame(robot, only_before(joint));
+        link.after = fixed_frame(robot, only_after(joint));
+        break;
+      case Convention::urdf:
+        link.before = joint.T_parent_joint;
+        break;
+    }
+    links_.push_back(link);
+  }
+}
+
+void RigidChain::regressor(const double* q, const double* qd, const double* qdd, Eigen::Ref<Eigen::MatrixXd> Y) const {
+  Y.setZero();
+  const Eigen::Map<const Eigen::VectorXd> reading(q, driven()), speed(qd, driven()), acceleration(qdd, driven());
+  constexpr int kMostJoints = 200;
+  thread_local std::vector<Vector3d> axes(kMostJoints), points(kMostJoints);
+  LinkMotion link;
+  link.a = -gravity_;
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    const Link& fixed = links_[i];
+    const auto row = static_cast<Eigen::Index>(i);
+    const double motion = zero_[row] + coupling_.row(row).dot(reading);
+    const double rate = coupling_.row(row).dot(speed), rate_of_rate = coupling_.row(row).dot(acceleration);
+
+    // To the joint's frame, still part of the link before.
+    const Vector3d joint_origin = link.origin + link.R * fixed.before.translation();
+    link.a = link.acceleration_at(joint_origin);
+    link.R = link.R * fixed.before.linear();
+    const Vector3d z = link.R * fixed.axis;
+    // The joint (Luh, Walker and Paul 1980, eq. 1 to 3, seen from the base).
+    Vector3d origin = joint_origin;
+    if (fixed.revolute) {
+      link.alpha += z * rate_of_rate + link.w.cross(z) * rate;
+      link.w += z * rate;
+      link.R = link.R * Eigen::AngleAxisd(motion, fixed.axis).toRotationMatrix();
+    } else {
+      const Vector3d moved = joint_origin + z * motion;
+      const Vector3d r = moved - joint_origin;
+      link.a += link.alpha.cross(r) + link.w.cross(link.w.cross(r)) + z * rate_of_rate + 2.0 * link.w.cross(z) * rate;
+      origin = moved;
+    }
+    // To the frame after the link.
+    link.origin = origin;
+    const Vector3d end = origin + link.R * fixed.after.translation();
+    link.a = link.acceleration_at(end);
+    link.origin = end;
+    link.R = link.R * fixed.after.linear();
+    axes[i] = z;
+    points[i] = joint_origin;
+
+    // Force and moment about the frame's origin of every parameter of one (Atkeson, An and Hollerbach 1986, eq. 7).
+    Eigen::Matrix<double, 3, kLinkParameters> force = Eigen::Matrix<double, 3, kLinkParameters>::Zero(), moment = force;
+    force.col(0) = link.a;
+    const Matrix3d field = skew(link.alpha) + skew(link.w) * skew(link.w);
+    force.middleCols<3>(1) = field * link.R;
+    moment.middleCols<3>(1) = -skew(link.a) * link.R;
+    const Vector3d u = link.R.transpose() * link.alpha, w = link.R.transpose() * link.w;
+    Eigen::Matrix<double, 3, 6> inertial;
+    inertial << u.x(), -w.y() * w.z(), w.y() * w.z(), u.y() - w.x() * w.z(), u.z() + w.x() * w.y(),
+        w.y() * w.y() - w.z() * w.z(),  //
+        w.x() * w.z(), u.y(), -w.x() * w.z(), u.x() + w.y() * w.z(), w.z() * w.z() - w.x() * w.x(),
+        u.z() - w.x() * w.y(),  //
+        -w.x() * w.y(), w.x() * w.y(), u.z(), w.x() * w.x() - w.y() * w.y(), u.x() - w.y() * w.z(),
+        u.y() + w.x() * w.z();
+    moment.rightCols<6>() = link.R * inertial;
+
+    // What each joint below feels of it, and by which readings that joint moves.
+    for (std::size_t j = 0; j <= i; ++j) {
+      Eigen::Matrix<double, 1, kLinkParameters> felt;
+      if (links_[j].revolute) {
+        const Vector3d lever = (link.origin - points[j]);
+        felt = axes[j].transpose() * moment + axes[j].cross(lever).transpose() * force;
+      } else {
+        felt = axes[j].transpose() * force;
+      }
+      for (Eigen::Index k = 0; k < driven(); ++k) {
+        const double by = coupling_(static_cast<Eigen::Index>(j), k);
+        if (by != 0.0) Y.block<1, kLinkParameters>(k, kLinkParameters * row) += by * felt;
+      }
+    }
+  }
+}
+
+}  // namespace truing::dynamics
