@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'torque_regressor', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -6638,6 +6638,13 @@ def large_boom_modes() -> tuple[FlexibleMode, ...]:
     """
     Four modes from 0.6 to 6 Hz: lateral, vertical, lateral, vertical.
     """
+def link_parameters(robot: Robot) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    Inertial parameters of all links, one after the other, shape=(10 * joints,).
+    
+    Of a link: mass, mass times centre of mass (x, y, z), inertia about the origin of the frame after the link (xx, yy, zz,
+    xy, xz, yz) [kg, kg m, kg m^2]; what is not known is zero.
+    """
 def nearest_contact(scene: Scene, robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], target: typing.SupportsInt | typing.SupportsIndex = 0) -> Contact:
     """
     The nearest pair at these readings, effects left out; without names when there is none to look at.
@@ -6711,6 +6718,14 @@ def rpy_from_rotation(rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.f
 def simulate_streams(robot: Robot, options: StreamSimulationOptions | None = None) -> SimulatedStreams:
     """
     Streams of an arm that sways, with known truth; shares no equation with the filter. Raises InputError on options that make no sense.
+    """
+def torque_regressor(robot: Robot, q: numpy.typing.ArrayLike, qd: numpy.typing.ArrayLike, qdd: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Y of tau = Y pi, shape=(n, driven joints, 10 * joints): torques against inertia and gravity, linear in
+    `link_parameters`.
+    
+    q, qd, qdd: shape=(n, driven joints), readings, their speeds and accelerations [rad | m, s]. Rotors are no part of it.
+    Raises InputError: a robot that cannot be used, another shape, values that are not finite.
     """
 def urdf_with_calibration(urdf_text: str, calibrated: Robot, base_link: str = '', tip_link: str = '') -> str:
     """

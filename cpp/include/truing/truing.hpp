@@ -5,6 +5,7 @@
 
 #include "truing/compensate.hpp"
 #include "truing/diagnose.hpp"
+#include "truing/dynamics/regressor.hpp"
 #include "truing/handeye.hpp"
 #include "truing/identify.hpp"
 #include "truing/inverse.hpp"

@@ -2,7 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/regressor.hpp"
 
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
 #include "math/rotation.hpp"
+#include "math/text.hpp"
 #include "model/motion.hpp"
 
 namespace truing::dynamics {
@@ -48,6 +54,23 @@ struct LinkMotion {
   }
 };
 
+void require_table(const char* name, const Eigen::MatrixXd& table, Eigen::Index rows, Eigen::Index joints) {
+  const auto shape = [](Eigen::Index r, Eigen::Index c) {
+    return "(" + std::to_string(r) + ", " + std::to_string(c) + ")";
+  };
+  if (table.rows() != rows || table.cols() != joints)
+    throw std::invalid_argument(std::string(name) + " has shape " + shape(table.rows(), table.cols()) + ", expected " +
+                                shape(rows, joints) +
+                                ": a row for each sample, a column for each joint with a reading");
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      if (!std::isfinite(table(i, j)))
+        throw std::invalid_argument(std::string(name) + ", row " + std::to_string(i + 1) + ", joint " +
+                                    std::to_string(j + 1) + ": " + number(table(i, j)) + ", expected a finite number");
+    }
+  }
+}
+
 }  // namespace
 
 LinkParameters link_parameters(const Joint& joint) {
@@ -62,6 +85,10 @@ LinkParameters link_parameters(const Joint& joint) {
 }
 
 void set_link_parameters(const LinkParameters& p, Joint* joint) {
+  if (p[0] == 0.0 && !p.segment<3>(1).isZero(0.0))
+    throw std::invalid_argument("joint '" + joint->name + "': mass 0 kg with a first moment of " +
+                                number(p.segment<3>(1).norm()) +
+                                " kg m has no centre of mass; expected a mass that is not zero");
   joint->mass = p[0];
   joint->center_of_mass = p[0] != 0.0 ? Vector3d(p.segment<3>(1) / p[0]) : Vector3d(Vector3d::Zero());
   const Vector3d& c = joint->center_of_mass;
@@ -81,9 +108,12 @@ RigidChain::RigidChain(const Robot& robot) : gravity_(robot.gravity) {
   const std::vector<std::size_t> driven = robot.driven_joints();
   const Eigen::VectorXd rest = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(driven.size()));
   zero_ = joint_motions(robot, rest);
-  coupling_.resize(static_cast<Eigen::Index>(robot.joints.size()), rest.size());
-  for (Eigen::Index k = 0; k < rest.size(); ++k)
-    coupling_.col(k) = joint_motions(robot, Eigen::VectorXd::Unit(rest.size(), k)) - zero_;
+  const Eigen::MatrixXd following = coupling_matrix(robot);
+  coupling_.resize(following.rows(), rest.size());
+  for (Eigen::Index k = 0; k < rest.size(); ++k) {
+    const std::size_t joint = driven[static_cast<std::size_t>(k)];
+    coupling_.col(k) = robot.joints[joint].ratio * following.col(static_cast<Eigen::Index>(joint));
+  }
   for (const Joint& joint : robot.joints) {
     Link link;
     link.revolute = joint.type == JointType::revolute;
@@ -177,6 +207,27 @@ void RigidChain::regressor(const double* q, const double* qd, const double* qdd,
       }
     }
   }
+}
+
+Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> torque_regressor(const Robot& robot,
+                                                                                        const Eigen::MatrixXd& q,
+                                                                                        const Eigen::MatrixXd& qd,
+                                                                                        const Eigen::MatrixXd& qdd) {
+  validate(robot);
+  const RigidChain chain(robot);
+  const Eigen::Index joints = chain.driven();
+  require_table("q", q, q.rows(), joints);
+  require_table("qd", qd, q.rows(), joints);
+  require_table("qdd", qdd, q.rows(), joints);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> out(q.rows() * joints,
+                                                                             kLinkParameters * chain.links());
+  Eigen::MatrixXd Y(joints, out.cols());
+  for (Eigen::Index i = 0; i < q.rows(); ++i) {
+    const Eigen::VectorXd a = q.row(i), b = qd.row(i), c = qdd.row(i);
+    chain.regressor(a.data(), b.data(), c.data(), Y);
+    out.middleRows(i * joints, joints) = Y;
+  }
+  return out;
 }
 
 }  // namespace truing::dynamics

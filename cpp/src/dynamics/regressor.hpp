@@ -2,29 +2,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Torques of the rigid chain, linear in the links' inertial parameters: tau = Y(q, qd, qdd) pi (Atkeson, An and
-// Hollerbach 1986).
+// The chain that the torque regressor runs over, compiled once.
 
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "rooms.hpp"
+#include "truing/dynamics/regressor.hpp"
 #include "truing/model/robot.hpp"
 
 namespace truing::dynamics {
-
-/// Of a link: mass, mass times centre of mass (3), inertia about the origin of the frame after the link (xx, yy, zz,
-/// xy, xz, yz), in that frame's axes.
-constexpr Eigen::Index kLinkParameters = 10;
-using LinkParameters = Eigen::Matrix<double, kLinkParameters, 1>;
-
-/// Of a joint's link as the robot has it; what is not known is zero.
-LinkParameters link_parameters(const Joint& joint);
-/// The other way: sets mass, centre of mass and inertia.
-void set_link_parameters(const LinkParameters& parameters, Joint* joint);
-/// Of all links one after the other: shape=(10 * joints,).
-Eigen::VectorXd link_parameters(const Robot& robot);
 
 /// What of a robot the regressor needs, made once.
 class RigidChain {

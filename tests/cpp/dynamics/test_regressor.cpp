@@ -1,0 +1,183 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/regressor.hpp"
+
+#include <stdexcept>
+
+#include <doctest/doctest.h>
+
+#include "support/newton_euler.hpp"
+
+namespace {
+
+using namespace rigid;
+using truing::dynamics::kLinkParameters;
+using truing::dynamics::link_parameters;
+using truing::dynamics::LinkParameters;
+using truing::dynamics::RigidChain;
+using truing::dynamics::set_link_parameters;
+
+/// Every convention, rails, passive joints, ratios and offsets, gravity askew.
+std::vector<Robot> robots() {
+  std::vector<Robot> out = {arms::palletizer(), arms::ur10(), arms::rail_arm(), arms::urdf_arm()};
+  std::mt19937_64 random(3);
+  for (Robot& robot : out) give_inertias(&robot, &random);
+  for (const Convention convention : {Convention::dh, Convention::mdh, Convention::urdf}) {
+    for (const unsigned seed : {1u, 2u}) out.push_back(linked_arm(convention, seed));
+  }
+  return out;
+}
+
+struct State {
+  VectorXd q, qd, qdd;
+};
+
+State random_state(const Robot& robot, std::mt19937_64* random) {
+  const auto n = static_cast<Index>(robot.driven_count());
+  return {random_vector(n, 3.0, random), random_vector(n, 2.0, random), random_vector(n, 5.0, random)};
+}
+
+MatrixXd regressor(const RigidChain& chain, const State& s) {
+  MatrixXd Y = MatrixXd::Constant(chain.driven(), kLinkParameters * chain.links(), 7.0);  // all of it is written
+  chain.regressor(s.q.data(), s.qd.data(), s.qdd.data(), Y);
+  return Y;
+}
+
+VectorXd torque(const Robot& robot, const State& s) { return regressor(RigidChain(robot), s) * link_parameters(robot); }
+
+double relative(const VectorXd& found, const VectorXd& expected) {
+  return (found - expected).cwiseAbs().maxCoeff() / expected.cwiseAbs().maxCoeff();
+}
+
+}  // namespace
+
+TEST_CASE("torques of the regressor are those of the Newton-Euler recursion") {
+  std::mt19937_64 random(11);
+  for (const Robot& robot : robots()) {
+    CAPTURE(robot.name);
+    CAPTURE(static_cast<int>(robot.convention));
+    for (int k = 0; k < 20; ++k) {
+      const State s = random_state(robot, &random);
+      CHECK(relative(torque(robot, s), newton_euler(robot, s.q, s.qd, s.qdd)) < 1e-12);
+    }
+  }
+}
+
+TEST_CASE("torques of the regressor follow from the energy alone") {
+  std::mt19937_64 random(12);
+  for (const Robot& robot : robots()) {
+    CAPTURE(robot.name);
+    CAPTURE(static_cast<int>(robot.convention));
+    for (int k = 0; k < 3; ++k) {
+      const State s = random_state(robot, &random);
+      CHECK(relative(torque(robot, s), lagrange(robot, s.q, s.qd, s.qdd)) < 1e-6);
+    }
+  }
+}
+
+TEST_CASE("every column of the regressor is the torque of a parameter of one") {
+  std::mt19937_64 random(13);
+  const Robot robot = linked_arm(Convention::mdh, 5);
+  const State s = random_state(robot, &random);
+  const MatrixXd Y = regressor(RigidChain(robot), s);
+  const VectorXd before = newton_euler(robot, s.q, s.qd, s.qdd);
+  for (Index link = 0; link < Y.cols() / kLinkParameters; ++link) {
+    for (Index k = 0; k < kLinkParameters; ++k) {
+      CAPTURE(link);
+      CAPTURE(k);
+      Robot other = robot;
+      Joint* joint = &other.joints[static_cast<std::size_t>(link)];
+      set_link_parameters(link_parameters(*joint) + LinkParameters::Unit(k), joint);
+      const VectorXd change = newton_euler(other, s.q, s.qd, s.qdd) - before;
+      CHECK((change - Y.col(kLinkParameters * link + k)).cwiseAbs().maxCoeff() < 1e-11 * before.cwiseAbs().maxCoeff());
+    }
+  }
+}
+
+TEST_CASE("the regressor does not depend on the inertias, nor on where the base stands in the measurement frame") {
+  std::mt19937_64 random(14);
+  Robot robot = linked_arm(Convention::dh, 6);
+  const State s = random_state(robot, &random);
+  const MatrixXd Y = regressor(RigidChain(robot), s);
+  robot.T_measurement_base = truing::frame_from_xyz_rpy({-3.0, 1.0, 8.0}, {1.0, 2.0, -0.5});
+  robot.targets = {{"tool", truing::frame_from_xyz_rpy({0.1, 0.2, 0.3}, {0.1, 0.2, 0.3})}};
+  for (Joint& joint : robot.joints) {
+    joint.mass.reset();
+    joint.inertia.reset();
+  }
+  CHECK(regressor(RigidChain(robot), s) == Y);
+}
+
+TEST_CASE("a base that is accelerated upwards is heavier") {
+  std::mt19937_64 random(15);
+  // A rail of steel under the whole arm, along the vertical, that weighs nothing.
+  const Robot robot = arms::ur10();
+  Robot lifted = robot;
+  Joint lift = arms::joint("lift", 0, 0, 0, 0);
+  lift.type = JointType::prismatic;
+  lifted.joints.insert(lifted.joints.begin(), lift);
+  Robot heavier = robot;
+  heavier.gravity.z() -= 3.0;
+  const State s = random_state(robot, &random);
+  State up;
+  up.q = (VectorXd(7) << 0.4, s.q).finished();
+  up.qd = (VectorXd(7) << 1.7, s.qd).finished();  // a constant speed is not felt
+  up.qdd = (VectorXd(7) << 3.0, s.qdd).finished();
+  CHECK(relative(torque(lifted, up).tail(6), torque(heavier, s)) < 1e-13);
+}
+
+TEST_CASE("without gravity the power of the torques is the change of the kinetic energy") {
+  std::mt19937_64 random(16);
+  for (Robot robot : robots()) {
+    robot.gravity.setZero();
+    const State s = random_state(robot, &random);
+    const auto kinetic = [&](double t) {
+      return lagrangian(robot, s.q + t * s.qd + 0.5 * t * t * s.qdd, s.qd + t * s.qdd);
+    };
+    const VectorXd found = torque(robot, s);
+    CHECK(std::abs(found.dot(s.qd) - derivative(kinetic, 3e-3)) < 1e-6 * found.norm() * s.qd.norm());
+  }
+}
+
+TEST_CASE("a joint feels the links behind it alone") {
+  std::mt19937_64 random(17);
+  const Robot robot = arms::ur10();
+  const MatrixXd Y = regressor(RigidChain(robot), random_state(robot, &random));
+  for (Index joint = 0; joint < 6; ++joint) {
+    CHECK(Y.row(joint).head(kLinkParameters * joint).isZero(0.0));
+    CHECK(Y.row(joint).segment(kLinkParameters * joint, kLinkParameters).norm() > 0.1);
+  }
+}
+
+TEST_CASE("set_link_parameters is the inverse of link_parameters") {
+  const Robot robot = linked_arm(Convention::dh, 7);
+  for (const Joint& joint : robot.joints) {
+    Joint other;
+    set_link_parameters(link_parameters(joint), &other);
+    CHECK(*other.mass == doctest::Approx(*joint.mass));
+    CHECK((other.center_of_mass - joint.center_of_mass).norm() < 1e-14);
+    CHECK((*other.inertia - *joint.inertia).norm() < 1e-13);
+    CHECK((link_parameters(other) - link_parameters(joint)).norm() < 1e-13);
+  }
+  // A rotor: inertia, and a mass that is counted elsewhere.
+  Joint rotor;
+  const LinkParameters turning = (LinkParameters() << 0, 0, 0, 0, 1, 2, 3, 0.1, 0.2, 0.3).finished();
+  set_link_parameters(turning, &rotor);
+  CHECK(link_parameters(rotor) == turning);
+}
+
+TEST_CASE("a first moment without a mass is refused: no link has it") {
+  Joint joint;
+  LinkParameters parameters = LinkParameters::Zero();
+  parameters[2] = 0.5;
+  CHECK_THROWS_WITH_AS(set_link_parameters(parameters, &joint), doctest::Contains("mass"), std::invalid_argument);
+}
+
+TEST_CASE("what is not known of a link counts as zero") {
+  Joint joint;
+  CHECK(link_parameters(joint).isZero(0.0));
+  joint.mass = 2.0;
+  joint.center_of_mass = {0.0, 0.0, 3.0};
+  const LinkParameters expected = (LinkParameters() << 2, 0, 0, 6, 18, 18, 0, 0, 0, 0).finished();
+  CHECK(link_parameters(joint) == expected);
+}
