@@ -23,6 +23,7 @@ ROOMS = {
     "planning": {"math", "kernel", "model", "estimation"},
     "diagnosis": {"math", "kernel", "model", "estimation"},
     "inverse_kinematics": {"math", "model"},
+    "dynamics": {"math", "kernel", "model", "estimation"},
     "hand_eye": {"math"},
     "tracking": {"math"},
 }
@@ -45,6 +46,7 @@ PUBLIC_OF = {
         "truing/inverse.hpp",
         "truing/compensate.hpp",
     ),
+    "dynamics": (*COMMON, MODEL, "truing/dynamics/"),
     "hand_eye": (*COMMON, MODEL, "truing/identify.hpp", "truing/handeye.hpp"),
     "tracking": (
         *COMMON,
@@ -99,7 +101,8 @@ def room_of(file: str) -> str:
         return "math"
     if file.startswith(MODEL):
         return "model"
-    return "tracking" if file.startswith("truing/tracking/") else ROOM_OF_PUBLIC[file]
+    folder = file.split("/")[1]
+    return folder if folder in ROOMS else ROOM_OF_PUBLIC[file]
 
 
 def includes(path: Path) -> Iterator[tuple[str, str]]:
