@@ -27,6 +27,9 @@ struct Motion {
   Eigen::MatrixXd qd;      ///< shape=(rows, joints) [rad/s | m/s]
   Eigen::MatrixXd qdd;     ///< shape=(rows, joints) [rad/s^2 | m/s^2]
   Eigen::MatrixXd torque;  ///< shape=(rows, joints) [Nm | N] that the model predicts in all, friction included
+  /// Of every joint, shape=(rows, 10 * links) each: torque for an inertial parameter of one (mass, first moments, xx yy zz
+  /// xy xz yz about the origin of the frame after the link), link after link.
+  std::vector<Eigen::MatrixXd> rigid;
   /// shape=(rows,) each: the further columns of the recording.
   std::map<std::string, Eigen::VectorXd> columns;
 
@@ -90,6 +93,9 @@ struct TorqueEffect {
   std::function<std::vector<TorqueForm>(const Robot& robot, std::size_t joint, const MotionRange& range)> forms;
   bool per_joint = true;  ///< false: `forms` is called once, with joint 0
   TorqueTraits traits{};
+  /// The form with these constants (by full name, as in TorqueTerm::constants). None: the effect's forms have none.
+  std::function<TorqueForm(const Robot& robot, std::size_t joint, const std::map<std::string, double>& constants)>
+      form_with{};
 };
 
 /// The effects that truing knows by name; docs/reference/torque_effects.md has their laws.
