@@ -1,0 +1,46 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The families of effects on torques; each file is one.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "rooms.hpp"
+#include "truing/dynamics/effect.hpp"
+
+namespace truing::dynamics {
+
+std::vector<TorqueEffect> friction_effects();
+std::vector<TorqueEffect> inertia_effects();
+std::vector<TorqueEffect> drive_effects();
+std::vector<TorqueEffect> transmission_effects();
+std::vector<TorqueEffect> thermal_effects();
+
+// --- what the families share ------------------------------------------------------------------------------------------
+
+/// The name of a joint that has a reading, by its number among those.
+const std::string& driven_name(const Robot& robot, std::size_t joint);
+bool is_revolute(const Robot& robot, std::size_t joint);
+/// "Nm" or "N".
+std::string torque_unit(const Robot& robot, std::size_t joint);
+/// "rad" or "m".
+std::string angle_unit(const Robot& robot, std::size_t joint);
+
+/// -1 … 1: the sign of a speed beyond the noise of speeds.
+Eigen::ArrayXd sign_of(const Eigen::VectorXd& speed);
+
+/// One column of one joint's torque.
+using Column = std::function<Eigen::ArrayXd(const Motion&)>;
+TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, double prior, Column column,
+                   bool needs_torque = false);
+
+/// "coulomb.J2"
+std::string parameter_name(const char* effect, const Robot& robot, std::size_t joint, const char* part = nullptr);
+
+/// The value of a constant by its full name; throws std::invalid_argument: it is not there.
+double constant_of(const std::map<std::string, double>& constants, const std::string& name);
+
+}  // namespace truing::dynamics

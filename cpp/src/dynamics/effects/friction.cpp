@@ -1,0 +1,207 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Friction in joints and gears.
+
+#include <cmath>
+
+#include "dynamics/effects/families.hpp"
+#include "dynamics/prepare.hpp"
+
+namespace truing::dynamics {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+
+/// Of a joint's torque's standard deviation, what friction may well be.
+double torque_prior(const MotionRange& range, std::size_t joint) {
+  return std::max(range.torque[static_cast<Index>(joint)], 1e-3);
+}
+double per_speed(const MotionRange& range, std::size_t joint) {
+  return torque_prior(range, joint) / std::max(range.speed[static_cast<Index>(joint)], kSpeedAtRest);
+}
+
+ArrayXd speed(const Motion& motion, std::size_t joint) { return motion.qd.col(static_cast<Index>(joint)); }
+ArrayXd direction(const Motion& motion, std::size_t joint) { return sign_of(motion.qd.col(static_cast<Index>(joint))); }
+
+std::vector<TorqueForm> coulomb(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  return {{term_at(joint, parameter_name("coulomb", robot, joint), torque_unit(robot, joint),
+                   torque_prior(range, joint), [joint](const Motion& m) { return direction(m, joint); })}};
+}
+
+std::vector<TorqueForm> viscous(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  return {{term_at(joint, parameter_name("viscous", robot, joint), torque_unit(robot, joint) + " s/" +
+                                                                     angle_unit(robot, joint),
+                   per_speed(range, joint), [joint](const Motion& m) { return speed(m, joint); })}};
+}
+
+// --- laws of the speed beside Coulomb's and the linear one -------------------------------------------------------------
+
+const char* const kLaw = "viscous_law";
+
+TorqueForm saturating_with(const Robot& robot, std::size_t joint, double v0, double prior) {
+  TorqueTerm term =
+      term_at(joint, parameter_name(kLaw, robot, joint, "saturating"), torque_unit(robot, joint), prior,
+              [joint, v0](const Motion& m) -> ArrayXd { return (speed(m, joint) / v0).tanh(); });
+  term.constants[parameter_name(kLaw, robot, joint, "v0")] = v0;
+  return {term};
+}
+
+std::vector<TorqueForm> viscous_law(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  const double torque = torque_prior(range, joint);
+  const double fastest = std::max(range.speed[static_cast<Index>(joint)], kSpeedAtRest);
+  const std::string unit = torque_unit(robot, joint), angle = angle_unit(robot, joint);
+  std::vector<TorqueForm> out;
+  out.push_back({term_at(joint, parameter_name(kLaw, robot, joint, "quadratic"), unit + " s^2/" + angle + "^2",
+                         torque / (fastest * fastest),
+                         [joint](const Motion& m) -> ArrayXd { return speed(m, joint) * speed(m, joint).abs(); })});
+  out.push_back({term_at(joint, parameter_name(kLaw, robot, joint, "cubic"), unit + " s^3/" + angle + "^3",
+                         torque / std::pow(fastest, 3.0),
+                         [joint](const Motion& m) -> ArrayXd { return speed(m, joint).cube(); })});
+  out.push_back({term_at(joint, parameter_name(kLaw, robot, joint, "root"), unit + " (s/" + angle + ")^0.5",
+                         torque / std::sqrt(fastest), [joint](const Motion& m) -> ArrayXd {
+                           return direction(m, joint) * speed(m, joint).abs().sqrt();
+                         })});
+  for (const double part : {0.05, 0.15, 0.4}) out.push_back(saturating_with(robot, joint, part * fastest, torque));
+  return out;
+}
+
+TorqueForm viscous_law_with(const Robot& robot, std::size_t joint, const std::map<std::string, double>& constants) {
+  return saturating_with(robot, joint, constant_of(constants, parameter_name(kLaw, robot, joint, "v0")), 1.0);
+}
+
+// --- Stribeck 1902: friction falls from stiction to Coulomb's as the joint gets faster ---------------------------------
+
+TorqueForm stribeck_at(const Robot& robot, std::size_t joint, double vs, double prior) {
+  TorqueTerm term = term_at(joint, parameter_name("stribeck", robot, joint), torque_unit(robot, joint), prior,
+                            [joint, vs](const Motion& m) -> ArrayXd {
+                              return direction(m, joint) * (-(speed(m, joint) / vs).square()).exp();
+                            });
+  term.constants[parameter_name("stribeck", robot, joint, "vs")] = vs;
+  return {term};
+}
+
+std::vector<TorqueForm> stribeck(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  std::vector<TorqueForm> out;
+  for (const double vs : {0.02, 0.05, 0.12, 0.3}) {
+    if (vs < 0.5 * range.speed[static_cast<Index>(joint)])
+      out.push_back(stribeck_at(robot, joint, vs, torque_prior(range, joint)));
+  }
+  if (out.empty()) throw Unsuited("the joint is too slow to leave the range of stiction");
+  return out;
+}
+
+TorqueForm stribeck_with(const Robot& robot, std::size_t joint, const std::map<std::string, double>& constants) {
+  return stribeck_at(robot, joint, constant_of(constants, parameter_name("stribeck", robot, joint, "vs")), 1.0);
+}
+
+// --- presliding: the stop operator of the travelled angle (Prandtl 1928): friction builds up over x0 after a reversal --
+
+TorqueForm presliding_at(const Robot& robot, std::size_t joint, double x0, double prior) {
+  TorqueTerm term = term_at(joint, parameter_name("presliding", robot, joint), torque_unit(robot, joint), prior,
+                            [joint, x0](const Motion& m) {
+                              const auto q = m.q.col(static_cast<Index>(joint));
+                              ArrayXd out(m.rows());
+                              double z = 0.0;
+                              for (Index i = 0; i < m.rows(); ++i) {
+                                if (i > 0) z = std::clamp(z + (q[i] - q[i - 1]) / x0, -1.0, 1.0);
+                                out[i] = z;
+                              }
+                              return out;
+                            });
+  term.constants[parameter_name("presliding", robot, joint, "x0")] = x0;
+  return {term};
+}
+
+std::vector<TorqueForm> presliding(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  std::vector<TorqueForm> out;
+  const double travel = range.upper[static_cast<Index>(joint)] - range.lower[static_cast<Index>(joint)];
+  for (const double x0 : {2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 3e-2}) {
+    if (x0 < 0.1 * travel) out.push_back(presliding_at(robot, joint, x0, torque_prior(range, joint)));
+  }
+  if (out.empty()) throw Unsuited("the joint travels too little");
+  return out;
+}
+
+TorqueForm presliding_with(const Robot& robot, std::size_t joint, const std::map<std::string, double>& constants) {
+  return presliding_at(robot, joint, constant_of(constants, parameter_name("presliding", robot, joint, "x0")), 1.0);
+}
+
+// --- friction that is not a function of the speed alone ----------------------------------------------------------------
+
+std::vector<TorqueForm> asymmetric(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  return {{term_at(joint, parameter_name("asymmetric_friction", robot, joint),
+                   torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(range, joint),
+                   [joint](const Motion& m) -> ArrayXd { return speed(m, joint).abs(); })}};
+}
+
+// Gears lose a part of what they carry (Hamon, Gautier and Garrec 2011).
+std::vector<TorqueForm> load_friction(const Robot& robot, std::size_t joint, const MotionRange&) {
+  return {{term_at(
+      joint, parameter_name("load_friction", robot, joint), "-", 0.3,
+      [joint](const Motion& m) -> ArrayXd {
+        return direction(m, joint) * m.torque.col(static_cast<Index>(joint)).array().abs();
+      },
+      true)}};
+}
+
+std::vector<TorqueForm> position_friction(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  if (!is_revolute(robot, joint)) throw Unsuited("a prismatic joint does not turn");
+  const double prior = 0.3 * torque_prior(range, joint);
+  const auto angle = [joint](const Motion& m) -> ArrayXd { return m.q.col(static_cast<Index>(joint)); };
+  return {{term_at(joint, parameter_name("position_friction", robot, joint, "sin"), "Nm", prior,
+                   [=](const Motion& m) -> ArrayXd { return direction(m, joint) * angle(m).sin(); }),
+           term_at(joint, parameter_name("position_friction", robot, joint, "cos"), "Nm", prior,
+                   [=](const Motion& m) -> ArrayXd { return direction(m, joint) * angle(m).cos(); })}};
+}
+
+TorqueTraits traits(const char* plain, SimulatorPlace mujoco, SimulatorPlace urdf, EffectDocumentation documentation) {
+  TorqueTraits out;
+  out.family = TorqueFamily::friction;
+  out.mujoco = mujoco;
+  out.urdf = urdf;
+  out.plain = plain;
+  out.documentation = std::move(documentation);
+  return out;
+}
+
+}  // namespace
+
+std::vector<TorqueEffect> friction_effects() {
+  using Place = SimulatorPlace;
+  std::vector<TorqueEffect> out;
+  out.push_back({"coulomb", "friction of one size, against the motion", coulomb, true,
+                 traits("dry friction", Place::field, Place::field,
+                        {"s = tanh(qd / 0.01)", "`coulomb.J2` [Nm]", "motion both ways"})});
+  out.push_back({"viscous", "friction that grows with the speed", viscous, true,
+                 traits("viscous friction", Place::field, Place::field, {"qd", "`viscous.J2` [Nm s/rad]", "speed"})});
+  for (TorqueEffect& effect : out) effect.traits.standard = true;
+  out.push_back({"viscous_law", "friction that grows faster, or slower, than the speed", viscous_law, true,
+                 traits("friction that is not linear in the speed", Place::field, Place::none,
+                        {"qd abs(qd); or qd^3; or s sqrt(abs(qd)); or tanh(qd / v0)",
+                         "`viscous_law.J2.quadratic`, `.cubic`, `.root` or `.saturating` with `.v0` [rad/s]",
+                         "slow and fast motion"}),
+                 viscous_law_with});
+  out.push_back({"stribeck", "friction that falls from stiction as the joint gets faster", stribeck, true,
+                 traits("stiction that fades with speed", Place::extra_element, Place::none,
+                        {"s exp(-(qd / vs)^2)", "`stribeck.J2` [Nm], `.vs` [rad/s]", "slow and fast motion"}),
+                 stribeck_with});
+  out.push_back({"presliding", "friction that builds up over a small angle after a reversal", presliding, true,
+                 traits("friction that builds up after a reversal", Place::extra_element, Place::none,
+                        {"z <- clip(z + dq / x0, -1, 1)", "`presliding.J2` [Nm], `.x0` [rad]", "reversals"}),
+                 presliding_with});
+  out.push_back({"asymmetric_friction", "friction that differs between the directions", asymmetric, true,
+                 traits("friction that differs between the directions", Place::callback, Place::none,
+                        {"abs(qd)", "`asymmetric_friction.J2` [Nm s/rad]", "motion both ways"})});
+  out.push_back({"load_friction", "friction that grows with the load that the gear carries", load_friction, true,
+                 traits("friction that grows with the load", Place::callback, Place::none,
+                        {"s abs(tau), tau the whole torque that the model predicts", "`load_friction.J2` [-]",
+                         "two loads, or gravity that changes"})});
+  out.push_back({"position_friction", "friction that changes over a turn of the joint", position_friction, true,
+                 traits("friction that changes with the joint's angle", Place::callback, Place::none,
+                        {"s sin q, s cos q", "`position_friction.J2.sin`, `.cos` [Nm]", "a wide range of angles"})});
+  return out;
+}
+
+}  // namespace truing::dynamics

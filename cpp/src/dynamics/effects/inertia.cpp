@@ -1,0 +1,115 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Masses: links, rotors, payload.
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/effects/families.hpp"
+#include "dynamics/regressor.hpp"
+
+namespace truing::dynamics {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr const char* kParts[kLinkParameters] = {"m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz"};
+
+/// A column of the rigid chain, at all joints with a reading.
+TorqueTerm rigid_term(const Robot& robot, std::string parameter, int part, std::size_t link, double prior) {
+  TorqueTerm term;
+  term.parameter = std::move(parameter);
+  term.unit = part == 0 ? "kg" : part < 4 ? "kg m" : "kg m^2";
+  for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
+  term.prior = prior;
+  const Index column = kLinkParameters * static_cast<Index>(link) + part;
+  term.basis = [column](const Motion& m) {
+    MatrixXd out(m.rows(), static_cast<Index>(m.rigid.size()));
+    for (std::size_t j = 0; j < m.rigid.size(); ++j) out.col(static_cast<Index>(j)) = m.rigid[j].col(column);
+    return out;
+  };
+  return term;
+}
+
+/// [m] what the robot would reach if it were one long line.
+double stretched(const Robot& robot) {
+  double length = 0.0;
+  for (const Joint& joint : robot.joints)
+    length += std::hypot(joint.a, joint.d) + joint.T_parent_joint.translation().norm();
+  return std::max(length, 0.1);
+}
+
+/// Sizes by which a link may differ from its file: of its own mass or of a usual one, over a link's length.
+struct Size {
+  double mass = 1.0, length = 0.2;
+  double of(int part) const { return mass * std::pow(length, part == 0 ? 0 : part < 4 ? 1 : 2); }
+};
+Size size_of_link(const Robot& robot, std::size_t link) {
+  double total = 0.0;
+  for (const Joint& joint : robot.joints) total += joint.mass.value_or(0.0);
+  const auto links = static_cast<double>(robot.joints.size());
+  Size out;
+  out.mass = std::max({robot.joints[link].mass.value_or(0.0), 0.3 * total / links, 0.01});
+  out.length = std::max(0.05, 0.6 * stretched(robot) / links);
+  return out;
+}
+
+std::vector<TorqueForm> link_inertia(const Robot& robot, std::size_t joint, const MotionRange&) {
+  const std::size_t link = robot.driven_joints()[joint];
+  const Size size = size_of_link(robot, link);
+  TorqueForm form;
+  for (int part = 0; part < kLinkParameters; ++part)
+    form.push_back(
+        rigid_term(robot, parameter_name("link_inertia", robot, joint, kParts[part]), part, link, size.of(part)));
+  return {form};
+}
+
+std::vector<TorqueForm> payload(const Robot& robot, std::size_t, const MotionRange&) {
+  const std::size_t last = robot.joints.size() - 1;
+  double total = 0.0;
+  for (const Joint& joint : robot.joints) total += joint.mass.value_or(0.0);
+  const Size size{std::max(0.1 * total, 0.05), std::max(0.05, 0.1 * stretched(robot))};
+  TorqueForm form;
+  for (int part = 0; part < 4; ++part)
+    form.push_back(rigid_term(robot, std::string("payload.") + kParts[part], part, last, size.of(part)));
+  return {form};
+}
+
+std::vector<TorqueForm> armature(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  const auto at = static_cast<Index>(joint);
+  const double prior = std::max(range.torque[at], 1e-3) / std::max(range.acceleration[at], 0.1);
+  return {{term_at(joint, parameter_name("armature", robot, joint), is_revolute(robot, joint) ? "kg m^2" : "kg", prior,
+                   [at](const Motion& m) -> ArrayXd { return m.qdd.col(at); })}};
+}
+
+}  // namespace
+
+std::vector<TorqueEffect> inertia_effects() {
+  std::vector<TorqueEffect> out;
+  TorqueTraits traits;
+  traits.family = TorqueFamily::inertia;
+  traits.mujoco = SimulatorPlace::field;
+  traits.urdf = SimulatorPlace::field;
+  traits.plain = "mass, centre of mass or inertia of the link";
+  traits.standard = true;
+  traits.documentation = {"the column of the link's inertial parameter",
+                          "`link_inertia.J2.m` [kg], `.mx` … [kg m], `.xx` … [kg m²]: what the link's differ by",
+                          "motion of the joints before it"};
+  out.push_back({"link_inertia", "mass, centre of mass and inertia of a link are other than in the file", link_inertia,
+                 true, traits});
+  traits.standard = false;
+  traits.plain = "a load at the flange";
+  traits.documentation = {"the last link's mass and first moments", "`payload.m` [kg], `.mx .my .mz` [kg m]",
+                          "a robot whose links are known"};
+  out.push_back({"payload", "a load at the flange that the model does not have", payload, false, traits});
+  traits.plain = "inertia of the motor's rotor";
+  traits.urdf = SimulatorPlace::none;
+  traits.documentation = {"qdd", "`armature.J2` [kg m²], as the joint feels it", "accelerations"};
+  out.push_back({"armature", "inertia of the motor's rotor and gear", armature, true, traits});
+  return out;
+}
+
+}  // namespace truing::dynamics
