@@ -1,0 +1,121 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// The effects on torques by name.
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/effects/families.hpp"
+#include "dynamics/prepare.hpp"
+#include "math/text.hpp"
+
+namespace truing {
+using namespace dynamics;
+
+namespace {
+
+const TorqueEffect* find(const std::vector<TorqueEffect>& effects, const std::string& name) {
+  const auto found = std::find_if(effects.begin(), effects.end(), [&](const TorqueEffect& e) { return e.name == name; });
+  return found == effects.end() ? nullptr : &*found;
+}
+
+std::size_t driven_number(const Robot& robot, const std::string& joint) {
+  for (std::size_t k = 0; k < robot.driven_count(); ++k) {
+    if (driven_name(robot, k) == joint) return k;
+  }
+  throw std::invalid_argument("joint '" + joint + "' has no reading, or is not there");
+}
+
+bool has_all(const TorqueForm& form, const std::map<std::string, double>& values) {
+  return std::all_of(form.begin(), form.end(), [&](const TorqueTerm& t) { return values.count(t.parameter) > 0; });
+}
+
+}  // namespace
+
+const std::vector<TorqueEffect>& torque_catalogue() {
+  static const std::vector<TorqueEffect> all = [] {
+    std::vector<TorqueEffect> out;
+    for (auto family : {friction_effects, inertia_effects, drive_effects, transmission_effects, thermal_effects}) {
+      for (TorqueEffect& effect : family()) out.push_back(std::move(effect));
+    }
+    return out;
+  }();
+  return all;
+}
+
+const TorqueEffect& find_torque_effect(const std::string& name, const std::vector<TorqueEffect>& own) {
+  if (const TorqueEffect* effect = find(own, name)) return *effect;
+  if (const TorqueEffect* effect = find(torque_catalogue(), name)) return *effect;
+  std::vector<std::string> names;
+  for (const auto* list : {&torque_catalogue(), &own}) {
+    for (const TorqueEffect& effect : *list) names.push_back(effect.name);
+  }
+  throw std::invalid_argument("there is no effect '" + name + "' on torques; there are: " + listed(names));
+}
+
+std::vector<TorqueTerm> terms_of(const AppliedEffect& applied, const Robot& robot, const MotionRange& range,
+                                 const std::vector<TorqueEffect>& own) {
+  const TorqueEffect& effect = find_torque_effect(applied.effect, own);
+  std::vector<std::size_t> joints;
+  if (effect.per_joint) {
+    for (const std::string& joint : applied.joints) joints.push_back(driven_number(robot, joint));
+  } else {
+    joints.push_back(0);
+  }
+  std::vector<TorqueTerm> out;
+  for (const std::size_t joint : joints) {
+    const auto take = [&](const TorqueForm& form) { out.insert(out.end(), form.begin(), form.end()); };
+    bool with_constants = false;
+    for (const TorqueForm& form : effect.forms(robot, joint, range)) {
+      if (!has_all(form, applied.parameters)) continue;
+      const bool has_constants = !form.front().constants.empty();
+      if (has_constants && with_constants) continue;
+      with_constants = with_constants || has_constants;
+      take(has_constants ? effect.form_with(robot, joint, applied.parameters) : form);
+    }
+  }
+  if (out.empty()) {
+    throw std::invalid_argument("effect '" + applied.effect + "' of the robot has no parameters that belong to it");
+  }
+  return out;
+}
+
+namespace dynamics {
+
+const std::string& driven_name(const Robot& robot, std::size_t joint) {
+  return robot.joints[robot.driven_joints().at(joint)].name;
+}
+bool is_revolute(const Robot& robot, std::size_t joint) {
+  return robot.joints[robot.driven_joints().at(joint)].type == JointType::revolute;
+}
+std::string torque_unit(const Robot& robot, std::size_t joint) { return is_revolute(robot, joint) ? "Nm" : "N"; }
+std::string angle_unit(const Robot& robot, std::size_t joint) { return is_revolute(robot, joint) ? "rad" : "m"; }
+
+Eigen::ArrayXd sign_of(const Eigen::VectorXd& speed) { return (speed.array() / kSpeedAtRest).tanh(); }
+
+TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, double prior, Column column,
+                   bool needs_torque) {
+  TorqueTerm term;
+  term.parameter = std::move(parameter);
+  term.unit = std::move(unit);
+  term.joints = {joint};
+  term.prior = prior;
+  term.needs_torque = needs_torque;
+  term.basis = [column = std::move(column)](const Motion& m) -> Eigen::MatrixXd { return column(m).matrix(); };
+  return term;
+}
+
+std::string parameter_name(const char* effect, const Robot& robot, std::size_t joint, const char* part) {
+  return std::string(effect) + "." + driven_name(robot, joint) + (part != nullptr ? "." + std::string(part) : "");
+}
+
+double constant_of(const std::map<std::string, double>& constants, const std::string& name) {
+  const auto found = constants.find(name);
+  if (found == constants.end() || !std::isfinite(found->second) || found->second <= 0.0)
+    throw std::invalid_argument("the robot's effects lack the constant '" + name + "', a positive number");
+  return found->second;
+}
+
+}  // namespace dynamics
+}  // namespace truing

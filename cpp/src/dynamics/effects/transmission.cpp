@@ -1,0 +1,206 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Gears, belts, springs: what one joint does to another, and what a turn of the joint repeats.
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/effects/families.hpp"
+#include "dynamics/filter.hpp"
+#include "dynamics/regressor.hpp"
+
+namespace truing::dynamics {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+double torque_prior(const MotionRange& range, std::size_t joint) {
+  return std::max(range.torque[static_cast<Index>(joint)], 1e-3);
+}
+
+// --- a joint's motor that carries, or is carried by, another's ---------------------------------------------------------
+
+std::vector<TorqueForm> coupling(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  std::vector<TorqueForm> out;
+  for (std::size_t k = 0; k < robot.driven_count(); ++k) {
+    if (k == joint) continue;
+    const auto other = static_cast<Index>(k);
+    const std::string name = parameter_name("coupling", robot, joint) + "." + driven_name(robot, k) + ".";
+    const double torque = 0.3 * torque_prior(range, joint);
+    const std::string unit = torque_unit(robot, joint);
+    out.push_back(
+        {term_at(joint, name + "coulomb", unit, torque,
+                 [other](const Motion& m) { return sign_of(m.qd.col(other)); }),
+         term_at(joint, name + "viscous", unit + " s/" + angle_unit(robot, k),
+                 torque / std::max(range.speed[other], 0.01),
+                 [other](const Motion& m) -> ArrayXd { return m.qd.col(other); }),
+         term_at(joint, name + "inertia", "kg m^2", torque / std::max(range.acceleration[other], 0.1),
+                 [other](const Motion& m) -> ArrayXd { return m.qdd.col(other); })});
+  }
+  if (out.empty()) throw Unsuited("there is no other joint");
+  return out;
+}
+
+// --- what repeats with the joint's turn --------------------------------------------------------------------------------
+
+std::vector<TorqueForm> ripple(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  if (!is_revolute(robot, joint)) throw Unsuited("a prismatic joint does not turn");
+  const auto at = static_cast<Index>(joint);
+  const double travel = range.upper[at] - range.lower[at];
+  std::vector<TorqueForm> out;
+  for (const int k : {1, 2, 3, 4, 6, 8, 12, 16, 24}) {
+    if (k * travel < 3.14) continue;  // less than half a wave is no wave
+    const std::string name = parameter_name("ripple", robot, joint);
+    const double prior = 0.2 * torque_prior(range, joint);
+    out.push_back({term_at(joint, name + ".sin" + std::to_string(k), "Nm", prior,
+                           [at, k](const Motion& m) -> ArrayXd { return (k * m.q.col(at).array()).sin(); }),
+                   term_at(joint, name + ".cos" + std::to_string(k), "Nm", prior,
+                           [at, k](const Motion& m) -> ArrayXd { return (k * m.q.col(at).array()).cos(); })});
+  }
+  if (out.empty()) throw Unsuited("the joint turns too little to tell a wave");
+  return out;
+}
+
+std::vector<TorqueForm> spring(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  const auto at = static_cast<Index>(joint);
+  const double travel = std::max(range.upper[at] - range.lower[at], 1e-3);
+  return {{term_at(joint, parameter_name("spring", robot, joint),
+                   torque_unit(robot, joint) + "/" + angle_unit(robot, joint), torque_prior(range, joint) / travel,
+                   [at](const Motion& m) -> ArrayXd { return m.q.col(at); })}};
+}
+
+// --- the link is not where the motor is --------------------------------------------------------------------------------
+
+/// What the torques change by when the joint stands `dq` further on than it was read: shape=(rows, joints).
+MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
+  const RigidChain chain(*m.robot);
+  const VectorXd pi = link_parameters(*m.robot);
+  const double step = 1e-4 / std::max(dq.cwiseAbs().maxCoeff(), 1e-12);  // rad: small against any posture
+  const MatrixXd dqd = rate_of(dq, m.step), dqdd = rate_of(dqd, m.step);
+  MatrixXd out(m.rows(), m.q.cols()), Y(chain.driven(), pi.size());
+  VectorXd q(m.q.cols()), qd(m.q.cols()), qdd(m.q.cols());
+  for (Index i = 0; i < m.rows(); ++i) {
+    q = m.q.row(i);
+    qd = m.qd.row(i);
+    qdd = m.qdd.row(i);
+    q[joint] += step * dq[i];
+    qd[joint] += step * dqd(i, 0);
+    qdd[joint] += step * dqdd(i, 0);
+    chain.regressor(q.data(), qd.data(), qdd.data(), Y);
+    for (Index j = 0; j < out.cols(); ++j)
+      out(i, j) = (Y.row(j).dot(pi) - m.rigid[static_cast<std::size_t>(j)].row(i).dot(pi)) / step;
+  }
+  return out;
+}
+
+TorqueTerm moved_link(const Robot& robot, std::size_t joint, std::string parameter, std::string unit, double prior,
+                      std::function<VectorXd(const Motion&)> dq) {
+  if (link_parameters(robot).isZero()) throw Unsuited("the links' masses are not known");
+  TorqueTerm term;
+  term.parameter = std::move(parameter);
+  term.unit = std::move(unit);
+  term.prior = prior;
+  term.needs_torque = true;
+  for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
+  term.basis = [joint, dq = std::move(dq)](const Motion& m) {
+    return torque_change(m, static_cast<Index>(joint), dq(m));
+  };
+  return term;
+}
+
+// A drive that gives way (Spong 1987): the link stands tau / K behind the motor.
+std::vector<TorqueForm> joint_elasticity(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  const double prior = 5e-3 / torque_prior(range, joint);
+  return {{moved_link(robot, joint, parameter_name("joint_elasticity", robot, joint),
+                      is_revolute(robot, joint) ? "rad/Nm" : "m/N", prior,
+                      [joint](const Motion& m) -> VectorXd { return -m.torque.col(static_cast<Index>(joint)); })}};
+}
+
+// Play: the link stands half of it behind the motor, on the side that the torque pushes it to.
+std::vector<TorqueForm> backlash(const Robot& robot, std::size_t joint, const MotionRange& range) {
+  const double soft = 0.1 * torque_prior(range, joint);
+  return {{moved_link(robot, joint, parameter_name("backlash", robot, joint), angle_unit(robot, joint), 3e-3,
+                      [joint, soft](const Motion& m) -> VectorXd {
+                        return -0.5 * (m.torque.col(static_cast<Index>(joint)).array() / soft).tanh();
+                      })}};
+}
+
+// --- what pulls at the tool --------------------------------------------------------------------------------------------
+
+// A cable or hose: a constant force at the tool, felt by the joints as J^T f.
+std::vector<TorqueForm> tool_force(const Robot& robot, std::size_t, const MotionRange& range) {
+  TorqueForm form;
+  const double prior = 0.1 * std::max(range.torque.size() > 0 ? range.torque.maxCoeff() : 1.0, 1.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    TorqueTerm term;
+    term.parameter = std::string("tool_force.") + "xyz"[axis];
+    term.unit = "N";
+    term.prior = prior;
+    for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
+    term.basis = [axis](const Motion& m) {
+      constexpr double h = 1e-6;
+      const Eigen::Matrix3d to_base = m.robot->T_measurement_base.linear().transpose();
+      MatrixXd out(m.rows(), m.q.cols());
+      VectorXd q(m.q.cols());
+      const auto tip = [&] { return Eigen::Vector3d(to_base * forward_kinematics(*m.robot, q).back().translation()); };
+      for (Index i = 0; i < m.rows(); ++i) {
+        for (Index j = 0; j < out.cols(); ++j) {  // the drive holds against the force: virtual work
+          q = m.q.row(i);
+          q[j] += h;
+          const double ahead = tip()[axis];
+          q[j] -= 2.0 * h;
+          out(i, j) = -(ahead - tip()[axis]) / (2.0 * h);
+        }
+      }
+      return out;
+    };
+    form.push_back(std::move(term));
+  }
+  return {form};
+}
+
+}  // namespace
+
+std::vector<TorqueEffect> transmission_effects() {
+  std::vector<TorqueEffect> out;
+  TorqueTraits traits;
+  traits.family = TorqueFamily::coupling;
+  traits.mujoco = SimulatorPlace::extra_element;
+  traits.plain = "another joint's motor acts on this one";
+  traits.documentation = {"s, qd and qdd of another joint",
+                          "`coupling.J5.J6.coulomb` [Nm], `.viscous` [Nm s/rad], `.inertia` [kg m²]",
+                          "joints that move apart from each other"};
+  out.push_back({"coupling", "motion of another joint acts on this one: shared gears, belts through the arm", coupling,
+                 true, traits});
+  traits.family = TorqueFamily::transmission;
+  traits.plain = "a torque that repeats with the joint's turn";
+  traits.documentation = {"sin kq, cos kq", "`ripple.J2.sin2`, `.cos2` [Nm]", "half a wave of travel"};
+  out.push_back({"ripple", "a torque that repeats with the joint's turn: cogging, an uneven gear", ripple, true,
+                 traits});
+  traits.family = TorqueFamily::gravity;
+  traits.mujoco = SimulatorPlace::field;
+  traits.plain = "a spring at the joint";
+  traits.documentation = {"q", "`spring.J2` [Nm/rad]", "a wide range of angles"};
+  out.push_back({"spring", "a spring, or cables that act like one", spring, true, traits});
+  traits.family = TorqueFamily::transmission;
+  traits.mujoco = SimulatorPlace::extra_element;
+  traits.plain = "a drive that gives way";
+  traits.documentation = {"change of the torques when the link stands tau behind the motor",
+                          "`joint_elasticity.J2` [rad/Nm]", "two encoders, or fast motion"};
+  out.push_back({"joint_elasticity", "gear or belt gives way under torque", joint_elasticity, true, traits});
+  traits.plain = "play";
+  traits.documentation = {"change of the torques when the link stands half the play to the side of the torque",
+                          "`backlash.J2` [rad]", "two encoders, or fast motion"};
+  out.push_back({"backlash", "play between motor and link", backlash, true, traits});
+  traits.family = TorqueFamily::gravity;
+  traits.plain = "a force at the tool";
+  traits.documentation = {"J^T f", "`tool_force.x .y .z` [N], in the base's axes", "several postures"};
+  out.push_back({"tool_force", "a force at the tool: a cable, a hose", tool_force, false, traits});
+  return out;
+}
+
+}  // namespace truing::dynamics
