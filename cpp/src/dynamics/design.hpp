@@ -1,0 +1,95 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Every effect at every joint as columns, and their normal equations joint by joint: a column of one joint's torque
+// meets those of the same joint alone.
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "dynamics/prepare.hpp"
+#include "dynamics/torque_model.hpp"
+#include "estimation/evidence.hpp"
+#include "rooms.hpp"
+#include "truing/common/not_testable.hpp"
+#include "truing/dynamics/effect.hpp"
+
+namespace truing::dynamics {
+
+/// Columns that come and go together: one form of an effect at a joint, or a free function.
+struct TorqueGroup {
+  std::string effect;               ///< empty: a free function
+  std::vector<std::string> joints;  ///< names; of an effect of the whole robot: none
+  int joint = -1;                   ///< number of the joint whose torque it is; -1: of several
+  bool standard = false;
+  TorqueFamily family = TorqueFamily::own;
+  std::vector<std::string> inputs;  ///< of a free function
+  int forms = 1;                    ///< number of forms that the effect has there
+  std::vector<int> columns;
+};
+
+struct TorqueDesign {
+  std::vector<TorqueTerm> terms;  ///< one a column
+  std::vector<TorqueGroup> groups;
+  std::vector<NotTestable> not_testable;
+};
+
+/// All effects of the catalogue, and one's own, at all joints. `leave_out`: names.
+TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::vector<TorqueEffect>& own,
+                       const std::set<std::string>& leave_out);
+/// One effect more, in all its forms, at a joint (-1: at every joint). Throws std::invalid_argument where it does not suit.
+void add_effect(const TorqueEffect& effect, int joint, const Robot& robot, const MotionRange& range,
+                TorqueDesign* design);
+/// Free functions of what may drive an unknown effect, at every joint.
+void add_free_functions(const Robot& robot, const MotionRange& range, TorqueDesign* design);
+
+/// Which tile rows belong to which fold.
+struct Folds {
+  std::vector<int> of_recording;  ///< -1: not of these folds
+  std::vector<int> of_block;      ///< not empty: recordings are cut into blocks of time; -1: not of these folds
+  double block_length = 0.0;      ///< [s]
+  int count = 0;
+
+  int fold(std::size_t recording, double time) const;
+};
+
+/// Normal equations of one joint's torque, fold by fold; columns are numbers of the design's.
+struct JointGrams {
+  std::vector<int> columns;
+  std::vector<Gram> folds;
+};
+
+/// How the errors of a model go on in time.
+struct Noise {
+  double sigma = 1.0;          ///< [Nm | N] standard deviation of a filtered row
+  double design_effect = 1.0;  ///< rows that count as one
+  double rows = 0.0;
+};
+
+/// What all passes share.
+struct Data {
+  const std::vector<Recording>& recordings;
+  const Robot& robot;
+  PrepareOptions prepare;
+  int threads = 0;
+};
+
+/// Measured torque less that of `subtracted` against the design's columns; rows at rest are left out. Terms that need a
+/// torque see that of `seen`.
+std::vector<JointGrams> sum_grams(const Data& data, const TorqueDesign& design, const TorqueModel& subtracted,
+                                  const TorqueModel& seen, const Folds& folds);
+
+/// Calls `use` with every tile of the recordings that the folds name and the error of the model, measured less
+/// predicted, shape=(count, joints) [Nm | N]; one recording after the other.
+void for_each_error(const Data& data, const TorqueModel& model, const Folds& folds,
+                    const std::function<void(const Tile&, const Eigen::MatrixXd& predicted)>& use);
+
+/// Standard deviation and design effect (Kish 1965; 1 + 2 sum of autocorrelations) of every joint's errors.
+std::vector<Noise> noise_of(const Data& data, const TorqueModel& model, const Folds& folds);
+
+/// All joints together, each in units of its noise and with rows that count as one.
+std::vector<Gram> weighted(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns);
+
+}  // namespace truing::dynamics
