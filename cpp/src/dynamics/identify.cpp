@@ -1,0 +1,136 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Torques fitted to what was asked for, and predicted.
+
+#include "truing/dynamics/identify.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "dynamics/search.hpp"
+#include "math/text.hpp"
+
+namespace truing {
+using namespace dynamics;
+
+bool TorqueOptions::is_valid(std::string* error) const {
+  if (!std::isnan(cutoff) && !(cutoff > 0.0)) return *error = "cutoff must be above 0 Hz", false;
+  if (!(test_share > 0.0 && test_share < 1.0)) return *error = "test_share must lie between 0 and 1", false;
+  if (threads < 0) return *error = "threads must be 0 or more", false;
+  return true;
+}
+
+namespace dynamics {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Groups of the effects asked for; of a law with inner constants all forms.
+TorqueDesign requested_design(const Problem& problem, const TorqueOptions& options) {
+  TorqueDesign design;
+  const std::vector<std::size_t> driven = problem.robot.driven_joints();
+  const auto number = [&](const std::string& joint) {
+    for (std::size_t k = 0; k < driven.size(); ++k)
+      if (problem.robot.joints[driven[k]].name == joint) return static_cast<int>(k);
+    std::vector<std::string> names;
+    for (const std::size_t j : driven) names.push_back(problem.robot.joints[j].name);
+    throw std::invalid_argument("there is no joint '" + joint + "' that has a reading; there are: " + listed(names));
+  };
+  std::vector<EffectRequest> requests = options.effects;
+  if (requests.empty()) requests = {{"current_offset", {}}, {"coulomb", {}}, {"viscous", {}}, {"armature", {}}};
+  if (options.fit_inertials) requests.insert(requests.begin(), {"link_inertia", {}});
+  for (const EffectRequest& request : requests) {
+    const TorqueEffect& effect = find_torque_effect(request.effect, options.own_effects);
+    if (request.joints.empty()) add_effect(effect, -1, problem.robot, problem.range, &design);
+    for (const std::string& joint : request.joints) add_effect(effect, number(joint), problem.robot, problem.range, &design);
+  }
+  return design;
+}
+
+/// Of every effect at every joint the form that fits best; the others are left out.
+std::vector<int> best_forms(const TorqueDesign& design, const Sums& sums) {
+  std::vector<int> chosen, columns;
+  for (std::size_t g = 0; g < design.groups.size(); ++g) {
+    if (design.groups[g].forms > 1 && design.groups[g].effect != "coupling") continue;
+    chosen.push_back(static_cast<int>(g));
+    columns.insert(columns.end(), design.groups[g].columns.begin(), design.groups[g].columns.end());
+  }
+  std::vector<bool> done(design.groups.size(), false);
+  for (std::size_t g = 0; g < design.groups.size(); ++g) {
+    const TorqueGroup& mine = design.groups[g];
+    if (done[g] || std::find(chosen.begin(), chosen.end(), static_cast<int>(g)) != chosen.end()) continue;
+    double least = std::numeric_limits<double>::infinity();
+    std::size_t best = g;
+    for (std::size_t h = g; h < design.groups.size(); ++h) {
+      const TorqueGroup& other = design.groups[h];
+      if (other.effect != mine.effect || other.joints != mine.joints) continue;
+      done[h] = true;
+      std::vector<int> with = columns;
+      with.insert(with.end(), other.columns.begin(), other.columns.end());
+      const Fit fit = fit_of(sums, with);
+      const double squares = sums.all.yy - fit.values.dot(sums.all.of(with).xy);
+      if (squares < least) {
+        least = squares;
+        best = h;
+      }
+    }
+    chosen.push_back(static_cast<int>(best));
+    columns.insert(columns.end(), design.groups[best].columns.begin(), design.groups[best].columns.end());
+  }
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
+}
+
+std::vector<int> columns_of(const TorqueDesign& design, const std::vector<int>& groups) {
+  std::vector<int> out;
+  for (const int g : groups) {
+    const std::vector<int>& columns = design.groups[static_cast<std::size_t>(g)].columns;
+    out.insert(out.end(), columns.begin(), columns.end());
+  }
+  return out;
+}
+
+}  // namespace
+
+TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings, const TorqueOptions& options) {
+  std::string error;
+  if (!options.is_valid(&error)) throw std::invalid_argument(error);
+  validate(robot);
+  require_usable(robot, recordings);
+  const Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
+  const Groundwork groundwork = groundwork_of(problem);
+  const TorqueDesign design = requested_design(problem, options);
+  std::vector<bool> with_prior(design.terms.size(), false);
+  for (const TorqueGroup& group : design.groups)
+    for (const int c : group.columns) with_prior[static_cast<std::size_t>(c)] = is_inertial(design, group);
+
+  TorqueFit out;
+  TorqueModel model = groundwork.model;
+  std::vector<Noise> noise = groundwork.noise;
+  std::vector<int> groups;
+  Fit fit;
+  // Terms that need the torque see that of the model found in the round before.
+  for (int round = 0; round < 2; ++round) {
+    const Sums sums =
+        sums_of(sum_grams(problem.data, design, problem.nominal, model, problem.train), noise, design, with_prior);
+    groups = best_forms(design, sums);
+    fit = fit_of(sums, columns_of(design, groups));
+    model = problem.nominal.with(valued(design, fit));
+    noise = noise_of(problem.data, model, problem.train);
+  }
+  out.robot = applied(robot, design, groups, fit, problem.range);
+  out.parameters = parameters_of(design, columns_of(design, groups), fit);
+  out.errors = errors_of(problem, {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model}});
+  out.cutoff = problem.data.prepare.cutoff;
+  out.held_out = problem.held_out;
+  out.not_testable = design.not_testable;
+  out.warnings = problem.warnings;
+  return out;
+}
+
+}  // namespace dynamics
+}  // namespace truing

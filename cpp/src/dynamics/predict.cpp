@@ -1,0 +1,74 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Torques of every row of a recording.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "dynamics/problem.hpp"
+#include "truing/dynamics/identify.hpp"
+
+namespace truing::dynamics {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Predicted torques at the times of the motion's rows, in order of time.
+struct Predicted {
+  std::vector<double> time;
+  std::vector<VectorXd> torque;
+
+  /// Between the rows by straight lines.
+  VectorXd at(double t) const {
+    const auto next = std::lower_bound(time.begin(), time.end(), t);
+    if (next == time.begin()) return torque.front();
+    if (next == time.end()) return torque.back();
+    const auto k = static_cast<std::size_t>(next - time.begin());
+    const double part = (t - time[k - 1]) / (time[k] - time[k - 1]);
+    return (1.0 - part) * torque[k - 1] + part * torque[k];
+  }
+};
+
+}  // namespace
+
+TorquePrediction predict(const Robot& robot, const Recording& recording, double cutoff,
+                         const std::vector<TorqueEffect>& own_effects) {
+  if (!(cutoff > 0.0)) throw std::invalid_argument("cutoff must be above 0 Hz");
+  validate(robot);
+  validate(recording, robot);
+  const std::vector<Recording> recordings{recording};
+  std::vector<std::string> warnings;
+  PrepareOptions options;
+  options.cutoff = cutoff;
+  options.torque_per_ampere = drive_constants(robot, recordings, &warnings);
+  const MotionRange range = range_of(recordings, robot, options);
+  const TorqueModel model(robot, valued_terms(robot, range, own_effects));
+  Predicted predicted;
+  for_each_tile(recording, 0, robot, RigidChain(robot), options, [&](Tile& tile) {
+    const MatrixXd torque = model.torque(&tile.motion);
+    const Index begin = tile.first * tile.stride;
+    const Index end = std::min(torque.rows(), (tile.first + tile.count) * tile.stride);
+    for (Index i = begin; i < end; ++i) {
+      predicted.time.push_back(tile.motion.time[i]);
+      predicted.torque.emplace_back(torque.row(i));
+    }
+  });
+  TorquePrediction out;
+  out.time = recording.time;
+  out.torque.resize(recording.time.size(), static_cast<Index>(robot.driven_count()));
+  out.current = MatrixXd::Constant(out.torque.rows(), out.torque.cols(), std::numeric_limits<double>::quiet_NaN());
+  for (Index i = 0; i < out.time.size(); ++i) out.torque.row(i) = predicted.at(out.time[i] - out.time[0]);
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  for (std::size_t k = 0; k < driven.size(); ++k) {
+    const auto& gain = robot.joints[driven[k]].torque_per_ampere;
+    const auto j = static_cast<Index>(k);
+    if (gain) out.current.col(j) = out.torque.col(j) / *gain;
+  }
+  return out;
+}
+
+}  // namespace truing::dynamics

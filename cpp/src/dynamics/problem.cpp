@@ -1,0 +1,325 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "math/linear_algebra.hpp"
+#include "math/text.hpp"
+
+namespace truing::dynamics {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kBlocks = 10;  ///< of time, where recordings cannot be the folds
+
+double length_of(const Recording& recording) { return recording.time[recording.time.size() - 1] - recording.time[0]; }
+
+/// Blocks of time as folds: every third or so is held out.
+void split_by_blocks(const std::vector<Recording>& recordings, double test_share, Problem* problem) {
+  problem->single = true;
+  double longest = 0.0;
+  for (const Recording& recording : recordings) longest = std::max(longest, length_of(recording));
+  Folds train, test;
+  train.block_length = test.block_length = longest / kBlocks * (1.0 + 1e-9);
+  train.of_recording.assign(recordings.size(), 0);
+  test.of_recording.assign(recordings.size(), 0);
+  for (int b = 0; b < kBlocks; ++b) {
+    // Evenly spread: block b is held out when b * share passes a whole number.
+    const bool held = std::floor((b + 1) * test_share + 0.5) > std::floor(b * test_share + 0.5);
+    train.of_block.push_back(held ? -1 : train.count++);
+    test.of_block.push_back(held ? test.count++ : -1);
+  }
+  problem->train = train;
+  problem->test = test;
+  problem->held_out = {"blocks of time"};
+}
+
+void split(const std::vector<Recording>& recordings, double test_share, Problem* problem) {
+  std::vector<bool> held(recordings.size());
+  std::size_t tests = 0;
+  for (std::size_t r = 0; r < recordings.size(); ++r) tests += (held[r] = recordings[r].test) ? 1u : 0u;
+  const std::size_t trains = recordings.size() - tests;
+  if (tests == 0 && recordings.size() >= 4) {  // every third or so
+    for (std::size_t r = 0; r < recordings.size(); ++r) {
+      const auto k = static_cast<double>(r);
+      held[r] = std::floor((k + 1.0) * test_share + 0.5) > std::floor(k * test_share + 0.5);
+    }
+    problem->warnings.push_back("no recording is marked as test (column set): every " +
+                                math::number(1.0 / test_share, 2) + "rd or so was held out");
+  } else if (trains < 3 && tests == 0) {
+    return split_by_blocks(recordings, test_share, problem);
+  }
+  Folds train, test;
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    train.of_recording.push_back(held[r] ? -1 : train.count++);
+    test.of_recording.push_back(held[r] ? test.count++ : -1);
+    if (held[r]) problem->held_out.push_back(recordings[r].name);
+  }
+  if (train.count < 3) {  // few long ones: blocks of theirs are the folds, and the marked ones are held out
+    double longest = 0.0;
+    for (std::size_t r = 0; r < recordings.size(); ++r)
+      if (!held[r]) longest = std::max(longest, length_of(recordings[r]));
+    for (int& of : train.of_recording) of = of < 0 ? -1 : 0;
+    train.block_length = longest / kBlocks * (1.0 + 1e-9);
+    for (int b = 0; b < kBlocks; ++b) train.of_block.push_back(b);
+    train.count = kBlocks;
+    problem->single = true;
+  }
+  problem->train = train;
+  problem->test = test;
+}
+
+std::size_t driven_number(const Robot& robot, const std::string& joint) {
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  for (std::size_t k = 0; k < driven.size(); ++k)
+    if (robot.joints[driven[k]].name == joint) return k;
+  return 0;
+}
+
+}  // namespace
+
+void require_usable(const Robot& robot, const std::vector<Recording>& recordings) {
+  if (recordings.empty()) throw std::invalid_argument("there are no recordings");
+  bool any_mass = false;
+  for (const Joint& joint : robot.joints) any_mass = any_mass || joint.mass.value_or(0.0) > 0.0;
+  if (!any_mass) {
+    throw std::invalid_argument(
+        "no link of the robot has a mass: torques need mass, com and inertia of the links (URDF: <inertial>; robot.yaml: "
+        "mass, com, inertia)");
+  }
+  for (const Recording& recording : recordings) {
+    validate(recording, robot);
+    if (recording.torque.cols() == 0 && recording.current.cols() == 0) {
+      throw std::invalid_argument("recording '" + recording.name +
+                                  "': no torques (tau1_Nm …) and no currents (i1_A …)" +
+                                  (recording.command.cols() > 0 ? "; it has commands: with these alone torques cannot "
+                                                                  "be compared"
+                                                                : ""));
+    }
+  }
+}
+
+std::vector<double> drive_constants(const Robot& robot, const std::vector<Recording>& recordings,
+                                    std::vector<std::string>* warnings) {
+  std::vector<double> out;
+  std::vector<std::string> unknown;
+  const bool by_current = std::any_of(recordings.begin(), recordings.end(),
+                                      [](const Recording& r) { return r.torque.cols() == 0; });
+  for (const std::size_t j : robot.driven_joints()) {
+    const Joint& joint = robot.joints[j];
+    out.push_back(joint.torque_per_ampere.value_or(1.0));
+    if (by_current && !joint.torque_per_ampere) unknown.push_back(joint.name);
+  }
+  if (!unknown.empty()) {
+    warnings->push_back("torque_per_ampere is not known of " + listed(unknown) +
+                        ": 1 Nm/A is assumed, so masses and drive constants cannot be told apart, and all torques of "
+                        "these joints are in amperes");
+  }
+  return out;
+}
+
+Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, const ProblemOptions& options)
+    : robot(given), data{recordings, robot, {}, options.threads}, nominal(given, {}) {
+  data.prepare.torque_per_ampere = drive_constants(robot, recordings, &warnings);
+  data.prepare.cutoff = std::isfinite(options.cutoff) ? options.cutoff : 8.0;
+  split(recordings, options.test_share, this);
+  range = range_of(recordings, robot, data.prepare);
+  nominal = TorqueModel(robot, valued_terms(robot, range, options.own_effects));
+  fitted_before = !robot.torque_effects.empty() && robot.fitted_range.count("qd1") > 0;
+}
+
+bool is_inertial(const TorqueDesign& design, const TorqueGroup& group) {
+  return group.standard && group.family == TorqueFamily::inertia && !design.terms.empty();
+}
+
+std::vector<int> standard_columns(const TorqueDesign& design) {
+  std::vector<int> out;
+  for (const TorqueGroup& group : design.groups) {
+    if (group.standard) out.insert(out.end(), group.columns.begin(), group.columns.end());
+  }
+  return out;
+}
+
+Sums sums_of(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
+             const std::vector<bool>& with_prior) {
+  Sums out;
+  out.folds = weighted(grams, noise, design.terms.size());
+  for (const Gram& fold : out.folds) out.all.add(fold);
+  out.precision = VectorXd::Zero(static_cast<Index>(design.terms.size()));
+  for (std::size_t c = 0; c < design.terms.size(); ++c) {
+    if (with_prior[c]) out.precision[static_cast<Index>(c)] = std::pow(design.terms[c].prior, -2.0);
+  }
+  out.all.xx.diagonal() += out.precision;
+  return out;
+}
+
+Fit fit_of(const Sums& sums, const std::vector<int>& columns, const VectorXd& ridge) {
+  const Gram gram = sums.all.of(columns);
+  MatrixXd d = gram.xx;
+  if (ridge.size() == d.rows()) d.diagonal() += ridge;
+  d.diagonal() += 1e-9 * gram.xx.diagonal();
+  d.diagonal().array() += 1e-30;
+  Fit out;
+  out.columns = columns;
+  const VectorXd scale = unit_scale<Eigen::Dynamic>(d);
+  const MatrixXd inverse = inverse_symmetric<Eigen::Dynamic>(scaled_both<Eigen::Dynamic>(scale, d));
+  out.covariance = scaled_both<Eigen::Dynamic>(scale, inverse);
+  out.values = out.covariance * gram.xy;
+  return out;
+}
+
+std::vector<ValuedTerm> valued(const TorqueDesign& design, const Fit& fit) {
+  std::vector<ValuedTerm> out;
+  for (std::size_t k = 0; k < fit.columns.size(); ++k)
+    out.push_back({design.terms[static_cast<std::size_t>(fit.columns[k])], fit.values[static_cast<Index>(k)]});
+  return out;
+}
+
+Groundwork groundwork_of(const Problem& problem) {
+  TorqueDesign design;
+  for (const TorqueEffect& effect : torque_catalogue()) {
+    if (effect.traits.standard) add_effect(effect, -1, problem.robot, problem.range, &design);
+  }
+  if (problem.fitted_before) {
+    const std::vector<Noise> noise = noise_of(problem.data, problem.nominal, problem.train);
+    return {std::move(design), {}, problem.nominal, noise};
+  }
+  std::vector<bool> with_prior(design.terms.size(), false);
+  for (const TorqueGroup& group : design.groups) {
+    for (const int c : group.columns) with_prior[static_cast<std::size_t>(c)] = is_inertial(design, group);
+  }
+  const std::vector<int> columns = standard_columns(design);
+  const std::vector<JointGrams> grams = sum_grams(problem.data, design, problem.nominal, problem.nominal, problem.train);
+  // Each joint by the noise that the fit leaves, which depends on it.
+  std::vector<Noise> noise(problem.robot.driven_count());
+  for (std::size_t j = 0; j < noise.size(); ++j)
+    noise[j].sigma = std::max(0.1 * problem.range.torque[static_cast<Index>(j)], 1e-6);
+  Fit fit;
+  TorqueModel model = problem.nominal;
+  for (int round = 0; round < 2; ++round) {
+    fit = fit_of(sums_of(grams, noise, design, with_prior), columns);
+    model = problem.nominal.with(valued(design, fit));
+    noise = noise_of(problem.data, model, problem.train);
+  }
+  return {std::move(design), std::move(fit), std::move(model), std::move(noise)};
+}
+
+std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vector<int>& columns, const Fit& fit) {
+  std::vector<Parameter> out;
+  for (const int c : columns) {
+    const auto at = std::find(fit.columns.begin(), fit.columns.end(), c);
+    if (at == fit.columns.end()) continue;
+    const auto k = static_cast<Index>(at - fit.columns.begin());
+    const TorqueTerm& term = design.terms[static_cast<std::size_t>(c)];
+    Parameter parameter;
+    parameter.name = term.parameter;
+    parameter.unit = term.unit;
+    parameter.value = fit.values[k];
+    parameter.sigma = std::sqrt(std::max(0.0, fit.covariance(k, k)));
+    out.push_back(std::move(parameter));
+    for (const auto& [name, value] : term.constants) out.push_back({name, value, value, 0.0, "", true});
+  }
+  return out;
+}
+
+Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<int>& groups, const Fit& fit,
+              const MotionRange& range) {
+  Robot out = robot;
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  for (const int g : groups) {
+    const TorqueGroup& group = design.groups[static_cast<std::size_t>(g)];
+    const std::vector<Parameter> parameters = parameters_of(design, group.columns, fit);
+    if (is_inertial(design, group)) {
+      Joint& joint = out.joints[driven[driven_number(robot, group.joints.front())]];
+      LinkParameters links = link_parameters(joint);
+      for (Index k = 0; k < kLinkParameters; ++k) links[k] += parameters[static_cast<std::size_t>(k)].value;
+      set_link_parameters(links, &joint);
+      continue;
+    }
+    AppliedEffect effect{group.effect, group.joints, {}};
+    for (const Parameter& parameter : parameters) effect.parameters[parameter.name] = parameter.value;
+    // What the robot carries already grows.
+    const auto same = std::find_if(out.torque_effects.begin(), out.torque_effects.end(), [&](const AppliedEffect& e) {
+      return e.effect == effect.effect && e.joints == effect.joints;
+    });
+    const auto grows = [&] {
+      return std::all_of(parameters.begin(), parameters.end(), [&](const Parameter& p) {
+        const auto old = same->parameters.find(p.name);
+        return old != same->parameters.end() && (!p.frozen || old->second == p.value);
+      });
+    };
+    if (same != out.torque_effects.end() && grows()) {
+      for (const Parameter& p : parameters)
+        if (!p.frozen) same->parameters[p.name] += p.value;
+    } else {
+      out.torque_effects.push_back(std::move(effect));
+    }
+  }
+  for (Index j = 0; j < range.speed.size(); ++j) {
+    const std::string number = std::to_string(j + 1);
+    out.fitted_range["q" + number] = {range.lower[j], range.upper[j]};
+    out.fitted_range["qd" + number] = {-range.speed[j], range.speed[j]};
+  }
+  return out;
+}
+
+// --- errors --------------------------------------------------------------------------------------------------------------
+
+namespace {
+
+struct Moments {
+  double n = 0.0, sum = 0.0, squares = 0.0, errors = 0.0;
+  TorqueError error(const std::string& joint) const {
+    TorqueError out;
+    out.joint = joint;
+    out.n = n;
+    if (n < 2.0) return out;
+    out.rms = std::sqrt(errors / n);
+    const double variance = squares / n - std::pow(sum / n, 2.0);
+    out.percent = 100.0 * out.rms / std::sqrt(std::max(variance, 1e-300));
+    return out;
+  }
+};
+
+}  // namespace
+
+std::vector<TorqueErrors> errors_of(const Problem& problem,
+                                    const std::vector<std::pair<std::string, TorqueModel>>& models) {
+  const std::size_t joints = problem.robot.driven_count();
+  const std::vector<std::size_t> driven = problem.robot.driven_joints();
+  std::vector<TorqueErrors> out;
+  for (const auto& [name, model] : models) {
+    TorqueErrors errors;
+    errors.model = name;
+    for (const bool held : {true, false}) {
+      std::vector<Moments> moments(joints);
+      const Folds& folds = held ? problem.test : problem.train;
+      for_each_error(problem.data, model, folds, [&](const Tile& tile, const MatrixXd& predicted) {
+        const VectorXd time = tile.own_time();
+        for (Index i = 0; i < tile.count; ++i) {
+          if (folds.fold(tile.recording, time[i]) < 0) continue;
+          for (std::size_t j = 0; j < joints; ++j) {
+            const double y = tile.measured(i, static_cast<Index>(j));
+            if (std::isnan(y)) continue;
+            Moments& m = moments[j];
+            m.n += 1.0;
+            m.sum += y;
+            m.squares += y * y;
+            m.errors += std::pow(y - predicted(i, static_cast<Index>(j)), 2.0);
+          }
+        }
+      });
+      std::vector<TorqueError>& list = held ? errors.held_out : errors.train;
+      for (std::size_t j = 0; j < joints; ++j) list.push_back(moments[j].error(problem.robot.joints[driven[j]].name));
+    }
+    out.push_back(std::move(errors));
+  }
+  return out;
+}
+
+}  // namespace truing::dynamics

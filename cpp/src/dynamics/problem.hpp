@@ -1,0 +1,95 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What identification and diagnosis of torques share: which rows are fitted and which are held out, the groundwork, and
+// fits from normal equations.
+
+#include <string>
+#include <vector>
+
+#include "dynamics/design.hpp"
+#include "rooms.hpp"
+#include "truing/dynamics/identify.hpp"
+
+namespace truing::dynamics {
+
+struct ProblemOptions {
+  double cutoff = 8.0;  ///< [Hz]; NaN: from the data
+  double test_share = 0.3;
+  int threads = 0;
+  std::vector<TorqueEffect> own_effects{};
+};
+
+/// Recordings to fit and recordings to judge on.
+struct Problem {
+  Problem(const Robot& robot, const std::vector<Recording>& recordings, const ProblemOptions& options);
+  Problem(const Problem&) = delete;  // `data` refers to `robot`
+  Problem& operator=(const Problem&) = delete;
+
+  Robot robot;
+  Data data;
+  MotionRange range;
+  Folds train, test;
+  bool single = false;  ///< folds are blocks of time
+  std::vector<std::string> held_out;
+  TorqueModel nominal;
+  bool fitted_before = false;  ///< the robot carries what an earlier fit of torques found
+  std::vector<std::string> warnings;
+};
+
+/// A choice of columns fitted to all training folds.
+struct Fit {
+  std::vector<int> columns;
+  Eigen::VectorXd values;
+  Eigen::MatrixXd covariance;  ///< of unit noise, rows that count as one
+};
+
+/// Grams of all joints together, and the prior that columns have.
+struct Sums {
+  std::vector<Gram> folds;
+  Gram all;                   ///< of the folds, with the priors on the diagonal
+  Eigen::VectorXd precision;  ///< of the priors, by column; 0: flat
+};
+
+/// `flat`: columns without a prior.
+Sums sums_of(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
+             const std::vector<bool>& with_prior);
+
+Fit fit_of(const Sums& sums, const std::vector<int>& columns, const Eigen::VectorXd& ridge = {});
+
+/// Terms with the values of a fit.
+std::vector<ValuedTerm> valued(const TorqueDesign& design, const Fit& fit);
+
+/// Groups of what is usual: inertial parameters, Coulomb, viscous, an offset. Their columns.
+std::vector<int> standard_columns(const TorqueDesign& design);
+/// Columns of the links' inertial parameters.
+bool is_inertial(const TorqueDesign& design, const TorqueGroup& group);
+
+/// The groundwork fitted to the problem's training rows: the model, and what noise it leaves.
+struct Groundwork {
+  TorqueDesign design;
+  Fit fit;
+  TorqueModel model;
+  std::vector<Noise> noise;
+};
+Groundwork groundwork_of(const Problem& problem);
+
+/// The robot with what a fit found: link inertias added to its links, effects to its torque effects.
+Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<int>& groups, const Fit& fit,
+              const MotionRange& range);
+
+/// Names, values and standard errors of some columns, constants among them.
+std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vector<int>& columns, const Fit& fit);
+
+/// Errors of models on held-out and training rows, both sides low-passed, rows at rest included.
+std::vector<TorqueErrors> errors_of(const Problem& problem, const std::vector<std::pair<std::string, TorqueModel>>& models);
+
+/// Throws std::invalid_argument where recordings cannot be fitted: no torque, no gains, nothing moves …
+void require_usable(const Robot& robot, const std::vector<Recording>& recordings);
+
+/// Torque per ampere of every joint: the robot's, or 1 (Nm/A) with a warning.
+std::vector<double> drive_constants(const Robot& robot, const std::vector<Recording>& recordings,
+                                    std::vector<std::string>* warnings);
+
+}  // namespace truing::dynamics
