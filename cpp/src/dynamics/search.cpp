@@ -1,0 +1,170 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace truing::dynamics {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+bool same_place(const TorqueGroup& a, const TorqueGroup& b) {
+  return a.effect == b.effect && a.joints == b.joints && a.inputs == b.inputs;
+}
+
+/// Having looked at all joints and forms of an effect costs the log of their number.
+std::vector<ColumnGroup> column_groups(const TorqueDesign& design) {
+  std::map<std::string, int> of_a_kind;
+  for (const TorqueGroup& group : design.groups) ++of_a_kind[group.effect];
+  std::vector<ColumnGroup> out;
+  for (const TorqueGroup& group : design.groups) {
+    ColumnGroup one;
+    one.columns = group.columns;
+    one.cost = std::log(static_cast<double>(of_a_kind[group.effect]));
+    out.push_back(std::move(one));
+  }
+  return out;
+}
+
+VectorXd priors_of(const TorqueDesign& design) {
+  VectorXd out(static_cast<Index>(design.terms.size()));
+  for (std::size_t c = 0; c < design.terms.size(); ++c) out[static_cast<Index>(c)] = design.terms[c].prior;
+  return out;
+}
+
+}  // namespace
+
+Search::Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nuisance)
+    : design_(design),
+      sums_(sums),
+      groups_(column_groups(design)),
+      evidence_(sums_.all, groups_, std::move(nuisance), priors_of(design)) {
+  for (const TorqueTerm& term : design.terms) {
+    for (const std::size_t j : term.joints) joints_ = std::max(joints_, j + 1);
+  }
+}
+
+Choice Search::without(const Choice& choice, std::size_t at) {
+  Choice out = choice;
+  out.groups.erase(out.groups.begin() + static_cast<std::ptrdiff_t>(at));
+  out.scales.erase(out.scales.begin() + static_cast<std::ptrdiff_t>(at));
+  return out;
+}
+
+std::vector<int> Search::columns(const Choice& choice) const {
+  std::vector<int> out = evidence_.nuisance();
+  for (const int g : choice.groups) {
+    const std::vector<int>& more = groups_[static_cast<std::size_t>(g)].columns;
+    out.insert(out.end(), more.begin(), more.end());
+  }
+  return out;
+}
+
+VectorXd Search::squares_of_folds(const Choice& choice) const {
+  const Evidence::State state = evidence_.evaluate(choice);
+  const Gram all = sums_.all.of(state.columns);
+  VectorXd out(static_cast<Index>(sums_.folds.size()));
+  for (std::size_t f = 0; f < sums_.folds.size(); ++f) {
+    const Gram held = sums_.folds[f].of(state.columns);
+    MatrixXd d = all.xx - held.xx;
+    d.diagonal() += state.precision;
+    out[static_cast<Index>(f)] =
+        estimation::held_out_squares(sums_.folds[f], state.columns, factorised(std::move(d)).solve(all.xy - held.xy));
+  }
+  return out;
+}
+
+double Search::squares_on(const Gram& other, const Choice& choice) const {
+  const Evidence::State state = evidence_.evaluate(choice);
+  return estimation::held_out_squares(other, state.columns, state.solution);
+}
+
+bool Search::may_enter(const Choice& choice, int group, bool free_functions) const {
+  const TorqueGroup& g = design_.groups[static_cast<std::size_t>(group)];
+  if (g.effect.empty() != free_functions) return false;
+  const auto& nuisance = evidence_.nuisance();
+  if (!nuisance.empty() && std::find(nuisance.begin(), nuisance.end(), g.columns.front()) != nuisance.end()) return false;
+  return std::none_of(choice.groups.begin(), choice.groups.end(), [&](int in) {
+    return same_place(design_.groups[static_cast<std::size_t>(in)], g);
+  });
+}
+
+/// Folds that were not fitted, surely and by enough: the mean of the folds' gains is above zero by 1.5 standard errors.
+bool Search::predicts(const Choice& with, const Choice& less, const SearchLimits& limits) const {
+  const VectorXd before = squares_of_folds(less), after = squares_of_folds(with);
+  const VectorXd gain = (before - after).cwiseQuotient(before);
+  const auto n = static_cast<double>(gain.size());
+  const double spread = std::sqrt((gain.array() - gain.mean()).square().sum() / std::max(1.0, n - 1.0));
+  // Every joint counts alike in the sum: one joint's errors are the part that it has of it.
+  const double least = limits.least_gain * before.sum() / static_cast<double>(joints_);
+  return before.sum() - after.sum() > least && gain.mean() > 1.5 * spread / std::sqrt(n);
+}
+
+Choice Search::better_forms(Choice choice) const {
+  for (std::size_t at = 0; at < choice.groups.size(); ++at) {
+    const TorqueGroup& mine = design_.groups[static_cast<std::size_t>(choice.groups[at])];
+    if (mine.forms < 2 || mine.effect.empty()) continue;
+    const Evidence::State less = evidence_.evaluate(without(choice, at));
+    Evidence::Gain best;
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      if (!same_place(design_.groups[g], mine)) continue;
+      Evidence::Gain gain = evidence_.gain(less, groups_[g].columns, groups_[g].cost);
+      gain.group = static_cast<int>(g);
+      if (gain.score > best.score) best = gain;
+    }
+    if (best.group < 0) continue;
+    choice.groups[at] = best.group;
+    choice.scales[at] = best.scale;
+  }
+  return choice;
+}
+
+Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits) const {
+  for (bool changed = true; changed;) {
+    changed = false;
+    const double score = evidence_.evaluate(choice).score;
+    for (std::size_t at = 0; at < choice.groups.size(); ++at) {
+      const Choice less = without(choice, at);
+      if (evidence_.evaluate(less).score < score - 0.5 * limits.threshold) continue;
+      choice = less;
+      changed = true;
+      break;
+    }
+  }
+  return choice;
+}
+
+Choice Search::run(Choice choice, const SearchLimits& limits, bool free_functions) const {
+  std::vector<int> refused;
+  while (static_cast<int>(choice.groups.size()) < limits.most) {
+    const Evidence::State state = evidence_.evaluate(choice);
+    std::vector<Evidence::Gain> gains = evidence_.gains(state);
+    std::sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
+    bool taken = false;
+    for (const Evidence::Gain& gain : gains) {
+      if (gain.score < limits.threshold) break;
+      if (!may_enter(choice, gain.group, free_functions)) continue;
+      if (std::find(refused.begin(), refused.end(), gain.group) != refused.end()) continue;
+      Choice grown = choice;
+      grown.groups.push_back(gain.group);
+      grown.scales.push_back(gain.scale);
+      if (!predicts(grown, choice, limits)) {
+        refused.push_back(gain.group);
+        continue;
+      }
+      choice = std::move(grown);
+      taken = true;
+      break;
+    }
+    if (!taken) break;
+    choice = better_forms(std::move(choice));
+  }
+  return less_what_is_idle(std::move(choice), limits);
+}
+
+}  // namespace truing::dynamics

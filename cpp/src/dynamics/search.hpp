@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Which effects explain the torques: one after the other by evidence, and only those that predict folds they were not
+// fitted to.
+
+#include <vector>
+
+#include "dynamics/problem.hpp"
+#include "estimation/evidence.hpp"
+#include "rooms.hpp"
+
+namespace truing::dynamics {
+
+struct SearchLimits {
+  double threshold = 4.0;     ///< nats beyond the cost
+  double least_gain = 0.004;  ///< of the joint's squared error on folds that were not fitted
+  int most = 40;
+};
+
+/// Candidates over one set of sums.
+class Search {
+ public:
+  /// `nuisance`: columns that are always in.
+  Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nuisance);
+
+  /// Takes effects as long as they win; starts from `choice`.
+  Choice run(Choice choice, const SearchLimits& limits, bool free_functions) const;
+
+  const Evidence& evidence() const { return evidence_; }
+  Evidence::State state(const Choice& choice) const { return evidence_.evaluate(choice); }
+  std::vector<int> columns(const Choice& choice) const;
+
+  /// Squared error of every fold, by the fit to the others.
+  Eigen::VectorXd squares_of_folds(const Choice& choice) const;
+  /// Squared error on other rows, by the fit to all folds.
+  double squares_on(const Gram& other, const Choice& choice) const;
+
+  /// The choice less its group number `at`.
+  static Choice without(const Choice& choice, std::size_t at);
+
+ private:
+  bool may_enter(const Choice& choice, int group, bool free_functions) const;
+  Choice better_forms(Choice choice) const;
+  Choice less_what_is_idle(Choice choice, const SearchLimits& limits) const;
+  bool predicts(const Choice& with, const Choice& less, const SearchLimits& limits) const;
+
+  const TorqueDesign& design_;
+  const Sums& sums_;
+  std::vector<ColumnGroup> groups_;
+  Evidence evidence_;
+  std::size_t joints_ = 1;
+};
+
+}  // namespace truing::dynamics
