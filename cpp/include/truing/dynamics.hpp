@@ -1,0 +1,9 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+/// Motion, torques and what lies between them and the model.
+#pragma once
+
+#include "truing/dynamics/diagnose.hpp"
+#include "truing/dynamics/effect.hpp"
+#include "truing/dynamics/identify.hpp"
+#include "truing/dynamics/recording.hpp"

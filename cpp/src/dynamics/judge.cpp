@@ -1,0 +1,139 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/judge.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace truing::dynamics {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kBins = 5;
+
+/// An input of a regime: its value in a row, and how far it goes.
+struct RegimeInput {
+  const char* name;
+  double low, high;
+  int bins;
+  std::function<double(const Tile&, Index fine_row)> value;
+};
+
+std::vector<RegimeInput> inputs_of(const MotionRange& range, Index j) {
+  std::vector<RegimeInput> out;
+  out.push_back({"speed", 0.0, range.speed[j], kBins,
+                 [j](const Tile& t, Index i) { return std::abs(t.motion.qd(i, j)); }});
+  out.push_back({"direction", -1.0, 1.0, 2,
+                 [j](const Tile& t, Index i) { return t.motion.qd(i, j) < 0.0 ? -0.5 : 0.5; }});
+  out.push_back({"acceleration", 0.0, range.acceleration[j], kBins,
+                 [j](const Tile& t, Index i) { return std::abs(t.motion.qdd(i, j)); }});
+  out.push_back({"load", 0.0, 2.5 * range.torque[j], kBins,
+                 [j](const Tile& t, Index i) { return std::abs(t.motion.torque(i, j)); }});
+  out.push_back({"angle", range.lower[j], range.upper[j], kBins,
+                 [j](const Tile& t, Index i) { return t.motion.q(i, j); }});
+  out.push_back({"time", 0.0, range.duration, kBins, [](const Tile& t, Index i) { return t.motion.time[i]; }});
+  const std::string own = "temp" + std::to_string(j + 1) + "_C";
+  for (const std::string& name : {own, std::string("temp_C")}) {
+    const auto at = range.columns.find(name);
+    if (at == range.columns.end() || !(at->second.second > at->second.first)) continue;
+    out.push_back({"temperature", at->second.first, at->second.second, kBins,
+                   [name](const Tile& t, Index i) { return t.motion.columns.at(name)[i]; }});
+    break;
+  }
+  return out;
+}
+
+struct Cell {
+  double standard = 0.0, named = 0.0, n = 0.0;
+};
+
+}  // namespace
+
+std::vector<TorqueRegime> regimes_of(const Problem& problem, const TorqueModel& standard, const TorqueModel& named) {
+  const auto joints = static_cast<Index>(problem.robot.driven_count());
+  std::vector<std::vector<RegimeInput>> inputs;
+  for (Index j = 0; j < joints; ++j) inputs.push_back(inputs_of(problem.range, j));
+  std::map<std::tuple<Index, std::size_t, int>, Cell> cells;
+  const RigidChain chain(problem.robot);
+  for (std::size_t r = 0; r < problem.data.recordings.size(); ++r) {
+    if (problem.test.of_recording[r] < 0) continue;
+    for_each_tile(problem.data.recordings[r], r, problem.robot, chain, problem.data.prepare, [&](Tile& tile) {
+      const MatrixXd after = tile.own_rows(named.torque(&tile.motion));
+      const MatrixXd before = tile.own_rows(standard.torque(&tile.motion));
+      const VectorXd time = tile.own_time();
+      for (Index i = 0; i < tile.count; ++i) {
+        if (problem.test.fold(r, time[i]) < 0) continue;
+        const Index fine = (tile.first + i) * tile.stride;
+        for (Index j = 0; j < joints; ++j) {
+          const double y = tile.measured(i, j);
+          if (std::isnan(y)) continue;
+          const std::vector<RegimeInput>& list = inputs[static_cast<std::size_t>(j)];
+          for (std::size_t k = 0; k < list.size(); ++k) {
+            const RegimeInput& in = list[k];
+            const double part = (in.value(tile, fine) - in.low) / std::max(in.high - in.low, 1e-300);
+            const int bin = std::clamp(static_cast<int>(part * in.bins), 0, in.bins - 1);
+            Cell& cell = cells[{j, k, bin}];
+            cell.n += 1.0;
+            cell.standard += std::pow(y - before(i, j), 2.0);
+            cell.named += std::pow(y - after(i, j), 2.0);
+          }
+        }
+      }
+    });
+  }
+  const std::vector<std::size_t> driven = problem.robot.driven_joints();
+  std::vector<TorqueRegime> out;
+  for (const auto& [key, cell] : cells) {
+    const auto& [j, k, bin] = key;
+    const RegimeInput& in = inputs[static_cast<std::size_t>(j)][k];
+    const double width = (in.high - in.low) / in.bins;
+    out.push_back({problem.robot.joints[driven[static_cast<std::size_t>(j)]].name, in.name, in.low + bin * width,
+                   in.low + (bin + 1) * width, std::sqrt(cell.standard / cell.n), std::sqrt(cell.named / cell.n),
+                   cell.n});
+  }
+  return out;
+}
+
+std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& standard, const TorqueModel& named,
+                                   double seconds) {
+  const auto joints = static_cast<Index>(problem.robot.driven_count());
+  const std::vector<std::size_t> driven = problem.robot.driven_joints();
+  std::vector<TorqueTrace> out(static_cast<std::size_t>(joints));
+  const auto first = std::find_if(problem.test.of_recording.begin(), problem.test.of_recording.end(),
+                                  [](int of) { return of >= 0; });
+  if (first == problem.test.of_recording.end()) return {};
+  const auto r = static_cast<std::size_t>(first - problem.test.of_recording.begin());
+  double begin = -1.0;
+  const RigidChain chain(problem.robot);
+  for_each_tile(problem.data.recordings[r], r, problem.robot, chain, problem.data.prepare, [&](Tile& tile) {
+    const VectorXd time = tile.own_time();
+    if (begin >= 0.0 && time[0] > begin + seconds) return;
+    const MatrixXd nominal = tile.own_rows(problem.nominal.torque(&tile.motion));
+    const MatrixXd before = tile.own_rows(standard.torque(&tile.motion));
+    const MatrixXd after = tile.own_rows(named.torque(&tile.motion));
+    for (Index i = 0; i < tile.count; ++i) {
+      if (problem.test.fold(r, time[i]) < 0) continue;
+      if (begin < 0.0 && tile.moving.row(i).maxCoeff() > 0.0) begin = time[i];
+      if (begin < 0.0 || time[i] > begin + seconds) continue;
+      for (Index j = 0; j < joints; ++j) {
+        TorqueTrace& trace = out[static_cast<std::size_t>(j)];
+        trace.time.push_back(time[i]);
+        trace.measured.push_back(tile.measured(i, j));
+        trace.nominal.push_back(nominal(i, j));
+        trace.standard.push_back(before(i, j));
+        trace.named.push_back(after(i, j));
+      }
+    }
+  });
+  for (Index j = 0; j < joints; ++j) {
+    out[static_cast<std::size_t>(j)].recording = problem.data.recordings[r].name;
+    out[static_cast<std::size_t>(j)].joint = problem.robot.joints[driven[static_cast<std::size_t>(j)]].name;
+  }
+  return out;
+}
+
+}  // namespace truing::dynamics

@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Where the gap lies, and what it looks like along a held-out recording.
+
+#include "dynamics/problem.hpp"
+#include "rooms.hpp"
+#include "truing/dynamics/diagnose.hpp"
+
+namespace truing::dynamics {
+
+/// The gap of every joint by speed, direction, acceleration, load, angle and time, on held-out rows.
+std::vector<TorqueRegime> regimes_of(const Problem& problem, const TorqueModel& standard, const TorqueModel& named);
+
+/// At most `seconds` of the first held-out recording, every joint.
+std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& standard, const TorqueModel& named,
+                                   double seconds = 12.0);
+
+}  // namespace truing::dynamics

@@ -1,0 +1,327 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/name.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "dynamics/judge.hpp"
+#include "math/text.hpp"
+
+namespace truing::dynamics {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double kClassNats = 3.0;      ///< a rival within this many is in the class
+constexpr double kClassR2 = 0.98;       ///< so is what can make the same torque
+constexpr double kTempered = 0.5;       ///< no model is exact: half a nat counts for one
+constexpr double kBlocksOfTime = 0.9;   ///< the most that folds of one recording are worth
+
+const TorqueGroup& group_of(const TorqueDesign& design, int g) { return design.groups[static_cast<std::size_t>(g)]; }
+
+bool same_place(const TorqueGroup& a, const TorqueGroup& b) { return a.effect == b.effect && a.joints == b.joints; }
+
+/// Everything about one chosen group.
+class Naming {
+ public:
+  Naming(const TorqueDesign& design, const Sums& sums, const Sums& held_out, const Search& search, const Choice& choice)
+      : design_(design),
+        sums_(sums),
+        held_out_(held_out),
+        search_(search),
+        choice_(choice),
+        state_(search.state(choice)),
+        fit_(fit_of(sums, state_.columns, state_.precision)) {
+    squares_ = folds_and_held_out(choice);
+    standard_ = folds_and_held_out({});
+  }
+
+  const Fit& fit() const { return fit_; }
+  const Evidence::State& state() const { return state_; }
+
+  /// Fraction of the standard model's squares that the group removes, and its interval over folds and held-out rows.
+  Share share(std::size_t at) const {
+    const VectorXd less = folds_and_held_out(Search::without(choice_, at));
+    const VectorXd gain = less - squares_;
+    Share out;
+    out.value = gain.sum() / standard_.sum();
+    const auto n = static_cast<double>(gain.size());
+    const double spread = std::sqrt((gain.array() - gain.mean()).square().sum() / std::max(1.0, n - 1.0) * n);
+    out.low = out.value - 1.645 * spread / standard_.sum();
+    out.high = out.value + 1.645 * spread / standard_.sum();
+    return out;
+  }
+
+  /// Posterior of the class, and what is in it.
+  double probability(std::size_t at, std::vector<TorqueAlternative>* confounded) const {
+    const int g = choice_.groups[at];
+    const TorqueGroup& mine = group_of(design_, g);
+    const Evidence::State less = search_.state(Search::without(choice_, at));
+    const double loss = state_.score - less.score;
+    const VectorXd theta = values_of(mine);
+    std::set<std::pair<std::string, std::vector<std::string>>> seen;
+    double in_class = 1.0, outside = std::exp(-kTempered * loss);
+    std::vector<Evidence::Gain> gains = search_.evidence().gains(less);
+    std::sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
+    for (const Evidence::Gain& gain : gains) {
+      const TorqueGroup& other = group_of(design_, gain.group);
+      if (other.effect.empty() || gain.rank == 0 || is_in(gain.group) || same_place(other, mine)) continue;
+      if (!seen.insert({other.effect, other.joints}).second) continue;
+      const double behind = loss - gain.score;
+      if (behind > 25.0) break;
+      const double weight = std::exp(-kTempered * std::max(behind, 0.0));
+      const double r2 = search_.evidence().explained(less, mine.columns, theta, other.columns);
+      if (behind < kClassNats || r2 > kClassR2) {
+        confounded->push_back({other.effect, other.joints, weight});
+        in_class += weight;
+      } else {
+        outside += weight;
+      }
+    }
+    for (TorqueAlternative& alternative : *confounded) alternative.probability *= 1.0 / (in_class + outside);
+    return in_class / (in_class + outside);
+  }
+
+  VectorXd values_of(const TorqueGroup& group) const {
+    VectorXd out(static_cast<Index>(group.columns.size()));
+    for (Index k = 0; k < out.size(); ++k) out[k] = value_of(group.columns[static_cast<std::size_t>(k)]);
+    return out;
+  }
+
+  double value_of(int column) const {
+    const auto at = std::find(fit_.columns.begin(), fit_.columns.end(), column);
+    return at == fit_.columns.end() ? 0.0 : fit_.values[static_cast<Index>(at - fit_.columns.begin())];
+  }
+
+  /// In units of the joints' noise: rms of the group's torque over all rows.
+  double weighted_rms(const TorqueGroup& group) const {
+    const VectorXd theta = values_of(group);
+    const Gram gram = sums_.all.of(group.columns);
+    return std::sqrt(std::max(0.0, theta.dot(gram.xx * theta)) / std::max(1.0, sums_.all.n));
+  }
+
+ private:
+  bool is_in(int g) const {
+    return std::find(choice_.groups.begin(), choice_.groups.end(), g) != choice_.groups.end();
+  }
+
+  VectorXd folds_and_held_out(const Choice& choice) const {
+    const VectorXd folds = search_.squares_of_folds(choice);
+    VectorXd out(folds.size() + static_cast<Index>(held_out_.folds.size()));
+    out.head(folds.size()) = folds;
+    for (std::size_t f = 0; f < held_out_.folds.size(); ++f)
+      out[folds.size() + static_cast<Index>(f)] = search_.squares_on(held_out_.folds[f], choice);
+    return out;
+  }
+
+  const TorqueDesign& design_;
+  const Sums& sums_;
+  const Sums& held_out_;
+  const Search& search_;
+  const Choice& choice_;
+  Evidence::State state_;
+  Fit fit_;
+  VectorXd squares_, standard_;
+};
+
+std::string at_joints(const std::vector<std::string>& joints) {
+  if (joints.empty()) return "";
+  if (joints.size() == 2) return " at " + joints[0] + " from " + joints[1];
+  return " at " + listed(joints);
+}
+
+std::string sentence_of(const TorqueEffect& effect, const FoundTorqueEffect& found) {
+  std::string out = effect.traits.plain + at_joints(found.joints);
+  out[0] = static_cast<char>(std::toupper(out[0]));
+  std::vector<std::string> sizes;
+  for (const Parameter& p : found.parameters) {
+    if (p.frozen || sizes.size() >= 4) continue;
+    sizes.push_back(number(p.value, 3) + " +- " + number(p.sigma, 2) + " " + p.unit);
+  }
+  if (!sizes.empty() && found.parameters.size() <= 6) out += ": " + listed(sizes);
+  return out;
+}
+
+/// The joints' noise in Nm of the group's joint; of several joints the mean.
+double noise_at(const std::vector<Noise>& noise, int joint) {
+  if (joint >= 0) return noise[static_cast<std::size_t>(joint)].sigma;
+  double sum = 0.0;
+  for (const Noise& one : noise) sum += one.sigma;
+  return sum / static_cast<double>(noise.size());
+}
+
+/// What is usual, by effect: one entry for all joints.
+std::vector<FoundTorqueEffect> standard_effects(const Problem& problem, const TorqueDesign& design,
+                                                const Naming& naming, const std::vector<Noise>& noise) {
+  std::vector<FoundTorqueEffect> out;
+  if (problem.fitted_before) return out;
+  for (const TorqueGroup& group : design.groups) {
+    if (!group.standard) continue;
+    auto at = std::find_if(out.begin(), out.end(), [&](const auto& e) { return e.effect == group.effect; });
+    if (at == out.end()) {
+      FoundTorqueEffect found;
+      found.effect = group.effect;
+      found.standard = true;
+      found.probability = 1.0;
+      out.push_back(std::move(found));
+      at = out.end() - 1;
+    }
+    at->joints.insert(at->joints.end(), group.joints.begin(), group.joints.end());
+    const std::vector<Parameter> more = parameters_of(design, group.columns, naming.fit());
+    at->parameters.insert(at->parameters.end(), more.begin(), more.end());
+    at->rms = std::max(at->rms, naming.weighted_rms(group) * noise_at(noise, group.joint));
+  }
+  for (FoundTorqueEffect& found : out)
+    found.sentence = find_torque_effect(found.effect).traits.plain + " at " + listed(found.joints);
+  return out;
+}
+
+std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const TorqueDesign& design, const Naming& naming,
+                                             const Choice& choice, const std::vector<Noise>& noise,
+                                             const std::vector<TorqueEffect>& own) {
+  std::vector<FoundTorqueEffect> out;
+  for (std::size_t k = 0; k < choice.groups.size(); ++k) {
+    const TorqueGroup& group = group_of(design, choice.groups[k]);
+    FoundTorqueEffect found;
+    found.effect = group.effect;
+    found.joints = group.joints;
+    found.standard = group.standard;
+    found.probability = naming.probability(k, &found.confounded_with);
+    if (problem.single) found.probability = std::min(found.probability, kBlocksOfTime);
+    found.parameters = parameters_of(design, group.columns, naming.fit());
+    found.share = naming.share(k);
+    found.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
+    found.sentence = sentence_of(find_torque_effect(group.effect, own), found);
+    out.push_back(std::move(found));
+  }
+  std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.share.value > b.share.value; });
+  return out;
+}
+
+std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& naming, const Choice& choice,
+                                      std::size_t first, const std::vector<Noise>& noise, bool single) {
+  std::vector<UnknownTorque> out;
+  for (std::size_t k = first; k < choice.groups.size(); ++k) {
+    const TorqueGroup& group = group_of(design, choice.groups[k]);
+    UnknownTorque unknown;
+    unknown.joint = group.joints.front();
+    unknown.inputs = group.inputs;
+    unknown.share = naming.share(k);
+    const Evidence::Gain none;
+    (void)none;
+    std::vector<TorqueAlternative> ignored;
+    unknown.probability = naming.probability(k, &ignored);
+    if (single) unknown.probability = std::min(unknown.probability, kBlocksOfTime);
+    unknown.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
+    const std::vector<Parameter> knots = parameters_of(design, group.columns, naming.fit());
+    for (std::size_t i = 0; i < knots.size(); ++i)
+      unknown.curve.push_back({static_cast<double>(i), knots[i].value, knots[i].sigma});
+    out.push_back(std::move(unknown));
+  }
+  return out;
+}
+
+/// Named by how much of the joints' squared error, each joint alike.
+double mean_square(const TorqueErrors& errors, const TorqueErrors& of) {
+  double sum = 0.0, n = 0.0;
+  for (std::size_t j = 0; j < errors.held_out.size(); ++j) {
+    if (!(of.held_out[j].rms > 0.0)) continue;
+    sum += std::pow(errors.held_out[j].rms / of.held_out[j].rms, 2.0);
+    n += 1.0;
+  }
+  return n > 0.0 ? sum / n : 1.0;
+}
+
+std::string verdict_sentence(const TorqueDiagnosis& d, bool fitted_before) {
+  const auto percent = [](double part) { return number(std::round(100.0 * part), 3) + " %"; };
+  const double left = std::sqrt(mean_square(d.errors[2], d.errors[1]));
+  std::vector<std::string> causes;
+  for (const FoundTorqueEffect& e : d.effects) {
+    if (e.standard && !fitted_before) continue;
+    if (causes.size() == 3) break;
+    causes.push_back(find_torque_effect(e.effect).traits.plain + at_joints(e.joints));
+  }
+  const std::string beside = fitted_before ? "the robot's model" : "standard practice (inertias, Coulomb, viscous, offset)";
+  if (d.verdict == Verdict::does_not_hold) return "What was found does not hold on recordings it never saw.";
+  if (causes.empty()) {
+    return d.unknown.empty() ? "No gap beyond noise is left by " + beside + "."
+                             : "What " + beside + " leaves goes with inputs that no known effect explains.";
+  }
+  std::size_t more = 0;
+  for (const FoundTorqueEffect& e : d.effects) more += (e.standard && !fitted_before) ? 0u : 1u;
+  std::string out = "The error that " + beside + " leaves shrinks by " + percent(1.0 - left) + ": ";
+  std::string text;
+  for (const std::string& cause : causes) text += (text.empty() ? "" : "; ") + cause;
+  out += text;
+  if (more > causes.size()) out += "; and " + std::to_string(more - causes.size()) + " smaller";
+  return out + ".";
+}
+
+Verdict verdict_of(const TorqueDiagnosis& d, bool any) {
+  if (any && mean_square(d.errors[2], d.errors[1]) > 1.0) return Verdict::does_not_hold;
+  if (any) return d.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown;
+  return d.unknown.empty() ? Verdict::none : Verdict::unknown;
+}
+
+std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effects) {
+  std::vector<TorqueClass> out;
+  const auto name = [](const std::string& effect, const std::vector<std::string>& joints) {
+    std::string text = effect;
+    for (std::size_t k = 0; k < joints.size(); ++k) text += (k == 0 ? ":" : "+") + joints[k];
+    return text;
+  };
+  for (const FoundTorqueEffect& found : effects) {
+    if (found.confounded_with.empty()) continue;
+    TorqueClass one;
+    one.effects.push_back(name(found.effect, found.joints));
+    for (const TorqueAlternative& other : found.confounded_with) one.effects.push_back(name(other.effect, other.joints));
+    one.sentence = "These recordings cannot tell apart: " + listed(one.effects);
+    out.push_back(std::move(one));
+  }
+  return out;
+}
+
+}  // namespace
+
+TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const TorqueDesign& design,
+                      const Sums& sums, const Sums& held_out, const Search& search, const Choice& choice,
+                      const Choice& with_unknown, const TorqueModel& model, const TorqueModel& model_with_unknown,
+                      const std::vector<Noise>& noise) {
+  const Naming naming(design, sums, held_out, search, choice);
+  TorqueDiagnosis out;
+  out.effects = found_effects(problem, design, naming, choice, noise, {});
+  const bool any = !out.effects.empty();
+  if (with_unknown.groups.size() > choice.groups.size()) {
+    const Naming all(design, sums, held_out, search, with_unknown);
+    out.unknown = unknown_of(design, all, with_unknown, choice.groups.size(), noise, problem.single);
+  }
+  for (FoundTorqueEffect& standard : standard_effects(problem, design, naming, noise))
+    out.effects.push_back(std::move(standard));
+  out.errors = errors_of(problem, {{"nominal", problem.nominal},
+                                   {"standard", groundwork.model},
+                                   {"named", model},
+                                   {"with_unknown", model_with_unknown}});
+  out.verdict = verdict_of(out, any);
+  out.sentence = verdict_sentence(out, problem.fitted_before);
+  out.where = regimes_of(problem, groundwork.model, model);
+  out.classes = classes_of(out.effects);
+  out.not_testable = design.not_testable;
+  out.traces = traces_of(problem, groundwork.model, model);
+  out.cutoff = problem.data.prepare.cutoff;
+  for (const Noise& one : noise) out.design_effect.push_back(one.design_effect);
+  out.held_out = problem.held_out;
+  std::vector<int> groups = choice.groups;
+  if (!problem.fitted_before) {
+    for (std::size_t g = 0; g < design.groups.size(); ++g)
+      if (design.groups[g].standard) groups.push_back(static_cast<int>(g));
+  }
+  std::sort(groups.begin(), groups.end());
+  out.robot = applied(problem.robot, design, groups, naming.fit(), problem.range);
+  out.warnings = problem.warnings;
+  return out;
+}
+
+}  // namespace truing::dynamics
