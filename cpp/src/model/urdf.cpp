@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
@@ -23,6 +24,7 @@ using namespace model;
 namespace {
 
 using Eigen::Isometry3d;
+using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr const char* tool_link = "truing_tool";
@@ -141,25 +143,34 @@ std::vector<urdf::JointConstSharedPtr> joints_between(const urdf::ModelInterface
   return path;
 }
 
-// Mass and first moment of a link and of all that is fixed to it, side branches too (a motor, a camera), in
-// the frame of the link that `T` was started from. What hangs on a further moving joint off the chain is left
-// out: where it is, is not known.
-struct Load {
-  bool known = false;
-  double mass = 0.0;
-  Vector3d moment = Vector3d::Zero();
+// A link and all that is fixed to it, side branches too (a motor, a camera), in the frame of the link that `T` was
+// started from. What hangs on a further moving joint off the chain is left out: where it is, is not known.
+struct Body {
+  double mass;
+  Vector3d center;   ///< of mass
+  Matrix3d inertia;  ///< about it
 };
 
-void add_load(const urdf::ModelInterface& model, const urdf::Link& link, const Isometry3d& T, Load& load) {
-  if (link.inertial) {
-    load.known = true;
-    load.mass += link.inertial->mass;
-    load.moment += link.inertial->mass * (T * vector_of(link.inertial->origin.position));
-  }
+Matrix3d symmetric(const Matrix3d& I) { return 0.5 * (I + I.transpose()); }
+
+Body body_of(const urdf::Inertial& inertial, const Isometry3d& T) {
+  Matrix3d I;
+  I << inertial.ixx, inertial.ixy, inertial.ixz,  //
+      inertial.ixy, inertial.iyy, inertial.iyz,   //
+      inertial.ixz, inertial.iyz, inertial.izz;
+  const Isometry3d T_link_body = T * frame_of(inertial.origin);
+  const Matrix3d R = T_link_body.linear();
+  // What is not turned keeps its digits.
+  return {inertial.mass, T_link_body.translation(), R.isIdentity(0.0) ? I : symmetric(R * I * R.transpose())};
+}
+
+void collect_bodies(const urdf::ModelInterface& model, const urdf::Link& link, const Isometry3d& T,
+                    std::vector<Body>* bodies) {
+  if (link.inertial) bodies->push_back(body_of(*link.inertial, T));
   for (const urdf::JointSharedPtr& joint : link.child_joints) {
     if (joint->type != urdf::Joint::FIXED) continue;
-    add_load(model, *model.getLink(joint->child_link_name), T * frame_of(joint->parent_to_joint_origin_transform),
-             load);
+    collect_bodies(model, *model.getLink(joint->child_link_name), T * frame_of(joint->parent_to_joint_origin_transform),
+                   bodies);
   }
 }
 
@@ -202,12 +213,37 @@ void take_mimic(const urdf::Joint& source, Joint& joint) {
   joint.offset = source.mimic->offset;
 }
 
-void take_mass(const urdf::ModelInterface& model, const urdf::Link& link, Joint& joint) {
-  Load load;
-  add_load(model, link, Isometry3d::Identity(), load);
-  if (!load.known) return;
-  joint.mass = load.mass;
-  if (load.mass > 0.0) joint.center_of_mass = load.moment / load.mass;
+void take_inertia(const urdf::ModelInterface& model, const urdf::Link& link, Joint& joint) {
+  std::vector<Body> bodies;
+  collect_bodies(model, link, Isometry3d::Identity(), &bodies);
+  if (bodies.empty()) return;
+  double mass = 0.0;
+  Vector3d moment = Vector3d::Zero();
+  for (const Body& body : bodies) {
+    mass += body.mass;
+    moment += body.mass * body.center;
+  }
+  joint.mass = mass;
+  if (bodies.size() == 1)
+    joint.center_of_mass = bodies.front().center;
+  else if (mass > 0.0)
+    joint.center_of_mass = moment / mass;
+  // Steiner: from each centre of mass to the common one.
+  Matrix3d inertia = Matrix3d::Zero();
+  for (const Body& body : bodies) {
+    const Vector3d r = body.center - joint.center_of_mass;
+    inertia += body.inertia + body.mass * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose());
+  }
+  joint.inertia = symmetric(inertia);
+}
+
+// urdfdom wants both limits stated, so a file that knows none writes zero, or -1 as in SDF.
+double stated_limit(double value) { return value > 0.0 ? value : std::numeric_limits<double>::infinity(); }
+
+void take_drive_limits(const urdf::Joint& source, Joint& joint) {
+  if (!source.limits) return;
+  joint.speed_limit = stated_limit(source.limits->velocity);
+  joint.torque_limit = stated_limit(source.limits->effort);
 }
 
 // What a URDF says about the chain, with what it takes to write it back.
@@ -230,6 +266,34 @@ void require_drivers_in_chain(const Robot& robot) {
   }
 }
 
+void add_friction(const char* effect, const std::string& joint, double value, Robot& robot) {
+  if (value == 0.0) return;
+  robot.torque_effects.push_back({effect, {joint}, {{effect + ("." + joint), value}}});
+}
+
+// <dynamics> of every joint, at the reading that moves it: a joint that mimics moves by w times its reading, and there
+// its friction counts |w| times, its damping w^2 (virtual work).
+void take_friction(const std::vector<urdf::JointConstSharedPtr>& sources, Robot& robot) {
+  const auto n = static_cast<Eigen::Index>(sources.size());
+  Eigen::VectorXd coulomb = Eigen::VectorXd::Zero(n), viscous = Eigen::VectorXd::Zero(n);
+  const Eigen::MatrixXd coupling = coupling_matrix(robot);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const urdf::JointConstSharedPtr& source = sources[static_cast<std::size_t>(i)];
+    if (!source->dynamics) continue;
+    for (const std::size_t index : robot.driven_joints()) {
+      const auto k = static_cast<Eigen::Index>(index);
+      const double w = coupling(i, k);
+      coulomb[k] += std::abs(w) * source->dynamics->friction;
+      viscous[k] += w * w * source->dynamics->damping;
+    }
+  }
+  for (const std::size_t index : robot.driven_joints()) {
+    const std::string& joint = robot.joints[index].name;
+    add_friction("coulomb", joint, coulomb[static_cast<Eigen::Index>(index)], robot);
+    add_friction("viscous", joint, viscous[static_cast<Eigen::Index>(index)], robot);
+  }
+}
+
 Chain read_chain(const std::string& urdf_text, const std::string& base_link, const std::string& tip_link) {
   const urdf::ModelInterfaceSharedPtr model = parse(urdf_text);
   const urdf::LinkConstSharedPtr base = base_link.empty() ? model->getRoot() : link_named(*model, base_link, "base");
@@ -240,6 +304,7 @@ Chain read_chain(const std::string& urdf_text, const std::string& base_link, con
   chain.robot.name = model->getName();
   chain.robot.convention = Convention::urdf;
   Isometry3d T_link_parent = Isometry3d::Identity();
+  std::vector<urdf::JointConstSharedPtr> sources;
   for (const urdf::JointConstSharedPtr& source : joints_between(*model, *base, *tip)) {
     const Isometry3d T_parent_joint = frame_of(source->parent_to_joint_origin_transform);
     if (source->type == urdf::Joint::FIXED) {
@@ -253,8 +318,10 @@ Chain read_chain(const std::string& urdf_text, const std::string& base_link, con
     take_axis(*source, joint);
     take_limits(*source, joint);
     take_mimic(*source, joint);
-    take_mass(*model, *model->getLink(source->child_link_name), joint);
+    take_inertia(*model, *model->getLink(source->child_link_name), joint);
+    take_drive_limits(*source, joint);
     chain.robot.joints.push_back(joint);
+    sources.push_back(source);
     chain.T_link_parent.push_back(T_link_parent);
     chain.last_link = source->child_link_name;
     T_link_parent = Isometry3d::Identity();
@@ -265,6 +332,8 @@ Chain read_chain(const std::string& urdf_text, const std::string& base_link, con
   }
   chain.robot.targets = {{"tool", T_link_parent}};
   require_drivers_in_chain(chain.robot);
+  validate(chain.robot);
+  take_friction(sources, chain.robot);
   validate(chain.robot);
   return chain;
 }

@@ -10,8 +10,8 @@ void bind_urdf(py::module_& m) {
   m.def("robot_from_urdf", &robot_from_urdf, py::arg("urdf_text"), py::arg("base_link") = "", py::arg("tip_link") = "",
         R"(The chain from `base_link` to `tip_link` of a URDF text, as a robot of convention 'urdf'.
 
-Fixed joints are folded into the next moving joint, the last ones into the tool; link masses are merged the same way;
-`mimic` becomes `driven_by`. Empty link names: the only root, the only leaf.
+Fixed joints are folded into the next moving joint, the last ones into the tool; masses and inertias of links are
+merged the same way; `mimic` becomes `driven_by`, `<dynamics>` the torque effects coulomb and viscous. Empty link names: the only root, the only leaf.
 Raises InputError: not a URDF, unknown base or tip (lists the links there are), tip not below base, planar or
 floating joint.)");
   m.def("urdf_with_calibration", &urdf_with_calibration, py::arg("urdf_text"), py::arg("calibrated"),

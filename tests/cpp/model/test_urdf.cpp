@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <map>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -191,6 +192,89 @@ TEST_CASE("masses fixed to a moving link are merged, what moves on a branch is n
   CHECK((robot.joints[0].center_of_mass - expected).norm() < 1e-15);
   CHECK(!robot.joints[1].mass);
   CHECK(!robot.joints[3].mass);
+}
+
+namespace {
+
+/// Two links, the second fixed to the first; `joint` goes into the moving joint, `last` behind it.
+std::string two_links(const std::string& first, const std::string& second, const std::string& joint = "",
+                      const std::string& last = "") {
+  return R"(<robot name="r"><link name="l0"/><link name="l1">)" + first + R"(</link><link name="l2">)" + second +
+         R"(</link><joint name="j" type="revolute"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/>)" + joint +
+         R"(</joint><joint name="f" type="fixed"><parent link="l1"/><child link="l2"/>
+         <origin xyz="-2 0 0" rpy="1.5707963267948966 0 0"/></joint>)" +
+         last + "</robot>";
+}
+
+std::string inertial(const std::string& origin, const std::string& mass, const std::string& xx, const std::string& yy,
+                     const std::string& zz) {
+  return "<inertial>" + origin + "<mass value=\"" + mass + "\"/><inertia ixx=\"" + xx + "\" iyy=\"" + yy + "\" izz=\"" +
+         zz + "\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>";
+}
+
+const char* const no_limits = R"(<limit lower="-1" upper="1" effort="0" velocity="0"/>)";
+
+}  // namespace
+
+TEST_CASE("inertias of links fixed to each other are turned and merged about the common centre of mass") {
+  const std::string point = inertial("", "1", "0", "0", "0");
+  const Robot dumbbell = truing::robot_from_urdf(two_links(point, point, no_limits));
+  REQUIRE(dumbbell.joints[0].inertia);
+  CHECK((dumbbell.joints[0].center_of_mass - Vector3d(-1, 0, 0)).norm() < 1e-15);
+  CHECK((*dumbbell.joints[0].inertia - Matrix3d(Vector3d(0, 2, 2).asDiagonal())).norm() < 1e-15);
+
+  // A quarter turn about z trades x for y, that of the fixed joint about x then y for z.
+  const std::string turned = inertial(R"(<origin xyz="0 0 0" rpy="0 0 1.5707963267948966"/>)", "0", "1", "2", "3");
+  const Robot one = truing::robot_from_urdf(two_links(turned, "", no_limits));
+  CHECK((*one.joints[0].inertia - Matrix3d(Vector3d(2, 1, 3).asDiagonal())).norm() < 1e-15);
+  const Robot other = truing::robot_from_urdf(two_links("", turned, no_limits));
+  CHECK((*other.joints[0].inertia - Matrix3d(Vector3d(2, 3, 1).asDiagonal())).norm() < 1e-15);
+  CHECK(*other.joints[0].inertia == other.joints[0].inertia->transpose());
+}
+
+TEST_CASE("a link without inertial has no mass and no inertia") {
+  const Robot robot = truing::robot_from_urdf(two_links("", "", no_limits));
+  CHECK(!robot.joints[0].mass);
+  CHECK(!robot.joints[0].inertia);
+}
+
+TEST_CASE("limits of speed and torque come over, zero or less is none") {
+  const Robot stated =
+      truing::robot_from_urdf(two_links("", "", R"(<limit lower="-1" upper="1" effort="330" velocity="3.14"/>)"));
+  CHECK(stated.joints[0].speed_limit == 3.14);
+  CHECK(stated.joints[0].torque_limit == 330.0);
+  for (const char* none : {"0", "-1"}) {
+    const std::string limit = std::string("<limit lower=\"-1\" upper=\"1\" effort=\"") + none + "\" velocity=\"" + none;
+    const Robot robot = truing::robot_from_urdf(two_links("", "", limit + "\"/>"));
+    CHECK(std::isinf(robot.joints[0].speed_limit));
+    CHECK(std::isinf(robot.joints[0].torque_limit));
+  }
+}
+
+TEST_CASE("stated friction and damping become torque effects, zeros none") {
+  const auto effects = [](const std::string& joint, const std::string& last = "") {
+    std::map<std::string, double> out;
+    for (const truing::AppliedEffect& e :
+         truing::robot_from_urdf(two_links("", "", no_limits + joint, last), "", "").torque_effects) {
+      REQUIRE(e.parameters.size() == 1);
+      CHECK(e.joints == std::vector<std::string>{"j"});
+      CHECK(e.parameters.begin()->first == e.effect + ".j");
+      out[e.effect] = e.parameters.begin()->second;
+    }
+    return out;
+  };
+  using Found = std::map<std::string, double>;
+  CHECK(effects("") == Found{});
+  CHECK(effects(R"(<dynamics damping="0" friction="0.0"/>)") == Found{});
+  CHECK(effects(R"(<dynamics damping="0.5"/>)") == Found{{"viscous", 0.5}});
+  CHECK(effects(R"(<dynamics friction="2" damping="0.5"/>)") == Found{{"coulomb", 2.0}, {"viscous", 0.5}});
+  // A joint that mimics at -3 times: its drive is the other's.
+  const std::string mimic = R"(<link name="l3"/><joint name="m" type="revolute"><parent link="l2"/><child link="l3"/>
+      <limit lower="-1" upper="1" effort="0" velocity="0"/><dynamics friction="1" damping="0.1"/>
+      <mimic joint="j" multiplier="-3"/></joint>)";
+  const Found found = effects(R"(<dynamics friction="2" damping="0.5"/>)", mimic);
+  CHECK(found.at("coulomb") == 5.0);
+  CHECK(std::abs(found.at("viscous") - 1.4) < 1e-15);
 }
 
 TEST_CASE("without names the only root and the only leaf are taken") {

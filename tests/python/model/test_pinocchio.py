@@ -4,6 +4,10 @@
 
 from __future__ import annotations
 
+import os
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -179,3 +183,48 @@ def test_exported_joint_zeros_are_turned_about_oblique_axes(both: Both) -> None:
     for reading in readings(both, 30, seed=11):
         ours = truing.forward_kinematics(robot, reading)[-1]
         np.testing.assert_allclose(ours, exported.frames(reading)[-1], rtol=0, atol=1e-12)
+
+
+# ---- Inertias ------------------------------------------------------------------------------------
+
+PUBLISHED = ("dyn_ur10e", "dyn_tx40", "dyn_ur10")
+
+
+def skewed_inertias(text: str) -> str:
+    """The URDF with an inertia of its own for every link: turned, off the axes, of another mass."""
+    random = np.random.default_rng(6)
+
+    def inertial(_: re.Match[str]) -> str:
+        A = random.normal(size=(3, 3))
+        xx, xy, xz, _yx, yy, yz, _zx, _zy, zz = (A @ A.T).ravel()
+        xyz, rpy = random.normal(size=3), random.uniform(-3, 3, 3)
+        return (
+            f'<inertial><origin xyz="{" ".join(map(str, xyz))}" rpy="{" ".join(map(str, rpy))}"/>'
+            f'<mass value="{random.uniform(0.1, 5.0)}"/>'
+            f'<inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="{xy}" ixz="{xz}" iyz="{yz}"/></inertial>'
+        )
+
+    return re.sub(r"<inertial>.*?</inertial>", inertial, text, flags=re.DOTALL)
+
+
+def assert_inertias_are_pinocchios(text: str) -> None:
+    both = Both.read(text)
+    for joint in both.robot.joints:
+        theirs = both.model.inertias[both.model.getJointId(joint.name)]
+        assert joint.mass == pytest.approx(theirs.mass, rel=1e-14)
+        np.testing.assert_allclose(joint.center_of_mass, theirs.lever, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(joint.inertia, theirs.inertia, rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", sorted(ROBOTS))
+def test_merged_inertias_are_pinocchios(name: str) -> None:
+    assert_inertias_are_pinocchios(skewed_inertias(ROBOTS[name]))
+
+
+@pytest.mark.realdata
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_inertias_of_published_urdfs_are_pinocchios(name: str) -> None:
+    path = Path(os.environ.get("TRUING_REALDATA", "")) / name / "robot.urdf"
+    if not path.exists():
+        pytest.skip(f"{name} is not there: set TRUING_REALDATA to the folder of recordings")
+    assert_inertias_are_pinocchios(path.read_text())
