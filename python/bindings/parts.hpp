@@ -12,6 +12,7 @@ void bind_robot(py::module_& m);
 void bind_measurement(py::module_& m);
 void bind_effect_traits(py::module_& m);
 void bind_effect(py::module_& m);
+void bind_motion_recording(py::module_& m);
 void bind_urdf(py::module_& m);
 void bind_torque_regressor(py::module_& m);
 void bind_scene(py::module_& m);

@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'torque_regressor', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -904,6 +904,85 @@ class OwnEffect:
     def traits(self) -> EffectTraits:
         """
         What it says of itself.
+        """
+class Recording:
+    """
+    A recording of motion: one file, one fold. It does not change; `replace` makes another.
+    
+    Arrays are copied. Tables have a column for each joint that has a reading, in chain order. A table that was not recorded
+    is left out, and then has the shape (n, 0); a joint that was not recorded is NaN throughout.
+    Raises InputError naming the array when shapes or types do not fit; `validate_recording` checks the values.
+    """
+    def __init__(self, name: str, *, time: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, speed: numpy.typing.ArrayLike | None = None, torque: numpy.typing.ArrayLike | None = None, current: numpy.typing.ArrayLike | None = None, command: numpy.typing.ArrayLike | None = None, speed_command: numpy.typing.ArrayLike | None = None, torque_command: numpy.typing.ArrayLike | None = None, columns: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, test: bool = False) -> None:
+        ...
+    def __len__(self) -> int:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> Recording:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> Recording:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def columns(self) -> types.MappingProxyType[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        Shape=(n,) each, by name: 'payload_kg', 'temp1_C' … or 'temp_C', 'volt_V', 'enabled', and one's own.
+        """
+    @property
+    def command(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [rad | m] positions commanded, if they were recorded.
+        """
+    @property
+    def current(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [A] of the drives, measured, if it was.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Of the file, in messages and results.
+        """
+    @property
+    def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [rad | m] as read.
+        """
+    @property
+    def speed(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [rad/s | m/s] as recorded, if it was.
+        """
+    @property
+    def speed_command(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [rad/s | m/s] speeds commanded, if they were recorded.
+        """
+    @property
+    def test(self) -> bool:
+        """
+        Held out: it is judged on, and never fitted to.
+        """
+    @property
+    def time(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shape=(n,) [s], increasing.
+        """
+    @property
+    def torque(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [Nm | N] of the drives, measured, if it was.
+        """
+    @property
+    def torque_command(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [Nm | N] torques commanded, if they were recorded.
         """
 class Obstacle:
     """
@@ -6739,6 +6818,13 @@ def validate_measurements(data: Measurements, robot: Robot, joints_only: bool = 
     
     Checked are: counts that do not fit the robot, joints or inputs that are not finite, a row without any measurement
     (unless `joints_only`), half a position, a quaternion that is not of unit length, directions, sigmas.
+    """
+def validate_recording(recording: Recording, robot: Robot) -> None:
+    """
+    Raises InputError naming the recording, the column (q2, tau3) and the row, counted from 1.
+    
+    Checked are: tables of another shape, times that do not increase, values that are not finite (but for joints that are
+    NaN throughout, which a position must not be) or beyond 1e12, fewer than 20 rows.
     """
 def validate_robot(robot: Robot) -> None:
     """

@@ -5,7 +5,8 @@
 
 #include "truing/compensate.hpp"
 #include "truing/diagnose.hpp"
-#include "truing/dynamics/regressor.hpp"
+#include "truing/dynamics/effect.hpp"
+#include "truing/dynamics/recording.hpp"
 #include "truing/handeye.hpp"
 #include "truing/identify.hpp"
 #include "truing/inverse.hpp"

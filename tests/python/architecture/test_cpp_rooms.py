@@ -46,7 +46,7 @@ PUBLIC_OF = {
         "truing/inverse.hpp",
         "truing/compensate.hpp",
     ),
-    "dynamics": (*COMMON, MODEL, "truing/dynamics/"),
+    "dynamics": (*COMMON, MODEL, "truing/identify.hpp", "truing/diagnose.hpp", "truing/dynamics/"),
     "hand_eye": (*COMMON, MODEL, "truing/identify.hpp", "truing/handeye.hpp"),
     "tracking": (
         *COMMON,
@@ -101,8 +101,9 @@ def room_of(file: str) -> str:
         return "math"
     if file.startswith(MODEL):
         return "model"
-    folder = file.split("/")[1]
-    return folder if folder in ROOMS else ROOM_OF_PUBLIC[file]
+    if file.startswith(("truing/tracking/", "truing/dynamics/")):
+        return file.split("/")[1]
+    return ROOM_OF_PUBLIC[file]
 
 
 def includes(path: Path) -> Iterator[tuple[str, str]]:

@@ -31,8 +31,9 @@ struct Recording {
   std::size_t rows() const { return static_cast<std::size_t>(time.size()); }
 };
 
-/// Throws std::invalid_argument that names the recording, the column and the row: tables of another shape, times that
-/// do not increase, values that are not finite (but for joints that are NaN throughout), fewer than 20 rows.
+/// Throws std::invalid_argument that names the recording, the column (as files have it, without its unit: q2, tau3) and
+/// the row, counted from 1: tables of another shape, times that do not increase, values that are not finite (but for
+/// joints that are NaN throughout, which a position must not be) or beyond 1e12, fewer than 20 rows.
 void validate(const Recording& recording, const Robot& robot);
 
 }  // namespace truing
