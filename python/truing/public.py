@@ -9,6 +9,7 @@ verb takes, and what it returns, are in that verb's room.
 from truing import (
     common as common,
     diagnosis as diagnosis,
+    dynamics as dynamics,
     examples as examples,
     files as files,
     hand_eye as hand_eye,

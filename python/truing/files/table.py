@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import csv
 import math
+import mmap
 import re
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 import pyarrow as pa
@@ -31,6 +32,7 @@ Floats = NDArray[np.float64]
 Codes = NDArray[np.int32]
 
 _PARQUET_MAGIC = b"PAR1"
+_MARK = b"\xef\xbb\xbf"  # of UTF-8 text, before its first line
 _LONGEST_HEADER = 1_000_000
 _MOST_COLUMNS = 2000
 _MOST_CELLS = 200_000_000  # 1.6 GB of doubles
@@ -45,18 +47,23 @@ _NUMBER = re.compile(
 
 
 class Table:
-    """A table on disk. `names` is known at once; `read` loads it; then columns are taken out one by one."""
+    """A table on disk. `names` is known at once; `read` loads it; then columns are taken out one by one.
 
-    def __init__(self, path: Path) -> None:
+    comments: lines of a CSV file that begin with # are passed over.
+    """
+
+    def __init__(self, path: Path, *, comments: bool = False) -> None:
         self.path = path
         self.rows = 0
         self._columns: dict[str, Any] = {}
+        self._comments = comments
+        self._header = 1  # line of the column names
         require_whole_file(path)
         try:
             with path.open("rb") as file:
                 head = file.read(65536)
                 file.seek(0)
-                first_line = file.readline(_LONGEST_HEADER)
+                first_line = self._header_line(file)
         except (OSError, ValueError) as error:
             raise InputError(f"{path}: cannot be read: {reason(error)}") from None
         if not head.strip():
@@ -166,8 +173,16 @@ class Table:
 
     # ---- Names
 
+    def _header_line(self, file: BinaryIO) -> bytes:
+        """The line of the column names: the first one, comments aside."""
+        line = file.readline(_LONGEST_HEADER)
+        while self._comments and line.removeprefix(_MARK).startswith(b"#") and line.endswith(b"\n"):
+            line = file.readline(_LONGEST_HEADER)
+            self._header += 1
+        return line
+
     def _check_names(self) -> None:
-        where = self.path if self._is_parquet else f"{self.path}, line 1"
+        where = self.path if self._is_parquet else f"{self.path}, line {self._header}"
         if len(self.names) == 1:
             for separator, called in ((";", "semicolons"), ("\t", "tabs")):
                 if separator in self.names[0]:
@@ -205,18 +220,18 @@ class Table:
         decoded(self.path, head[: head.rfind(b"\n") + 1] or head)  # binary or of another encoding?
         if len(first_line) >= _LONGEST_HEADER:
             raise InputError(
-                f"{self.path}, line 1: has more than {_LONGEST_HEADER} characters, expected column names"
+                f"{self.path}, line {self._header}: has more than {_LONGEST_HEADER} characters, expected column names"
             )
         line = re.split(r"[\r\n]", decoded(self.path, first_line))[0]
         if not line.strip():
-            raise InputError(f"{self.path}, line 1: is blank, expected column names")
+            raise InputError(f"{self.path}, line {self._header}: is blank, expected column names")
         if line.count('"') % 2:
-            raise InputError(f"{self.path}, line 1: a quotation mark is not closed")
+            raise InputError(f"{self.path}, line {self._header}: a quotation mark is not closed")
         try:
             return [name.strip() for name in next(csv.reader([line]))]
         except (csv.Error, StopIteration) as error:
             raise InputError(
-                f"{self.path}, line 1: expected column names, separated by commas ({error})"
+                f"{self.path}, line {self._header}: expected column names, separated by commas ({error})"
             ) from None
 
     # ---- Loading
@@ -246,12 +261,13 @@ class Table:
         if self.path.stat().st_size > _LARGEST_CSV:
             self.refuse(f"has more than {_LARGEST_CSV // 10**9} GB: take every n-th row")
         # The header is skipped, not parsed again: Arrow would leave spaces around the names.
-        read = pa.csv.ReadOptions(column_names=self.names, skip_rows=1)
+        source, above = self._without_comments()
+        read = pa.csv.ReadOptions(column_names=self.names, skip_rows=above)
         convert = pa.csv.ConvertOptions(
             column_types=types, null_values=_EMPTY, true_values=[], false_values=[]
         )
         try:
-            return pa.csv.read_csv(str(self.path), read_options=read, convert_options=convert)
+            return pa.csv.read_csv(source, read_options=read, convert_options=convert)
         except (pa.ArrowException, OSError, ValueError) as error:
             complaint = reason(error)
         if "Empty CSV file" in complaint or "Could not skip initial" in complaint:
@@ -259,14 +275,28 @@ class Table:
         self._find_fault(numbers)
         raise InputError(f"{self.path}: cannot be read as a table: {complaint[:200]}")
 
+    def _without_comments(self) -> tuple[Any, int]:
+        """What Arrow reads, and how many lines it skips at the top."""
+        if not self._comments:
+            return str(self.path), 1
+        with self.path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            if data.find(b"\n#") < 0 and self._header == 1:
+                return str(self.path), 1
+            kept = re.sub(rb"(?m)^#.*\n?", b"", data[:].removeprefix(_MARK))
+        return pa.BufferReader(kept), 1
+
     def _csv_lines(self) -> Iterator[tuple[int, list[str]]]:
         """Line number and cells of every row, the slow way."""
         with self.path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+            for _ in range(self._header - 1):
+                file.readline()
             reader = csv.reader(file)
             next(reader)
             for cells in reader:
+                if cells and self._comments and cells[0].startswith("#"):
+                    continue
                 if cells:  # Arrow passes over blank lines, too
-                    yield reader.line_num, cells
+                    yield self._header - 1 + reader.line_num, cells
 
     def _find_fault(self, numbers: Collection[str]) -> None:
         """Raises InputError for the first line with a wrong number of cells, or without a number where one

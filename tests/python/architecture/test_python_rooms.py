@@ -36,6 +36,7 @@ ROOMS: dict[str, set[str]] = {
     "diagnosis": BASIC | {"identification"},
     "hand_eye": BASIC | {"identification"},
     "inverse_kinematics": BASIC,
+    "dynamics": BASIC,
     "tracking": BASIC | {"hand_eye"},
     "testing": BASIC,
     "exam": {"truing", "model", "report"},  # of both only what test_exam.py allows
@@ -61,6 +62,9 @@ FLOORS = {
         "handeye_file",
         "robot_file",
         "measurement_file",
+        "recording_parts",
+        "recording_table",
+        "recording_file",
         "scene_file",
         "stream_file",
         "target_file",

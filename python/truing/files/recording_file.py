@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Recordings of motion, from whatever file they are in."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from truing import _core
+from truing.errors import InputError
+from truing.files.common import PathLike, shown
+from truing.files.recording_parts import split_joints
+from truing.files.recording_table import read_table
+
+_WILD = "*?["
+
+
+def load_recordings(
+    paths: PathLike | Sequence[PathLike], robot: _core.Robot, *, joints: Sequence[str] | str | None = None
+) -> tuple[_core.Recording, ...]:
+    """Read recordings of motion of `robot`: CSV or Parquet files, or patterns such as "runs/*.csv".
+
+    One file is one recording, called as the file without its ending. Columns, with their unit in the name:
+    t_s; q1_rad ... for the joints that have a reading, in chain order; where there, qd1_rad_s ...,
+    tau1_Nm ... or i1_A ..., u1_rad ... or u1_Nm ..., ud1_rad_s ..., payload_kg, temp1_C or temp_C, volt_V,
+    enabled, set. Any other column of numbers is kept in `Recording.columns` under its name. Lines that begin
+    with # are comments. Stamps since 1970 are counted from the first row on. Where `set` changes within a
+    file, each run of rows is a recording of its own: name#1, name#2.
+
+    joints: which of the robot's joints each number of the file is, in the file's order, "-" for none; absent:
+    the file has the robot's joints in chain order.
+    Raises InputError that names the file, the line, the column, what was found and what was expected. Warns
+    (InputWarning) of columns without a meaning of their own that are left out, as they have gaps.
+    """
+    names = split_joints(joints)
+    found = _expanded([paths] if isinstance(paths, (str, os.PathLike)) else list(paths))
+    out: list[_core.Recording] = []
+    for path, name in zip(found, _names(found), strict=True):
+        out += read_table(path, name, robot, names)
+    return tuple(out)
+
+
+def _expanded(paths: Sequence[PathLike]) -> list[Path]:
+    """The files that are meant, patterns filled in, each once."""
+    found: list[Path] = []
+    for given in paths:
+        path = Path(given)
+        if any(sign in str(given) for sign in _WILD) and not path.exists():
+            matches = sorted(glob.glob(str(given), recursive=True))
+            if not matches:
+                raise InputError(f"{shown(str(given))}: no file matches this pattern")
+            found += [Path(match) for match in matches]
+        else:
+            found.append(path)
+    if not found:
+        raise InputError("no recordings are given: expected at least one file")
+    for path, count in Counter(path.resolve() for path in found).items():
+        if count > 1:
+            raise InputError(f"{path}: is given {count} times: a recording counts once")
+    return found
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """What the recordings are called: the file without its ending, with its folders where that is not unique."""
+    stems = Counter(path.stem for path in paths)
+    return [path.stem if stems[path.stem] == 1 else path.as_posix() for path in paths]
