@@ -7,12 +7,13 @@ from __future__ import annotations
 import glob
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from truing import _core
 from truing.errors import InputError
-from truing.files.common import PathLike, shown
+from truing.files.common import PathLike, listed, shown
+from truing.files.recording_bag import is_bag, read_bag
 from truing.files.recording_parts import split_joints
 from truing.files.recording_table import read_table
 
@@ -20,9 +21,14 @@ _WILD = "*?["
 
 
 def load_recordings(
-    paths: PathLike | Sequence[PathLike], robot: _core.Robot, *, joints: Sequence[str] | str | None = None
+    paths: PathLike | Sequence[PathLike],
+    robot: _core.Robot,
+    *,
+    joints: Sequence[str] | str | None = None,
+    topic: str | None = None,
 ) -> tuple[_core.Recording, ...]:
-    """Read recordings of motion of `robot`: CSV or Parquet files, or patterns such as "runs/*.csv".
+    """Read recordings of motion of `robot`: CSV and Parquet files, ROS bags, or patterns such as
+    "runs/*.csv".
 
     One file is one recording, called as the file without its ending. Columns, with their unit in the name:
     t_s; q1_rad ... for the joints that have a reading, in chain order; where there, qd1_rad_s ...,
@@ -31,17 +37,38 @@ def load_recordings(
     with # are comments. Stamps since 1970 are counted from the first row on. Where `set` changes within a
     file, each run of rows is a recording of its own: name#1, name#2.
 
-    joints: which of the robot's joints each number of the file is, in the file's order, "-" for none; absent:
-    the file has the robot's joints in chain order.
+    Of a bag (rosbag2, .mcap, .db3, .bag; needs truing[bags]) the joint states are read: position, velocity,
+    effort of the joints by name.
+
+    joints: which of the robot's joints each joint of the file is, in the file's order, "-" for none; absent:
+    a table has the robot's joints in chain order, and names are the robot's.
+    topic: of the joint states, where a bag has several.
     Raises InputError that names the file, the line, the column, what was found and what was expected. Warns
     (InputWarning) of columns without a meaning of their own that are left out, as they have gaps.
     """
     names = split_joints(joints)
     found = _expanded([paths] if isinstance(paths, (str, os.PathLike)) else list(paths))
+    _refuse_idle("topic= is of bags", topic, found, is_bag)
     out: list[_core.Recording] = []
     for path, name in zip(found, _names(found), strict=True):
-        out += read_table(path, name, robot, names)
+        if is_bag(path):
+            out += read_bag(path, name, robot, names, topic)
+        elif path.is_dir():
+            raise InputError(
+                f"{path}: is a folder, and no bag (metadata.yaml): its files are meant by"
+                f" {str(path / '*.csv')!r}"
+            )
+        else:
+            out += read_table(path, name, robot, names)
     return tuple(out)
+
+
+def _refuse_idle(what: str, value: object, paths: Sequence[Path], suits: Callable[[Path], bool]) -> None:
+    """An option that none of the files takes was meant for others."""
+    if value is not None and not any(suits(path) for path in paths):
+        raise InputError(
+            f"{what}: there is none among the recordings, {listed([str(path) for path in paths])}"
+        )
 
 
 def _expanded(paths: Sequence[PathLike]) -> list[Path]:
@@ -65,6 +92,6 @@ def _expanded(paths: Sequence[PathLike]) -> list[Path]:
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
-    """What the recordings are called: the file without its ending, with its folders where that is not unique."""
+    """What recordings are called: the file without its ending, with its folders where that is not unique."""
     stems = Counter(path.stem for path in paths)
     return [path.stem if stems[path.stem] == 1 else path.as_posix() for path in paths]

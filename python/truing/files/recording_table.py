@@ -33,8 +33,8 @@ _SLIDING = {"m_s": 1.0, "mm_s": 1e-3}
 _TORQUE = {"Nm": 1.0, "mNm": 1e-3}
 _FORCE = {"N": 1.0}
 _AMPERE = {"A": 1.0, "mA": 1e-3}
-# Columns with a joint's number, q1_rad, tau1_Nm ...: the table of the recording, and the units of a revolute and
-# of a prismatic joint.
+# Columns with a joint's number, q1_rad, tau1_Nm ...: the table of the recording, and the units of a revolute
+# and of a prismatic joint.
 _OF_JOINTS: dict[str, tuple[tuple[str, dict[str, float], dict[str, float]], ...]] = {
     "q": (("position", _ANGLE, _LENGTH),),
     "qd": (("speed", _TURNING, _SLIDING),),
@@ -113,8 +113,8 @@ class _Layout:
                 return  # a joint that is none of the robot's, as the caller said
             self.table.refuse(
                 f"the robot has {len(self.joints)} joints with a reading:"
-                f" {listed([joint.name for joint in self.joints])}; where the file has others, say with joints="
-                " which of the robot's each number is ('-' for none)",
+                f" {listed([joint.name for joint in self.joints])}; where the file has others, say with"
+                " joints= which of the robot's each number is ('-' for none)",
                 column=name,
             )
         index = self.joint_of[number]
@@ -131,8 +131,8 @@ class _Layout:
             expected += [f"{stem}{number}_{word}" for word in units]
         found = f"found the unit {unit!r} in the name" if unit else "there is no unit in the name"
         self.table.refuse(
-            f"{found}, expected {' or '.join(expected)} (joint {joint.name!r} is {joint.type}; rename a column"
-            " that means something else)",
+            f"{found}, expected {' or '.join(expected)} (joint {joint.name!r} is {joint.type}; rename a"
+            " column that means something else)",
             column=name,
         )
 
@@ -272,8 +272,8 @@ class _Reader:
         row = int(np.argmin(usable))
         warnings.warn(
             InputWarning(
-                f"{self.table.path}, column {name!r}: is left out: found {values[row]:g} in row {row + 1}, and"
-                f" no usable number in {len(values) - int(usable.sum())} of {len(values)} rows"
+                f"{self.table.path}, column {name!r}: is left out: found {values[row]:g} in row {row + 1},"
+                f" and no usable number in {len(values) - int(usable.sum())} of {len(values)} rows"
             ),
             stacklevel=6,
         )

@@ -220,7 +220,8 @@ class Table:
         decoded(self.path, head[: head.rfind(b"\n") + 1] or head)  # binary or of another encoding?
         if len(first_line) >= _LONGEST_HEADER:
             raise InputError(
-                f"{self.path}, line {self._header}: has more than {_LONGEST_HEADER} characters, expected column names"
+                f"{self.path}, line {self._header}: has more than {_LONGEST_HEADER} characters, expected"
+                " column names"
             )
         line = re.split(r"[\r\n]", decoded(self.path, first_line))[0]
         if not line.strip():

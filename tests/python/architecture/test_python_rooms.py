@@ -64,6 +64,7 @@ FLOORS = {
         "measurement_file",
         "recording_parts",
         "recording_table",
+        "recording_bag",
         "recording_file",
         "scene_file",
         "stream_file",
@@ -109,6 +110,7 @@ ONLY_IN = {
     "rich": {"cli"},
     "mujoco": {"exam"},
     "cv2": {"files"},
+    "rosbags": {"files"},
 }
 
 FILES = {path.relative_to(PACKAGE).as_posix(): path for path in PACKAGE.rglob("*.py")}
