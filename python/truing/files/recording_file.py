@@ -14,6 +14,7 @@ from truing import _core
 from truing.errors import InputError
 from truing.files.common import PathLike, listed, shown
 from truing.files.recording_bag import is_bag, read_bag
+from truing.files.recording_lerobot import LeRobotUnits, is_lerobot, read_lerobot
 from truing.files.recording_parts import split_joints
 from truing.files.recording_table import read_table
 
@@ -26,9 +27,10 @@ def load_recordings(
     *,
     joints: Sequence[str] | str | None = None,
     topic: str | None = None,
+    units: LeRobotUnits | None = None,
 ) -> tuple[_core.Recording, ...]:
-    """Read recordings of motion of `robot`: CSV and Parquet files, ROS bags, or patterns such as
-    "runs/*.csv".
+    """Read recordings of motion of `robot`: CSV and Parquet files, ROS bags, LeRobot data sets, or patterns
+    such as "runs/*.csv".
 
     One file is one recording, called as the file without its ending. Columns, with their unit in the name:
     t_s; q1_rad ... for the joints that have a reading, in chain order; where there, qd1_rad_s ...,
@@ -38,25 +40,31 @@ def load_recordings(
     file, each run of rows is a recording of its own: name#1, name#2.
 
     Of a bag (rosbag2, .mcap, .db3, .bag; needs truing[bags]) the joint states are read: position, velocity,
-    effort of the joints by name.
+    effort of the joints by name. Every episode of a LeRobot data set (its folder) is a recording: the state
+    of the joints by name, and the actions as commands.
 
     joints: which of the robot's joints each joint of the file is, in the file's order, "-" for none; absent:
     a table has the robot's joints in chain order, and names are the robot's.
     topic: of the joint states, where a bag has several.
+    units: of the positions of a LeRobot data set, which does not say: "deg", "rad", or "percent" for -100 to
+    100 of the range between the joint's limits.
     Raises InputError that names the file, the line, the column, what was found and what was expected. Warns
     (InputWarning) of columns without a meaning of their own that are left out, as they have gaps.
     """
     names = split_joints(joints)
     found = _expanded([paths] if isinstance(paths, (str, os.PathLike)) else list(paths))
     _refuse_idle("topic= is of bags", topic, found, is_bag)
+    _refuse_idle("units= is of LeRobot data sets", units, found, is_lerobot)
     out: list[_core.Recording] = []
     for path, name in zip(found, _names(found), strict=True):
         if is_bag(path):
             out += read_bag(path, name, robot, names, topic)
+        elif is_lerobot(path):
+            out += read_lerobot(path, name, robot, names, units)
         elif path.is_dir():
             raise InputError(
-                f"{path}: is a folder, and no bag (metadata.yaml): its files are meant by"
-                f" {str(path / '*.csv')!r}"
+                f"{path}: is a folder, and neither a bag (metadata.yaml) nor a LeRobot data set"
+                f" (meta/info.json): its files are meant by {str(path / '*.csv')!r}"
             )
         else:
             out += read_table(path, name, robot, names)

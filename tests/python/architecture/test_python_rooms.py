@@ -65,6 +65,7 @@ FLOORS = {
         "recording_parts",
         "recording_table",
         "recording_bag",
+        "recording_lerobot",
         "recording_file",
         "scene_file",
         "stream_file",
