@@ -1,0 +1,123 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tables/dynamics/diagnose.hpp"
+#include "convert/columns.hpp"
+#include "convert/options.hpp"
+#include "convert/text.hpp"
+#include "parts.hpp"
+#include "repr.hpp"
+
+namespace truing::python {
+
+namespace {
+
+std::string repr(const FoundTorqueEffect& e) {
+  return "FoundTorqueEffect(" + at_joints(e.effect, e.joints) + ", probability " + text(e.probability) + ")";
+}
+
+std::string errors_line(const TorqueErrors& errors) {
+  std::string out = errors.model + ":";
+  for (const TorqueError& e : errors.held_out) out += formatted(" %.1f", e.percent);
+  return out + " %\n";
+}
+
+std::string summary(const TorqueDiagnosis& d) {
+  std::string out = d.sentence + "\nheld-out torque, rms error in % of its standard deviation\n";
+  for (const TorqueErrors& errors : d.errors) out += errors_line(errors);
+  for (const FoundTorqueEffect& e : d.effects) {
+    out += at_joints(e.effect, e.joints) + (e.standard ? " (standard)" : "") + ": probability " + text(e.probability) +
+           formatted(", removes %.1f %%", 100.0 * e.share.value);
+    for (const TorqueAlternative& a : e.confounded_with) out += ", or " + at_joints(a.effect, a.joints);
+    out += "\n";
+  }
+  for (const UnknownTorque& u : d.unknown) out += "unknown, at " + u.joint + ", over " + joined(u.inputs) + "\n";
+  for (const std::string& w : d.warnings) out += "warning: " + w + "\n";
+  return out;
+}
+
+void bind_fit(py::module_& m) {
+  auto error = define_result<TorqueError>(m, "TorqueError");
+  error.def("__repr__",
+            [](const TorqueError& e) { return formatted("TorqueError(%s, %.3g %%)", e.joint.c_str(), e.percent); });
+  auto errors = define_result<TorqueErrors>(m, "TorqueErrors");
+  errors.def("__repr__", [](const TorqueErrors& e) { return "TorqueErrors(" + e.model + ")"; });
+  auto fit = define_result<TorqueFit>(m, "TorqueFit");
+  fit.def("__repr__",
+          [](const TorqueFit& f) { return "TorqueFit(" + std::to_string(f.parameters.size()) + " parameters)"; });
+  auto prediction = define_result<TorquePrediction>(m, "TorquePrediction");
+  prediction.def("__repr__", [](const TorquePrediction& p) {
+    return "TorquePrediction(" + std::to_string(p.torque.rows()) + " rows)";
+  });
+}
+
+void bind_found(py::module_& m) {
+  auto alternative = define_result<TorqueAlternative>(m, "TorqueAlternative");
+  alternative.def("__repr__", [](const TorqueAlternative& a) {
+    return "TorqueAlternative(" + at_joints(a.effect, a.joints) + ")";
+  });
+  auto found = define_result<FoundTorqueEffect>(m, "FoundTorqueEffect");
+  found.def("__repr__", [](const FoundTorqueEffect& e) { return repr(e); });
+  auto unknown = define_result<UnknownTorque>(m, "UnknownTorque");
+  unknown.def("__repr__", [](const UnknownTorque& u) {
+    return "UnknownTorque(" + at_joints(joined(u.inputs), {u.joint}) + ", probability " + text(u.probability) + ")";
+  });
+  auto regime = define_result<TorqueRegime>(m, "TorqueRegime");
+  regime.def("__repr__", [](const TorqueRegime& r) { return "TorqueRegime(" + r.joint + ", " + r.input + ")"; });
+  auto one_class = define_result<TorqueClass>(m, "TorqueClass");
+  one_class.def("__repr__", [](const TorqueClass& c) { return "TorqueClass(" + c.sentence + ")"; });
+  auto trace = define_result<TorqueTrace>(m, "TorqueTrace");
+  trace.def("__repr__", [](const TorqueTrace& t) { return "TorqueTrace(" + t.recording + ", " + t.joint + ")"; });
+  auto diagnosis = define_result<TorqueDiagnosis>(m, "TorqueDiagnosis");
+  diagnosis.def("summary", &summary, "A few lines for people.");
+  diagnosis.def("__repr__", [](const TorqueDiagnosis& d) {
+    return std::string("TorqueDiagnosis('") + word(d.verdict) + "', " + std::to_string(d.effects.size()) + " effects)";
+  });
+}
+
+}  // namespace
+
+void bind_torque(py::module_& m) {
+  define_options<TorqueOptions>(m, "TorqueOptions");
+  define_options<TorqueDiagnoseOptions>(m, "TorqueDiagnoseOptions");
+  bind_fit(m);
+  bind_found(m);
+  m.def(
+      "dynamics_identify",
+      [](const Robot& given_robot, const std::vector<Recording>& recordings,
+         const std::optional<TorqueOptions>& given) {
+        const TorqueOptions options = given.value_or(TorqueOptions{});
+        const Robot robot = given_robot;
+        const py::gil_scoped_release unlocked;
+        return dynamics::identify(robot, recordings, options);
+      },
+      py::arg("robot"), py::arg("recordings"), py::arg("options") = py::none(),
+      R"(Finds inertial parameters and the effects asked for from recordings with torques or currents.
+
+Raises InputError on recordings or options that cannot be used.)");
+  m.def(
+      "dynamics_diagnose",
+      [](const Robot& given_robot, const std::vector<Recording>& recordings,
+         const std::optional<TorqueDiagnoseOptions>& given) {
+        const TorqueDiagnoseOptions options = given.value_or(TorqueDiagnoseOptions{});
+        const Robot robot = given_robot;
+        const py::gil_scoped_release unlocked;
+        return dynamics::diagnose(robot, recordings, options);
+      },
+      py::arg("robot"), py::arg("recordings"), py::arg("options") = py::none(),
+      R"(Which effects stand between a robot's model and the torques that it was recorded with.
+
+Raises InputError on recordings or options that cannot be used.)");
+  m.def(
+      "dynamics_predict",
+      [](const Robot& given_robot, const Recording& recording, double cutoff) {
+        const Robot robot = given_robot;
+        const py::gil_scoped_release unlocked;
+        return dynamics::predict(robot, recording, cutoff);
+      },
+      py::arg("robot"), py::arg("recording"), py::arg("cutoff") = 8.0,
+      R"(Torques of every row of a recording: links, rotors, and the effects that the robot carries.
+
+Raises InputError on a recording that cannot be used.)");
+}
+
+}  // namespace truing::python

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Dynamics: which effects stand between a robot's model and the torques that it was recorded with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from truing import _core
+from truing._core import Recording, Robot, TorqueDiagnosis, TorqueFit, TorquePrediction
+from truing.keywords import made, takes
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from truing._keywords import TorqueDiagnoseKeywords, TorqueKeywords
+
+
+@takes(_core.TorqueOptions)
+def identify(robot: Robot, recordings: Sequence[Recording], **options: Unpack[TorqueKeywords]) -> TorqueFit:
+    """Find inertial parameters and the effects asked for from recordings with torques or currents.
+
+        truing.dynamics.identify(robot, recordings, effects="coulomb,viscous,load_friction:J2+J3")
+
+    robot: with masses, centres of mass and inertias of its links. recordings: see `load_recordings`; those
+    marked as test are held out.
+    options: fields of `TorqueOptions`. `effects` may be one text, as above; without it armature, Coulomb and
+    viscous friction and an offset are fitted at every joint.
+
+    Raises InputError on recordings or options that cannot be used.
+    """
+    return _core.dynamics_identify(robot, list(recordings), made(_core.TorqueOptions, options))
+
+
+@takes(_core.TorqueDiagnoseOptions)
+def diagnose(
+    robot: Robot, recordings: Sequence[Recording], **options: Unpack[TorqueDiagnoseKeywords]
+) -> TorqueDiagnosis:
+    """Find which effects stand between a robot's model and the torques that it was recorded with.
+
+        found = truing.dynamics.diagnose(robot, recordings)
+        print(found.summary())
+
+    Inertial parameters, Coulomb and viscous friction and an offset are the groundwork, unless the robot was
+    fitted before: then everything is a departure from it. Every effect at every joint competes. What is
+    named predicts recordings that it was not fitted to.
+
+    robot: with masses, centres of mass and inertias of its links. recordings: see `load_recordings`; those
+    marked as test are held out.
+    options: fields of `TorqueDiagnoseOptions`. `leave_out` may be one text, "coupling,ripple".
+
+    Raises InputError on recordings or options that cannot be used.
+    """
+    return _core.dynamics_diagnose(robot, list(recordings), made(_core.TorqueDiagnoseOptions, options))
+
+
+def predict(robot: Robot, recording: Recording, *, cutoff: float = 8.0) -> TorquePrediction:
+    """Torques of every row of a recording: links, rotors, and the effects that the robot carries.
+
+    cutoff: [Hz] of the low-pass without phase that the angles go through for their derivatives.
+
+    Raises InputError on a recording that cannot be used.
+    """
+    return _core.dynamics_predict(robot, recording, cutoff)
