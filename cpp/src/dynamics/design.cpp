@@ -204,7 +204,7 @@ void add_effect(const TorqueEffect& effect, int joint, const Robot& robot, const
 }
 
 TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::vector<TorqueEffect>& own,
-                       const std::set<std::string>& leave_out) {
+                       const std::set<std::string>& leave_out, bool fits_masses) {
   TorqueDesign out;
   const auto try_at = [&](const TorqueEffect& effect, std::size_t joint) {
     const std::string name = robot.joints[robot.driven_joints()[joint]].name;
@@ -220,6 +220,11 @@ TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::
   for (const auto* effects : {&torque_catalogue(), &own}) {
     for (const TorqueEffect& effect : *effects) {
       if (leave_out.count(effect.name) > 0) continue;
+      if (fits_masses && effect.traits.scales_masses) {
+        out.not_testable.push_back({effect.name, {}, "the same as all masses times a factor: needs a known payload",
+                                    Untestable::same_as_masses});
+        continue;
+      }
       const std::size_t times = effect.per_joint ? robot.driven_count() : 1;
       for (std::size_t j = 0; j < times; ++j) try_at(effect, j);
     }

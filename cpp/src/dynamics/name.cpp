@@ -17,6 +17,7 @@ using Eigen::VectorXd;
 
 constexpr double kClassNats = 3.0;      ///< a rival within this many is in the class
 constexpr double kClassR2 = 0.98;       ///< so is what can make the same torque
+constexpr double kSameR2 = 0.5;         ///< what makes less of the torque is another matter
 constexpr double kTempered = 0.5;       ///< no model is exact: half a nat counts for one
 constexpr double kBlocksOfTime = 0.9;   ///< the most that folds of one recording are worth
 
@@ -74,6 +75,7 @@ class Naming {
       if (behind > 25.0) break;
       const double weight = std::exp(-kTempered * std::max(behind, 0.0));
       const double r2 = search_.evidence().explained(less, mine.columns, theta, other.columns);
+      if (r2 < kSameR2) continue;  // it explains something else
       if (behind < kClassNats || r2 > kClassR2) {
         confounded->push_back({other.effect, other.joints, weight});
         in_class += weight;
@@ -210,8 +212,6 @@ std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& 
     unknown.joint = group.joints.front();
     unknown.inputs = group.inputs;
     unknown.share = naming.share(k);
-    const Evidence::Gain none;
-    (void)none;
     std::vector<TorqueAlternative> ignored;
     unknown.probability = naming.probability(k, &ignored);
     if (single) unknown.probability = std::min(unknown.probability, kBlocksOfTime);

@@ -97,12 +97,19 @@ bool Search::may_enter(const Choice& choice, int group, bool free_functions) con
 /// Folds that were not fitted, surely and by enough: the mean of the folds' gains is above zero by 1.5 standard errors.
 bool Search::predicts(const Choice& with, const Choice& less, const SearchLimits& limits) const {
   const VectorXd before = squares_of_folds(less), after = squares_of_folds(with);
-  const VectorXd gain = (before - after).cwiseQuotient(before);
-  const auto n = static_cast<double>(gain.size());
-  const double spread = std::sqrt((gain.array() - gain.mean()).square().sum() / std::max(1.0, n - 1.0));
+  double n = 0.0, sum = 0.0, squares = 0.0;
+  for (Index f = 0; f < before.size(); ++f) {
+    if (!(before[f] > 0.0)) continue;  // nothing moved
+    const double gain = (before[f] - after[f]) / before[f];
+    n += 1.0;
+    sum += gain;
+    squares += gain * gain;
+  }
+  const double mean = sum / std::max(1.0, n);
+  const double spread = std::sqrt(std::max(0.0, squares - n * mean * mean) / std::max(1.0, n - 1.0));
   // Every joint counts alike in the sum: one joint's errors are the part that it has of it.
   const double least = limits.least_gain * before.sum() / static_cast<double>(joints_);
-  return before.sum() - after.sum() > least && gain.mean() > 1.5 * spread / std::sqrt(n);
+  return before.sum() - after.sum() > least && mean > 1.5 * spread / std::sqrt(std::max(1.0, n));
 }
 
 Choice Search::better_forms(Choice choice) const {
@@ -130,7 +137,8 @@ Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits) cons
     const double score = evidence_.evaluate(choice).score;
     for (std::size_t at = 0; at < choice.groups.size(); ++at) {
       const Choice less = without(choice, at);
-      if (evidence_.evaluate(less).score < score - 0.5 * limits.threshold) continue;
+      const bool wins = evidence_.evaluate(less).score < score - 0.5 * limits.threshold;
+      if (wins && predicts(choice, less, limits)) continue;
       choice = less;
       changed = true;
       break;
@@ -158,6 +166,7 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
         continue;
       }
       choice = std::move(grown);
+      refused.clear();  // beside what is in now they may predict
       taken = true;
       break;
     }

@@ -15,6 +15,7 @@ enum class Untestable {
   input_constant,  ///< its input never changes
   no_motion,       ///< it moves nothing at these poses
   same_as_frames,  ///< base and tool do the same
+  same_as_masses,  ///< other masses of the links do the same
   other,           ///< as `why` says
 };
 

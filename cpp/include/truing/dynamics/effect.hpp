@@ -65,6 +65,7 @@ enum class SimulatorPlace {
 struct TorqueTraits {
   TorqueFamily family = TorqueFamily::own;
   bool standard = false;  ///< what everybody fits beside the inertias: offset, Coulomb, viscous
+  bool scales_masses = false;  ///< where inertial parameters are fitted it is the same as all of them times a factor
   SimulatorPlace mujoco = SimulatorPlace::callback;
   SimulatorPlace urdf = SimulatorPlace::none;
   std::string plain{};  ///< in plain words, without the joint: "friction that grows with the load"

@@ -52,8 +52,8 @@ Size size_of_link(const Robot& robot, std::size_t link) {
   for (const Joint& joint : robot.joints) total += joint.mass.value_or(0.0);
   const auto links = static_cast<double>(robot.joints.size());
   Size out;
-  out.mass = std::max({robot.joints[link].mass.value_or(0.0), 0.3 * total / links, 0.01});
-  out.length = std::max(0.05, 0.6 * stretched(robot) / links);
+  out.mass = std::max({0.5 * robot.joints[link].mass.value_or(0.0), 0.2 * total / links, 0.01});
+  out.length = std::max(0.05, 0.4 * stretched(robot) / links);
   return out;
 }
 
