@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/regressor.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -134,6 +135,67 @@ RigidChain::RigidChain(const Robot& robot) : gravity_(robot.gravity) {
         break;
     }
     links_.push_back(link);
+  }
+  compile();
+}
+
+void RigidChain::compile() {
+  for (const Link& link : links_) {
+    // Turned so that the motion is about (along) z, and back.
+    Isometry3d to_z = Isometry3d::Identity();
+    to_z.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), link.axis).toRotationMatrix();
+    const bool is_z = link.axis == Vector3d::UnitZ();
+    const Isometry3d before = is_z ? link.before : link.before * to_z,
+                     after = is_z ? link.after : to_z.inverse() * link.after;
+    kernel::RigidLink out;
+    Eigen::Map<Eigen::Matrix<double, 3, 4>>(out.before) = before.affine();
+    Eigen::Map<Eigen::Matrix<double, 3, 4>>(out.after) = after.affine();
+    out.moves_before = !before.matrix().isIdentity(0.0);
+    out.moves_after = !after.matrix().isIdentity(0.0);
+    out.revolute = link.revolute;
+    compiled_.push_back(out);
+  }
+  felt_.resize(static_cast<std::size_t>(driven()));
+  for (Eigen::Index i = 0; i < links(); ++i) {
+    for (Eigen::Index k = 0; k < driven(); ++k) {
+      coupling_rows_.push_back(coupling_(i, k));
+      if (!coupling_.col(k).head(i + 1).isZero(0.0)) felt_[static_cast<std::size_t>(k)].push_back(i);
+    }
+  }
+}
+
+void RigidChain::regressors(const kernel::RigidFunctions& kernel, const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,
+                            const Eigen::MatrixXd& qdd, Eigen::Index begin, Eigen::Index end, double* const* blocks,
+                            Eigen::Index stride) const {
+  constexpr Eigen::Index kRows = 64;  // of a pass: what goes in and the columns of a joint stay in the cache
+  thread_local std::vector<double> motions, scratch;
+  thread_local std::vector<double*> out;
+  const auto plane = static_cast<std::size_t>(links() * kRows);
+  motions.resize(3 * plane);
+  scratch.resize(kernel::rigid_scratch(static_cast<int>(driven())));
+  out.resize(static_cast<std::size_t>(driven() * links()));
+  const kernel::RigidProgram program{compiled_.data(),
+                                     static_cast<int>(links()),
+                                     static_cast<int>(driven()),
+                                     coupling_rows_.data(),
+                                     {gravity_.x(), gravity_.y(), gravity_.z()}};
+  for (Eigen::Index first = begin; first < end; first += kRows) {
+    const Eigen::Index rows = std::min(kRows, end - first), all = padded(rows);
+    for (Eigen::Index i = 0; i < links(); ++i) {
+      const Eigen::MatrixXd* const tables[3] = {&q, &qd, &qdd};
+      for (std::size_t t = 0; t < 3; ++t) {
+        Eigen::Map<Eigen::VectorXd> to(motions.data() + t * plane + static_cast<std::size_t>(i * kRows), all);
+        to.setConstant(t == 0 ? zero_[i] : 0.0);
+        for (Eigen::Index k = 0; k < driven(); ++k) {
+          const double by = coupling_(i, k);
+          if (by != 0.0) to.head(rows) += by * tables[t]->col(k).segment(first, rows);
+        }
+        to.tail(all - rows).setConstant(to[rows - 1]);
+      }
+    }
+    for (std::size_t at = 0; at < out.size(); ++at) out[at] = blocks[at] ? blocks[at] + (first - begin) : nullptr;
+    kernel.regressor(program, {static_cast<int>(all), motions.data(), motions.data() + plane,
+                               motions.data() + 2 * plane, kRows, out.data(), stride, scratch.data()});
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "kernel/rigid.hpp"
 #include "rooms.hpp"
 #include "truing/dynamics/regressor.hpp"
 #include "truing/model/robot.hpp"
@@ -25,7 +26,28 @@ class RigidChain {
   /// Y of one sample, shape=(driven, 10 * links): readings, their speeds and accelerations [rad | m, s].
   void regressor(const double* q, const double* qd, const double* qdd, Eigen::Ref<Eigen::MatrixXd> Y) const;
 
+  /// Links that load the joint of reading k, ascending; to it the others' columns are zero.
+  const std::vector<Eigen::Index>& felt_links(Eigen::Index k) const { return felt_[static_cast<std::size_t>(k)]; }
+
+  /// The same of rows begin to end of tables of shape (rows, driven), samples side by side on the kernel that the
+  /// processor is best at. blocks[k * links + i]: where reading k's joint has its ten columns of link i, `stride`
+  /// numbers apart, with room for `padded(end - begin)` rows (what is beyond the last is a copy of it); null: not
+  /// wanted. A row's numbers depend neither on the rows around it nor on the thread. Angles below 1e5 rad.
+  void regressors(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd, Eigen::Index begin,
+                  Eigen::Index end, double* const* blocks, Eigen::Index stride) const {
+    regressors(kernel::rigid_functions(), q, qd, qdd, begin, end, blocks, stride);
+  }
+  /// On a copy of the kernel of one's choice.
+  void regressors(const kernel::RigidFunctions& kernel, const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,
+                  const Eigen::MatrixXd& qdd, Eigen::Index begin, Eigen::Index end, double* const* blocks,
+                  Eigen::Index stride) const;
+  static constexpr Eigen::Index padded(Eigen::Index rows) {
+    return (rows + kernel::kSampleMultiple - 1) / kernel::kSampleMultiple * kernel::kSampleMultiple;
+  }
+
  private:
+  void compile();
+
   struct Link {
     Eigen::Isometry3d before, after;  ///< the fixed parts: T = before * motion * after
     Eigen::Vector3d axis;
@@ -35,6 +57,9 @@ class RigidChain {
   Eigen::MatrixXd coupling_;  ///< shape=(links, driven): motion of every joint for a reading's change of one
   Eigen::VectorXd zero_;      ///< motion of every joint at readings of zero [rad | m]
   Eigen::Vector3d gravity_;   ///< in the base's axes
+  std::vector<std::vector<Eigen::Index>> felt_;
+  std::vector<kernel::RigidLink> compiled_;  ///< the links again, motions about z
+  std::vector<double> coupling_rows_;        ///< coupling_, row by row
 };
 
 }  // namespace truing::dynamics

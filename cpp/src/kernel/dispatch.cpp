@@ -8,22 +8,27 @@
 #include <string>
 
 #include "kernel.hpp"
+#include "rigid.hpp"
 
 namespace truing::kernel {
 
 namespace scalar {
 extern const Functions table;
-}
+extern const RigidFunctions rigid_table;
+}  // namespace scalar
 namespace sse2 {
 extern const Functions table;
-}
+extern const RigidFunctions rigid_table;
+}  // namespace sse2
 #if TRUING_X86
 namespace avx2 {
 extern const Functions table;
-}
+extern const RigidFunctions rigid_table;
+}  // namespace avx2
 namespace avx512 {
 extern const Functions table;
-}
+extern const RigidFunctions rigid_table;
+}  // namespace avx512
 #endif
 
 const Functions* functions(const char* name) {
@@ -52,6 +57,24 @@ const Functions& functions() {
     }
     return sse2::table;
   }();
+  return chosen;
+}
+
+const RigidFunctions* rigid_functions(const char* name) {
+  const Functions* found = functions(name);
+  if (!found) return nullptr;
+  for (const RigidFunctions* copy : {&scalar::rigid_table, &sse2::rigid_table,
+#if TRUING_X86
+                                     &avx2::rigid_table, &avx512::rigid_table
+#endif
+       }) {
+    if (std::strcmp(copy->name, found->name) == 0) return copy;
+  }
+  return nullptr;
+}
+
+const RigidFunctions& rigid_functions() {
+  static const RigidFunctions& chosen = *rigid_functions(functions().name);
   return chosen;
 }
 

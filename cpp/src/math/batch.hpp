@@ -15,13 +15,16 @@
 
 namespace truing::math {
 
+/// So many neighbours go to one thread, one after the other.
+constexpr std::size_t kBatchChunk = 64;
+
 /// Calls work(k) for every k below count, on so many threads (0: as many as the machine has). What work(k) does must
 /// not depend on the others, and then nothing depends on the number of threads. `progress` is called by the calling
 /// thread with how many are done, the last time with all; false stops. The first exception comes out when all threads
 /// have ended. A thread takes `at_a_time` of them: one where each is long.
 inline void for_each_on_threads(std::size_t count, int threads, const std::function<bool(std::size_t)>& progress,
-                                const std::function<void(std::size_t)>& work, std::size_t at_a_time = 64) {
-  const std::size_t chunks = (count + at_a_time - 1) / at_a_time;
+                                const std::function<void(std::size_t)>& work) {
+  const std::size_t chunks = (count + kBatchChunk - 1) / kBatchChunk;
   std::size_t workers =
       threads > 0 ? static_cast<std::size_t>(threads) : std::max(1u, std::thread::hardware_concurrency());
   workers = std::max<std::size_t>(1, std::min(workers, chunks));
@@ -33,9 +36,9 @@ inline void for_each_on_threads(std::size_t count, int threads, const std::funct
   const auto run = [&](bool reports) {
     try {
       for (std::size_t chunk = next++; chunk < chunks && !stop; chunk = next++) {
-        const std::size_t begin = chunk * at_a_time, end = std::min(count, begin + at_a_time);
-        for (std::size_t k = begin; k < end; ++k) work(k);
-        done += end - begin;
+        const std::size_t end = std::min(count, (chunk + 1) * kBatchChunk);
+        for (std::size_t k = chunk * kBatchChunk; k < end; ++k) work(k);
+        done += end - chunk * kBatchChunk;
         if (reports && progress && !progress(reported = done)) stop = true;
       }
     } catch (...) {

@@ -45,6 +45,33 @@ MatrixXd regressor(const RigidChain& chain, const State& s) {
 
 VectorXd torque(const Robot& robot, const State& s) { return regressor(RigidChain(robot), s) * link_parameters(robot); }
 
+/// Many states, a row each.
+struct States {
+  MatrixXd q, qd, qdd;
+
+  States(const RigidChain& chain, Index rows, std::mt19937_64* random)
+      : q(random_vector(rows * chain.driven(), 3.0, random).reshaped(rows, chain.driven())),
+        qd(random_vector(rows * chain.driven(), 2.0, random).reshaped(rows, chain.driven())),
+        qdd(random_vector(rows * chain.driven(), 5.0, random).reshaped(rows, chain.driven())) {}
+  State at(Index row) const { return {q.row(row), qd.row(row), qdd.row(row)}; }
+};
+
+/// Columns of every joint, those that it does not feel at zero.
+std::vector<MatrixXd> tiles(const RigidChain& chain, const truing::kernel::RigidFunctions& kernel, const States& states,
+                            Index begin, Index end) {
+  const Index stride = RigidChain::padded(end - begin);
+  std::vector<MatrixXd> out(static_cast<std::size_t>(chain.driven()),
+                            MatrixXd::Zero(stride, kLinkParameters * chain.links()));
+  std::vector<double*> blocks(static_cast<std::size_t>(chain.driven() * chain.links()), nullptr);
+  for (Index k = 0; k < chain.driven(); ++k) {
+    for (const Index link : chain.felt_links(k))
+      blocks[static_cast<std::size_t>(k * chain.links() + link)] =
+          out[static_cast<std::size_t>(k)].col(kLinkParameters * link).data();
+  }
+  chain.regressors(kernel, states.q, states.qd, states.qdd, begin, end, blocks.data(), stride);
+  return out;
+}
+
 double relative(const VectorXd& found, const VectorXd& expected) {
   return (found - expected).cwiseAbs().maxCoeff() / expected.cwiseAbs().maxCoeff();
 }
@@ -146,6 +173,45 @@ TEST_CASE("a joint feels the links behind it alone") {
   for (Index joint = 0; joint < 6; ++joint) {
     CHECK(Y.row(joint).head(kLinkParameters * joint).isZero(0.0));
     CHECK(Y.row(joint).segment(kLinkParameters * joint, kLinkParameters).norm() > 0.1);
+  }
+}
+
+TEST_CASE("tiles are the plain regressor's, on every copy of the kernel") {
+  std::mt19937_64 random(18);
+  for (const Robot& robot : robots()) {
+    CAPTURE(robot.name);
+    const RigidChain chain(robot);
+    for (const Index rows : {1, 63, 64, 137}) {
+      const States states(chain, rows, &random);
+      for (const char* name : {"scalar", "sse2", "avx2", "avx512"}) {
+        const truing::kernel::RigidFunctions* kernel = truing::kernel::rigid_functions(name);
+        if (!kernel) continue;
+        CAPTURE(name);
+        const std::vector<MatrixXd> found = tiles(chain, *kernel, states, 0, rows);
+        double worst = 0.0, largest = 0.0;
+        for (Index row = 0; row < rows; ++row) {
+          const MatrixXd Y = regressor(chain, states.at(row));
+          largest = std::max(largest, Y.cwiseAbs().maxCoeff());
+          for (Index k = 0; k < chain.driven(); ++k)
+            worst = std::max(worst, (found[static_cast<std::size_t>(k)].row(row) - Y.row(k)).cwiseAbs().maxCoeff());
+        }
+        CHECK(worst < 1e-13 * largest);
+      }
+    }
+  }
+}
+
+TEST_CASE("a row of a tile does not depend on the rows around it, to the bit") {
+  std::mt19937_64 random(19);
+  const RigidChain chain(linked_arm(Convention::urdf, 8));
+  const States states(chain, 200, &random);
+  const truing::kernel::RigidFunctions& kernel = truing::kernel::rigid_functions();
+  const std::vector<MatrixXd> all = tiles(chain, kernel, states, 0, 200);
+  const std::vector<std::pair<Index, Index>> parts = {{0, 1}, {1, 90}, {90, 103}, {103, 200}};
+  for (const auto& part : parts) {
+    const std::vector<MatrixXd> found = tiles(chain, kernel, states, part.first, part.second);
+    for (std::size_t k = 0; k < found.size(); ++k)
+      CHECK(found[k].topRows(part.second - part.first) == all[k].middleRows(part.first, part.second - part.first));
   }
 }
 

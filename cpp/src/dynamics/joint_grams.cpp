@@ -1,0 +1,99 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/joint_grams.hpp"
+
+#include <algorithm>
+#include <memory>
+
+#include "kernel/kernel.hpp"
+#include "math/batch.hpp"
+
+namespace truing::dynamics {
+namespace {
+
+constexpr Eigen::Index kRows = 128;  // of a tile: its columns of all joints are about what the second-level cache holds
+
+/// Tiles of all joints, and their sums.
+class Sums {
+ public:
+  Sums(const RigidChain& chain, const std::vector<Eigen::Index>& further)
+      : chain_(chain), blocks_(static_cast<std::size_t>(chain.driven() * chain.links()), nullptr) {
+    for (Eigen::Index k = 0; k < chain.driven(); ++k) {
+      const std::vector<Eigen::Index>& felt = chain.felt_links(k);
+      const Eigen::Index inertial = kLinkParameters * static_cast<Eigen::Index>(felt.size());
+      rows_.emplace_back(kRows, inertial + further[static_cast<std::size_t>(k)] + 1);
+      sums_.emplace_back(kernel::functions().gram_size(static_cast<int>(rows_.back().cols())), 0.0);
+      for (std::size_t i = 0; i < felt.size(); ++i)
+        blocks_[static_cast<std::size_t>(k * chain.links() + felt[i])] =
+            rows_.back().col(kLinkParameters * static_cast<Eigen::Index>(i)).data();
+    }
+  }
+
+  void add(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd, Eigen::Index begin,
+           Eigen::Index end, const CompleteRows& complete) {
+    const Eigen::Index rows = end - begin, all = RigidChain::padded(rows);
+    chain_.regressors(q, qd, qdd, begin, end, blocks_.data(), kRows);
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      Eigen::MatrixXd& tile = rows_[k];
+      complete(static_cast<Eigen::Index>(k), begin,
+               JointRows(tile.data(), rows, tile.cols(), Eigen::OuterStride<>(kRows)));
+      tile.middleRows(rows, all - rows).setZero();
+      kernel::functions().gram_add(tile.data(), kRows, static_cast<int>(tile.cols()), static_cast<int>(all),
+                                   sums_[k].data());
+    }
+    n_ += static_cast<double>(rows);
+  }
+
+  std::vector<estimation::Gram> finish() {
+    std::vector<estimation::Gram> out;
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      const Eigen::Index columns = rows_[k].cols(), x = columns - 1;
+      Eigen::MatrixXd all = Eigen::MatrixXd::Zero(columns, columns);
+      kernel::functions().gram_reduce(sums_[k].data(), static_cast<int>(columns), all.data());
+      estimation::Gram gram;
+      gram.xx = all.topLeftCorner(x, x).selfadjointView<Eigen::Upper>();
+      gram.xy = all.col(x).head(x);
+      gram.yy = all(x, x);
+      gram.n = n_;
+      out.push_back(std::move(gram));
+    }
+    return out;
+  }
+
+ private:
+  const RigidChain& chain_;
+  std::vector<Eigen::MatrixXd> rows_;  ///< of every joint, shape (kRows, columns + 1)
+  std::vector<double*> blocks_;
+  std::vector<std::vector<double>> sums_;  ///< the kernel's own
+  double n_ = 0.0;
+};
+
+}  // namespace
+
+std::vector<estimation::Gram> joint_grams(const RigidChain& chain, const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,
+                                          const Eigen::MatrixXd& qdd, const std::vector<Eigen::Index>& further,
+                                          const CompleteRows& complete, int threads) {
+  // So many sums whatever the number of threads, added in order. A thread takes the parts of one after the other.
+  constexpr Eigen::Index kMostSlots = 8, kParts = kBatchChunk;
+  const Eigen::Index tiles = (q.rows() + kRows - 1) / kRows;
+  const Eigen::Index slots = std::clamp<Eigen::Index>(tiles / 4, 1, kMostSlots);
+  std::vector<std::unique_ptr<Sums>> sums(static_cast<std::size_t>(slots));
+  std::vector<std::vector<estimation::Gram>> grams(static_cast<std::size_t>(slots));
+  for_each_on_threads(static_cast<std::size_t>(slots * kParts), threads, {}, [&](std::size_t at) {
+    const std::size_t slot = at / kParts, part = at % kParts;
+    if (part == 0) sums[slot] = std::make_unique<Sums>(chain, further);
+    const auto edge = [&](std::size_t k) { return static_cast<Eigen::Index>(k) * tiles / (slots * kParts); };
+    for (Eigen::Index tile = edge(at); tile < edge(at + 1); ++tile)
+      sums[slot]->add(q, qd, qdd, tile * kRows, std::min((tile + 1) * kRows, q.rows()), complete);
+    if (part + 1 < kParts) return;
+    grams[slot] = sums[slot]->finish();
+    sums[slot].reset();
+  });
+  std::vector<estimation::Gram> out = std::move(grams[0]);
+  for (std::size_t slot = 1; slot < grams.size(); ++slot) {
+    for (std::size_t k = 0; k < out.size(); ++k) out[k].add(grams[slot][k]);
+  }
+  return out;
+}
+
+}  // namespace truing::dynamics

@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The torque regressor of a rigid chain, samples side by side in SIMD lanes. See README.md in this folder.
+
+#include <cstddef>
+
+namespace truing::kernel {
+
+/// Samples that the caller hands over are filled up to a multiple of this, which every copy's lanes divide.
+constexpr int kSampleMultiple = 8;
+constexpr int kLinkColumns = 10;
+
+/// One link: before * motion about or along z * after. Frames: R column by column, then p.
+struct RigidLink {
+  double before[12];
+  double after[12];
+  bool moves_before;  ///< false: `before` is the identity
+  bool moves_after;
+  bool revolute;
+};
+
+struct RigidProgram {
+  const RigidLink* links;
+  int link_count;
+  int driven_count;
+  const double* coupling;  ///< [link][driven]: motion of a link's joint for a reading's change of one
+  double gravity[3];       ///< in the base's axes
+};
+
+struct RigidTile {
+  int samples;                   ///< a multiple of kSampleMultiple
+  const double* motion;          ///< [link][stride]: of the joints, below 1e5 rad
+  const double* rate;            ///< [link][stride]
+  const double* acceleration;    ///< [link][stride]
+  std::ptrdiff_t stride;         ///< of these three
+  double* const* blocks;         ///< out [driven][link]: first of ten columns; null: this joint does not feel this link
+  std::ptrdiff_t column_stride;  ///< of these
+  double* scratch;               ///< rigid_scratch(program.driven_count) numbers
+};
+
+constexpr std::size_t rigid_scratch(int driven) { return 6 * kSampleMultiple * static_cast<std::size_t>(driven); }
+
+struct RigidFunctions {
+  const char* name;
+  void (*regressor)(const RigidProgram&, const RigidTile&);
+};
+
+/// The copy of the same name as functions().
+const RigidFunctions& rigid_functions();
+/// The named copy, or null when this machine or build lacks it.
+const RigidFunctions* rigid_functions(const char* name);
+
+}  // namespace truing::kernel
