@@ -81,7 +81,7 @@ struct Tables {
 
 /// Every row, over and over in the same buffers, as the normal equations take them.
 void time_regressor(const RigidChain& chain, const Tables& t) {
-  constexpr Index kTile = 128;
+  constexpr Index kTile = 256;
   std::vector<MatrixXd> out(kJoints, MatrixXd::Zero(kTile, kLinkParameters * kJoints));
   std::vector<double*> blocks(kJoints * kJoints, nullptr);
   for (Index k = 0; k < kJoints; ++k) {
@@ -120,7 +120,7 @@ void time_grams(const RigidChain& chain, const Tables& t) {
   for (const Index effects : {Index{0}, kEffects}) {
     const std::vector<Index> further(kJoints, effects);
     for (const int threads : {1, 2}) {
-      const double time = best_seconds(5, [&] {
+      const double time = best_seconds(40, [&] {
         joint_grams(
             chain, t.q, t.qd, t.qdd, further,
             [&](Index k, Index begin, JointRows tile) {
@@ -136,7 +136,7 @@ void time_grams(const RigidChain& chain, const Tables& t) {
 
 /// What the processor can do of the Gram alone: the same products on tiles that stay where they are.
 void time_limit(Index rows) {
-  constexpr Index kTile = 128;
+  constexpr Index kTile = 256;
   std::vector<MatrixXd> tiles;
   std::vector<std::vector<double>> sums;
   double products = 0.0;
@@ -146,7 +146,7 @@ void time_limit(Index rows) {
     sums.emplace_back(kernel::functions().gram_size(static_cast<int>(columns)), 0.0);
     products += 0.5 * static_cast<double>(columns * (columns + 1));
   }
-  const double time = best_seconds(5, [&] {
+  const double time = best_seconds(40, [&] {
     for (Index first = 0; first < rows; first += kTile) {
       for (std::size_t k = 0; k < tiles.size(); ++k)
         kernel::functions().gram_add(tiles[k].data(), kTile, static_cast<int>(tiles[k].cols()), kTile, sums[k].data());
@@ -175,7 +175,7 @@ int main(int argc, char** argv) {
   std::mt19937_64 random(1);
   const Robot robot = ur10();
   const RigidChain chain(robot);
-  const Tables tables(200000, &random);
+  const Tables tables(16384, &random);
   std::printf("{\"name\": \"kernel\", \"value\": \"%s\", \"unit\": \"\"}\n", kernel::functions().name);
   time_regressor(chain, tables);
   time_grams(chain, tables);

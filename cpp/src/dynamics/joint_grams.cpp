@@ -11,7 +11,7 @@
 namespace truing::dynamics {
 namespace {
 
-constexpr Eigen::Index kRows = 128;  // of a tile: its columns of all joints are about what the second-level cache holds
+constexpr Eigen::Index kRows = 256;  // of a tile: longer columns gain the Gram nothing, and would not stay in the cache
 
 /// Tiles of all joints, and their sums.
 class Sums {
