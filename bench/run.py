@@ -34,6 +34,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 PEERS = HERE / "peers"
 sys.path.insert(0, str(PEERS))
+from dynamics import figures as dynamics_figures  # noqa: E402  (beside this file)
 from make_data import make  # noqa: E402  (shared with the peers)
 from result import score  # noqa: E402
 
@@ -49,6 +50,7 @@ FIT_PEERS = (
 CPP = "build/release/bench/bench_identify"
 AVX2 = "TRUING_KERNEL=avx2 " + CPP
 PYTHON = "python bench/run.py"
+DYNAMICS = "python bench/dynamics.py build/release/bench/bench_dynamics"
 
 
 @dataclass(frozen=True)
@@ -247,6 +249,7 @@ class Timings:
     csv: dict[str, float]
     blas: list[dict[str, Any]]
     peers: list[dict[str, Any]]
+    dynamics: dict[str, Any]
 
     def kernels(self) -> list[tuple[dict[str, Any], str]]:
         """Figures of each kernel with the command that they are from, the widest first."""
@@ -261,6 +264,7 @@ def collect(timings: Timings) -> list[Row]:
         *fit_rows(timings),
         *iteration_rows(timings),
         *large_rows(timings.cpp, timings.csv),
+        *dynamics_rows(timings.dynamics),
     ]
     here = machine()
     return [replace(row, machine=here) for row in rows]
@@ -364,6 +368,34 @@ def large_rows(cpp: dict[str, Any], csv: dict[str, float]) -> list[Row]:
             command=PYTHON,
             note=read,
         ),
+    ]
+
+
+def dynamics_rows(found: dict[str, Any]) -> list[Row]:
+    """The torque regressor of six joints; more samples a second are better here."""
+    kernel, theirs = found["kernel"], found["pinocchio"]
+    note = "" if theirs else "Pinocchio is not installed"
+    rows = [
+        (f"torque regressor, six joints, one core, {kernel}", f"regressor_{kernel}", ""),
+        (
+            "torque regressor and Grams of six joints, 70 effect columns each, 2 threads",
+            "grams_70_threads_2",
+            ">= 0.4",
+        ),
+    ]
+    return [
+        Row(
+            name,
+            1e-6 * found[figure],
+            "M samples/s",
+            reach,
+            "pinocchio, regressor alone, from Python",
+            theirs and 1e-6 * theirs,
+            theirs and found[figure] / theirs,
+            command=DYNAMICS,
+            note=note,
+        )
+        for name, figure, reach in rows
     ]
 
 
@@ -582,11 +614,13 @@ def time_all(args: argparse.Namespace, folder: Path) -> tuple[Timings, float | N
     avx2 = avx2 and better(avx2, run_cpp(args.cpp, "avx2"))
     print("BLAS, after ...", flush=True)
     blas += peers("--only", "blas")
+    print("truing, torques ...", flush=True)
+    dynamics = dynamics_figures(args.cpp.with_name("bench_dynamics"))
     busy = other_work.cores()
     print("peers ...", flush=True)
     names = ",".join(("pinocchio", *FIT_PEERS))
     others = peers("--only", names, *(("--quick",) if args.quick else ()))
-    return Timings(cpp, avx2, python, csv, blas, others), busy
+    return Timings(cpp, avx2, python, csv, blas, others, dynamics), busy
 
 
 def results_text(rows: list[Row]) -> str:

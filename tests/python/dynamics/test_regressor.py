@@ -16,7 +16,8 @@ pin = pytest.importorskip("pinocchio", reason="Pinocchio (pip package 'pin') is 
 
 Floats = NDArray[np.float64]
 ROBOTS = {"arm": ARM, "oblique": OBLIQUE, "gantry": GANTRY}
-# Pinocchio: m, mc, then Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the joint's frame; ours: Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
+# Pinocchio: m, mc, then Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the joint's frame; ours: Ixx, Iyy, Izz, Ixy, Ixz,
+# Iyz.
 ORDER = [0, 1, 2, 3, 4, 6, 9, 5, 7, 8]
 
 
@@ -37,7 +38,8 @@ def random_chain(seed: int) -> str:
         text += f'''<link name="l{k}">{inertia}</link>
   <joint name="J{k}" type="{kind}"><parent link="l{k - 1}"/><child link="l{k}"/>
     <origin xyz="{numbers(rng.uniform(-0.5, 0.5, 3))}" rpy="{numbers(rng.uniform(-3, 3, 3))}"/>
-    <axis xyz="{numbers(rng.normal(size=3))}"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'''
+    <axis xyz="{numbers(rng.normal(size=3))}"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'''
     return text + "</robot>"
 
 
