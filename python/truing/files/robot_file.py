@@ -29,6 +29,7 @@ from truing.files.yaml_tree import (
     AngleName,
     Document,
     FreeMapping,
+    Inertia,
     LengthName,
     Limits,
     Loc,
@@ -87,6 +88,11 @@ class _Joint(Strict):
     limits: Limits = None
     mass: Number | None = None
     com: Vector3 = _ZERO
+    inertia: Inertia | None = None
+    torque_per_ampere: Number | None = None
+    rotor_inertia: Number = Decimal(0)
+    speed_limit: Number | None = None
+    torque_limit: Number | None = None
 
 
 class _LinkJoint(_Joint):
@@ -124,6 +130,7 @@ class _RobotFile(Strict):
     tool: _Frame = _AT_ORIGIN
     targets: dict[str, _Frame] = {}
     effects: list[_Effect] = []
+    torque_effects: list[_Effect] = []
     fitted_range: dict[str, Range] = {}
     anchor: _Anchor | None = None
     calibration: FreeMapping = {}
@@ -253,6 +260,7 @@ def _check_joints(document: Document, model: _LinkTable | _UrdfChain) -> None:
                 (*loc, "ratio"),
                 "found 0, expected the joint's gear ratio relative to the nominal one, near 1",
             )
+        _check_drive(document, joint, loc)
         if isinstance(joint, _UrdfJoint):
             length = math.sqrt(sum(float(value) ** 2 for value in joint.axis))
             if abs(length - 1.0) > 1e-6:
@@ -284,6 +292,22 @@ def _check_joints(document: Document, model: _LinkTable | _UrdfChain) -> None:
             )
 
 
+def _check_drive(document: Document, joint: _Joint, loc: Loc) -> None:
+    if joint.rotor_inertia < 0:
+        document.refuse(
+            (*loc, "rotor_inertia"), f"found {joint.rotor_inertia}, expected zero or more (kg m^2)"
+        )
+    if joint.torque_per_ampere == 0:
+        document.refuse(
+            (*loc, "torque_per_ampere"),
+            "found 0, expected Nm/A at the joint; leave it out if it is not known",
+        )
+    for key in ("speed_limit", "torque_limit"):
+        value = getattr(joint, key)
+        if value is not None and value <= 0:
+            document.refuse((*loc, key), f"found {value}, expected more than zero; leave it out for none")
+
+
 def _circle(start: str, drivers: Mapping[str, Sequence[str]]) -> list[str]:
     """A way along `drivers` from `start` back to it; empty if there is none."""
     came_from: dict[str, str] = {}
@@ -304,13 +328,14 @@ def _circle(start: str, drivers: Mapping[str, Sequence[str]]) -> list[str]:
 
 def _check_effects(document: Document, model: _LinkTable | _UrdfChain) -> None:
     names = [joint.name for joint in model.joints]
-    for i, effect in enumerate(model.effects):
-        for k, joint in enumerate(effect.joints):
-            if joint not in names:
-                document.refuse(
-                    ("effects", i, "joints", k),
-                    f"there is no joint {shown(joint)}; the joints are {listed(names)}",
-                )
+    for key, effects in (("effects", model.effects), ("torque_effects", model.torque_effects)):
+        for i, effect in enumerate(effects):
+            for k, joint in enumerate(effect.joints):
+                if joint not in names:
+                    document.refuse(
+                        (key, i, "joints", k),
+                        f"there is no joint {shown(joint)}; the joints are {listed(names)}",
+                    )
 
 
 # ---- Do the numbers look like the unit that the file names? --------------------------------------
@@ -445,6 +470,13 @@ def _to_robot(model: _LinkTable | _UrdfChain, default_name: str) -> _core.Robot:
             "upper": math.inf if upper is None else _to_si(upper, own),
             "mass": None if entry.mass is None else float(entry.mass),
             "center_of_mass": vector(entry.com, length),
+            "inertia": None if entry.inertia is None else _matrix(vector(entry.inertia)),
+            "torque_per_ampere": (
+                None if entry.torque_per_ampere is None else float(entry.torque_per_ampere)
+            ),
+            "rotor_inertia": float(entry.rotor_inertia),
+            "speed_limit": math.inf if entry.speed_limit is None else _to_si(entry.speed_limit, own),
+            "torque_limit": math.inf if entry.torque_limit is None else float(entry.torque_limit),
         }
         if isinstance(entry, _UrdfJoint):
             fields["T_parent_joint"] = frame(entry.xyz, entry.rpy)
@@ -454,6 +486,14 @@ def _to_robot(model: _LinkTable | _UrdfChain, default_name: str) -> _core.Robot:
             fields.update((key, _to_si(getattr(entry, key), length)) for key in ("d", "a"))
         return _core.Joint(**fields)
 
+    def applied(entries: Sequence[_Effect]) -> list[_core.AppliedEffect]:
+        return [
+            _core.AppliedEffect(
+                entry.effect, entry.joints, {name: float(value) for name, value in entry.parameters.items()}
+            )
+            for entry in entries
+        ]
+
     targets = {_TOOL: model.tool, **model.targets}
     return _core.Robot(
         model.name or default_name,
@@ -462,12 +502,8 @@ def _to_robot(model: _LinkTable | _UrdfChain, default_name: str) -> _core.Robot:
         T_measurement_base=frame(model.base.xyz, model.base.rpy),
         joints=[joint(entry) for entry in model.joints],
         targets=[_core.Target(name, frame(target.xyz, target.rpy)) for name, target in targets.items()],
-        effects=[
-            _core.AppliedEffect(
-                entry.effect, entry.joints, {name: float(value) for name, value in entry.parameters.items()}
-            )
-            for entry in model.effects
-        ],
+        effects=applied(model.effects),
+        torque_effects=applied(model.torque_effects),
         fitted_range={name: (float(low), float(high)) for name, (low, high) in model.fitted_range.items()},
         anchor=(
             None
@@ -475,6 +511,12 @@ def _to_robot(model: _LinkTable | _UrdfChain, default_name: str) -> _core.Robot:
             else _core.Anchor(vector(model.anchor.xyz, length), _to_si(model.anchor.zero, length))
         ),
     )
+
+
+def _matrix(inertia: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[ixx, iyy, izz, ixy, ixz, iyz] as shape=(3, 3)."""
+    xx, yy, zz, xy, xz, yz = inertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _unit(axis: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -558,6 +600,9 @@ class _Writer:
         if robot.effects:
             lines.append("effects:  # values in SI units (rad, m, rad/Nm ...), whatever `units` says")
             lines += [f"  - {self._effect(effect)}" for effect in robot.effects]
+        if robot.torque_effects:
+            lines.append("torque_effects:  # values in SI units (Nm, Nm s/rad ...), whatever `units` says")
+            lines += [f"  - {self._effect(effect)}" for effect in robot.torque_effects]
         if robot.fitted_range:
             lines.append("fitted_range:  # of the inputs that the effects were fitted on (rad, m, kg, deg C)")
             lines += [
@@ -604,7 +649,23 @@ class _Writer:
             parts.append(f"mass: {_digits(joint.mass, _SI)}")
         if not all(_is_plain_zero(value) for value in joint.center_of_mass):
             parts.append(f"com: {self._vector(joint.center_of_mass, self._length)}")
+        parts += self._drive(joint, own)
         return f"{{{', '.join(parts)}}}"
+
+    def _drive(self, joint: _core.Joint, own: Decimal) -> list[str]:
+        parts = []
+        if joint.inertia is not None:
+            upper = [joint.inertia[i, k] for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+            parts.append(f"inertia: {self._vector(upper, _SI)}")
+        if joint.torque_per_ampere is not None:
+            parts.append(f"torque_per_ampere: {_digits(joint.torque_per_ampere, _SI)}")
+        if joint.rotor_inertia != 0.0:
+            parts.append(f"rotor_inertia: {_digits(joint.rotor_inertia, _SI)}")
+        if math.isfinite(joint.speed_limit):
+            parts.append(f"speed_limit: {_digits(joint.speed_limit, own)}")
+        if math.isfinite(joint.torque_limit):
+            parts.append(f"torque_limit: {_digits(joint.torque_limit, _SI)}")
+        return parts
 
     def _effect(self, effect: _core.AppliedEffect) -> str:
         joints = ", ".join(_quoted(name) for name in effect.joints)

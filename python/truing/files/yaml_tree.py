@@ -241,6 +241,12 @@ def _vector3(value: object) -> tuple[Decimal, Decimal, Decimal]:
     return x, y, z
 
 
+def _inertia(value: object) -> tuple[Decimal, ...]:
+    if not isinstance(value, list) or len(value) != 6:
+        raise expected(value, "a list of 6 numbers, [ixx, iyy, izz, ixy, ixz, iyz]")
+    return tuple(_number(item) for item in value)
+
+
 def _pair(value: object) -> tuple[Decimal | None, Decimal | None]:
     if not isinstance(value, list) or len(value) != 2:
         raise expected(value, "a list of 2 numbers, [lower, upper]")
@@ -275,6 +281,7 @@ def choice(*allowed: str) -> Callable[[object], str]:
 Number = Annotated[Decimal, PlainValidator(_number)]
 Text = Annotated[str, PlainValidator(_text)]
 Vector3 = Annotated[tuple[Decimal, Decimal, Decimal], PlainValidator(_vector3)]
+Inertia = Annotated[tuple[Decimal, ...], PlainValidator(_inertia)]
 Limits = Annotated[tuple[Decimal | None, Decimal | None] | None, PlainValidator(_pair)]
 Range = Annotated[tuple[Decimal, Decimal], PlainValidator(_range)]
 FreeMapping = Annotated[dict[str, Any], PlainValidator(_mapping)]

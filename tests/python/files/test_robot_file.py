@@ -76,6 +76,20 @@ fitted_range: {q1: [0.1, 0.7], q2: [-1.25, 2], payload: [0, 5]}
 calibration: {source: tracker.csv, date: 2026-02-03, rms_m: 4.5e-5, covariance: covariance.csv, poses: 50}
 """
 
+DYNAMIC = """\
+format: truing-robot/1
+units: {length: m, angle: rad, mass: kg}
+convention: dh
+joints:
+  - {name: J1, type: revolute, theta: 0, d: 0.7, a: 0.3, alpha: -1.5708, mass: 220, com: [-0.1, 0.1, 0],
+     inertia: [9, 8.5, 7, 0.25, -0.5, 1e-3], torque_per_ampere: -12.5, rotor_inertia: 0.75, speed_limit: 2.1,
+     torque_limit: 9000}
+  - {name: J2, type: prismatic, theta: 0, d: 0.1, a: 0, alpha: 0, rotor_inertia: 40, speed_limit: 0.7, torque_limit: 600.1}
+torque_effects:
+  - {effect: coulomb, joints: [J1], parameters: {coulomb.J1: 7.25}}
+  - {effect: payload, joints: [], parameters: {payload.m: 2.5, payload.mz: 0.1}}
+"""
+
 URDF = """\
 <robot name="arm">
   <link name="base"/><link name="upper"/><link name="hand"/>
@@ -114,7 +128,14 @@ def assert_same(found: _core.Robot, expected: _core.Robot) -> None:
     assert len(found.joints) == len(expected.joints)
     for a, b in zip(found.joints, expected.joints, strict=True):
         assert (a.name, a.type, a.mass, list(a.driven_by)) == (b.name, b.type, b.mass, list(b.driven_by))
-        for field in ("theta", "d", "a", "alpha", "beta", "ratio", "offset", "lower", "upper"):
+        assert (a.torque_per_ampere, a.torque_limit) == (b.torque_per_ampere, b.torque_limit)
+        assert (a.inertia is None) == (b.inertia is None)
+        if a.inertia is not None and b.inertia is not None:
+            assert bits(a.inertia) == bits(b.inertia)
+        for field in (
+            *("theta", "d", "a", "alpha", "beta", "ratio", "offset", "lower", "upper"),
+            *("rotor_inertia", "speed_limit"),
+        ):
             assert np.float64(getattr(a, field)).tobytes() == np.float64(getattr(b, field)).tobytes(), (
                 a.name,
                 field,
@@ -124,9 +145,13 @@ def assert_same(found: _core.Robot, expected: _core.Robot) -> None:
     assert [target.name for target in found.targets] == [target.name for target in expected.targets]
     for c, d in zip(found.targets, expected.targets, strict=True):
         assert bits(c.T_last_target) == bits(d.T_last_target)
-    assert [(e.effect, list(e.joints), dict(e.parameters)) for e in found.effects] == [
-        (e.effect, list(e.joints), dict(e.parameters)) for e in expected.effects
-    ]
+    for found_list, expected_list in (
+        (found.effects, expected.effects),
+        (found.torque_effects, expected.torque_effects),
+    ):
+        assert [(e.effect, list(e.joints), dict(e.parameters)) for e in found_list] == [
+            (e.effect, list(e.joints), dict(e.parameters)) for e in expected_list
+        ]
     assert dict(found.fitted_range) == dict(expected.fitted_range)
     assert (found.anchor is None) == (expected.anchor is None)
     if found.anchor is not None and expected.anchor is not None:
@@ -157,6 +182,30 @@ def test_every_key_arrives_in_si(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         robot.T_measurement_base[:2, 0], [math.cos(0.3), math.sin(0.3)], rtol=0, atol=1e-15
     )
+
+
+def test_what_drives_and_what_is_driven_arrives(tmp_path: Path) -> None:
+    robot = load(tmp_path, DYNAMIC)
+    first, rail = robot.joints
+    assert np.array_equal(first.inertia, [[9, 0.25, -0.5], [0.25, 8.5, 1e-3], [-0.5, 1e-3, 7]])
+    assert (first.torque_per_ampere, first.rotor_inertia) == (-12.5, 0.75)
+    assert (first.speed_limit, first.torque_limit) == (2.1, 9000)
+    assert rail.inertia is None and rail.torque_per_ampere is None
+    assert [(e.effect, list(e.joints), dict(e.parameters)) for e in robot.torque_effects] == [
+        ("coulomb", ["J1"], {"coulomb.J1": 7.25}),
+        ("payload", [], {"payload.m": 2.5, "payload.mz": 0.1}),
+    ]
+    still = load(tmp_path, PALLETIZER).joints[0]
+    assert (still.rotor_inertia, still.speed_limit, still.torque_limit) == (0, math.inf, math.inf)
+
+
+def test_speeds_are_in_the_files_units(tmp_path: Path) -> None:
+    text = DYNAMIC.replace("length: m, angle: rad", "length: mm, angle: deg")
+    text = text.replace("-1.5708", "-90").replace("d: 0.7", "d: 700").replace("a: 0.3", "a: 300")
+    first, rail = load(tmp_path, text.replace("d: 0.1", "d: 100")).joints
+    assert first.speed_limit == pytest.approx(math.radians(2.1), rel=1e-15)
+    assert rail.speed_limit == 0.7e-3
+    assert (first.torque_limit, first.inertia[0, 0]) == (9000, 9)
 
 
 def test_millimetres_and_degrees_are_converted_to_the_nearest_double(tmp_path: Path) -> None:
@@ -221,7 +270,7 @@ def test_numbers_may_have_an_exponent_without_a_point(tmp_path: Path) -> None:
 # ---- What is written -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("text", [PALLETIZER, UR10, CHAIN])
+@pytest.mark.parametrize("text", [PALLETIZER, UR10, CHAIN, DYNAMIC])
 @pytest.mark.parametrize(
     "units", [Units("m", "rad"), Units("mm", "deg"), Units("mm", "rad"), Units("m", "deg")]
 )
@@ -230,6 +279,10 @@ def test_saved_robot_loads_bit_for_bit(tmp_path: Path, text: str, units: Units) 
     save_robot(tmp_path / "saved.yaml", robot, units=units)
     assert_same(load_robot(tmp_path / "saved.yaml"), robot)
     assert load_units(tmp_path / "saved.yaml") == units
+
+
+def symmetric(A: np.ndarray) -> np.ndarray:
+    return np.asarray(np.triu(A) + np.triu(A, 1).T)
 
 
 @pytest.mark.parametrize("units", [Units("m", "rad"), Units("mm", "deg")])
@@ -250,10 +303,16 @@ def test_arbitrary_doubles_survive_in_any_unit(tmp_path: Path, units: Units) -> 
                     ratio=random.normal(1, 1e-3),
                     lower=-random.uniform(1, 3),
                     upper=random.uniform(1, 3),
+                    inertia=symmetric(random.normal(size=(3, 3)) * 10.0 ** random.integers(-9, 3)),
+                    torque_per_ampere=random.normal(),
+                    rotor_inertia=random.uniform(0, 1e-3),
+                    speed_limit=random.uniform(1, 9),
+                    torque_limit=random.uniform(1, 900),
                 )
             )
         joints[0].a = random.uniform(0.5, 1.0)
-        robot = _core.Robot("random", joints=joints, gravity=random.normal(size=3))
+        friction = _core.AppliedEffect("coulomb", ["J1"], {"coulomb.J1": random.normal()})
+        robot = _core.Robot("random", joints=joints, gravity=random.normal(size=3), torque_effects=[friction])
         save_robot(tmp_path / "saved.yaml", robot, units=units)
         assert_same(load_robot(tmp_path / "saved.yaml"), robot)
 
@@ -451,6 +510,47 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, case: str) -> None
     with pytest.raises(InputError, match=message) as error:
         load(tmp_path, PALLETIZER.replace(old, new, 1))
     assert "robot.yaml" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "[9, 8.5, 7, 0.25, -0.5, 1e-3]",
+            "[9, 8.5, 7]",
+            r"line 6: joints\[0\] \(J1\) inertia: found a list of 3, expected a list of 6 numbers, \[ixx, iyy",
+        ),
+        ("[9, 8.5", "[.nan, 8.5", "line 6: .*inertia: found NaN, expected a finite number"),
+        ("[9, 8.5", "[heavy, 8.5", "line 6: .*inertia: found 'heavy', expected a finite number"),
+        ("-12.5", "0", "line 6: .*torque_per_ampere: found 0, expected Nm/A"),
+        ("-12.5", ".inf", "line 6: .*torque_per_ampere: found Infinity"),
+        (
+            "rotor_inertia: 0.75",
+            "rotor_inertia: -1",
+            "line 6: .*rotor_inertia: found -1, expected zero or more",
+        ),
+        ("speed_limit: 2.1", "speed_limit: 0", "line 6: .*speed_limit: found 0, expected more than zero"),
+        (
+            "torque_limit: 9000",
+            "torque_limit: -3",
+            "line 7: .*torque_limit: found -3, expected more than zero",
+        ),
+        ("torque_limit: 9000", "torque_limits: 3", "line 7: .*unknown key; did you mean 'torque_limit'"),
+        (
+            "joints: [J1]",
+            "joints: [J3]",
+            r"line 10: torque_effects\[0\] \(coulomb\) joints\[0\]: there is no joint 'J3'",
+        ),
+        ("coulomb.J1: 7.25", "coulomb.J1: .nan", "line 10: .*found NaN"),
+        ("effect: coulomb, ", "", "line 10: .*key 'effect' is missing"),
+    ],
+)
+def test_what_is_wrong_with_drives_is_named_with_its_line(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    assert old in DYNAMIC
+    with pytest.raises(InputError, match=message):
+        load(tmp_path, DYNAMIC.replace(old, new, 1))
 
 
 @pytest.mark.parametrize(
