@@ -121,7 +121,7 @@ bool is_bounded(const Eigen::Vector3d& v) { return (v.array().abs() <= kLargestN
 void require_usable(const std::string& where, const char* name, double value) {
   require_finite(where, name, value);
   if (std::abs(value) <= kLargestNumber) return;
-  refuse(where, std::string(name) + " is " + number(value) + ", expected a value between -1e6 and 1e6 (m, rad, kg)");
+  refuse(where, std::string(name) + " is " + number(value) + ", expected a value between -1e6 and 1e6 (m, rad, kg, N)");
 }
 
 void require_frame(const std::string& where, const char* name, const Isometry3d& T) {
@@ -134,6 +134,33 @@ void require_frame(const std::string& where, const char* name, const Isometry3d&
     refuse(where,
            std::string(name) + " is not a rigid transform: its rotation part must be orthonormal and right-handed");
   }
+}
+
+// Published URDFs state inertias that no body has (principal moments below zero, or beyond the triangle's inequality):
+// such a robot can be used all the same, and what is exported of it is made consistent.
+void validate_inertia(const std::string& where, const Eigen::Matrix3d& inertia) {
+  if (!(inertia.array().abs() <= kLargestNumber * kLargestNumber).all())
+    refuse(where, "inertia has a value that is not finite, or beyond 1e12 kg m^2");
+  if ((inertia - inertia.transpose()).cwiseAbs().maxCoeff() > 1e-9 * inertia.cwiseAbs().maxCoeff())
+    refuse(where, "inertia is not symmetric");
+}
+
+void require_limit(const std::string& where, const char* name, double value) {
+  if (value > 0.0 && (value <= kLargestNumber || std::isinf(value))) return;  // of NaN too this is false
+  refuse(where, std::string(name) + " is " + number(value) + ", expected more than zero, or inf for none");
+}
+
+void validate_drive(const std::string& where, const Joint& joint) {
+  require_usable(where, "rotor_inertia", joint.rotor_inertia);
+  if (joint.rotor_inertia < 0.0)
+    refuse(where, "rotor_inertia is " + number(joint.rotor_inertia) + ", expected zero or more");
+  if (joint.torque_per_ampere) {
+    require_usable(where, "torque_per_ampere", *joint.torque_per_ampere);
+    if (*joint.torque_per_ampere == 0.0)
+      refuse(where, "torque_per_ampere is 0: leave it out if it is not known; negative where the current's sign is");
+  }
+  require_limit(where, "speed_limit", joint.speed_limit);
+  require_limit(where, "torque_limit", joint.torque_limit);
 }
 
 void validate_joint(const Joint& joint, Convention convention) {
@@ -165,6 +192,8 @@ void validate_joint(const Joint& joint, Convention convention) {
   }
   if (!is_bounded(joint.center_of_mass))
     refuse(where, "center_of_mass has a value that is not finite, or beyond 1e6 m");
+  if (joint.inertia) validate_inertia(where, *joint.inertia);
+  validate_drive(where, joint);
 }
 
 // Parameters are named after joints and targets (`J2.a`, `tool.x`, `base.rz`, `anchor.zero`), so these names
@@ -219,6 +248,15 @@ void validate_effects(const Robot& robot) {
   }
 }
 
+// Whether an effect has such parameters and acts at such joints is known where its law is.
+void validate_torque_effects(const Robot& robot) {
+  for (const AppliedEffect& applied : robot.torque_effects) {
+    if (applied.effect.empty()) refuse("torque_effects", "one has no name");
+    const std::string where = "torque effect '" + applied.effect + "'";
+    for (const auto& [name, value] : applied.parameters) require_usable(where, name.c_str(), value);
+  }
+}
+
 }  // namespace
 
 std::size_t Robot::driven_count() const { return driven_joints().size(); }
@@ -263,6 +301,7 @@ void validate(const Robot& robot) {
   for (const Target& target : robot.targets)
     require_frame("target '" + target.name + "'", "T_last_target", target.T_last_target);
   validate_effects(robot);
+  validate_torque_effects(robot);
   if (robot.anchor && !(is_bounded(robot.anchor->point) && std::abs(robot.anchor->zero) <= kLargestNumber)) {
     refuse(where, "anchor has a value that is not finite, or beyond 1e6 m");
   }

@@ -237,8 +237,10 @@ void take_inertia(const urdf::ModelInterface& model, const urdf::Link& link, Joi
   joint.inertia = symmetric(inertia);
 }
 
-// urdfdom wants both limits stated, so a file that knows none writes zero, or -1 as in SDF.
-double stated_limit(double value) { return value > 0.0 ? value : std::numeric_limits<double>::infinity(); }
+// urdfdom wants both limits stated, so a file that knows none writes zero, -1 as in SDF, or 1e10.
+double stated_limit(double value) {
+  return value > 0.0 && value < 1e6 ? value : std::numeric_limits<double>::infinity();
+}
 
 void take_drive_limits(const urdf::Joint& source, Joint& joint) {
   if (!source.limits) return;

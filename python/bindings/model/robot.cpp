@@ -240,7 +240,8 @@ void bind_robot(py::module_& m) {
         R"(Raises InputError when the robot cannot be used.
 
 The error names the joint and what is wrong: no joints, duplicate or empty names, unknown or circular `driven_by`,
-values that are not finite, an axis that is not of unit length, lower > upper.)");
+values that are not finite, an axis that is not of unit length, lower > upper, an inertia that is not symmetric, a
+negative rotor inertia, limits of speed or torque that are not above zero, torque_per_ampere of zero.)");
   m.def("forward_kinematics", &frames_of, py::arg("robot"), py::arg("q"), py::arg("target") = 0,
         R"(Frames of the links and of a target in the measurement frame, effects left out.
 

@@ -333,6 +333,55 @@ TEST_CASE("validate names the joint and what is wrong with it") {
   }
 }
 
+TEST_CASE("validate refuses what no drive and no link has, and takes inertias as they are published") {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  Robot robot = palletizing_arm();
+  truing::Joint& joint = robot.joints[1];
+  joint.inertia = Vector3d(-1.0, 5.0, 0.1).asDiagonal();  // of no body
+  joint.mass = 0.0;
+  joint.torque_per_ampere = -3.0;
+  joint.rotor_inertia = 0.2;
+  joint.speed_limit = inf;
+  joint.torque_limit = 10.0;
+  robot.torque_effects = {{"coulomb", {"J2"}, {{"coulomb.J2", 1.0}}}, {"payload", {}, {{"payload.m", 2.0}}}};
+  CHECK(complaint(robot) == "");
+  SUBCASE("inertia") {
+    (*joint.inertia)(0, 1) = 1e-6;
+    CHECK(complaint(robot) == "joint 'J2': inertia is not symmetric");
+    (*joint.inertia)(1, 0) = 1e-6;
+    CHECK(complaint(robot) == "");
+    (*joint.inertia)(2, 2) = nan;
+    CHECK(contains(complaint(robot), "joint 'J2': inertia has a value that is not finite"));
+  }
+  SUBCASE("rotor") {
+    for (const double value : {-1e-9, nan, inf}) {
+      joint.rotor_inertia = value;
+      CHECK(contains(complaint(robot), "joint 'J2': rotor_inertia is"));
+    }
+  }
+  SUBCASE("drive") {
+    for (const double value : {0.0, nan, inf}) {
+      joint.torque_per_ampere = value;
+      CHECK(contains(complaint(robot), "joint 'J2': torque_per_ampere is"));
+    }
+  }
+  SUBCASE("limits") {
+    for (const double value : {0.0, -1.0, nan}) {
+      joint.torque_limit = value;
+      CHECK(contains(complaint(robot), "joint 'J2': torque_limit is"));
+      joint.speed_limit = value;
+      CHECK(contains(complaint(robot), "joint 'J2': speed_limit is"));
+      joint.speed_limit = 1.0;
+    }
+  }
+  SUBCASE("torque effects") {
+    robot.torque_effects[1].parameters["payload.m"] = nan;
+    CHECK(contains(complaint(robot), "torque effect 'payload': payload.m is nan"));
+    robot.torque_effects = {{"", {}, {}}};
+    CHECK(contains(complaint(robot), "torque_effects: one has no name"));
+  }
+}
+
 TEST_CASE("an unknown joint name is answered with the names there are") {
   CHECK(palletizing_arm().joint_index("J3") == 2);
   CHECK_THROWS_WITH_AS(palletizing_arm().joint_index("j3"),

@@ -238,12 +238,12 @@ TEST_CASE("a link without inertial has no mass and no inertia") {
   CHECK(!robot.joints[0].inertia);
 }
 
-TEST_CASE("limits of speed and torque come over, zero or less is none") {
+TEST_CASE("limits of speed and torque come over, zero, less and what no machine has is none") {
   const Robot stated =
       truing::robot_from_urdf(two_links("", "", R"(<limit lower="-1" upper="1" effort="330" velocity="3.14"/>)"));
   CHECK(stated.joints[0].speed_limit == 3.14);
   CHECK(stated.joints[0].torque_limit == 330.0);
-  for (const char* none : {"0", "-1"}) {
+  for (const char* none : {"0", "-1", "1e10"}) {
     const std::string limit = std::string("<limit lower=\"-1\" upper=\"1\" effort=\"") + none + "\" velocity=\"" + none;
     const Robot robot = truing::robot_from_urdf(two_links("", "", limit + "\"/>"));
     CHECK(std::isinf(robot.joints[0].speed_limit));

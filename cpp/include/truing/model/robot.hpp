@@ -105,7 +105,8 @@ struct Robot {
 
 /// Throws std::invalid_argument, naming the joint and what is wrong, when the robot cannot be used: no joints,
 /// duplicate or empty names, unknown or circular `driven_by`, values that are not finite, axis not of unit length,
-/// lower > upper.
+/// lower > upper, an inertia that is not symmetric (principal moments may be anything), a negative rotor inertia,
+/// limits of speed or torque that are not above zero, torque_per_ampere of zero.
 void validate(const Robot& robot);
 
 /// Roll-pitch-yaw as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll). [rad]
