@@ -43,4 +43,5 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_replay(m);
   truing::python::bind_simulation(m);
   truing::python::bind_calibrate(m);
+  truing::python::bind_rigid(m);
 }

@@ -28,6 +28,7 @@ void bind_streams(py::module_& m);
 void bind_tracker(py::module_& m);
 void bind_replay(py::module_& m);
 void bind_simulation(py::module_& m);
+void bind_rigid(py::module_& m);
 void bind_calibrate(py::module_& m);
 
 }  // namespace truing::python

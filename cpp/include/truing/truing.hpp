@@ -5,8 +5,7 @@
 
 #include "truing/compensate.hpp"
 #include "truing/diagnose.hpp"
-#include "truing/dynamics/effect.hpp"
-#include "truing/dynamics/recording.hpp"
+#include "truing/dynamics/rigid.hpp"
 #include "truing/handeye.hpp"
 #include "truing/identify.hpp"
 #include "truing/inverse.hpp"

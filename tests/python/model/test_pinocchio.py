@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import os
-import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 import truing
 from pinocchio_arms import ARM, GANTRY, OBLIQUE, Both
+from urdf_inertias import skewed_inertias
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio (pip package 'pin') is not installed")
 
@@ -188,23 +188,6 @@ def test_exported_joint_zeros_are_turned_about_oblique_axes(both: Both) -> None:
 # ---- Inertias ------------------------------------------------------------------------------------
 
 PUBLISHED = ("dyn_ur10e", "dyn_tx40", "dyn_ur10")
-
-
-def skewed_inertias(text: str) -> str:
-    """The URDF with an inertia of its own for every link: turned, off the axes, of another mass."""
-    random = np.random.default_rng(6)
-
-    def inertial(_: re.Match[str]) -> str:
-        A = random.normal(size=(3, 3))
-        xx, xy, xz, _yx, yy, yz, _zx, _zy, zz = (A @ A.T).ravel()
-        xyz, rpy = random.normal(size=3), random.uniform(-3, 3, 3)
-        return (
-            f'<inertial><origin xyz="{" ".join(map(str, xyz))}" rpy="{" ".join(map(str, rpy))}"/>'
-            f'<mass value="{random.uniform(0.1, 5.0)}"/>'
-            f'<inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="{xy}" ixz="{xz}" iyz="{yz}"/></inertial>'
-        )
-
-    return re.sub(r"<inertial>.*?</inertial>", inertial, text, flags=re.DOTALL)
 
 
 def assert_inertias_are_pinocchios(text: str) -> None:
