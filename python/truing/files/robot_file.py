@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robot files: robot.yaml (format truing-robot/1) and URDF.
+"""Robot files: robot.yaml (format truing-robot/1), URDF and MJCF.
 
 A number in a file is read with all its digits, converted once and rounded once; it is written with as few
 digits as lead back to the same double. So a saved robot loads bit for bit, in any unit. Frames are written as
@@ -23,6 +23,7 @@ from pydantic import Field, PlainValidator
 from truing import _core
 from truing.errors import InputError
 from truing.files.common import PathLike, Units, atomic_write, decoded, listed, read_bytes, shown
+from truing.files.mjcf_file import is_mjcf, robot_from_mjcf
 from truing.files.yaml_tree import (
     LONGEST_NAME,
     NAME,
@@ -148,17 +149,20 @@ class _UrdfChain(_RobotFile):
 
 
 def load_robot(path: PathLike, base_link: str = "", tip_link: str = "") -> _core.Robot:
-    """Read a robot from robot.yaml or from URDF (.urdf, .xml).
+    """Read a robot from robot.yaml, from URDF (.urdf, .xml) or from MJCF (.xml; needs MuJoCo: truing[dynamics]).
 
-    `base_link` and `tip_link` choose the chain of a URDF; empty: its only root and its only leaf.
+    `base_link` and `tip_link` choose the chain of a URDF, or of an MJCF (bodies; the tip may be a site); empty: its only
+    root and its only leaf. Warns (InputWarning) of what an MJCF has and a robot does not hold: contacts, moving branches.
     Raises InputError that names the file, the line, what was found and what was expected.
     """
     path = Path(path)
     if path.suffix.lower() in _URDF_SUFFIXES:
-        return _from_urdf(path, base_link, tip_link)
+        robot = (robot_from_mjcf if is_mjcf(path) else _from_urdf)(path, base_link, tip_link)
+        _check_lengths_of_names(path, robot)
+        return robot
     if base_link or tip_link:
         raise InputError(
-            f"{path}: base and tip links choose a chain from a URDF file, and this is not one (.urdf, .xml)"
+            f"{path}: base and tip links choose a chain from a URDF or MJCF, and this is not one (.urdf, .xml)"
         )
     document, model = _read(path)
     _check_names(document, model)
@@ -174,7 +178,7 @@ def load_robot(path: PathLike, base_link: str = "", tip_link: str = "") -> _core
 
 
 def load_units(path: PathLike) -> Units:
-    """The units that a robot file is written in; a URDF's are always m and rad."""
+    """The units that a robot file is written in; those of URDF and MJCF are always m and rad."""
     path = Path(path)
     if path.suffix.lower() in _URDF_SUFFIXES:
         return Units()
@@ -211,10 +215,13 @@ def _from_urdf(path: Path, base_link: str, tip_link: str) -> _core.Robot:
     except ValueError as error:
         # The parser quotes the file, line ends and all.
         raise InputError(f"{path}: {' '.join(str(error).split())[:1000]}") from None
+    return robot
+
+
+def _check_lengths_of_names(path: Path, robot: _core.Robot) -> None:
     for name in (robot.name, *(joint.name for joint in robot.joints)):
         if len(name) > LONGEST_NAME:
             raise InputError(f"{path}: found {shown(name)}, expected {NAME}")
-    return robot
 
 
 def _read(path: Path) -> tuple[Document, _LinkTable | _UrdfChain]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.errors import InputError
-from truing.files import load_units, save_robot, write_table
+from truing.files import is_mjcf, load_units, save_robot, write_table
 from truing.identification.api import predict, residuals
 from truing.identification.page import identification_report, prediction_report
 from truing.report.json_text import to_json, without_nan
@@ -335,7 +335,8 @@ def write_robot(
     base_link: str,
     tip_link: str,
 ) -> None:
-    """Writes ``robot.yaml`` in the units of the nominal file, and ``robot.urdf`` if that was URDF."""
+    """Writes ``robot.yaml`` in the units of the nominal file, and ``robot.urdf`` if that was URDF (MJCF: only the
+    former)."""
     save_robot(
         folder / "robot.yaml",
         robot,
@@ -346,7 +347,9 @@ def write_robot(
             **calibration,
         },
     )
-    if nominal_file is not None and robot.convention == "urdf" and nominal_file.suffix.lower() != ".yaml":
+    if nominal_file is None or nominal_file.suffix.lower() == ".yaml" or is_mjcf(nominal_file):
+        return
+    if robot.convention == "urdf":
         text = nominal_file.read_text(encoding="utf-8-sig")
         (folder / "robot.urdf").write_text(
             _core.urdf_with_calibration(text, robot, base_link, tip_link), encoding="utf-8"

@@ -60,6 +60,7 @@ FLOORS = {
         "opencv_file",
         "other_poses",
         "handeye_file",
+        "mjcf_file",
         "robot_file",
         "measurement_file",
         "recording_parts",
@@ -109,7 +110,7 @@ ONLY_IN = {
     "plotly": {"report"},
     "typer": {"cli"},
     "rich": {"cli"},
-    "mujoco": {"exam"},
+    "mujoco": {"exam", "files"},
     "cv2": {"files"},
     "rosbags": {"files"},
 }
