@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """MJCF: MuJoCo compiles the file, and the chain from base to tip becomes a robot of convention urdf.
 
-A joint's frame stands at its anchor with the axes of its body, so that the motion is about the frame's origin; motion
-counts from `ref`. Bodies that do not move against a link are merged into it. MuJoCo's names are kept.
+A joint's frame stands at its anchor with the axes of its body, so that the motion is about the frame's
+origin; motion counts from `ref`. Bodies that do not move against a link are merged into it. Names are kept.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ def is_mjcf(path: Path) -> bool:
 def robot_from_mjcf(path: Path, base: str = "", tip: str = "") -> _core.Robot:
     """The chain from body `base` to body or site `tip` of an MJCF; empty: the world, the only end.
 
-    Warns (InputWarning) of what the file has and the robot leaves out. Raises InputError: MuJoCo is not installed, not an
-    MJCF that it takes, no such body, several ends, free or ball joints, closed loops.
+    Warns (InputWarning) of what the file has and the robot leaves out. Raises InputError: MuJoCo is not
+    installed, not an MJCF that it takes, no such body, several ends, free or ball joints, closed loops.
     """
     mj = _mujoco(path)
     model = _compiled(mj, path)
@@ -77,8 +77,9 @@ def _compiled(mj: Any, path: Path) -> Any:
         try:
             return spec.compile()
         except ValueError:
-            # Meshes are often left behind. Where inertials are stated, shapes say nothing that is wanted here.
-            from_shapes = spec.compiler.inertiafromgeom == mj.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+            # Meshes are often left behind. Where inertials are stated, shapes say nothing wanted here.
+            always = mj.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+            from_shapes = int(spec.compiler.inertiafromgeom) == int(always)
             if from_shapes or not all(body.explicitinertial for body in spec.bodies[1:]):
                 raise
             bare = mj.MjSpec.from_file(str(path))
@@ -258,8 +259,8 @@ class _Chain:
             return last
         self._refuse(
             f"below {self._body_name(self.base)} {len(ends)} branches end, at"
-            f" {', '.join(self._body_name(body) for body in ends)}: name the tip (--tip-link, tip_link=), a body or"
-            " a site"
+            f" {', '.join(self._body_name(body) for body in ends)}: name the tip (--tip-link, tip_link=), a"
+            " body or a site"
         )
 
     def _end_of(self, last: int) -> int:
@@ -289,8 +290,8 @@ class _Chain:
         path = self._path(self.tip)
         if not path:
             self._refuse(
-                f"tip {self._body_name(self.tip)} is not below base {self._body_name(self.base)}; the bodies are "
-                f"{listed(self._body_names())}"
+                f"tip {self._body_name(self.tip)} is not below base {self._body_name(self.base)}; the bodies"
+                f" are {listed(self._body_names())}"
             )
         return path
 
@@ -299,8 +300,8 @@ class _Chain:
         name, kind = shown(self._joint_name(joint)), int(self.m.jnt_type[joint])
         if kind == int(kinds.mjJNT_FREE):
             self._refuse(
-                f"joint {name} is free: a floating base is not read. Name a base body (--base-link, base_link=) above"
-                " which nothing counts, if the robot stood still"
+                f"joint {name} is free: a floating base is not read. Name a base body (--base-link,"
+                " base_link=) above which nothing counts, if the robot stood still"
             )
         if kind == int(kinds.mjJNT_BALL):
             self._refuse(f"joint {name} is a ball: between base and tip only hinge and slide joints are read")
@@ -336,8 +337,8 @@ class _Chain:
             )
         if two not in self.joints:
             self._refuse(
-                f"joint {name} follows {shown(self._joint_name(two))}, which does not move between base and tip:"
-                " choose them so that both do"
+                f"joint {name} follows {shown(self._joint_name(two))}, which does not move between base and"
+                " tip: choose them so that both do"
             )
         if one in self.followers:
             self._refuse(f"joint {name} follows two joints at once")
@@ -357,9 +358,9 @@ class _Chain:
         if self._link_below(one) == self._link_below(two):
             return  # within what is merged into one link
         self._refuse(
-            f"the equality constraint `{kind}` between {self._body_name(one)} and {self._body_name(two)} closes a loop:"
-            " closed chains are not read. Write the passive joint of a parallelogram as `driven_by` in a robot.yaml, or as"
-            " `equality/joint`, and take the constraint out"
+            f"the equality constraint `{kind}` between {self._body_name(one)} and {self._body_name(two)}"
+            " closes a loop: closed chains are not read. Write the passive joint of a parallelogram as"
+            " `driven_by` in a robot.yaml, or as `equality/joint`, and take the constraint out"
         )
 
     def _refuse_tendon(self, k: int, tendons: Iterable[int]) -> None:
@@ -448,8 +449,8 @@ class _Chain:
             self.owner[body] = (link, T)
             if body not in self.bodies and self._joints_of(body) and link >= 0:
                 self.left_out.append(
-                    f"{self._body_name(body)} moves off the chain: it is merged into the link that carries it, as it"
-                    " stands at its reference position"
+                    f"{self._body_name(body)} moves off the chain: it is merged into the link that carries"
+                    " it, as it stands at its reference position"
                 )
 
     def _turns(self, joint: int) -> bool:
@@ -589,7 +590,7 @@ class _Chain:
         )
 
     def _colliding(self, moved: list[int]) -> str:
-        """Two bodies of which one moves with the chain, and whose geoms are not kept from touching each other."""
+        """Two bodies, one of which moves with the chain, whose geoms are not kept from touching."""
         m = self.m
         flags = self.mj.mjtDisableBit
         if int(m.opt.disableflags) & int(flags.mjDSBL_CONTACT):

@@ -149,11 +149,12 @@ class _UrdfChain(_RobotFile):
 
 
 def load_robot(path: PathLike, base_link: str = "", tip_link: str = "") -> _core.Robot:
-    """Read a robot from robot.yaml, from URDF (.urdf, .xml) or from MJCF (.xml; needs MuJoCo: truing[dynamics]).
+    """Read a robot from robot.yaml, URDF (.urdf, .xml) or MJCF (.xml; needs MuJoCo: truing[dynamics]).
 
-    `base_link` and `tip_link` choose the chain of a URDF, or of an MJCF (bodies; the tip may be a site); empty: its only
-    root and its only leaf. Warns (InputWarning) of what an MJCF has and a robot does not hold: contacts, moving branches.
-    Raises InputError that names the file, the line, what was found and what was expected.
+    `base_link` and `tip_link` choose the chain of a URDF, or of an MJCF (bodies; the tip may be a site);
+    empty: its only root and its only leaf. Warns (InputWarning) of what an MJCF has and a robot does not:
+    contacts, moving branches. Raises InputError that names the file, the line, what was found and what was
+    expected.
     """
     path = Path(path)
     if path.suffix.lower() in _URDF_SUFFIXES:
@@ -162,7 +163,7 @@ def load_robot(path: PathLike, base_link: str = "", tip_link: str = "") -> _core
         return robot
     if base_link or tip_link:
         raise InputError(
-            f"{path}: base and tip links choose a chain from a URDF or MJCF, and this is not one (.urdf, .xml)"
+            f"{path}: base and tip links choose a chain from URDF or MJCF, and this is not one (.urdf, .xml)"
         )
     document, model = _read(path)
     _check_names(document, model)

@@ -335,8 +335,8 @@ def write_robot(
     base_link: str,
     tip_link: str,
 ) -> None:
-    """Writes ``robot.yaml`` in the units of the nominal file, and ``robot.urdf`` if that was URDF (MJCF: only the
-    former)."""
+    """Writes ``robot.yaml`` in the units of the nominal file, and ``robot.urdf`` if that was URDF (of MJCF
+    only the former)."""
     save_robot(
         folder / "robot.yaml",
         robot,

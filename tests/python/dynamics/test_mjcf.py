@@ -96,14 +96,15 @@ def assert_same_torques(text: str, robot: truing.Robot, seed: int = 1) -> None:
     np.testing.assert_allclose(torques(robot, q, qd, qdd), expected, rtol=0, atol=1e-9)
 
 
-# Origins and inertias turned, anchors and axes off the frames, references, springs, laws of every kind, two joints on
-# one body, a rail, bodies without joints between and behind, gravity that is not along an axis.
+# Origins and inertias turned, anchors and axes off the frames, references, springs, laws of every kind, three
+# joints on one body, a rail, bodies without joints between and behind, gravity that is not along an axis.
 ARM = """<mujoco model="arm"><compiler angle="radian" autolimits="true"/>
 <option gravity="1 -2 -9"/>
 <worldbody><body name="pedestal" pos="0.1 0.2 0.5" euler="0.3 -0.2 1">
   <inertial pos="0 0 0" mass="80" diaginertia="1 1 1"/>
-  <body name="a" pos="0 0.1 0.4" euler="0.1 0.2 -0.3"><joint name="A" type="hinge" axis="0 1 2" pos="0.02 0.03 -0.01"
-      range="-2 1.5" ref="0.3" armature="0.7" damping="0.4" frictionloss="1.1" stiffness="3" springref="0.9"/>
+  <body name="a" pos="0 0.1 0.4" euler="0.1 0.2 -0.3"><joint name="A" type="hinge" axis="0 1 2"
+      pos="0.02 0.03 -0.01" range="-2 1.5" ref="0.3" armature="0.7" damping="0.4" frictionloss="1.1"
+      stiffness="3" springref="0.9"/>
     <inertial pos="0.1 0.02 0.3" quat="1 0.2 -0.3 0.5" mass="4" diaginertia="0.3 0.2 0.4"/>
     <body name="cover" pos="0.2 0 0.1" euler="1 0 0">
       <inertial pos="0.05 0 0" mass="0.7" fullinertia="0.01 0.02 0.015 0.001 -0.002 0.003"/></body>
@@ -112,11 +113,15 @@ ARM = """<mujoco model="arm"><compiler angle="radian" autolimits="true"/>
       <joint name="B2" type="slide" axis="0 0.6 -0.8" ref="-0.1" frictionloss="2" stiffness="50"/>
       <joint name="B3" type="hinge" axis="0 0 1" pos="0.05 0 0.02"/>
       <inertial pos="0 0.1 0.1" mass="2" diaginertia="0.03 0.02 0.04"/>
-      <body name="spacer" pos="0 0 0.2" euler="0 0 2"><inertial pos="0 0 0.1" mass="0.5" diaginertia="0.01 0.01 0.01"/>
-        <body name="c" pos="0.1 0 0.2"><joint name="C" type="hinge" axis="-1 2 0.5" stiffness="0.4" springref="-1"/>
+      <body name="spacer" pos="0 0 0.2" euler="0 0 2">
+        <inertial pos="0 0 0.1" mass="0.5" diaginertia="0.01 0.01 0.01"/>
+        <body name="c" pos="0.1 0 0.2"><joint name="C" type="hinge" axis="-1 2 0.5" stiffness="0.4"
+            springref="-1"/>
           <inertial pos="0.02 0 0.15" mass="1.2" diaginertia="0.01 0.02 0.015"/>
-          <body name="flange" pos="0 0.1 0.3" euler="0.5 0 0"><inertial pos="0 0 0.02" mass="0.2" diaginertia="1e-3 1e-3 1e-3"/>
-            <site name="tcp" pos="0 0 0.1" euler="0 0.7 0"/></body></body></body></body></body></body></worldbody>
+          <body name="flange" pos="0 0.1 0.3" euler="0.5 0 0">
+            <inertial pos="0 0 0.02" mass="0.2" diaginertia="1e-3 1e-3 1e-3"/>
+            <site name="tcp" pos="0 0 0.1" euler="0 0.7 0"/></body></body></body></body></body></body>
+</worldbody>
 <actuator><motor name="m" joint="A" gear="20" armature="0.001" damping="0.002" forcerange="-5 4"/>
   <motor joint="C" forcerange="-7 7"/></actuator>
 </mujoco>"""
@@ -183,11 +188,25 @@ def test_inverse_dynamics_of_published_models_are_mujocos(name: str) -> None:
     assert_same_torques(path.read_text(), truing.load_robot(path))
 
 
+def test_a_robot_from_mjcf_is_calibrated_like_any_other(tmp_path: Path) -> None:
+    """Its file is no URDF, so that none is written."""
+    path, out = tmp_path / "robot.xml", tmp_path / "out"
+    path.write_text(ARM.replace('frictionloss="2"', 'frictionloss="2" range="0 1"'))
+    assert main(["simulate", str(path), "--poses", "60", "--out", str(out)]) == 0
+    data = str(out / "measurements.csv")
+    assert main(["identify", str(path), data, "--tip-link", "tcp", "--out", str(tmp_path / "found")]) == 0
+    found = truing.load_robot(tmp_path / "found" / "robot.yaml")
+    assert len(found.torque_effects) == len(load(tmp_path, ARM).torque_effects)
+    assert not (tmp_path / "found" / "robot.urdf").exists()
+
+
 # ---- Branches, followers -------------------------------------------------------------------------
 
 JAW = """<mujoco><compiler angle="radian"/><worldbody>
-  <body name="l1"><joint name="J1" axis="0 1 0"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
-    <body name="l2" pos="0.4 0 0"><joint name="J2" axis="0 1 0"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
+  <body name="l1"><joint name="J1" axis="0 1 0"/>
+      <inertial pos="0.1 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
+    <body name="l2" pos="0.4 0 0"><joint name="J2" axis="0 1 0"/>
+      <inertial pos="0.1 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
       <body name="left" pos="0.2 0.05 0" euler="0 0 1"><joint name="L" axis="0 0 1" ref="0.2"/>
         <inertial pos="0.05 0 0" mass="0.3" diaginertia="1e-4 2e-4 3e-4"/></body>
       <body name="right" pos="0.2 -0.05 0"><joint name="R" type="slide" axis="0 1 0"/>
@@ -228,12 +247,12 @@ def test_of_several_ends_that_with_the_only_site_is_taken(tmp_path: Path) -> Non
 
 
 def test_a_joint_equality_makes_a_passive_joint(tmp_path: Path) -> None:
-    """q2 - ref2 = 0.1 - 1.5 (q1 - ref1); springs, friction and rotor of the one that follows are felt by the other."""
+    """q2 - ref2 = 0.1 - 1.5 (q1 - ref1); what the follower needs, the other feels."""
     text = """<mujoco><compiler angle="radian"/><worldbody>
       <body name="l1"><joint name="J1" axis="0 1 0" ref="0.2" damping="0.1"/>
         <inertial pos="0.1 0 0.02" mass="1" diaginertia="0.01 0.02 0.03"/>
-        <body name="l2" pos="0.4 0 0"><joint name="J2" axis="0.6 0.8 0" ref="-0.3" armature="0.05" damping="0.2 0.03 0.01"
-            frictionloss="0.7" stiffness="2" springref="0.5"/>
+        <body name="l2" pos="0.4 0 0"><joint name="J2" axis="0.6 0.8 0" ref="-0.3" armature="0.05"
+            damping="0.2 0.03 0.01" frictionloss="0.7" stiffness="2" springref="0.5"/>
           <inertial pos="0.1 0 0.1" mass="1" diaginertia="0.01 0.02 0.03"/></body></body>
       </worldbody><equality><joint joint1="J2" joint2="J1" polycoef="0.1 -1.5 0 0 0"/></equality></mujoco>"""
     robot = load(tmp_path, text)
@@ -330,8 +349,10 @@ def test_a_loop_within_a_branch_does_not_matter(tmp_path: Path) -> None:
 
 
 BALL = """<mujoco><worldbody>GROUND
-  <body name="l1" pos="0 0 1"><joint name="J1" axis="0 1 0"/><geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/>
-    <body name="l2" pos="0.4 0 0"><joint name="J2" axis="0 1 0"/><geom type="sphere" size="0.05" COLLIDES/></body></body>
+  <body name="l1" pos="0 0 1"><joint name="J1" axis="0 1 0"/>
+    <geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/>
+    <body name="l2" pos="0.4 0 0"><joint name="J2" axis="0 1 0"/>
+      <geom type="sphere" size="0.05" COLLIDES/></body></body>
 </worldbody></mujoco>"""
 
 
