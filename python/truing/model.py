@@ -21,6 +21,7 @@ from truing._core import (
     forward_kinematics as forward_kinematics,
     frame_from_xyz_rpy as frame_from_xyz_rpy,
     gravity_torques as gravity_torques,
+    last_moving_link as last_moving_link,
     nearest_contact as nearest_contact,
     pose_groups as pose_groups,
     robot_from_urdf as robot_from_urdf,

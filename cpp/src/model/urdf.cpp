@@ -126,6 +126,18 @@ urdf::LinkConstSharedPtr only_leaf(const urdf::ModelInterface& model, const urdf
   return model.getLink(leaves.front());
 }
 
+// Links behind a moving joint below which nothing moves any more; true where anything moves below `link`.
+bool collect_moving_ends(const urdf::ModelInterface& model, const urdf::Link& link, std::vector<std::string>* ends) {
+  bool moves = false;
+  for (const urdf::JointSharedPtr& joint : link.child_joints) {
+    const bool goes_on = collect_moving_ends(model, *model.getLink(joint->child_link_name), ends);
+    const bool is_fixed = joint->type == urdf::Joint::FIXED;
+    if (!is_fixed && !goes_on) ends->push_back(joint->child_link_name);
+    moves = moves || goes_on || !is_fixed;
+  }
+  return moves;
+}
+
 // The joints between two links, base first.
 std::vector<urdf::JointConstSharedPtr> joints_between(const urdf::ModelInterface& model, const urdf::Link& base,
                                                       const urdf::Link& tip) {
@@ -458,6 +470,20 @@ void write_comment(tinyxml2::XMLDocument& document, const std::string& text) {
 
 Robot robot_from_urdf(const std::string& urdf_text, const std::string& base_link, const std::string& tip_link) {
   return read_chain(urdf_text, base_link, tip_link).robot;
+}
+
+std::string last_moving_link(const std::string& urdf_text, const std::string& base_link) {
+  const urdf::ModelInterfaceSharedPtr model = parse(urdf_text);
+  const urdf::LinkConstSharedPtr base = base_link.empty() ? model->getRoot() : link_named(*model, base_link, "base");
+  std::vector<std::string> ends;
+  collect_moving_ends(*model, *base, &ends);
+  if (ends.empty()) throw std::invalid_argument("nothing moves below base link '" + base->name + "'");
+  if (ends.size() > 1) {
+    std::sort(ends.begin(), ends.end());
+    throw std::invalid_argument("name the tip link: below '" + base->name + "' " + std::to_string(ends.size()) +
+                                " chains move, that end at " + listed(ends));
+  }
+  return ends.front();
 }
 
 std::string urdf_with_calibration(const std::string& urdf_text, const Robot& calibrated, const std::string& base_link,

@@ -14,6 +14,10 @@ Fixed joints are folded into the next moving joint, the last ones into the tool;
 merged the same way; `mimic` becomes `driven_by`, `<dynamics>` the torque effects coulomb and viscous. Empty link names: the only root, the only leaf.
 Raises InputError: not a URDF, unknown base or tip (lists the links there are), tip not below base, planar or
 floating joint.)");
+  m.def("last_moving_link", &last_moving_link, py::arg("urdf_text"), py::arg("base_link") = "",
+        R"(The last moving link of the only chain below `base_link` of a URDF text, whatever is fixed to it.
+
+Raises InputError: not a URDF, unknown base, nothing moves, several chains move.)");
   m.def("urdf_with_calibration", &urdf_with_calibration, py::arg("urdf_text"), py::arg("calibrated"),
         py::arg("base_link") = "", py::arg("tip_link") = "",
         R"(The URDF text with the joint origins of the chain replaced by those of `calibrated`.

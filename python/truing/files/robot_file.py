@@ -148,17 +148,23 @@ class _UrdfChain(_RobotFile):
 # ---- Reading -------------------------------------------------------------------------------------
 
 
-def load_robot(path: PathLike, base_link: str = "", tip_link: str = "") -> _core.Robot:
+def load_robot(
+    path: PathLike, base_link: str = "", tip_link: str = "", *, any_tool: bool = False
+) -> _core.Robot:
     """Read a robot from robot.yaml, URDF (.urdf, .xml) or MJCF (.xml; needs MuJoCo: truing[dynamics]).
 
     `base_link` and `tip_link` choose the chain of a URDF, or of an MJCF (bodies; the tip may be a site);
-    empty: its only root and its only leaf. Warns (InputWarning) of what an MJCF has and a robot does not:
-    contacts, moving branches. Raises InputError that names the file, the line, what was found and what was
-    expected.
+    empty: its only root and its only leaf. any_tool: of a URDF whose joints form one chain the tip need not
+    be named, however many links are fixed to the last one; the tool is then that link (torques know none).
+    Warns (InputWarning) of what an MJCF has and a robot does not: contacts, moving branches.
+    Raises InputError that names the file, the line, what was found and what was expected.
     """
     path = Path(path)
     if path.suffix.lower() in _URDF_SUFFIXES:
-        robot = (robot_from_mjcf if is_mjcf(path) else _from_urdf)(path, base_link, tip_link)
+        if is_mjcf(path):
+            robot = robot_from_mjcf(path, base_link, tip_link)
+        else:
+            robot = _from_urdf(path, base_link, tip_link, any_tool)
         _check_lengths_of_names(path, robot)
         return robot
     if base_link or tip_link:
@@ -207,11 +213,13 @@ def _without_decimals(value: Any) -> Any:
     return value
 
 
-def _from_urdf(path: Path, base_link: str, tip_link: str) -> _core.Robot:
+def _from_urdf(path: Path, base_link: str, tip_link: str, any_tool: bool) -> _core.Robot:
     text = decoded(path, read_bytes(path, _LARGEST_URDF))
     if not text.strip():
         raise InputError(f"{path}: is empty, expected a URDF")
     try:
+        if any_tool and not tip_link:
+            tip_link = _core.last_moving_link(text, base_link)
         robot = _core.robot_from_urdf(text, base_link, tip_link)
     except ValueError as error:
         # The parser quotes the file, line ends and all.

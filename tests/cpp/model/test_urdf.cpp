@@ -286,6 +286,27 @@ TEST_CASE("without names the only root and the only leaf are taken") {
   CHECK(robot.targets.size() == 1);
 }
 
+TEST_CASE("the last moving link is found whatever is fixed to it, unless several chains move") {
+  const auto refused = [](const std::string& text, const std::string& base) -> std::string {
+    try {
+      return truing::last_moving_link(text, base);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+  };
+  const std::string three_ends = two_links("", "", no_limits, R"(<link name="l3"/><link name="stand"/>
+      <joint name="g" type="fixed"><parent link="l1"/><child link="l3"/></joint>
+      <joint name="h" type="fixed"><parent link="l0"/><child link="stand"/></joint>)");
+  CHECK(contains(complaint(three_ends), "has 3 ends"));
+  CHECK(truing::last_moving_link(three_ends) == "l1");
+  CHECK(truing::robot_from_urdf(three_ends, "", "l1").joints.size() == 1);
+  CHECK(refused(arm, "") == "finger");
+  const std::string two_chains = replaced(three_ends, R"(name="h" type="fixed")", R"(name="h" type="continuous")");
+  CHECK(refused(two_chains, "") == "name the tip link: below 'l0' 2 chains move, that end at l1, stand");
+  CHECK(refused(three_ends, "l1") == "nothing moves below base link 'l1'");
+  CHECK(contains(refused(three_ends, "l9"), "base link 'l9' does not exist"));
+}
+
 TEST_CASE("a URDF that cannot be used is refused with what is wrong") {
   CHECK(contains(complaint("hello"), "not a URDF"));
   CHECK(contains(complaint(""), "not a URDF"));

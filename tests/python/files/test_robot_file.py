@@ -259,6 +259,25 @@ def test_urdf_is_a_robot_file(tmp_path: Path) -> None:
     assert_same(load_robot(tmp_path / "robot.yaml"), robot)
 
 
+def test_who_wants_no_tool_need_not_name_the_tip(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    fixed = '<link name="LINK"/><joint name="J" type="fixed"><parent link="b"/><child link="LINK"/></joint>'
+    path.write_text(
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous"><parent link="a"/>'
+        '<child link="b"/></joint>'
+        + fixed.replace("LINK", "tool0").replace('"J"', '"f"')
+        + fixed.replace("LINK", "flange").replace('"J"', '"g"')
+        + "</robot>"
+    )
+    with pytest.raises(InputError, match="has 2 ends, flange, tool0"):
+        load_robot(path)
+    robot = load_robot(path, any_tool=True)
+    assert [joint.name for joint in robot.joints] == ["j"]
+    assert np.array_equal(robot.targets[0].T_last_target, np.eye(4))
+    with pytest.raises(InputError, match="arm.urdf: nothing moves below base link 'b'"):
+        load_robot(path, "b", any_tool=True)
+
+
 def test_bom_and_windows_line_ends_do_not_matter(tmp_path: Path) -> None:
     plain = load(tmp_path, PALLETIZER)
     assert_same(load(tmp_path, b"\xef\xbb\xbf" + PALLETIZER.replace("\n", "\r\n").encode()), plain)

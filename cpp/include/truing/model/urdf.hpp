@@ -19,6 +19,10 @@ namespace truing {
 Robot robot_from_urdf(const std::string& urdf_text, const std::string& base_link = "",
                       const std::string& tip_link = "");
 
+/// The last moving link of the only chain below `base_link`: a tip for who wants the motion and not a tool, whatever is
+/// fixed to that link. Throws std::invalid_argument: not a URDF, unknown base, nothing moves, several chains move.
+std::string last_moving_link(const std::string& urdf_text, const std::string& base_link = "");
+
 /// The same URDF text with the origins of the chain's joints replaced by those of `calibrated`. What URDF cannot hold
 /// (ratios, offsets that cannot be folded in, base frame, effects) is named in a comment at the top.
 /// A joint zero is folded into the origin (rotation about the axis). Frames, never rpy, are composed.
