@@ -49,7 +49,8 @@ _NUMBER = re.compile(
 class Table:
     """A table on disk. `names` is known at once; `read` loads it; then columns are taken out one by one.
 
-    comments: lines of a CSV file that begin with # are passed over.
+    comments: lines of a CSV file that begin with # are passed over; the last of those above the first row may
+    be the column names, as numpy.savetxt writes them.
     """
 
     def __init__(self, path: Path, *, comments: bool = False) -> None:
@@ -58,6 +59,7 @@ class Table:
         self._columns: dict[str, Any] = {}
         self._comments = comments
         self._header = 1  # line of the column names
+        self._header_is_comment = False
         require_whole_file(path)
         try:
             with path.open("rb") as file:
@@ -176,9 +178,14 @@ class Table:
     def _header_line(self, file: BinaryIO) -> bytes:
         """The line of the column names: the first one, comments aside."""
         line = file.readline(_LONGEST_HEADER)
+        comment = b""
         while self._comments and line.removeprefix(_MARK).startswith(b"#") and line.endswith(b"\n"):
-            line = file.readline(_LONGEST_HEADER)
+            comment, line = line, file.readline(_LONGEST_HEADER)
             self._header += 1
+        if comment.count(b",") == line.count(b",") > 0 and all(map(_is_cell_of_number, line.split(b","))):
+            self._header -= 1
+            self._header_is_comment = True
+            return comment.removeprefix(_MARK).lstrip(b"# ")
         return line
 
     def _check_names(self) -> None:
@@ -281,10 +288,10 @@ class Table:
         if not self._comments:
             return str(self.path), 1
         with self.path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            if data.find(b"\n#") < 0 and self._header == 1:
+            if data.find(b"\n#") < 0 and self._header == 1 and not self._header_is_comment:
                 return str(self.path), 1
             kept = re.sub(rb"(?m)^#.*\n?", b"", data[:].removeprefix(_MARK))
-        return pa.BufferReader(kept), 1
+        return pa.BufferReader(kept), 0 if self._header_is_comment else 1
 
     def _csv_lines(self) -> Iterator[tuple[int, list[str]]]:
         """Line number and cells of every row, the slow way."""
@@ -292,7 +299,7 @@ class Table:
             for _ in range(self._header - 1):
                 file.readline()
             reader = csv.reader(file)
-            next(reader)
+            next(reader)  # the column names, in a comment or not
             for cells in reader:
                 if cells and self._comments and cells[0].startswith("#"):
                     continue
@@ -356,6 +363,11 @@ def _is_number(kind: Any) -> bool:
     return bool(
         types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind) or types.is_null(kind)
     )
+
+
+def _is_cell_of_number(cell: bytes) -> bool:
+    text = cell.decode("utf-8", errors="replace").strip()
+    return text in _EMPTY or _NUMBER.fullmatch(text) is not None
 
 
 def sample_rows(rows: int, at_most: int) -> NDArray[np.intp]:

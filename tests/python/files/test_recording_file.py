@@ -202,6 +202,18 @@ def test_comments_are_passed_over_and_lines_still_counted(tmp_path: Path) -> Non
     assert "line 13, column 'tau1_Nm': found 'nan', expected a finite number" in refusal(path)
 
 
+def test_column_names_may_be_a_comment_as_numpy_writes_them(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    rows = np.column_stack([T, Q1, Q2])
+    np.savetxt(path, rows, delimiter=",", header="by hand\nt_s,q1_rad,q2_m")
+    (found,) = load_recordings(path, ROBOT)
+    assert np.array_equal(found.time, T)
+    assert np.array_equal(found.position, rows[:, 1:])
+    rows[5, 1] = np.nan
+    np.savetxt(path, rows, delimiter=",", header="t_s,q1_rad,q2_m")
+    assert "line 7, column 'q1_rad': found 'nan'" in refusal(path)
+
+
 @pytest.mark.parametrize(
     ("columns", "message"),
     [
