@@ -6,7 +6,8 @@ ROS.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from array import array
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -16,7 +17,7 @@ from truing import _core
 from truing.errors import InputError
 from truing.files.common import listed
 from truing.files.output import reason, require_whole_file
-from truing.files.recording_parts import checked_times, joints_of_names, make_recordings, table_of
+from truing.files.recording_parts import checked_times, joints_of_names, make_recordings
 from truing.files.table import Floats
 
 BAG_SUFFIXES = (".mcap", ".db3", ".bag")
@@ -35,9 +36,10 @@ def read_bag(
     require_whole_file(path)
     if not path.exists():
         raise InputError(f"{path}: cannot be read: there is no such file")
-    used, messages = _messages(path, topic)
-    where = f"{path}, topic {used}"
-    stamps, tables = _tables(where, messages, robot, joints)
+    rows = _Rows(path, robot, joints)
+    for where, received, message in _messages(path, topic):
+        rows.take(where, received, message)
+    where, stamps, tables = rows.result()
 
     def refuse(message: str, *, row: int | None = None, column: str | None = None) -> NoReturn:
         place = where if row is None else f"{where}, message {row + 1} of these joints"
@@ -52,8 +54,8 @@ def read_bag(
     return make_recordings(where, name, robot, out, {})
 
 
-def _messages(path: Path, topic: str | None) -> tuple[str, list[tuple[int, Any]]]:
-    """The topic, and stamps of the recorder [ns] with the messages of joint states."""
+def _messages(path: Path, topic: str | None) -> Iterator[tuple[str, int, Any]]:
+    """File and topic for error messages, the recorder's stamp [ns], and each message of joint states."""
     try:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
@@ -68,10 +70,8 @@ def _messages(path: Path, topic: str | None) -> tuple[str, list[tuple[int, Any]]
         with AnyReader([path], default_typestore=usual) as reader:
             used = _topic(path, topic, {c.topic: c.msgtype for c in reader.connections})
             wanted = [c for c in reader.connections if c.topic == used]
-            return used, [
-                (stamp, reader.deserialize(data, connection.msgtype))
-                for connection, stamp, data in reader.messages(wanted)
-            ]
+            for connection, stamp, data in reader.messages(wanted):
+                yield f"{path}, topic {used}", stamp, reader.deserialize(data, connection.msgtype)
     except InputError:
         raise
     except Exception as error:  # of storage, of compression, of messages: a damaged file may raise anything
@@ -102,43 +102,56 @@ def _topic(path: Path, topic: str | None, types: dict[str, str]) -> str:
     return there[0]
 
 
-def _tables(
-    where: str, messages: Sequence[tuple[int, Any]], robot: _core.Robot, joints: Sequence[str] | None
-) -> tuple[Floats, dict[str, Floats]]:
-    """Stamps [s], and the fields of the messages that have all of the robot's joints: shape=(n, joints), NaN
-    where a message leaves a field empty.
-    """
-    places: dict[tuple[str, ...], list[int] | InputError] = {}
-    chosen: list[tuple[int, Any, list[int]]] = []
-    for received, message in messages:
+class _Rows:
+    """The messages that have all of the robot's joints, as rows of numbers; the others are passed over."""
+
+    def __init__(self, path: Path, robot: _core.Robot, joints: Sequence[str] | None) -> None:
+        self._path = path
+        self._robot = robot
+        self._joints = joints
+        self._missing = np.full(len(robot.driven_joints()), np.nan).tobytes()
+        # Where the robot's joints are among the names of a message, or why they are not there.
+        self._places: dict[tuple[str, ...], list[int] | InputError] = {}
+        self._where = ""
+        self._stamps = array("d")
+        self._received = array("q")
+        self._values = {field: bytearray() for field in _FIELDS}
+
+    def take(self, where: str, received: int, message: Any) -> None:
         names = tuple(message.name)
-        if names not in places:
+        if names not in self._places:
             try:
-                places[names] = joints_of_names(robot, joints, names, where)
+                self._places[names] = joints_of_names(self._robot, self._joints, names, where)
             except InputError as error:
-                places[names] = error
-        place = places[names]
-        if not isinstance(place, InputError):
-            chosen.append((received, message, place))
-    if not chosen:
-        # Several publishers may share a topic: the one that comes closest says what is wrong.
-        errors = [(len(names), error) for names, error in places.items() if isinstance(error, InputError)]
-        raise (
-            max(errors, key=lambda item: item[0])[1] if errors else InputError(f"{where}: holds no messages")
-        )
-    stamps = np.array([m.header.stamp.sec + 1e-9 * m.header.stamp.nanosec for _, m, _ in chosen])
-    if not stamps.any():  # the publisher did not fill them in: what the recorder says
-        first = chosen[0][0]
-        stamps = np.array([1e-9 * (received - first) for received, _, _ in chosen])
-    tables = {}
-    for field in _FIELDS:
-        table = table_of(len(chosen), len(robot.driven_joints()))
-        for row, (_, message, place) in enumerate(chosen):
-            values = getattr(message, field)
-            if len(values) > max(place):
-                table[row] = np.asarray(values)[place]
-        tables[field] = table
-    return stamps, tables
+                self._places[names] = error
+        place = self._places[names]
+        if isinstance(place, InputError):
+            return
+        self._where = where
+        self._stamps.append(message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec)
+        self._received.append(received)
+        for field, values in self._values.items():
+            given = np.asarray(getattr(message, field), dtype=np.float64)
+            values += given[place].tobytes() if len(given) > max(place) else self._missing
+
+    def result(self) -> tuple[str, Floats, dict[str, Floats]]:
+        """File and topic, stamps [s], and the fields: shape=(n, joints), NaN where a message has none."""
+        if not self._stamps:
+            # Several publishers may share a topic: the one that comes closest says what is wrong.
+            closest = self._places.get(max(self._places, key=len, default=()))
+            if isinstance(closest, InputError):
+                raise closest
+            raise InputError(f"{self._path}: holds no messages of joint states")
+        stamps = np.array(self._stamps)
+        if not stamps.any():  # the publisher did not fill them in: what the recorder says
+            received = np.array(self._received)
+            stamps = 1e-9 * (received - received[0])
+        rows = len(stamps)
+        tables = {
+            field: np.frombuffer(values).reshape(rows, -1).copy(order="F")
+            for field, values in self._values.items()
+        }
+        return self._where, stamps, tables
 
 
 def _recorded(values: Floats, names: Sequence[str], field: str, refuse: Any) -> Floats | None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -98,6 +99,27 @@ def test_joint_states_come_by_name(tmp_path: Path, storage: StoragePlugin) -> No
         assert found.speed.shape == (ROWS, 0)
 
 
+def test_bags_of_ros_1_are_read_as_well(tmp_path: Path) -> None:
+    types = get_typestore(Stores.ROS1_NOETIC)
+    with Writer1(tmp_path / "run.bag") as writer:
+        connection = writer.add_connection("/joint_states", SENSORS, typestore=types)
+        for row in range(ROWS):
+            stamp = types.types["builtin_interfaces/msg/Time"](sec=100, nanosec=round(1e9 * T[row]))
+            sent = types.types[SENSORS](
+                header=types.types["std_msgs/msg/Header"](seq=row, stamp=stamp, frame_id="base"),
+                name=list(ORDER),
+                position=np.array(positions(row)),
+                velocity=np.full(4, 0.5),
+                effort=np.zeros(0),
+            )
+            writer.write(connection, round(1e9 * (100.0 + T[row])), types.serialize_ros1(sent, SENSORS))
+    (found,) = load_recordings(tmp_path / "run.bag", ROBOT)
+    assert found.position[:, 2] == pytest.approx(-0.3 * np.arange(ROWS))
+    assert (found.speed == 0.5).all()
+    assert found.torque.shape == (ROWS, 0)
+    assert found.time == pytest.approx(100.0 + T)
+
+
 def test_efforts_that_are_zero_throughout_were_not_measured(tmp_path: Path) -> None:
     (found,) = load_recordings(bag(tmp_path, effort=lambda row: [0.0, np.nan, 0.0, 0.0]), ROBOT)
     assert found.torque.shape == (ROWS, 0)
@@ -127,6 +149,8 @@ def test_of_several_topics_one_has_to_be_chosen(tmp_path: Path) -> None:
     assert "holds no topic of sensor_msgs/JointState" in refusal(
         bag(tmp_path, StoragePlugin.SQLITE3, topics=())
     )
+    (tmp_path / "none").mkdir()
+    assert "holds no messages of joint states" in refusal(bag(tmp_path / "none", stamps=()))
 
 
 def test_what_cannot_be_is_refused_at_its_message(tmp_path: Path) -> None:
