@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -209,21 +209,25 @@ class _Reader:
     def values(self, source: _Source, *, required: bool = False) -> Floats | None:
         """The column in SI units; None: nothing was recorded. Gaps within it are refused."""
         values = self.table.numbers(source.column, any_value=True)
-        good = np.isfinite(values)
-        if not good.all():
+        if not (np.abs(values) <= LARGEST_NUMBER).all():  # False for NaN
             if not required and np.isnan(values).all():
                 return None
-            row = int(np.argmin(good))
-            after = np.flatnonzero(good[row:])
-            run = int(after[0]) if after.size else len(values) - row
-            more = f" (in {run} rows from here, {len(values) - int(good.sum())} of {len(values)} in all)"
-            advice = "leave these rows out" if required else "leave these rows out, or the whole column"
-            self.table.refuse_cell(row, source.column, f"a finite number{more if run > 1 else ''}: {advice}")
-        large = np.abs(values) > LARGEST_NUMBER
-        if large.any():
-            limit = f"a number between -{LARGEST_NUMBER:g} and {LARGEST_NUMBER:g}"
-            self.table.refuse_cell(int(np.argmax(large)), source.column, limit)
+            self._refuse_value(source.column, values, required)
+        if (source.factor, source.shift) == (1.0, 0.0):
+            return values
         return values * source.factor + source.shift
+
+    def _refuse_value(self, column: str, values: Floats, required: bool) -> NoReturn:
+        good = np.isfinite(values)
+        if good.all():
+            limit = f"a number between -{LARGEST_NUMBER:g} and {LARGEST_NUMBER:g}"
+            self.table.refuse_cell(int(np.argmax(np.abs(values) > LARGEST_NUMBER)), column, limit)
+        row = int(np.argmin(good))
+        after = np.flatnonzero(good[row:])
+        run = int(after[0]) if after.size else len(values) - row
+        more = f" (in {run} rows from here, {len(values) - int(good.sum())} of {len(values)} in all)"
+        advice = "leave these rows out" if required else "leave these rows out, or the whole column"
+        self.table.refuse_cell(row, column, f"a finite number{more if run > 1 else ''}: {advice}")
 
     def tables(self) -> dict[str, Floats]:
         """Positions and what else was recorded of the joints."""

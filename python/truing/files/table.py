@@ -361,7 +361,11 @@ class Table:
 def _is_number(kind: Any) -> bool:
     types = pa.types
     return bool(
-        types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind) or types.is_null(kind)
+        types.is_integer(kind)
+        or types.is_floating(kind)
+        or types.is_decimal(kind)
+        or types.is_boolean(kind)  # 0 and 1; of Parquet alone
+        or types.is_null(kind)
     )
 
 

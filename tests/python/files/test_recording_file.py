@@ -313,6 +313,9 @@ def test_parquet_is_the_same_recording(tmp_path: Path) -> None:
     for field in ("time", "position", "torque"):
         assert np.array_equal(getattr(left, field), getattr(right, field), equal_nan=True)
     assert left.test and right.test
+    write_table(tmp_path / "on.parquet", {**columns, "enabled": T > 0.1})  # type: ignore[arg-type]
+    (found,) = load_recordings(tmp_path / "on.parquet", ROBOT)
+    assert np.array_equal(found.columns["enabled"], T > 0.1)
     write_table(tmp_path / "bad.parquet", {**columns, "tau1_Nm": np.where(T == 0.1, np.nan, 1.0)})  # type: ignore[arg-type]
     assert "bad.parquet, row 11, column 'tau1_Nm': found an empty cell" in refusal(tmp_path / "bad.parquet")
 
