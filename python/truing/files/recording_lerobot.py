@@ -55,10 +55,14 @@ def read_lerobot(
     held_out = _test_episodes(info)
 
     out: list[_core.Recording] = []
+    seen: set[int] = set()
     starts = [0, *(np.flatnonzero(np.diff(episode)) + 1), len(episode)]
     for start, end in zip(starts[:-1], starts[1:], strict=True):
         number = int(episode[start])
         where = f"{path}, episode {number}"
+        if number in seen:
+            raise InputError(f"{where}: is there twice, with another one in between")
+        seen.add(number)
         if end - start < _FEWEST_ROWS:
             few = f"has {end - start} rows and is left out: a recording has at least {_FEWEST_ROWS}"
             warnings.warn(InputWarning(f"{where}: {few}"), stacklevel=3)

@@ -41,7 +41,7 @@ def states(episode: int) -> np.ndarray:
 def episode_table(episode: int, rows: int = ROWS, **other: Any) -> pa.Table:
     state = states(episode)[:rows].astype(np.float32)
     columns: dict[str, Any] = {
-        "observation.state": pa.array(state.tolist(), pa.list_(pa.float32())),
+        "observation.state": pa.array(state.tolist(), pa.list_(pa.float32(), 3)),
         "action": pa.array((state + 1.0).tolist(), pa.list_(pa.float32())),
         "timestamp": pa.array(np.arange(rows, dtype=np.float32) / np.float32(30.0)),
         "frame_index": pa.array(np.arange(rows)),
@@ -180,6 +180,9 @@ def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
     }
     for message, other in broken.items():
         assert message in refusal(data_set(tmp_path, [episode_table(0, **other)]), units="deg")
+    (tmp_path / "twice").mkdir()
+    twice = data_set(tmp_path / "twice", [episode_table(k) for k in (0, 1, 0)], "v3.0")
+    assert "episode 0: is there twice" in refusal(twice, units="deg")
     path = data_set(tmp_path, [episode_table(0)])
     (path / "meta" / "info.json").write_text("{")
     assert "info.json: is not JSON" in refusal(path, units="deg")
