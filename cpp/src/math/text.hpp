@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <locale>
 #include <sstream>
 #include <string>
@@ -41,8 +42,14 @@ inline std::string listed(const std::vector<std::string>& names) {
   return text.empty() ? "none" : text;
 }
 
+/// Three digits, from 1000 on whole numbers in full: "0.124", "1142", not 1.14e+03.
+inline std::string short_number(double value) {
+  const bool in_full = std::abs(value) >= 999.5 && std::abs(value) < 1e9;
+  return in_full ? number(std::round(value), 9) : number(value, 3);
+}
+
 /// A length or an angle as people read it: "0.124 mm", "0.3 deg".
-inline std::string millimetres(double metres) { return number(1e3 * metres, 3) + " mm"; }
-inline std::string degrees(double radians) { return number(180.0 / kPi * radians, 3) + " deg"; }
+inline std::string millimetres(double metres) { return short_number(1e3 * metres) + " mm"; }
+inline std::string degrees(double radians) { return short_number(180.0 / kPi * radians) + " deg"; }
 
 }  // namespace truing::math
