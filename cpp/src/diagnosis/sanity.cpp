@@ -189,24 +189,6 @@ void infer_directions(Checked* out) {
                            {}});
 }
 
-/// Size of what was measured, which tells how large an error is large: the diagonal of the box around all points, or
-/// the range of distances.
-double spread_of(const Measurements& data) {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e300), high = -low;
-  double least = 1e300, most = -1e300;
-  for (std::size_t row = 0; row < data.rows; ++row) {
-    for (int k = 0; k < 3 && data.has_position(row); ++k) {
-      low[k] = std::min(low[k], data.position[static_cast<std::size_t>(k)][row]);
-      high[k] = std::max(high[k], data.position[static_cast<std::size_t>(k)][row]);
-    }
-    if (data.has_distance(row)) {
-      least = std::min(least, data.distance[row]);
-      most = std::max(most, data.distance[row]);
-    }
-  }
-  return high[0] >= low[0] ? (high - low).norm() : most > least ? most - least : 1.0;
-}
-
 }  // namespace
 
 Checked check(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
@@ -219,9 +201,11 @@ Checked check(const Robot& robot, const Measurements& data, const DiagnoseOption
     throw std::invalid_argument(std::to_string(poses) +
                                 " poses are too few to diagnose anything: measure at least 12, better 100");
   find_duplicates(data, &out.findings);
-  const double spread = spread_of(data);
   choose_record(robot, options, &out);
-  try_readings(robot, options, spread, &out);
+  std::vector<std::int32_t> rows(data.rows);
+  std::iota(rows.begin(), rows.end(), 0);
+  const double range = measured_range(data, rows);
+  try_readings(robot, options, range > 0.0 ? range : 1.0, &out);
   infer_directions(&out);
   return out;
 }

@@ -23,6 +23,7 @@
 #include "math/registration.hpp"
 #include "math/rotation.hpp"
 #include "math/statistics.hpp"
+#include "model/readings.hpp"
 #include "rooms.hpp"
 
 namespace truing {
@@ -637,14 +638,7 @@ Start fit_instrument(const Job& nominal_job, const std::vector<std::string>& unk
 }
 
 double spread_of(const Job& job, const std::vector<std::int32_t>& rejected) {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e300), high = -low;
-  for (const std::int32_t row : without(job.rows, rejected)) {
-    for (int k = 0; k < 3 && job.data.has_position(row); ++k) {
-      low[k] = std::min(low[k], job.data.position[static_cast<std::size_t>(k)][row]);
-      high[k] = std::max(high[k], job.data.position[static_cast<std::size_t>(k)][row]);
-    }
-  }
-  return high[0] < low[0] ? 0.0 : (high - low).norm();
+  return measured_range(job.data, without(job.rows, rejected));
 }
 
 /// A target far from where the model has it can spoil the registration: then other places are tried, and the best one

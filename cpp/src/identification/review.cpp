@@ -13,6 +13,7 @@
 #include "math/constants.hpp"
 #include "math/text.hpp"
 #include "model/model.hpp"
+#include "model/motion.hpp"
 #include "model/readings.hpp"
 #include "model/repeats.hpp"
 #include "rooms.hpp"
@@ -41,26 +42,14 @@ constexpr int kIterations = 30;        ///< a reading that needs more explains n
 /// drawn misses by less than this part, it is the fit that went astray, and not the drawing.
 constexpr double kMissed = 0.05;
 
-double reach(const Robot& robot) {
-  double out = 0.0;
-  for (const Joint& joint : robot.joints)
-    out += std::hypot(joint.a, joint.d) + joint.T_parent_joint.translation().norm();
-  return out;
-}
-
-/// Diagonal of the box around all measured points, or the range of distances. [m]
-double measured_range(const Measurements& data) {
-  Eigen::Vector4d low = Eigen::Vector4d::Constant(1e300), high = -low;
-  for (std::size_t row = 0; row < data.rows; ++row) {
-    for (int k = 0; k < 4; ++k) {
-      if (k < 3 ? !data.has_position(row) : !data.has_distance(row)) continue;
-      const double value = k < 3 ? data.position[static_cast<std::size_t>(k)][row] : data.distance[row];
-      low[k] = std::min(low[k], value);
-      high[k] = std::max(high[k], value);
-    }
+/// Rows that the fit counted: not held out, not rejected.
+std::vector<std::int32_t> fitted_rows(const Identification& found) {
+  const std::set<std::size_t> rejected(found.rejected_rows.begin(), found.rejected_rows.end());
+  std::vector<std::int32_t> out;
+  for (std::size_t row = 0; row < found.set.size(); ++row) {
+    if (found.set[row] == 0 && rejected.count(row) == 0) out.push_back(static_cast<std::int32_t>(row));
   }
-  const Eigen::Vector4d range = (high - low).cwiseMax(0.0);
-  return range.head<3>().norm() > 0.0 ? range.head<3>().norm() : range[3];
+  return out;
 }
 
 /// By how much a parameter changed; whole turns are none.
@@ -82,7 +71,7 @@ std::string zero_of(const Joint& joint, Convention convention) {
 class Workshop {
  public:
   Workshop(const Robot& nominal, const Measurements& data)
-      : reach_(reach(nominal)), length_(std::max(kLength, kShareOfReach * reach_)) {
+      : reach_(stretched_length(nominal)), length_(std::max(kLength, kShareOfReach * reach_)) {
     for (const ParameterInfo& info : make_model(nominal, data).parameters) {
       if (info.role == Role::geometry || info.role == Role::offset || info.role == Role::ratio)
         robot_.insert(info.name);
@@ -234,7 +223,7 @@ std::optional<Mistake> review(const Robot& nominal, const Measurements& data, co
                               const IdentifyOptions& options) {
   const Workshop workshop(nominal, data);
   std::vector<Parameter> changes = workshop.changes(found);
-  const bool much_left = found.train.after.median > kWorthALook * measured_range(data);
+  const bool much_left = found.train.after.median > kWorthALook * measured_range(data, fitted_rows(found));
   if (changes.empty() && !much_left) return std::nullopt;
   const Trials trials(data, options);
   const double as_is = trials.error(nominal, data);

@@ -18,4 +18,7 @@ Eigen::VectorXd joint_motions(const Robot& robot, const Eigen::VectorXd& reading
 /// passive joint.
 Eigen::MatrixXd coupling_matrix(const Robot& robot);
 
+/// How far the robot reaches with all links in one line, at most, at zero of its rails [m].
+double stretched_length(const Robot& robot);
+
 }  // namespace truing::model

@@ -3,6 +3,7 @@
 
 #include "model/readings.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -133,6 +134,22 @@ Measurements with_joint_columns(const Measurements& data, std::vector<std::vecto
   for (std::size_t k = 0; k < owned->columns.size(); ++k) out.joints[k] = {owned->columns[k].data(), 1};
   out.owner = owned;
   return out;
+}
+
+double measured_range(const Measurements& data, const std::vector<std::int32_t>& rows) {
+  Eigen::Vector4d low = Eigen::Vector4d::Constant(1e300), high = -low;
+  const auto see = [&](Eigen::Index k, double value) {
+    low[k] = std::min(low[k], value);
+    high[k] = std::max(high[k], value);
+  };
+  for (const std::int32_t i : rows) {
+    const auto row = static_cast<std::size_t>(i);
+    for (std::size_t k = 0; k < 3 && data.has_position(row); ++k)
+      see(static_cast<Eigen::Index>(k), data.position[k][row]);
+    if (data.has_distance(row)) see(3, data.distance[row]);
+  }
+  const Eigen::Vector4d range = (high - low).cwiseMax(0.0);
+  return high[0] >= low[0] ? range.head<3>().norm() : range[3];
 }
 
 RowSample sample_of(const Measurements& data, std::size_t most) {

@@ -35,6 +35,10 @@ struct RowSample {
 
 RowSample sample_of(const Measurements& data, std::size_t most);
 
+/// How large what was measured is [m]: the diagonal of the box around all positions of these rows, without any the
+/// range of their distances; 0: none of either.
+double measured_range(const Measurements& data, const std::vector<std::int32_t>& rows);
+
 /// The data with other joint columns.
 Measurements with_joint_columns(const Measurements& data, std::vector<std::vector<double>> columns);
 

@@ -349,6 +349,13 @@ Eigen::MatrixXd coupling_matrix(const Robot& robot) {
   return coupling;
 }
 
+double stretched_length(const Robot& robot) {
+  double length = 0.0;
+  for (const Joint& joint : robot.joints)
+    length += std::hypot(joint.a, joint.d) + joint.T_parent_joint.translation().norm();
+  return length;
+}
+
 Eigen::VectorXd joint_motions(const Robot& robot, const Eigen::VectorXd& reading) {
   const std::vector<std::size_t> driven = robot.driven_joints();
   if (reading.size() != static_cast<Eigen::Index>(driven.size())) {

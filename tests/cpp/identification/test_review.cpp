@@ -131,6 +131,24 @@ TEST_CASE("no mistake is said of arms that are as workshops make them") {
   }
 }
 
+TEST_CASE("a spike far away does not make what is left look small") {
+  // Base and tool alone are fitted, so that nothing of the links changes: the error that is left must say it.
+  const Robot robot = ur10();
+  const auto table = measured(robot, 150, 330);
+  scale(table.get(), &table->data.joints[4], -1.0);
+  std::vector<double> x;
+  for (std::size_t row = 0; row < table->data.rows; ++row) x.push_back(table->data.position[0][row]);
+  x[40] += 9e5;
+  table->data.position[0] = table->add(x);
+  truing::IdentifyOptions options;
+  options.free = {"base.*", "tool.*"};
+  const Identification found = truing::identify(robot, table->data, options);
+  REQUIRE(found.rejected_rows == std::vector<std::size_t>{40});
+  const std::optional<Mistake> said = truing::review(robot, table->data, found, options);
+  REQUIRE(said);
+  CHECK(said->kind == "joint_sign");
+}
+
 TEST_CASE("the zero of a joint may be anywhere") {
   const auto table = measured(ur10(), 150, 500);
   Robot turned = ur10();

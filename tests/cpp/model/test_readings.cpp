@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include "model/readings.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "model/motion.hpp"
+#include "support/arms.hpp"
+
+using namespace arms;
+using truing::model::measured_range;
+using truing::model::stretched_length;
+
+namespace readings {
+namespace {
+
+const double kNan = std::nan("");
+
+}  // namespace
+
+TEST_CASE("the measured range is the diagonal of the box around the rows asked for") {
+  Table table(4);
+  table.data.position[0] = table.add({0.0, 3.0, 1000.0, 1.0});
+  table.data.position[1] = table.add({1.0, 5.0, 1000.0, 2.0});
+  table.data.position[2] = table.add({0.0, 0.0, 1000.0, kNan});
+  table.data.distance = table.add({1.0, 2.0, 9.0, 4.0});
+  CHECK(measured_range(table.data, {0, 1}) == 5.0);
+  CHECK(measured_range(table.data, {0, 1, 2}) > 1000.0);
+  CHECK(measured_range(table.data, {1}) == 0.0);  // one point has no size, whatever its distance
+}
+
+TEST_CASE("without positions the measured range is that of the distances, without both it is none") {
+  Table table(3);
+  CHECK(measured_range(table.data, {0, 1, 2}) == 0.0);
+  table.data.distance = table.add({1.0, kNan, 4.0});
+  CHECK(measured_range(table.data, {0, 1, 2}) == 3.0);
+  CHECK(measured_range(table.data, {1}) == 0.0);
+  CHECK(measured_range(table.data, {}) == 0.0);
+}
+
+TEST_CASE("the stretched length adds up the links of tables and of joint origins") {
+  Robot robot;
+  robot.joints.resize(2);
+  robot.joints[0].a = 0.3;
+  robot.joints[0].d = -0.4;
+  robot.joints[1].T_parent_joint.translation() = Eigen::Vector3d(0.0, 0.6, 0.8);
+  CHECK(std::abs(stretched_length(robot) - 1.5) < 1e-15);
+}
+
+}  // namespace readings
