@@ -180,7 +180,7 @@ class Plan {
         continue;
       }
       const EffectSize size = smallest(view_, groups_[g], g, options_);
-      if (is_nobodys(size, robot_)) {
+      if (is_beyond_machines(size, groups_[g], robot_)) {
         result_.not_testable.push_back(why_not_seen(size));
         continue;
       }

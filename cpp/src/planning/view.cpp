@@ -16,6 +16,7 @@
 #include "estimation/selection.hpp"
 #include "math/constants.hpp"
 #include "math/text.hpp"
+#include "model/motion.hpp"
 #include "planning/poses.hpp"
 
 namespace truing::planning {
@@ -28,15 +29,9 @@ constexpr double kSameColumn = 1e-8, kSameRival = 1e-4;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// A parameter as large as these is nobody's: a joint that turns by a radian, a tenth of the robot's reach at the tip.
-constexpr double kWholeUnit = 1.0, kShareOfReach = 0.1;
-
-double reach_of(const Robot& robot) {
-  double reach = 0.0;
-  for (const Joint& joint : robot.joints)
-    reach += std::hypot(joint.a, joint.d) + joint.T_parent_joint.translation().norm();
-  return reach;
-}
+/// Where an effect does not say what machines have: a joint that turns by a radian. A tenth of the robot's length at
+/// the tip none has.
+constexpr double kWholeUnit = 1.0, kShareOfLength = 0.1;
 
 /// Length one, where there is any length.
 MatrixXd unit_columns(MatrixXd x) {
@@ -218,16 +213,18 @@ EffectSize smallest(const View& view, const Group& group, std::size_t g, const D
   return best;
 }
 
-bool is_nobodys(const EffectSize& size, const Robot& robot) {
+bool is_beyond_machines(const EffectSize& size, const Group& group, const Robot& robot) {
   const bool whole = size.unit == "rad" || size.unit == "m" || size.unit == "-";
-  return (whole && size.size > kWholeUnit) || size.size_at_tip > kShareOfReach * reach_of(robot);
+  const double plausible = group.effect->traits.plausible;
+  const bool too_large = plausible > 0.0 ? size.size > plausible : whole && size.size > kWholeUnit;
+  return too_large || size.size_at_tip > kShareOfLength * stretched_length(robot);
 }
 
 NotTestable why_not_seen(const EffectSize& size) {
   NotTestable out{size.effect, {}, "", Untestable::other};
   if (!size.joint.empty()) out.joints = {size.joint};
   out.why = "it would show from " + number(size.size, 2) + " " + (size.unit == "-" ? "" : size.unit + " ") +
-            "on, more than any robot has";
+            "on, more than machines have";
   return out;
 }
 

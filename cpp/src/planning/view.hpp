@@ -66,8 +66,8 @@ View look(const Robot& robot, const std::vector<Planned>& poses, const std::vect
 /// The smallest effect of a group that the plan would see.
 EffectSize smallest(const View& view, const Group& group, std::size_t g, const DistinguishOptions& options);
 
-/// A size that no robot has: the plan does not test for the effect.
-bool is_nobodys(const EffectSize& size, const Robot& robot);
+/// A size that no machine has: the plan does not test for the effect.
+bool is_beyond_machines(const EffectSize& size, const Group& group, const Robot& robot);
 NotTestable why_not_seen(const EffectSize& size);
 
 /// Why nothing is left of a group beyond base and tool.

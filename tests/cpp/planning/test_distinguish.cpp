@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "math/random.hpp"
+#include "model/effects/traits.hpp"
 #include "support/arms.hpp"
 
 namespace {
@@ -174,6 +175,28 @@ TEST_CASE("an effect that only a size beyond every robot would show is not testa
       CHECK(e.size_at_tip < 0.15);
     }
   }
+}
+
+TEST_CASE("an effect that would show only where it is larger than machines have it is not testable there") {
+  // 0.2 mm beside the last axis: play of 5 mrad moves the tip by a thousandth of a millimetre.
+  truing::Robot robot = arms::ur10();
+  arms::set_tool(&robot, {2e-4, 0.0, 0.15});
+  DistinguishOptions options;
+  options.columns = {"dir", "payload", "temp", "t"};
+  const Distinction d = truing::distinguish(robot, random_poses(robot, 40, 6), options);
+  for (const EffectSize& e : d.effects) {
+    CAPTURE(e.effect);
+    CAPTURE(e.joint);
+    const double plausible = truing::model::traits_of(e.effect, {}).plausible;
+    if (plausible > 0.0) CHECK(e.size <= plausible);
+  }
+  CHECK(size_of(d, "backlash", "J6") == nullptr);
+  const truing::NotTestable* backlash = not_testable(d, "backlash", "J6");
+  REQUIRE(backlash);
+  CHECK_MESSAGE(backlash->why.find("rad on, more than machines have") != std::string::npos, backlash->why);
+  // A whole turn is what it takes without the limit of machines: between the two lies what this test is of.
+  CHECK(std::stod(backlash->why.substr(backlash->why.find("from ") + 5)) < 1.0);
+  CHECK(size_of(d, "backlash", "J2") != nullptr);
 }
 
 TEST_CASE("a promised smallest size is as many of identify's standard errors as it says") {
