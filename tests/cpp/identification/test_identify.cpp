@@ -314,6 +314,32 @@ TEST_CASE("the result does not depend on where the measurement frame stands") {
   }
 }
 
+/// What results of many seeds say of their standard errors.
+class Scatter {
+ public:
+  void add(const Identification& result) {
+    std::vector<double> fitted;
+    for (const truing::Parameter& p : result.parameters) {
+      if (!p.frozen) fitted.push_back(p.value);
+    }
+    values_.push_back(Eigen::Map<Eigen::VectorXd>(fitted.data(), static_cast<Eigen::Index>(fitted.size())));
+    variances_.push_back(result.covariance.diagonal());
+  }
+
+  /// Standard deviation over the seeds by the standard error, of every parameter that is fitted.
+  Eigen::ArrayXd ratio() const {
+    const auto seeds = static_cast<double>(values_.size());
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(values_[0].size()), scatter = mean, variance = mean;
+    for (const Eigen::VectorXd& v : values_) mean += v / seeds;
+    for (const Eigen::VectorXd& v : values_) scatter += (v - mean).cwiseAbs2() / (seeds - 1.0);
+    for (const Eigen::VectorXd& v : variances_) variance += v / seeds;
+    return (scatter.array() / variance.array()).sqrt();
+  }
+
+ private:
+  std::vector<Eigen::VectorXd> values_, variances_;
+};
+
 TEST_CASE("standard errors match the scatter over 200 seeds within 10 per cent") {
   const double sigma = 5e-5;
   const int seeds = 200;
@@ -323,25 +349,13 @@ TEST_CASE("standard errors match the scatter over 200 seeds within 10 per cent")
   auto table = random_joints(truth, 80, 24);
   IdentifyOptions options;
   options.test_share = 0.0;
-  std::vector<Eigen::VectorXd> values;
-  Eigen::VectorXd mean_variance;
+  Scatter scatter;
   for (int seed = 0; seed < seeds; ++seed) {
     measure(table.get(), truth, What::position, sigma, 1000u + static_cast<unsigned>(seed));
-    const Identification result = truing::identify(nominal, table->data, options);
-    std::vector<double> v;
-    for (const truing::Parameter& p : result.parameters) {
-      if (!p.frozen) v.push_back(p.value);
-    }
-    values.push_back(Eigen::Map<Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
-    const Eigen::VectorXd variance = result.covariance.diagonal();
-    mean_variance = seed ? Eigen::VectorXd(mean_variance + variance) : variance;
+    scatter.add(truing::identify(nominal, table->data, options));
   }
-  mean_variance /= seeds;
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(mean_variance.size()), scatter = mean;
-  for (const Eigen::VectorXd& v : values) mean += v / seeds;
-  for (const Eigen::VectorXd& v : values) scatter += (v - mean).cwiseAbs2() / (seeds - 1);
   // One ratio scatters by 1/sqrt(400) = 5 per cent itself: 10 per cent for their mean, 20 for each.
-  const Eigen::ArrayXd ratio = (scatter.array() / mean_variance.array()).sqrt();
+  const Eigen::ArrayXd ratio = scatter.ratio();
   CHECK(ratio.mean() == doctest::Approx(1.0).scale(0).epsilon(0.1));
   CHECK(ratio.minCoeff() > 0.8);
   CHECK(ratio.maxCoeff() < 1.2);
@@ -356,8 +370,7 @@ TEST_CASE("standard errors take repeats of a pose for one observation where the 
   IdentifyOptions options;
   options.test_share = 0.0;
   options.loss = truing::Loss::none;
-  std::vector<Eigen::VectorXd> values;
-  Eigen::VectorXd mean_variance;
+  Scatter scatter;
   for (unsigned seed = 0; seed < seeds; ++seed) {
     auto table = random_joints(truth, poses, 3200 + seed);
     truing::math::Random random(3300 + seed);
@@ -379,21 +392,10 @@ TEST_CASE("standard errors take repeats of a pose for one observation where the 
       }
       repeated->data.position[k] = repeated->add(position);
     }
-    const Identification result = truing::identify(nominal, repeated->data, options);
-    std::vector<double> v;
-    for (const truing::Parameter& p : result.parameters) {
-      if (!p.frozen) v.push_back(p.value);
-    }
-    values.push_back(Eigen::Map<Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
-    const Eigen::VectorXd variance = result.covariance.diagonal();
-    mean_variance = seed ? Eigen::VectorXd(mean_variance + variance) : variance;
+    scatter.add(truing::identify(nominal, repeated->data, options));
   }
-  mean_variance /= seeds;
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(mean_variance.size()), scatter = mean;
-  for (const Eigen::VectorXd& v : values) mean += v / seeds;
-  for (const Eigen::VectorXd& v : values) scatter += (v - mean).cwiseAbs2() / (seeds - 1);
   // Taken for 400 rows the standard errors would be half of the scatter.
-  const Eigen::ArrayXd ratio = (scatter.array() / mean_variance.array()).sqrt();
+  const Eigen::ArrayXd ratio = scatter.ratio();
   CHECK(ratio.mean() > 0.85);
   CHECK(ratio.mean() < 1.2);
 }
