@@ -34,7 +34,7 @@ test-all:
 	@scripts/test.sh --all
 
 format:
-	@scripts/setup.sh --test
+	@test -x .venv/bin/clang-format -a -x .venv/bin/ruff || scripts/setup.sh --test
 	@scripts/format.sh
 
 tidy:
