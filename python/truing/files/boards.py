@@ -363,6 +363,7 @@ def find_board(
         if progress is not None:
             progress(number + 1, len(images))
     search.look_again(images)
+    search.refuse_other_spacing()
     board, seen = search.board, search.seen
     found = sorted(seen)
     missing = [number for number in range(len(images)) if number not in seen]
@@ -410,6 +411,18 @@ class _Search:
         if self._finder is not None:
             for number in self._undecided:
                 self._find(number, _grey(self._cv, images[number], self._called[number]))
+
+    def refuse_other_spacing(self) -> None:
+        """Raises InputError where tags are not as far apart as was said: then nothing else is right."""
+        spacing = self._finder.spacing_seen() if self._finder is not None else None
+        if spacing is None:
+            return
+        said, side = self.board.spacing, self.board.size * 1e3
+        raise InputError(
+            f"--board {self.board}: between neighbouring tags are gaps of {spacing:.3g} times their side in"
+            f" the images ({spacing * side:.3g} mm of {side:.4g} mm), and the spacing that was said is"
+            f" {said:g}: measure side (its black border included) and gap on the board"
+        )
 
     def _find(self, number: int, grey: Image) -> None:
         assert self._finder is not None
@@ -495,6 +508,10 @@ class _Finder:
         except self.cv.error:  # its searches give up on odd images so
             return None
         return None if pixels is None else (self._points, pixels)
+
+    def spacing_seen(self) -> float | None:
+        """Of a grid of tags, where it is another one than was said: gap between two over their side."""
+        return None if self._tags is None else self._tags.spacing_seen()
 
     # -- chessboard
 

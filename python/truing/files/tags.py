@@ -28,6 +28,14 @@ _OFF = 0.1  # of a tag's side: further away a corner is not where a plane has it
 _IN_FROM_EDGE = 0.8  # of the border: a corner's surroundings that hold no other corner
 
 
+# How far the gaps that are seen may be from the spacing that was said.
+_FEWEST_GAPS = 4  # two neighbours show two
+_SPACING = 0.02  # as it was measured or rounded
+_CORNER = 0.7  # [px] of a side, by which blur and the print of dark ink may move its ends
+_LENS = 0.3  # times (side over the image's width)^2: what a wide lens bends
+_ERRORS = 5.0  # standard errors of the median
+
+
 @dataclass(frozen=True)
 class TagGrid:
     """`columns` x `rows` tags of side `size` [m], gaps of `spacing` times that between them; `first`: the
@@ -62,6 +70,15 @@ class _Seen:
     numbers: NDArray[np.intp]
     corners: Floats  # shape=(n, 4, 2) [px] clockwise from the top left
 
+    @property
+    def area(self) -> float:
+        """Of all of them [px^2]. A border two cells wide may be read as that of a smaller tag, one wide:
+        where as many tags are read with either, it is the larger ones that are printed.
+        """
+        diagonals = self.corners[:, 2:] - self.corners[:, :2]
+        across, down = diagonals[:, 0], diagonals[:, 1]
+        return float(0.5 * np.sum(np.abs(across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0])))
+
 
 class TagFinder:
     """Finds a grid of tags, or one tag, image by image. Which border the tags have, and at which corner they
@@ -80,21 +97,34 @@ class TagFinder:
         self._borders: tuple[int, ...] = _BORDERS
         self._turns: tuple[int, ...] = (0, 1, 2, 3) if grid.count > 1 else (0,)
         self._first = grid.first
+        self._gaps: list[Floats] = []  # of each image, as _gaps_of has them
 
     def __call__(self, grey: Image) -> tuple[Floats, Floats] | None:
         """Points, shape=(m, 3) [m], and where they are seen, shape=(m, 2) [px]."""
-        best: tuple[tuple[Floats, Floats], int, int] | None = None
-        for border in self._borders:
-            seen = self._seen(grey, border)
-            for turn in self._turns:
-                hit = self._in_plane(seen, turn)
-                if hit is not None and (best is None or len(hit[0]) > len(best[0][0])):
-                    best = hit, border, turn
-        if best is None:
+        border, seen = max(
+            ((border, self._seen(grey, border)) for border in self._borders), key=lambda one: one[1].area
+        )
+        hits = [(turn, hit) for turn in self._turns if (hit := self._in_plane(seen, turn)) is not None]
+        if not hits:
+            gaps = [self._gaps_of(seen, turn, grey.shape[1]) for turn in self._turns]
+            self._gaps.append(max(gaps, key=len))
             return None
-        hit, border, turn = best
+        turn, hit = max(hits, key=lambda one: len(one[1][0]))
         self._borders, self._turns = (border,), (turn,)
+        self._gaps.append(self._gaps_of(seen, turn, grey.shape[1]))
         return hit
+
+    def spacing_seen(self) -> float | None:
+        """Gap between neighbouring tags over their side, of all images so far; None: too few neighbours, or
+        it is that of the grid as far as they tell.
+        """
+        gaps = np.concatenate([np.empty((0, 3)), *self._gaps])
+        if len(gaps) < _FEWEST_GAPS:
+            return None
+        spacing, side, of_image = (float(value) for value in np.median(gaps, axis=0))
+        error = 1.4826 * float(np.median(np.abs(gaps[:, 0] - spacing))) / np.sqrt(len(gaps))
+        allowed = _SPACING + _CORNER / side + _LENS * of_image**2 + _ERRORS * error
+        return spacing if abs(spacing - self.grid.spacing) > allowed else None
 
     def in_sight(self, grey: Image) -> list[int]:
         """Numbers of all tags of the family in an image, whatever the grid."""
@@ -165,6 +195,40 @@ class TagFinder:
             return None
         good = np.asarray(inside).ravel() > 0
         return (points[good], pixels[good]) if good.sum() >= max(6, _AGREEING * len(good)) else None
+
+    def _gaps_of(self, seen: _Seen, turn: int, width: int) -> Floats:
+        """Between neighbours in a row (of a single column: above each other): gap over side, side [px], side
+        over the image's width; shape=(m, 3).
+        """
+        tags = dict(zip(seen.numbers.tolist(), np.roll(seen.corners, turn, axis=1), strict=True))
+        columns, out = self.grid.columns, []
+        edges = ((0, 1), (3, 2)) if columns > 1 else ((3, 0), (2, 1))
+        for number, tag in tags.items():
+            if number + 1 not in tags or (columns > 1 and (number + 1) % columns == 0):
+                continue
+            for begin, end in edges:
+                out += _gap_in_line(np.array([*tag[[begin, end]], *tags[number + 1][[begin, end]]]))
+        gaps = np.array(out).reshape(-1, 2)
+        return np.column_stack([gaps, gaps[:, 1] / width])
+
+
+def _gap_in_line(corners: Floats) -> list[tuple[float, float]]:
+    """Of two equal sides and the gap between them, seen in perspective, shape=(4, 2) [px]: gap over side, and
+    the side [px]; none where they are not one after the other in one line.
+    """
+    way = corners[3] - corners[0]
+    length = float(np.linalg.norm(way))
+    if length == 0.0:
+        return []
+    way /= length
+    away = corners - corners[0]
+    t, off = away @ way, np.abs(away @ [-way[1], way[0]])
+    sides = t[1] - t[0], t[3] - t[2]
+    if not (0.0 < t[1] < t[2] < t[3]) or off.max() > _OFF * max(sides):
+        return []
+    # (side + gap)^2 / (gap (2 side + gap)), whatever the perspective.
+    ratio = (t[2] - t[0]) * (t[3] - t[1]) / ((t[2] - t[1]) * (t[3] - t[0]))
+    return [(float(np.sqrt(ratio / (ratio - 1.0)) - 1.0), float(sum(sides) / 2))]
 
 
 def detected(cv: Any, grey: Image, family: str, border: int) -> _Seen:

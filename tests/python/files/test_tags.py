@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from handeye_scenes import CAMERA_IN_HAND, columns_of, write_csv
 from truing import InputError
 from truing.cli.app import main
 from truing.files import Board, find_board, parse_board
+from truing.files.tags import TagFinder
 from truing.hand_eye import Camera
 
 cv2 = pytest.importorskip("cv2")
@@ -189,6 +191,54 @@ def test_other_tags_than_were_said_are_named(said: str, message: str) -> None:
     images = [render(board, T, LARGE, seed=k, paint=KALIBR) for k, T in enumerate(large_poses(board, 3))]
     with pytest.raises(InputError, match=message):
         find_board(images, said, camera=LARGE)
+
+
+# ---- The gap between tags ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("printed", "said", "paint"),
+    [
+        ("36h11:4x3:40mm:0.3", 0.25, KALIBR),
+        ("36h11:4x3:40mm:0.3", 0.36, KALIBR),
+        ("36h11:4x3:40mm:0.3", 1.3, KALIBR),
+        ("36h11:3x4:40mm:0.2", 0.3, PLAIN),
+        ("25h9:4x3:40mm:0.5", 0.25, PLAIN),
+        ("16h5:1x3:40mm:0.4", 0.3, PLAIN),
+        ("36h11:3x3:40mm:0.3", 0.2, tags_texture(turn=2)),
+    ],
+)
+def test_a_spacing_that_is_not_that_of_the_tags_is_refused(printed: str, said: float, paint: Any) -> None:
+    board = parse_board(f"apriltag:{printed}")
+    images = [
+        render(board, T, LARGE, seed=k, paint=paint) for k, T in enumerate(large_poses(board, 3, seed=3))
+    ]
+    with pytest.raises(
+        InputError, match=rf"gaps of 0\.\d+ times their side .* that was said is {said:g}:"
+    ) as why:
+        find_board(images, replace(board, spacing=said), camera=LARGE)
+    seen = float(str(why.value).split("gaps of ")[1].split()[0])
+    assert seen == pytest.approx(board.spacing, abs=0.015)
+    find_board(images, board, camera=LARGE)
+
+
+@pytest.mark.parametrize(
+    ("text", "paint"),
+    [
+        ("36h11:6x6:30mm:0.3", KALIBR),
+        ("36h11:4x3:40mm:0.2", PLAIN),
+        ("25h9:3x4:40mm:0.5", PLAIN),
+        ("16h5:2x3:40mm:0.25", PLAIN),
+        ("36h11:3x3:40mm:0.3", tags_texture(turn=1)),
+    ],
+)
+@pytest.mark.parametrize("views", [2, pytest.param(10, marks=pytest.mark.slow)])
+def test_no_single_view_of_the_right_spacing_is_refused(text: str, paint: Any, views: int) -> None:
+    board = parse_board(f"apriltag:{text}")
+    for seed, T in enumerate(large_poses(board, views, seed=11)):
+        finder = TagFinder(cv2, board.tags)
+        assert finder(render(board, T, LARGE, seed=seed, paint=paint)) is not None
+        assert finder.spacing_seen() is None
 
 
 # ---- To the camera -------------------------------------------------------------------------------
