@@ -88,16 +88,15 @@ TEST_CASE("a bend over 40 degrees of travel is no harmonic with an amplitude bey
 }
 
 TEST_CASE("a vertical joint of a base that leans a little is no spring" * doctest::skip(kSanitized)) {
-  // It carries next to nothing: 0.3 degrees of the arm's weight. What looks like that is something else.
+  // It carries next to nothing, 0.006 degrees of the arm's weight. What looks like its spring is smaller than
+  // what machines may have, and would give way by a radian under the weight that other joints carry.
   Robot leaning = ur10();
-  leaning.gravity = Eigen::AngleAxisd(5e-3, Eigen::Vector3d(0.6, 0.8, 0.0)) * leaning.gravity;
+  leaning.gravity = Eigen::AngleAxisd(1e-4, Eigen::Vector3d(0.6, 0.8, 0.0)) * leaning.gravity;
   Robot truth = leaning;
   truth.T_measurement_base = somewhere();
+  truth.effects = {{"joint_compliance", {"J1"}, {{"joint_compliance.J1", 4.5e-3}}}};
   for (const unsigned seed : {61u, 62u, 63u}) {
-    const auto table = measured(truth, 200, seed, 0, [](const Table& t, std::size_t row) {
-      const double q1 = t.data.joints[0][row], q2 = t.data.joints[1][row];
-      return 2e-4 * std::cos(q1 + 0.9) * std::cos(q2);
-    });
+    const auto table = measured(truth, 300, seed, 0, [](const Table&, std::size_t) { return 0.0; });
     const Diagnosis d = diagnose(leaning, table->data);
     CAPTURE(seed);
     CHECK(!is_named(d, "joint_compliance", "J1"));
