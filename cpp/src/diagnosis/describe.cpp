@@ -565,8 +565,12 @@ void add_next_poses(const Work& work, const Measurements& data, const DiagnoseOp
   }
 }
 
-/// The smallest effect that would have shown: play if there is one, of which everybody has an idea.
-static std::string would_have_shown(const std::vector<Detectable>& detectable) {
+/// The smallest effect that would have shown and that machines may have: play if there is one, of which everybody has
+/// an idea.
+static std::string would_have_shown(std::vector<Detectable> detectable) {
+  detectable.erase(std::remove_if(detectable.begin(), detectable.end(),
+                                  [](const Detectable& one) { return !may_be_of_machines(one); }),
+                   detectable.end());
   if (detectable.empty()) return "";
   const auto rank = [](const Detectable& d) {
     return (model::traits_of(d.effect, {}).driver == Driver::direction ? 0.0 : 1.0) + d.size_at_tip;
@@ -593,7 +597,8 @@ static std::string failure_in_words(const Diagnosis& d) {
   return "The model found does not hold on poses that it never saw: their error of " + millimetres(d.gap.rms) +
          " would be " + millimetres(after) + " with " +
          (d.effects.empty() ? std::string("the functions found") : largest_causes(d)) +
-         ". Nothing of it is in the robot's file: measure more poses, spread over the whole range.";
+         ". Nothing of it is in the robot's file." + answerable_questions(d) +
+         " Measure more poses, spread over the whole range.";
 }
 
 static std::string unknown_in_words(const Diagnosis& d) {
@@ -626,8 +631,8 @@ std::string sentence_of(const Diagnosis& d) {
     return "Robot file and measurements do not go together: " + mistake->text;
   if (too_few_poses(d)) {
     return "These poses are too few to tell a gap from noise: with base and tool fitted, held-out poses are off by " +
-           millimetres(d.gap.rms) + " rms, and a fit of everything at once leaves " + millimetres(d.noise_floor) +
-           ". Measure more of them.";
+           millimetres(d.gap.rms) + " rms, and a fit of everything at once leaves " + millimetres(d.noise_floor) + "." +
+           answerable_questions(d) + " Measure more of them.";
   }
   if (d.verdict == Verdict::none) {
     return "No gap beyond noise: " + millimetres(d.gap.rms) + " rms on held-out poses, of which noise is " +

@@ -261,6 +261,10 @@ std::string sentence_of(const Diagnosis& d);
 
 std::string plain(const std::string& effect);
 std::string largest_causes(const Diagnosis& d);
+/// It is no larger than machines have it.
+bool may_be_of_machines(const Detectable& detectable);
+/// What poses that are too few for more can tell: single effects that would show where they are smaller than the gap.
+std::string answerable_questions(const Diagnosis& d);
 
 // --- shares.cpp: how much each cause counts --------------------------------------------------------------------------
 

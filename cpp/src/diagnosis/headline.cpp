@@ -8,13 +8,15 @@
 #include <vector>
 
 #include "diagnosis/diagnosis.hpp"
+#include "math/text.hpp"
 #include "model/effects/traits.hpp"
 
 namespace truing::diagnosis {
 
-constexpr std::size_t kCauses = 3;   ///< that a headline has room for
-constexpr std::size_t kJoints = 3;   ///< of a cause, that are listed
-constexpr double kContender = 0.25;  ///< of a cause's probability: an alternative that must be reckoned with
+constexpr std::size_t kCauses = 3;     ///< that a headline has room for
+constexpr std::size_t kQuestions = 5;  ///< that a sentence has room for
+constexpr std::size_t kJoints = 3;     ///< of a cause, that are listed
+constexpr double kContender = 0.25;    ///< of a cause's probability: an alternative that must be reckoned with
 
 /// "transmission error (81 per turn)" of "transmission_error@81".
 std::string plain(const std::string& effect) {
@@ -70,6 +72,37 @@ static std::string in_words(const Cause& cause) {
   if (other.probability > 0.0 && other.probability >= kContender * cause.only->probability)
     text += " (or " + effect_at(other.effect, other.joints) + ": these data cannot tell)";
   return text;
+}
+
+bool may_be_of_machines(const Detectable& detectable) {
+  const double plausible = model::traits_of(detectable.effect, {}).plausible;
+  return !(plausible > 0.0 && detectable.size > plausible);
+}
+
+std::string answerable_questions(const Diagnosis& d) {
+  std::vector<Cause> questions;
+  double largest = 0.0;
+  for (const Detectable& one : d.detectable) {
+    if (!(one.size_at_tip < d.gap.rms) || !may_be_of_machines(one)) continue;
+    auto question =
+        std::find_if(questions.begin(), questions.end(), [&](const Cause& c) { return c.effect == one.effect; });
+    if (question == questions.end()) question = questions.insert(question, Cause{one.effect, {}, 0.0, 0, nullptr});
+    if (!one.joint.empty()) question->joints.push_back(one.joint);
+    largest = std::max(largest, one.size_at_tip);
+  }
+  if (questions.empty()) return " Nor can these poses answer whether any single effect makes the gap.";
+  std::stable_sort(questions.begin(), questions.end(),
+                   [](const Cause& a, const Cause& b) { return a.joints.size() > b.joints.size(); });
+  const std::size_t shown = std::min(questions.size(), kQuestions);
+  std::string text;
+  for (std::size_t k = 0; k < shown; ++k)
+    text += (k == 0                      ? ""
+             : k + 1 == questions.size() ? " or "
+                                         : ", ") +
+            effect_at(questions[k].effect, questions[k].joints);
+  if (shown < questions.size()) text += " and " + std::to_string(questions.size() - shown) + " more";
+  return " What these poses can answer is whether a single effect makes the gap: " + text + " would show from " +
+         math::millimetres(largest) + " at the tip on.";
 }
 
 /// "link geometry of 6 links, joint compliance at J2 and J3, backlash at J6 and 2 smaller".

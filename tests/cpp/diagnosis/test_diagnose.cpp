@@ -336,6 +336,7 @@ TEST_CASE("diagnose says so when held-out poses contradict what was found, and l
   CHECK(d.verdict == Verdict::does_not_hold);
   CHECK(d.after.rms > d.gap.rms);
   CHECK(d.sentence.find("The model found does not hold") == 0);
+  CHECK(d.sentence.find("What these poses can answer is whether a single effect makes the gap: ") != std::string::npos);
   CHECK(d.robot.effects.empty());
   CHECK(fresh_error(d.robot, light_arm(), 570) < 1.1 * fresh_error(d.robot_before, light_arm(), 570));
 }

@@ -17,8 +17,10 @@ using truing::Diagnosis;
 using truing::Explained;
 using truing::FoundEffect;
 using truing::Verdict;
+using truing::diagnosis::answerable_questions;
 using truing::diagnosis::explained_by;
 using truing::diagnosis::largest_causes;
+using truing::diagnosis::sentence_of;
 
 namespace {
 
@@ -123,4 +125,33 @@ TEST_CASE("the headline names the three largest causes, an effect at several joi
   CHECK(largest_causes(d) == "joint compliance at J2");  // nine to one is no question
   d.effects[0].confounded_with[0].probability = 0.4;
   CHECK(largest_causes(d) == "joint compliance at J2 (or harmonic at J3: these data cannot tell)");
+}
+
+TEST_CASE("where poses are too few the sentence says which single effects they would show") {
+  Diagnosis d;
+  d.gap.rms = 5e-3;
+  d.noise_floor = 1e-3;
+  d.verdict = Verdict::none;
+  const std::string none = " Nor can these poses answer whether any single effect makes the gap.";
+  CHECK(answerable_questions(d) == none);
+  CHECK(sentence_of(d).find("These poses are too few to tell a gap from noise") == 0);
+  CHECK(sentence_of(d).find(none + " Measure more of them.") != std::string::npos);
+  // Play of 60 mrad no machine has; what moves the tip by more than the gap cannot be part of it.
+  d.detectable = {{"backlash", "J6", "backlash.J6", "rad", 0.06, 2e-3},
+                  {"gear_ratio", "J2", "J2.ratio", "-", 1e-3, 6e-3}};
+  CHECK(answerable_questions(d) == none);
+  d.detectable.push_back({"backlash", "J1", "backlash.J1", "rad", 2e-3, 2e-3});
+  d.detectable.push_back({"backlash", "J2", "backlash.J2", "rad", 1e-3, 3e-3});
+  d.detectable.push_back({"scale", "", "scale", "-", 1e-3, 2.5e-3});
+  const std::string some =
+      " What these poses can answer is whether a single effect makes the gap: backlash at J1 and J2 or scale would "
+      "show from 3 mm at the tip on.";
+  CHECK(answerable_questions(d) == some);
+  CHECK(sentence_of(d).find(some + " Measure more of them.") != std::string::npos);
+  d.verdict = Verdict::does_not_hold;
+  CHECK(sentence_of(d).find(some + " Measure more poses") != std::string::npos);
+  for (const char* effect : {"harmonic", "joint_compliance", "axis_wobble", "joint_offset"})
+    d.detectable.push_back({effect, "J1", "", "rad", 1e-6, 2e-3});
+  CHECK(answerable_questions(d).find("backlash at J1 and J2, ") != std::string::npos);
+  CHECK(answerable_questions(d).find(" and 1 more would show") != std::string::npos);
 }

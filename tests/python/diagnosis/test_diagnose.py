@@ -7,6 +7,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ import truing
 from truing.cli import main
 from truing.errors import InputWarning
 from truing.examples import example
-from truing.model import AppliedEffect, catalogue
+from truing.model import AppliedEffect, catalogue, catalogue_effects
 from truing.testing.simulation import random_joints
 
 ROBOT = str(example("irb120"))
@@ -356,6 +357,31 @@ def test_rows_beyond_what_effects_were_fitted_on_are_warned_of() -> None:
     joints[:7, 2] += 9.0
     with pytest.warns(InputWarning, match=r"7 of 220 rows lie beyond the range .* \(q3\)"):
         truing.predict(robot, data.replace(joints=joints))
+
+
+def test_of_25_poses_that_are_too_few_it_is_said_what_they_can_answer() -> None:
+    nominal = truing.load_robot(example("ur10"))
+    data = truing.simulate(nominal, poses=25, noise=6e-4, lengths=3e-4, angles=3e-4, seed=21).data
+    found = truing.diagnose(nominal, data)
+    assert found.verdict == "does_not_hold"
+    said = re.search(
+        r" can answer is whether a single effect makes the gap: (.*) would show from (.*) mm at the tip on\.",
+        found.sentence,
+    )
+    assert said is not None
+    asked, shown = said.groups()
+    traits = {effect.name: effect.traits for effect in catalogue_effects()}
+    small = [
+        d
+        for d in found.detectable
+        if d.size_at_tip < found.gap.rms
+        and (not traits[d.effect].plausible or d.size <= traits[d.effect].plausible)
+    ]
+    names = {d.effect.replace("_", " ") for d in small}
+    named = {name for effect in traits if (name := effect.replace("_", " ")) in asked}
+    assert 5 <= len(named) < len(names) and named <= names
+    assert asked.endswith(f" and {len(names) - 5} more")
+    assert float(shown) == pytest.approx(1e3 * max(d.size_at_tip for d in small), rel=0.01)
 
 
 def test_what_held_out_poses_contradict_ends_with_status_1(capsys: pytest.CaptureFixture[str]) -> None:
