@@ -3276,6 +3276,11 @@ class Reading:
         one.
         """
     @property
+    def other_setup(self) -> bool:
+        """
+        It is about the set-up: camera and board are in each other's place.
+        """
+    @property
     def position_rms(self) -> float:
         """
         [m] median closure.

@@ -141,6 +141,7 @@ struct Reading {
   std::string explanation;    ///< in words: 'hand poses are base in hand (inverted)'
   double position_rms = 0.0;  ///< [m] median closure
   double rotation_rms = 0.0;  ///< [rad]
+  bool other_setup = false;   ///< it is about the set-up: camera and board are in each other's place
 };
 
 /// What a warning is about.

@@ -542,7 +542,7 @@ bool closes(const HandEyeOptions& options, const Work& work, const Rows& rows, c
     return false;
   if (result->readings.empty() && !(open > kHopeless)) return true;
   result->status = HandEyeStatus::not_closing;
-  result->as_given = {"", "", agreement.position, agreement.rotation};
+  result->as_given = {"", "", agreement.position, agreement.rotation, false};
   result->message = not_closing_message(*result, options.setup);
   return false;
 }

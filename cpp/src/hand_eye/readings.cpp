@@ -390,10 +390,11 @@ std::size_t oddities(const Frames& hand, const Frames& board, const Closed& clos
 Found close_in(const std::string& name, Frames hand, Frames board, HandEyeSetup setup) {
   apply_reading(name, &hand, &board);
   const Closed closed = close_up(hand, board, setup);
-  const bool on_hand = camera_on_hand(setup, scope_of(name).setup);
+  const bool other_setup = scope_of(name).setup;
+  const bool on_hand = camera_on_hand(setup, other_setup);
   return {closed.distance,
           parts_of(name).size() + oddities(hand, board, closed, on_hand),
-          {name, explain_reading(name), closed.position, closed.rotation}};
+          {name, explain_reading(name), closed.position, closed.rotation, other_setup}};
 }
 
 /// Hand poses inverted, board poses inverted and the other set-up are one equation, that closes at one end of the loop
@@ -413,7 +414,7 @@ void sort_readings(std::vector<Found>* found) {
     if (a_good != b_good) return a_good;
     if (!a_good) return a.distance < b.distance;
     const ReadingScope in_a = scope_of(a.reading.name), in_b = scope_of(b.reading.name);
-    if (a.changes == b.changes && in_a.setup != in_b.setup) return in_a.setup;
+    if (a.changes == b.changes && a.reading.other_setup != b.reading.other_setup) return a.reading.other_setup;
     const bool a_hand = in_a.hand_first, b_hand = in_b.hand_first;  // a mirror may be on either side
     return a.changes != b.changes ? a.changes < b.changes : a_hand != b_hand ? a_hand : a.distance < b.distance;
   });
@@ -488,7 +489,8 @@ std::string explain_reading(const std::string& name, const HandEyeNouns& nouns) 
 
 std::vector<Reading> handeye_readings() {
   std::vector<Reading> out;
-  for (const Atom& atom : atoms()) out.push_back({atom.name, in_words(atom.explanation, {}), 0.0, 0.0});
+  for (const Atom& atom : atoms())
+    out.push_back({atom.name, in_words(atom.explanation, {}), 0.0, 0.0, atom.part == Part::setup});
   return out;
 }
 

@@ -75,7 +75,7 @@ std::string not_closing_message(const HandEyeResult& result, HandEyeSetup setup)
   const Reading& best = result.readings.front();
   const std::string closes =
       given + " It closes to " + millimetres(best.position_rms) + ", " + degrees(best.rotation_rms) + " if ";
-  if (!scope_of(best.name).setup) return closes + best.explanation + ": reading \"" + best.name + "\".";
+  if (!best.other_setup) return closes + best.explanation + ": reading \"" + best.name + "\".";
   const std::string other = setup == HandEyeSetup::eye_in_hand ? "eye-to-hand" : "eye-in-hand",
                     told = setup == HandEyeSetup::eye_in_hand ? "eye-in-hand" : "eye-to-hand";
   const std::string rest = best.name.substr(0, best.name.find(kOtherSetup));  // and what is to be read otherwise

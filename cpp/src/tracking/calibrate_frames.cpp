@@ -281,7 +281,7 @@ FramesResult calibrate_frames(const std::vector<Isometry3d>& T_base_flange,
   HandEyeOptions options;
   options.setup = HandEyeSetup::eye_to_hand;
   HandEyeResult start = handeye(poses, options);
-  const auto is_of_setup = [](const Reading& r) { return r.name.find("other-setup") != std::string::npos; };
+  const auto is_of_setup = [](const Reading& r) { return r.other_setup; };
   start.readings.erase(std::remove_if(start.readings.begin(), start.readings.end(), is_of_setup),
                        start.readings.end());  // a tracker does not ride on the flange
   FramesResult out;

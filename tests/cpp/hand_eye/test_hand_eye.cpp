@@ -640,6 +640,7 @@ TEST_CASE("the set-up exchanged is proposed first, and closes when it is told so
         REQUIRE(refused.status == HandEyeStatus::not_closing);
         REQUIRE_FALSE(refused.readings.empty());
         CHECK(refused.readings[0].name == "other-setup");
+        CHECK(refused.readings[0].other_setup);
         CHECK(refused.message.find(setup == HandEyeSetup::eye_in_hand ? "set-up eye-in-hand."
                                                                       : "set-up eye-to-hand.") != std::string::npos);
         const HandEyeResult told = handeye(s.poses, options_for(s));
@@ -657,6 +658,9 @@ TEST_CASE("what is wrong beside the set-up is proposed with it, and the set-up i
   REQUIRE(r.status == HandEyeStatus::not_closing);
   REQUIRE_FALSE(r.readings.empty());
   CHECK(r.readings[0].name == "hand-millimetres+other-setup");
+  CHECK(r.readings[0].other_setup);
+  for (const truing::Reading& reading : r.readings)
+    CHECK(reading.other_setup == (reading.name.find("other-setup") != std::string::npos));
   CHECK(r.message.find("set-up eye-to-hand, reading \"hand-millimetres\".") != std::string::npos);
   HandEyeOptions o;
   o.reading = "other-setup";

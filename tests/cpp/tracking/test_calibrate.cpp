@@ -142,6 +142,13 @@ TEST_CASE("readings of the tracker's numbers are named: mm for m, left-handed, d
     CHECK(r.status == CalibrationStatus::not_consistent);
     CHECK(said(r, "left-handed"));
   }
+  SUBCASE("inverted") {
+    for (Isometry3d& T : p.receiver) T = T.inverse(Eigen::Isometry);
+    const FramesResult r = calibrate_frames(p.flange, p.receiver);
+    CHECK(r.status == CalibrationStatus::not_consistent);
+    CHECK(said(r, "inverted"));
+    CHECK(!said(r, "set-up"));  // closes as well, but a tracker does not ride on the flange
+  }
   SUBCASE("degrees") {
     for (Isometry3d& T : p.flange)
       T.linear() = exp_rotation(M_PI / 180.0 * log_rotation(Quaterniond(T.linear()))).toRotationMatrix();
