@@ -67,6 +67,7 @@ class Answer:
     processor_seconds: float = math.nan  # of its process; NaN where that is gone
     sentence: str = ""
     error: str = ""
+    parameters: Mapping[str, float] = field(default_factory=dict)  # by full name, of what was named
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)

@@ -6,10 +6,8 @@ from __future__ import annotations
 
 import functools
 import json
-import time
 import warnings
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -31,7 +29,8 @@ from truing.exam.builds import package_build
 from truing.exam.scenes import Case, NoSetError
 from truing.exam.score import Scores, Sheet, cost_markdown, markdown, score, told_left_out
 from truing.exam.sealing import BrokenSealError, Envelope, fingerprint, opened, resealed, sealed
-from truing.exam.workers import Lost, dealt
+from truing.exam.sitting import Clock, append, folder_of, limited, sat
+from truing.exam.workers import Lost
 
 Candidate = Callable[[truing.Robot, truing.Measurements], Any]
 """Who sits the examination: gets robot and data, returns a Diagnosis or what has its attributes."""
@@ -96,12 +95,16 @@ def run_exam(
     out: folder for sealed.jsonl (written before the answers), salts.jsonl, answers.jsonl, labels.jsonl (after
     them), scores.json and scores.md.
     """
-    names = _limited(sets.ids(which, quick=quick, families=families, only=only, seed=seed), limit)
-    folder, stored = _folder(out, {"set": which, "seed": seed, "build": f"{package_build()} {build}"}, resume)
+    names = limited(sets.ids(which, quick=quick, families=families, only=only, seed=seed), limit)
+    folder, stored = folder_of(
+        out, {"set": which, "seed": seed, "build": f"{package_build()} {build}"}, resume
+    )
     left_out = dict(sets.skipped(which, names))
     names = [name for name in names if name not in left_out]
     papers = []
-    for done, paper in enumerate(_sat(names, candidate, workers, timeout, folder, stored), 1):
+    jobs = {name: functools.partial(sit, name, candidate, folder, stored.get(name)) for name in names}
+    give_up = functools.partial(_give_up, folder)
+    for done, paper in enumerate(sat(jobs, give_up, workers, timeout), 1):
         if isinstance(paper, LeftOut):
             left_out[paper.id] = paper.why
         else:
@@ -114,7 +117,7 @@ def run_exam(
     for text in told_left_out(left_out):
         warnings.warn(text, truing.InputWarning, stacklevel=2)
     if folder:
-        _write(folder, papers, sheets, scores)
+        write_papers(folder, papers, sheets, scores)
     return scores
 
 
@@ -130,9 +133,9 @@ def sit(
     except NoSetError as error:
         return LeftOut(id, str(error))
     if stored:
-        return _again(id, case.label, stored)
+        return again(id, case.label, stored)
     envelope = _seal(id, case, folder)
-    clock = _Clock()
+    clock = Clock()
     try:
         diagnosis = candidate(case.robot, case.data)
         seconds, processor = clock.spent()
@@ -157,18 +160,11 @@ def sit(
     return _answered(id, envelope, answer, others, folder)
 
 
-class _Clock:
-    """What a diagnosis costs, from when this is made."""
-
-    def __init__(self) -> None:
-        self.began = time.perf_counter(), time.process_time()
-
-    def spent(self) -> tuple[float, float]:
-        """By the clock, and by the processor [s]."""
-        return time.perf_counter() - self.began[0], time.process_time() - self.began[1]
+def _give_up(folder: Path | None, id: str, lost: Lost) -> Callable[[], Paper | LeftOut]:
+    return functools.partial(_given_up, folder, id, lost)
 
 
-def _give_up(id: str, lost: Lost, folder: Path | None) -> Paper:
+def _given_up(folder: Path | None, id: str, lost: Lost) -> Paper | LeftOut:
     """A set whose process is gone, and its envelope with it: it is sealed again, and counts as wrong."""
     envelope = _seal(id, sets.build(id), folder)
     return _answered(id, envelope, failed(lost.why, lost.seconds), {}, folder)
@@ -176,8 +172,8 @@ def _give_up(id: str, lost: Lost, folder: Path | None) -> Paper:
 
 def _seal(id: str, case: Case, folder: Path | None) -> Envelope:
     envelope = sealed(case.label)
-    _append(folder, "salts.jsonl", {"id": id, "salt": envelope.salt})
-    _append(folder, "sealed.jsonl", {"id": id, "seal": envelope.seal, "data": fingerprint(case.data)})
+    append(folder, "salts.jsonl", {"id": id, "salt": envelope.salt})
+    append(folder, "sealed.jsonl", {"id": id, "seal": envelope.seal, "data": fingerprint(case.data)})
     return envelope
 
 
@@ -185,11 +181,11 @@ def _answered(
     id: str, envelope: Envelope, answer: Answer, others: dict[str, Answer], folder: Path | None
 ) -> Paper:
     told = {name: other.to_dict() for name, other in others.items()}
-    _append(folder, "answers.jsonl", {"id": id, "answer": answer.to_dict(), "others": told})
+    append(folder, "answers.jsonl", {"id": id, "answer": answer.to_dict(), "others": told})
     return Paper(id, envelope.seal, envelope, answer, others)
 
 
-def _again(id: str, label: dict[str, Any], stored: Mapping[str, Any]) -> Paper:
+def again(id: str, label: dict[str, Any], stored: Mapping[str, Any]) -> Paper:
     """An answer of before, with the label made anew: it must be the one that was sealed then."""
     envelope = resealed(label, stored["salt"])
     try:
@@ -202,125 +198,9 @@ def _again(id: str, label: dict[str, Any], stored: Mapping[str, Any]) -> Paper:
     return Paper(id, envelope.seal, envelope, answer_from(stored["answer"]), others)
 
 
-def _limited(names: Sequence[str], limit: int | None) -> list[str]:
-    if limit is None:
-        return list(names)
-    met: Counter[str] = Counter()
-    kept = []
-    for name in names:
-        family = name.split("/")[1]
-        met[family] += 1
-        if met[family] <= limit:
-            kept.append(name)
-    return kept
-
-
-def _sat(
-    names: Sequence[str],
-    candidate: Candidate,
-    workers: int,
-    timeout: float | None,
-    folder: Path | None,
-    stored: Mapping[str, Mapping[str, Any]],
-) -> Iterator[Paper | LeftOut]:
-    """Papers as they come. Every set is made by a worker, be it the only one: one thread of linear algebra
-    makes the same bits as another one, several do not.
-    """
-    jobs = {name: functools.partial(sit, name, candidate, folder, stored.get(name)) for name in names}
-    lost: dict[str, Lost] = {}
-    for name, paper in dealt(jobs, max(workers, 1), timeout):
-        if isinstance(paper, Lost):
-            lost[name] = paper
-        else:
-            yield paper
-    again = {name: functools.partial(_give_up, name, why, folder) for name, why in lost.items()}
-    for name, paper in dealt(again, max(workers, 1)):
-        if isinstance(paper, Lost):
-            raise RuntimeError(f"{name}: the examiner cannot make this set: {paper.why}")
-        yield paper
-
-
-_ANSWERED = ("sealed.jsonl", "salts.jsonl", "answers.jsonl")
-_AFTERWARDS = ("labels.jsonl", "scores.json", "scores.md")
-_SITTING = "sitting.json"
-"""Of which set, seed and build the answers are."""
-
-
-def _folder(
-    out: Path | str | None, sitting: Mapping[str, Any], resume: bool
-) -> tuple[Path | None, dict[str, dict[str, Any]]]:
-    """Where files go, and what was answered there in the same sitting. Of another one nothing is touched."""
-    if out is None:
-        return None, {}
-    folder = Path(out)
-    if resume:
-        _refuse_another(folder, sitting)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name in _AFTERWARDS if resume else (*_ANSWERED, *_AFTERWARDS):
-            (folder / name).unlink(missing_ok=True)
-        (folder / _SITTING).write_text(json.dumps(sitting), encoding="utf-8")
-    except OSError as error:
-        raise truing.InputError(f"{folder}: cannot be written: {error.strerror}") from None
-    return folder, _stored(folder) if resume else {}
-
-
-def _refuse_another(folder: Path, sitting: Mapping[str, Any]) -> None:
-    """InputError if the answers in a folder are of another sitting."""
-    if not any((folder / name).is_file() for name in _ANSWERED):
-        return
-    try:
-        before = json.loads(_text(folder / _SITTING))
-        differ = [name for name, value in sitting.items() if before[name] != value]
-    except (ValueError, KeyError, TypeError):
-        raise truing.InputError(
-            f"{folder}: holds answers, but no {_SITTING} that says whose they are: sit it from the start,"
-            " without --resume"
-        ) from None
-    told = [
-        f"another {name}" + ("" if name == "build" else f" ({before[name]}, expected {sitting[name]})")
-        for name in differ
-    ]
-    if told:
-        raise truing.InputError(
-            f"{folder}: holds the answers of {' and '.join(told)}, and a sitting is of one: sit it from the"
-            " start, without --resume, or in another folder"
-        )
-
-
-def _text(file: Path) -> str:
-    return file.read_text(encoding="utf-8") if file.is_file() else ""
-
-
-def _stored(folder: Path) -> dict[str, dict[str, Any]]:
-    """Seal, salt and answer of every set that has all three; of sets sealed twice the last."""
-    found: dict[str, dict[str, Any]] = {}
-    for name in ("sealed.jsonl", "salts.jsonl", "answers.jsonl"):
-        for entry in _whole_lines(folder / name):
-            found.setdefault(entry["id"], {}).update(entry)
-    needed = {"seal", "salt", "answer", "others"}
-    return {id: entry for id, entry in found.items() if needed <= set(entry)}
-
-
-def _whole_lines(file: Path) -> list[dict[str, Any]]:
-    """What a file holds; the end of a line at which the sitting before was ended is cut off."""
-    text = _text(file)
-    whole = text[: text.rfind("\n") + 1]
-    if whole != text:
-        file.write_text(whole, encoding="utf-8")
-    return [json.loads(line) for line in whole.splitlines()]
-
-
-def _append(folder: Path | None, name: str, line: dict[str, Any]) -> None:
-    if folder is None:
-        return
-    with open(folder / name, "a", encoding="utf-8") as file:
-        file.write(json.dumps(line) + "\n")
-
-
-def _write(folder: Path, papers: Sequence[Paper], sheets: Sequence[Sheet], scores: Scores) -> None:
+def write_papers(folder: Path, papers: Sequence[Paper], sheets: Sequence[Sheet], scores: Scores) -> None:
     for paper, sheet in zip(papers, sheets, strict=True):
-        _append(
+        append(
             folder,
             "labels.jsonl",
             {"id": sheet.id, "seal": paper.seal, "salt": paper.envelope.salt, "label": paper.envelope.text},

@@ -18,7 +18,7 @@ from truing.exam.names import FINDINGS
 
 _Z90 = 1.6448536269514722
 _CONFIDENT = 0.9
-_GEOMETRY = frozenset({"link_geometry", "joint_offset"})  # what lies underneath, by either name
+_GEOMETRY = ("link_geometry", "joint_offset")  # what lies underneath, by either name
 _SHARED = frozenset({"several", "teeth"})  # one cause on several joints: the smallest may be named or not
 _WHOLE = frozenset({"drift", "scale", "joint_coupling", "time_offset"})
 _BINS = 10
@@ -137,14 +137,16 @@ def called_right(named: Named, label: Label) -> bool:
     return bool(said & {effect for effect, _ in _pairs(label["effects"]) + _pairs(label["acceptable"])})
 
 
+def underneath(label: Label) -> frozenset[str]:
+    """What is rightly named of any joint, because link values, or inertias, are wrong everywhere."""
+    return frozenset(label.get("underneath", _GEOMETRY)) if label["geometry_underneath"] else frozenset()
+
+
 def counted(sheet: Sheet) -> list[Named]:
-    """Named effects, without geometry where geometry is wrong underneath: naming it is right there and says
-    nothing.
-    """
+    """Named effects, without what is wrong underneath: naming that is right and says nothing."""
     named = list(sheet.answer.effects)
-    if not sheet.label["geometry_underneath"]:
-        return named
-    others = [item for item in named if item.effect not in _GEOMETRY or right(item, sheet.label)]
+    beneath = underneath(sheet.label)
+    others = [item for item in named if item.effect not in beneath or right(item, sheet.label)]
     return others or named
 
 
@@ -229,10 +231,10 @@ def _excused(sheet: Sheet, item: Named, truths: Sequence[Effect]) -> bool:
     inside = item.effect == "link_geometry" and any(
         true[0] == "joint_offset" and set(true[1]) <= set(item.joints) for true in truths
     )
-    underneath = sheet.label["geometry_underneath"] and item.effect in _GEOMETRY
+    beneath = item.effect in underneath(sheet.label)
     if sheet.label["family"] == "confounded":  # the twin alone, for certain, is what must not be said
-        return inside or underneath
-    return inside or underneath or right(item, sheet.label)
+        return inside or beneath
+    return inside or beneath or right(item, sheet.label)
 
 
 def false_alarm(sheet: Sheet) -> bool:
@@ -305,8 +307,7 @@ def small_false_name(sheet: Sheet) -> bool:
 
 
 def _excusable(sheet: Sheet, item: Named) -> bool:
-    underneath = sheet.label["geometry_underneath"] and item.effect in _GEOMETRY
-    return underneath or right(item, sheet.label)
+    return item.effect in underneath(sheet.label) or right(item, sheet.label)
 
 
 # ---- The table -----------------------------------------------------------------------------------
@@ -337,7 +338,7 @@ class Line:
         return not self.good if sheet.answer.error else self.passed(sheet)
 
 
-def _family(*families: str) -> Test:
+def family(*families: str) -> Test:
     return lambda s: s.label["family"] in families
 
 
@@ -409,7 +410,7 @@ LINES = (
     Line(
         "joint",
         "joint right given the effect",
-        _family("single", "double"),
+        family("single", "double"),
         lambda s: right(counted(s)[0], s.label),
         at_least=0.98,
         given=_called,
@@ -417,12 +418,12 @@ LINES = (
     Line("two_exact", "two effects: exact set", _many(2), exact_set, at_least=0.88),
     Line("two_present", "two effects: both present", _many(2), both_present, at_least=0.96),
     Line(
-        "class", "confounded by design: class returned", _family("confounded"), class_returned, at_least=0.95
+        "class", "confounded by design: class returned", family("confounded"), class_returned, at_least=0.95
     ),
     Line(
         "class_wrong",
         "confounded by design: confident single wrong name",
-        _family("confounded"),
+        family("confounded"),
         confidently_wrong,
         at_most=0.01,
         good=False,
@@ -462,7 +463,7 @@ LINES = (
     Line(
         "unlisted_wrong",
         "unlisted effect: a listed one named for certain",
-        _family("unlisted"),
+        family("unlisted"),
         confidently_wrong,
         at_most=0.03,
         good=False,
@@ -470,7 +471,7 @@ LINES = (
     Line(
         "wrong_law",
         "right effect named first though its law is wrong",
-        _family("wrong_law"),
+        family("wrong_law"),
         first_right,
         at_least=0.88,
     ),
@@ -479,7 +480,7 @@ LINES = (
     Line(
         "few_worse",
         "25-70 poses: robot.yaml worse than geometry alone on fresh poses by > 5 %",
-        _family("few"),
+        family("few"),
         lambda s: worse_than(s, "geometry"),
         at_most=0.02,
         good=False,
@@ -515,40 +516,40 @@ MORE = (
     Line(
         "companion",
         "a second effect named beside one of wrong law",
-        _family("wrong_law"),
+        family("wrong_law"),
         lambda s: len(counted(s)) > 1,
         good=False,
     ),
     Line(
         "missing_wrong",
         "column withheld: confident wrong name",
-        _family("missing"),
+        family("missing"),
         confidently_wrong,
         good=False,
     ),
     Line(
         "missing_told",
         "column withheld: named, or called not testable",
-        _family("missing"),
+        family("missing"),
         told_or_untestable,
     ),
     Line(
         "few_worse_frames",
         "25-70 poses: robot.yaml worse than base and tool alone by > 5 %",
-        _family("few"),
+        family("few"),
         lambda s: worse_than(s, "frames"),
         good=False,
     ),
-    Line("few_wrong", "25-70 poses: confident wrong name", _family("few"), confidently_wrong, good=False),
+    Line("few_wrong", "25-70 poses: confident wrong name", family("few"), confidently_wrong, good=False),
     Line(
         "few_first",
         "25-70 poses, one effect or two: first-named right",
-        lambda s: _family("few")(s) and bool(s.label["effects"]),
+        lambda s: family("few")(s) and bool(s.label["effects"]),
         first_right,
     ),
-    Line("grid", "poses on a grid: first-named right", _family("grid"), first_right),
+    Line("grid", "poses on a grid: first-named right", family("grid"), first_right),
     Line(
-        "grid_wrong", "poses on a grid: confident wrong name", _family("grid"), confidently_wrong, good=False
+        "grid_wrong", "poses on a grid: confident wrong name", family("grid"), confidently_wrong, good=False
     ),
     *(
         Line(f"mistake_{kind}", f"{text}: said", _mistake(kind), mistake_told)
@@ -561,12 +562,12 @@ MORE = (
     Line(
         "mistake_worse",
         "such a mistake: robot.yaml worse than base and tool alone on fresh poses",
-        _family("mistaken"),
+        family("mistaken"),
         lambda s: worse_than(s, "frames", 1.0),
         good=False,
     ),
     Line(
-        "mistake_wrong", "such a mistake: confident name", _family("mistaken"), confidently_wrong, good=False
+        "mistake_wrong", "such a mistake: confident name", family("mistaken"), confidently_wrong, good=False
     ),
     *(
         Line(f"machine_{kind}", f"{text}: named first", _machine(kind), first_right)
@@ -582,13 +583,13 @@ MORE = (
     Line(
         "machine_place",
         "laws that machines have: named first, or unknown at the right joint and input",
-        _family("machines"),
+        family("machines"),
         first_or_unknown,
     ),
     Line(
         "machine_wrong",
         "laws that machines have: confident wrong name",
-        _family("machines"),
+        family("machines"),
         confidently_wrong,
         good=False,
     ),
@@ -608,25 +609,25 @@ MORE = (
     Line(
         "teeth_place",
         "teeth: so, or unknown at the right joint and input",
-        _family("teeth"),
+        family("teeth"),
         lambda s: told_or_untestable(s) or place_right(s),
     ),
-    Line("teeth_present", "teeth: every joint named", _family("teeth"), both_present),
+    Line("teeth_present", "teeth: every joint named", family("teeth"), both_present),
     Line(
         "teeth_order",
         "teeth: order per turn right, where an order is said",
-        _family("teeth"),
+        family("teeth"),
         order_right,
         given=lambda s: any(math.isfinite(item.order) for item in s.answer.effects),
     ),
-    Line("teeth_wrong", "teeth: confident wrong name", _family("teeth"), confidently_wrong, good=False),
-    Line("several_first", "one cause on several joints: first-named right", _family("several"), first_right),
-    Line("several_present", "one cause on several joints: every joint", _family("several"), both_present),
-    Line("several_exact", "one cause on several joints: and nothing else", _family("several"), exact_set),
+    Line("teeth_wrong", "teeth: confident wrong name", family("teeth"), confidently_wrong, good=False),
+    Line("several_first", "one cause on several joints: first-named right", family("several"), first_right),
+    Line("several_present", "one cause on several joints: every joint", family("several"), both_present),
+    Line("several_exact", "one cause on several joints: and nothing else", family("several"), exact_set),
     Line(
         "several_wrong",
         "one cause on several joints: confident wrong name",
-        _family("several"),
+        family("several"),
         confidently_wrong,
         good=False,
     ),
@@ -640,14 +641,14 @@ MORE = (
     Line(
         "small_false_companion",
         "the same beside an effect of 1 to 2 % of the gap",
-        _family("companion"),
+        family("companion"),
         small_false_name,
         good=False,
     ),
     Line(
         "companion_main",
         "beside a small companion: the large effect first",
-        _family("companion"),
+        family("companion"),
         main_first,
     ),
     Line(
@@ -657,9 +658,9 @@ MORE = (
         lambda s: bool(s.answer.error),
         good=False,
     ),
-    Line("twenty", "twenty poses: first-named right", _family("twenty"), first_right),
+    Line("twenty", "twenty poses: first-named right", family("twenty"), first_right),
     Line(
-        "twenty_wrong", "twenty poses: confident wrong name", _family("twenty"), confidently_wrong, good=False
+        "twenty_wrong", "twenty poses: confident wrong name", family("twenty"), confidently_wrong, good=False
     ),
 )
 
@@ -730,9 +731,7 @@ def _none_if_nan(value: float) -> float | None:
 
 def score(sheets: Sequence[Sheet], which: str = "", left_out: Mapping[str, str] | None = None) -> Scores:
     """Every row of the table, from all sheets. left_out: sets that could not be made, and why."""
-    rows = (
-        [_share(line, sheets) for line in LINES] + _values(sheets) + [_share(line, sheets) for line in MORE]
-    )
+    rows = [share(line, sheets) for line in LINES] + _values(sheets) + [share(line, sheets) for line in MORE]
     names = sorted({name for sheet in sheets for name in sheet.others})
     single = (
         "first_physics",
@@ -756,20 +755,20 @@ def score(sheets: Sequence[Sheet], which: str = "", left_out: Mapping[str, str] 
             for s in sheets
             if name in s.others or s.answer.error
         ]
-        others[name] = [_share(line, theirs) for line in (*LINES, *MORE) if line.key in single]
+        others[name] = [share(line, theirs) for line in (*LINES, *MORE) if line.key in single]
     return Scores(
         rows,
         others,
-        _failures(sheets),
+        failures(sheets, (*LINES, *MORE)),
         len(sheets),
         which,
         left_out=dict(left_out or {}),
-        drawn_anew=_drawn_anew(sheets),
-        costs={family: cost_of(of) for family, of in {**_by_family(sheets), "all": sheets}.items()},
+        drawn_anew=drawn_anew(sheets),
+        costs={family: cost_of(of) for family, of in {**by_family(sheets), "all": sheets}.items()},
     )
 
 
-def _drawn_anew(sheets: Sequence[Sheet]) -> dict[str, dict[str, int]]:
+def drawn_anew(sheets: Sequence[Sheet]) -> dict[str, dict[str, int]]:
     """Draws that the examiner threw away while it made the sets of each family, by the reason."""
     found: dict[str, Counter[str]] = {}
     for sheet in sheets:
@@ -799,7 +798,7 @@ def told_drawn_anew(drawn_anew: Mapping[str, Mapping[str, int]]) -> list[str]:
     return lines
 
 
-def _share(line: Line, sheets: Sequence[Sheet]) -> Row:
+def share(line: Line, sheets: Sequence[Sheet]) -> Row:
     chosen = line.of(sheets)
     hits = sum(line.passes(sheet) for sheet in chosen)
     value = hits / len(chosen) if chosen else math.nan
@@ -852,12 +851,12 @@ def _values(sheets: Sequence[Sheet]) -> list[Row]:
     told = [("calibration", "stated confidence against frequency", 0.03, sheets)]
     told += [
         (f"calibration_{family}", f"the same within {family}", 0.08, of_family)
-        for family, of_family in _by_family(sheets).items()
+        for family, of_family in by_family(sheets).items()
     ]
     cost = cost_of(sheets)
     return [
         *_shrinks(sheets),
-        *(_calibration_row(*one) for one in told),
+        *(calibration_row(*one) for one in told),
         Row(
             "seconds",
             "seconds per set, median",
@@ -871,14 +870,14 @@ def _values(sheets: Sequence[Sheet]) -> list[Row]:
     ]
 
 
-def _by_family(sheets: Sequence[Sheet]) -> dict[str, list[Sheet]]:
+def by_family(sheets: Sequence[Sheet]) -> dict[str, list[Sheet]]:
     found: dict[str, list[Sheet]] = {}
     for sheet in sheets:
         found.setdefault(sheet.label["family"], []).append(sheet)
     return found
 
 
-def _calibration_row(key: str, text: str, most: float, sheets: Sequence[Sheet]) -> Row:
+def calibration_row(key: str, text: str, most: float, sheets: Sequence[Sheet]) -> Row:
     """Few names are said to be few, and not judged: ten bins of them show chance."""
     found = calibration(sheets)
     few = found.n < _FEWEST
@@ -955,13 +954,11 @@ def calibration(sheets: Sequence[Sheet]) -> Calibration:
     return Calibration(error, float(np.mean((p - hit) ** 2)), len(p))
 
 
-def _failures(sheets: Sequence[Sheet]) -> list[dict[str, Any]]:
+def failures(sheets: Sequence[Sheet], lines: Sequence[Line]) -> list[dict[str, Any]]:
     """Every set that failed a row, with label and answer."""
     found = []
     for sheet in sheets:
-        failed = [
-            line.key for line in (*LINES, *MORE) if line.of([sheet]) and line.passes(sheet) != line.good
-        ]
+        failed = [line.key for line in lines if line.of([sheet]) and line.passes(sheet) != line.good]
         if failed or sheet.answer.error:
             found.append(
                 {"id": sheet.id, "failed": failed, "label": sheet.label, "answer": sheet.answer.to_dict()}

@@ -94,6 +94,7 @@ FLOORS = {
         "score",
         "sealing",
         "workers",
+        "sitting",
         "builds",
         "run",
         "page",
