@@ -97,8 +97,27 @@ FLOORS = {
         "sitting",
         "builds",
         "run",
+        "dynamics",
         "page",
         "result",
+    ],
+    "exam/dynamics": [
+        "robots",
+        "bodies",
+        "motions",
+        "physics",
+        "laws",
+        "noise",
+        "sizing",
+        "departures",
+        "recordings",
+        "scenes",
+        "spike_in",
+        "families",
+        "sets",
+        "answers",
+        "score",
+        "run",
     ],
 }
 
@@ -203,12 +222,20 @@ def test_heavy_packages_stay_where_they_are_needed(file: str) -> None:
 @pytest.mark.parametrize("room", sorted(FLOORS))
 def test_a_module_imports_only_those_below_it_in_its_room(room: str) -> None:
     floors = FLOORS[room]
-    there = {file for file in FILES if file.startswith(f"{room}/")} - {f"{room}/__init__.py"}
-    assert there == {f"{room}/{module}.py" for module in floors}, "a new module gets its floor here"
+    depth = room.count("/") + 1
+    there = {file.split("/")[depth] for file in FILES if file.startswith(f"{room}/")} - {"__init__.py"}
+    expected = {module if f"{room}/{module}" in FLOORS else f"{module}.py" for module in floors}
+    assert there == expected, "a new module gets its floor here"
+    inside = ["truing", *room.split("/")]
     for floor, module in enumerate(floors):
-        for name in ours(f"{room}/{module}.py"):
-            if room_of(name) == room:
-                words = name.split(".")
-                assert (words[2] if len(words) > 2 else "") in floors[:floor], (
-                    f"{room}/{module}.py imports {name}"
+        if f"{room}/{module}" in FLOORS:  # a room within, with floors of its own
+            below = {name for file in FILES if file.startswith(f"{room}/{module}/") for name in ours(file)}
+            allowed = floors[: floor + 1]
+        else:
+            below, allowed = set(ours(f"{room}/{module}.py")), floors[:floor]
+        for name in below:
+            words = name.split(".")
+            if words[: len(inside)] == inside:
+                assert (words[len(inside)] if len(words) > len(inside) else "") in allowed, (
+                    f"{room}/{module} imports {name}"
                 )

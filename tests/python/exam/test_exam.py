@@ -443,7 +443,9 @@ ONLY_IN = {
 WRITES = {"page.py", "result.py"}  # these see scores only, and may use the HTML toolkit
 
 
-@pytest.mark.parametrize("file", sorted(EXAM.glob("*.py")), ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "file", sorted(EXAM.rglob("*.py")), ids=lambda path: path.relative_to(EXAM).as_posix()
+)
 def test_the_examiner_knows_no_law_of_the_candidate(file: Path) -> None:
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):

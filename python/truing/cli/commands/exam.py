@@ -38,6 +38,9 @@ class Command(run.Command[None, "Scores"]):
         Literal["development", "examination"],
         Choice("Robots, sizes and effects to develop with, or those kept for the examination.", flag="--set"),
     ] = "development"
+    dynamics: Annotated[
+        bool, Flag("The dynamic half: effects on the torques of recorded motion, for 'dynamics diagnose'.")
+    ] = False
     quick: Annotated[bool, Flag("A few data sets of every family.")] = False
     families: Annotated[list[str], Words("Only these families of data sets: 'none,one'. Default: all.")] = ()  # type: ignore[assignment]
     sets: Annotated[list[str], Words("Only these data sets: 'single/12,grid/3'. Default: all.")] = ()  # type: ignore[assignment]
@@ -52,6 +55,7 @@ class Command(run.Command[None, "Scores"]):
 
     def load(self, progress: run.Progress) -> None:
         try:
+            import truing.exam.dynamics.run
             import truing.exam.run  # noqa: F401
         except ModuleNotFoundError as error:
             if (error.name or "").split(".")[0] == "truing":
@@ -62,8 +66,10 @@ class Command(run.Command[None, "Scores"]):
             ) from None
 
     def solve(self, loaded: None, progress: run.Progress) -> Scores:
-        from truing.exam.run import run_exam
+        from truing.exam import run as statics
+        from truing.exam.dynamics import run as dynamics
 
+        run_exam = dynamics.run_exam if self.dynamics else statics.run_exam
         return run_exam(
             self.which,
             quick=self.quick,
@@ -85,6 +91,7 @@ class Command(run.Command[None, "Scores"]):
         return write_exam(
             folder,
             {
+                "half": "dynamics" if self.dynamics else "statics",
                 "set": self.which,
                 "seed": self.seed,
                 "sets": found.sets,
