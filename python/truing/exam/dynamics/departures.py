@@ -53,7 +53,7 @@ def _load_friction(arm: Arm, j: int, rng: Generator) -> Hidden:
     driven = rng.uniform(0.7, 1.3)
 
     def drag(s: Scene) -> Floats:
-        load, sign = s.motion.torque[:, j], s.sign(j)
+        load, sign = s.total[:, j], s.sign(j)
         factor = np.where(load * s.motion.qd[:, j] > 0.0, 1.0, driven)
         return s.at(j, factor * sign * np.abs(load))
 

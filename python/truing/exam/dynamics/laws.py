@@ -149,11 +149,11 @@ def asymmetric_friction(arm: Arm, j: int, rng: Generator) -> Hidden:
 
 
 def load_friction(arm: Arm, j: int, rng: Generator) -> Hidden:
-    """Friction that grows with the load, rounded where the load turns."""
+    """Friction that grows with the load on the motor's side of the gear, rounded where the load turns."""
     part = rng.uniform(0.05, 0.2)
 
     def drag(s: Scene) -> Floats:
-        load = s.motion.torque[:, j]
+        load = s.total[:, j]
         round_off = part * float(np.std(load))
         return s.at(j, s.sign(j) * (np.hypot(load, round_off) - round_off))
 
