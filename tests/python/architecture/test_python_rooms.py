@@ -38,6 +38,7 @@ ROOMS: dict[str, set[str]] = {
     "inverse_kinematics": BASIC,
     "dynamics": BASIC,
     "tracking": BASIC | {"hand_eye"},
+    "dynamics": BASIC | {"identification"},
     "testing": BASIC,
     "exam": {"truing", "model", "report"},  # of both only what test_exam.py allows
 }
@@ -130,7 +131,7 @@ ONLY_IN = {
     "plotly": {"report"},
     "typer": {"cli"},
     "rich": {"cli"},
-    "mujoco": {"exam", "files"},
+    "mujoco": {"exam", "dynamics"},
     "cv2": {"files"},
     "rosbags": {"files"},
 }

@@ -1,0 +1,214 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The calibrated robot for a simulator: MuJoCo (MJCF), URDF, Isaac Lab; and what could not be written, by
+name."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.dynamics.export import beside, isaaclab, mjcf, urdf
+from truing.dynamics.export.chain import Chain, chain_of, file_name
+from truing.dynamics.export.parts import (
+    NotWritten as NotWritten,
+    Reference,
+    parts_of,
+    recorded_motion,
+    reference_motion,
+)
+from truing.dynamics.motion import Recorded
+from truing.errors import InputError
+from truing.files.output import atomic_output_dir
+
+Simulator = Literal["mjcf", "urdf", "isaaclab"]
+
+CALLBACKS = "callbacks.py"
+NOT_WRITTEN = "not_written.yaml"
+_NEAR_M = 1e-8  # [m] between the robot's and the written model's tools
+_NEAR_NM = 1e-7  # of the largest gravity torque
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written."""
+
+    folder: Path
+    model: Path  # the file for the simulator
+    callbacks: Path | None  # MuJoCo: what has no field, as a Python module
+    not_written: tuple[NotWritten, ...]  # largest first
+    robot: _core.Robot = field(repr=False)
+    chain: Chain = field(repr=False)  # the robot as it was written
+
+    def summary(self) -> str:
+        """What was written, and what was not, in lines."""
+        lines = [f"{self.model}"]
+        if self.callbacks is not None:
+            lines.append(f"{self.callbacks}: torques that the simulator has no field for")
+        for item in self.not_written:
+            size = "" if math.isnan(item.size) else f" ({item.size:.2g} Nm)"
+            lines.append(f"not written: {item.name}{size}: {item.reason}")
+        return "\n".join(lines)
+
+
+def export(
+    robot: _core.Robot,
+    to: Simulator,
+    out: str | os.PathLike[str],
+    source: str | os.PathLike[str] | None = None,
+    recordings: Sequence[Recorded] = (),
+) -> Exported:
+    """Writes a robot with its bodies and `torque_effects` for a simulator, into the folder `out`.
+
+    to: "mjcf" (MuJoCo 4, robot.xml and perhaps callbacks.py), "urdf" (robot.urdf) or "isaaclab" (robot.urdf
+    and actuators.py). source: the URDF file that the robot was read from: its meshes and names are kept
+    (not for mjcf). not_written.yaml lists what the model lacks, each with its size in Nm. recordings:
+    motion on which sizes are stated, and on which Coulomb friction and damping are made to stand for laws
+    that the format has not; without any, a motion through the robot's range, with the torques of gravity.
+
+    The MJCF is loaded again and compared with the robot: tool pose, and torques against gravity. Raises
+    InputError: robot without masses, unknown simulator, source that is not this robot's, an effect without
+    its constant, mujoco not installed; RuntimeError if the written model disagrees with the robot.
+    """
+    if to not in get_args(Simulator):
+        raise InputError(f"simulator {to!r} is not known, expected one of {', '.join(get_args(Simulator))}")
+    if to == "mjcf" and source is not None:
+        raise InputError(
+            "source is not used for mjcf, whose chain is written anew: leave it out, or export to urdf"
+        )
+    chain = chain_of(robot)
+    usual = reference_motion(robot, chain)
+    reference = recorded_motion(robot, recordings) if recordings else usual
+    parts = parts_of(robot, chain, reference)
+    name = file_name(robot.name)
+    files: dict[str, str] = {}
+    if to == "mjcf":
+        model = mjcf.model_of(chain, parts, reference)
+        files[f"{name}.xml"] = mjcf.write(robot, chain, parts, model)
+        left = model.not_written
+        if model.beside:
+            files[CALLBACKS] = _callbacks_text(chain, model)
+        _check(robot, chain, usual, files[f"{name}.xml"])
+    else:
+        text = None if source is None else _source_text(Path(source))
+        files[f"{name}.urdf"], left = urdf.write(robot, chain, parts, reference, text)
+        if to == "isaaclab":
+            files["actuators.py"], left = isaaclab.write(robot, chain, parts, reference)
+    left = sorted(left, key=lambda item: -item.size if math.isfinite(item.size) else -math.inf)
+    where = "the recordings" if recordings else "a motion through the robot's range at the torques of gravity"
+    files[NOT_WRITTEN] = _listed(robot, to, left, where)
+    inputs = [] if source is None else [Path(source)]
+    with atomic_output_dir(out, inputs=inputs, obsolete=[CALLBACKS]) as folder:
+        for file, text in files.items():
+            (folder / file).write_text(text, encoding="utf-8")
+    folder = Path(out)
+    main = {"mjcf": f"{name}.xml", "urdf": f"{name}.urdf", "isaaclab": "actuators.py"}[to]
+    beside_it = folder / CALLBACKS if CALLBACKS in files else None
+    return Exported(folder, folder / main, beside_it, tuple(left), robot, chain)
+
+
+def _source_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a URDF: {error}") from None
+
+
+def _callbacks_text(chain: Chain, model: mjcf.Model) -> str:
+    """The source of `beside` with this robot's numbers."""
+    text = inspect.getsource(beside)
+    values: dict[str, tuple[str, Any]] = {
+        "JOINTS": ("list[str]", [link.name for link in chain.driven]),
+        "RATIOS": ("list[float]", [link.ratio for link in chain.driven]),
+        "EFFECTS": ("list[Effect]", model.beside),
+        "FIELDS": ("dict[str, list[float]]", model.fields_beside),
+    }
+    for name, (kind, value) in values.items():
+        empty = "{}" if kind.startswith("dict") else "[]"
+        declaration = f"{name}: {kind} = {empty}\n"
+        if declaration not in text:
+            raise RuntimeError(f"the template of {CALLBACKS} lacks {declaration!r}")
+        text = text.replace(declaration, f"{name}: {kind} = {value!r}\n")
+    return text
+
+
+def _listed(robot: _core.Robot, to: str, left: Sequence[NotWritten], where: str) -> str:
+    """YAML of what was not written (JSON strings are YAML strings)."""
+    lines = [
+        f"robot: {json.dumps(robot.name)}",
+        f"simulator: {to}",
+        f"# size: root mean square over {where}; thermal effects 10 degrees and 600 s from where they count",
+        "not_written:" + ("" if left else " []"),
+    ]
+    for item in left:
+        lines.append(f"  - name: {json.dumps(item.name)}")
+        size = "null" if math.isnan(item.size) else f"{item.size:.4g}"
+        lines.append(f"    size_Nm: {size}")
+        lines.append(f"    reason: {json.dumps(item.reason)}")
+    return "\n".join(lines) + "\n"
+
+
+def import_mujoco() -> Any:
+    """Raises InputError where MuJoCo 4 is not installed."""
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError("MuJoCo is not installed: pip install 'truing[dynamics]'") from None
+    if int(mujoco.__version__.split(".")[0]) < 4:
+        raise InputError(f"MuJoCo is {mujoco.__version__}, expected 4 or later: pip install -U mujoco")
+    return mujoco
+
+
+def _check(robot: _core.Robot, chain: Chain, reference: Reference, text: str) -> None:
+    """Loads the model and holds it against the robot at ten poses. Raises RuntimeError."""
+    mujoco = import_mujoco()
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    base = np.linalg.inv(np.array(robot.T_measurement_base))
+    site = model.site(robot.targets[0].name if robot.targets else "flange").id
+    fitted = {"link_inertia", "payload"} & {effect.effect for effect in robot.torque_effects}
+    for q, torque in zip(reference.q[::40], reference.torque[::40], strict=True):
+        set_readings(chain, model, data, q)
+        mujoco.mj_forward(model, data)
+        pose = base @ np.array(_core.forward_kinematics(robot, q)[-1])
+        if robot.targets and np.abs(data.site_xpos[site] - pose[:3, 3]).max() > _NEAR_M:
+            raise RuntimeError(
+                f"the written model's tool is at {data.site_xpos[site]}, the robot's at {pose[:3, 3]}"
+            )
+        if fitted or chain.adjusted:
+            continue  # gravity_torques knows the bodies that the robot had before
+        held = np.zeros(model.nv)
+        mujoco.mj_rne(model, data, 0, held)
+        found = coupling_matrix(chain).T @ held
+        if np.abs(found - torque).max() > _NEAR_NM * (1.0 + np.abs(torque).max()):
+            raise RuntimeError(f"the written model holds itself with {found} Nm, the robot with {torque} Nm")
+
+
+def coupling_matrix(chain: Chain) -> NDArray[np.float64]:
+    """Motion of every joint of the model for readings of one. shape=(links, driven)"""
+    number = {link.name: k for k, link in enumerate(chain.driven)}
+    rows: dict[str, NDArray[np.float64]] = {}
+    for link in chain.links:
+        row = np.zeros(len(number))
+        if link.drivers:
+            row += sum(weight * rows[driver] for driver, weight in link.drivers)
+        else:
+            row[number[link.name]] = link.ratio
+        rows[link.name] = row
+    return np.array([rows[link.name] for link in chain.links])
+
+
+def set_readings(chain: Chain, model: Any, data: Any, q: NDArray[np.float64]) -> None:
+    """Puts the model's joints where the robot's readings are."""
+    for link, value in zip(chain.links, coupling_matrix(chain) @ q, strict=True):
+        data.qpos[model.joint(link.name).qposadr[0]] = value

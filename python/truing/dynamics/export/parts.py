@@ -1,0 +1,334 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The torque effects of a robot, sorted by what simulators have for them.
+
+Laws and names: docs/reference/torque_effects.md. Everything here is at the readings; a writer turns it into
+the joints of its format.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from truing import _core
+from truing.dynamics.export.beside import Effect, dry_friction, smooth_torques
+from truing.dynamics.export.chain import Chain, Floats
+from truing.dynamics.motion import SMOOTHING, Recorded, track_of
+from truing.errors import InputError
+
+_USUAL_SPEED = 1.0  # [rad/s | m/s] of a joint without a speed limit
+_PER_JOINT = (
+    "coulomb",
+    "viscous",
+    "current_offset",
+    "viscous_law",
+    "stribeck",
+    "presliding",
+    "asymmetric_friction",
+    "load_friction",
+    "position_friction",
+    "ripple",
+    "armature",
+    "spring",
+    "motor_constant",
+    "torque_lag",
+    "joint_elasticity",
+    "backlash",
+    "thermal_friction",
+    "warmup",
+)
+_IN_BODIES = ("link_inertia", "payload")
+_ONLY_MEASURED = {
+    "motor_constant": "belongs to the measurement: divide measured torques by one plus this",
+    "torque_lag": "belongs to the measurement: the torque was read so much later than the motion",
+    "time_offset": "belongs to the measurement: torques and positions have other clocks",
+}
+_NO_PLACE = {
+    "joint_elasticity": "needs a further hinge and a motor body in every joint: the model's joints would no"
+    " longer be the robot's",
+    "backlash": "needs a further hinge with limits: the model's joints would no longer be the robot's",
+}
+
+
+@dataclass(frozen=True)
+class NotWritten:
+    """What the written model lacks, or has only nearly."""
+
+    name: str  # of the parameter or effect, e.g. "load_friction.J2"
+    size: float  # [Nm | N] root mean square over the reference motion, of what is lacking; NaN: not known
+    reason: str
+
+
+@dataclass
+class JointParts:
+    """Of one joint, at its reading. Sums where an effect stands twice."""
+
+    coulomb: float = 0.0  # [Nm | N]
+    damping: Floats = field(default_factory=lambda: np.zeros(3))  # of qd, qd |qd|, qd^3
+    offset: float = 0.0  # [Nm | N]
+    armature: float = 0.0  # [kg m^2 | kg]
+    spring: float = 0.0  # [Nm/rad | N/m]
+    presliding: list[tuple[float, float]] = field(default_factory=list)  # [Nm | N], x0 [rad | m]
+    stribeck: list[tuple[float, float]] = field(default_factory=list)  # [Nm | N], vs [rad/s | m/s]
+    ripple: dict[int, tuple[float, float]] = field(default_factory=dict)  # order: sin, cos [Nm | N]
+
+
+@dataclass
+class Parts:
+    joints: list[JointParts]  # of those that have a reading
+    beside: list[Effect]  # only a callback can do these
+    tool_force: Floats  # shape=(3,) [N] that the drives must give, in the base's axes
+    coupled_inertia: dict[tuple[int, int], float]  # at the first joint, by the second's acceleration
+    not_written: list[NotWritten]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The motion on which the sizes of effects are stated: recorded, or through the robot's range."""
+
+    time: Floats  # shape=(n,) [s], evenly
+    q: Floats  # shape=(n, joints) [rad | m]
+    qd: Floats
+    qdd: Floats
+    torque: Floats  # shape=(n, joints) [Nm | N]: as recorded, or what the drives hold against gravity
+
+    def size(self, effect: Effect) -> float:
+        """[Nm | N] root mean square of an effect of `beside`."""
+        zero = np.zeros(self.q.shape[1])
+        smooth = smooth_torques(self.q, self.qd, self.torque, 30.0, 600.0, [effect])[:, effect[1]]
+        positive = dry_friction(self.q, self.qd, self.torque, 30.0, 600.0, [effect], list(zero))[:, effect[1]]
+        minus = (effect[0], effect[1], effect[2], _turned(effect[3]))
+        negative = dry_friction(self.q, self.qd, self.torque, 30.0, 600.0, [minus], list(zero))[:, effect[1]]
+        return rms(np.sign(self.qd[:, effect[1]]) * (positive - negative) - smooth)
+
+
+def _turned(parts: dict[str, float]) -> dict[str, float]:
+    return {key: value if key in ("vs", "v0", "x0") else -value for key, value in parts.items()}
+
+
+def rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def reference_motion(robot: _core.Robot, chain: Chain) -> Reference:
+    """20 s of sines, at every joint another frequency, through half its range and up to half its speed
+    limit."""
+    time = np.arange(0.0, 20.0, 0.05)
+    q, qd, qdd = (np.zeros((time.size, len(chain.driven))) for _ in range(3))
+    for j, link in enumerate(chain.driven):
+        ends = np.sort(np.array([link.lower, link.upper]) / link.ratio)
+        usual = 0.25 if link.prismatic else np.pi / 2
+        middle, reach = 0.0, usual
+        if np.all(np.isfinite(ends)):
+            middle, reach = float(ends.mean()), min(usual, 0.25 * float(ends[1] - ends[0]))
+        speed = 0.5 * (link.speed_limit if np.isfinite(link.speed_limit) else 2.0 * _USUAL_SPEED)
+        w = min(speed / max(reach, 1e-9), 2.0 * np.pi) * (1.0 + 0.13 * j) / (1.0 + 0.13 * len(chain.driven))
+        phase = w * time + 0.7 * j
+        q[:, j] = middle + reach * np.sin(phase)
+        qd[:, j] = reach * w * np.cos(phase)
+        qdd[:, j] = -reach * w * w * np.sin(phase)
+    every = {link.name: k for k, link in enumerate(chain.links)}
+    driven = [every[link.name] for link in chain.driven]
+    # What gravity does to the joints themselves; the drives hold against it, at their readings.
+    ratios = np.array([link.ratio for link in chain.driven])
+    torque = np.array([-ratios * _core.gravity_torques(robot, row)[driven] for row in q])
+    return Reference(time, q, qd, qdd, torque)
+
+
+def recorded_motion(robot: _core.Robot, recordings: Sequence[Recorded]) -> Reference:
+    """The recordings one after the other, and the torques of the drives in them."""
+    rows: list[Floats] = []
+    torques: list[Floats] = []
+    steps: list[float] = []
+    for recording in recordings:
+        track, free = track_of(recording, robot, SMOOTHING)
+        rows.append(np.asarray(np.stack([track.q, track.qd, track.qdd])[:, free], dtype=float))
+        torques.append(drive_torque(robot, track.torque_time, track.torque, track.time)[free])
+        steps.append(float(track.time[1] - track.time[0]))
+    q, qd, qdd = (np.asarray(np.concatenate([table[k] for table in rows]), dtype=float) for k in range(3))
+    time = float(np.median(steps)) * np.arange(len(q), dtype=np.float64)
+    return Reference(time, q, qd, qdd, np.concatenate(torques))
+
+
+def parts_of(robot: _core.Robot, chain: Chain, reference: Reference) -> Parts:
+    """Raises InputError for a joint that the robot lacks, or a parameter whose constant is missing."""
+    number = {link.name: k for k, link in enumerate(chain.driven)}
+    parts = Parts([JointParts() for _ in number], [], np.zeros(3), {}, [])
+    for joint in robot.joints:
+        if joint.name in number:
+            parts.joints[number[joint.name]].armature += joint.rotor_inertia
+        elif joint.rotor_inertia:
+            parts.not_written.append(
+                NotWritten(f"{joint.name}.rotor_inertia", np.nan, "of a joint that has no motor")
+            )
+    for change in chain.adjusted:
+        size = change.inertia * (rms(reference.qdd) if reference.qdd.size else 0.0) + 9.81 * change.mass
+        parts.not_written.append(
+            NotWritten(f"inertia.{change.joint}", size, change.reason + ": nearest written")
+        )
+    for name, joint_name, by, values in _forms(robot):
+        for who in (joint_name, by):
+            if who and who not in number:
+                raise InputError(
+                    f"{robot.name}: torque effect {name} is of {who}, which has no reading; joints with one"
+                    f" are {', '.join(number)}"
+                )
+        _add(parts, name, number.get(joint_name, -1), number.get(by, -1), values, joint_name, reference)
+    return parts
+
+
+def _forms(robot: _core.Robot) -> Iterator[tuple[str, str, str, dict[str, float]]]:
+    """Effect, joint, causing joint, parameters without their prefix; of every form that the robot carries."""
+    for applied in robot.torque_effects:
+        found: dict[tuple[str, str], dict[str, float]] = {}
+        for key, value in applied.parameters.items():
+            words = key.split(".")
+            if not np.isfinite(value):
+                raise InputError(f"{robot.name}: parameter {key} of a torque effect is {value}, not a number")
+            if applied.effect in _PER_JOINT and len(words) >= 2:
+                found.setdefault((words[1], ""), {})[".".join(words[2:])] = value
+            elif applied.effect == "coupling" and len(words) == 4:
+                found.setdefault((words[1], words[2]), {})[words[3]] = value
+            else:
+                found.setdefault(("", ""), {})[".".join(words[1:])] = value
+        for (joint, by), values in found.items():
+            yield applied.effect, joint, by, values
+
+
+def _add(
+    parts: Parts,
+    name: str,
+    j: int,
+    by: int,
+    values: dict[str, float],
+    joint: str,
+    reference: Reference,
+) -> None:
+    if name in _IN_BODIES:
+        return
+    if name in _ONLY_MEASURED or name in _NO_PLACE:
+        reason = _ONLY_MEASURED.get(name) or _NO_PLACE[name]
+        full = f"{name}.{joint}" if joint else name
+        parts.not_written.append(NotWritten(full, _measured_size(name, j, values, reference), reason))
+    elif name == "tool_force":
+        parts.tool_force = parts.tool_force + np.array([values.get(axis, 0.0) for axis in "xyz"])
+    elif name == "coupling":
+        inertia = values.pop("inertia", 0.0)
+        if inertia:
+            parts.coupled_inertia[j, by] = parts.coupled_inertia.get((j, by), 0.0) + inertia
+        if values:
+            parts.beside.append((name, j, by, values))
+    elif name in _PER_JOINT:
+        _add_to_joint(parts, name, j, values, joint)
+    else:
+        parts.not_written.append(
+            NotWritten(name, np.nan, "an effect of one's own, whose law only its Python code knows")
+        )
+
+
+def _constant(name: str, joint: str, key: str, values: dict[str, float]) -> float:
+    if not values.get(key, 0.0) > 0.0:
+        raise InputError(
+            f"torque effect {name} of {joint}: its constant {name}.{joint}.{key} is"
+            f" {values.get(key, 'missing')}, expected a positive number"
+        )
+    return values[key]
+
+
+def _add_to_joint(parts: Parts, name: str, j: int, values: dict[str, float], joint: str) -> None:
+    own, value = parts.joints[j], values.get("", 0.0)
+    if name == "coulomb":
+        own.coulomb += value
+    elif name == "viscous":
+        own.damping[0] += value
+    elif name == "current_offset":
+        own.offset += value
+    elif name == "armature":
+        own.armature += value
+    elif name == "spring":
+        own.spring += value
+    elif name == "presliding":
+        own.presliding.append((value, _constant(name, joint, "x0", values)))
+    elif name == "stribeck":
+        own.stribeck.append((value, _constant(name, joint, "vs", values)))
+    elif name == "ripple":
+        for key, amplitude in values.items():
+            order = int(key[3:])
+            s, c = own.ripple.get(order, (0.0, 0.0))
+            own.ripple[order] = (s + amplitude, c) if key.startswith("sin") else (s, c + amplitude)
+    elif name == "viscous_law":
+        own.damping[1] += values.get("quadratic", 0.0)
+        own.damping[2] += values.get("cubic", 0.0)
+        rest = {key: v for key, v in values.items() if key in ("root", "saturating", "v0")}
+        if "saturating" in rest:
+            _constant(name, joint, "v0", rest)
+        if rest:
+            parts.beside.append((name, j, j, rest))
+    else:
+        parts.beside.append((name, j, j, values))
+
+
+def _measured_size(name: str, j: int, values: dict[str, float], reference: Reference) -> float:
+    """[Nm | N] of what belongs to the measurement."""
+    value = values.get("", 0.0)
+    torque = reference.torque
+    if name == "motor_constant":
+        return abs(value) * rms(torque[:, j])
+    if name in ("torque_lag", "time_offset"):
+        rate = np.gradient(torque, reference.time, axis=0)
+        return abs(value) * rms(rate[:, j] if j >= 0 else rate)
+    return float("nan")
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """What Coulomb friction and damping can do for a law that the model has no field for."""
+
+    coulomb: float
+    viscous: float
+    left: float  # [Nm | N] root mean square of what they cannot do
+
+
+def stand_in(effect: Effect, reference: Reference) -> StandIn:
+    """Least squares over the reference motion of the friction without its sign, by 1 and abs(qd),
+    neither with the other sign."""
+    j = effect[1]
+    if effect[0] not in ("load_friction", "viscous_law", "stribeck", "position_friction"):
+        return StandIn(0.0, 0.0, reference.size(effect))
+    zero = [0.0] * reference.q.shape[1]
+    positive, negative = (
+        dry_friction(reference.q, reference.qd, reference.torque, 20.0, 0.0, [one], zero)[:, j]
+        for one in (effect, (*effect[:3], _turned(effect[3])))
+    )
+    wanted, speed = positive - negative, np.abs(reference.qd[:, j])
+    columns = np.column_stack([np.ones_like(speed), speed])
+    constant, slope = np.linalg.lstsq(columns, wanted, rcond=None)[0].tolist()
+    mean = float(wanted.mean())
+    if constant * mean < 0.0:  # neither works against what it stands for
+        constant, slope = 0.0, float(speed @ wanted) / max(float(speed @ speed), 1e-12)
+    elif slope * mean < 0.0:
+        constant, slope = mean, 0.0
+    return StandIn(constant, slope, rms(wanted - constant - slope * speed))
+
+
+def drive_torque(robot: _core.Robot, time: Floats, torque: Floats, at: Floats) -> Floats:
+    """The drives' torques at the times `at`, shape=(at, joints) [Nm | N], from those measured: gains, lags
+    and the clock that the robot's torque effects say the measurement has are taken out.
+
+    measured = (1 + motor_constant) T - torque_lag dT/dt + time_offset dT/dt, to first order.
+    """
+    names = [joint.name for joint in robot.joints if not joint.passive]
+    gain, late = np.ones(len(names)), np.zeros(len(names))
+    for effect in robot.torque_effects:
+        for key, value in effect.parameters.items():
+            joint = key.partition(".")[2]
+            if effect.effect == "time_offset":
+                late -= value
+            elif effect.effect == "motor_constant":
+                gain[names.index(joint)] += value
+            elif effect.effect == "torque_lag":
+                late[names.index(joint)] += value
+    return np.column_stack([np.interp(at + late[j], time, torque[:, j]) / gain[j] for j in range(len(names))])
