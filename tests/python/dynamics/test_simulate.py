@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Models judged by motion: the right one moves like the robot, and a wrong one does not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+import truing
+from truing.dynamics.export import export
+from truing.dynamics.simulate import drive_torque, judge, windows_of
+from truing.model import AppliedEffect, Joint, Robot
+
+Floats = NDArray[np.float64]
+COULOMB, VISCOUS, LOAD = (4.0, 2.0), (3.0, 1.0), (0.1, 0.0)
+
+
+@dataclass
+class Recording:
+    name: str
+    time: Floats
+    position: Floats
+    torque: Floats
+    speed: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    current: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+def applied(effect: str, sizes: tuple[float, float]) -> AppliedEffect:
+    return AppliedEffect(effect, ["J1", "J2"], {f"{effect}.J{k + 1}": size for k, size in enumerate(sizes)})
+
+
+def two_links(*effects: AppliedEffect) -> Robot:
+    joints = []
+    for k, (mass, length) in enumerate(((5.0, 0.5), (3.0, 0.4))):
+        T = np.eye(4)
+        T[2, 3] = 0.5 * k
+        joints.append(
+            Joint(
+                f"J{k + 1}",
+                T_parent_joint=T,
+                axis=[0.0, 1.0, 0.0],
+                mass=mass,
+                center_of_mass=[0.0, 0.0, length / 2],
+                inertia=mass * length**2 / 12.0 * np.diag([1.0, 1.0, 0.05]),
+                rotor_inertia=0.2,
+                torque_per_ampere=10.0,
+            )
+        )
+    return Robot("two links", joints=joints, convention="urdf", torque_effects=effects)
+
+
+def move(seed: int, load: tuple[float, float], duration: float = 6.0) -> Recording:
+    """The arm followed by a controller, integrated in tenths of a millisecond; 200 rows a second."""
+    model = pin.Model()
+    parent = 0
+    for joint in two_links().joints:
+        parent = model.addJoint(
+            parent, pin.JointModelRY(), pin.SE3(np.array(joint.T_parent_joint)), joint.name
+        )
+        inertia = pin.Inertia(joint.mass, np.array(joint.center_of_mass), np.array(joint.inertia))
+        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+    model.armature = np.array([0.2, 0.2])
+    data = model.createData()
+    rng = np.random.default_rng(seed)
+    w, phase = rng.uniform(1.0, 3.0, size=(2, 2)), rng.uniform(0.0, 6.0, size=(2, 2))
+    h, q, qd, rows = 1e-4, np.zeros(2), np.zeros(2), []
+    for k in range(int(duration / h)):
+        t = k * h
+        wanted = 0.5 * (np.sin(w * t + phase) - np.sin(phase)).sum(axis=1)
+        rate = 0.5 * (w * np.cos(w * t + phase)).sum(axis=1)
+        torque = 400.0 * (wanted - q) + 60.0 * (rate - qd) + pin.computeGeneralizedGravity(model, data, q)
+        if k % 50 == 0:
+            rows.append(np.concatenate([[t], q, torque]))
+        dry = np.array(COULOMB) + np.array(load) * np.abs(torque)
+        friction = dry * np.tanh(qd / 1e-3) + np.array(VISCOUS) * qd
+        qd = qd + h * pin.aba(model, data, q, qd, torque - friction)
+        q = q + h * qd
+    table = np.array(rows)
+    return Recording(f"motion {seed}", table[:, 0], table[:, 1:3], table[:, 3:])
+
+
+STANDARD = (applied("coulomb", COULOMB), applied("viscous", VISCOUS))
+
+
+def test_the_right_model_moves_like_the_robot() -> None:
+    recordings = [move(seed, (0.0, 0.0)) for seed in (1, 2)]
+    found = judge({"without friction": two_links(), "right": two_links(*STANDARD)}, recordings)
+    assert found.worst_joint("right", 0.5) < 1e-3
+    assert found.worst_joint("right", 0.1) < 2e-4
+    assert found.worst_joint("without friction", 0.5) > 0.05
+    assert 0.0 < found.step_error["right"] < 1e-3
+    assert found.rms("right", 0.5).max() < 2e-3
+    assert {row["model"] for row in found.rows()} == {"without friction", "right"}
+    assert found.simulated["right"].shape == found.windows.measured.shape
+
+
+def test_callbacks_add_what_the_file_cannot_say() -> None:
+    recordings = [move(3, LOAD)]
+    robot = two_links(*STANDARD, applied("load_friction", LOAD))
+    with_them = judge({"named": robot}, recordings, horizons=(0.5,))
+    without = judge({"named": robot}, recordings, horizons=(0.5,), callbacks=False)
+    standard = judge({"standard": two_links(*STANDARD)}, recordings, horizons=(0.5,))
+    assert with_them.worst_joint("named", 0.5) < 2e-3
+    assert without.worst_joint("named", 0.5) > 2.0 * with_them.worst_joint("named", 0.5)
+    assert standard.worst_joint("standard", 0.5) > without.worst_joint("named", 0.5)
+
+
+def test_a_written_folder_and_currents_do_as_well(tmp_path: Path) -> None:
+    recording = move(1, (0.0, 0.0), duration=3.0)
+    currents = Recording("currents", recording.time, recording.position, np.zeros((0, 0)))
+    currents.current = recording.torque / 10.0
+    robot = two_links(*STANDARD)
+    exported = export(robot, "mjcf", tmp_path)
+    one = judge({"right": exported}, [currents], horizons=(0.5,))
+    other = judge({"right": robot}, [recording], horizons=(0.5,))
+    assert one.errors("right", 0.5) == pytest.approx(other.errors("right", 0.5), abs=1e-9)
+
+
+def test_what_the_measurement_adds_is_taken_out_of_torques() -> None:
+    time = np.arange(0.0, 5.0, 0.001)
+    true = np.column_stack([np.sin(2.0 * time), np.cos(3.0 * time)])
+    slope = np.column_stack([2.0 * np.cos(2.0 * time), -3.0 * np.sin(3.0 * time)])
+    measured = true * [1.1, 1.0] - slope * [0.0, 0.004] + 0.002 * slope
+    measured[:, 0] += 0.1 * 0.002 * slope[:, 0]  # the gain acts on what the clock shifted
+    effects = (
+        applied("motor_constant", (0.1, 0.0)),
+        applied("torque_lag", (0.0, 0.004)),
+        AppliedEffect("time_offset", [], {"time_offset": 0.002}),
+    )
+    at = np.arange(0.5, 4.5, 0.01)
+    found = drive_torque(two_links(*effects), time, measured, at)
+    assert found == pytest.approx(np.column_stack([np.sin(2.0 * at), np.cos(3.0 * at)]), abs=1e-4)
+
+
+def test_windows_leave_gaps_out_and_say_what_is_missing() -> None:
+    recording = move(1, (0.0, 0.0), duration=4.0)
+    kept = (recording.time < 1.5) | (recording.time > 1.8)
+    gap = Recording("gap", recording.time[kept], recording.position[kept], recording.torque[kept])
+    windows = windows_of([gap], two_links(), horizons=(0.5,), every=0.25)
+    ends = windows.starts + 0.5
+    assert len(windows.starts) > 4
+    assert not np.any((windows.starts < 1.8) & (ends > 1.5))
+    with pytest.raises(truing.InputError, match="no recording has 10.1 s without a gap"):
+        windows_of([recording], two_links(), horizons=(10.0,))
+    nothing = Recording("nothing", recording.time, recording.position, np.zeros((0, 0)))
+    with pytest.raises(truing.InputError, match="nothing: no torques, and no currents"):
+        windows_of([nothing], two_links())
+    with pytest.raises(truing.InputError, match="was not judged: models right, horizons 0.5 s"):
+        judge({"right": two_links(*STANDARD)}, [recording], horizons=(0.5,)).errors("right", 0.1)
