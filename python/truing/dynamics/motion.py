@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -16,6 +17,7 @@ from truing.errors import InputError
 Floats = NDArray[np.float64]
 
 SMOOTHING = 0.05  # [s] half of the stretch whose cubic gives a smoothed value
+REFERENCE_C = 20.0  # from which thermal effects count
 _GAP = 5.0  # of the usual time between rows: a gap
 
 
@@ -34,6 +36,8 @@ class Recorded(Protocol):
     def torque(self) -> Any: ...
     @property
     def current(self) -> Any: ...
+    @property
+    def columns(self) -> Mapping[str, Any]: ...
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,7 @@ class Track:
     qdd: Floats
     torque_time: Floats
     torque: Floats
+    temperature: Floats  # shape=(n, joints) [deg C], as the torques
 
 
 def track_of(recording: Recorded, robot: _core.Robot, smoothing: float) -> tuple[Track, NDArray[np.bool_]]:
@@ -67,7 +72,9 @@ def track_of(recording: Recorded, robot: _core.Robot, smoothing: float) -> tuple
     free = np.ones(grid.size, dtype=bool)
     for k in np.flatnonzero(np.diff(time) > _GAP * step):
         free &= (grid < time[k] - smoothing) | (grid > time[k + 1] + smoothing)
-    return Track(grid, smooth, rate, _filtered(rate, slope), time, torque), free
+    return Track(
+        grid, smooth, rate, _filtered(rate, slope), time, torque, temperatures(recording, torque.shape)
+    ), free
 
 
 def measured_torque(recording: Recorded, robot: _core.Robot) -> Floats:
@@ -91,6 +98,14 @@ def measured_torque(recording: Recorded, robot: _core.Robot) -> Floats:
                 " numbers"
             )
     return torque
+
+
+def temperatures(recording: Recorded, shape: tuple[int, int]) -> Floats:
+    """shape=(n, joints) [deg C]: columns 'temp1_C' … of the joints, or 'temp_C' of all; REFERENCE_C where
+    none is."""
+    columns = {name: np.asarray(values, dtype=float) for name, values in recording.columns.items()}
+    common = columns.get("temp_C", np.full(shape[0], REFERENCE_C))
+    return np.column_stack([columns.get(f"temp{j + 1}_C", common) for j in range(shape[1])])
 
 
 def _kernels(half: int, step: float) -> tuple[Floats, Floats]:

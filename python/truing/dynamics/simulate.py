@@ -180,7 +180,10 @@ class _Runner:
     def __init__(self, exported: Exported, windows: Windows, callbacks: bool) -> None:
         self.mujoco = import_mujoco()
         self.model = self.mujoco.MjModel.from_xml_path(str(exported.model))
-        self.model.opt.disableflags |= int(self.mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        # Nothing but the robot's own torques: measured ones are not clamped, and ranges may be narrower than motion.
+        off = self.mujoco.mjtDisableBit
+        for bit in (off.mjDSBL_CONTACT, off.mjDSBL_CLAMPCTRL, off.mjDSBL_LIMIT):
+            self.model.opt.disableflags |= int(bit)
         self.windows = windows
         self.robot = exported.robot
         names = [link.name for link in exported.chain.driven]
@@ -243,6 +246,19 @@ class _Runner:
                 out[k, m.actuator_actadr[i]] = z
         return out
 
+    def _warmth(self, chosen: NDArray[np.intp]) -> tuple[Floats, Floats]:
+        """Temperatures of the joints [deg C] and time since the recording began [s] of each window, where it
+        begins. shape=(windows, joints), (windows, 1)"""
+        starts, tracks = (
+            self.windows.starts[chosen],
+            [self.windows.tracks[t] for t in self.windows.track[chosen]],
+        )
+        warm = [
+            table_at(track.torque_time, track.temperature, np.array([start]))[0]
+            for start, track in zip(starts, tracks, strict=True)
+        ]
+        return np.array(warm), (starts - [track.time[0] for track in tracks])[:, None]
+
     def _torques(self, chosen: NDArray[np.intp], at: Floats) -> Floats:
         """Torques of the drives of each window, shape=(windows, times, joints) [Nm | N]."""
         out = np.empty((chosen.size, at.size, self.qpos.size))
@@ -275,7 +291,7 @@ class _Runner:
         if self.beside is None:
             path = self._rollout([self.model], self.states[chosen], control)
         else:
-            path = self._with_callbacks(self.beside, self.states[chosen], control, torque)
+            path = self._with_callbacks(self.beside, chosen, control, torque)
         found = path[:, steps - 1][:, :, 1 + self.qpos] / self.ratios
         return np.asarray(
             np.where(np.abs(found) < _OUT, found, np.nan_to_num(np.sign(found), nan=1.0) * _OUT)
@@ -288,11 +304,15 @@ class _Runner:
         path, _ = rollout.rollout(models if len(models) > 1 else models[0], datas, states, control)
         return np.asarray(path)
 
-    def _with_callbacks(self, beside: Any, states: Floats, control: Floats, torque: Floats) -> Floats:
+    def _with_callbacks(
+        self, beside: Any, chosen: NDArray[np.intp], control: Floats, torque: Floats
+    ) -> Floats:
         """Few steps at a time: each window has a model of its own, whose dry friction changes with its
         state."""
         from mujoco import rollout
 
+        states = self.states[chosen]
+        warm, begun = self._warmth(chosen)
         m, n = self.model, states.shape[0]
         models = [copy.copy(m) for _ in range(n)]
         losses = [model.dof_frictionloss for model in models]
@@ -306,10 +326,11 @@ class _Runner:
                 end = min(k + _HELD_STEPS, control.shape[1])
                 q = state[:, 1 + self.qpos] / self.ratios
                 qd = state[:, 1 + m.nq + self.dofs] / self.ratios
-                friction = beside.dry_friction(q, qd, torque[:, k]) / np.abs(self.ratios)
+                now = (q, qd, torque[:, k], warm, begun + k * m.opt.timestep)
+                friction = beside.dry_friction(*now) / np.abs(self.ratios)
                 for loss, row in zip(losses, friction, strict=True):
                     loss[self.dofs] = row
-                smooth = beside.smooth_torques(q, qd, torque[:, k]) / self.ratios
+                smooth = beside.smooth_torques(*now) / self.ratios
                 both[:, k:end, self.model.nu + self.dofs] = smooth[:, None]
                 part, _ = pool.rollout(
                     models, datas, state, both[:, k:end], control_spec=int(applied[0]) | int(applied[1])

@@ -489,6 +489,16 @@ def test_bad_input_is_one_clear_message_and_leaves_nothing(tmp_path: Path) -> No
         export(robot.replace(torque_effects=[applied("coulomb", J9=1.0)]), "mjcf", out)
     with pytest.raises(truing.InputError, match="presliding.J1.x0 is missing, expected a positive number"):
         export(robot.replace(torque_effects=[applied("presliding", J1=1.0)]), "mjcf", out)
+    with pytest.raises(
+        truing.InputError, match="viscous_law of J1 has a parameter that ends in 'fifth', expected quad"
+    ):
+        export(robot.replace(torque_effects=[applied("viscous_law", J1__fifth=1.0)]), "mjcf", out)
+    with pytest.raises(
+        truing.InputError, match="ripple of J1 has a parameter that ends in 'tan2', expected sin1"
+    ):
+        export(robot.replace(torque_effects=[applied("ripple", J1__tan2=1.0)]), "mjcf", out)
+    with pytest.raises(truing.InputError, match="link_inertia is of J9; joints are J1, J2, J3, J4"):
+        export(robot.replace(torque_effects=[applied("link_inertia", J9__m=1.0)]), "mjcf", out)
     with pytest.raises(truing.InputError, match="parameter coulomb.J1 of a torque effect is nan"):
         export(robot.replace(torque_effects=[applied("coulomb", J1=float("nan"))]), "mjcf", out)
     with pytest.raises(truing.InputError, match="no mass is known of the links of J2"):

@@ -29,6 +29,7 @@ class Recording:
     torque: Floats
     speed: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     current: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    columns: dict[str, Floats] = field(default_factory=dict)
 
 
 def applied(effect: str, sizes: tuple[float, float]) -> AppliedEffect:
@@ -109,6 +110,47 @@ def test_callbacks_add_what_the_file_cannot_say() -> None:
     assert with_them.worst_joint("named", 0.5) < 2e-3
     assert without.worst_joint("named", 0.5) > 2.0 * with_them.worst_joint("named", 0.5)
     assert standard.worst_joint("standard", 0.5) > without.worst_joint("named", 0.5)
+
+
+def test_temperature_and_time_of_the_recording_reach_the_callbacks() -> None:
+    # The friction that the motion was made with, told as what heat and running time have made of it.
+    recording = move(2, (0.0, 0.0))
+    recording.columns["temp_C"] = np.full(recording.time.size, 30.0)
+    warm = AppliedEffect(
+        "thermal_friction",
+        ["J1", "J2"],
+        {
+            f"thermal_friction.J{k + 1}.{part}": sizes[k] / 10.0
+            for part, sizes in (("coulomb", COULOMB), ("viscous", VISCOUS))
+            for k in range(2)
+        },
+    )
+    models = {"warm": two_links(warm), "right": two_links(*STANDARD)}
+    found = judge(models, [recording], horizons=(0.5,))
+    assert found.worst_joint("warm", 0.5) < 2e-3
+    recording.columns["temp2_C"] = np.full(recording.time.size, 20.0)  # the second joint's own: it stays cold
+    assert judge(models, [recording], horizons=(0.5,)).worst_joint("warm", 0.5) > 0.02
+    late = AppliedEffect("warmup", ["J1"], {"warmup.J1.coulomb": 1.0})
+    grows = judge({"late": two_links(*STANDARD, late)}, [recording], horizons=(0.5,)).errors("late", 0.5)
+    assert np.abs(grows[-1]).max() > 3.0 * np.abs(grows[0]).max()
+
+
+def test_ratios_and_zeros_change_nothing_but_the_readings() -> None:
+    recording = move(1, (0.0, 0.0), duration=4.0)
+    ratio, zero = np.array([-1.25, 0.8]), np.array([0.1, -0.2])
+    read = Recording("read", recording.time, (recording.position - zero) / ratio, recording.torque * ratio)
+    plain = two_links(*STANDARD)
+    joints = [
+        joint.replace(ratio=ratio[k], offset=zero[k], rotor_inertia=0.2 * ratio[k] ** 2)
+        for k, joint in enumerate(plain.joints)
+    ]
+    coulomb, viscous = np.array(COULOMB) * np.abs(ratio), np.array(VISCOUS) * ratio**2
+    effects = [applied("coulomb", tuple(coulomb)), applied("viscous", tuple(viscous))]
+    one = judge({"right": plain}, [recording], horizons=(0.5,))
+    other = judge({"right": plain.replace(joints=joints, torque_effects=effects)}, [read], horizons=(0.5,))
+    assert other.errors("right", 0.5) * ratio == pytest.approx(
+        one.errors("right", 0.5), abs=2e-5
+    )  # how far the friction solver goes
 
 
 def test_a_written_folder_and_currents_do_as_well(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ the joints of its format.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -40,6 +41,17 @@ _PER_JOINT = (
     "thermal_friction",
     "warmup",
 )
+_PARTS = {
+    "viscous_law": ("quadratic", "cubic", "root", "saturating", "v0"),
+    "stribeck": ("", "vs"),
+    "presliding": ("", "x0"),
+    "position_friction": ("sin", "cos"),
+    "thermal_friction": ("coulomb", "viscous"),
+    "warmup": ("coulomb", "viscous"),
+    "coupling": ("viscous", "coulomb", "inertia"),
+    "tool_force": ("x", "y", "z"),
+}
+"""What follows the joint in the names of an effect's parameters; nothing where it is not listed."""
 _IN_BODIES = ("link_inertia", "payload")
 _ONLY_MEASURED = {
     "motor_constant": "belongs to the measurement: divide measured torques by one plus this",
@@ -170,6 +182,7 @@ def parts_of(robot: _core.Robot, chain: Chain, reference: Reference) -> Parts:
             NotWritten(f"inertia.{change.joint}", size, change.reason + ": nearest written")
         )
     for name, joint_name, by, values in _forms(robot):
+        _check_parts(robot, name, joint_name, values)
         for who in (joint_name, by):
             if who and who not in number:
                 raise InputError(
@@ -178,6 +191,32 @@ def parts_of(robot: _core.Robot, chain: Chain, reference: Reference) -> Parts:
                 )
         _add(parts, name, number.get(joint_name, -1), number.get(by, -1), values, joint_name, reference)
     return parts
+
+
+def _check_parts(robot: _core.Robot, name: str, joint: str, values: dict[str, float]) -> None:
+    """Raises InputError for a parameter that the effect has not."""
+    if name in _IN_BODIES:
+        known = {joint.name for joint in robot.joints}
+        for key in values if name == "link_inertia" else ():
+            if key.split(".")[0] not in known:
+                raise InputError(
+                    f"{robot.name}: torque effect {name} is of {key.split('.')[0]}; joints are"
+                    f" {', '.join(joint.name for joint in robot.joints)}"
+                )
+        return
+    if name not in _PER_JOINT and name not in _PARTS:
+        return
+    for part in values:
+        if name == "ripple":
+            good, wanted = re.fullmatch(r"(sin|cos)\d+", part) is not None, "sin1, cos1, sin2 …"
+        else:
+            parts = _PARTS.get(name, ("",))
+            good, wanted = part in parts, ", ".join(key or "nothing" for key in parts)
+        if not good:
+            raise InputError(
+                f"{robot.name}: torque effect {name}{f' of {joint}' if joint else ''} has a parameter that ends"
+                f" in {part!r}, expected {wanted}"
+            )
 
 
 def _forms(robot: _core.Robot) -> Iterator[tuple[str, str, str, dict[str, float]]]:
