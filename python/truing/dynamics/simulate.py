@@ -180,7 +180,7 @@ class _Runner:
     def __init__(self, exported: Exported, windows: Windows, callbacks: bool) -> None:
         self.mujoco = import_mujoco()
         self.model = self.mujoco.MjModel.from_xml_path(str(exported.model))
-        # Nothing but the robot's own torques: measured ones are not clamped, and ranges may be narrower than motion.
+        # Measured torques are not clamped, and ranges may be narrower than the motion was.
         off = self.mujoco.mjtDisableBit
         for bit in (off.mjDSBL_CONTACT, off.mjDSBL_CLAMPCTRL, off.mjDSBL_LIMIT):
             self.model.opt.disableflags |= int(bit)

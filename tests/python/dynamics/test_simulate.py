@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -57,7 +58,14 @@ def two_links(*effects: AppliedEffect) -> Robot:
 
 
 def move(seed: int, load: tuple[float, float], duration: float = 6.0) -> Recording:
-    """The arm followed by a controller, integrated in tenths of a millisecond; 200 rows a second."""
+    table = moved(seed, load, duration)
+    return Recording(f"motion {seed}", table[:, 0], table[:, 1:3].copy(), table[:, 3:].copy())
+
+
+@functools.cache
+def moved(seed: int, load: tuple[float, float], duration: float) -> Floats:
+    """The arm led by a controller, integrated in tenths of a millisecond: time, positions, torques, 200
+    rows a second."""
     model = pin.Model()
     parent = 0
     for joint in two_links().joints:
@@ -82,8 +90,7 @@ def move(seed: int, load: tuple[float, float], duration: float = 6.0) -> Recordi
         friction = dry * np.tanh(qd / 1e-3) + np.array(VISCOUS) * qd
         qd = qd + h * pin.aba(model, data, q, qd, torque - friction)
         q = q + h * qd
-    table = np.array(rows)
-    return Recording(f"motion {seed}", table[:, 0], table[:, 1:3], table[:, 3:])
+    return np.array(rows)
 
 
 STANDARD = (applied("coulomb", COULOMB), applied("viscous", VISCOUS))
@@ -136,7 +143,7 @@ def test_temperature_and_time_of_the_recording_reach_the_callbacks() -> None:
 
 
 def test_ratios_and_zeros_change_nothing_but_the_readings() -> None:
-    recording = move(1, (0.0, 0.0), duration=4.0)
+    recording = move(1, (0.0, 0.0))
     ratio, zero = np.array([-1.25, 0.8]), np.array([0.1, -0.2])
     read = Recording("read", recording.time, (recording.position - zero) / ratio, recording.torque * ratio)
     plain = two_links(*STANDARD)
@@ -154,7 +161,7 @@ def test_ratios_and_zeros_change_nothing_but_the_readings() -> None:
 
 
 def test_a_written_folder_and_currents_do_as_well(tmp_path: Path) -> None:
-    recording = move(1, (0.0, 0.0), duration=3.0)
+    recording = move(1, (0.0, 0.0))
     currents = Recording("currents", recording.time, recording.position, np.zeros((0, 0)))
     currents.current = recording.torque / 10.0
     robot = two_links(*STANDARD)
@@ -181,7 +188,7 @@ def test_what_the_measurement_adds_is_taken_out_of_torques() -> None:
 
 
 def test_windows_leave_gaps_out_and_say_what_is_missing() -> None:
-    recording = move(1, (0.0, 0.0), duration=4.0)
+    recording = move(1, (0.0, 0.0))
     kept = (recording.time < 1.5) | (recording.time > 1.8)
     gap = Recording("gap", recording.time[kept], recording.position[kept], recording.torque[kept])
     windows = windows_of([gap], two_links(), horizons=(0.5,), every=0.25)

@@ -214,8 +214,8 @@ def _check_parts(robot: _core.Robot, name: str, joint: str, values: dict[str, fl
             good, wanted = part in parts, ", ".join(key or "nothing" for key in parts)
         if not good:
             raise InputError(
-                f"{robot.name}: torque effect {name}{f' of {joint}' if joint else ''} has a parameter that ends"
-                f" in {part!r}, expected {wanted}"
+                f"{robot.name}: torque effect {name}{f' of {joint}' if joint else ''} has a parameter that"
+                f" ends in {part!r}, expected {wanted}"
             )
 
 
