@@ -17,7 +17,6 @@ from truing.errors import InputError
 Floats = NDArray[np.float64]
 
 SMOOTHING = 0.05  # [s] half of the stretch whose cubic gives a smoothed value
-REFERENCE_C = 20.0  # from which thermal effects count
 _GAP = 5.0  # of the usual time between rows: a gap
 
 
@@ -50,7 +49,7 @@ class Track:
     qdd: Floats
     torque_time: Floats
     torque: Floats
-    temperature: Floats  # shape=(n, joints) [deg C], as the torques
+    temperature: Floats  # shape=(n, joints) [deg C], as the torques; NaN: not known
 
 
 def track_of(recording: Recorded, robot: _core.Robot, smoothing: float) -> tuple[Track, NDArray[np.bool_]]:
@@ -101,10 +100,9 @@ def measured_torque(recording: Recorded, robot: _core.Robot) -> Floats:
 
 
 def temperatures(recording: Recorded, shape: tuple[int, int]) -> Floats:
-    """shape=(n, joints) [deg C]: columns 'temp1_C' … of the joints, or 'temp_C' of all; REFERENCE_C where
-    none is."""
+    """shape=(n, joints) [deg C]: columns 'temp1_C' … of the joints, or 'temp_C' of all; NaN without."""
     columns = {name: np.asarray(values, dtype=float) for name, values in recording.columns.items()}
-    common = columns.get("temp_C", np.full(shape[0], REFERENCE_C))
+    common = columns.get("temp_C", np.full(shape[0], np.nan))
     return np.column_stack([columns.get(f"temp{j + 1}_C", common) for j in range(shape[1])])
 
 

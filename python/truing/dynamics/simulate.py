@@ -247,8 +247,8 @@ class _Runner:
         return out
 
     def _warmth(self, chosen: NDArray[np.intp]) -> tuple[Floats, Floats]:
-        """Temperatures of the joints [deg C] and time since the recording began [s] of each window, where it
-        begins. shape=(windows, joints), (windows, 1)"""
+        """Temperatures of the joints [deg C; NaN: not known] and time since the recording began [s] of each
+        window, where it begins. shape=(windows, joints), (windows, 1)"""
         starts, tracks = (
             self.windows.starts[chosen],
             [self.windows.tracks[t] for t in self.windows.track[chosen]],
@@ -313,6 +313,7 @@ class _Runner:
 
         states = self.states[chosen]
         warm, begun = self._warmth(chosen)
+        warm = np.where(np.isnan(warm), beside.REFERENCE_C, warm)
         m, n = self.model, states.shape[0]
         models = [copy.copy(m) for _ in range(n)]
         losses = [model.dof_frictionloss for model in models]

@@ -8,6 +8,7 @@ import functools
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -158,6 +159,28 @@ def test_ratios_and_zeros_change_nothing_but_the_readings() -> None:
     assert other.errors("right", 0.5) * ratio == pytest.approx(
         one.errors("right", 0.5), abs=2e-5
     )  # how far the friction solver goes
+
+
+def test_recordings_say_what_stands_for_a_law_that_has_no_field(tmp_path: Path) -> None:
+    recordings = [move(3, LOAD)]
+    robot = two_links(*STANDARD, applied("load_friction", LOAD))
+    exported = export(robot, "mjcf", tmp_path, recordings=recordings)
+    torque = recordings[0].torque[:, 0]
+    speed = np.abs(np.gradient(recordings[0].position[:, 0], recordings[0].time))
+    load = LOAD[0] * np.abs(torque)
+    columns = np.column_stack([np.ones_like(speed), speed])
+    by_one, by_speed = np.linalg.lstsq(columns, load, rcond=None)[0]
+    if by_speed < 0.0:
+        by_one, by_speed = load.mean(), 0.0
+    left = np.sqrt(np.mean((load - by_one - by_speed * speed) ** 2))
+    (first, second) = exported.not_written
+    assert (first.name, second.name) == ("load_friction.J1", "load_friction.J2")
+    assert first.size == pytest.approx(left, rel=0.02)
+    assert second.size == 0.0
+    model = mujoco.MjModel.from_xml_path(str(exported.model))
+    assert model.dof_frictionloss == pytest.approx([COULOMB[0] + by_one, COULOMB[1]], rel=0.02)
+    assert model.dof_damping == pytest.approx([VISCOUS[0] + by_speed, VISCOUS[1]], rel=0.02)
+    assert "over the recordings" in (tmp_path / "not_written.yaml").read_text(encoding="utf-8")
 
 
 def test_a_written_folder_and_currents_do_as_well(tmp_path: Path) -> None:
