@@ -7,3 +7,5 @@
 #include "truing/dynamics/effect.hpp"
 #include "truing/dynamics/identify.hpp"
 #include "truing/dynamics/recording.hpp"
+#include "truing/dynamics/regressor.hpp"
+#include "truing/dynamics/rigid.hpp"

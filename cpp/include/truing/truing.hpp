@@ -5,6 +5,11 @@
 
 #include "truing/compensate.hpp"
 #include "truing/diagnose.hpp"
+#include "truing/dynamics/diagnose.hpp"
+#include "truing/dynamics/effect.hpp"
+#include "truing/dynamics/identify.hpp"
+#include "truing/dynamics/recording.hpp"
+#include "truing/dynamics/regressor.hpp"
 #include "truing/dynamics/rigid.hpp"
 #include "truing/handeye.hpp"
 #include "truing/identify.hpp"

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "math/batch.hpp"
+#include "math/statistics.hpp"
 
 namespace truing::dynamics {
 namespace {
@@ -255,56 +256,107 @@ std::vector<JointGrams> sum_grams(const Data& data, const TorqueDesign& design, 
     out.push_back({columns, std::vector<Gram>(static_cast<std::size_t>(folds.count))});
   // Recordings side by side, and added up in their order.
   std::vector<std::unique_ptr<RecordingGrams>> parts(data.recordings.size());
-  const auto sum = [&](std::size_t r) {
-    if (folds.of_recording[r] < 0) return;
+  for_each_recording(data, folds, [&](std::size_t r) {
     parts[r] = std::make_unique<RecordingGrams>(design, subtracted, seen, folds, by_joint);
     for_each_tile(data.recordings[r], r, data.robot, chain, data.prepare, [&](Tile& tile) { parts[r]->add(&tile); });
-  };
-  for_each_on_threads(data.recordings.size(), data.threads, {}, sum, 1);
+  });
   for (const auto& part : parts) {
     if (part) part->finish(&out);
   }
   return out;
 }
 
-void for_each_error(const Data& data, const TorqueModel& model, const Folds& folds,
-                    const std::function<void(const Tile&, const MatrixXd& predicted)>& use) {
-  const RigidChain chain(data.robot);
-  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-    if (folds.of_recording[r] < 0) continue;
-    for_each_tile(data.recordings[r], r, data.robot, chain, data.prepare, [&](Tile& tile) {
-      const MatrixXd predicted = tile.own_rows(model.torque(&tile.motion));
-      use(tile, predicted);
-    });
-  }
+void for_each_recording(const Data& data, const Folds& folds, const std::function<void(std::size_t)>& work) {
+  const auto one = [&](std::size_t r) {
+    if (folds.of_recording[r] >= 0) work(r);
+  };
+  for_each_on_threads(data.recordings.size(), data.threads, {}, one, 1);
 }
 
-std::vector<Noise> noise_of(const Data& data, const TorqueModel& model, const Folds& folds) {
-  constexpr Index kLags = 80;
-  const std::size_t joints = data.robot.driven_count();
-  std::vector<VectorXd> products(joints, VectorXd::Zero(kLags)), pairs = products;
-  for_each_error(data, model, folds, [&](const Tile& tile, const MatrixXd& predicted) {
-    for (std::size_t j = 0; j < joints; ++j) {
+namespace {
+
+/// Sums over the errors of one recording, joint by joint.
+struct ErrorSums {
+  static constexpr Index kLags = 80;
+  explicit ErrorSums(std::size_t joints, int folds)
+      : products(joints, VectorXd::Zero(kLags)),
+        pairs(joints, VectorXd::Zero(kLags)),
+        squares(joints, VectorXd::Zero(folds)),
+        rows(joints, VectorXd::Zero(folds)) {}
+
+  void add(const Tile& tile, const MatrixXd& errors, const Folds& folds) {
+    const VectorXd time = tile.own_time();
+    for (std::size_t j = 0; j < products.size(); ++j) {
       const auto col = static_cast<Index>(j);
       for (Index i = 0; i < tile.count; ++i) {
-        if (tile.moving(i, col) == 0.0 || std::isnan(tile.measured(i, col))) continue;
-        const double e = tile.measured(i, col) - predicted(i, col);
+        const int fold = folds.fold(tile.recording, time[i]);
+        const double e = errors(i, col);
+        if (fold < 0 || tile.moving(i, col) == 0.0 || std::isnan(e)) continue;
+        squares[j][fold] += e * e;
+        rows[j][fold] += 1.0;
         for (Index lag = 0; lag < std::min(kLags, tile.count - i); ++lag) {
           if (tile.moving(i + lag, col) == 0.0) break;
-          products[j][lag] += e * (tile.measured(i + lag, col) - predicted(i + lag, col));
+          products[j][lag] += e * errors(i + lag, col);
           pairs[j][lag] += 1.0;
         }
       }
     }
+  }
+  void add(const ErrorSums& other) {
+    for (std::size_t j = 0; j < products.size(); ++j) {
+      products[j] += other.products[j];
+      pairs[j] += other.pairs[j];
+      squares[j] += other.squares[j];
+      rows[j] += other.rows[j];
+    }
+  }
+
+  std::vector<VectorXd> products, pairs;  ///< by lag
+  std::vector<VectorXd> squares, rows;    ///< by fold
+};
+
+/// A fold whose errors are far beyond those of the others (more than twice the median) counts for less.
+VectorXd weights_of_folds(const VectorXd& squares, const VectorXd& rows) {
+  constexpr double kUsual = 2.0;
+  std::vector<double> sizes;
+  for (Index f = 0; f < rows.size(); ++f) {
+    if (rows[f] > 0.0) sizes.push_back(std::sqrt(squares[f] / rows[f]));
+  }
+  const double usual = kUsual * median_of(sizes);
+  VectorXd out = VectorXd::Ones(rows.size());
+  for (Index f = 0; f < rows.size(); ++f) {
+    const double size = rows[f] > 0.0 ? std::sqrt(squares[f] / rows[f]) : 0.0;
+    if (size > usual) out[f] = std::pow(usual / size, 2.0);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<Noise> noise_of(const Data& data, const TorqueModel& model, const Folds& folds) {
+  const std::size_t joints = data.robot.driven_count();
+  const RigidChain chain(data.robot);
+  std::vector<std::unique_ptr<ErrorSums>> parts(data.recordings.size());
+  for_each_recording(data, folds, [&](std::size_t r) {
+    parts[r] = std::make_unique<ErrorSums>(joints, folds.count);
+    for_each_tile(data.recordings[r], r, data.robot, chain, data.prepare, [&](Tile& tile) {
+      parts[r]->add(tile, tile.measured - tile.own_rows(model.torque(&tile.motion)), folds);
+    });
   });
+  ErrorSums all(joints, folds.count);
+  for (const auto& part : parts) {
+    if (part) all.add(*part);
+  }
   std::vector<Noise> out(joints);
   for (std::size_t j = 0; j < joints; ++j) {
-    if (!(pairs[j][0] > 0.0) || !(products[j][0] > 0.0)) continue;
-    const double variance = products[j][0] / pairs[j][0];
-    out[j].sigma = std::sqrt(variance);
-    out[j].rows = pairs[j][0];
-    for (Index lag = 1; lag < kLags && pairs[j][lag] > 0.0; ++lag) {
-      const double correlation = products[j][lag] / pairs[j][lag] / variance;
+    out[j].weight_of_fold = weights_of_folds(all.squares[j], all.rows[j]);
+    out[j].rows = all.rows[j].sum();
+    if (!(all.products[j][0] > 0.0)) continue;
+    const double weight = out[j].weight_of_fold.dot(all.rows[j]);
+    out[j].sigma = std::sqrt(out[j].weight_of_fold.dot(all.squares[j]) / weight);
+    const double variance = all.products[j][0] / all.pairs[j][0];
+    for (Index lag = 1; lag < ErrorSums::kLags && all.pairs[j][lag] > 0.0; ++lag) {
+      const double correlation = all.products[j][lag] / all.pairs[j][lag] / variance;
       if (correlation < 0.05) break;  // initial positive sequence (Geyer 1992)
       out[j].design_effect += 2.0 * correlation;
     }
@@ -320,7 +372,8 @@ std::vector<Gram> weighted(const std::vector<JointGrams>& grams, const std::vect
     for (std::size_t j = 0; j < grams.size(); ++j) {
       const Gram& gram = grams[j].folds[f];
       if (gram.xx.size() == 0) continue;
-      const double rows = 1.0 / noise[j].design_effect, weight = rows / (noise[j].sigma * noise[j].sigma);
+      const double usual = noise[j].weight_of_fold.size() > 0 ? noise[j].weight_of_fold[static_cast<Index>(f)] : 1.0;
+      const double rows = usual / noise[j].design_effect, weight = rows / (noise[j].sigma * noise[j].sigma);
       const std::vector<int>& at = grams[j].columns;
       for (std::size_t a = 0; a < at.size(); ++a) {
         for (std::size_t b = 0; b < at.size(); ++b)

@@ -67,6 +67,8 @@ struct Noise {
   double sigma = 1.0;          ///< [Nm | N] standard deviation of a filtered row
   double design_effect = 1.0;  ///< rows that count as one
   double rows = 0.0;
+  /// Less than 1 where errors are far beyond those of other folds; none: 1.
+  Eigen::VectorXd weight_of_fold{};
 };
 
 /// What all passes share.
@@ -82,10 +84,8 @@ struct Data {
 std::vector<JointGrams> sum_grams(const Data& data, const TorqueDesign& design, const TorqueModel& subtracted,
                                   const TorqueModel& seen, const Folds& folds);
 
-/// Calls `use` with every tile of the recordings that the folds name and the error of the model, measured less
-/// predicted, shape=(count, joints) [Nm | N]; one recording after the other.
-void for_each_error(const Data& data, const TorqueModel& model, const Folds& folds,
-                    const std::function<void(const Tile&, const Eigen::MatrixXd& predicted)>& use);
+/// Calls work(r) for every recording that the folds name, on several threads.
+void for_each_recording(const Data& data, const Folds& folds, const std::function<void(std::size_t)>& work);
 
 /// Standard deviation and design effect (Kish 1965; 1 + 2 sum of autocorrelations) of every joint's errors.
 std::vector<Noise> noise_of(const Data& data, const TorqueModel& model, const Folds& folds);

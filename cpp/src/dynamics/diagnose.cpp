@@ -90,6 +90,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   SearchLimits limits;
   limits.least_gain = options.least_gain;
   limits.most = options.max_effects;
+  limits.plausible_only = !problem.fitted_before;  // departures from what the robot carries have either sign
   TorqueModel model = groundwork.model;
   std::vector<JointGrams> grams = sum_grams(problem.data, design, problem.nominal, model, problem.train);
   tick("grams");

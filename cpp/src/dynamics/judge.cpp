@@ -58,10 +58,9 @@ std::vector<TorqueRegime> regimes_of(const Problem& problem, const TorqueModel& 
   std::vector<std::vector<RegimeInput>> inputs;
   for (Index j = 0; j < joints; ++j) inputs.push_back(inputs_of(problem.range, j));
   std::map<std::tuple<Index, std::size_t, int>, Cell> cells;
-  const RigidChain chain(problem.robot);
   for (std::size_t r = 0; r < problem.data.recordings.size(); ++r) {
     if (problem.test.of_recording[r] < 0) continue;
-    for_each_tile(problem.data.recordings[r], r, problem.robot, chain, problem.data.prepare, [&](Tile& tile) {
+    for_each_tile(problem.data.recordings[r], r, problem.robot, problem.chain, problem.data.prepare, [&](Tile& tile) {
       const MatrixXd after = tile.own_rows(named.torque(&tile.motion));
       const MatrixXd before = tile.own_rows(standard.torque(&tile.motion));
       const VectorXd time = tile.own_time();
@@ -108,8 +107,7 @@ std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& st
   if (first == problem.test.of_recording.end()) return {};
   const auto r = static_cast<std::size_t>(first - problem.test.of_recording.begin());
   double begin = -1.0;
-  const RigidChain chain(problem.robot);
-  for_each_tile(problem.data.recordings[r], r, problem.robot, chain, problem.data.prepare, [&](Tile& tile) {
+  for_each_tile(problem.data.recordings[r], r, problem.robot, problem.chain, problem.data.prepare, [&](Tile& tile) {
     const VectorXd time = tile.own_time();
     if (begin >= 0.0 && time[0] > begin + seconds) return;
     const MatrixXd nominal = tile.own_rows(problem.nominal.torque(&tile.motion));

@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 constexpr double kFinePerCutoff = 12.5;   ///< rows of a motion, per period of the cut-off
 constexpr double kCoarsePerCutoff = 3.1;  ///< rows that the fit sees
-constexpr Index kTileRows = 4096;         ///< of a motion
+constexpr Index kTileRows = 2048;         ///< of a motion
 constexpr double kLeadIn = 1.0;           ///< [s] what play operators take to forget how they began
 constexpr double kRestWindow = 0.25;      ///< [s] on both sides
 constexpr double kGap = 5.0;              ///< usual steps without a row: here the recording is cut
@@ -144,20 +144,6 @@ Tile tile_of(const Stretch& stretch, Index from, Index to) {
   return out;
 }
 
-void add_rigid(const RigidChain& chain, Motion* motion) {
-  const Index rows = motion->rows(), joints = chain.driven(), columns = kLinkParameters * chain.links();
-  motion->rigid.assign(static_cast<std::size_t>(joints), MatrixXd(rows, columns));
-  MatrixXd Y(joints, columns);
-  VectorXd q(joints), qd(joints), qdd(joints);
-  for (Index i = 0; i < rows; ++i) {
-    q = motion->q.row(i);
-    qd = motion->qd.row(i);
-    qdd = motion->qdd.row(i);
-    chain.regressor(q.data(), qd.data(), qdd.data(), Y);
-    for (Index j = 0; j < joints; ++j) motion->rigid[static_cast<std::size_t>(j)].row(i) = Y.row(j);
-  }
-}
-
 }  // namespace
 
 MatrixXd Tile::filtered_rows(const MatrixXd& values) const { return filtered(values, weights, stride); }
@@ -194,7 +180,7 @@ void for_each_tile(const Recording& recording, std::size_t number, const Robot& 
       Tile tile = tile_of(stretch, from, std::min(coarse, from + each));
       tile.recording = number;
       tile.motion.robot = &robot;
-      add_rigid(chain, &tile.motion);
+      tile.motion.rigid = regressor_columns(chain, tile.motion.q, tile.motion.qd, tile.motion.qdd);
       use(tile);
     }
   }

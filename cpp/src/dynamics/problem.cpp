@@ -124,7 +124,7 @@ std::vector<double> drive_constants(const Robot& robot, const std::vector<Record
 }
 
 Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, const ProblemOptions& options)
-    : robot(given), data{recordings, robot, {}, options.threads}, nominal(given, {}) {
+    : robot(given), chain(given), data{recordings, robot, {}, options.threads}, nominal(given, {}) {
   data.prepare.torque_per_ampere = drive_constants(robot, recordings, &warnings);
   data.prepare.cutoff = std::isfinite(options.cutoff) ? options.cutoff : 8.0;
   split(recordings, options.test_share, this);
@@ -274,6 +274,19 @@ namespace {
 
 struct Moments {
   double n = 0.0, sum = 0.0, squares = 0.0, errors = 0.0;
+
+  void add(double measured, double predicted) {
+    n += 1.0;
+    sum += measured;
+    squares += measured * measured;
+    errors += std::pow(measured - predicted, 2.0);
+  }
+  void add(const Moments& other) {
+    n += other.n;
+    sum += other.sum;
+    squares += other.squares;
+    errors += other.errors;
+  }
   TorqueError error(const std::string& joint) const {
     TorqueError out;
     out.joint = joint;
@@ -286,38 +299,48 @@ struct Moments {
   }
 };
 
+using ModelMoments = std::vector<std::vector<Moments>>;  // by model and joint
+
+/// Of one recording, its rows in these folds.
+void add_moments(const Problem& problem, const std::vector<std::pair<std::string, TorqueModel>>& models,
+                 const Folds& folds, std::size_t r, ModelMoments* out) {
+  for_each_tile(problem.data.recordings[r], r, problem.robot, problem.chain, problem.data.prepare, [&](Tile& tile) {
+    const VectorXd time = tile.own_time();
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      const MatrixXd predicted = tile.own_rows(models[m].second.torque(&tile.motion));
+      for (Index i = 0; i < tile.count; ++i) {
+        if (folds.fold(r, time[i]) < 0) continue;
+        for (Index j = 0; j < predicted.cols(); ++j) {
+          const double y = tile.measured(i, j);
+          if (!std::isnan(y)) (*out)[m][static_cast<std::size_t>(j)].add(y, predicted(i, j));
+        }
+      }
+    }
+  });
+}
+
 }  // namespace
 
 std::vector<TorqueErrors> errors_of(const Problem& problem,
                                     const std::vector<std::pair<std::string, TorqueModel>>& models) {
   const std::size_t joints = problem.robot.driven_count();
   const std::vector<std::size_t> driven = problem.robot.driven_joints();
-  std::vector<TorqueErrors> out;
-  for (const auto& [name, model] : models) {
-    TorqueErrors errors;
-    errors.model = name;
-    for (const bool held : {true, false}) {
-      std::vector<Moments> moments(joints);
-      const Folds& folds = held ? problem.test : problem.train;
-      for_each_error(problem.data, model, folds, [&](const Tile& tile, const MatrixXd& predicted) {
-        const VectorXd time = tile.own_time();
-        for (Index i = 0; i < tile.count; ++i) {
-          if (folds.fold(tile.recording, time[i]) < 0) continue;
-          for (std::size_t j = 0; j < joints; ++j) {
-            const double y = tile.measured(i, static_cast<Index>(j));
-            if (std::isnan(y)) continue;
-            Moments& m = moments[j];
-            m.n += 1.0;
-            m.sum += y;
-            m.squares += y * y;
-            m.errors += std::pow(y - predicted(i, static_cast<Index>(j)), 2.0);
-          }
-        }
-      });
-      std::vector<TorqueError>& list = held ? errors.held_out : errors.train;
-      for (std::size_t j = 0; j < joints; ++j) list.push_back(moments[j].error(problem.robot.joints[driven[j]].name));
+  const ModelMoments none(models.size(), std::vector<Moments>(joints));
+  std::vector<TorqueErrors> out(models.size());
+  for (const bool held : {true, false}) {
+    const Folds& folds = held ? problem.test : problem.train;
+    std::vector<ModelMoments> parts(problem.data.recordings.size(), none);
+    for_each_recording(problem.data, folds, [&](std::size_t r) { add_moments(problem, models, folds, r, &parts[r]); });
+    ModelMoments all = none;
+    for (const ModelMoments& part : parts) {
+      for (std::size_t m = 0; m < models.size(); ++m)
+        for (std::size_t j = 0; j < joints; ++j) all[m][j].add(part[m][j]);
     }
-    out.push_back(std::move(errors));
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      out[m].model = models[m].first;
+      std::vector<TorqueError>& list = held ? out[m].held_out : out[m].train;
+      for (std::size_t j = 0; j < joints; ++j) list.push_back(all[m][j].error(problem.robot.joints[driven[j]].name));
+    }
   }
   return out;
 }

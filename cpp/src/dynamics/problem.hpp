@@ -28,6 +28,7 @@ struct Problem {
   Problem& operator=(const Problem&) = delete;
 
   Robot robot;
+  RigidChain chain;
   Data data;
   MotionRange range;
   Folds train, test;

@@ -292,4 +292,33 @@ Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> torque_re
   return out;
 }
 
+std::vector<Eigen::MatrixXd> regressor_columns(const RigidChain& chain, const Eigen::MatrixXd& q,
+                                               const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd) {
+  const Eigen::Index rows = q.rows(), padded = RigidChain::padded(rows);
+  std::vector<Eigen::MatrixXd> out(static_cast<std::size_t>(chain.driven()),
+                                   Eigen::MatrixXd::Zero(padded, kLinkParameters * chain.links()));
+  std::vector<double*> blocks(static_cast<std::size_t>(chain.driven() * chain.links()), nullptr);
+  for (Eigen::Index k = 0; k < chain.driven(); ++k) {
+    for (const Eigen::Index link : chain.felt_links(k))
+      blocks[static_cast<std::size_t>(k * chain.links() + link)] =
+          out[static_cast<std::size_t>(k)].data() + padded * kLinkParameters * link;
+  }
+  if (rows > 0) chain.regressors(q, qd, qdd, 0, rows, blocks.data(), padded);
+  for (Eigen::MatrixXd& columns : out) columns.conservativeResize(rows, Eigen::NoChange);
+  return out;
+}
+
+// Kinetic energy of the rotors 1/2 sum I_i (C qd)_i^2: their mass matrix is C^T diag(I) C.
+Eigen::MatrixXd rotor_matrix(const Robot& robot) {
+  const Eigen::MatrixXd coupling = coupling_matrix(robot);
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  Eigen::MatrixXd C(coupling.rows(), static_cast<Eigen::Index>(driven.size()));
+  for (std::size_t k = 0; k < driven.size(); ++k)
+    C.col(static_cast<Eigen::Index>(k)) =
+        robot.joints[driven[k]].ratio * coupling.col(static_cast<Eigen::Index>(driven[k]));
+  Eigen::VectorXd inertia(C.rows());
+  for (Eigen::Index i = 0; i < C.rows(); ++i) inertia[i] = robot.joints[static_cast<std::size_t>(i)].rotor_inertia;
+  return C.transpose() * inertia.asDiagonal() * C;
+}
+
 }  // namespace truing::dynamics

@@ -62,4 +62,11 @@ class RigidChain {
   std::vector<double> coupling_rows_;        ///< coupling_, row by row
 };
 
+/// Columns of every row, joint by joint: shape=(rows, 10 * links) each.
+std::vector<Eigen::MatrixXd> regressor_columns(const RigidChain& chain, const Eigen::MatrixXd& q,
+                                               const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd);
+
+/// Mass matrix of the rotors [kg m^2 | kg], of the joints that have a reading.
+Eigen::MatrixXd rotor_matrix(const Robot& robot);
+
 }  // namespace truing::dynamics

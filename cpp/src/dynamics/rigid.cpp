@@ -36,24 +36,6 @@ void require_table(const char* name, const MatrixXd& table, Index rows, Index jo
   }
 }
 
-// How far every joint's motion grows with a reading: shape=(joints, driven).
-MatrixXd motion_of_readings(const Robot& robot) {
-  const MatrixXd coupling = coupling_matrix(robot);
-  const std::vector<std::size_t> driven = robot.driven_joints();
-  MatrixXd out(coupling.rows(), static_cast<Index>(driven.size()));
-  for (std::size_t k = 0; k < driven.size(); ++k)
-    out.col(static_cast<Index>(k)) = robot.joints[driven[k]].ratio * coupling.col(static_cast<Index>(driven[k]));
-  return out;
-}
-
-// Kinetic energy of the rotors 1/2 sum I_i (C qd)_i^2: their mass matrix is C^T diag(I) C.
-MatrixXd rotor_matrix(const Robot& robot) {
-  const MatrixXd C = motion_of_readings(robot);
-  VectorXd inertia(C.rows());
-  for (Index i = 0; i < C.rows(); ++i) inertia[i] = robot.joints[static_cast<std::size_t>(i)].rotor_inertia;
-  return C.transpose() * inertia.asDiagonal() * C;
-}
-
 }  // namespace
 
 Eigen::MatrixXd rigid_torques(const Robot& robot, const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,

@@ -13,6 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr double kSureGain = 1.5;  ///< standard errors over the folds
+
 bool same_place(const TorqueGroup& a, const TorqueGroup& b) {
   return a.effect == b.effect && a.joints == b.joints && a.inputs == b.inputs;
 }
@@ -94,22 +96,35 @@ bool Search::may_enter(const Choice& choice, int group, bool free_functions) con
   });
 }
 
-/// Folds that were not fitted, surely and by enough: the mean of the folds' gains is above zero by 1.5 standard errors.
+/// Folds that were not fitted, by enough in the mean and for sure: the mean of the folds' gains is above zero by 1.5
+/// standard errors, gains as roots, or a single fold could decide.
 bool Search::predicts(const Choice& with, const Choice& less, const SearchLimits& limits) const {
   const VectorXd before = squares_of_folds(less), after = squares_of_folds(with);
-  double n = 0.0, sum = 0.0, squares = 0.0;
+  double n = 0.0, gains = 0.0, roots = 0.0, squares = 0.0;
   for (Index f = 0; f < before.size(); ++f) {
     if (!(before[f] > 0.0)) continue;  // nothing moved
     const double gain = (before[f] - after[f]) / before[f];
     n += 1.0;
-    sum += gain;
-    squares += gain * gain;
+    gains += gain;
+    roots += std::copysign(std::sqrt(std::abs(gain)), gain);
+    squares += std::abs(gain);
   }
-  const double mean = sum / std::max(1.0, n);
-  const double spread = std::sqrt(std::max(0.0, squares - n * mean * mean) / std::max(1.0, n - 1.0));
+  if (n < 2.0) return false;
+  const double mean = roots / n, spread = std::sqrt(std::max(0.0, squares / n - mean * mean) * n / (n - 1.0));
   // Every joint counts alike in the sum: one joint's errors are the part that it has of it.
-  const double least = limits.least_gain * before.sum() / static_cast<double>(joints_);
-  return before.sum() - after.sum() > least && mean > 1.5 * spread / std::sqrt(std::max(1.0, n));
+  return gains / n > limits.least_gain / static_cast<double>(joints_) && mean > kSureGain * spread / std::sqrt(n);
+}
+
+/// Parameters of the group within what machines have; what is beyond stands for something else.
+bool Search::is_plausible(const Choice& choice, int group) const {
+  const Evidence::State state = evidence_.evaluate(choice);
+  for (const int c : groups_[static_cast<std::size_t>(group)].columns) {
+    const auto at = std::find(state.columns.begin(), state.columns.end(), c) - state.columns.begin();
+    const double value = state.solution[static_cast<Index>(at)];
+    const TorqueTerm& term = design_.terms[static_cast<std::size_t>(c)];
+    if (value < term.least || value > term.most) return false;
+  }
+  return true;
 }
 
 Choice Search::better_forms(Choice choice) const {
@@ -137,7 +152,8 @@ Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits) cons
     const double score = evidence_.evaluate(choice).score;
     for (std::size_t at = 0; at < choice.groups.size(); ++at) {
       const Choice less = without(choice, at);
-      const bool wins = evidence_.evaluate(less).score < score - 0.5 * limits.threshold;
+      const bool possible = !limits.plausible_only || is_plausible(choice, choice.groups[at]);
+      const bool wins = possible && evidence_.evaluate(less).score < score - 0.5 * limits.threshold;
       if (wins && predicts(choice, less, limits)) continue;
       choice = less;
       changed = true;
@@ -161,7 +177,8 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
       Choice grown = choice;
       grown.groups.push_back(gain.group);
       grown.scales.push_back(gain.scale);
-      if (!predicts(grown, choice, limits)) {
+      const bool possible = !limits.plausible_only || is_plausible(grown, gain.group);
+      if (!possible || !predicts(grown, choice, limits)) {
         refused.push_back(gain.group);
         continue;
       }

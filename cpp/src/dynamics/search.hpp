@@ -17,6 +17,7 @@ struct SearchLimits {
   double threshold = 4.0;     ///< nats beyond the cost
   double least_gain = 0.004;  ///< of the joint's squared error on folds that were not fitted
   int most = 40;
+  bool plausible_only = true;  ///< parameters within what machines have
 };
 
 /// Candidates over one set of sums.
@@ -44,6 +45,7 @@ class Search {
   bool may_enter(const Choice& choice, int group, bool free_functions) const;
   Choice better_forms(Choice choice) const;
   Choice less_what_is_idle(Choice choice, const SearchLimits& limits) const;
+  bool is_plausible(const Choice& choice, int group) const;
   bool predicts(const Choice& with, const Choice& less, const SearchLimits& limits) const;
 
   const TorqueDesign& design_;

@@ -29,12 +29,7 @@ void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, cons
 }
 
 TorqueModel::TorqueModel(const Robot& robot, std::vector<ValuedTerm> own)
-    : robot_(robot), links_(link_parameters(robot)), terms_(std::move(own)) {
-  const std::vector<std::size_t> driven = robot.driven_joints();
-  rotors_.resize(static_cast<Index>(driven.size()));
-  for (std::size_t k = 0; k < driven.size(); ++k)
-    rotors_[static_cast<Index>(k)] = robot.joints[driven[k]].rotor_inertia;
-}
+    : robot_(robot), links_(link_parameters(robot)), rotors_(rotor_matrix(robot)), terms_(std::move(own)) {}
 
 TorqueModel TorqueModel::with(const std::vector<ValuedTerm>& more) const {
   TorqueModel out = *this;
@@ -43,9 +38,8 @@ TorqueModel TorqueModel::with(const std::vector<ValuedTerm>& more) const {
 }
 
 MatrixXd TorqueModel::torque(Motion* motion) const {
-  MatrixXd out(motion->rows(), motion->q.cols());
-  for (Index j = 0; j < out.cols(); ++j)
-    out.col(j) = motion->rigid[static_cast<std::size_t>(j)] * links_ + rotors_[j] * motion->qdd.col(j);
+  MatrixXd out = motion->qdd * rotors_;  // it is symmetric
+  for (Index j = 0; j < out.cols(); ++j) out.col(j) += motion->rigid[static_cast<std::size_t>(j)] * links_;
   add_terms(terms_, false, *motion, &out);
   motion->torque = out;
   add_terms(terms_, true, *motion, &out);

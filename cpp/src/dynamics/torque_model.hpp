@@ -43,7 +43,7 @@ class TorqueModel {
  private:
   Robot robot_;
   Eigen::VectorXd links_;   ///< inertial parameters
-  Eigen::VectorXd rotors_;  ///< of joints that have a reading
+  Eigen::MatrixXd rotors_;  ///< mass matrix of the rotors
   std::vector<ValuedTerm> terms_;
 };
 

@@ -23,8 +23,8 @@ constexpr std::size_t kBatchChunk = 64;
 /// thread with how many are done, the last time with all; false stops. The first exception comes out when all threads
 /// have ended. A thread takes `at_a_time` of them: one where each is long.
 inline void for_each_on_threads(std::size_t count, int threads, const std::function<bool(std::size_t)>& progress,
-                                const std::function<void(std::size_t)>& work) {
-  const std::size_t chunks = (count + kBatchChunk - 1) / kBatchChunk;
+                                const std::function<void(std::size_t)>& work, std::size_t at_a_time = kBatchChunk) {
+  const std::size_t chunks = (count + at_a_time - 1) / at_a_time;
   std::size_t workers =
       threads > 0 ? static_cast<std::size_t>(threads) : std::max(1u, std::thread::hardware_concurrency());
   workers = std::max<std::size_t>(1, std::min(workers, chunks));
@@ -36,9 +36,9 @@ inline void for_each_on_threads(std::size_t count, int threads, const std::funct
   const auto run = [&](bool reports) {
     try {
       for (std::size_t chunk = next++; chunk < chunks && !stop; chunk = next++) {
-        const std::size_t end = std::min(count, (chunk + 1) * kBatchChunk);
-        for (std::size_t k = chunk * kBatchChunk; k < end; ++k) work(k);
-        done += end - chunk * kBatchChunk;
+        const std::size_t begin = chunk * at_a_time, end = std::min(count, begin + at_a_time);
+        for (std::size_t k = begin; k < end; ++k) work(k);
+        done += end - begin;
         if (reports && progress && !progress(reported = done)) stop = true;
       }
     } catch (...) {

@@ -1,3 +1,32 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Dynamics: from recorded motion and torque to the named cause, and back into the simulator."""
+"""Dynamics: from recorded motion and torque to the named cause, and back into the simulator.
+
+    robot = truing.load_robot("robot.urdf", any_tool=True)
+    recordings = truing.dynamics.load_recordings("recordings/*.csv", robot)
+    print(truing.dynamics.diagnose(robot, recordings).summary())
+"""
+
+from truing._core import (
+    FoundTorqueEffect as FoundTorqueEffect,
+    Recording as Recording,
+    TorqueAlternative as TorqueAlternative,
+    TorqueClass as TorqueClass,
+    TorqueDiagnoseOptions as TorqueDiagnoseOptions,
+    TorqueDiagnosis as TorqueDiagnosis,
+    TorqueError as TorqueError,
+    TorqueErrors as TorqueErrors,
+    TorqueFit as TorqueFit,
+    TorqueOptions as TorqueOptions,
+    TorquePrediction as TorquePrediction,
+    TorqueRegime as TorqueRegime,
+    TorqueTrace as TorqueTrace,
+    UnknownTorque as UnknownTorque,
+    validate_recording as validate_recording,
+)
+from truing.dynamics.api import (
+    diagnose as diagnose,
+    identify as identify,
+    predict as predict,
+)
+from truing.files import load_recordings as load_recordings

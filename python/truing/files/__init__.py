@@ -31,6 +31,7 @@ from truing.files.measurement_file import (
     save_measurements as save_measurements,
 )
 from truing.files.mjcf_file import is_mjcf as is_mjcf
+from truing.files.recording_file import load_recordings as load_recordings
 from truing.files.robot_file import (
     load_calibration as load_calibration,
     load_robot as load_robot,

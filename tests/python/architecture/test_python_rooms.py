@@ -36,7 +36,6 @@ ROOMS: dict[str, set[str]] = {
     "diagnosis": BASIC | {"identification"},
     "hand_eye": BASIC | {"identification"},
     "inverse_kinematics": BASIC,
-    "dynamics": BASIC,
     "tracking": BASIC | {"hand_eye"},
     "dynamics": BASIC | {"identification"},
     "testing": BASIC,
@@ -131,7 +130,7 @@ ONLY_IN = {
     "plotly": {"report"},
     "typer": {"cli"},
     "rich": {"cli"},
-    "mujoco": {"exam", "dynamics"},
+    "mujoco": {"exam", "files", "dynamics"},
     "cv2": {"files"},
     "rosbags": {"files"},
 }

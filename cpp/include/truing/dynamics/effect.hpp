@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -46,6 +47,8 @@ struct TorqueTerm {
   std::function<Eigen::MatrixXd(const Motion&)> basis;
   bool needs_torque = false;  ///< the basis depends on Motion::torque
   double prior = 1.0;         ///< size that the parameter may well have
+  double least = -std::numeric_limits<double>::infinity();  ///< no machine has less than this
+  double most = std::numeric_limits<double>::infinity();    ///< no machine has more
   /// Numbers that the basis was made with (a Stribeck speed): kept by full name among the parameters of
   /// Robot::torque_effects.
   std::map<std::string, double> constants{};

@@ -106,6 +106,12 @@ TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, d
   return term;
 }
 
+TorqueTerm within(TorqueTerm term, double least, double most) {
+  term.least = least;
+  term.most = most;
+  return term;
+}
+
 std::string parameter_name(const char* effect, const Robot& robot, std::size_t joint, const char* part) {
   return std::string(effect) + "." + driven_name(robot, joint) + (part != nullptr ? "." + std::string(part) : "");
 }

@@ -5,6 +5,7 @@
 // The families of effects on torques; each file is one.
 
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,9 @@ Eigen::ArrayXd sign_of(const Eigen::VectorXd& speed);
 using Column = std::function<Eigen::ArrayXd(const Motion&)>;
 TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, double prior, Column column,
                    bool needs_torque = false);
+
+/// The same term of a parameter that machines have between these bounds.
+TorqueTerm within(TorqueTerm term, double least, double most = std::numeric_limits<double>::infinity());
 
 /// "coulomb.J2"
 std::string parameter_name(const char* effect, const Robot& robot, std::size_t joint, const char* part = nullptr);

@@ -111,7 +111,7 @@ TorqueForm presliding_at(const Robot& robot, std::size_t joint, double x0, doubl
                               return out;
                             });
   term.constants[parameter_name("presliding", robot, joint, "x0")] = x0;
-  return {term};
+  return {within(std::move(term), 0.0)};
 }
 
 std::vector<TorqueForm> presliding(const Robot& robot, std::size_t joint, const MotionRange& range) {
@@ -138,12 +138,10 @@ std::vector<TorqueForm> asymmetric(const Robot& robot, std::size_t joint, const 
 
 // Gears lose a part of what they carry (Hamon, Gautier and Garrec 2011).
 std::vector<TorqueForm> load_friction(const Robot& robot, std::size_t joint, const MotionRange&) {
-  return {{term_at(
-      joint, parameter_name("load_friction", robot, joint), "-", 0.3,
-      [joint](const Motion& m) -> ArrayXd {
-        return direction(m, joint) * m.torque.col(static_cast<Index>(joint)).array().abs();
-      },
-      true)}};
+  const auto column = [joint](const Motion& m) -> ArrayXd {
+    return direction(m, joint) * m.torque.col(static_cast<Index>(joint)).array().abs();
+  };
+  return {{within(term_at(joint, parameter_name("load_friction", robot, joint), "-", 0.3, column, true), 0.0, 0.6)}};
 }
 
 std::vector<TorqueForm> position_friction(const Robot& robot, std::size_t joint, const MotionRange& range) {

@@ -18,17 +18,21 @@ using Eigen::MatrixXd;
 
 constexpr const char* kParts[kLinkParameters] = {"m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz"};
 
-/// A column of the rigid chain, at all joints with a reading.
-TorqueTerm rigid_term(const Robot& robot, std::string parameter, int part, std::size_t link, double prior) {
+/// A column of the rigid chain, at the joints that feel the link.
+TorqueTerm rigid_term(const RigidChain& chain, std::string parameter, int part, std::size_t link, double prior) {
   TorqueTerm term;
   term.parameter = std::move(parameter);
   term.unit = part == 0 ? "kg" : part < 4 ? "kg m" : "kg m^2";
-  for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
+  for (Index j = 0; j < chain.driven(); ++j) {
+    const std::vector<Index>& felt = chain.felt_links(j);
+    if (std::find(felt.begin(), felt.end(), static_cast<Index>(link)) != felt.end())
+      term.joints.push_back(static_cast<std::size_t>(j));
+  }
   term.prior = prior;
   const Index column = kLinkParameters * static_cast<Index>(link) + part;
-  term.basis = [column](const Motion& m) {
-    MatrixXd out(m.rows(), static_cast<Index>(m.rigid.size()));
-    for (std::size_t j = 0; j < m.rigid.size(); ++j) out.col(static_cast<Index>(j)) = m.rigid[j].col(column);
+  term.basis = [column, joints = term.joints](const Motion& m) {
+    MatrixXd out(m.rows(), static_cast<Index>(joints.size()));
+    for (std::size_t k = 0; k < joints.size(); ++k) out.col(static_cast<Index>(k)) = m.rigid[joints[k]].col(column);
     return out;
   };
   return term;
@@ -60,10 +64,11 @@ Size size_of_link(const Robot& robot, std::size_t link) {
 std::vector<TorqueForm> link_inertia(const Robot& robot, std::size_t joint, const MotionRange&) {
   const std::size_t link = robot.driven_joints()[joint];
   const Size size = size_of_link(robot, link);
+  const RigidChain chain(robot);
   TorqueForm form;
   for (int part = 0; part < kLinkParameters; ++part)
     form.push_back(
-        rigid_term(robot, parameter_name("link_inertia", robot, joint, kParts[part]), part, link, size.of(part)));
+        rigid_term(chain, parameter_name("link_inertia", robot, joint, kParts[part]), part, link, size.of(part)));
   return {form};
 }
 
@@ -72,17 +77,19 @@ std::vector<TorqueForm> payload(const Robot& robot, std::size_t, const MotionRan
   double total = 0.0;
   for (const Joint& joint : robot.joints) total += joint.mass.value_or(0.0);
   const Size size{std::max(0.1 * total, 0.05), std::max(0.05, 0.1 * stretched(robot))};
+  const RigidChain chain(robot);
   TorqueForm form;
   for (int part = 0; part < 4; ++part)
-    form.push_back(rigid_term(robot, std::string("payload.") + kParts[part], part, last, size.of(part)));
+    form.push_back(rigid_term(chain, std::string("payload.") + kParts[part], part, last, size.of(part)));
   return {form};
 }
 
 std::vector<TorqueForm> armature(const Robot& robot, std::size_t joint, const MotionRange& range) {
   const auto at = static_cast<Index>(joint);
   const double prior = std::max(range.torque[at], 1e-3) / std::max(range.acceleration[at], 0.1);
-  return {{term_at(joint, parameter_name("armature", robot, joint), is_revolute(robot, joint) ? "kg m^2" : "kg", prior,
-                   [at](const Motion& m) -> ArrayXd { return m.qdd.col(at); })}};
+  return {{within(term_at(joint, parameter_name("armature", robot, joint), is_revolute(robot, joint) ? "kg m^2" : "kg",
+                          prior, [at](const Motion& m) -> ArrayXd { return m.qdd.col(at); }),
+                  0.0)}};
 }
 
 }  // namespace

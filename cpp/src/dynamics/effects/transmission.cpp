@@ -77,23 +77,17 @@ std::vector<TorqueForm> spring(const Robot& robot, std::size_t joint, const Moti
 
 /// What the torques change by when the joint stands `dq` further on than it was read: shape=(rows, joints).
 MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
-  const RigidChain chain(*m.robot);
   const VectorXd pi = link_parameters(*m.robot);
   const double step = 1e-4 / std::max(dq.cwiseAbs().maxCoeff(), 1e-12);  // rad: small against any posture
   const MatrixXd dqd = rate_of(dq, m.step), dqdd = rate_of(dqd, m.step);
-  MatrixXd out(m.rows(), m.q.cols()), Y(chain.driven(), pi.size());
-  VectorXd q(m.q.cols()), qd(m.q.cols()), qdd(m.q.cols());
-  for (Index i = 0; i < m.rows(); ++i) {
-    q = m.q.row(i);
-    qd = m.qd.row(i);
-    qdd = m.qdd.row(i);
-    q[joint] += step * dq[i];
-    qd[joint] += step * dqd(i, 0);
-    qdd[joint] += step * dqdd(i, 0);
-    chain.regressor(q.data(), qd.data(), qdd.data(), Y);
-    for (Index j = 0; j < out.cols(); ++j)
-      out(i, j) = (Y.row(j).dot(pi) - m.rigid[static_cast<std::size_t>(j)].row(i).dot(pi)) / step;
-  }
+  MatrixXd q = m.q, qd = m.qd, qdd = m.qdd;
+  q.col(joint) += step * dq;
+  qd.col(joint) += step * dqd;
+  qdd.col(joint) += step * dqdd;
+  const std::vector<MatrixXd> moved = regressor_columns(RigidChain(*m.robot), q, qd, qdd);
+  MatrixXd out(m.rows(), m.q.cols());
+  for (std::size_t j = 0; j < moved.size(); ++j)
+    out.col(static_cast<Index>(j)) = (moved[j] * pi - m.rigid[j] * pi) / step;
   return out;
 }
 
@@ -109,7 +103,7 @@ TorqueTerm moved_link(const Robot& robot, std::size_t joint, std::string paramet
   term.basis = [joint, dq = std::move(dq)](const Motion& m) {
     return torque_change(m, static_cast<Index>(joint), dq(m));
   };
-  return term;
+  return within(std::move(term), 0.0);  // a link stands behind its motor
 }
 
 // A drive that gives way (Spong 1987): the link stands tau / K behind the motor.
@@ -131,7 +125,23 @@ std::vector<TorqueForm> backlash(const Robot& robot, std::size_t joint, const Mo
 
 // --- what pulls at the tool --------------------------------------------------------------------------------------------
 
-// A cable or hose: a constant force at the tool, felt by the joints as J^T f.
+/// J^T f of a force of one along an axis of the base at the tool. A mass of one there that gravity of one pulls the
+/// other way, at rest, asks the same torques of the drives.
+MatrixXd held_against(const Motion& m, int axis) {
+  Robot robot = *m.robot;
+  robot.gravity = Eigen::Vector3d::Unit(axis);
+  const MatrixXd rest = MatrixXd::Zero(m.rows(), m.q.cols());
+  const std::vector<MatrixXd> columns = regressor_columns(RigidChain(robot), m.q, rest, rest);
+  const Index last = kLinkParameters * (static_cast<Index>(robot.joints.size()) - 1);
+  const Eigen::Vector3d tool = robot.targets.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero())
+                                                     : Eigen::Vector3d(robot.targets[0].T_last_target.translation());
+  MatrixXd out(m.rows(), m.q.cols());
+  for (std::size_t j = 0; j < columns.size(); ++j)
+    out.col(static_cast<Index>(j)) = columns[j].col(last) + columns[j].middleCols<3>(last + 1) * tool;
+  return out;
+}
+
+// A cable or hose: a constant force at the tool.
 std::vector<TorqueForm> tool_force(const Robot& robot, std::size_t, const MotionRange& range) {
   TorqueForm form;
   const double prior = 0.1 * std::max(range.torque.size() > 0 ? range.torque.maxCoeff() : 1.0, 1.0);
@@ -141,23 +151,7 @@ std::vector<TorqueForm> tool_force(const Robot& robot, std::size_t, const Motion
     term.unit = "N";
     term.prior = prior;
     for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
-    term.basis = [axis](const Motion& m) {
-      constexpr double h = 1e-6;
-      const Eigen::Matrix3d to_base = m.robot->T_measurement_base.linear().transpose();
-      MatrixXd out(m.rows(), m.q.cols());
-      VectorXd q(m.q.cols());
-      const auto tip = [&] { return Eigen::Vector3d(to_base * forward_kinematics(*m.robot, q).back().translation()); };
-      for (Index i = 0; i < m.rows(); ++i) {
-        for (Index j = 0; j < out.cols(); ++j) {  // the drive holds against the force: virtual work
-          q = m.q.row(i);
-          q[j] += h;
-          const double ahead = tip()[axis];
-          q[j] -= 2.0 * h;
-          out(i, j) = -(ahead - tip()[axis]) / (2.0 * h);
-        }
-      }
-      return out;
-    };
+    term.basis = [axis](const Motion& m) { return held_against(m, axis); };
     form.push_back(std::move(term));
   }
   return {form};
