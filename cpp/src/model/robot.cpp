@@ -280,7 +280,8 @@ std::size_t Robot::joint_index(const std::string& joint_name) const {
 static bool is_input(const std::string& name, const Robot& robot) {
   if (name == "payload" || name == "temp") return true;
   for (std::size_t k = 1; k <= robot.driven_count(); ++k) {
-    if (name == "q" + std::to_string(k)) return true;
+    const std::string number = std::to_string(k);
+    if (name == "q" + number || name == "qd" + number) return true;
   }
   return false;
 }
@@ -308,7 +309,7 @@ void validate(const Robot& robot) {
   for (const auto& [name, ends] : robot.fitted_range) {
     if (!(std::isfinite(ends.first) && std::isfinite(ends.second) && ends.first <= ends.second))
       refuse(where, "fitted_range of '" + name + "' is not a smallest and a largest value");
-    if (!is_input(name, robot)) refuse(where, "fitted_range has '" + name + "', expected q1 ..., payload or temp");
+    if (!is_input(name, robot)) refuse(where, "fitted_range has '" + name + "', expected q1 ..., qd1 ..., payload or temp");
   }
 }
 

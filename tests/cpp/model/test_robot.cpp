@@ -259,7 +259,8 @@ TEST_CASE("validate refuses what no machine has: angles of 1e50, thousands of jo
 
 TEST_CASE("validate refuses ranges that are none, and of what is no input") {
   Robot robot = oblique_arm();
-  robot.fitted_range = {{"q1", {-1.0, 1.0}}, {"payload", {0.0, 0.0}}, {"temp", {18.0, 25.0}}};
+  robot.fitted_range = {
+      {"q1", {-1.0, 1.0}}, {"qd1", {-2.0, 2.0}}, {"payload", {0.0, 0.0}}, {"temp", {18.0, 25.0}}};
   CHECK(complaint(robot) == "");
   robot.fitted_range["q1"] = {1.0, -1.0};
   CHECK(contains(complaint(robot), "fitted_range of 'q1'"));
@@ -267,6 +268,8 @@ TEST_CASE("validate refuses ranges that are none, and of what is no input") {
   CHECK(contains(complaint(robot), "fitted_range of 'q1'"));
   robot.fitted_range = {{"q99", {0.0, 1.0}}};
   CHECK(contains(complaint(robot), "fitted_range has 'q99'"));
+  robot.fitted_range = {{"qd99", {0.0, 1.0}}};
+  CHECK(contains(complaint(robot), "fitted_range has 'qd99'"));
 }
 
 TEST_CASE("validate names the joint and what is wrong with it") {
