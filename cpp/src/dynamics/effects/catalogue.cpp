@@ -31,6 +31,16 @@ bool has_all(const TorqueForm& form, const std::map<std::string, double>& values
   return std::all_of(form.begin(), form.end(), [&](const TorqueTerm& t) { return values.count(t.parameter) > 0; });
 }
 
+/// What a robot carries acts in any motion: a range in which no law is left out because it would not show.
+MotionRange unlimited(MotionRange range) {
+  constexpr double kFar = 1e3;  // [rad, m, rad/s, s] more than any law asks for
+  range.upper = range.lower.array() + kFar;
+  range.speed.setConstant(kFar);
+  range.duration = kFar;
+  for (auto& column : range.columns) column.second.second = std::max(column.second.second, column.second.first + 1.0);
+  return range;
+}
+
 }  // namespace
 
 const std::vector<TorqueEffect>& torque_catalogue() {
@@ -54,8 +64,9 @@ const TorqueEffect& find_torque_effect(const std::string& name, const std::vecto
   throw std::invalid_argument("there is no effect '" + name + "' on torques; there are: " + listed(names));
 }
 
-std::vector<TorqueTerm> terms_of(const AppliedEffect& applied, const Robot& robot, const MotionRange& range,
+std::vector<TorqueTerm> terms_of(const AppliedEffect& applied, const Robot& robot, const MotionRange& given,
                                  const std::vector<TorqueEffect>& own) {
+  const MotionRange range = unlimited(given);
   const TorqueEffect& effect = find_torque_effect(applied.effect, own);
   std::vector<std::size_t> joints;
   if (effect.per_joint) {

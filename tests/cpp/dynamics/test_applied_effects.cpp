@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// What a robot carries acts in every motion, also in one that could not have shown it.
+
+#include <doctest/doctest.h>
+
+#include "truing/dynamics/effect.hpp"
+
+using namespace truing;
+
+namespace {
+
+Robot one_joint() {
+  Robot robot;
+  Joint joint;
+  joint.name = "J1";
+  joint.mass = 2.0;
+  joint.center_of_mass = Eigen::Vector3d(0.1, 0.0, 0.0);
+  robot.joints.push_back(joint);
+  return robot;
+}
+
+/// Of an arm that stands still for a second, at one temperature.
+MotionRange at_rest(const Robot& robot) {
+  const auto n = static_cast<Eigen::Index>(robot.driven_count());
+  MotionRange out;
+  out.lower = out.upper = out.speed = out.acceleration = Eigen::VectorXd::Zero(n);
+  out.torque = Eigen::VectorXd::Ones(n);
+  out.duration = 1.0;
+  out.columns["temp_C"] = {20.0, 20.0};
+  return out;
+}
+
+std::vector<TorqueTerm> terms(const std::string& effect, const std::map<std::string, double>& parameters) {
+  const Robot robot = one_joint();
+  const std::string& joint = robot.joints.front().name;
+  std::map<std::string, double> named;
+  for (const auto& [part, value] : parameters) named[effect + "." + joint + part] = value;
+  return terms_of({effect, {joint}, named}, robot, at_rest(robot));
+}
+
+}  // namespace
+
+TEST_CASE("effects that a robot carries have their terms whatever the motion") {
+  CHECK(terms("warmup", {{".coulomb", 0.1}, {".viscous", 0.2}}).size() == 2);
+  CHECK(terms("thermal_friction", {{".coulomb", 0.1}, {".viscous", 0.2}}).size() == 2);
+  CHECK(terms("stribeck", {{"", 1.0}, {".vs", 0.05}}).size() == 1);
+  CHECK(terms("presliding", {{"", 1.0}, {".x0", 1e-3}}).size() == 1);
+  CHECK(terms("ripple", {{".sin1", 0.1}, {".cos1", 0.2}}).size() == 2);
+}
