@@ -74,6 +74,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
                          const TorqueDiagnoseOptions& options) {
   std::string error;
   if (!options.is_valid(&error)) throw std::invalid_argument(error);
+  for (const std::string& name : options.leave_out) find_torque_effect(name, options.own_effects);
   validate(robot);
   require_usable(robot, recordings);
   const Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
