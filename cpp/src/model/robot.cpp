@@ -309,7 +309,8 @@ void validate(const Robot& robot) {
   for (const auto& [name, ends] : robot.fitted_range) {
     if (!(std::isfinite(ends.first) && std::isfinite(ends.second) && ends.first <= ends.second))
       refuse(where, "fitted_range of '" + name + "' is not a smallest and a largest value");
-    if (!is_input(name, robot)) refuse(where, "fitted_range has '" + name + "', expected q1 ..., qd1 ..., payload or temp");
+    if (!is_input(name, robot))
+      refuse(where, "fitted_range has '" + name + "', expected q1 ..., qd1 ..., payload or temp");
   }
 }
 
