@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from truing import _core
 from truing._core import Recording, Robot, TorqueDiagnosis, TorqueFit, TorquePrediction
+from truing.effects import parse_effects
 from truing.keywords import made, takes
 
 if TYPE_CHECKING:
@@ -30,7 +31,13 @@ def identify(robot: Robot, recordings: Sequence[Recording], **options: Unpack[To
 
     Raises InputError on recordings or options that cannot be used.
     """
-    return _core.dynamics_identify(robot, list(recordings), made(_core.TorqueOptions, options))
+    fit = made(_core.TorqueOptions, {**options, "effects": requests(options.get("effects", ()))})
+    return _core.dynamics_identify(robot, list(recordings), fit)
+
+
+def requests(effects: str | Sequence[_core.EffectRequest]) -> list[_core.EffectRequest]:
+    """Effects asked for, also as one text: "coulomb,load_friction:J2+J3". Raises InputError."""
+    return parse_effects(effects) if isinstance(effects, str) and effects.strip() else list(effects or ())
 
 
 @takes(_core.TorqueDiagnoseOptions)
