@@ -36,6 +36,7 @@ ROOMS: dict[str, set[str]] = {
     "diagnosis": BASIC | {"identification"},
     "hand_eye": BASIC | {"identification"},
     "inverse_kinematics": BASIC,
+    "dynamics": BASIC | {"identification"},
     "tracking": BASIC | {"hand_eye"},
     "dynamics": BASIC | {"identification"},
     "testing": BASIC,

@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files of `truing dynamics`: what the contract of result.json asks for, and tables that fit the recordings."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import truing
+from pages import charts_of, visible
+from truing.dynamics import Recording, TorqueDiagnosis, diagnose, identify, predict
+from truing.dynamics.result import (
+    prediction_columns,
+    write_diagnosis,
+    write_fit,
+    write_prediction,
+)
+from truing.testing.dynamics import HIDDEN, SimulatedMotion, demo_arm, simulate_motion
+
+
+@pytest.fixture(scope="module")
+def simulated() -> SimulatedMotion:
+    return simulate_motion(seconds=16.0)
+
+
+@pytest.fixture(scope="module")
+def found(simulated: SimulatedMotion) -> TorqueDiagnosis:
+    return diagnose(simulated.nominal, simulated.recordings)
+
+
+@pytest.fixture(scope="module")
+def folder(
+    simulated: SimulatedMotion, found: TorqueDiagnosis, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    out = tmp_path_factory.mktemp("diagnosis")
+    write_diagnosis(out, found, simulated.recordings, warnings=["a warning about the input"])
+    return out
+
+
+@pytest.fixture(scope="module")
+def result(folder: Path) -> Any:
+    return json.loads((folder / "result.json").read_text(encoding="utf-8"))
+
+
+def test_hidden_effects_are_named_within_their_errors(result: dict[str, Any]) -> None:
+    named = {e["effect"]: e for e in result["effects"] if not e["standard"]}
+    for effect, (joints, values) in HIDDEN.items():
+        assert named[effect]["joints"] == list(joints)
+        sizes = {p["name"]: p for p in named[effect]["parameters"]}
+        for name, value in values.items():
+            assert abs(sizes[name]["value"] - value) < max(5 * sizes[name]["sigma"], 0.06 * value), name
+
+
+def test_result_has_what_the_contract_lists(result: dict[str, Any]) -> None:
+    assert result["format"] == "truing-dynamics/1"
+    assert result["verdict"] in ("effects", "effects+unknown")
+    assert {"effect", "joints", "standard", "probability", "parameters", "share", "ci", "rms_Nm"} < set(
+        result["effects"][0]
+    )
+    assert {"confounded_with", "sentence"} < set(result["effects"][0])
+    joints = ["J1", "J2", "J3", "J4", "J5", "J6"]
+    for held in ("held_out", "train"):
+        for model in ("nominal", "standard", "named", "with_unknown"):
+            assert list(result["torque"][held][model]) == joints
+    assert result["held_out"] == ["motion4", "motion5"]
+    assert result["sanity"] == [] and result["cutoff_hz"] > 0
+    assert result["warnings"][0] == "a warning about the input"
+    for key in ("unknown", "classes", "not_testable"):
+        assert isinstance(result[key], list)
+
+
+def test_where_says_the_joint_that_was_worst(result: dict[str, Any]) -> None:
+    shares = {w["joint"]: w["share"] for w in result["where"]["joints"]}
+    assert max(shares, key=lambda joint: shares[joint]) == "J5"
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert all(0.0 <= w["share"] <= 1.0 for w in result["where"]["inputs"])
+    assert {"joint", "input", "low", "high", "standard_rms_Nm", "named_rms_Nm", "n"} == set(
+        result["where"]["regimes"][0]
+    )
+
+
+def test_residuals_have_every_row_and_are_small(folder: Path, simulated: SimulatedMotion) -> None:
+    table = pq.read_table(folder / "residuals.parquet").to_pydict()
+    assert len(table["t_s"]) == sum(len(recording) for recording in simulated.recordings)
+    assert set(zip(table["recording"], table["set"], strict=True)) == {
+        *((f"motion{k}", "train") for k in (1, 2, 3)),
+        *((f"motion{k}", "test") for k in (4, 5)),
+    }
+    measured, error = np.array(table["tau5_Nm"]), np.array(table["error_tau5_Nm"])
+    np.testing.assert_allclose(measured - np.array(table["predicted_tau5_Nm"]), error, atol=1e-12)
+    assert error.std() < 0.05 * measured.std()
+
+
+def test_the_robot_file_predicts_as_the_robot_found(
+    folder: Path, found: TorqueDiagnosis, simulated: SimulatedMotion
+) -> None:
+    robot = truing.load_robot(folder / "robot.yaml")
+    recording = simulated.recordings[-1]
+    np.testing.assert_allclose(
+        predict(robot, recording).torque, predict(found.robot, recording).torque, rtol=1e-9, atol=1e-9
+    )
+
+
+def test_the_report_says_it_in_its_first_lines(folder: Path, result: dict[str, Any]) -> None:
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    text = visible(page)
+    assert "Torque error falls from" in text
+    assert "another joint's motor acts on this one (J6 on J5)" in text.replace("&#x27;", "'")
+    assert "a warning about the input" in text
+    charts = charts_of(page)
+    assert {"trace", "errors", "where", "friction0"} <= set(charts)
+    shown = [trace for trace in charts["trace"]["data"] if trace["visible"]]
+    assert {trace["name"] for trace in shown} == {"measured", "nominal", "standard", "named"}
+    assert charts["trace"]["layout"]["updatemenus"][0]["buttons"][0]["label"] == "J5"  # the worst is first
+    loads = [len([t for t in charts[f"friction{k}"]["data"]]) for k in range(6)]
+    assert loads[1] == 2 and loads[0] == 1  # only J2 has friction that grows with the load
+
+
+def test_a_fit_writes_its_parameters_with_errors(simulated: SimulatedMotion, tmp_path: Path) -> None:
+    fit = identify(simulated.nominal, simulated.recordings, effects="coulomb,viscous,load_friction:J2")
+    result = write_fit(tmp_path, fit, simulated.recordings)
+    assert result["format"] == "truing-dynamics-identification/1"
+    with (tmp_path / "covariance.csv").open(encoding="utf-8") as file:
+        rows = {row["parameter"]: row for row in csv.DictReader(file)}
+    assert float(rows["load_friction.J2"]["value"]) == pytest.approx(0.09, abs=0.02)
+    assert float(rows["coulomb.J1"]["sigma"]) > 0 and rows["coulomb.J1"]["unit"] == "Nm"
+    assert truing.load_robot(tmp_path / "robot.yaml").torque_effects
+    assert "coulomb.J1" in visible((tmp_path / "report.html").read_text(encoding="utf-8"))
+
+
+def test_a_prediction_has_the_columns_that_were_measured(simulated: SimulatedMotion, tmp_path: Path) -> None:
+    recording = simulated.recordings[0]
+    predicted = predict(simulated.truth, recording)
+    write_prediction(tmp_path, simulated.truth, recording, predicted, cutoff=8.0)
+    with (tmp_path / "predicted.csv").open(encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == ["t_s", *(f"tau{k}_Nm" for k in range(1, 7))]
+    assert len(rows) == 1 + len(recording)
+    result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    assert result["rows"] == len(recording) and result["errors"]["J2"]["percent"] < 10
+
+
+def test_predicted_currents_are_torques_by_the_drives_constants(simulated: SimulatedMotion) -> None:
+    robot = demo_arm()
+    for joint in robot.joints:
+        joint.torque_per_ampere = 4.0
+    bare = simulated.recordings[0]
+    recording = Recording("currents", time=bare.time, position=bare.position, current=bare.torque / 4.0)
+    predicted = predict(robot, recording)
+    columns = prediction_columns(robot, recording, predicted)
+    assert list(columns) == ["t_s", *(f"i{k}_A" for k in range(1, 7))]
+    np.testing.assert_allclose(columns["i2_A"], predicted.torque[:, 1] / 4.0)
+
+
+def test_the_same_seed_gives_the_same_recordings() -> None:
+    one, other, third = (simulate_motion(seconds=2.0, recordings=1, held_out=0, seed=s) for s in (3, 3, 4))
+    np.testing.assert_array_equal(one.recordings[0].torque, other.recordings[0].torque)
+    assert np.abs(one.recordings[0].torque - third.recordings[0].torque).max() > 1.0
