@@ -32,7 +32,7 @@ from truing.errors import InputError
 
 COMMANDS = Path(__file__).parent / "commands"
 
-PANELS = ("Calibrate", "Diagnose", "Hand-eye", "Inverse kinematics", "Track", "Try out")
+PANELS = ("Calibrate", "Diagnose", "Hand-eye", "Inverse kinematics", "Track", "Dynamics", "Try out")
 """Headings of `truing --help` in their order; others come last."""
 
 _WIDEST = 24  # characters of a metavar
@@ -201,8 +201,10 @@ def typer_parameters(bound: Sequence[Bound]) -> list[Any]:
         annotation: Any = str | None
         if isinstance(one.kind, Flag):
             annotation, default = bool, False
-        elif one.kind.several:
+        elif one.kind.several and not (one.kind.argument and one.default is MISSING):
             annotation, default = list[str] | None, None
+        elif one.kind.several:
+            annotation = list[Path] if isinstance(one.kind, File) else list[str]
         elif default is inspect.Parameter.empty:
             annotation = Path if isinstance(one.kind, File) else str
         parameters.append(

@@ -330,6 +330,14 @@ class Speed(Quantity):
     example = "0.3m/s"
 
 
+class Frequency(Quantity):
+    metavar = "FREQUENCY"
+    noun = "a frequency"
+    units = {"Hz": 1.0, "kHz": 1e3}
+    shown_in = ("Hz",)
+    example = "8Hz"
+
+
 class Pixels(Quantity):
     metavar = "PIXELS"
     noun = "a number of pixels"
@@ -389,6 +397,20 @@ class Words(Kind):
 
     def complete(self, incomplete: str) -> list[str]:
         return continued(incomplete, self.known)
+
+
+class Numbers(Kind):
+    """Numbers between commas, of a unit that the help states, each above zero; the field holds a list."""
+
+    metavar = "NUMBERS"
+
+    def read(self, text: str, option: str) -> list[float]:
+        number = Number(noun="numbers between commas, each above 0", example="10,10.7,8.5")
+        values = [number.read(word.strip(), option) for word in text.split(",")]
+        for word, value in zip(text.split(","), values, strict=True):
+            if value <= 0:
+                raise refused(option, word.strip(), f"{number.noun}, such as {number.example}")
+        return values
 
 
 class Names(Kind):

@@ -131,7 +131,7 @@ ONLY_IN = {
     "plotly": {"report"},
     "typer": {"cli"},
     "rich": {"cli"},
-    "mujoco": {"exam", "files", "dynamics"},
+    "mujoco": {"exam", "dynamics"},
     "cv2": {"files"},
     "rosbags": {"files"},
 }

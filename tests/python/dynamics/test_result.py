@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files of `truing dynamics`: what the contract of result.json asks for, and tables that fit the recordings."""
+"""Files of `truing dynamics`: what the contract of result.json asks for, and tables of the recordings."""
 
 from __future__ import annotations
 
