@@ -7,9 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <ctime>
 
 #include "dynamics/judge.hpp"
 #include "dynamics/name.hpp"
@@ -29,10 +26,6 @@ bool TorqueDiagnoseOptions::is_valid(std::string* error) const {
 
 namespace dynamics {
 namespace {
-double now() { timespec t; clock_gettime(CLOCK_MONOTONIC, &t); return t.tv_sec + 1e-9 * t.tv_nsec; }
-double t0 = 0;
-void tick(const char* what) { if (getenv("DBG")) fprintf(stderr, "%-20s %.3f\n", what, now() - t0); t0 = now(); }
-
 std::vector<bool> with_prior(const TorqueDesign& design) {
   std::vector<bool> out(design.terms.size(), false);
   for (const TorqueGroup& group : design.groups)
@@ -78,9 +71,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   validate(robot);
   require_usable(robot, recordings);
   const Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
-  tick("problem");
   const Groundwork groundwork = groundwork_of(problem);
-  tick("groundwork");
   TorqueDesign design = design_of(problem.robot, problem.range, options.own_effects,
                                   {options.leave_out.begin(), options.leave_out.end()}, !problem.fitted_before);
   add_free_functions(problem.robot, problem.range, &design);
@@ -94,32 +85,25 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   limits.plausible_only = !problem.fitted_before;  // departures from what the robot carries have either sign
   TorqueModel model = groundwork.model;
   std::vector<JointGrams> grams = sum_grams(problem.data, design, problem.nominal, model, problem.train);
-  tick("grams");
   std::vector<Noise> noise = noise_of_all(problem, design, grams, groundwork.noise);
-  tick("noise of all");
   Choice choice;
   // What noise is, and the torque that some terms need, are those of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
     if (round > 0) grams = sum_grams(problem.data, design, problem.nominal, model, problem.train);
     const Sums sums = sums_of(grams, noise, design, priors);
     const Search search(design, sums, nuisance);
-    tick("grams");
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);
-    tick("search");
     model = model_of(problem, design, sums, search, choice);
     noise = noise_of(problem.data, model, problem.train);
   }
   const Sums sums = sums_of(grams, noise, design, priors);
   const Sums held_out = sums_of(sum_grams(problem.data, design, problem.nominal, model, problem.test), noise, design,
                                 std::vector<bool>(design.terms.size(), false));
-  tick("test grams");
   const Search search(design, sums, nuisance);
   SearchLimits few = limits;
   few.least_gain = std::max(0.01, limits.least_gain);
   few.most = static_cast<int>(choice.groups.size()) + 6;
   const Choice with_unknown = search.run(choice, few, true);
-  tick("unknown");
-  struct End { ~End() { tick("named"); } } end;
   return named(problem, groundwork, design, sums, held_out, search, choice, with_unknown, model,
                model_of(problem, design, sums, search, with_unknown), noise);
 }

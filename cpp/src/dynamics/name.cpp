@@ -61,7 +61,9 @@ class Naming {
     const int g = choice_.groups[at];
     const TorqueGroup& mine = group_of(design_, g);
     const Evidence::State less = search_.state(Search::without(choice_, at));
-    const double loss = state_.score - less.score;
+    // As gains are, so that rivals and the group itself are measured alike.
+    const double loss =
+        search_.evidence().gain(less, mine.columns, search_.cost(g)).score;
     const VectorXd theta = values_of(mine);
     std::set<std::pair<std::string, std::vector<std::string>>> seen;
     double in_class = 1.0, outside = std::exp(-kTempered * loss);
@@ -190,7 +192,7 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Torqu
     FoundTorqueEffect found;
     found.effect = group.effect;
     found.joints = group.joints;
-    found.standard = group.standard;
+    found.standard = group.standard && !problem.fitted_before;
     found.probability = naming.probability(k, &found.confounded_with);
     if (problem.single) found.probability = std::min(found.probability, kBlocksOfTime);
     found.parameters = parameters_of(design, group.columns, naming.fit());
@@ -266,8 +268,26 @@ Verdict verdict_of(const TorqueDiagnosis& d, bool any) {
   return d.unknown.empty() ? Verdict::none : Verdict::unknown;
 }
 
+/// Inherent: what is weighed by its torque is known as well as the drives' constants are.
+void add_scale_of_masses(const std::vector<FoundTorqueEffect>& effects, std::vector<TorqueClass>* out) {
+  TorqueClass one;
+  for (const FoundTorqueEffect& found : effects) {
+    if (!found.standard && find_torque_effect(found.effect).traits.family == TorqueFamily::inertia)
+      one.effects.push_back(found.effect);
+  }
+  if (one.effects.empty()) return;
+  for (const TorqueEffect& effect : torque_catalogue()) {
+    if (effect.traits.scales_masses) one.effects.push_back(effect.name);
+  }
+  one.sentence =
+      "Masses and the drives' constants share one scale: with constants that are 10 % larger all masses and inertias are "
+      "10 % larger. A payload of known mass tells.";
+  out->push_back(std::move(one));
+}
+
 std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effects) {
   std::vector<TorqueClass> out;
+  add_scale_of_masses(effects, &out);
   const auto name = [](const std::string& effect, const std::vector<std::string>& joints) {
     std::string text = effect;
     for (std::size_t k = 0; k < joints.size(); ++k) text += (k == 0 ? ":" : "+") + joints[k];

@@ -30,6 +30,7 @@ class Search {
   Choice run(Choice choice, const SearchLimits& limits, bool free_functions) const;
 
   const Evidence& evidence() const { return evidence_; }
+  double cost(int group) const { return groups_[static_cast<std::size_t>(group)].cost; }
   Evidence::State state(const Choice& choice) const { return evidence_.evaluate(choice); }
   std::vector<int> columns(const Choice& choice) const;
 

@@ -75,12 +75,17 @@ def demo_arm() -> Robot:
 
 
 def simulate_motion(
-    *, recordings: int = 5, held_out: int = 2, seconds: float = 24.0, seed: int = 0
+    *,
+    recordings: int = 5,
+    held_out: int = 2,
+    seconds: float = 24.0,
+    seed: int = 0,
+    hidden: Mapping[str, tuple[Sequence[str], Mapping[str, float]]] = HIDDEN,
 ) -> SimulatedMotion:
     """Recordings of `demo_arm` along Fourier trajectories, with friction of every joint, hidden effects (see
     HIDDEN), and noise whose rows are correlated, of 2 % of each torque.
 
-    held_out: so many, the last, are marked as test. The same seed gives the same recordings.
+    held_out: so many, the last, are marked as test. hidden: effects, their joints and parameters. The same seed gives the same recordings.
     """
     nominal = demo_arm()
     truth = nominal.copy()
@@ -90,8 +95,8 @@ def simulate_motion(
         for name, values in zip(names, USUAL, strict=True)
         for k, effect in enumerate(("coulomb", "viscous"))
     ]
-    hidden = [AppliedEffect(name, joints, values) for name, (joints, values) in HIDDEN.items()]
-    truth.torque_effects = [*usual, *hidden]
+    more = [AppliedEffect(name, joints, values) for name, (joints, values) in hidden.items()]
+    truth.torque_effects = [*usual, *more]
     out = []
     for number in range(recordings):
         random = np.random.default_rng([seed, number])

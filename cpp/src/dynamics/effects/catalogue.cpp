@@ -41,6 +41,13 @@ MotionRange unlimited(MotionRange range) {
   return range;
 }
 
+/// A parameter of the form is among the terms already.
+bool has_any(const std::vector<TorqueTerm>& terms, const TorqueForm& form) {
+  return std::any_of(terms.begin(), terms.end(), [&](const TorqueTerm& t) {
+    return std::any_of(form.begin(), form.end(), [&](const TorqueTerm& f) { return f.parameter == t.parameter; });
+  });
+}
+
 }  // namespace
 
 const std::vector<TorqueEffect>& torque_catalogue() {
@@ -77,13 +84,12 @@ std::vector<TorqueTerm> terms_of(const AppliedEffect& applied, const Robot& robo
   std::vector<TorqueTerm> out;
   for (const std::size_t joint : joints) {
     const auto take = [&](const TorqueForm& form) { out.insert(out.end(), form.begin(), form.end()); };
-    bool with_constants = false;
-    for (const TorqueForm& form : effect.forms(robot, joint, range)) {
-      if (!has_all(form, applied.parameters)) continue;
-      const bool has_constants = !form.front().constants.empty();
-      if (has_constants && with_constants) continue;
-      with_constants = with_constants || has_constants;
-      take(has_constants ? effect.form_with(robot, joint, applied.parameters) : form);
+    // The largest first: a smaller form may be a part of it.
+    std::vector<TorqueForm> forms = effect.forms(robot, joint, range);
+    std::stable_sort(forms.begin(), forms.end(), [](const auto& a, const auto& b) { return a.size() > b.size(); });
+    for (const TorqueForm& form : forms) {
+      if (!has_all(form, applied.parameters) || has_any(out, form)) continue;
+      take(form.front().constants.empty() ? form : effect.form_with(robot, joint, applied.parameters));
     }
   }
   if (out.empty()) {

@@ -78,10 +78,16 @@ std::vector<TorqueForm> payload(const Robot& robot, std::size_t, const MotionRan
   for (const Joint& joint : robot.joints) total += joint.mass.value_or(0.0);
   const Size size{std::max(0.1 * total, 0.05), std::max(0.05, 0.1 * stretched(robot))};
   const RigidChain chain(robot);
-  TorqueForm form;
-  for (int part = 0; part < 4; ++part)
-    form.push_back(rigid_term(chain, std::string("payload.") + kParts[part], part, last, size.of(part)));
-  return {form};
+  // A small load is a mass at a place, a large one has an inertia as well.
+  std::vector<TorqueForm> forms;
+  for (const int parts : {4, static_cast<int>(kLinkParameters)}) {
+    TorqueForm form;
+    for (int part = 0; part < parts; ++part)
+      form.push_back(rigid_term(chain, std::string("payload.") + kParts[part], part, last, size.of(part)));
+    form.front().least = 0.0;
+    forms.push_back(std::move(form));
+  }
+  return forms;
 }
 
 std::vector<TorqueForm> armature(const Robot& robot, std::size_t joint, const MotionRange& range) {
@@ -109,7 +115,8 @@ std::vector<TorqueEffect> inertia_effects() {
                  true, traits});
   traits.standard = false;
   traits.plain = "a load at the flange";
-  traits.documentation = {"the last link's mass and first moments", "`payload.m` [kg], `.mx .my .mz` [kg m]",
+  traits.documentation = {"the last link's columns",
+                          "`payload.m` [kg], `.mx .my .mz` [kg m], of a large load `.xx` … [kg m²]",
                           "a robot whose links are known"};
   out.push_back({"payload", "a load at the flange that the model does not have", payload, false, traits});
   traits.plain = "inertia of the motor's rotor";

@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+
+#include <doctest/doctest.h>
+
+#include "dynamics/filter.hpp"
+#include "math/constants.hpp"
+
+using namespace truing::dynamics;
+
+namespace {
+
+constexpr double kStep = 0.01;
+
+Eigen::MatrixXd sine(double frequency, Eigen::Index rows) {
+  Eigen::MatrixXd out(rows, 1);
+  for (Eigen::Index i = 0; i < rows; ++i)
+    out(i, 0) = std::sin(2.0 * truing::math::kPi * frequency * kStep * static_cast<double>(i));
+  return out;
+}
+
+/// Amplitude of a sine in the middle of a filtered record, and of what is out of phase with it.
+std::pair<double, double> response(double frequency) {
+  const Eigen::MatrixXd x = sine(frequency, 1200), y = filtered(x, low_pass(8.0, kStep));
+  double in = 0.0, out = 0.0, squares = 0.0;
+  for (Eigen::Index i = 200; i < 1000; ++i) {
+    const double cosine = std::cos(2.0 * truing::math::kPi * frequency * kStep * static_cast<double>(i));
+    in += x(i, 0) * y(i, 0);
+    out += cosine * y(i, 0);
+    squares += x(i, 0) * x(i, 0);
+  }
+  return {in / squares, out / squares};
+}
+
+}  // namespace
+
+TEST_CASE("a slow sine passes the low-pass unchanged, a fast one does not, and neither is delayed") {
+  CHECK(std::abs(response(1.0).first - 1.0) < 1e-3);
+  CHECK(std::abs(response(8.0).first - 0.5) < 0.02);
+  CHECK(std::abs(response(20.0).first) < 1e-3);
+  for (const double frequency : {1.0, 4.0, 8.0, 20.0}) CHECK(std::abs(response(frequency).second) < 1e-3);
+}
+
+TEST_CASE("a straight line passes the low-pass up to its ends") {
+  Eigen::MatrixXd x(300, 1);
+  for (Eigen::Index i = 0; i < 300; ++i) x(i, 0) = 3.0 - 0.2 * static_cast<double>(i);
+  const Eigen::MatrixXd y = filtered(x, low_pass(8.0, kStep));
+  CHECK((y - x).cwiseAbs().maxCoeff() < 1e-9);
+}
+
+TEST_CASE("every third row of a filtered record is that row") {
+  const Eigen::MatrixXd x = sine(2.0, 400);
+  const Eigen::VectorXd weights = low_pass(8.0, kStep);
+  const Eigen::MatrixXd all = filtered(x, weights), some = filtered(x, weights, 3);
+  REQUIRE(some.rows() == 134);
+  for (Eigen::Index i = 0; i < some.rows(); ++i) CHECK(some(i, 0) == all(3 * i, 0));
+}
+
+TEST_CASE("the rate of a sine is its cosine") {
+  const double w = 2.0 * truing::math::kPi * 0.5;
+  const Eigen::MatrixXd rate = rate_of(sine(0.5, 400), kStep);
+  for (Eigen::Index i = 1; i < 399; ++i)
+    CHECK(std::abs(rate(i, 0) - w * std::cos(w * kStep * static_cast<double>(i))) < 1e-3 * w);
+}

@@ -1,0 +1,149 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which effects stand between a model and recorded torques: simulated arms, and recordings of real ones."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truing
+from truing.dynamics import Recording, diagnose, identify, load_recordings, predict
+from truing.errors import InputError
+from truing.model import AppliedEffect, Robot
+from truing.testing.dynamics import HIDDEN, simulate_motion
+
+REAL = Path(os.environ.get("TRUING_REALDATA", ""))
+UR10E_GAINS = (10.0, 10.6956, 8.4566, 9.0029, 9.4800, 10.1232)  # [Nm/A] published beside the recordings
+
+SIMULATED = simulate_motion(seed=3)
+
+
+def real(folder: str) -> Path:
+    path = REAL / folder
+    if not os.environ.get("TRUING_REALDATA") or not path.exists():
+        pytest.skip(f"TRUING_REALDATA does not hold {folder}")
+    return path
+
+
+def beyond_standard(found: truing.dynamics.TorqueDiagnosis) -> list[tuple[str, tuple[str, ...]]]:
+    return [(e.effect, tuple(e.joints)) for e in found.effects if not e.standard]
+
+
+def percent(found: truing.dynamics.TorqueDiagnosis, model: str) -> np.ndarray:
+    errors = next(e for e in found.errors if e.model == model)
+    return np.array([e.percent for e in errors.held_out])
+
+
+def test_hidden_effects_are_named_with_their_sizes() -> None:
+    found = diagnose(SIMULATED.nominal, SIMULATED.recordings)
+    named = beyond_standard(found)
+    for effect, (joints, values) in HIDDEN.items():
+        assert (effect, tuple(joints)) in named
+        parameters = {
+            p.name: p for e in found.effects if (e.effect, list(e.joints)) == (effect, joints) for p in e.parameters
+        }
+        for name, value in values.items():
+            assert abs(parameters[name].value - value) < 0.2 * abs(value) + 4 * parameters[name].sigma
+    assert len(named) <= len(HIDDEN) + 2
+    assert percent(found, "named").max() < 5 < percent(found, "standard").max()
+
+
+def test_nothing_is_named_where_nothing_is_hidden() -> None:
+    simulated = simulate_motion(seed=4, hidden={})
+    found = diagnose(simulated.nominal, simulated.recordings)
+    assert beyond_standard(found) == []
+    assert found.verdict == "none"
+
+
+def test_one_and_two_threads_give_the_same_bits() -> None:
+    one, two = (diagnose(SIMULATED.nominal, SIMULATED.recordings, threads=n) for n in (1, 2))
+    assert [p.value for e in one.effects for p in e.parameters] == [p.value for e in two.effects for p in e.parameters]
+
+
+def test_identify_finds_what_it_is_asked_for() -> None:
+    fit = identify(
+        SIMULATED.nominal,
+        SIMULATED.recordings,
+        effects="coulomb,viscous,current_offset,load_friction:J2,coupling:J5,armature:J3",
+    )
+    values = {p.name: p.value for p in fit.parameters}
+    for _, (_, hidden) in HIDDEN.items():
+        for name, value in hidden.items():
+            assert values[name] == pytest.approx(value, rel=0.2)
+
+
+def test_the_robot_that_was_found_predicts_the_torques() -> None:
+    found = diagnose(SIMULATED.nominal, SIMULATED.recordings)
+    recording = SIMULATED.recordings[-1]
+    error = predict(found.robot, recording).torque - recording.torque
+    assert (error.std(axis=0) / recording.torque.std(axis=0)).max() < 0.06
+
+
+def test_a_fitted_robot_needs_nothing_more() -> None:
+    found = diagnose(SIMULATED.nominal, SIMULATED.recordings)
+    again = diagnose(found.robot, SIMULATED.recordings)
+    assert sum(e.share.value for e in again.effects) < 0.1
+
+
+def test_prediction_is_the_effects_laws_beside_the_rigid_torques() -> None:
+    arm = SIMULATED.nominal.copy()
+    bare = SIMULATED.recordings[0]
+    rigid = predict(arm, bare).torque
+    arm.torque_effects = [AppliedEffect("current_offset", ["J2"], {"current_offset.J2": 3.0})]
+    assert np.abs(predict(arm, bare).torque - rigid - np.eye(6)[1] * 3.0).max() < 1e-9
+
+
+def test_recordings_without_torques_are_refused() -> None:
+    first = SIMULATED.recordings[0]
+    bare = Recording("bare", time=first.time, position=first.position)
+    with pytest.raises(InputError, match="'bare': no torques"):
+        diagnose(SIMULATED.nominal, [bare])
+
+
+def test_a_robot_without_masses_is_refused() -> None:
+    bare = SIMULATED.nominal.copy()
+    for joint in bare.joints:
+        joint.mass = None
+    with pytest.raises(InputError, match="mass"):
+        diagnose(bare, SIMULATED.recordings)
+
+
+def ur10e() -> tuple[Robot, Path]:
+    folder = real("dyn_ur10e")
+    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
+    for index, gain in zip(robot.driven_joints(), UR10E_GAINS, strict=True):
+        robot.joints[index].torque_per_ampere = gain
+    return robot, folder
+
+
+@pytest.mark.realdata
+def test_ur10e_held_out_torque_and_the_payload_that_nobody_told() -> None:
+    robot, folder = ur10e()
+    free = [p for p in sorted(folder.glob("*.csv")) if not p.name.endswith("_load.csv") and p.stem != "ptp10"]
+    found = diagnose(robot, load_recordings(free, robot))
+    assert set(found.held_out) == {"h7_20s", "h12_40s"}
+    assert (percent(found, "named") < [7.0, 3.5, 3.5, 6.5, 11.0, 8.5]).all()
+    names = beyond_standard(found)
+    assert ("load_friction", ("elbow_joint",)) in names and ("load_friction", ("shoulder_lift_joint",)) in names
+    assert ("presliding", ("wrist_2_joint",)) in names[:3]
+
+    loaded = diagnose(found.robot, load_recordings([folder / "h14_50s_load.csv"], found.robot))
+    first = loaded.effects[0]
+    assert first.effect == "payload" and first.probability >= 0.9
+    mass = next(p.value for p in first.parameters if p.name == "payload.m")
+    assert mass == pytest.approx(2.805, rel=0.15)
+    assert any("share one scale" in c.sentence for c in loaded.classes)
+
+
+@pytest.mark.realdata
+def test_the_coupled_wrist_of_a_tx40_is_named_first() -> None:
+    folder = real("dyn_tx40")
+    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
+    found = diagnose(robot, load_recordings([folder / "run.csv"], robot), cutoff=20.0)
+    first = beyond_standard(found)[:2]
+    assert {("coupling", ("joint_5", "joint_6")), ("coupling", ("joint_6", "joint_5"))} == set(first)
+    assert all(e.probability <= 0.9 for e in found.effects if not e.standard)  # one recording
