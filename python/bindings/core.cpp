@@ -27,7 +27,6 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_effect_traits(m);
   truing::python::bind_effect(m);
   truing::python::bind_motion_recording(m);
-  truing::python::bind_torque(m);
   truing::python::bind_urdf(m);
   truing::python::bind_torque_regressor(m);
   truing::python::bind_scene(m);
@@ -44,4 +43,5 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_simulation(m);
   truing::python::bind_calibrate(m);
   truing::python::bind_rigid(m);
+  truing::python::bind_torque(m);
 }

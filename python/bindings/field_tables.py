@@ -9,7 +9,8 @@ in brackets.
 
 - Fields of one declaration share its comment. A field of an enum's type lists what the values mean.
 - A double whose default is NaN is `None` in Python as long as it is not given.
-- Own effects (`std::vector<Effect>`, `std::vector<TorqueEffect>`) hold functions: they are arguments of the bound functions, not fields.
+- Own effects (`std::vector<Effect>`, `std::vector<TorqueEffect>`) hold functions: they are arguments of
+  the bound functions, not fields.
 - An enumerator is its name in Python, or the quoted word that its comment begins with:
   `not_closing,  ///< "not closing": ...`. Enumerators with numbers of their own are left out.
 """

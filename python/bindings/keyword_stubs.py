@@ -13,7 +13,18 @@ import ast
 import sys
 from pathlib import Path
 
-TAKEN = ("Identify", "Plan", "Distinguish", "Diagnose", "HandEye", "HandEyePlan", "Inverse", "Path", "Torque", "TorqueDiagnose")
+TAKEN = (
+    "Identify",
+    "Plan",
+    "Distinguish",
+    "Diagnose",
+    "HandEye",
+    "HandEyePlan",
+    "Inverse",
+    "Path",
+    "Torque",
+    "TorqueDiagnose",
+)
 
 HEAD = '''# Made by python/bindings/keyword_stubs.py from _core.pyi: run scripts/stubs.sh.
 """Keywords that are the fields of an options class, by class."""

@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'urdf_with_calibration', 'validate_measurements', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueClass', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'torque_effects', 'torque_regressor', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -152,7 +152,7 @@ class NotTestable:
         Where; empty: at any joint.
         """
     @property
-    def reason(self) -> typing.Literal['column_missing', 'masses_missing', 'joint_at_rest', 'input_constant', 'no_motion', 'same_as_frames', 'other']:
+    def reason(self) -> typing.Literal['column_missing', 'masses_missing', 'joint_at_rest', 'input_constant', 'no_motion', 'same_as_frames', 'same_as_masses', 'other']:
         """
         The same for programs.
         
@@ -162,6 +162,7 @@ class NotTestable:
         'input_constant': its input never changes
         'no_motion': it moves nothing at these poses
         'same_as_frames': base and tool do the same
+        'same_as_masses': other masses of the links do the same
         'other': as `why` says
         """
     @property
@@ -563,8 +564,9 @@ class Robot:
     @property
     def fitted_range(self) -> types.MappingProxyType[str, tuple[float, float]]:
         """
-        Smallest and largest value of the inputs that the effects were fitted on: 'q1' … [rad | m],
-        'payload' [kg], 'temp' [deg C]. Beyond it nobody has seen what they do. Empty: not known.
+        Smallest and largest value of the inputs that the effects were fitted on: 'q1' … [rad | m], 'qd1' …
+        [rad/s | m/s], 'payload' [kg], 'temp' [deg C]. Beyond it nobody has seen what they do. Empty: not
+        known.
         """
     @fitted_range.setter
     def fitted_range(self, arg1: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
@@ -6553,6 +6555,560 @@ class InertialResult:
         """
         What to know or do.
         """
+class TorqueOptions:
+    """
+    How torques are fitted.
+    
+    effects = []: Effects to fit. None: what is usual, the links' inertial parameters, armature, Coulomb and viscous
+        friction, an offset.
+    fit_inertials = True: The links' inertial parameters are fitted beside the effects.
+    cutoff = None: [Hz] of the low-pass without phase that both sides of the equation of motion go through; NaN: from
+        the data, where torques and model stop to go together.
+    test_share = 0.3: Fraction of the time held out when there is one recording, or none is marked as test.
+    threads = 0: 0: as many as the machine has.
+    """
+    def __init__(self, *, effects: collections.abc.Sequence[EffectRequest] = [], fit_inertials: bool = True, cutoff: typing.SupportsFloat | typing.SupportsIndex | None = None, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> TorqueOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> TorqueOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def cutoff(self) -> float | None:
+        """
+        [Hz] of the low-pass without phase that both sides of the equation of motion go through; NaN: from
+        the data, where torques and model stop to go together.
+        """
+    @cutoff.setter
+    def cutoff(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def effects(self) -> tuple[EffectRequest, ...]:
+        """
+        Effects to fit. None: what is usual, the links' inertial parameters, armature, Coulomb and viscous
+        friction, an offset.
+        """
+    @effects.setter
+    def effects(self, arg1: collections.abc.Sequence[EffectRequest]) -> None:
+        ...
+    @property
+    def fit_inertials(self) -> bool:
+        """
+        The links' inertial parameters are fitted beside the effects.
+        """
+    @fit_inertials.setter
+    def fit_inertials(self, arg1: bool) -> None:
+        ...
+    @property
+    def test_share(self) -> float:
+        """
+        Fraction of the time held out when there is one recording, or none is marked as test.
+        """
+    @test_share.setter
+    def test_share(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def threads(self) -> int:
+        """
+        0: as many as the machine has.
+        """
+    @threads.setter
+    def threads(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class TorqueDiagnoseOptions:
+    """
+    How a gap of torques is diagnosed.
+    
+    leave_out = []: Effects that are not to be considered, by name.
+    cutoff = None: [Hz] of the low-pass without phase; NaN: from the data, where torques and model stop to go together.
+    test_share = 0.3: Fraction of the time held out when there is one recording, or none is marked as test.
+    max_effects = 40: Maximum number of effects named.
+    least_gain = 0.004: [-] fraction of a joint's squared error on unseen recordings that a name must remove.
+    threads = 0: 0: as many as the machine has.
+    """
+    def __init__(self, *, leave_out: collections.abc.Sequence[str] = [], cutoff: typing.SupportsFloat | typing.SupportsIndex | None = None, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, max_effects: typing.SupportsInt | typing.SupportsIndex = 40, least_gain: typing.SupportsFloat | typing.SupportsIndex = 0.004, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> TorqueDiagnoseOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> TorqueDiagnoseOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def cutoff(self) -> float | None:
+        """
+        [Hz] of the low-pass without phase; NaN: from the data, where torques and model stop to go together.
+        """
+    @cutoff.setter
+    def cutoff(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def least_gain(self) -> float:
+        """
+        [-] fraction of a joint's squared error on unseen recordings that a name must remove.
+        """
+    @least_gain.setter
+    def least_gain(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def leave_out(self) -> tuple[str, ...]:
+        """
+        Effects that are not to be considered, by name.
+        """
+    @leave_out.setter
+    def leave_out(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
+    def max_effects(self) -> int:
+        """
+        Maximum number of effects named.
+        """
+    @max_effects.setter
+    def max_effects(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def test_share(self) -> float:
+        """
+        Fraction of the time held out when there is one recording, or none is marked as test.
+        """
+    @test_share.setter
+    def test_share(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def threads(self) -> int:
+        """
+        0: as many as the machine has.
+        """
+    @threads.setter
+    def threads(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class TorqueError:
+    """
+    Errors of a joint's torque, both sides low-passed.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def joint(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def n(self) -> float:
+        """
+        Number of rows.
+        """
+    @property
+    def percent(self) -> float:
+        """
+        [%] of the measured torque's standard deviation.
+        """
+    @property
+    def rms(self) -> float:
+        """
+        [Nm | N]
+        """
+class TorqueErrors:
+    """
+    Errors of one model on the recordings that were held out, and on the others.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def held_out(self) -> tuple[TorqueError, ...]:
+        """
+        Joint by joint.
+        """
+    @property
+    def model(self) -> str:
+        """
+        'nominal', 'standard', 'named' or 'with_unknown'.
+        """
+    @property
+    def train(self) -> tuple[TorqueError, ...]:
+        """
+        Joint by joint.
+        """
+class TorqueFit:
+    """
+    What a fit of torques found.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def cutoff(self) -> float:
+        """
+        [Hz] of the low-pass.
+        """
+    @property
+    def errors(self) -> tuple[TorqueErrors, ...]:
+        """
+        'nominal', 'standard' (what is usual), 'named' (what was asked for)
+        """
+    @property
+    def held_out(self) -> tuple[str, ...]:
+        """
+        Names of the recordings that were held out; of one recording: 'blocks of time'.
+        """
+    @property
+    def not_testable(self) -> tuple[NotTestable, ...]:
+        """
+        What the recordings could not show.
+        """
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """
+        Of the effects, with standard errors; 'link_inertia…': change from nominal.
+        """
+    @property
+    def robot(self) -> Robot:
+        """
+        With the inertial parameters and Robot::torque_effects that were found.
+        """
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """
+        What to know before trusting it.
+        """
+class TorquePrediction:
+    """
+    Torques of a recording as a robot predicts them.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def current(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [A] of drives whose torque per ampere is known, else NaN.
+        """
+    @property
+    def time(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shape=(n,) [s] as recorded.
+        """
+    @property
+    def torque(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [Nm | N]
+        """
+class TorqueAlternative:
+    """
+    An effect that explains torques as well as the one named.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effect(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Where.
+        """
+    @property
+    def probability(self) -> float:
+        """
+        Its part of the class's posterior probability.
+        """
+class FoundTorqueEffect:
+    """
+    An effect on the torques that `diagnose` named.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def confounded_with(self) -> tuple[TorqueAlternative, ...]:
+        """
+        Effects that would explain these recordings as well.
+        """
+    @property
+    def curve(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(n, 3): input, torque, standard error of it [Nm | N]
+        """
+    @property
+    def curve_input(self) -> str:
+        """
+        What the curve is drawn against, with its unit.
+        """
+    @property
+    def effect(self) -> str:
+        """
+        Its name, as in `torque_catalogue()`.
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Where; of a coupling the joint that is moved first, the acting one second.
+        """
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """
+        Values and standard errors, constants of its law among them.
+        """
+    @property
+    def probability(self) -> float:
+        """
+        Posterior of the class: this effect or one of `confounded_with`.
+        """
+    @property
+    def rms(self) -> float:
+        """
+        [Nm | N] of its torque.
+        """
+    @property
+    def sentence(self) -> str:
+        """
+        In plain words.
+        """
+    @property
+    def share(self) -> Share:
+        """
+        Fraction of the squared error that standard practice leaves (of a standard one: that the nominal
+        model leaves) that it removes, all others in, on recordings that were not fitted; over all joints,
+        each by its noise.
+        """
+    @property
+    def standard(self) -> bool:
+        """
+        What everybody fits: inertial parameters, Coulomb, viscous, an offset.
+        """
+class UnknownTorque:
+    """
+    A part of the torques that goes with an input, and that no effect of the catalogue explains.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def curve(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(n, 3): input, torque, standard error [Nm | N]
+        """
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """
+        'angle', 'speed', 'load', 'time', 'direction' or a column.
+        """
+    @property
+    def joint(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def probability(self) -> float:
+        """
+        Posterior that there is such a thing.
+        """
+    @property
+    def rms(self) -> float:
+        """
+        [Nm | N] of its torque.
+        """
+    @property
+    def share(self) -> Share:
+        """
+        As that of an effect.
+        """
+class TorqueRegime:
+    """
+    How much of the gap lies in one part of the motion.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def high(self) -> float:
+        """
+        Of the input: upper end.
+        """
+    @property
+    def input(self) -> str:
+        """
+        'speed', 'direction', 'acceleration', 'load', 'time', 'temperature', 'angle'.
+        """
+    @property
+    def joint(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def low(self) -> float:
+        """
+        Of the input: lower end.
+        """
+    @property
+    def n(self) -> float:
+        """
+        Number of rows.
+        """
+    @property
+    def named(self) -> float:
+        """
+        [Nm | N] rms error that is left with what was named.
+        """
+    @property
+    def standard(self) -> float:
+        """
+        [Nm | N] rms error that standard practice leaves there.
+        """
+class TorqueClass:
+    """
+    What cannot be told apart from these recordings.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """
+        'motor_constant:J2', 'payload' ….
+        """
+    @property
+    def sentence(self) -> str:
+        """
+        In words, with what to record to tell.
+        """
+class TorqueTrace:
+    """
+    A stretch of a held-out recording, to look at.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def joint(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def measured(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(n,) [Nm | N]
+        """
+    @property
+    def named(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(n,) [Nm | N]
+        """
+    @property
+    def nominal(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(n,) [Nm | N]
+        """
+    @property
+    def recording(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def standard(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(n,) [Nm | N]
+        """
+    @property
+    def time(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(n,) [s]
+        """
+class TorqueDiagnosis:
+    """
+    What `truing::dynamics::diagnose` found.
+    """
+    def __repr__(self) -> str:
+        ...
+    def summary(self) -> str:
+        """
+        A few lines for people.
+        """
+    @property
+    def classes(self) -> tuple[TorqueClass, ...]:
+        """
+        What cannot be told apart.
+        """
+    @property
+    def cutoff(self) -> float:
+        """
+        [Hz] of the low-pass.
+        """
+    @property
+    def design_effect(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(joints,): rows that count as one.
+        """
+    @property
+    def effects(self) -> tuple[FoundTorqueEffect, ...]:
+        """
+        Beyond standard practice by share, then what is standard.
+        """
+    @property
+    def errors(self) -> tuple[TorqueErrors, ...]:
+        """
+        'nominal', 'standard', 'named', 'with_unknown'.
+        """
+    @property
+    def held_out(self) -> tuple[str, ...]:
+        """
+        Names of the recordings that were held out; of one recording: 'blocks of time'.
+        """
+    @property
+    def not_testable(self) -> tuple[NotTestable, ...]:
+        """
+        What the recordings could not show.
+        """
+    @property
+    def robot(self) -> Robot:
+        """
+        With what was named.
+        """
+    @property
+    def sentence(self) -> str:
+        """
+        The verdict in words.
+        """
+    @property
+    def traces(self) -> tuple[TorqueTrace, ...]:
+        """
+        A held-out stretch of every joint.
+        """
+    @property
+    def unknown(self) -> tuple[UnknownTorque, ...]:
+        """
+        What no effect explains.
+        """
+    @property
+    def verdict(self) -> typing.Literal['none', 'effects', 'unknown', 'effects+unknown', 'does_not_hold']:
+        """
+        Whether there is a gap beyond standard practice, and whether names explain it.
+        
+        'none': no gap beyond noise
+        'effects': named, and nothing is left
+        'unknown': a gap that no effect of the catalogue explains
+        'effects+unknown': named, and something is left
+        'does_not_hold': what was found does not make the error of held-out poses less: nothing of it is in `robot`
+        """
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """
+        What to know before trusting it.
+        """
+    @property
+    def where(self) -> tuple[TorqueRegime, ...]:
+        """
+        The gap by joint and part of the motion.
+        """
 def assemble_setup(frames: FramesResult, inertial: InertialResult, tool: ToolResult | None = None) -> tuple[TrackSetup, list[str]]:
     """
     The parts put together, gravity in the base frame; and what to know, as a base that is not level. Without `tool` it is the flange.
@@ -6609,6 +7165,24 @@ def distinguish(robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, n
     Before any data: which effects a plan can tell apart, how small it would still see them, and the poses to add.
     
     Raises InputError: unknown effects, joints or columns.
+    """
+def dynamics_diagnose(robot: Robot, recordings: collections.abc.Sequence[Recording], options: TorqueDiagnoseOptions | None = None) -> TorqueDiagnosis:
+    """
+    Which effects stand between a robot's model and the torques that it was recorded with.
+    
+    Raises InputError on recordings or options that cannot be used.
+    """
+def dynamics_identify(robot: Robot, recordings: collections.abc.Sequence[Recording], options: TorqueOptions | None = None) -> TorqueFit:
+    """
+    Finds inertial parameters and the effects asked for from recordings with torques or currents.
+    
+    Raises InputError on recordings or options that cannot be used.
+    """
+def dynamics_predict(robot: Robot, recording: Recording, cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0) -> TorquePrediction:
+    """
+    Torques of every row of a recording: links, rotors, and the effects that the robot carries.
+    
+    Raises InputError on a recording that cannot be used.
     """
 def find_rests(t: numpy.typing.ArrayLike, T_base_flange: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[n, 4, 4]"], tracker_t: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, orientation: numpy.typing.ArrayLike, *, least: typing.SupportsFloat | typing.SupportsIndex = 2.0, margin: typing.SupportsFloat | typing.SupportsIndex = 0.5, moved_by: typing.SupportsFloat | typing.SupportsIndex = 0.0005, turned_by: typing.SupportsFloat | typing.SupportsIndex = 0.0005, clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> tuple[RestPose, ...]:
     """
@@ -6728,6 +7302,13 @@ def last_moving_link(urdf_text: str, base_link: str = '') -> str:
     
     Raises InputError: not a URDF, unknown base, nothing moves, several chains move.
     """
+def link_parameters(robot: Robot) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    Inertial parameters of all links, one after the other, shape=(10 * joints,).
+    
+    Of a link: mass, mass times centre of mass (x, y, z), inertia about the origin of the frame after the link (xx, yy, zz,
+    xy, xz, yz) [kg, kg m, kg m^2]; what is not known is zero.
+    """
 def nearest_contact(scene: Scene, robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], target: typing.SupportsInt | typing.SupportsIndex = 0) -> Contact:
     """
     The nearest pair at these readings, effects left out; without names when there is none to look at.
@@ -6809,6 +7390,10 @@ def rpy_from_rotation(rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.f
 def simulate_streams(robot: Robot, options: StreamSimulationOptions | None = None) -> SimulatedStreams:
     """
     Streams of an arm that sways, with known truth; shares no equation with the filter. Raises InputError on options that make no sense.
+    """
+def torque_effects() -> list[dict[str, str]]:
+    """
+    What every effect on torques is, in words, by the catalogue's order.
     """
 def torque_regressor(robot: Robot, q: numpy.typing.ArrayLike, qd: numpy.typing.ArrayLike, qdd: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """

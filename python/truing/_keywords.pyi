@@ -247,3 +247,31 @@ class PathKeywords(TypedDict, total=False):
     """Samples of each rail before the arm, over what it can be reached from."""
     smoothing: int
     """Smoothing iterations of the path, where the task leaves degrees of freedom."""
+
+class TorqueKeywords(TypedDict, total=False):
+    effects: Effects
+    """Effects to fit. None: what is usual, the links' inertial parameters, armature, Coulomb and viscous
+    friction, an offset."""
+    fit_inertials: bool
+    """The links' inertial parameters are fitted beside the effects."""
+    cutoff: float | None
+    """[Hz] of the low-pass without phase that both sides of the equation of motion go through; NaN: from
+    the data, where torques and model stop to go together."""
+    test_share: float
+    """Fraction of the time held out when there is one recording, or none is marked as test."""
+    threads: int
+    """0: as many as the machine has."""
+
+class TorqueDiagnoseKeywords(TypedDict, total=False):
+    leave_out: str | Sequence[str]
+    """Effects that are not to be considered, by name."""
+    cutoff: float | None
+    """[Hz] of the low-pass without phase; NaN: from the data, where torques and model stop to go together."""
+    test_share: float
+    """Fraction of the time held out when there is one recording, or none is marked as test."""
+    max_effects: int
+    """Maximum number of effects named."""
+    least_gain: float
+    """[-] fraction of a joint's squared error on unseen recordings that a name must remove."""
+    threads: int
+    """0: as many as the machine has."""

@@ -47,7 +47,8 @@ void add_at(const TorqueEffect& effect, std::size_t joint, const Robot& robot, c
   }
 }
 
-// --- free functions ----------------------------------------------------------------------------------------------------
+// --- free functions
+// ----------------------------------------------------------------------------------------------------
 
 /// An input of a free function, and how far it goes.
 struct FreeInput {
@@ -86,8 +87,7 @@ void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, dou
       const VectorXd x = input.value(m);
       MatrixXd out(x.size(), 1);
       for (Index i = 0; i < x.size(); ++i) {
-        const double side =
-            input.times_direction ? std::tanh(m.qd(i, static_cast<Index>(joint)) / kSpeedAtRest) : 1.0;
+        const double side = input.times_direction ? std::tanh(m.qd(i, static_cast<Index>(joint)) / kSpeedAtRest) : 1.0;
         out(i, 0) = side * hat(x[i], k, input.low, input.high);
       }
       return out;
@@ -105,8 +105,8 @@ std::vector<FreeInput> inputs_at(std::size_t joint, const MotionRange& range) {
   const auto load = [j](const Motion& m) -> VectorXd { return m.torque.col(j); };
   const double torque = 2.0 * range.torque[j];
   out.push_back({"angle", range.lower[j], range.upper[j], false, angle});
-  out.push_back({"speed", -range.speed[j], range.speed[j], false,
-                 [j](const Motion& m) -> VectorXd { return m.qd.col(j); }});
+  out.push_back(
+      {"speed", -range.speed[j], range.speed[j], false, [j](const Motion& m) -> VectorXd { return m.qd.col(j); }});
   out.push_back({"load", -torque, torque, true, load});
   out.push_back({"angle", range.lower[j], range.upper[j], false, angle, true});
   out.push_back({"load", -torque, torque, true, load, true});
@@ -120,7 +120,8 @@ std::vector<FreeInput> inputs_at(std::size_t joint, const MotionRange& range) {
   return out;
 }
 
-// --- normal equations --------------------------------------------------------------------------------------------------
+// --- normal equations
+// --------------------------------------------------------------------------------------------------
 
 /// Columns of the design that a joint's torque has.
 std::vector<std::vector<int>> columns_by_joint(const TorqueDesign& design, std::size_t joints) {
@@ -152,8 +153,8 @@ std::vector<MatrixXd> filtered_columns(const Tile& tile, const TorqueDesign& des
 /// Sums of one recording.
 class RecordingGrams {
  public:
-  RecordingGrams(const TorqueDesign& design, const TorqueModel& subtracted, const TorqueModel& seen,
-                 const Folds& folds, const std::vector<std::vector<int>>& by_joint)
+  RecordingGrams(const TorqueDesign& design, const TorqueModel& subtracted, const TorqueModel& seen, const Folds& folds,
+                 const std::vector<std::vector<int>>& by_joint)
       : design_(design), subtracted_(subtracted), seen_(seen), folds_(folds), by_joint_(by_joint) {
     for (const std::vector<int>& columns : by_joint_)
       sums_.emplace_back(static_cast<std::size_t>(folds.count), GramSum(static_cast<Index>(columns.size())));
@@ -209,7 +210,8 @@ TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::
   TorqueDesign out;
   const auto try_at = [&](const TorqueEffect& effect, std::size_t joint) {
     const std::string name = robot.joints[robot.driven_joints()[joint]].name;
-    const std::vector<std::string> where = effect.per_joint ? std::vector<std::string>{name} : std::vector<std::string>{};
+    const std::vector<std::string> where =
+        effect.per_joint ? std::vector<std::string>{name} : std::vector<std::string>{};
     try {
       add_at(effect, joint, robot, range, &out);
     } catch (const MissingColumn& error) {
@@ -222,7 +224,9 @@ TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::
     for (const TorqueEffect& effect : *effects) {
       if (leave_out.count(effect.name) > 0) continue;
       if (fits_masses && effect.traits.scales_masses) {
-        out.not_testable.push_back({effect.name, {}, "the same as all masses times a factor: needs a known payload",
+        out.not_testable.push_back({effect.name,
+                                    {},
+                                    "the same as all masses times a factor: needs a known payload",
                                     Untestable::same_as_masses});
         continue;
       }

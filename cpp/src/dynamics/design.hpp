@@ -36,11 +36,12 @@ struct TorqueDesign {
   std::vector<NotTestable> not_testable;
 };
 
-/// All effects of the catalogue, and one's own, at all joints. `leave_out`: names. `fits_masses`: inertial parameters are
-/// fitted beside them.
+/// All effects of the catalogue, and one's own, at all joints. `leave_out`: names. `fits_masses`: inertial parameters
+/// are fitted beside them.
 TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::vector<TorqueEffect>& own,
                        const std::set<std::string>& leave_out, bool fits_masses);
-/// One effect more, in all its forms, at a joint (-1: at every joint). Throws std::invalid_argument where it does not suit.
+/// One effect more, in all its forms, at a joint (-1: at every joint). Throws std::invalid_argument where it does not
+/// suit.
 void add_effect(const TorqueEffect& effect, int joint, const Robot& robot, const MotionRange& range,
                 TorqueDesign* design);
 /// Free functions of what may drive an unknown effect, at every joint.

@@ -39,9 +39,8 @@ std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& desi
   std::vector<int> columns;
   for (const TorqueGroup& group : design.groups) {
     // Not what needs the torque: with that of another model it would be another column.
-    const bool fixed = std::none_of(group.columns.begin(), group.columns.end(), [&](int c) {
-      return design.terms[static_cast<std::size_t>(c)].needs_torque;
-    });
+    const bool fixed = std::none_of(group.columns.begin(), group.columns.end(),
+                                    [&](int c) { return design.terms[static_cast<std::size_t>(c)].needs_torque; });
     if (!group.effect.empty() && fixed) columns.insert(columns.end(), group.columns.begin(), group.columns.end());
   }
   std::vector<Noise> noise = first;

@@ -46,7 +46,8 @@ TorqueDesign requested_design(const Problem& problem, const TorqueOptions& optio
   for (const EffectRequest& request : requests) {
     const TorqueEffect& effect = find_torque_effect(request.effect, options.own_effects);
     if (request.joints.empty()) add_effect(effect, -1, problem.robot, problem.range, &design);
-    for (const std::string& joint : request.joints) add_effect(effect, number(joint), problem.robot, problem.range, &design);
+    for (const std::string& joint : request.joints)
+      add_effect(effect, number(joint), problem.robot, problem.range, &design);
   }
   return design;
 }

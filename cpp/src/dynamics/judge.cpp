@@ -25,16 +25,16 @@ struct RegimeInput {
 
 std::vector<RegimeInput> inputs_of(const MotionRange& range, Index j) {
   std::vector<RegimeInput> out;
-  out.push_back({"speed", 0.0, range.speed[j], kBins,
-                 [j](const Tile& t, Index i) { return std::abs(t.motion.qd(i, j)); }});
-  out.push_back({"direction", -1.0, 1.0, 2,
-                 [j](const Tile& t, Index i) { return t.motion.qd(i, j) < 0.0 ? -0.5 : 0.5; }});
+  out.push_back(
+      {"speed", 0.0, range.speed[j], kBins, [j](const Tile& t, Index i) { return std::abs(t.motion.qd(i, j)); }});
+  out.push_back(
+      {"direction", -1.0, 1.0, 2, [j](const Tile& t, Index i) { return t.motion.qd(i, j) < 0.0 ? -0.5 : 0.5; }});
   out.push_back({"acceleration", 0.0, range.acceleration[j], kBins,
                  [j](const Tile& t, Index i) { return std::abs(t.motion.qdd(i, j)); }});
   out.push_back({"load", 0.0, 2.5 * range.torque[j], kBins,
                  [j](const Tile& t, Index i) { return std::abs(t.motion.torque(i, j)); }});
-  out.push_back({"angle", range.lower[j], range.upper[j], kBins,
-                 [j](const Tile& t, Index i) { return t.motion.q(i, j); }});
+  out.push_back(
+      {"angle", range.lower[j], range.upper[j], kBins, [j](const Tile& t, Index i) { return t.motion.q(i, j); }});
   out.push_back({"time", 0.0, range.duration, kBins, [](const Tile& t, Index i) { return t.motion.time[i]; }});
   const std::string own = "temp" + std::to_string(j + 1) + "_C";
   for (const std::string& name : {own, std::string("temp_C")}) {
@@ -102,8 +102,8 @@ std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& st
   const auto joints = static_cast<Index>(problem.robot.driven_count());
   const std::vector<std::size_t> driven = problem.robot.driven_joints();
   std::vector<TorqueTrace> out(static_cast<std::size_t>(joints));
-  const auto first = std::find_if(problem.test.of_recording.begin(), problem.test.of_recording.end(),
-                                  [](int of) { return of >= 0; });
+  const auto first =
+      std::find_if(problem.test.of_recording.begin(), problem.test.of_recording.end(), [](int of) { return of >= 0; });
   if (first == problem.test.of_recording.end()) return {};
   const auto r = static_cast<std::size_t>(first - problem.test.of_recording.begin());
   double begin = -1.0;

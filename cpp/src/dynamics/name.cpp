@@ -15,11 +15,11 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kClassNats = 3.0;      ///< a rival within this many is in the class
-constexpr double kClassR2 = 0.98;       ///< so is what can make the same torque
-constexpr double kSameR2 = 0.5;         ///< what makes less of the torque is another matter
-constexpr double kTempered = 0.5;       ///< no model is exact: half a nat counts for one
-constexpr double kBlocksOfTime = 0.9;   ///< the most that folds of one recording are worth
+constexpr double kClassNats = 3.0;     ///< a rival within this many is in the class
+constexpr double kClassR2 = 0.98;      ///< so is what can make the same torque
+constexpr double kSameR2 = 0.5;        ///< what makes less of the torque is another matter
+constexpr double kTempered = 0.5;      ///< no model is exact: half a nat counts for one
+constexpr double kBlocksOfTime = 0.9;  ///< the most that folds of one recording are worth
 
 const TorqueGroup& group_of(const TorqueDesign& design, int g) { return design.groups[static_cast<std::size_t>(g)]; }
 
@@ -62,8 +62,7 @@ class Naming {
     const TorqueGroup& mine = group_of(design_, g);
     const Evidence::State less = search_.state(Search::without(choice_, at));
     // As gains are, so that rivals and the group itself are measured alike.
-    const double loss =
-        search_.evidence().gain(less, mine.columns, search_.cost(g)).score;
+    const double loss = search_.evidence().gain(less, mine.columns, search_.cost(g)).score;
     const VectorXd theta = values_of(mine);
     std::set<std::pair<std::string, std::vector<std::string>>> seen;
     double in_class = 1.0, outside = std::exp(-kTempered * loss);
@@ -108,9 +107,7 @@ class Naming {
   }
 
  private:
-  bool is_in(int g) const {
-    return std::find(choice_.groups.begin(), choice_.groups.end(), g) != choice_.groups.end();
-  }
+  bool is_in(int g) const { return std::find(choice_.groups.begin(), choice_.groups.end(), g) != choice_.groups.end(); }
 
   VectorXd folds_and_held_out(const Choice& choice) const {
     const VectorXd folds = search_.squares_of_folds(choice);
@@ -246,7 +243,8 @@ std::string verdict_sentence(const TorqueDiagnosis& d, bool fitted_before) {
     if (causes.size() == 3) break;
     causes.push_back(find_torque_effect(e.effect).traits.plain + at_joints(e.joints));
   }
-  const std::string beside = fitted_before ? "the robot's model" : "standard practice (inertias, Coulomb, viscous, offset)";
+  const std::string beside =
+      fitted_before ? "the robot's model" : "standard practice (inertias, Coulomb, viscous, offset)";
   if (d.verdict == Verdict::does_not_hold) return "What was found does not hold on recordings it never saw.";
   if (causes.empty()) {
     return d.unknown.empty() ? "No gap beyond noise is left by " + beside + "."
@@ -280,7 +278,8 @@ void add_scale_of_masses(const std::vector<FoundTorqueEffect>& effects, std::vec
     if (effect.traits.scales_masses) one.effects.push_back(effect.name);
   }
   one.sentence =
-      "Masses and the drives' constants share one scale: with constants that are 10 % larger all masses and inertias are "
+      "Masses and the drives' constants share one scale: with constants that are 10 % larger all masses and inertias "
+      "are "
       "10 % larger. A payload of known mass tells.";
   out->push_back(std::move(one));
 }
@@ -297,7 +296,8 @@ std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effect
     if (found.confounded_with.empty()) continue;
     TorqueClass one;
     one.effects.push_back(name(found.effect, found.joints));
-    for (const TorqueAlternative& other : found.confounded_with) one.effects.push_back(name(other.effect, other.joints));
+    for (const TorqueAlternative& other : found.confounded_with)
+      one.effects.push_back(name(other.effect, other.joints));
     one.sentence = "These recordings cannot tell apart: " + listed(one.effects);
     out.push_back(std::move(one));
   }

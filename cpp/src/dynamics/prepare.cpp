@@ -72,7 +72,8 @@ MatrixXd moving_rows(const MatrixXd& qd, double step, Index stride) {
     last_fast = qd.rows() + window + 1;
     for (Index i = qd.rows() - 1; i >= 0; --i) {
       if (std::abs(qd(i, c)) > kSpeedAtRest) last_fast = i;
-      if (i % stride == 0) out(i / stride, c) = fast[static_cast<std::size_t>(i)] || last_fast - i <= window ? 1.0 : 0.0;
+      if (i % stride == 0)
+        out(i / stride, c) = fast[static_cast<std::size_t>(i)] || last_fast - i <= window ? 1.0 : 0.0;
     }
   }
   return out;
@@ -122,8 +123,8 @@ VectorXd rows_of(const VectorXd& x, Index begin, Index count) { return x.segment
 Tile tile_of(const Stretch& stretch, Index from, Index to) {
   const Tile& whole = stretch.whole;
   const Index stride = whole.stride, half = whole.weights.size() / 2;
-  const auto lead = static_cast<Index>(std::ceil((kLeadIn / whole.motion.step + static_cast<double>(half)) /
-                                                 static_cast<double>(stride)));
+  const auto lead = static_cast<Index>(
+      std::ceil((kLeadIn / whole.motion.step + static_cast<double>(half)) / static_cast<double>(stride)));
   const Index coarse_begin = std::max<Index>(0, from - lead);
   const Index begin = coarse_begin * stride;
   const Index end = std::min(whole.motion.rows(), (to - 1) * stride + half + 1);
@@ -224,7 +225,8 @@ MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robo
     }
   }
   for (Index j = 0; j < joints; ++j) {
-    if (count[j] > 0.0) out.torque[j] = std::sqrt(std::max(0.0, squares[j] / count[j] - std::pow(sum[j] / count[j], 2)));
+    if (count[j] > 0.0)
+      out.torque[j] = std::sqrt(std::max(0.0, squares[j] / count[j] - std::pow(sum[j] / count[j], 2)));
   }
   return out;
 }

@@ -23,13 +23,13 @@ constexpr double kSpeedAtRest = 0.01;
 /// give, filtered as the measured torques were.
 struct Tile {
   std::size_t recording = 0;
-  Motion motion;                ///< as fine as the basis functions need it; Motion::torque is for the caller to fill
-  Eigen::VectorXd weights;      ///< of the filter
+  Motion motion;            ///< as fine as the basis functions need it; Motion::torque is for the caller to fill
+  Eigen::VectorXd weights;  ///< of the filter
   Eigen::Index stride = 1;
-  Eigen::Index first = 0;       ///< of the filtered rows those before it only lead in
-  Eigen::Index count = 0;       ///< of filtered rows that are this tile's own
-  Eigen::MatrixXd measured;     ///< shape=(count, joints) [Nm | N] filtered; NaN: not measured
-  Eigen::MatrixXd moving;       ///< shape=(count, joints): 1 where the joint moves, 0 where it has been at rest a while
+  Eigen::Index first = 0;    ///< of the filtered rows those before it only lead in
+  Eigen::Index count = 0;    ///< of filtered rows that are this tile's own
+  Eigen::MatrixXd measured;  ///< shape=(count, joints) [Nm | N] filtered; NaN: not measured
+  Eigen::MatrixXd moving;    ///< shape=(count, joints): 1 where the joint moves, 0 where it has been at rest a while
 
   /// The tile's own rows of basis values given at every row of the motion.
   Eigen::MatrixXd own_rows(const Eigen::MatrixXd& values) const {
@@ -41,8 +41,8 @@ struct Tile {
 };
 
 struct PrepareOptions {
-  double cutoff = 8.0;                   ///< [Hz]
-  std::vector<double> torque_per_ampere; ///< [Nm/A | N/A] of joints measured by current
+  double cutoff = 8.0;                    ///< [Hz]
+  std::vector<double> torque_per_ampere;  ///< [Nm/A | N/A] of joints measured by current
 };
 
 /// Calls `use` with each tile of a recording, in order of time. Throws std::invalid_argument: too short to be filtered.

@@ -89,7 +89,8 @@ void require_usable(const Robot& robot, const std::vector<Recording>& recordings
   for (const Joint& joint : robot.joints) any_mass = any_mass || joint.mass.value_or(0.0) > 0.0;
   if (!any_mass) {
     throw std::invalid_argument(
-        "no link of the robot has a mass: torques need mass, com and inertia of the links (URDF: <inertial>; robot.yaml: "
+        "no link of the robot has a mass: torques need mass, com and inertia of the links (URDF: <inertial>; "
+        "robot.yaml: "
         "mass, com, inertia)");
   }
   for (const Recording& recording : recordings) {
@@ -108,8 +109,8 @@ std::vector<double> drive_constants(const Robot& robot, const std::vector<Record
                                     std::vector<std::string>* warnings) {
   std::vector<double> out;
   std::vector<std::string> unknown;
-  const bool by_current = std::any_of(recordings.begin(), recordings.end(),
-                                      [](const Recording& r) { return r.torque.cols() == 0; });
+  const bool by_current =
+      std::any_of(recordings.begin(), recordings.end(), [](const Recording& r) { return r.torque.cols() == 0; });
   for (const std::size_t j : robot.driven_joints()) {
     const Joint& joint = robot.joints[j];
     out.push_back(joint.torque_per_ampere.value_or(1.0));
@@ -194,7 +195,8 @@ Groundwork groundwork_of(const Problem& problem) {
     for (const int c : group.columns) with_prior[static_cast<std::size_t>(c)] = is_inertial(design, group);
   }
   const std::vector<int> columns = standard_columns(design);
-  const std::vector<JointGrams> grams = sum_grams(problem.data, design, problem.nominal, problem.nominal, problem.train);
+  const std::vector<JointGrams> grams =
+      sum_grams(problem.data, design, problem.nominal, problem.nominal, problem.train);
   // Each joint by the noise that the fit leaves, which depends on it.
   std::vector<Noise> noise(problem.robot.driven_count());
   for (std::size_t j = 0; j < noise.size(); ++j)
@@ -268,7 +270,8 @@ Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<
   return out;
 }
 
-// --- errors --------------------------------------------------------------------------------------------------------------
+// --- errors
+// --------------------------------------------------------------------------------------------------------------
 
 namespace {
 

@@ -84,7 +84,8 @@ Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<
 std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vector<int>& columns, const Fit& fit);
 
 /// Errors of models on held-out and training rows, both sides low-passed, rows at rest included.
-std::vector<TorqueErrors> errors_of(const Problem& problem, const std::vector<std::pair<std::string, TorqueModel>>& models);
+std::vector<TorqueErrors> errors_of(const Problem& problem,
+                                    const std::vector<std::pair<std::string, TorqueModel>>& models);
 
 /// Throws std::invalid_argument where recordings cannot be fitted: no torque, no gains, nothing moves …
 void require_usable(const Robot& robot, const std::vector<Recording>& recordings);

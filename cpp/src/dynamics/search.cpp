@@ -90,10 +90,10 @@ bool Search::may_enter(const Choice& choice, int group, bool free_functions) con
   const TorqueGroup& g = design_.groups[static_cast<std::size_t>(group)];
   if (g.effect.empty() != free_functions) return false;
   const auto& nuisance = evidence_.nuisance();
-  if (!nuisance.empty() && std::find(nuisance.begin(), nuisance.end(), g.columns.front()) != nuisance.end()) return false;
-  return std::none_of(choice.groups.begin(), choice.groups.end(), [&](int in) {
-    return same_place(design_.groups[static_cast<std::size_t>(in)], g);
-  });
+  if (!nuisance.empty() && std::find(nuisance.begin(), nuisance.end(), g.columns.front()) != nuisance.end())
+    return false;
+  return std::none_of(choice.groups.begin(), choice.groups.end(),
+                      [&](int in) { return same_place(design_.groups[static_cast<std::size_t>(in)], g); });
 }
 
 /// Folds that were not fitted, by enough in the mean and for sure: the mean of the folds' gains is above zero by 1.5

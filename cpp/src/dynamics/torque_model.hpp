@@ -34,8 +34,8 @@ class TorqueModel {
   /// The same with more terms.
   TorqueModel with(const std::vector<ValuedTerm>& more) const;
 
-  /// Torques of every row [Nm | N], shape=(rows, joints). Sets Motion::torque to what the terms that ask for it see: the
-  /// torques of all others.
+  /// Torques of every row [Nm | N], shape=(rows, joints). Sets Motion::torque to what the terms that ask for it see:
+  /// the torques of all others.
   Eigen::MatrixXd torque(Motion* motion) const;
 
   const Robot& robot() const { return robot_; }

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "truing/dynamics/rigid.hpp"
 #include "convert/columns.hpp"
 #include "parts.hpp"
-#include "truing/dynamics/rigid.hpp"
 
 namespace truing::python {
 

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tables/dynamics/diagnose.hpp"
 #include "convert/columns.hpp"
 #include "convert/options.hpp"
 #include "convert/text.hpp"
 #include "parts.hpp"
 #include "repr.hpp"
+#include "tables/dynamics/diagnose.hpp"
 
 namespace truing::python {
 
@@ -76,7 +76,24 @@ void bind_found(py::module_& m) {
 
 }  // namespace
 
+/// Name, summary and what the documents say of every effect on torques.
+std::vector<std::map<std::string, std::string>> torque_effects() {
+  std::vector<std::map<std::string, std::string>> out;
+  for (const TorqueEffect& effect : torque_catalogue()) {
+    const TorqueTraits& traits = effect.traits;
+    out.push_back({{"name", effect.name},
+                   {"summary", effect.summary},
+                   {"law", traits.documentation.law},
+                   {"parameters", traits.documentation.parameters},
+                   {"needs", traits.documentation.needs},
+                   {"family", word(traits.family)},
+                   {"plain", traits.plain}});
+  }
+  return out;
+}
+
 void bind_torque(py::module_& m) {
+  m.def("torque_effects", &torque_effects, "What every effect on torques is, in words, by the catalogue's order.");
   define_options<TorqueOptions>(m, "TorqueOptions");
   define_options<TorqueDiagnoseOptions>(m, "TorqueDiagnoseOptions");
   bind_fit(m);

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Dynamics: from recorded motion and torque to the named cause, and back into the simulator.
 
-    robot = truing.load_robot("robot.urdf", any_tool=True)
-    recordings = truing.dynamics.load_recordings("recordings/*.csv", robot)
-    print(truing.dynamics.diagnose(robot, recordings).summary())
+robot = truing.load_robot("robot.urdf", any_tool=True)
+recordings = truing.dynamics.load_recordings("recordings/*.csv", robot)
+print(truing.dynamics.diagnose(robot, recordings).summary())
 """
 
 from truing._core import (

@@ -62,6 +62,20 @@ def diagnose(
     return _core.dynamics_diagnose(robot, list(recordings), made(_core.TorqueDiagnoseOptions, options))
 
 
+def markdown_table() -> str:
+    """The table of docs/reference/torque_effects.md: what every effect of the catalogue is."""
+    lines = ["| effect | adds to the torque | parameters | needs |", "| --- | --- | --- | --- |"]
+    for effect in _core.torque_effects():
+        words = (
+            f"`{effect['name']}`: {effect['summary']}",
+            effect["law"],
+            effect["parameters"],
+            effect["needs"],
+        )
+        lines.append("| " + " | ".join(words) + " |")
+    return "\n".join(lines)
+
+
 def predict(robot: Robot, recording: Recording, *, cutoff: float = 8.0) -> TorquePrediction:
     """Torques of every row of a recording: links, rotors, and the effects that the robot carries.
 

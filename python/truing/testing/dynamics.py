@@ -85,7 +85,8 @@ def simulate_motion(
     """Recordings of `demo_arm` along Fourier trajectories, with friction of every joint, hidden effects (see
     HIDDEN), and noise whose rows are correlated, of 2 % of each torque.
 
-    held_out: so many, the last, are marked as test. hidden: effects, their joints and parameters. The same seed gives the same recordings.
+    held_out: so many, the last, are marked as test. hidden: effects, their joints and parameters. The same
+    seed gives the same recordings.
     """
     nominal = demo_arm()
     truth = nominal.copy()

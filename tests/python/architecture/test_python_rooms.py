@@ -38,7 +38,6 @@ ROOMS: dict[str, set[str]] = {
     "inverse_kinematics": BASIC,
     "dynamics": BASIC | {"identification"},
     "tracking": BASIC | {"hand_eye"},
-    "dynamics": BASIC | {"identification"},
     "testing": BASIC,
     "exam": {"truing", "model", "report"},  # of both only what test_exam.py allows
 }

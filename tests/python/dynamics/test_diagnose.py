@@ -12,6 +12,7 @@ import pytest
 
 import truing
 from truing.dynamics import Recording, diagnose, identify, load_recordings, predict
+from truing.dynamics.api import markdown_table
 from truing.errors import InputError
 from truing.model import AppliedEffect, Robot
 from truing.testing.dynamics import HIDDEN, simulate_motion
@@ -44,7 +45,10 @@ def test_hidden_effects_are_named_with_their_sizes() -> None:
     for effect, (joints, values) in HIDDEN.items():
         assert (effect, tuple(joints)) in named
         parameters = {
-            p.name: p for e in found.effects if (e.effect, list(e.joints)) == (effect, joints) for p in e.parameters
+            p.name: p
+            for e in found.effects
+            if (e.effect, list(e.joints)) == (effect, joints)
+            for p in e.parameters
         }
         for name, value in values.items():
             assert abs(parameters[name].value - value) < 0.2 * abs(value) + 4 * parameters[name].sigma
@@ -61,7 +65,9 @@ def test_nothing_is_named_where_nothing_is_hidden() -> None:
 
 def test_one_and_two_threads_give_the_same_bits() -> None:
     one, two = (diagnose(SIMULATED.nominal, SIMULATED.recordings, threads=n) for n in (1, 2))
-    assert [p.value for e in one.effects for p in e.parameters] == [p.value for e in two.effects for p in e.parameters]
+    assert [p.value for e in one.effects for p in e.parameters] == [
+        p.value for e in two.effects for p in e.parameters
+    ]
 
 
 def test_identify_finds_what_it_is_asked_for() -> None:
@@ -128,7 +134,10 @@ def test_ur10e_held_out_torque_and_the_payload_that_nobody_told() -> None:
     assert set(found.held_out) == {"h7_20s", "h12_40s"}
     assert (percent(found, "named") < [7.0, 3.5, 3.5, 6.5, 11.0, 8.5]).all()
     names = beyond_standard(found)
-    assert ("load_friction", ("elbow_joint",)) in names and ("load_friction", ("shoulder_lift_joint",)) in names
+    assert ("load_friction", ("elbow_joint",)) in names and (
+        "load_friction",
+        ("shoulder_lift_joint",),
+    ) in names
     assert ("presliding", ("wrist_2_joint",)) in names[:3]
 
     loaded = diagnose(found.robot, load_recordings([folder / "h14_50s_load.csv"], found.robot))
@@ -147,3 +156,12 @@ def test_the_coupled_wrist_of_a_tx40_is_named_first() -> None:
     first = beyond_standard(found)[:2]
     assert {("coupling", ("joint_5", "joint_6")), ("coupling", ("joint_6", "joint_5"))} == set(first)
     assert all(e.probability <= 0.9 for e in found.effects if not e.standard)  # one recording
+
+
+def test_the_table_of_torque_effects_is_the_one_that_they_tell() -> None:
+    page = Path(__file__).parents[3] / "docs" / "reference" / "torque_effects.md"
+    text = page.read_text(encoding="utf-8")
+    table = text.split("<!-- table -->\n")[1].split("\n<!-- end of table -->")[0]
+    assert table == markdown_table(), (
+        "put what truing.dynamics.api.markdown_table() returns between the marks"
+    )

@@ -19,8 +19,8 @@ struct TorqueDiagnoseOptions {
   std::vector<std::string> leave_out;     ///< effects that are not to be considered, by name
   /// [Hz] of the low-pass without phase; NaN: from the data, where torques and model stop to go together.
   double cutoff = std::numeric_limits<double>::quiet_NaN();
-  double test_share = 0.3;  ///< fraction of the time held out when there is one recording, or none is marked as test
-  int max_effects = 40;     ///< maximum number of effects named
+  double test_share = 0.3;    ///< fraction of the time held out when there is one recording, or none is marked as test
+  int max_effects = 40;       ///< maximum number of effects named
   double least_gain = 0.004;  ///< [-] fraction of a joint's squared error on unseen recordings that a name must remove
   int threads = 0;            ///< 0: as many as the machine has
 
@@ -43,8 +43,8 @@ struct FoundTorqueEffect {
   double probability = 0.0;           ///< posterior of the class: this effect or one of `confounded_with`
   std::vector<Parameter> parameters;  ///< values and standard errors, constants of its law among them
   double rms = 0.0;                   ///< [Nm | N] of its torque
-  /// Fraction of the squared error that standard practice leaves (of a standard one: that the nominal model leaves) that
-  /// it removes, all others in, on recordings that were not fitted; over all joints, each by its noise.
+  /// Fraction of the squared error that standard practice leaves (of a standard one: that the nominal model leaves)
+  /// that it removes, all others in, on recordings that were not fitted; over all joints, each by its noise.
   Share share;
   std::vector<TorqueAlternative> confounded_with;  ///< effects that would explain these recordings as well
   std::string sentence;                            ///< in plain words
@@ -54,11 +54,11 @@ struct FoundTorqueEffect {
 
 /// A part of the torques that goes with an input, and that no effect of the catalogue explains.
 struct UnknownTorque {
-  std::string joint;                ///< its name
-  std::vector<std::string> inputs;  ///< 'angle', 'speed', 'load', 'time', 'direction' or a column
-  double probability = 0.0;         ///< posterior that there is such a thing
-  Share share;                      ///< as that of an effect
-  double rms = 0.0;                 ///< [Nm | N] of its torque
+  std::string joint;                         ///< its name
+  std::vector<std::string> inputs;           ///< 'angle', 'speed', 'load', 'time', 'direction' or a column
+  double probability = 0.0;                  ///< posterior that there is such a thing
+  Share share;                               ///< as that of an effect
+  double rms = 0.0;                          ///< [Nm | N] of its torque
   std::vector<std::array<double, 3>> curve;  ///< shape=(n, 3): input, torque, standard error [Nm | N]
 };
 
@@ -103,8 +103,9 @@ struct TorqueDiagnosis {
   std::vector<TorqueTrace> traces;         ///< a held-out stretch of every joint
   double cutoff = 0.0;                     ///< [Hz] of the low-pass
   std::vector<double> design_effect;       ///< shape=(joints,): rows that count as one
-  std::vector<std::string> held_out;  ///< names of the recordings that were held out; of one recording: 'blocks of time'
-  Robot robot;                        ///< with what was named
+  std::vector<std::string>
+      held_out;  ///< names of the recordings that were held out; of one recording: 'blocks of time'
+  Robot robot;   ///< with what was named
   std::vector<std::string> warnings;  ///< what to know before trusting it
 };
 
@@ -113,9 +114,9 @@ namespace dynamics {
 /// Which effects stand between a robot's model and the torques that it was recorded with.
 ///
 /// Inertial parameters, Coulomb and viscous friction and an offset are the groundwork, unless the robot is one that was
-/// fitted before; then everything is a departure from it. Every effect of the catalogue at every joint competes; what is
-/// named predicts recordings that were not fitted. Throws std::invalid_argument on recordings or options that cannot be
-/// used.
+/// fitted before; then everything is a departure from it. Every effect of the catalogue at every joint competes; what
+/// is named predicts recordings that were not fitted. Throws std::invalid_argument on recordings or options that cannot
+/// be used.
 TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recordings,
                          const TorqueDiagnoseOptions& options = {});
 

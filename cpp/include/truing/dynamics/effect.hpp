@@ -28,8 +28,8 @@ struct Motion {
   Eigen::MatrixXd qd;      ///< shape=(rows, joints) [rad/s | m/s]
   Eigen::MatrixXd qdd;     ///< shape=(rows, joints) [rad/s^2 | m/s^2]
   Eigen::MatrixXd torque;  ///< shape=(rows, joints) [Nm | N] that the model predicts in all, friction included
-  /// Of every joint, shape=(rows, 10 * links) each: torque for an inertial parameter of one (mass, first moments, xx yy zz
-  /// xy xz yz about the origin of the frame after the link), link after link.
+  /// Of every joint, shape=(rows, 10 * links) each: torque for an inertial parameter of one (mass, first moments, xx yy
+  /// zz xy xz yz about the origin of the frame after the link), link after link.
   std::vector<Eigen::MatrixXd> rigid;
   /// shape=(rows,) each: the further columns of the recording.
   std::map<std::string, Eigen::VectorXd> columns;
@@ -45,8 +45,8 @@ struct TorqueTerm {
   /// shape=(rows, joints.size()) [Nm | N] for a parameter of one. Rows depend on each other only through what came
   /// shortly before (a play operator); `Motion` begins early enough for that.
   std::function<Eigen::MatrixXd(const Motion&)> basis;
-  bool needs_torque = false;  ///< the basis depends on Motion::torque
-  double prior = 1.0;         ///< size that the parameter may well have
+  bool needs_torque = false;                                ///< the basis depends on Motion::torque
+  double prior = 1.0;                                       ///< size that the parameter may well have
   double least = -std::numeric_limits<double>::infinity();  ///< no machine has less than this
   double most = std::numeric_limits<double>::infinity();    ///< no machine has more
   /// Numbers that the basis was made with (a Stribeck speed): kept by full name among the parameters of
@@ -67,7 +67,7 @@ enum class SimulatorPlace {
 
 struct TorqueTraits {
   TorqueFamily family = TorqueFamily::own;
-  bool standard = false;  ///< what everybody fits beside the inertias: offset, Coulomb, viscous
+  bool standard = false;       ///< what everybody fits beside the inertias: offset, Coulomb, viscous
   bool scales_masses = false;  ///< where inertial parameters are fitted it is the same as all of them times a factor
   SimulatorPlace mujoco = SimulatorPlace::callback;
   SimulatorPlace urdf = SimulatorPlace::none;

@@ -24,7 +24,7 @@ struct TorqueOptions {
   /// offset.
   std::vector<EffectRequest> effects;
   std::vector<TorqueEffect> own_effects;  ///< known beside the catalogue
-  bool fit_inertials = true;  ///< the links' inertial parameters are fitted beside the effects
+  bool fit_inertials = true;              ///< the links' inertial parameters are fitted beside the effects
   /// [Hz] of the low-pass without phase that both sides of the equation of motion go through; NaN: from the data, where
   /// torques and model stop to go together.
   double cutoff = std::numeric_limits<double>::quiet_NaN();
@@ -56,16 +56,17 @@ struct TorqueFit {
   std::vector<Parameter> parameters;  ///< of the effects, with standard errors; 'link_inertia…': change from nominal
   std::vector<TorqueErrors> errors;   ///< 'nominal', 'standard' (what is usual), 'named' (what was asked for)
   double cutoff = 0.0;                ///< [Hz] of the low-pass
-  std::vector<std::string> held_out;  ///< names of the recordings that were held out; of one recording: 'blocks of time'
+  std::vector<std::string>
+      held_out;  ///< names of the recordings that were held out; of one recording: 'blocks of time'
   std::vector<NotTestable> not_testable;  ///< what the recordings could not show
   std::vector<std::string> warnings;      ///< what to know before trusting it
 };
 
 /// Torques of a recording as a robot predicts them.
 struct TorquePrediction {
-  Eigen::VectorXd time;    ///< shape=(n,) [s] as recorded
-  Eigen::MatrixXd torque;  ///< shape=(n, joints) [Nm | N]
-  Eigen::MatrixXd current; ///< shape=(n, joints) [A] of drives whose torque per ampere is known, else NaN
+  Eigen::VectorXd time;     ///< shape=(n,) [s] as recorded
+  Eigen::MatrixXd torque;   ///< shape=(n, joints) [Nm | N]
+  Eigen::MatrixXd current;  ///< shape=(n, joints) [A] of drives whose torque per ampere is known, else NaN
 };
 
 namespace dynamics {

@@ -16,7 +16,8 @@ using namespace dynamics;
 namespace {
 
 const TorqueEffect* find(const std::vector<TorqueEffect>& effects, const std::string& name) {
-  const auto found = std::find_if(effects.begin(), effects.end(), [&](const TorqueEffect& e) { return e.name == name; });
+  const auto found =
+      std::find_if(effects.begin(), effects.end(), [&](const TorqueEffect& e) { return e.name == name; });
   return found == effects.end() ? nullptr : &*found;
 }
 

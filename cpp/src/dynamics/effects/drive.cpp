@@ -55,15 +55,15 @@ std::vector<TorqueEffect> drive_effects() {
   traits.mujoco = SimulatorPlace::field;
   traits.plain = "an offset of the torque";
   traits.documentation = {"1", "`current_offset.J2` [Nm]", "-"};
-  out.push_back({"current_offset", "a constant torque that is read, or acts, beside all others", current_offset, true,
-                 traits});
+  out.push_back(
+      {"current_offset", "a constant torque that is read, or acts, beside all others", current_offset, true, traits});
   traits.standard = false;
   traits.scales_masses = true;
   traits.plain = "a motor constant that is off";
   traits.documentation = {"tau, the whole torque that the model predicts", "`motor_constant.J2` [-]",
                           "a known payload"};
-  out.push_back({"motor_constant", "the drive gives another torque per ampere than assumed", motor_constant, true,
-                 traits});
+  out.push_back(
+      {"motor_constant", "the drive gives another torque per ampere than assumed", motor_constant, true, traits});
   traits.scales_masses = false;
   traits.mujoco = SimulatorPlace::none;
   traits.family = TorqueFamily::measurement;

@@ -20,7 +20,8 @@ std::vector<TorqueEffect> drive_effects();
 std::vector<TorqueEffect> transmission_effects();
 std::vector<TorqueEffect> thermal_effects();
 
-// --- what the families share ------------------------------------------------------------------------------------------
+// --- what the families share
+// ------------------------------------------------------------------------------------------
 
 /// The name of a joint that has a reading, by its number among those.
 const std::string& driven_name(const Robot& robot, std::size_t joint);

@@ -31,19 +31,19 @@ std::vector<TorqueForm> coulomb(const Robot& robot, std::size_t joint, const Mot
 }
 
 std::vector<TorqueForm> viscous(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  return {{term_at(joint, parameter_name("viscous", robot, joint), torque_unit(robot, joint) + " s/" +
-                                                                     angle_unit(robot, joint),
-                   per_speed(range, joint), [joint](const Motion& m) { return speed(m, joint); })}};
+  return {{term_at(joint, parameter_name("viscous", robot, joint),
+                   torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(range, joint),
+                   [joint](const Motion& m) { return speed(m, joint); })}};
 }
 
-// --- laws of the speed beside Coulomb's and the linear one -------------------------------------------------------------
+// --- laws of the speed beside Coulomb's and the linear one
+// -------------------------------------------------------------
 
 const char* const kLaw = "viscous_law";
 
 TorqueForm saturating_with(const Robot& robot, std::size_t joint, double v0, double prior) {
-  TorqueTerm term =
-      term_at(joint, parameter_name(kLaw, robot, joint, "saturating"), torque_unit(robot, joint), prior,
-              [joint, v0](const Motion& m) -> ArrayXd { return (speed(m, joint) / v0).tanh(); });
+  TorqueTerm term = term_at(joint, parameter_name(kLaw, robot, joint, "saturating"), torque_unit(robot, joint), prior,
+                            [joint, v0](const Motion& m) -> ArrayXd { return (speed(m, joint) / v0).tanh(); });
   term.constants[parameter_name(kLaw, robot, joint, "v0")] = v0;
   return {term};
 }
@@ -59,10 +59,9 @@ std::vector<TorqueForm> viscous_law(const Robot& robot, std::size_t joint, const
   out.push_back({term_at(joint, parameter_name(kLaw, robot, joint, "cubic"), unit + " s^3/" + angle + "^3",
                          torque / std::pow(fastest, 3.0),
                          [joint](const Motion& m) -> ArrayXd { return speed(m, joint).cube(); })});
-  out.push_back({term_at(joint, parameter_name(kLaw, robot, joint, "root"), unit + " (s/" + angle + ")^0.5",
-                         torque / std::sqrt(fastest), [joint](const Motion& m) -> ArrayXd {
-                           return direction(m, joint) * speed(m, joint).abs().sqrt();
-                         })});
+  out.push_back({term_at(
+      joint, parameter_name(kLaw, robot, joint, "root"), unit + " (s/" + angle + ")^0.5", torque / std::sqrt(fastest),
+      [joint](const Motion& m) -> ArrayXd { return direction(m, joint) * speed(m, joint).abs().sqrt(); })});
   for (const double part : {0.05, 0.15, 0.4}) out.push_back(saturating_with(robot, joint, part * fastest, torque));
   return out;
 }
@@ -71,7 +70,8 @@ TorqueForm viscous_law_with(const Robot& robot, std::size_t joint, const std::ma
   return saturating_with(robot, joint, constant_of(constants, parameter_name(kLaw, robot, joint, "v0")), 1.0);
 }
 
-// --- Stribeck 1902: friction falls from stiction to Coulomb's as the joint gets faster ---------------------------------
+// --- Stribeck 1902: friction falls from stiction to Coulomb's as the joint gets faster
+// ---------------------------------
 
 TorqueForm stribeck_at(const Robot& robot, std::size_t joint, double vs, double prior) {
   TorqueTerm term = term_at(joint, parameter_name("stribeck", robot, joint), torque_unit(robot, joint), prior,
@@ -96,7 +96,8 @@ TorqueForm stribeck_with(const Robot& robot, std::size_t joint, const std::map<s
   return stribeck_at(robot, joint, constant_of(constants, parameter_name("stribeck", robot, joint, "vs")), 1.0);
 }
 
-// --- presliding: the stop operator of the travelled angle (Prandtl 1928): friction builds up over x0 after a reversal --
+// --- presliding: the stop operator of the travelled angle (Prandtl 1928): friction builds up over x0 after a reversal
+// --
 
 TorqueForm presliding_at(const Robot& robot, std::size_t joint, double x0, double prior) {
   TorqueTerm term = term_at(joint, parameter_name("presliding", robot, joint), torque_unit(robot, joint), prior,
@@ -128,7 +129,8 @@ TorqueForm presliding_with(const Robot& robot, std::size_t joint, const std::map
   return presliding_at(robot, joint, constant_of(constants, parameter_name("presliding", robot, joint, "x0")), 1.0);
 }
 
-// --- friction that is not a function of the speed alone ----------------------------------------------------------------
+// --- friction that is not a function of the speed alone
+// ----------------------------------------------------------------
 
 std::vector<TorqueForm> asymmetric(const Robot& robot, std::size_t joint, const MotionRange& range) {
   return {{term_at(joint, parameter_name("asymmetric_friction", robot, joint),

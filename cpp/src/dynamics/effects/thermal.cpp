@@ -33,8 +33,7 @@ TorqueForm friction_times(const char* effect, const Robot& robot, std::size_t jo
   return {term_at(joint, parameter_name(effect, robot, joint, "coulomb"), unit + "/" + per, torque,
                   [at, factor](const Motion& m) -> ArrayXd { return sign_of(m.qd.col(at)) * factor(m); }),
           term_at(joint, parameter_name(effect, robot, joint, "viscous"),
-                  unit + " s/(" + angle_unit(robot, joint) + " " + per + ")",
-                  torque / std::max(range.speed[at], 0.01),
+                  unit + " s/(" + angle_unit(robot, joint) + " " + per + ")", torque / std::max(range.speed[at], 0.01),
                   [at, factor](const Motion& m) -> ArrayXd { return m.qd.col(at).array() * factor(m); })};
 }
 

@@ -22,7 +22,8 @@ double torque_prior(const MotionRange& range, std::size_t joint) {
   return std::max(range.torque[static_cast<Index>(joint)], 1e-3);
 }
 
-// --- a joint's motor that carries, or is carried by, another's ---------------------------------------------------------
+// --- a joint's motor that carries, or is carried by, another's
+// ---------------------------------------------------------
 
 std::vector<TorqueForm> coupling(const Robot& robot, std::size_t joint, const MotionRange& range) {
   std::vector<TorqueForm> out;
@@ -33,8 +34,7 @@ std::vector<TorqueForm> coupling(const Robot& robot, std::size_t joint, const Mo
     const double torque = 0.3 * torque_prior(range, joint);
     const std::string unit = torque_unit(robot, joint);
     out.push_back(
-        {term_at(joint, name + "coulomb", unit, torque,
-                 [other](const Motion& m) { return sign_of(m.qd.col(other)); }),
+        {term_at(joint, name + "coulomb", unit, torque, [other](const Motion& m) { return sign_of(m.qd.col(other)); }),
          term_at(joint, name + "viscous", unit + " s/" + angle_unit(robot, k),
                  torque / std::max(range.speed[other], 0.01),
                  [other](const Motion& m) -> ArrayXd { return m.qd.col(other); }),
@@ -45,7 +45,8 @@ std::vector<TorqueForm> coupling(const Robot& robot, std::size_t joint, const Mo
   return out;
 }
 
-// --- what repeats with the joint's turn --------------------------------------------------------------------------------
+// --- what repeats with the joint's turn
+// --------------------------------------------------------------------------------
 
 std::vector<TorqueForm> ripple(const Robot& robot, std::size_t joint, const MotionRange& range) {
   if (!is_revolute(robot, joint)) throw Unsuited("a prismatic joint does not turn");
@@ -73,7 +74,8 @@ std::vector<TorqueForm> spring(const Robot& robot, std::size_t joint, const Moti
                    [at](const Motion& m) -> ArrayXd { return m.q.col(at); })}};
 }
 
-// --- the link is not where the motor is --------------------------------------------------------------------------------
+// --- the link is not where the motor is
+// --------------------------------------------------------------------------------
 
 /// What the torques change by when the joint stands `dq` further on than it was read: shape=(rows, joints).
 MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
@@ -123,7 +125,8 @@ std::vector<TorqueForm> backlash(const Robot& robot, std::size_t joint, const Mo
                       })}};
 }
 
-// --- what pulls at the tool --------------------------------------------------------------------------------------------
+// --- what pulls at the tool
+// --------------------------------------------------------------------------------------------
 
 /// J^T f of a force of one along an axis of the base at the tool. A mass of one there that gravity of one pulls the
 /// other way, at rest, asks the same torques of the drives.
@@ -173,8 +176,8 @@ std::vector<TorqueEffect> transmission_effects() {
   traits.family = TorqueFamily::transmission;
   traits.plain = "a torque that repeats with the joint's turn";
   traits.documentation = {"sin kq, cos kq", "`ripple.J2.sin2`, `.cos2` [Nm]", "half a wave of travel"};
-  out.push_back({"ripple", "a torque that repeats with the joint's turn: cogging, an uneven gear", ripple, true,
-                 traits});
+  out.push_back(
+      {"ripple", "a torque that repeats with the joint's turn: cogging, an uneven gear", ripple, true, traits});
   traits.family = TorqueFamily::gravity;
   traits.mujoco = SimulatorPlace::field;
   traits.plain = "a spring at the joint";
