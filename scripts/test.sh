@@ -116,12 +116,15 @@ step_examples() {
     fi
     printf 'ran\n'
   done
-  # The README's first command: its last line is the path of a report that is there.
-  printf 'truing demo: '
-  local report
-  report=$("$root/.venv/bin/truing" demo --out demo 2> demo.log | tee -a demo.log | tail -n 1)
-  [[ -s ${report#report: } ]] || { printf 'failed\n'; cat demo.log; return 1; }
-  printf 'ran\n'
+  # The README's first command, and that of dynamics: the last line is the path of a report that is there.
+  local report demo
+  for demo in demo "dynamics demo"; do
+    printf 'truing %s: ' "$demo"
+    # shellcheck disable=SC2086  # two words are meant
+    report=$("$root/.venv/bin/truing" $demo --out "${demo// /-}" 2> demo.log | tee -a demo.log | tail -n 1)
+    [[ -s ${report#report: } ]] || { printf 'failed\n'; cat demo.log; return 1; }
+    printf 'ran\n'
+  done
 }
 
 step_docs() {

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""What ``truing dynamics diagnose``, ``identify`` and ``predict`` write.
+"""What ``truing dynamics`` writes: of ``diagnose``, ``identify``, ``predict`` and ``export``.
 
 ``result.json``, ``residuals.parquet``, ``covariance.csv``, ``predicted.csv``, the robot and the report.
 """
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.friction import friction_dict
 from truing.dynamics.page import diagnosis_report, fit_report, prediction_report
 from truing.files import load_units, save_robot, write_table
@@ -26,6 +27,7 @@ from truing.report.json_text import to_json, without_nan
 DYNAMICS_FORMAT = "truing-dynamics/1"
 IDENTIFICATION_FORMAT = "truing-dynamics-identification/1"
 PREDICTION_FORMAT = "truing-dynamics-prediction/1"
+EXPORT_FORMAT = "truing-dynamics-export/1"
 BLOCKS_OF_TIME = "blocks of time"  # what `held_out` says where parts of the only recording were held out
 Floats = NDArray[np.float64]
 
@@ -293,6 +295,29 @@ def prediction_dict(
         "errors": errors,
         "warnings": list(warnings),
     }
+
+
+def export_dict(
+    robot: _core.Robot,
+    to: str,
+    model: str,
+    not_written: Sequence[NotWritten],
+    *,
+    warnings: Iterable[str] = (),
+) -> dict[str, Any]:
+    """What ``result.json`` of ``truing dynamics export`` holds. model: name of the simulator's file."""
+    found: dict[str, Any] = without_nan(
+        {
+            "format": EXPORT_FORMAT,
+            "version": _core.version(),
+            "robot": robot.name,
+            "to": to,
+            "model": model,
+            "not_written": [{"name": n.name, "size_Nm": n.size, "reason": n.reason} for n in not_written],
+            "warnings": list(warnings),
+        }
+    )
+    return found
 
 
 # ---- Everything ----------------------------------------------------------------------------------

@@ -170,3 +170,35 @@ def test_the_demonstration_ends_with_a_report(tmp_path: Path, capsys: pytest.Cap
     assert "load_friction.J2" in said and "not named" not in said
     for name in ("report.html", "nominal.yaml", "truth.yaml", "motion1.csv", "motion5.csv"):
         assert (tmp_path / "demo" / name).exists()
+
+
+@pytest.mark.parametrize(
+    ("to", "names"),
+    [
+        ("mjcf", {"demo_arm.xml", "callbacks.py"}),
+        ("urdf", {"demo_arm.urdf"}),
+        ("isaaclab", {"demo_arm.urdf", "actuators.py"}),
+    ],
+)
+def test_export_writes_the_model_and_what_it_lacks(
+    to: str,
+    names: set[str],
+    simulated: SimulatedMotion,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    truing.save_robot(tmp_path / "robot.yaml", simulated.truth)
+    out = tmp_path / "model"
+    assert main(["dynamics", "export", str(tmp_path), "--to", to, "--out", str(out)]) == 0
+    assert {path.name for path in out.iterdir()} == names | {"not_written.yaml", "result.json"}
+    result = json.loads((out / "result.json").read_text())
+    assert result["format"] == "truing-dynamics-export/1" and result["to"] == to
+    assert (out / result["model"]).exists()
+    said = capsys.readouterr().out
+    assert str(out / result["model"]) in said
+    if to == "urdf":  # it has no place for friction that grows with the load
+        assert any("load_friction" in n["name"] for n in result["not_written"])
+
+
+def test_a_folder_without_a_robot_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "robot.yaml: there is no such file" in refused(["export", str(tmp_path)], tmp_path, capsys)
