@@ -354,6 +354,8 @@ def _error_card(page: Page, result: Mapping[str, Any]) -> None:
                 "text": ["" if v is None else figures_text(v, 2) for v in values],
                 "textposition": "auto",
                 "textangle": -90,
+                "constraintext": "none",
+                "textfont": {"size": 11},
                 "cliponaxis": False,
                 "name": MODELS[model][0],
                 "marker": {"color": MODELS[model][1]},
@@ -459,16 +461,29 @@ def _sigma(parameter: Mapping[str, Any]) -> str:
 
 
 def _parameters(result: Mapping[str, Any]) -> str:
-    lines = "".join(
-        f"<tr><td>{escaped(p['name'])}</td>{table_cell(p['value'], figures_text(p['value']))}"
-        f"<td>{_sigma(p)}</td><td>{escaped(p['unit'])}</td></tr>"
-        for p in result["parameters"]
+    """What was fitted: effects first; changes of the links' inertias are folded away."""
+    inertias = [p for p in result["parameters"] if p["name"].startswith("link_inertia.")]
+    effects = [p for p in result["parameters"] if p not in inertias]
+    fold = (
+        "<details><summary>Changes of the links' inertias: what motion cannot tell"
+        f" stays near nominal</summary>{_parameter_table(inertias)}</details>"
+        if inertias
+        else ""
     )
+    return f'<section class="card"><h2>What was fitted</h2>{_parameter_table(effects)}{fold}</section>'
+
+
+def _parameter_table(parameters: Sequence[Mapping[str, Any]]) -> str:
+    lines = []
+    for p in parameters:
+        value = 0.0 if abs(p["value"]) < 1e-3 * (p["sigma"] or 0.0) else p["value"]
+        lines.append(
+            f"<tr><td>{escaped(p['name'])}</td>{table_cell(p['value'], figures_text(value))}"
+            f"<td>{_sigma(p)}</td><td>{escaped(p['unit'])}</td></tr>"
+        )
     return (
-        '<section class="card"><h2>What was fitted</h2><div'
-        ' class="scroll"><table><thead><tr><th>parameter</th>'
-        "<th>value</th><th>standard"
-        f" error</th><th></th></tr></thead><tbody>{lines}</tbody></table></div></section>"
+        '<div class="scroll"><table><thead><tr><th>parameter</th><th>value</th><th>standard error</th>'
+        f"<th></th></tr></thead><tbody>{''.join(lines)}</tbody></table></div>"
     )
 
 

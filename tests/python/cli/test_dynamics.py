@@ -37,7 +37,7 @@ def test_diagnose_names_what_was_hidden(
     robot, recordings = str(files / "robot.yaml"), str(files / "motion*.csv")
     assert main(["dynamics", "diagnose", robot, recordings, "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    assert "coupling at J5 from J6" in said and "with what is named" in said
+    assert "coupling at J5 from J6" in said and "standard   named" in said
     assert {path.name for path in out.iterdir()} == {
         "result.json",
         "report.html",

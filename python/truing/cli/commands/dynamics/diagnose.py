@@ -105,9 +105,9 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueDiagnosis"]):
 def print_diagnosis(result: Mapping[str, Any]) -> None:
     """The verdict, the errors, and the causes."""
     say(result["sentence"])
-    models = [("nominal", "nominal"), ("standard", "standard practice"), ("named", "with what is named")]
+    models = [("nominal", "nominal"), ("standard", "standard"), ("named", "named")]
     if result["unknown"]:
-        models.append(("with_unknown", "with free functions"))
+        models.append(("with_unknown", "+ unknown"))
     print_errors(result, models)
     lines = cause_lines(result)
     if lines:

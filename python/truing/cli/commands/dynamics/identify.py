@@ -96,6 +96,6 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueFit"]):
         return write_fit(folder, found, loaded[1], warnings=warnings, nominal_file=self.robot)
 
     def table(self, result: Mapping[str, Any], found: TorqueFit) -> None:
-        models = (("nominal", "nominal"), ("standard", "standard practice"), ("named", "as fitted"))
+        models = (("nominal", "nominal"), ("standard", "standard"), ("named", "fitted"))
         print_errors(result, models)
         say(f"{len(result['parameters'])} parameters fitted; low-pass at {result['cutoff_hz']:.3g} Hz")
