@@ -37,7 +37,9 @@ def identify(robot: Robot, recordings: Sequence[Recording], **options: Unpack[To
 
 def requests(effects: str | Sequence[_core.EffectRequest]) -> list[_core.EffectRequest]:
     """Effects asked for, also as one text: "coulomb,load_friction:J2+J3". Raises InputError."""
-    return parse_effects(effects) if isinstance(effects, str) and effects.strip() else list(effects or ())
+    if isinstance(effects, str):
+        return parse_effects(effects) if effects.strip() else []
+    return list(effects)
 
 
 @takes(_core.TorqueDiagnoseOptions)
