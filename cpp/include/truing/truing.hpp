@@ -5,6 +5,7 @@
 
 #include "truing/compensate.hpp"
 #include "truing/diagnose.hpp"
+#include "truing/dynamics.hpp"
 #include "truing/dynamics/diagnose.hpp"
 #include "truing/dynamics/effect.hpp"
 #include "truing/dynamics/identify.hpp"

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from truing import _core
 from truing._core import Recording, Robot, TorqueDiagnosis, TorqueFit, TorquePrediction
-from truing.effects import parse_effects
+from truing.effects import Effect, Effects, parse_effects
+from truing.errors import InputError
 from truing.keywords import made, takes
 
 if TYPE_CHECKING:
@@ -35,11 +36,18 @@ def identify(robot: Robot, recordings: Sequence[Recording], **options: Unpack[To
     return _core.dynamics_identify(robot, list(recordings), fit)
 
 
-def requests(effects: str | Sequence[_core.EffectRequest]) -> list[_core.EffectRequest]:
+def requests(effects: Effects) -> list[_core.EffectRequest]:
     """Effects asked for, also as one text: "coulomb,load_friction:J2+J3". Raises InputError."""
     if isinstance(effects, str):
         return parse_effects(effects) if effects.strip() else []
-    return list(effects)
+    asked: list[_core.EffectRequest] = []
+    for item in [effects] if isinstance(effects, Effect | _core.EffectRequest) else effects:
+        if isinstance(item, Effect):
+            raise InputError(
+                f"effect '{item.name}' is one on positions: of torques the catalogue's can be asked for by name"
+            )
+        asked += parse_effects(item) if isinstance(item, str) else [item]
+    return asked
 
 
 @takes(_core.TorqueDiagnoseOptions)

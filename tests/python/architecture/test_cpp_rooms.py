@@ -101,8 +101,8 @@ def room_of(file: str) -> str:
         return "math"
     if file.startswith(MODEL):
         return "model"
-    if file.startswith(("truing/tracking/", "truing/dynamics/")):
-        return file.split("/")[1]
+    if file.startswith(("truing/tracking/", "truing/dynamics")):
+        return file.removesuffix(".hpp").split("/")[1]
     return ROOM_OF_PUBLIC[file]
 
 

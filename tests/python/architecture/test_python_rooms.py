@@ -130,7 +130,7 @@ ONLY_IN = {
     "plotly": {"report"},
     "typer": {"cli"},
     "rich": {"cli"},
-    "mujoco": {"exam", "dynamics"},
+    "mujoco": {"exam", "files", "dynamics"},
     "cv2": {"files"},
     "rosbags": {"files"},
 }
