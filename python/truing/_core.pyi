@@ -6562,12 +6562,11 @@ class TorqueOptions:
     effects = []: Effects to fit. None: what is usual, the links' inertial parameters, armature, Coulomb and viscous
         friction, an offset.
     fit_inertials = True: The links' inertial parameters are fitted beside the effects.
-    cutoff = None: [Hz] of the low-pass without phase that both sides of the equation of motion go through; NaN: from
-        the data, where torques and model stop to go together.
+    cutoff = 8.0: [Hz] of the low-pass without phase that both sides of the equation of motion go through.
     test_share = 0.3: Fraction of the time held out when there is one recording, or none is marked as test.
     threads = 0: 0: as many as the machine has.
     """
-    def __init__(self, *, effects: collections.abc.Sequence[EffectRequest] = [], fit_inertials: bool = True, cutoff: typing.SupportsFloat | typing.SupportsIndex | None = None, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, effects: collections.abc.Sequence[EffectRequest] = [], fit_inertials: bool = True, cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -6582,13 +6581,12 @@ class TorqueOptions:
         A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
         """
     @property
-    def cutoff(self) -> float | None:
+    def cutoff(self) -> float:
         """
-        [Hz] of the low-pass without phase that both sides of the equation of motion go through; NaN: from
-        the data, where torques and model stop to go together.
+        [Hz] of the low-pass without phase that both sides of the equation of motion go through.
         """
     @cutoff.setter
-    def cutoff(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+    def cutoff(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def effects(self) -> tuple[EffectRequest, ...]:
@@ -6628,13 +6626,13 @@ class TorqueDiagnoseOptions:
     How a gap of torques is diagnosed.
     
     leave_out = []: Effects that are not to be considered, by name.
-    cutoff = None: [Hz] of the low-pass without phase; NaN: from the data, where torques and model stop to go together.
+    cutoff = 8.0: [Hz] of the low-pass without phase that both sides of the equation of motion go through.
     test_share = 0.3: Fraction of the time held out when there is one recording, or none is marked as test.
     max_effects = 40: Maximum number of effects named.
     least_gain = 0.004: [-] fraction of a joint's squared error on unseen recordings that a name must remove.
     threads = 0: 0: as many as the machine has.
     """
-    def __init__(self, *, leave_out: collections.abc.Sequence[str] = [], cutoff: typing.SupportsFloat | typing.SupportsIndex | None = None, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, max_effects: typing.SupportsInt | typing.SupportsIndex = 40, least_gain: typing.SupportsFloat | typing.SupportsIndex = 0.004, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, leave_out: collections.abc.Sequence[str] = [], cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, max_effects: typing.SupportsInt | typing.SupportsIndex = 40, least_gain: typing.SupportsFloat | typing.SupportsIndex = 0.004, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -6649,12 +6647,12 @@ class TorqueDiagnoseOptions:
         A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
         """
     @property
-    def cutoff(self) -> float | None:
+    def cutoff(self) -> float:
         """
-        [Hz] of the low-pass without phase; NaN: from the data, where torques and model stop to go together.
+        [Hz] of the low-pass without phase that both sides of the equation of motion go through.
         """
     @cutoff.setter
-    def cutoff(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+    def cutoff(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def least_gain(self) -> float:
@@ -6838,16 +6836,6 @@ class FoundTorqueEffect:
         Effects that would explain these recordings as well.
         """
     @property
-    def curve(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Shape=(n, 3): input, torque, standard error of it [Nm | N]
-        """
-    @property
-    def curve_input(self) -> str:
-        """
-        What the curve is drawn against, with its unit.
-        """
-    @property
     def effect(self) -> str:
         """
         Its name, as in `torque_catalogue()`.
@@ -6863,6 +6851,11 @@ class FoundTorqueEffect:
         Values and standard errors, constants of its law among them.
         """
     @property
+    def plain(self) -> str:
+        """
+        What it is in plain words, without the joints.
+        """
+    @property
     def probability(self) -> float:
         """
         Posterior of the class: this effect or one of `confounded_with`.
@@ -6875,7 +6868,7 @@ class FoundTorqueEffect:
     @property
     def sentence(self) -> str:
         """
-        In plain words.
+        What it is, where, and how large.
         """
     @property
     def share(self) -> Share:

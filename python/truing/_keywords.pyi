@@ -254,9 +254,8 @@ class TorqueKeywords(TypedDict, total=False):
     friction, an offset."""
     fit_inertials: bool
     """The links' inertial parameters are fitted beside the effects."""
-    cutoff: float | None
-    """[Hz] of the low-pass without phase that both sides of the equation of motion go through; NaN: from
-    the data, where torques and model stop to go together."""
+    cutoff: float
+    """[Hz] of the low-pass without phase that both sides of the equation of motion go through."""
     test_share: float
     """Fraction of the time held out when there is one recording, or none is marked as test."""
     threads: int
@@ -265,8 +264,8 @@ class TorqueKeywords(TypedDict, total=False):
 class TorqueDiagnoseKeywords(TypedDict, total=False):
     leave_out: str | Sequence[str]
     """Effects that are not to be considered, by name."""
-    cutoff: float | None
-    """[Hz] of the low-pass without phase; NaN: from the data, where torques and model stop to go together."""
+    cutoff: float
+    """[Hz] of the low-pass without phase that both sides of the equation of motion go through."""
     test_share: float
     """Fraction of the time held out when there is one recording, or none is marked as test."""
     max_effects: int

@@ -74,6 +74,8 @@ void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, dou
   group.joints = {robot.joints[robot.driven_joints()[joint]].name};
   group.joint = static_cast<int>(joint);
   group.inputs = {input.name};
+  group.low = input.low;
+  group.high = input.high;
   if (input.times_direction) group.inputs.push_back("direction");
   for (int k = 0; k < kKnots; ++k) {
     TorqueTerm term;

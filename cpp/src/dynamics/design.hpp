@@ -26,6 +26,7 @@ struct TorqueGroup {
   bool standard = false;
   TorqueFamily family = TorqueFamily::own;
   std::vector<std::string> inputs;  ///< of a free function
+  double low = 0.0, high = 0.0;     ///< of its first input: first and last knot
   int forms = 1;                    ///< number of forms that the effect has there
   std::vector<int> columns;
 };

@@ -16,7 +16,7 @@ namespace truing {
 using namespace dynamics;
 
 bool TorqueDiagnoseOptions::is_valid(std::string* error) const {
-  if (!std::isnan(cutoff) && !(cutoff > 0.0)) return *error = "cutoff must be above 0 Hz", false;
+  if (!(cutoff > 0.0) || !std::isfinite(cutoff)) return *error = "cutoff must be above 0 Hz", false;
   if (!(test_share > 0.0 && test_share < 1.0)) return *error = "test_share must lie between 0 and 1", false;
   if (max_effects < 1) return *error = "max_effects must be 1 or more", false;
   if (!(least_gain >= 0.0)) return *error = "least_gain must be 0 or more", false;
@@ -104,7 +104,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   few.most = static_cast<int>(choice.groups.size()) + 6;
   const Choice with_unknown = search.run(choice, few, true);
   return named(problem, groundwork, design, sums, held_out, search, choice, with_unknown, model,
-               model_of(problem, design, sums, search, with_unknown), noise);
+               model_of(problem, design, sums, search, with_unknown), noise, options.own_effects);
 }
 
 }  // namespace dynamics

@@ -16,7 +16,7 @@ namespace truing {
 using namespace dynamics;
 
 bool TorqueOptions::is_valid(std::string* error) const {
-  if (!std::isnan(cutoff) && !(cutoff > 0.0)) return *error = "cutoff must be above 0 Hz", false;
+  if (!(cutoff > 0.0) || !std::isfinite(cutoff)) return *error = "cutoff must be above 0 Hz", false;
   if (!(test_share > 0.0 && test_share < 1.0)) return *error = "test_share must lie between 0 and 1", false;
   if (threads < 0) return *error = "threads must be 0 or more", false;
   return true;

@@ -134,8 +134,8 @@ std::string at_joints(const std::vector<std::string>& joints) {
   return " at " + listed(joints);
 }
 
-std::string sentence_of(const TorqueEffect& effect, const FoundTorqueEffect& found) {
-  std::string out = effect.traits.plain + at_joints(found.joints);
+std::string sentence_of(const FoundTorqueEffect& found) {
+  std::string out = found.plain + at_joints(found.joints);
   out[0] = static_cast<char>(std::toupper(out[0]));
   std::vector<std::string> sizes;
   for (const Parameter& p : found.parameters) {
@@ -175,8 +175,10 @@ std::vector<FoundTorqueEffect> standard_effects(const Problem& problem, const To
     at->parameters.insert(at->parameters.end(), more.begin(), more.end());
     at->rms = std::max(at->rms, naming.weighted_rms(group) * noise_at(noise, group.joint));
   }
-  for (FoundTorqueEffect& found : out)
-    found.sentence = find_torque_effect(found.effect).traits.plain + " at " + listed(found.joints);
+  for (FoundTorqueEffect& found : out) {
+    found.plain = find_torque_effect(found.effect).traits.plain;
+    found.sentence = found.plain + " at " + listed(found.joints);
+  }
   return out;
 }
 
@@ -195,7 +197,8 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Torqu
     found.parameters = parameters_of(design, group.columns, naming.fit());
     found.share = naming.share(k);
     found.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
-    found.sentence = sentence_of(find_torque_effect(group.effect, own), found);
+    found.plain = find_torque_effect(group.effect, own).traits.plain;
+    found.sentence = sentence_of(found);
     out.push_back(std::move(found));
   }
   std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.share.value > b.share.value; });
@@ -216,8 +219,9 @@ std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& 
     if (single) unknown.probability = std::min(unknown.probability, kBlocksOfTime);
     unknown.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     const std::vector<Parameter> knots = parameters_of(design, group.columns, naming.fit());
+    const double width = (group.high - group.low) / std::max(1.0, static_cast<double>(knots.size()) - 1.0);
     for (std::size_t i = 0; i < knots.size(); ++i)
-      unknown.curve.push_back({static_cast<double>(i), knots[i].value, knots[i].sigma});
+      unknown.curve.push_back({group.low + width * static_cast<double>(i), knots[i].value, knots[i].sigma});
     out.push_back(std::move(unknown));
   }
   return out;
@@ -234,30 +238,44 @@ double mean_square(const TorqueErrors& errors, const TorqueErrors& of) {
   return n > 0.0 ? sum / n : 1.0;
 }
 
-std::string verdict_sentence(const TorqueDiagnosis& d, bool fitted_before) {
-  const auto percent = [](double part) { return number(std::round(100.0 * part), 3) + " %"; };
-  const double left = std::sqrt(mean_square(d.errors[2], d.errors[1]));
-  std::vector<std::string> causes;
-  for (const FoundTorqueEffect& e : d.effects) {
-    if (e.standard && !fitted_before) continue;
-    if (causes.size() == 3) break;
-    causes.push_back(find_torque_effect(e.effect).traits.plain + at_joints(e.joints));
+/// Root mean square over the joints of errors in parts of their torques' standard deviations.
+double mean_percent(const TorqueErrors& errors) {
+  double squares = 0.0, n = 0.0;
+  for (const TorqueError& e : errors.held_out) {
+    if (!(e.n > 0.0)) continue;
+    squares += e.percent * e.percent;
+    n += 1.0;
   }
-  const std::string beside =
-      fitted_before ? "the robot's model" : "standard practice (inertias, Coulomb, viscous, offset)";
-  if (d.verdict == Verdict::does_not_hold) return "What was found does not hold on recordings it never saw.";
-  if (causes.empty()) {
-    return d.unknown.empty() ? "No gap beyond noise is left by " + beside + "."
-                             : "What " + beside + " leaves goes with inputs that no known effect explains.";
-  }
-  std::size_t more = 0;
-  for (const FoundTorqueEffect& e : d.effects) more += (e.standard && !fitted_before) ? 0u : 1u;
-  std::string out = "The error that " + beside + " leaves shrinks by " + percent(1.0 - left) + ": ";
+  return std::sqrt(squares / std::max(n, 1.0));
+}
+
+/// What was found, the largest first, in plain words; and how many more.
+std::string causes_of(const std::vector<FoundTorqueEffect>& effects) {
   std::string text;
-  for (const std::string& cause : causes) text += (text.empty() ? "" : "; ") + cause;
-  out += text;
-  if (more > causes.size()) out += "; and " + std::to_string(more - causes.size()) + " smaller";
-  return out + ".";
+  std::size_t named = 0, more = 0;
+  for (const FoundTorqueEffect& e : effects) {
+    if (e.standard) continue;
+    if (++named > 3) {
+      ++more;
+      continue;
+    }
+    text += (text.empty() ? "" : "; ") + e.plain + at_joints(e.joints);
+  }
+  return more > 0 ? text + "; and " + std::to_string(more) + " smaller" : text;
+}
+
+std::string verdict_sentence(const TorqueDiagnosis& d, bool fitted_before) {
+  const auto percent = [](const TorqueErrors& errors) { return number(mean_percent(errors), 2) + " %"; };
+  const std::string beside =
+      fitted_before ? "the robot's model" : "standard practice (inertias, Coulomb and viscous friction, an offset)";
+  if (d.verdict == Verdict::does_not_hold) return "What was found does not hold on recordings it never saw.";
+  const std::string causes = causes_of(d.effects);
+  if (!causes.empty()) {
+    return "The error of held-out torques falls from " + percent(d.errors[1]) + ", which " + beside + " leaves, to " +
+           percent(d.errors[2]) + " of their standard deviation: " + causes + ".";
+  }
+  return d.unknown.empty() ? "No gap beyond noise is left by " + beside + "."
+                           : "What " + beside + " leaves goes with inputs that no known effect explains.";
 }
 
 Verdict verdict_of(const TorqueDiagnosis& d, bool any) {
@@ -267,10 +285,11 @@ Verdict verdict_of(const TorqueDiagnosis& d, bool any) {
 }
 
 /// Inherent: what is weighed by its torque is known as well as the drives' constants are.
-void add_scale_of_masses(const std::vector<FoundTorqueEffect>& effects, std::vector<TorqueClass>* out) {
+void add_scale_of_masses(const std::vector<FoundTorqueEffect>& effects, const std::vector<TorqueEffect>& own,
+                         std::vector<TorqueClass>* out) {
   TorqueClass one;
   for (const FoundTorqueEffect& found : effects) {
-    if (!found.standard && find_torque_effect(found.effect).traits.family == TorqueFamily::inertia)
+    if (!found.standard && find_torque_effect(found.effect, own).traits.family == TorqueFamily::inertia)
       one.effects.push_back(found.effect);
   }
   if (one.effects.empty()) return;
@@ -284,9 +303,10 @@ void add_scale_of_masses(const std::vector<FoundTorqueEffect>& effects, std::vec
   out->push_back(std::move(one));
 }
 
-std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effects) {
+std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effects,
+                                    const std::vector<TorqueEffect>& own) {
   std::vector<TorqueClass> out;
-  add_scale_of_masses(effects, &out);
+  add_scale_of_masses(effects, own, &out);
   const auto name = [](const std::string& effect, const std::vector<std::string>& joints) {
     std::string text = effect;
     for (std::size_t k = 0; k < joints.size(); ++k) text += (k == 0 ? ":" : "+") + joints[k];
@@ -309,10 +329,10 @@ std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effect
 TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const TorqueDesign& design,
                       const Sums& sums, const Sums& held_out, const Search& search, const Choice& choice,
                       const Choice& with_unknown, const TorqueModel& model, const TorqueModel& model_with_unknown,
-                      const std::vector<Noise>& noise) {
+                      const std::vector<Noise>& noise, const std::vector<TorqueEffect>& own) {
   const Naming naming(design, sums, held_out, search, choice);
   TorqueDiagnosis out;
-  out.effects = found_effects(problem, design, naming, choice, noise, {});
+  out.effects = found_effects(problem, design, naming, choice, noise, own);
   const bool any = !out.effects.empty();
   if (with_unknown.groups.size() > choice.groups.size()) {
     const Naming all(design, sums, held_out, search, with_unknown);
@@ -327,7 +347,7 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   out.verdict = verdict_of(out, any);
   out.sentence = verdict_sentence(out, problem.fitted_before);
   out.where = regimes_of(problem, groundwork.model, model);
-  out.classes = classes_of(out.effects);
+  out.classes = classes_of(out.effects, own);
   out.not_testable = design.not_testable;
   out.traces = traces_of(problem, groundwork.model, model);
   out.cutoff = problem.data.prepare.cutoff;

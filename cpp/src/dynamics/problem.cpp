@@ -127,7 +127,7 @@ std::vector<double> drive_constants(const Robot& robot, const std::vector<Record
 Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, const ProblemOptions& options)
     : robot(given), chain(given), data{recordings, robot, {}, options.threads}, nominal(given, {}) {
   data.prepare.torque_per_ampere = drive_constants(robot, recordings, &warnings);
-  data.prepare.cutoff = std::isfinite(options.cutoff) ? options.cutoff : 8.0;
+  data.prepare.cutoff = options.cutoff;
   split(recordings, options.test_share, this);
   range = range_of(recordings, robot, data.prepare);
   nominal = TorqueModel(robot, valued_terms(robot, range, options.own_effects));

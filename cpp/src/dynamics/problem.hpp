@@ -15,7 +15,7 @@
 namespace truing::dynamics {
 
 struct ProblemOptions {
-  double cutoff = 8.0;  ///< [Hz]; NaN: from the data
+  double cutoff = 8.0;  ///< [Hz]
   double test_share = 0.3;
   int threads = 0;
   std::vector<TorqueEffect> own_effects{};

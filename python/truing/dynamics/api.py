@@ -44,7 +44,7 @@ def requests(effects: Effects) -> list[_core.EffectRequest]:
     for item in [effects] if isinstance(effects, Effect | _core.EffectRequest) else effects:
         if isinstance(item, Effect):
             raise InputError(
-                f"effect '{item.name}' is one on positions: of torques the catalogue's can be asked for by name"
+                f"effect '{item.name}' is one on positions: those on torques are asked for by name"
             )
         asked += parse_effects(item) if isinstance(item, str) else [item]
     return asked

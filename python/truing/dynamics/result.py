@@ -87,8 +87,6 @@ def _effect(e: _core.FoundTorqueEffect) -> dict[str, Any]:
             for a in e.confounded_with
         ],
         "sentence": e.sentence,
-        "curve": [list(point) for point in e.curve],
-        "curve_input": e.curve_input,
     }
 
 

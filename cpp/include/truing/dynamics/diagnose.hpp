@@ -17,10 +17,9 @@ namespace truing {
 struct TorqueDiagnoseOptions {
   std::vector<TorqueEffect> own_effects;  ///< take part beside the catalogue
   std::vector<std::string> leave_out;     ///< effects that are not to be considered, by name
-  /// [Hz] of the low-pass without phase; NaN: from the data, where torques and model stop to go together.
-  double cutoff = std::numeric_limits<double>::quiet_NaN();
-  double test_share = 0.3;    ///< fraction of the time held out when there is one recording, or none is marked as test
-  int max_effects = 40;       ///< maximum number of effects named
+  double cutoff = 8.0;      ///< [Hz] of the low-pass without phase that both sides of the equation of motion go through
+  double test_share = 0.3;  ///< fraction of the time held out when there is one recording, or none is marked as test
+  int max_effects = 40;     ///< maximum number of effects named
   double least_gain = 0.004;  ///< [-] fraction of a joint's squared error on unseen recordings that a name must remove
   int threads = 0;            ///< 0: as many as the machine has
 
@@ -47,9 +46,8 @@ struct FoundTorqueEffect {
   /// that it removes, all others in, on recordings that were not fitted; over all joints, each by its noise.
   Share share;
   std::vector<TorqueAlternative> confounded_with;  ///< effects that would explain these recordings as well
-  std::string sentence;                            ///< in plain words
-  std::vector<std::array<double, 3>> curve;        ///< shape=(n, 3): input, torque, standard error of it [Nm | N]
-  std::string curve_input;                         ///< what the curve is drawn against, with its unit
+  std::string plain;                               ///< what it is in plain words, without the joints
+  std::string sentence;                            ///< what it is, where, and how large
 };
 
 /// A part of the torques that goes with an input, and that no effect of the catalogue explains.

@@ -25,9 +25,7 @@ struct TorqueOptions {
   std::vector<EffectRequest> effects;
   std::vector<TorqueEffect> own_effects;  ///< known beside the catalogue
   bool fit_inertials = true;              ///< the links' inertial parameters are fitted beside the effects
-  /// [Hz] of the low-pass without phase that both sides of the equation of motion go through; NaN: from the data, where
-  /// torques and model stop to go together.
-  double cutoff = std::numeric_limits<double>::quiet_NaN();
+  double cutoff = 8.0;      ///< [Hz] of the low-pass without phase that both sides of the equation of motion go through
   double test_share = 0.3;  ///< fraction of the time held out when there is one recording, or none is marked as test
   int threads = 0;          ///< 0: as many as the machine has
 

@@ -1,0 +1,136 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include <doctest/doctest.h>
+
+#include "math/random.hpp"
+#include "support/sanitized.hpp"
+#include "truing/dynamics.hpp"
+
+using namespace truing;
+using truing::math::Random;
+
+namespace {
+
+/// Two links that turn about parallel, level axes.
+Robot arm() {
+  Robot out;
+  out.name = "arm";
+  for (const char* name : {"J1", "J2"}) {
+    Joint joint;
+    joint.name = name;
+    joint.a = 0.4;
+    joint.alpha = 0.0;
+    joint.mass = 3.0;
+    joint.center_of_mass = {-0.2, 0.0, 0.0};
+    joint.inertia = Eigen::Vector3d(0.004, 0.04, 0.04).asDiagonal();
+    out.joints.push_back(joint);
+  }
+  out.gravity = {0.0, -9.81, 0.0};
+  out.targets = {{"tool", Eigen::Isometry3d::Identity()}};
+  return out;
+}
+
+Recording motion(int number, double seconds) {
+  Recording out;
+  out.name = "motion" + std::to_string(number);
+  const auto rows = static_cast<Eigen::Index>(100.0 * seconds);
+  out.time = Eigen::VectorXd::LinSpaced(rows, 0.0, 0.01 * static_cast<double>(rows - 1));
+  out.position.resize(rows, 2);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const double t = out.time[i], phase = 1.3 * number;
+    out.position(i, 0) = 0.8 * std::sin(0.9 * t + phase) + 0.3 * std::sin(2.3 * t);
+    out.position(i, 1) = 0.9 * std::sin(1.1 * t + 2.0 * phase) + 0.3 * std::cos(2.9 * t + phase);
+  }
+  return out;
+}
+
+std::vector<Recording> recorded(const Robot& truth, const std::vector<TorqueEffect>& own = {}) {
+  std::vector<Recording> out;
+  for (int k = 0; k < 5; ++k) {
+    Recording one = motion(k, kSanitized ? 8.0 : 20.0);
+    one.torque = dynamics::predict(truth, one, 30.0, own).torque;
+    Random random(static_cast<std::uint64_t>(k));
+    for (double& value : one.torque.reshaped()) value += 0.05 * random.normal();
+    one.test = k > 2;
+    out.push_back(one);
+  }
+  return out;
+}
+
+const FoundTorqueEffect* found(const TorqueDiagnosis& d, const std::string& effect) {
+  const auto at = std::find_if(d.effects.begin(), d.effects.end(), [&](const auto& e) { return e.effect == effect; });
+  return at == d.effects.end() ? nullptr : &*at;
+}
+
+Robot with_friction() {
+  Robot out = arm();
+  for (const char* name : {"J1", "J2"}) {
+    out.torque_effects.push_back({"coulomb", {name}, {{std::string("coulomb.") + name, 1.5}}});
+    out.torque_effects.push_back({"viscous", {name}, {{std::string("viscous.") + name, 0.8}}});
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("a spring that nobody put into the model is named with its stiffness") {
+  Robot truth = with_friction();
+  truth.torque_effects.push_back({"spring", {"J2"}, {{"spring.J2", 4.0}}});
+  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(truth));
+  REQUIRE(!d.effects.empty());
+  CHECK(d.effects.front().effect == "spring");
+  CHECK(d.effects.front().joints == std::vector<std::string>{"J2"});
+  CHECK(std::abs(d.effects.front().parameters.front().value - 4.0) < 0.4);
+  CHECK(d.effects.front().probability > 0.9);
+}
+
+TEST_CASE("an effect of one's own is named like the catalogue's") {
+  const TorqueEffect cable{"cable", "a cable that pulls", [](const Robot&, std::size_t joint, const MotionRange&) {
+                             TorqueTerm term;
+                             term.parameter = joint == 0 ? "cable.J1" : "cable.J2";
+                             term.unit = "Nm";
+                             term.joints = {joint};
+                             term.basis = [joint](const Motion& m) -> Eigen::MatrixXd {
+                               return m.q.col(static_cast<Eigen::Index>(joint)).array().square().cube();
+                             };
+                             return std::vector<TorqueForm>{{term}};
+                           }};
+  Robot truth = with_friction();
+  truth.torque_effects.push_back({"cable", {"J1"}, {{"cable.J1", 5.0}}});
+  TorqueDiagnoseOptions options;
+  options.own_effects = {cable};
+  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(truth, {cable}), options);
+  const FoundTorqueEffect* named = found(d, "cable");
+  REQUIRE(named != nullptr);
+  CHECK(named->joints == std::vector<std::string>{"J1"});
+  CHECK(std::abs(named->parameters.front().value - 5.0) < 0.5);
+}
+
+TEST_CASE("friction alone is standard practice, and no gap beyond it is named") {
+  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(with_friction()));
+  CHECK(d.verdict == Verdict::none);
+  for (const FoundTorqueEffect& effect : d.effects) CHECK(effect.standard);
+}
+
+TEST_CASE("drives' constants are not searched for beside masses that are fitted") {
+  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(with_friction()));
+  CHECK(std::any_of(d.not_testable.begin(), d.not_testable.end(),
+                    [](const NotTestable& n) { return n.reason == Untestable::same_as_masses; }));
+}
+
+TEST_CASE("what cannot be used is refused in words") {
+  std::vector<Recording> recordings = recorded(with_friction());
+  TorqueDiagnoseOptions options;
+  options.cutoff = 0.0;
+  CHECK_THROWS_WITH_AS(dynamics::diagnose(arm(), recordings, options), "cutoff must be above 0 Hz",
+                       std::invalid_argument);
+  CHECK_THROWS_WITH_AS(dynamics::diagnose(arm(), {}), "there are no recordings", std::invalid_argument);
+  Robot massless = arm();
+  for (Joint& joint : massless.joints) joint.mass.reset();
+  CHECK_THROWS_AS(dynamics::diagnose(massless, recordings), std::invalid_argument);
+  recordings.front().torque.resize(0, 0);
+  CHECK_THROWS_AS(dynamics::diagnose(arm(), recordings), std::invalid_argument);
+}
