@@ -20,7 +20,7 @@ READING = "Reading"
 
 RobotWithMasses = Annotated[
     Path,
-    File("Robot with masses and inertias: URDF or robot.yaml.", argument=True, metavar="ROBOT"),
+    File("Robot with masses and inertias: URDF, MJCF or robot.yaml.", argument=True, metavar="ROBOT"),
 ]
 RecordingFiles = Annotated[
     list[Path],
@@ -55,9 +55,7 @@ TorquePerAmpere = Annotated[
 ]
 CutOff = Annotated[
     float | None,
-    Frequency(
-        "Of the low-pass that torques and model go through. Default: where they stop to go together.", above=0
-    ),
+    Frequency("Of the low-pass without phase that torques and model go through. Default: 8 Hz.", above=0),
 ]
 TestShare = Annotated[
     float,
@@ -78,7 +76,7 @@ def robot_and_recordings(
 ) -> tuple[Robot, list[Recording]]:
     from truing.files import load_recordings, load_robot
 
-    model = load_robot(robot, base_link, tip_link)
+    model = load_robot(robot, base_link, tip_link, any_tool=True)
     if torque_per_ampere is not None:
         model = with_drives(model, torque_per_ampere)
     require_masses(robot, model)
