@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/effects/families.hpp"
 #include "dynamics/search.hpp"
 #include "math/text.hpp"
 
@@ -32,14 +33,6 @@ using Eigen::VectorXd;
 /// Groups of the effects asked for; of a law with inner constants all forms.
 TorqueDesign requested_design(const Problem& problem, const TorqueOptions& options) {
   TorqueDesign design;
-  const std::vector<std::size_t> driven = problem.robot.driven_joints();
-  const auto number = [&](const std::string& joint) {
-    for (std::size_t k = 0; k < driven.size(); ++k)
-      if (problem.robot.joints[driven[k]].name == joint) return static_cast<int>(k);
-    std::vector<std::string> names;
-    for (const std::size_t j : driven) names.push_back(problem.robot.joints[j].name);
-    throw std::invalid_argument("there is no joint '" + joint + "' that has a reading; there are: " + listed(names));
-  };
   std::vector<EffectRequest> requests = options.effects;
   if (requests.empty()) requests = {{"current_offset", {}}, {"coulomb", {}}, {"viscous", {}}, {"armature", {}}};
   if (options.fit_inertials) requests.insert(requests.begin(), {"link_inertia", {}});
@@ -47,7 +40,7 @@ TorqueDesign requested_design(const Problem& problem, const TorqueOptions& optio
     const TorqueEffect& effect = find_torque_effect(request.effect, options.own_effects);
     if (request.joints.empty()) add_effect(effect, -1, problem.robot, problem.range, &design);
     for (const std::string& joint : request.joints)
-      add_effect(effect, number(joint), problem.robot, problem.range, &design);
+      add_effect(effect, static_cast<int>(driven_number(problem.robot, joint)), problem.robot, problem.range, &design);
   }
   return design;
 }

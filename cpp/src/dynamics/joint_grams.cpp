@@ -14,9 +14,9 @@ namespace {
 constexpr Eigen::Index kRows = 256;  // of a tile: longer columns gain the Gram nothing, and would not stay in the cache
 
 /// Tiles of all joints, and their sums.
-class Sums {
+class JointSums {
  public:
-  Sums(const RigidChain& chain, const std::vector<Eigen::Index>& further)
+  JointSums(const RigidChain& chain, const std::vector<Eigen::Index>& further)
       : chain_(chain), blocks_(static_cast<std::size_t>(chain.driven() * chain.links()), nullptr) {
     for (Eigen::Index k = 0; k < chain.driven(); ++k) {
       const std::vector<Eigen::Index>& felt = chain.felt_links(k);
@@ -77,11 +77,11 @@ std::vector<estimation::Gram> joint_grams(const RigidChain& chain, const Eigen::
   constexpr Eigen::Index kMostSlots = 8, kParts = kBatchChunk;
   const Eigen::Index tiles = (q.rows() + kRows - 1) / kRows;
   const Eigen::Index slots = std::clamp<Eigen::Index>(tiles / 4, 1, kMostSlots);
-  std::vector<std::unique_ptr<Sums>> sums(static_cast<std::size_t>(slots));
+  std::vector<std::unique_ptr<JointSums>> sums(static_cast<std::size_t>(slots));
   std::vector<std::vector<estimation::Gram>> grams(static_cast<std::size_t>(slots));
   for_each_on_threads(static_cast<std::size_t>(slots * kParts), threads, {}, [&](std::size_t at) {
     const std::size_t slot = at / kParts, part = at % kParts;
-    if (part == 0) sums[slot] = std::make_unique<Sums>(chain, further);
+    if (part == 0) sums[slot] = std::make_unique<JointSums>(chain, further);
     const auto edge = [&](std::size_t k) { return static_cast<Eigen::Index>(k) * tiles / (slots * kParts); };
     for (Eigen::Index tile = edge(at); tile < edge(at + 1); ++tile)
       sums[slot]->add(q, qd, qdd, tile * kRows, std::min((tile + 1) * kRows, q.rows()), complete);

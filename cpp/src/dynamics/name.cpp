@@ -23,7 +23,7 @@ constexpr double kBlocksOfTime = 0.9;  ///< the most that folds of one recording
 
 const TorqueGroup& group_of(const TorqueDesign& design, int g) { return design.groups[static_cast<std::size_t>(g)]; }
 
-bool same_place(const TorqueGroup& a, const TorqueGroup& b) { return a.effect == b.effect && a.joints == b.joints; }
+bool same_name(const TorqueGroup& a, const TorqueGroup& b) { return a.effect == b.effect && a.joints == b.joints; }
 
 /// Everything about one chosen group.
 class Naming {
@@ -70,7 +70,7 @@ class Naming {
     std::sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
     for (const Evidence::Gain& gain : gains) {
       const TorqueGroup& other = group_of(design_, gain.group);
-      if (other.effect.empty() || gain.rank == 0 || is_in(gain.group) || same_place(other, mine)) continue;
+      if (other.effect.empty() || gain.rank == 0 || is_in(gain.group) || same_name(other, mine)) continue;
       if (!seen.insert({other.effect, other.joints}).second) continue;
       const double behind = loss - gain.score;
       if (behind > 25.0) break;

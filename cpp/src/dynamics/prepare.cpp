@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 constexpr double kFinePerCutoff = 12.5;   ///< rows of a motion, per period of the cut-off
 constexpr double kCoarsePerCutoff = 3.1;  ///< rows that the fit sees
-constexpr Index kTileRows = 2048;         ///< of a motion
+constexpr Index kTileRows = 1024;         ///< of a motion
 constexpr double kLeadIn = 1.0;           ///< [s] what play operators take to forget how they began
 constexpr double kRestWindow = 0.25;      ///< [s] on both sides
 constexpr double kGap = 5.0;              ///< usual steps without a row: here the recording is cut

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/effects/families.hpp"
 #include "math/linear_algebra.hpp"
 #include "math/text.hpp"
 
@@ -72,13 +73,6 @@ void split(const std::vector<Recording>& recordings, double test_share, Problem*
   }
   problem->train = train;
   problem->test = test;
-}
-
-std::size_t driven_number(const Robot& robot, const std::string& joint) {
-  const std::vector<std::size_t> driven = robot.driven_joints();
-  for (std::size_t k = 0; k < driven.size(); ++k)
-    if (robot.joints[driven[k]].name == joint) return k;
-  return 0;
 }
 
 }  // namespace

@@ -55,6 +55,8 @@ struct LinkMotion {
   }
 };
 
+}  // namespace
+
 void require_table(const char* name, const Eigen::MatrixXd& table, Eigen::Index rows, Eigen::Index joints) {
   const auto shape = [](Eigen::Index r, Eigen::Index c) {
     return "(" + std::to_string(r) + ", " + std::to_string(c) + ")";
@@ -71,8 +73,6 @@ void require_table(const char* name, const Eigen::MatrixXd& table, Eigen::Index 
     }
   }
 }
-
-}  // namespace
 
 LinkParameters link_parameters(const Joint& joint) {
   const double m = joint.mass.value_or(0.0);

@@ -62,6 +62,9 @@ class RigidChain {
   std::vector<double> coupling_rows_;        ///< coupling_, row by row
 };
 
+/// Throws std::invalid_argument that names the table, row and joint: another shape, values that are not finite.
+void require_table(const char* name, const Eigen::MatrixXd& table, Eigen::Index rows, Eigen::Index joints);
+
 /// Columns of every row, joint by joint: shape=(rows, 10 * links) each.
 std::vector<Eigen::MatrixXd> regressor_columns(const RigidChain& chain, const Eigen::MatrixXd& q,
                                                const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd);

@@ -14,7 +14,7 @@ namespace {
 
 using namespace truing;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 /// Three joints, of which the second follows the first: two have a reading.
 Robot two_readings() {
@@ -33,7 +33,7 @@ Recording sound() {
   recording.time = Eigen::VectorXd::LinSpaced(30, 0.0, 0.29);
   recording.position = Eigen::MatrixXd::Random(30, 2);
   recording.torque = Eigen::MatrixXd::Random(30, 2);
-  recording.torque.col(0).setConstant(kNaN);
+  recording.torque.col(0).setConstant(kNotANumber);
   recording.columns["payload_kg"] = Eigen::VectorXd::Constant(30, 2.5);
   return recording;
 }
@@ -57,11 +57,11 @@ TEST_CASE("a sound recording is taken, with joints that were not recorded") {
 }
 
 TEST_CASE("a value that is not finite is refused at its column and row") {
-  const std::string torque = complaint([](Recording& r) { r.torque(11, 1) = kNaN; });
+  const std::string torque = complaint([](Recording& r) { r.torque(11, 1) = kNotANumber; });
   CHECK_MESSAGE(contains(torque, "recording 'swing', column tau2, row 12: found nan, expected a finite number"),
                 torque);
   CHECK(contains(torque, "leave the rows out"));
-  const std::string position = complaint([](Recording& r) { r.position.col(1).setConstant(kNaN); });
+  const std::string position = complaint([](Recording& r) { r.position.col(1).setConstant(kNotANumber); });
   CHECK_MESSAGE(contains(position, "column q2, row 1: found nan"), position);
   const std::string own = complaint([](Recording& r) { r.columns["payload_kg"][29] = -1.0 / 0.0; });
   CHECK_MESSAGE(contains(own, "column payload_kg, row 30: found -inf"), own);
@@ -75,7 +75,7 @@ TEST_CASE("a value that is not finite is refused at its column and row") {
 TEST_CASE("times that do not increase are refused at their row") {
   const std::string twice = complaint([](Recording& r) { r.time[7] = r.time[6]; });
   CHECK_MESSAGE(contains(twice, "column t, row 8: found 0.06, expected a time after 0.06"), twice);
-  CHECK(contains(complaint([](Recording& r) { r.time[7] = kNaN; }), "column t, row 8: found nan"));
+  CHECK(contains(complaint([](Recording& r) { r.time[7] = kNotANumber; }), "column t, row 8: found nan"));
   CHECK(contains(complaint([](Recording& r) { r.time[7] = -1.0; }), "column t, row 8: found -1"));
 }
 

@@ -87,7 +87,7 @@ TEST_CASE("torques of tables of another shape, or of values that are none, are r
   CHECK(contains(complaint(pendulum(), q, q, MatrixXd::Zero(1, 4)), "qdd has shape (1, 4), expected (4, 1)"));
   MatrixXd wrong = q;
   wrong(2, 0) = std::nan("");
-  CHECK(contains(complaint(pendulum(), q, wrong, q), "qd, row 3, joint 1: is not a finite number"));
+  CHECK(contains(complaint(pendulum(), q, wrong, q), "qd, row 3, joint 1: nan, expected a finite number"));
   Robot robot = pendulum();
   robot.joints[0].mass = -1.0;
   CHECK(contains(complaint(robot, q, q, q), "mass is -1 kg"));

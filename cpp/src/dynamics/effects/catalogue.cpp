@@ -21,13 +21,6 @@ const TorqueEffect* find(const std::vector<TorqueEffect>& effects, const std::st
   return found == effects.end() ? nullptr : &*found;
 }
 
-std::size_t driven_number(const Robot& robot, const std::string& joint) {
-  for (std::size_t k = 0; k < robot.driven_count(); ++k) {
-    if (driven_name(robot, k) == joint) return k;
-  }
-  throw std::invalid_argument("joint '" + joint + "' has no reading, or is not there");
-}
-
 bool has_all(const TorqueForm& form, const std::map<std::string, double>& values) {
   return std::all_of(form.begin(), form.end(), [&](const TorqueTerm& t) { return values.count(t.parameter) > 0; });
 }
@@ -100,6 +93,19 @@ std::vector<TorqueTerm> terms_of(const AppliedEffect& applied, const Robot& robo
 }
 
 namespace dynamics {
+
+double torque_prior(const MotionRange& range, std::size_t joint) {
+  return std::max(range.torque[static_cast<Eigen::Index>(joint)], 1e-3);
+}
+
+std::size_t driven_number(const Robot& robot, const std::string& joint) {
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < robot.driven_count(); ++k) {
+    names.push_back(driven_name(robot, k));
+    if (names.back() == joint) return k;
+  }
+  throw std::invalid_argument("there is no joint '" + joint + "' that has a reading; there are: " + listed(names));
+}
 
 const std::string& driven_name(const Robot& robot, std::size_t joint) {
   return robot.joints[robot.driven_joints().at(joint)].name;

@@ -23,6 +23,8 @@ std::vector<TorqueEffect> thermal_effects();
 // --- what the families share
 // ------------------------------------------------------------------------------------------
 
+/// The number of a joint among those that have a reading; throws std::invalid_argument that lists them.
+std::size_t driven_number(const Robot& robot, const std::string& joint);
 /// The name of a joint that has a reading, by its number among those.
 const std::string& driven_name(const Robot& robot, std::size_t joint);
 bool is_revolute(const Robot& robot, std::size_t joint);
@@ -30,6 +32,9 @@ bool is_revolute(const Robot& robot, std::size_t joint);
 std::string torque_unit(const Robot& robot, std::size_t joint);
 /// "rad" or "m".
 std::string angle_unit(const Robot& robot, std::size_t joint);
+
+/// Standard deviation of a joint's torque [Nm | N], and more than nothing: what effects on it may well make.
+double torque_prior(const MotionRange& range, std::size_t joint);
 
 /// -1 … 1: the sign of a speed beyond the noise of speeds.
 Eigen::ArrayXd sign_of(const Eigen::VectorXd& speed);

@@ -14,10 +14,6 @@ namespace {
 using Eigen::ArrayXd;
 using Eigen::Index;
 
-/// Of a joint's torque's standard deviation, what friction may well be.
-double torque_prior(const MotionRange& range, std::size_t joint) {
-  return std::max(range.torque[static_cast<Index>(joint)], 1e-3);
-}
 double per_speed(const MotionRange& range, std::size_t joint) {
   return torque_prior(range, joint) / std::max(range.speed[static_cast<Index>(joint)], kSpeedAtRest);
 }

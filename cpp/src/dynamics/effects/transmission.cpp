@@ -18,10 +18,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-double torque_prior(const MotionRange& range, std::size_t joint) {
-  return std::max(range.torque[static_cast<Index>(joint)], 1e-3);
-}
-
 // --- a joint's motor that carries, or is carried by, another's
 // ---------------------------------------------------------
 
