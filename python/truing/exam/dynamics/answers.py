@@ -40,7 +40,11 @@ def answer_of(diagnosis: Any) -> Answer:
 
 
 def _answer_of(diagnosis: Any) -> Answer:
-    effects = [found for found in diagnosis.effects if str(found.effect) not in STANDARD]
+    effects = [
+        found
+        for found in diagnosis.effects
+        if str(found.effect) not in STANDARD and not getattr(found, "standard", False)
+    ]
     return Answer(
         verdict=str(diagnosis.verdict),
         effects=tuple(_named(found) for found in effects),
@@ -70,7 +74,8 @@ def _named(found: Any) -> Named:
         raise UnreadableAnswerError(
             f"found the probability {found.probability!r} of {effect}, expected a number from 0 to 1"
         )
-    return Named(effect, joints, probability, same, float(getattr(found, "share", math.nan)))
+    share = getattr(found, "share", math.nan)
+    return Named(effect, joints, probability, same, float(getattr(share, "value", share)))
 
 
 def _known(item: Any) -> tuple[str, tuple[str, ...]]:

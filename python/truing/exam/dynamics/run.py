@@ -43,7 +43,7 @@ def diagnose(robot: Path, recordings: Sequence[Path]) -> Any:
     """The candidate that the examination is for."""
     dynamics = importlib.import_module("truing.dynamics")
     arm = truing.load_robot(robot)
-    return dynamics.diagnose(arm, dynamics.load_recordings(arm, list(recordings)))
+    return dynamics.diagnose(arm, dynamics.load_recordings(list(recordings), arm))
 
 
 def has_candidate() -> bool:
