@@ -14,7 +14,7 @@ using namespace arms;
 using truing::model::measured_range;
 using truing::model::stretched_length;
 
-namespace readings {
+namespace of_readings {
 namespace {
 
 const double kNan = std::nan("");
@@ -50,4 +50,4 @@ TEST_CASE("the stretched length adds up the links of tables and of joint origins
   CHECK(std::abs(stretched_length(robot) - 1.5) < 1e-15);
 }
 
-}  // namespace readings
+}  // namespace of_readings
