@@ -11,7 +11,8 @@
 namespace truing::dynamics {
 namespace {
 
-constexpr Eigen::Index kRows = 256;  // of a tile: longer columns gain the Gram nothing, and would not stay in the cache
+// Rows of a tile: longer columns gain the Gram nothing, and would not stay in the cache.
+constexpr Eigen::Index kTile = 256;
 
 /// Tiles of all joints, and their sums.
 class JointSums {
@@ -21,7 +22,7 @@ class JointSums {
     for (Eigen::Index k = 0; k < chain.driven(); ++k) {
       const std::vector<Eigen::Index>& felt = chain.felt_links(k);
       const Eigen::Index inertial = kLinkParameters * static_cast<Eigen::Index>(felt.size());
-      rows_.emplace_back(kRows, inertial + further[static_cast<std::size_t>(k)] + 1);
+      rows_.emplace_back(kTile, inertial + further[static_cast<std::size_t>(k)] + 1);
       sums_.emplace_back(kernel::functions().gram_size(static_cast<int>(rows_.back().cols())), 0.0);
       for (std::size_t i = 0; i < felt.size(); ++i)
         blocks_[static_cast<std::size_t>(k * chain.links() + felt[i])] =
@@ -32,13 +33,13 @@ class JointSums {
   void add(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd, Eigen::Index begin,
            Eigen::Index end, const CompleteRows& complete) {
     const Eigen::Index rows = end - begin, all = RigidChain::padded(rows);
-    chain_.regressors(q, qd, qdd, begin, end, blocks_.data(), kRows);
+    chain_.regressors(q, qd, qdd, begin, end, blocks_.data(), kTile);
     for (std::size_t k = 0; k < rows_.size(); ++k) {
       Eigen::MatrixXd& tile = rows_[k];
       complete(static_cast<Eigen::Index>(k), begin,
-               JointRows(tile.data(), rows, tile.cols(), Eigen::OuterStride<>(kRows)));
+               JointRows(tile.data(), rows, tile.cols(), Eigen::OuterStride<>(kTile)));
       tile.middleRows(rows, all - rows).setZero();
-      kernel::functions().gram_add(tile.data(), kRows, static_cast<int>(tile.cols()), static_cast<int>(all),
+      kernel::functions().gram_add(tile.data(), kTile, static_cast<int>(tile.cols()), static_cast<int>(all),
                                    sums_[k].data());
     }
     n_ += static_cast<double>(rows);
@@ -62,7 +63,7 @@ class JointSums {
 
  private:
   const RigidChain& chain_;
-  std::vector<Eigen::MatrixXd> rows_;  ///< of every joint, shape (kRows, columns + 1)
+  std::vector<Eigen::MatrixXd> rows_;  ///< of every joint, shape (kTile, columns + 1)
   std::vector<double*> blocks_;
   std::vector<std::vector<double>> sums_;  ///< the kernel's own
   double n_ = 0.0;
@@ -74,18 +75,18 @@ std::vector<estimation::Gram> joint_grams(const RigidChain& chain, const Eigen::
                                           const Eigen::MatrixXd& qdd, const std::vector<Eigen::Index>& further,
                                           const CompleteRows& complete, int threads) {
   // So many sums whatever the number of threads, added in order. A thread takes the parts of one after the other.
-  constexpr Eigen::Index kMostSlots = 8, kParts = kBatchChunk;
-  const Eigen::Index tiles = (q.rows() + kRows - 1) / kRows;
+  constexpr Eigen::Index kMostSlots = 8, kPartsOfSlot = kBatchChunk;
+  const Eigen::Index tiles = (q.rows() + kTile - 1) / kTile;
   const Eigen::Index slots = std::clamp<Eigen::Index>(tiles / 4, 1, kMostSlots);
   std::vector<std::unique_ptr<JointSums>> sums(static_cast<std::size_t>(slots));
   std::vector<std::vector<estimation::Gram>> grams(static_cast<std::size_t>(slots));
-  for_each_on_threads(static_cast<std::size_t>(slots * kParts), threads, {}, [&](std::size_t at) {
-    const std::size_t slot = at / kParts, part = at % kParts;
+  for_each_on_threads(static_cast<std::size_t>(slots * kPartsOfSlot), threads, {}, [&](std::size_t at) {
+    const std::size_t slot = at / kPartsOfSlot, part = at % kPartsOfSlot;
     if (part == 0) sums[slot] = std::make_unique<JointSums>(chain, further);
-    const auto edge = [&](std::size_t k) { return static_cast<Eigen::Index>(k) * tiles / (slots * kParts); };
+    const auto edge = [&](std::size_t k) { return static_cast<Eigen::Index>(k) * tiles / (slots * kPartsOfSlot); };
     for (Eigen::Index tile = edge(at); tile < edge(at + 1); ++tile)
-      sums[slot]->add(q, qd, qdd, tile * kRows, std::min((tile + 1) * kRows, q.rows()), complete);
-    if (part + 1 < kParts) return;
+      sums[slot]->add(q, qd, qdd, tile * kTile, std::min((tile + 1) * kTile, q.rows()), complete);
+    if (part + 1 < kPartsOfSlot) return;
     grams[slot] = sums[slot]->finish();
     sums[slot].reset();
   });

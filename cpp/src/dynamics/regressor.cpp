@@ -167,10 +167,10 @@ void RigidChain::compile() {
 void RigidChain::regressors(const kernel::RigidFunctions& kernel, const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,
                             const Eigen::MatrixXd& qdd, Eigen::Index begin, Eigen::Index end, double* const* blocks,
                             Eigen::Index stride) const {
-  constexpr Eigen::Index kRows = 64;  // of a pass: what goes in and the columns of a joint stay in the cache
+  constexpr Eigen::Index kPassRows = 64;  // of a pass: what goes in and the columns of a joint stay in the cache
   thread_local std::vector<double> motions, scratch;
   thread_local std::vector<double*> out;
-  const auto plane = static_cast<std::size_t>(links() * kRows);
+  const auto plane = static_cast<std::size_t>(links() * kPassRows);
   motions.resize(3 * plane);
   scratch.resize(kernel::rigid_scratch(static_cast<int>(driven())));
   out.resize(static_cast<std::size_t>(driven() * links()));
@@ -179,12 +179,12 @@ void RigidChain::regressors(const kernel::RigidFunctions& kernel, const Eigen::M
                                      static_cast<int>(driven()),
                                      coupling_rows_.data(),
                                      {gravity_.x(), gravity_.y(), gravity_.z()}};
-  for (Eigen::Index first = begin; first < end; first += kRows) {
-    const Eigen::Index rows = std::min(kRows, end - first), all = padded(rows);
+  for (Eigen::Index first = begin; first < end; first += kPassRows) {
+    const Eigen::Index rows = std::min(kPassRows, end - first), all = padded(rows);
     for (Eigen::Index i = 0; i < links(); ++i) {
       const Eigen::MatrixXd* const tables[3] = {&q, &qd, &qdd};
       for (std::size_t t = 0; t < 3; ++t) {
-        Eigen::Map<Eigen::VectorXd> to(motions.data() + t * plane + static_cast<std::size_t>(i * kRows), all);
+        Eigen::Map<Eigen::VectorXd> to(motions.data() + t * plane + static_cast<std::size_t>(i * kPassRows), all);
         to.setConstant(t == 0 ? zero_[i] : 0.0);
         for (Eigen::Index k = 0; k < driven(); ++k) {
           const double by = coupling_(i, k);
@@ -195,7 +195,7 @@ void RigidChain::regressors(const kernel::RigidFunctions& kernel, const Eigen::M
     }
     for (std::size_t at = 0; at < out.size(); ++at) out[at] = blocks[at] ? blocks[at] + (first - begin) : nullptr;
     kernel.regressor(program, {static_cast<int>(all), motions.data(), motions.data() + plane,
-                               motions.data() + 2 * plane, kRows, out.data(), stride, scratch.data()});
+                               motions.data() + 2 * plane, kPassRows, out.data(), stride, scratch.data()});
   }
 }
 

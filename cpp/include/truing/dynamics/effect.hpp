@@ -113,4 +113,8 @@ const TorqueEffect& find_torque_effect(const std::string& name, const std::vecto
 std::vector<TorqueTerm> terms_of(const AppliedEffect& effect, const Robot& robot, const MotionRange& range,
                                  const std::vector<TorqueEffect>& own = {});
 
+namespace dynamics {
+using truing::Motion;  // and no other room's, where one has a name alike
+}
+
 }  // namespace truing
