@@ -37,7 +37,7 @@ struct Predicted {
 
 TorquePrediction predict(const Robot& robot, const Recording& recording, double cutoff,
                          const std::vector<TorqueEffect>& own_effects) {
-  if (!(cutoff > 0.0)) throw std::invalid_argument("cutoff must be above 0 Hz");
+  if (!(cutoff > 0.0) || !std::isfinite(cutoff)) throw std::invalid_argument("cutoff must be above 0 Hz");
   validate(robot);
   validate(recording, robot);
   const std::vector<Recording> recordings{recording};
@@ -45,10 +45,12 @@ TorquePrediction predict(const Robot& robot, const Recording& recording, double 
   PrepareOptions options;
   options.cutoff = cutoff;
   options.torque_per_ampere = drive_constants(robot, recordings, &warnings);
-  const MotionRange range = range_of(recordings, robot, options);
+  options.short_stretches = true;  // every row has a prediction
+  const RigidChain chain(robot);
+  const MotionRange range = range_of(recordings, robot, chain, options);
   const TorqueModel model(robot, valued_terms(robot, range, own_effects));
   Predicted predicted;
-  for_each_tile(recording, 0, robot, RigidChain(robot), options, [&](Tile& tile) {
+  for_each_tile(recording, 0, robot, chain, options, [&](Tile& tile) {
     const MatrixXd torque = model.torque(&tile.motion);
     const Index begin = tile.first * tile.stride;
     const Index end = std::min(torque.rows(), (tile.first + tile.count) * tile.stride);

@@ -19,8 +19,9 @@ using Eigen::VectorXd;
 
 constexpr double kFinePerCutoff = 12.5;   ///< rows of a motion, per period of the cut-off
 constexpr double kCoarsePerCutoff = 3.1;  ///< rows that the fit sees
-constexpr Index kTileRows = 1024;         ///< of a motion
-constexpr double kLeadIn = 1.0;           ///< [s] what play operators take to forget how they began
+constexpr Index kTileRows = 8192;         ///< of a motion, less what leads in
+constexpr double kForgets = 0.06;         ///< [rad | m] travel after which no play operator knows what was before
+constexpr double kMostLeadIn = 60.0;      ///< [s] of a joint that rests for longer, it is forgotten
 constexpr double kRestWindow = 0.25;      ///< [s] on both sides
 constexpr double kGap = 5.0;              ///< usual steps without a row: here the recording is cut
 
@@ -119,13 +120,25 @@ Stretch stretch_of(const Recording& recording, const MatrixXd& torque, Index beg
 
 VectorXd rows_of(const VectorXd& x, Index begin, Index count) { return x.segment(begin, count); }
 
+/// The row before `begin` from which on every joint has travelled so far that play operators forget what was before.
+Index row_that_forgets(const Motion& motion, Index begin) {
+  const Index earliest = std::max<Index>(0, begin - static_cast<Index>(kMostLeadIn / motion.step));
+  VectorXd low = motion.q.row(begin), high = low;
+  Index row = begin;
+  while (row > earliest && (high - low).minCoeff() < kForgets) {
+    --row;
+    low = low.cwiseMin(motion.q.row(row).transpose());
+    high = high.cwiseMax(motion.q.row(row).transpose());
+  }
+  return row;
+}
+
 /// Coarse rows [from, to) of a stretch, with the rows before and after that filter and play operators reach.
 Tile tile_of(const Stretch& stretch, Index from, Index to) {
   const Tile& whole = stretch.whole;
   const Index stride = whole.stride, half = whole.weights.size() / 2;
-  const auto lead = static_cast<Index>(
-      std::ceil((kLeadIn / whole.motion.step + static_cast<double>(half)) / static_cast<double>(stride)));
-  const Index coarse_begin = std::max<Index>(0, from - lead);
+  const Index reached = std::max<Index>(0, from * stride - half);
+  const Index coarse_begin = row_that_forgets(whole.motion, reached) / stride;
   const Index begin = coarse_begin * stride;
   const Index end = std::min(whole.motion.rows(), (to - 1) * stride + half + 1);
   Tile out;
@@ -172,7 +185,7 @@ void for_each_tile(const Recording& recording, std::size_t number, const Robot& 
   bool any = false;
   for (const auto& [begin, end] : stretches_of(recording.time, step)) {
     const double length = recording.time[end - 1] - recording.time[begin];
-    if (length < 4.0 / options.cutoff) continue;  // shorter than the filter
+    if (end - begin < 2 || (!options.short_stretches && length < 4.0 / options.cutoff)) continue;
     any = true;
     const Stretch stretch = stretch_of(recording, torque, begin, end, step, options);
     const Index coarse = stretch.measured.rows();
@@ -192,42 +205,56 @@ void for_each_tile(const Recording& recording, std::size_t number, const Robot& 
   }
 }
 
-MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robot, const PrepareOptions& options) {
+namespace {
+
+/// Sums of a torque, over rows where it was measured.
+struct TorqueSums {
+  double n = 0.0, sum = 0.0, squares = 0.0;
+  double standard_deviation() const {
+    return n > 0.0 ? std::sqrt(std::max(0.0, squares / n - std::pow(sum / n, 2.0))) : 0.0;
+  }
+};
+
+void widen(const Tile& tile, MotionRange* range, std::vector<TorqueSums>* sums) {
+  const Motion& m = tile.motion;
+  const Index first = tile.first * tile.stride;
+  const Index rows = std::min(m.rows(), (tile.first + tile.count) * tile.stride) - first;
+  range->lower = range->lower.cwiseMin(m.q.middleRows(first, rows).colwise().minCoeff().transpose());
+  range->upper = range->upper.cwiseMax(m.q.middleRows(first, rows).colwise().maxCoeff().transpose());
+  range->speed = range->speed.cwiseMax(m.qd.middleRows(first, rows).cwiseAbs().colwise().maxCoeff().transpose());
+  range->acceleration =
+      range->acceleration.cwiseMax(m.qdd.middleRows(first, rows).cwiseAbs().colwise().maxCoeff().transpose());
+  range->duration = std::max(range->duration, m.time[first + rows - 1]);
+  for (const auto& [name, column] : m.columns) {
+    const auto own = column.segment(first, rows);
+    auto [at, fresh] = range->columns.try_emplace(name, own.minCoeff(), own.maxCoeff());
+    if (!fresh) at->second = {std::min(at->second.first, own.minCoeff()), std::max(at->second.second, own.maxCoeff())};
+  }
+  for (std::size_t j = 0; j < sums->size(); ++j) {
+    for (Index i = 0; i < tile.count; ++i) {
+      const double torque = tile.measured(i, static_cast<Index>(j));
+      if (std::isnan(torque)) continue;
+      (*sums)[j].n += 1.0;
+      (*sums)[j].sum += torque;
+      (*sums)[j].squares += torque * torque;
+    }
+  }
+}
+
+}  // namespace
+
+MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robot, const RigidChain& chain,
+                     const PrepareOptions& options) {
   const auto joints = static_cast<Index>(robot.driven_count());
   constexpr double inf = std::numeric_limits<double>::infinity();
   MotionRange out;
   out.lower = VectorXd::Constant(joints, inf);
   out.upper = VectorXd::Constant(joints, -inf);
   out.speed = out.acceleration = out.torque = VectorXd::Zero(joints);
-  VectorXd sum = VectorXd::Zero(joints), squares = sum, count = sum;
-  for (const Recording& recording : recordings) {
-    if (recording.rows() < 3) continue;
-    const double step = usual_step(recording.time);
-    const MatrixXd q = filtered(recording.position, low_pass(options.cutoff, step));
-    const MatrixXd qd = rate_of(q, step);
-    out.lower = out.lower.cwiseMin(q.colwise().minCoeff().transpose());
-    out.upper = out.upper.cwiseMax(q.colwise().maxCoeff().transpose());
-    out.speed = out.speed.cwiseMax(qd.cwiseAbs().colwise().maxCoeff().transpose());
-    out.acceleration = out.acceleration.cwiseMax(rate_of(qd, step).cwiseAbs().colwise().maxCoeff().transpose());
-    const MatrixXd torque = measured_torque(recording, options.torque_per_ampere);
-    for (Index j = 0; j < joints; ++j) {
-      if (std::isnan(torque(0, j))) continue;
-      sum[j] += torque.col(j).sum();
-      squares[j] += torque.col(j).squaredNorm();
-      count[j] += static_cast<double>(torque.rows());
-    }
-    out.duration = std::max(out.duration, recording.time[recording.time.size() - 1] - recording.time[0]);
-    for (const auto& [name, column] : recording.columns) {
-      auto [at, fresh] = out.columns.try_emplace(name, column.minCoeff(), column.maxCoeff());
-      if (fresh) continue;
-      at->second.first = std::min(at->second.first, column.minCoeff());
-      at->second.second = std::max(at->second.second, column.maxCoeff());
-    }
-  }
-  for (Index j = 0; j < joints; ++j) {
-    if (count[j] > 0.0)
-      out.torque[j] = std::sqrt(std::max(0.0, squares[j] / count[j] - std::pow(sum[j] / count[j], 2)));
-  }
+  std::vector<TorqueSums> sums(static_cast<std::size_t>(joints));
+  for (std::size_t r = 0; r < recordings.size(); ++r)
+    for_each_tile(recordings[r], r, robot, chain, options, [&](Tile& tile) { widen(tile, &out, &sums); });
+  for (std::size_t j = 0; j < sums.size(); ++j) out.torque[static_cast<Index>(j)] = sums[j].standard_deviation();
   return out;
 }
 

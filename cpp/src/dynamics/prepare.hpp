@@ -43,6 +43,7 @@ struct Tile {
 struct PrepareOptions {
   double cutoff = 8.0;                    ///< [Hz]
   std::vector<double> torque_per_ampere;  ///< [Nm/A | N/A] of joints measured by current
+  bool short_stretches = false;           ///< those between gaps that are shorter than the filter, too
 };
 
 /// Calls `use` with each tile of a recording, in order of time. Throws std::invalid_argument: too short to be filtered.
@@ -52,7 +53,8 @@ void for_each_tile(const Recording& recording, std::size_t number, const Robot& 
 /// Torques measured, or currents times the drives' constants: shape=(n, joints), NaN throughout where there is neither.
 Eigen::MatrixXd measured_torque(const Recording& recording, const std::vector<double>& torque_per_ampere);
 
-/// What the recordings hold together.
-MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robot, const PrepareOptions& options);
+/// What the recordings hold together; throws as for_each_tile.
+MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robot, const RigidChain& chain,
+                     const PrepareOptions& options);
 
 }  // namespace truing::dynamics
