@@ -47,8 +47,7 @@ void add_at(const TorqueEffect& effect, std::size_t joint, const Robot& robot, c
   }
 }
 
-// --- free functions
-// ----------------------------------------------------------------------------------------------------
+// --- free functions ------------------------------------------------------------------------------
 
 /// An input of a free function, and how far it goes.
 struct FreeInput {
@@ -122,8 +121,7 @@ std::vector<FreeInput> inputs_at(std::size_t joint, const MotionRange& range) {
   return out;
 }
 
-// --- normal equations
-// --------------------------------------------------------------------------------------------------
+// --- normal equations ----------------------------------------------------------------------------
 
 /// Columns of the design that a joint's torque has.
 std::vector<std::vector<int>> columns_by_joint(const TorqueDesign& design, std::size_t joints) {

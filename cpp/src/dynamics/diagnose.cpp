@@ -26,12 +26,6 @@ bool TorqueDiagnoseOptions::is_valid(std::string* error) const {
 
 namespace dynamics {
 namespace {
-std::vector<bool> with_prior(const TorqueDesign& design) {
-  std::vector<bool> out(design.terms.size(), false);
-  for (const TorqueGroup& group : design.groups)
-    for (const int c : group.columns) out[static_cast<std::size_t>(c)] = is_inertial(design, group);
-  return out;
-}
 
 /// What all effects together leave: the errors of the groundwork alone go on in time as the effects do that it lacks.
 std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& design,
@@ -75,7 +69,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
                                   {options.leave_out.begin(), options.leave_out.end()}, !problem.fitted_before);
   add_free_functions(problem.robot, problem.range, &design);
   const std::vector<int> nuisance = problem.fitted_before ? std::vector<int>{} : standard_columns(design);
-  std::vector<bool> priors = with_prior(design);
+  std::vector<bool> priors = inertial_columns(design);
   if (problem.fitted_before) priors.assign(priors.size(), false);  // they are candidates, with priors of their own
 
   SearchLimits limits;

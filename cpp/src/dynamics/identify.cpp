@@ -34,8 +34,11 @@ using Eigen::VectorXd;
 TorqueDesign requested_design(const Problem& problem, const TorqueOptions& options) {
   TorqueDesign design;
   std::vector<EffectRequest> requests = options.effects;
-  if (requests.empty()) requests = {{"current_offset", {}}, {"coulomb", {}}, {"viscous", {}}, {"armature", {}}};
-  if (options.fit_inertials) requests.insert(requests.begin(), {"link_inertia", {}});
+  for (const TorqueEffect& effect : torque_catalogue()) {
+    const bool inertial = effect.traits.standard && effect.traits.family == TorqueFamily::inertia;
+    const bool unasked = options.effects.empty() && effect.traits.usual && !inertial;
+    if (unasked || (inertial && options.fit_inertials)) requests.push_back({effect.name, {}});
+  }
   for (const EffectRequest& request : requests) {
     const TorqueEffect& effect = find_torque_effect(request.effect, options.own_effects);
     if (request.joints.empty()) add_effect(effect, -1, problem.robot, problem.range, &design);
@@ -49,7 +52,7 @@ TorqueDesign requested_design(const Problem& problem, const TorqueOptions& optio
 std::vector<int> best_forms(const TorqueDesign& design, const Sums& sums) {
   std::vector<int> chosen, columns;
   for (std::size_t g = 0; g < design.groups.size(); ++g) {
-    if (design.groups[g].forms > 1 && design.groups[g].effect != "coupling") continue;
+    if (design.groups[g].forms > 1) continue;
     chosen.push_back(static_cast<int>(g));
     columns.insert(columns.end(), design.groups[g].columns.begin(), design.groups[g].columns.end());
   }
@@ -98,9 +101,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   const Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
   const Groundwork groundwork = groundwork_of(problem);
   const TorqueDesign design = requested_design(problem, options);
-  std::vector<bool> with_prior(design.terms.size(), false);
-  for (const TorqueGroup& group : design.groups)
-    for (const int c : group.columns) with_prior[static_cast<std::size_t>(c)] = is_inertial(design, group);
+  const std::vector<bool> with_prior = inertial_columns(design);
 
   TorqueFit out;
   TorqueModel model = groundwork.model;

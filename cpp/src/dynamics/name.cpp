@@ -227,17 +227,6 @@ std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& 
   return out;
 }
 
-/// Named by how much of the joints' squared error, each joint alike.
-double mean_square(const TorqueErrors& errors, const TorqueErrors& of) {
-  double sum = 0.0, n = 0.0;
-  for (std::size_t j = 0; j < errors.held_out.size(); ++j) {
-    if (!(of.held_out[j].rms > 0.0)) continue;
-    sum += std::pow(errors.held_out[j].rms / of.held_out[j].rms, 2.0);
-    n += 1.0;
-  }
-  return n > 0.0 ? sum / n : 1.0;
-}
-
 /// Root mean square over the joints of errors in parts of their torques' standard deviations.
 double mean_percent(const TorqueErrors& errors) {
   double squares = 0.0, n = 0.0;
@@ -279,7 +268,7 @@ std::string verdict_sentence(const TorqueDiagnosis& d, bool fitted_before) {
 }
 
 Verdict verdict_of(const TorqueDiagnosis& d, bool any) {
-  if (any && mean_square(d.errors[2], d.errors[1]) > 1.0) return Verdict::does_not_hold;
+  if (any && mean_percent(d.errors[2]) > mean_percent(d.errors[1])) return Verdict::does_not_hold;
   if (any) return d.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown;
   return d.unknown.empty() ? Verdict::none : Verdict::unknown;
 }
@@ -297,9 +286,8 @@ void add_scale_of_masses(const std::vector<FoundTorqueEffect>& effects, const st
     if (effect.traits.scales_masses) one.effects.push_back(effect.name);
   }
   one.sentence =
-      "Masses and the drives' constants share one scale: with constants that are 10 % larger all masses and inertias "
-      "are "
-      "10 % larger. A payload of known mass tells.";
+      "Masses and the drives' constants share one scale: with constants that are 10 % larger, all masses and inertias "
+      "are 10 % larger. A payload of known mass tells.";
   out->push_back(std::move(one));
 }
 
@@ -322,6 +310,15 @@ std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effect
     out.push_back(std::move(one));
   }
   return out;
+}
+
+/// The robot with its groundwork, where it had none, and with further groups of the same fit.
+Robot with_groundwork(const Problem& problem, const TorqueDesign& design, const Fit& fit, std::vector<int> groups) {
+  for (std::size_t g = 0; g < design.groups.size() && !problem.fitted_before; ++g) {
+    if (design.groups[g].standard) groups.push_back(static_cast<int>(g));
+  }
+  std::sort(groups.begin(), groups.end());
+  return applied(problem.robot, design, groups, fit, problem.range);
 }
 
 }  // namespace
@@ -353,13 +350,9 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   out.cutoff = problem.data.prepare.cutoff;
   for (const Noise& one : noise) out.design_effect.push_back(one.design_effect);
   out.held_out = problem.held_out;
-  std::vector<int> groups = choice.groups;
-  if (!problem.fitted_before) {
-    for (std::size_t g = 0; g < design.groups.size(); ++g)
-      if (design.groups[g].standard) groups.push_back(static_cast<int>(g));
-  }
-  std::sort(groups.begin(), groups.end());
-  out.robot = applied(problem.robot, design, groups, naming.fit(), problem.range);
+  // What does not hold is not in the robot.
+  out.robot = out.verdict == Verdict::does_not_hold ? with_groundwork(problem, groundwork.design, groundwork.fit, {})
+                                                    : with_groundwork(problem, design, naming.fit(), choice.groups);
   out.warnings = problem.warnings;
   return out;
 }

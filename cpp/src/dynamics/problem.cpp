@@ -16,11 +16,17 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kBlocks = 10;  ///< of time, where recordings cannot be the folds
+constexpr int kBlocks = 10;                ///< of time, where recordings cannot be the folds
+constexpr std::size_t kFewRecordings = 4;  ///< fewer unmarked ones are parted into blocks of time
 
 double length_of(const Recording& recording) { return recording.time[recording.time.size() - 1] - recording.time[0]; }
 
-/// Blocks of time as folds: every third or so is held out.
+/// Evenly spread: number k of a row is held out when k times the fraction passes a whole number.
+bool is_held_out(double k, double test_share) {
+  return std::floor((k + 1.0) * test_share + 0.5) > std::floor(k * test_share + 0.5);
+}
+
+/// Blocks of time as folds: some of them are held out.
 void split_by_blocks(const std::vector<Recording>& recordings, double test_share, Problem* problem) {
   problem->single = true;
   double longest = 0.0;
@@ -30,8 +36,7 @@ void split_by_blocks(const std::vector<Recording>& recordings, double test_share
   train.of_recording.assign(recordings.size(), 0);
   test.of_recording.assign(recordings.size(), 0);
   for (int b = 0; b < kBlocks; ++b) {
-    // Evenly spread: block b is held out when b * share passes a whole number.
-    const bool held = std::floor((b + 1) * test_share + 0.5) > std::floor(b * test_share + 0.5);
+    const bool held = is_held_out(b, test_share);
     train.of_block.push_back(held ? -1 : train.count++);
     test.of_block.push_back(held ? test.count++ : -1);
   }
@@ -42,18 +47,15 @@ void split_by_blocks(const std::vector<Recording>& recordings, double test_share
 
 void split(const std::vector<Recording>& recordings, double test_share, Problem* problem) {
   std::vector<bool> held(recordings.size());
-  std::size_t tests = 0;
-  for (std::size_t r = 0; r < recordings.size(); ++r) tests += (held[r] = recordings[r].test) ? 1u : 0u;
-  const std::size_t trains = recordings.size() - tests;
-  if (tests == 0 && recordings.size() >= 4) {  // every third or so
-    for (std::size_t r = 0; r < recordings.size(); ++r) {
-      const auto k = static_cast<double>(r);
-      held[r] = std::floor((k + 1.0) * test_share + 0.5) > std::floor(k * test_share + 0.5);
-    }
-    problem->warnings.push_back("no recording is marked as test (column set): every " +
-                                math::number(1.0 / test_share, 2) + "rd or so was held out");
-  } else if (trains < 3 && tests == 0) {
-    return split_by_blocks(recordings, test_share, problem);
+  for (std::size_t r = 0; r < recordings.size(); ++r) held[r] = recordings[r].test;
+  const auto tests = std::count(held.begin(), held.end(), true);
+  if (tests == static_cast<std::ptrdiff_t>(held.size()))
+    throw std::invalid_argument("all recordings are marked as test (column set): none is left to be fitted");
+  if (tests == 0) {
+    if (recordings.size() < kFewRecordings) return split_by_blocks(recordings, test_share, problem);
+    for (std::size_t r = 0; r < held.size(); ++r) held[r] = is_held_out(static_cast<double>(r), test_share);
+    problem->warnings.push_back("no recording is marked as test (column set): " + math::number(100.0 * test_share, 2) +
+                                " % of them were held out");
   }
   Folds train, test;
   for (std::size_t r = 0; r < recordings.size(); ++r) {
@@ -83,18 +85,15 @@ void require_usable(const Robot& robot, const std::vector<Recording>& recordings
   for (const Joint& joint : robot.joints) any_mass = any_mass || joint.mass.value_or(0.0) > 0.0;
   if (!any_mass) {
     throw std::invalid_argument(
-        "no link of the robot has a mass: torques need mass, com and inertia of the links (URDF: <inertial>; "
-        "robot.yaml: "
-        "mass, com, inertia)");
+        "no link of the robot has a mass: torques need mass, centre of mass and inertia of the links (URDF: "
+        "<inertial>; robot.yaml: mass, com, inertia)");
   }
   for (const Recording& recording : recordings) {
     validate(recording, robot);
     if (recording.torque.cols() == 0 && recording.current.cols() == 0) {
       throw std::invalid_argument("recording '" + recording.name +
                                   "': no torques (tau1_Nm …) and no currents (i1_A …)" +
-                                  (recording.command.cols() > 0 ? "; it has commands: with these alone torques cannot "
-                                                                  "be compared"
-                                                                : ""));
+                                  (recording.command.cols() > 0 ? ", which commands alone are not" : ""));
     }
   }
 }
@@ -103,12 +102,16 @@ std::vector<double> drive_constants(const Robot& robot, const std::vector<Record
                                     std::vector<std::string>* warnings) {
   std::vector<double> out;
   std::vector<std::string> unknown;
-  const bool by_current =
-      std::any_of(recordings.begin(), recordings.end(), [](const Recording& r) { return r.torque.cols() == 0; });
-  for (const std::size_t j : robot.driven_joints()) {
-    const Joint& joint = robot.joints[j];
+  const auto by_current = [&](Index column) {
+    return std::any_of(recordings.begin(), recordings.end(), [column](const Recording& r) {
+      return r.current.cols() > 0 && (r.torque.cols() == 0 || std::isnan(r.torque(0, column)));
+    });
+  };
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  for (std::size_t k = 0; k < driven.size(); ++k) {
+    const Joint& joint = robot.joints[driven[k]];
     out.push_back(joint.torque_per_ampere.value_or(1.0));
-    if (by_current && !joint.torque_per_ampere) unknown.push_back(joint.name);
+    if (!joint.torque_per_ampere && by_current(static_cast<Index>(k))) unknown.push_back(joint.name);
   }
   if (!unknown.empty()) {
     warnings->push_back("torque_per_ampere is not known of " + listed(unknown) +
@@ -123,13 +126,23 @@ Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, c
   data.prepare.torque_per_ampere = drive_constants(robot, recordings, &warnings);
   data.prepare.cutoff = options.cutoff;
   split(recordings, options.test_share, this);
-  range = range_of(recordings, robot, data.prepare);
+  range = range_of(recordings, robot, chain, data.prepare);
+  if (range.speed.maxCoeff() < kSpeedAtRest) {
+    throw std::invalid_argument("nothing moves: no joint of any recording is faster than " +
+                                math::number(kSpeedAtRest) + " rad/s (or m/s), and at rest friction tells nothing");
+  }
   nominal = TorqueModel(robot, valued_terms(robot, range, options.own_effects));
   fitted_before = !robot.torque_effects.empty() && robot.fitted_range.count("qd1") > 0;
 }
 
-bool is_inertial(const TorqueDesign& design, const TorqueGroup& group) {
-  return group.standard && group.family == TorqueFamily::inertia && !design.terms.empty();
+bool is_inertial(const TorqueGroup& group) { return group.standard && group.family == TorqueFamily::inertia; }
+
+std::vector<bool> inertial_columns(const TorqueDesign& design) {
+  std::vector<bool> out(design.terms.size(), false);
+  for (const TorqueGroup& group : design.groups) {
+    for (const int c : group.columns) out[static_cast<std::size_t>(c)] = is_inertial(group);
+  }
+  return out;
 }
 
 std::vector<int> standard_columns(const TorqueDesign& design) {
@@ -184,10 +197,7 @@ Groundwork groundwork_of(const Problem& problem) {
     const std::vector<Noise> noise = noise_of(problem.data, problem.nominal, problem.train);
     return {std::move(design), {}, problem.nominal, noise};
   }
-  std::vector<bool> with_prior(design.terms.size(), false);
-  for (const TorqueGroup& group : design.groups) {
-    for (const int c : group.columns) with_prior[static_cast<std::size_t>(c)] = is_inertial(design, group);
-  }
+  const std::vector<bool> with_prior = inertial_columns(design);
   const std::vector<int> columns = standard_columns(design);
   const std::vector<JointGrams> grams =
       sum_grams(problem.data, design, problem.nominal, problem.nominal, problem.train);
@@ -230,7 +240,7 @@ Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<
   for (const int g : groups) {
     const TorqueGroup& group = design.groups[static_cast<std::size_t>(g)];
     const std::vector<Parameter> parameters = parameters_of(design, group.columns, fit);
-    if (is_inertial(design, group)) {
+    if (is_inertial(group)) {
       Joint& joint = out.joints[driven[driven_number(robot, group.joints.front())]];
       LinkParameters links = link_parameters(joint);
       for (Index k = 0; k < kLinkParameters; ++k) links[k] += parameters[static_cast<std::size_t>(k)].value;
@@ -264,8 +274,7 @@ Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<
   return out;
 }
 
-// --- errors
-// --------------------------------------------------------------------------------------------------------------
+// --- errors --------------------------------------------------------------------------------------
 
 namespace {
 

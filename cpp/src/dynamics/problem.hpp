@@ -53,7 +53,7 @@ struct Sums {
   Eigen::VectorXd precision;  ///< of the priors, by column; 0: flat
 };
 
-/// `flat`: columns without a prior.
+/// `with_prior`: by column, whether its term's prior holds; the others are flat.
 Sums sums_of(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
              const std::vector<bool>& with_prior);
 
@@ -64,8 +64,10 @@ std::vector<ValuedTerm> valued(const TorqueDesign& design, const Fit& fit);
 
 /// Groups of what is usual: inertial parameters, Coulomb, viscous, an offset. Their columns.
 std::vector<int> standard_columns(const TorqueDesign& design);
-/// Columns of the links' inertial parameters.
-bool is_inertial(const TorqueDesign& design, const TorqueGroup& group);
+/// The links' inertial parameters.
+bool is_inertial(const TorqueGroup& group);
+/// By column: whether it is one of these.
+std::vector<bool> inertial_columns(const TorqueDesign& design);
 
 /// The groundwork fitted to the problem's training rows: the model, and what noise it leaves.
 struct Groundwork {
@@ -87,7 +89,7 @@ std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vect
 std::vector<TorqueErrors> errors_of(const Problem& problem,
                                     const std::vector<std::pair<std::string, TorqueModel>>& models);
 
-/// Throws std::invalid_argument where recordings cannot be fitted: no torque, no gains, nothing moves …
+/// Throws std::invalid_argument where recordings cannot be fitted: there are none, no torque, no link has a mass.
 void require_usable(const Robot& robot, const std::vector<Recording>& recordings);
 
 /// Torque per ampere of every joint: the robot's, or 1 (Nm/A) with a warning.

@@ -58,15 +58,6 @@ Choice Search::without(const Choice& choice, std::size_t at) {
   return out;
 }
 
-std::vector<int> Search::columns(const Choice& choice) const {
-  std::vector<int> out = evidence_.nuisance();
-  for (const int g : choice.groups) {
-    const std::vector<int>& more = groups_[static_cast<std::size_t>(g)].columns;
-    out.insert(out.end(), more.begin(), more.end());
-  }
-  return out;
-}
-
 VectorXd Search::squares_of_folds(const Choice& choice) const {
   const Evidence::State state = evidence_.evaluate(choice);
   const Gram all = sums_.all.of(state.columns);
@@ -98,8 +89,7 @@ bool Search::may_enter(const Choice& choice, int group, bool free_functions) con
 
 /// Folds that were not fitted, by enough in the mean and for sure: the mean of the folds' gains is above zero by 1.5
 /// standard errors, gains as roots, or a single fold could decide.
-bool Search::predicts(const Choice& with, const Choice& less, const SearchLimits& limits) const {
-  const VectorXd before = squares_of_folds(less), after = squares_of_folds(with);
+bool Search::predicts(const VectorXd& before, const VectorXd& after, const SearchLimits& limits) const {
   double n = 0.0, gains = 0.0, roots = 0.0, squares = 0.0;
   for (Index f = 0; f < before.size(); ++f) {
     if (!(before[f] > 0.0)) continue;  // nothing moved
@@ -150,11 +140,12 @@ Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits) cons
   for (bool changed = true; changed;) {
     changed = false;
     const double score = evidence_.evaluate(choice).score;
+    const VectorXd squares = squares_of_folds(choice);
     for (std::size_t at = 0; at < choice.groups.size(); ++at) {
       const Choice less = without(choice, at);
       const bool possible = !limits.plausible_only || is_plausible(choice, choice.groups[at]);
       const bool wins = possible && evidence_.evaluate(less).score < score - 0.5 * limits.threshold;
-      if (wins && predicts(choice, less, limits)) continue;
+      if (wins && predicts(squares_of_folds(less), squares, limits)) continue;
       choice = less;
       changed = true;
       break;
@@ -169,6 +160,7 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
     const Evidence::State state = evidence_.evaluate(choice);
     std::vector<Evidence::Gain> gains = evidence_.gains(state);
     std::sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
+    const VectorXd squares = squares_of_folds(choice);
     bool taken = false;
     for (const Evidence::Gain& gain : gains) {
       if (gain.score < limits.threshold) break;
@@ -178,7 +170,7 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
       grown.groups.push_back(gain.group);
       grown.scales.push_back(gain.scale);
       const bool possible = !limits.plausible_only || is_plausible(grown, gain.group);
-      if (!possible || !predicts(grown, choice, limits)) {
+      if (!possible || !predicts(squares, squares_of_folds(grown), limits)) {
         refused.push_back(gain.group);
         continue;
       }

@@ -32,7 +32,6 @@ class Search {
   const Evidence& evidence() const { return evidence_; }
   double cost(int group) const { return groups_[static_cast<std::size_t>(group)].cost; }
   Evidence::State state(const Choice& choice) const { return evidence_.evaluate(choice); }
-  std::vector<int> columns(const Choice& choice) const;
 
   /// Squared error of every fold, by the fit to the others.
   Eigen::VectorXd squares_of_folds(const Choice& choice) const;
@@ -47,7 +46,7 @@ class Search {
   Choice better_forms(Choice choice) const;
   Choice less_what_is_idle(Choice choice, const SearchLimits& limits) const;
   bool is_plausible(const Choice& choice, int group) const;
-  bool predicts(const Choice& with, const Choice& less, const SearchLimits& limits) const;
+  bool predicts(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const SearchLimits& limits) const;
 
   const TorqueDesign& design_;
   const Sums& sums_;

@@ -134,3 +134,44 @@ TEST_CASE("what cannot be used is refused in words") {
   recordings.front().torque.resize(0, 0);
   CHECK_THROWS_AS(dynamics::diagnose(arm(), recordings), std::invalid_argument);
 }
+
+TEST_CASE("recordings are parted so that some are fitted and some are held out") {
+  std::vector<Recording> recordings = recorded(with_friction());
+  for (Recording& one : recordings) one.test = true;
+  CHECK_THROWS_WITH_AS(dynamics::diagnose(arm(), recordings),
+                       "all recordings are marked as test (column set): none is left to be fitted",
+                       std::invalid_argument);
+  for (Recording& one : recordings) one.test = false;
+  const TorqueFit five = dynamics::identify(arm(), recordings);
+  CHECK(five.held_out.size() == 2);
+  recordings.resize(3);
+  const TorqueFit three = dynamics::identify(arm(), recordings);
+  CHECK(three.held_out == std::vector<std::string>{"blocks of time"});
+  for (const TorqueFit* fit : {&five, &three}) {
+    for (const TorqueErrors& errors : fit->errors) CHECK(errors.held_out.front().n > 0.0);
+  }
+}
+
+TEST_CASE("recordings in which nothing moves are refused") {
+  std::vector<Recording> recordings = recorded(with_friction());
+  for (Recording& one : recordings) one.position.setConstant(0.3);
+  CHECK_THROWS_AS(dynamics::diagnose(arm(), recordings), std::invalid_argument);
+}
+
+TEST_CASE("what does not hold on held-out recordings is said first, and is not in the robot") {
+  Robot one = with_friction(), other = with_friction();
+  one.torque_effects.push_back({"spring", {"J2"}, {{"spring.J2", 4.0}}});
+  other.torque_effects.push_back({"spring", {"J2"}, {{"spring.J2", -4.0}}});
+  std::vector<Recording> recordings = recorded(one);
+  const std::vector<Recording> others = recorded(other);
+  for (std::size_t k = 0; k < recordings.size(); ++k) {
+    if (recordings[k].test) recordings[k] = others[k];
+  }
+  const TorqueDiagnosis d = dynamics::diagnose(arm(), recordings);
+  REQUIRE(found(d, "spring") != nullptr);
+  CHECK(d.verdict == Verdict::does_not_hold);
+  CHECK(std::none_of(d.robot.torque_effects.begin(), d.robot.torque_effects.end(),
+                     [](const AppliedEffect& e) { return e.effect == "spring"; }));
+  CHECK(std::any_of(d.robot.torque_effects.begin(), d.robot.torque_effects.end(),
+                    [](const AppliedEffect& e) { return e.effect == "coulomb"; }));
+}

@@ -68,6 +68,7 @@ enum class SimulatorPlace {
 struct TorqueTraits {
   TorqueFamily family = TorqueFamily::own;
   bool standard = false;       ///< what everybody fits beside the inertias: offset, Coulomb, viscous
+  bool usual = false;          ///< `identify` fits it where nothing in particular is asked for
   bool scales_masses = false;  ///< where inertial parameters are fitted it is the same as all of them times a factor
   SimulatorPlace mujoco = SimulatorPlace::callback;
   SimulatorPlace urdf = SimulatorPlace::none;

@@ -51,13 +51,13 @@ std::vector<TorqueEffect> drive_effects() {
   std::vector<TorqueEffect> out;
   TorqueTraits traits;
   traits.family = TorqueFamily::drive;
-  traits.standard = true;
+  traits.standard = traits.usual = true;
   traits.mujoco = SimulatorPlace::field;
   traits.plain = "an offset of the torque";
   traits.documentation = {"1", "`current_offset.J2` [Nm]", "-"};
   out.push_back(
       {"current_offset", "a constant torque that is read, or acts, beside all others", current_offset, true, traits});
-  traits.standard = false;
+  traits.standard = traits.usual = false;
   traits.scales_masses = true;
   traits.plain = "a motor constant that is off";
   traits.documentation = {"tau, the whole torque that the model predicts", "`motor_constant.J2` [-]",

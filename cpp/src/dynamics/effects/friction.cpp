@@ -33,7 +33,6 @@ std::vector<TorqueForm> viscous(const Robot& robot, std::size_t joint, const Mot
 }
 
 // --- laws of the speed beside Coulomb's and the linear one
-// -------------------------------------------------------------
 
 const char* const kLaw = "viscous_law";
 
@@ -67,7 +66,6 @@ TorqueForm viscous_law_with(const Robot& robot, std::size_t joint, const std::ma
 }
 
 // --- Stribeck 1902: friction falls from stiction to Coulomb's as the joint gets faster
-// ---------------------------------
 
 TorqueForm stribeck_at(const Robot& robot, std::size_t joint, double vs, double prior) {
   TorqueTerm term = term_at(joint, parameter_name("stribeck", robot, joint), torque_unit(robot, joint), prior,
@@ -126,7 +124,6 @@ TorqueForm presliding_with(const Robot& robot, std::size_t joint, const std::map
 }
 
 // --- friction that is not a function of the speed alone
-// ----------------------------------------------------------------
 
 std::vector<TorqueForm> asymmetric(const Robot& robot, std::size_t joint, const MotionRange& range) {
   return {{term_at(joint, parameter_name("asymmetric_friction", robot, joint),
@@ -172,7 +169,7 @@ std::vector<TorqueEffect> friction_effects() {
                         {"s = tanh(qd / 0.01)", "`coulomb.J2` [Nm]", "motion both ways"})});
   out.push_back({"viscous", "friction that grows with the speed", viscous, true,
                  traits("viscous friction", Place::field, Place::field, {"qd", "`viscous.J2` [Nm s/rad]", "speed"})});
-  for (TorqueEffect& effect : out) effect.traits.standard = true;
+  for (TorqueEffect& effect : out) effect.traits.standard = effect.traits.usual = true;
   out.push_back({"viscous_law", "friction that grows faster, or slower, than the speed", viscous_law, true,
                  traits("friction that is not linear in the speed", Place::field, Place::none,
                         {"qd abs(qd); or qd^3; or s sqrt(abs(qd)); or tanh(qd / v0)",

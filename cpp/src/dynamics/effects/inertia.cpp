@@ -107,18 +107,19 @@ std::vector<TorqueEffect> inertia_effects() {
   traits.mujoco = SimulatorPlace::field;
   traits.urdf = SimulatorPlace::field;
   traits.plain = "mass, centre of mass or inertia of the link";
-  traits.standard = true;
+  traits.standard = traits.usual = true;
   traits.documentation = {"the column of the link's inertial parameter",
                           "`link_inertia.J2.m` [kg], `.mx` … [kg m], `.xx` … [kg m²]: what the link's differ by",
                           "motion of the joints before it"};
   out.push_back({"link_inertia", "mass, centre of mass and inertia of a link are other than in the file", link_inertia,
                  true, traits});
-  traits.standard = false;
+  traits.standard = traits.usual = false;
   traits.plain = "a load at the flange";
   traits.documentation = {"the last link's columns",
                           "`payload.m` [kg], `.mx .my .mz` [kg m], of a large load `.xx` … [kg m²]",
                           "a robot whose links are known"};
   out.push_back({"payload", "a load at the flange that the model does not have", payload, false, traits});
+  traits.usual = true;
   traits.plain = "inertia of the motor's rotor";
   traits.urdf = SimulatorPlace::none;
   traits.documentation = {"qdd", "`armature.J2` [kg m²], as the joint feels it", "accelerations"};

@@ -19,7 +19,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 // --- a joint's motor that carries, or is carried by, another's
-// ---------------------------------------------------------
 
 std::vector<TorqueForm> coupling(const Robot& robot, std::size_t joint, const MotionRange& range) {
   std::vector<TorqueForm> out;
@@ -42,7 +41,6 @@ std::vector<TorqueForm> coupling(const Robot& robot, std::size_t joint, const Mo
 }
 
 // --- what repeats with the joint's turn
-// --------------------------------------------------------------------------------
 
 std::vector<TorqueForm> ripple(const Robot& robot, std::size_t joint, const MotionRange& range) {
   if (!is_revolute(robot, joint)) throw Unsuited("a prismatic joint does not turn");
@@ -71,7 +69,6 @@ std::vector<TorqueForm> spring(const Robot& robot, std::size_t joint, const Moti
 }
 
 // --- the link is not where the motor is
-// --------------------------------------------------------------------------------
 
 /// What the torques change by when the joint stands `dq` further on than it was read: shape=(rows, joints).
 MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
@@ -122,7 +119,6 @@ std::vector<TorqueForm> backlash(const Robot& robot, std::size_t joint, const Mo
 }
 
 // --- what pulls at the tool
-// --------------------------------------------------------------------------------------------
 
 /// J^T f of a force of one along an axis of the base at the tool. A mass of one there that gravity of one pulls the
 /// other way, at rest, asks the same torques of the drives.
