@@ -48,8 +48,8 @@ std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& desi
 }
 
 /// The choice fitted, as a model beside the nominal one.
-TorqueModel model_of(const Problem& problem, const TorqueDesign& design, const Sums& sums, const Search& search,
-                     const Choice& choice) {
+TorqueModel fitted_model(const Problem& problem, const TorqueDesign& design, const Sums& sums, const Search& search,
+                         const Choice& choice) {
   const Evidence::State state = search.state(choice);
   return problem.nominal.with(valued(design, fit_of(sums, state.columns, state.precision)));
 }
@@ -86,7 +86,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
     const Sums sums = sums_of(grams, noise, design, priors);
     const Search search(design, sums, nuisance);
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);
-    model = model_of(problem, design, sums, search, choice);
+    model = fitted_model(problem, design, sums, search, choice);
     noise = noise_of(problem.data, model, problem.train);
   }
   const Sums sums = sums_of(grams, noise, design, priors);
@@ -97,8 +97,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   few.least_gain = std::max(0.01, limits.least_gain);
   few.most = static_cast<int>(choice.groups.size()) + 6;
   const Choice with_unknown = search.run(choice, few, true);
-  return named(problem, groundwork, design, sums, held_out, search, choice, with_unknown, model,
-               model_of(problem, design, sums, search, with_unknown), noise, options.own_effects);
+  return named(problem, groundwork, design, sums, held_out, search, choice, with_unknown, noise);
 }
 
 }  // namespace dynamics

@@ -107,23 +107,25 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   TorqueModel model = groundwork.model;
   std::vector<Noise> noise = groundwork.noise;
   std::vector<int> groups;
+  Sums sums;
   Fit fit;
   // Terms that need the torque see that of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
-    const Sums sums =
-        sums_of(sum_grams(problem.data, design, problem.nominal, model, problem.train), noise, design, with_prior);
+    sums = sums_of(sum_grams(problem.data, design, problem.nominal, model, problem.train), noise, design, with_prior);
     groups = best_forms(design, sums);
     fit = fit_of(sums, columns_of(design, groups));
     model = problem.nominal.with(valued(design, fit));
     noise = noise_of(problem.data, model, problem.train);
   }
+  out.warnings = problem.warnings;
+  fit = with_bodies(robot, design, sums, fit, &out.warnings);
   out.robot = applied(robot, design, groups, fit, problem.range);
   out.parameters = parameters_of(design, columns_of(design, groups), fit);
-  out.errors = errors_of(problem, {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model}});
+  out.errors = errors_of(
+      problem, {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model_of(out.robot, problem)}});
   out.cutoff = problem.data.prepare.cutoff;
   out.held_out = problem.held_out;
   out.not_testable = design.not_testable;
-  out.warnings = problem.warnings;
   return out;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include "dynamics/judge.hpp"
@@ -206,10 +207,11 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Torqu
 }
 
 std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& naming, const Choice& choice,
-                                      std::size_t first, const std::vector<Noise>& noise, bool single) {
+                                      const std::vector<Noise>& noise, bool single) {
   std::vector<UnknownTorque> out;
-  for (std::size_t k = first; k < choice.groups.size(); ++k) {
+  for (std::size_t k = 0; k < choice.groups.size(); ++k) {
     const TorqueGroup& group = group_of(design, choice.groups[k]);
+    if (!group.effect.empty()) continue;
     UnknownTorque unknown;
     unknown.joint = group.joints.front();
     unknown.inputs = group.inputs;
@@ -312,37 +314,67 @@ std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effect
   return out;
 }
 
-/// The robot with its groundwork, where it had none, and with further groups of the same fit.
-Robot with_groundwork(const Problem& problem, const TorqueDesign& design, const Fit& fit, std::vector<int> groups) {
+/// The robot with its groundwork, where it had none, and with further groups, of bodies that there can be.
+Robot with_groundwork(const Problem& problem, const TorqueDesign& design, const Sums& sums, const Fit& fit,
+                      std::vector<int> groups, std::vector<std::string>* warnings) {
   for (std::size_t g = 0; g < design.groups.size() && !problem.fitted_before; ++g) {
     if (design.groups[g].standard) groups.push_back(static_cast<int>(g));
   }
   std::sort(groups.begin(), groups.end());
-  return applied(problem.robot, design, groups, fit, problem.range);
+  const Fit bodies = problem.fitted_before ? fit : with_bodies(problem.robot, design, sums, fit, warnings);
+  return applied(problem.robot, design, groups, bodies, problem.range);
+}
+
+/// Groups of a choice that are effects.
+std::vector<int> effects_in(const Choice& choice, const TorqueDesign& design) {
+  std::vector<int> out;
+  std::copy_if(choice.groups.begin(), choice.groups.end(), std::back_inserter(out),
+               [&](int g) { return !group_of(design, g).effect.empty(); });
+  return out;
+}
+
+/// The robot and the free functions, as a model.
+TorqueModel with_functions(const Problem& problem, const Robot& robot, const TorqueDesign& design, const Fit& fit) {
+  std::vector<ValuedTerm> functions;
+  for (const TorqueGroup& group : design.groups) {
+    if (!group.effect.empty()) continue;
+    for (std::size_t k = 0; k < fit.columns.size(); ++k) {
+      if (std::find(group.columns.begin(), group.columns.end(), fit.columns[k]) != group.columns.end())
+        functions.push_back(
+            {design.terms[static_cast<std::size_t>(fit.columns[k])], fit.values[static_cast<Index>(k)]});
+    }
+  }
+  return model_of(robot, problem).with(functions);
 }
 
 }  // namespace
 
 TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const TorqueDesign& design,
                       const Sums& sums, const Sums& held_out, const Search& search, const Choice& choice,
-                      const Choice& with_unknown, const TorqueModel& model, const TorqueModel& model_with_unknown,
-                      const std::vector<Noise>& noise, const std::vector<TorqueEffect>& own) {
-  const Naming naming(design, sums, held_out, search, choice);
+                      const Choice& with_unknown, const std::vector<Noise>& noise) {
+  const std::vector<TorqueEffect>& own = problem.own_effects;
+  const Naming naming(design, sums, held_out, search, choice), all(design, sums, held_out, search, with_unknown);
   TorqueDiagnosis out;
+  out.warnings = problem.warnings;
   out.effects = found_effects(problem, design, naming, choice, noise, own);
   const bool any = !out.effects.empty();
-  if (with_unknown.groups.size() > choice.groups.size()) {
-    const Naming all(design, sums, held_out, search, with_unknown);
-    out.unknown = unknown_of(design, all, with_unknown, choice.groups.size(), noise, problem.single);
-  }
+  out.unknown = unknown_of(design, all, with_unknown, noise, problem.single);
   for (FoundTorqueEffect& standard : standard_effects(problem, design, naming, noise))
     out.effects.push_back(std::move(standard));
+  // Errors are those of the robot that is handed over.
+  out.robot = with_groundwork(problem, design, sums, naming.fit(), choice.groups, &out.warnings);
+  std::vector<std::string> said_already;
+  const Robot beside =
+      with_groundwork(problem, design, sums, all.fit(), effects_in(with_unknown, design), &said_already);
+  const TorqueModel model = model_of(out.robot, problem);
   out.errors = errors_of(problem, {{"nominal", problem.nominal},
                                    {"standard", groundwork.model},
                                    {"named", model},
-                                   {"with_unknown", model_with_unknown}});
+                                   {"with_unknown", with_functions(problem, beside, design, all.fit())}});
   out.verdict = verdict_of(out, any);
   out.sentence = verdict_sentence(out, problem.fitted_before);
+  if (out.verdict == Verdict::does_not_hold)
+    out.robot = with_groundwork(problem, groundwork.design, groundwork.sums, groundwork.fit, {}, &said_already);
   out.where = regimes_of(problem, groundwork.model, model);
   out.classes = classes_of(out.effects, own);
   out.not_testable = design.not_testable;
@@ -350,10 +382,6 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   out.cutoff = problem.data.prepare.cutoff;
   for (const Noise& one : noise) out.design_effect.push_back(one.design_effect);
   out.held_out = problem.held_out;
-  // What does not hold is not in the robot.
-  out.robot = out.verdict == Verdict::does_not_hold ? with_groundwork(problem, groundwork.design, groundwork.fit, {})
-                                                    : with_groundwork(problem, design, naming.fit(), choice.groups);
-  out.warnings = problem.warnings;
   return out;
 }
 

@@ -12,7 +12,6 @@ namespace truing::dynamics {
 
 TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const TorqueDesign& design,
                       const Sums& sums, const Sums& held_out, const Search& search, const Choice& choice,
-                      const Choice& with_unknown, const TorqueModel& model, const TorqueModel& model_with_unknown,
-                      const std::vector<Noise>& noise, const std::vector<TorqueEffect>& own);
+                      const Choice& with_unknown, const std::vector<Noise>& noise);
 
 }  // namespace truing::dynamics

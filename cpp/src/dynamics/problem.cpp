@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "dynamics/effects/families.hpp"
+#include "dynamics/physical.hpp"
 #include "math/linear_algebra.hpp"
 #include "math/text.hpp"
 
@@ -131,7 +132,8 @@ Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, c
     throw std::invalid_argument("nothing moves: no joint of any recording is faster than " +
                                 math::number(kSpeedAtRest) + " rad/s (or m/s), and at rest friction tells nothing");
   }
-  nominal = TorqueModel(robot, valued_terms(robot, range, options.own_effects));
+  own_effects = options.own_effects;
+  nominal = model_of(robot, *this);
   fitted_before = !robot.torque_effects.empty() && robot.fitted_range.count("qd1") > 0;
 }
 
@@ -174,11 +176,76 @@ Fit fit_of(const Sums& sums, const std::vector<int>& columns, const VectorXd& ri
   d.diagonal().array() += 1e-30;
   Fit out;
   out.columns = columns;
+  out.ridge = ridge.size() == d.rows() ? ridge : VectorXd(VectorXd::Zero(d.rows()));
   const VectorXd scale = unit_scale<Eigen::Dynamic>(d);
   const MatrixXd inverse = inverse_symmetric<Eigen::Dynamic>(scaled_both<Eigen::Dynamic>(scale, d));
   out.covariance = scaled_both<Eigen::Dynamic>(scale, inverse);
   out.values = out.covariance * gram.xy;
   return out;
+}
+
+namespace {
+
+/// Of a fit: which of its columns are inertial, at which of 10 * links parameters, and the others.
+struct InertialPart {
+  std::vector<Index> inertial, parameter, other;
+};
+
+InertialPart inertial_part(const Robot& robot, const TorqueDesign& design, const Fit& fit) {
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  std::vector<Index> parameter_of(design.terms.size(), -1);
+  for (const TorqueGroup& group : design.groups) {
+    if (!is_inertial(group)) continue;
+    const auto link = static_cast<Index>(driven[driven_number(robot, group.joints.front())]);
+    for (std::size_t k = 0; k < group.columns.size(); ++k)
+      parameter_of[static_cast<std::size_t>(group.columns[k])] = kLinkParameters * link + static_cast<Index>(k);
+  }
+  InertialPart out;
+  for (std::size_t k = 0; k < fit.columns.size(); ++k) {
+    const Index parameter = parameter_of[static_cast<std::size_t>(fit.columns[k])];
+    (parameter < 0 ? out.other : out.inertial).push_back(static_cast<Index>(k));
+    if (parameter >= 0) out.parameter.push_back(parameter);
+  }
+  return out;
+}
+
+}  // namespace
+
+// With the other columns eliminated (Schur complement), the inertial parameters' normal equations are H delta = g.
+Fit with_bodies(const Robot& nominal, const TorqueDesign& design, const Sums& sums, const Fit& fit,
+                std::vector<std::string>* warnings) {
+  const InertialPart part = inertial_part(nominal, design, fit);
+  if (part.inertial.empty()) return fit;
+  const Gram gram = sums.all.of(fit.columns);
+  MatrixXd d = gram.xx;
+  d.diagonal() += fit.ridge + 1e-9 * gram.xx.diagonal();
+  for (const Index k : part.inertial) d(k, k) -= sums.precision[fit.columns[static_cast<std::size_t>(k)]];
+  const MatrixXd to_other = d(part.other, part.inertial);
+  const MatrixXd follow = solve_symmetric<Eigen::Dynamic, Eigen::Dynamic>(d(part.other, part.other), to_other);
+  MatrixXd H = d(part.inertial, part.inertial) - to_other.transpose() * follow;
+  H = (0.5 * (H + H.transpose())).eval();
+  const VectorXd g = gram.xy(part.inertial) - follow.transpose() * gram.xy(part.other);
+
+  const VectorXd before = link_parameters(nominal);
+  MatrixXd information = MatrixXd::Zero(before.size(), before.size());
+  information(part.parameter, part.parameter) = H;
+  VectorXd gradient = information * before;
+  gradient(part.parameter) += g;
+  const PhysicalInertias bodies = physical_inertias(nominal, information, gradient);
+  for (const LiftedLink& link : bodies.lifted)
+    warnings->push_back("no body can have the mass and inertia that the file gives the link of '" + link.joint +
+                        "': the nearest that one can have was taken for a start");
+
+  const VectorXd change = (bodies.parameters - before)(part.parameter);
+  const VectorXd moved = change - fit.values(part.inertial);
+  Fit out = fit;
+  out.values(part.inertial) = change;
+  out.values(part.other) -= follow * moved;
+  return out;
+}
+
+TorqueModel model_of(const Robot& robot, const Problem& problem) {
+  return {robot, valued_terms(robot, problem.range, problem.own_effects)};
 }
 
 std::vector<ValuedTerm> valued(const TorqueDesign& design, const Fit& fit) {
@@ -195,7 +262,7 @@ Groundwork groundwork_of(const Problem& problem) {
   }
   if (problem.fitted_before) {
     const std::vector<Noise> noise = noise_of(problem.data, problem.nominal, problem.train);
-    return {std::move(design), {}, problem.nominal, noise};
+    return {std::move(design), {}, {}, problem.nominal, noise};
   }
   const std::vector<bool> with_prior = inertial_columns(design);
   const std::vector<int> columns = standard_columns(design);
@@ -205,14 +272,16 @@ Groundwork groundwork_of(const Problem& problem) {
   std::vector<Noise> noise(problem.robot.driven_count());
   for (std::size_t j = 0; j < noise.size(); ++j)
     noise[j].sigma = std::max(0.1 * problem.range.torque[static_cast<Index>(j)], 1e-6);
+  Sums sums;
   Fit fit;
   TorqueModel model = problem.nominal;
   for (int round = 0; round < 2; ++round) {
-    fit = fit_of(sums_of(grams, noise, design, with_prior), columns);
+    sums = sums_of(grams, noise, design, with_prior);
+    fit = fit_of(sums, columns);
     model = problem.nominal.with(valued(design, fit));
     noise = noise_of(problem.data, model, problem.train);
   }
-  return {std::move(design), std::move(fit), std::move(model), std::move(noise)};
+  return {std::move(design), std::move(sums), std::move(fit), std::move(model), std::move(noise)};
 }
 
 std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vector<int>& columns, const Fit& fit) {

@@ -34,6 +34,7 @@ struct Problem {
   Folds train, test;
   bool single = false;  ///< folds are blocks of time
   std::vector<std::string> held_out;
+  std::vector<TorqueEffect> own_effects;
   TorqueModel nominal;
   bool fitted_before = false;  ///< the robot carries what an earlier fit of torques found
   std::vector<std::string> warnings;
@@ -44,6 +45,7 @@ struct Fit {
   std::vector<int> columns;
   Eigen::VectorXd values;
   Eigen::MatrixXd covariance;  ///< of unit noise, rows that count as one
+  Eigen::VectorXd ridge;       ///< beside the priors, on the diagonal
 };
 
 /// Grams of all joints together, and the prior that columns have.
@@ -59,6 +61,11 @@ Sums sums_of(const std::vector<JointGrams>& grams, const std::vector<Noise>& noi
 
 Fit fit_of(const Sums& sums, const std::vector<int>& columns, const Eigen::VectorXd& ridge = {});
 
+/// The fit with inertial parameters that bodies can have, and the other values that go with them. `nominal`: the robot
+/// that the inertial columns add to. Links whose nominal no body could have are said in `warnings`.
+Fit with_bodies(const Robot& nominal, const TorqueDesign& design, const Sums& sums, const Fit& fit,
+                std::vector<std::string>* warnings);
+
 /// Terms with the values of a fit.
 std::vector<ValuedTerm> valued(const TorqueDesign& design, const Fit& fit);
 
@@ -72,6 +79,7 @@ std::vector<bool> inertial_columns(const TorqueDesign& design);
 /// The groundwork fitted to the problem's training rows: the model, and what noise it leaves.
 struct Groundwork {
   TorqueDesign design;
+  Sums sums;
   Fit fit;
   TorqueModel model;
   std::vector<Noise> noise;
@@ -81,6 +89,9 @@ Groundwork groundwork_of(const Problem& problem);
 /// The robot with what a fit found: link inertias added to its links, effects to its torque effects.
 Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<int>& groups, const Fit& fit,
               const MotionRange& range);
+
+/// A robot's torques with the effects that it carries.
+TorqueModel model_of(const Robot& robot, const Problem& problem);
 
 /// Names, values and standard errors of some columns, constants among them.
 std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vector<int>& columns, const Fit& fit);

@@ -158,6 +158,24 @@ def test_the_coupled_wrist_of_a_tx40_is_named_first() -> None:
     assert all(e.probability <= 0.9 for e in found.effects if not e.standard)  # one recording
 
 
+@pytest.mark.realdata
+def test_the_robot_that_is_handed_over_has_links_that_there_can_be() -> None:
+    folder = real("dyn_ur10")  # plain least squares gives five of six links inertias that no body has
+    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
+    recordings = load_recordings([folder / "run.csv"], robot)
+    for found in (diagnose(robot, recordings).robot, identify(robot, recordings).robot):
+        for joint in found.joints:
+            assert joint.mass is not None and joint.mass > 0 and joint.inertia is not None
+            principal = np.linalg.eigvalsh(joint.inertia)
+            assert principal[0] > 0 and principal[2] < principal[0] + principal[1]
+
+
+def test_errors_are_those_of_the_robot_that_is_handed_over() -> None:
+    found = diagnose(SIMULATED.nominal, SIMULATED.recordings)
+    again = diagnose(found.robot, SIMULATED.recordings)
+    assert percent(again, "nominal") == pytest.approx(percent(found, "named"), rel=1e-6)
+
+
 def test_the_table_of_torque_effects_is_the_one_that_they_tell() -> None:
     page = Path(__file__).parents[3] / "docs" / "reference" / "torque_effects.md"
     text = page.read_text(encoding="utf-8")
