@@ -88,7 +88,7 @@ void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, dou
       const VectorXd x = input.value(m);
       MatrixXd out(x.size(), 1);
       for (Index i = 0; i < x.size(); ++i) {
-        const double side = input.times_direction ? std::tanh(m.qd(i, static_cast<Index>(joint)) / kSpeedAtRest) : 1.0;
+        const double side = input.times_direction ? m.direction(i, static_cast<Index>(joint)) : 1.0;
         out(i, 0) = side * hat(x[i], k, input.low, input.high);
       }
       return out;

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "dynamics/judge.hpp"
 #include "dynamics/name.hpp"
@@ -47,6 +48,43 @@ std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& desi
   return noise;
 }
 
+/// All effects that there are to find, and the free functions.
+TorqueDesign whole_design(const Problem& problem, const TorqueDiagnoseOptions& options) {
+  TorqueDesign out = design_of(problem.robot, problem.range, options.own_effects,
+                               {options.leave_out.begin(), options.leave_out.end()}, !problem.fitted_before);
+  add_free_functions(problem.robot, problem.range, &out);
+  return out;
+}
+
+/// The terms of a choice alone, and what is always in.
+TorqueDesign part_of(const TorqueDesign& whole, const Choice& choice) {
+  TorqueDesign out;
+  for (std::size_t g = 0; g < whole.groups.size(); ++g) {
+    TorqueGroup group = whole.groups[g];
+    const bool chosen =
+        std::find(choice.groups.begin(), choice.groups.end(), static_cast<int>(g)) != choice.groups.end();
+    if (!group.standard && !chosen) continue;
+    for (int& column : group.columns) {
+      out.terms.push_back(whole.terms[static_cast<std::size_t>(column)]);
+      column = static_cast<int>(out.terms.size()) - 1;
+    }
+    out.groups.push_back(std::move(group));
+  }
+  return out;
+}
+
+/// What is left where everything chosen is fitted with the turns that are set.
+std::vector<Noise> noise_left(const Problem& problem, const TorqueDesign& whole, const Choice& choice,
+                              const TorqueModel& seen, const std::vector<Noise>& before) {
+  const TorqueDesign design = part_of(whole, choice);
+  const Sums sums =
+      sums_of(sum_grams(problem.data, design, problem.nominal, seen.turning(problem.range.turns), problem.train),
+              before, design, inertial_columns(design));
+  std::vector<int> columns(design.terms.size());
+  std::iota(columns.begin(), columns.end(), 0);
+  return noise_of(problem.data, problem.nominal.with(valued(design, fit_of(sums, columns))), problem.train);
+}
+
 /// The choice fitted, as a model beside the nominal one.
 TorqueModel fitted_model(const Problem& problem, const TorqueDesign& design, const Sums& sums, const Search& search,
                          const Choice& choice) {
@@ -63,11 +101,9 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   for (const std::string& name : options.leave_out) find_torque_effect(name, options.own_effects);
   validate(robot);
   require_usable(robot, recordings);
-  const Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
-  const Groundwork groundwork = groundwork_of(problem);
-  TorqueDesign design = design_of(problem.robot, problem.range, options.own_effects,
-                                  {options.leave_out.begin(), options.leave_out.end()}, !problem.fitted_before);
-  add_free_functions(problem.robot, problem.range, &design);
+  Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
+  const Groundwork groundwork = groundwork_of(&problem);
+  TorqueDesign design = whole_design(problem, options);
   const std::vector<int> nuisance = problem.fitted_before ? std::vector<int>{} : standard_columns(design);
   std::vector<bool> priors = inertial_columns(design);
   if (problem.fitted_before) priors.assign(priors.size(), false);  // they are candidates, with priors of their own
@@ -82,6 +118,11 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   Choice choice;
   // What noise is, and the torque that some terms need, are those of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
+    if (round > 0 && !problem.fitted_before) {
+      choose_turns(&problem, [&] { return noise_left(problem, design, choice, model, noise); });
+      design = whole_design(problem, options);  // of the same groups
+      model = model.turning(problem.range.turns);
+    }
     if (round > 0) grams = sum_grams(problem.data, design, problem.nominal, model, problem.train);
     const Sums sums = sums_of(grams, noise, design, priors);
     const Search search(design, sums, nuisance);

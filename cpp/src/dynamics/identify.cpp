@@ -98,8 +98,8 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   if (!options.is_valid(&error)) throw std::invalid_argument(error);
   validate(robot);
   require_usable(robot, recordings);
-  const Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
-  const Groundwork groundwork = groundwork_of(problem);
+  Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
+  const Groundwork groundwork = groundwork_of(&problem);
   const TorqueDesign design = requested_design(problem, options);
   const std::vector<bool> with_prior = inertial_columns(design);
 

@@ -251,6 +251,7 @@ MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robo
   out.lower = VectorXd::Constant(joints, inf);
   out.upper = VectorXd::Constant(joints, -inf);
   out.speed = out.acceleration = out.torque = VectorXd::Zero(joints);
+  out.turns.resize(static_cast<std::size_t>(joints));
   std::vector<TorqueSums> sums(static_cast<std::size_t>(joints));
   for (std::size_t r = 0; r < recordings.size(); ++r)
     for_each_tile(recordings[r], r, robot, chain, options, [&](Tile& tile) { widen(tile, &out, &sums); });

@@ -15,8 +15,7 @@
 
 namespace truing::dynamics {
 
-/// Speeds [rad/s | m/s] below this are noise: the sign of a speed is tanh(speed / this), and a joint that stays below
-/// it is at rest.
+/// A joint whose speed [rad/s | m/s] stays below this is at rest.
 constexpr double kSpeedAtRest = 0.01;
 
 /// A stretch of a recording. Basis functions see every row of `motion`; the fit sees every `stride`-th row of what they

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "dynamics/effects/families.hpp"
 #include "dynamics/physical.hpp"
@@ -128,6 +129,7 @@ Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, c
   data.prepare.cutoff = options.cutoff;
   split(recordings, options.test_share, this);
   range = range_of(recordings, robot, chain, data.prepare);
+  range.turns = turns_of(robot);
   if (range.speed.maxCoeff() < kSpeedAtRest) {
     throw std::invalid_argument("nothing moves: no joint of any recording is faster than " +
                                 math::number(kSpeedAtRest) + " rad/s (or m/s), and at rest friction tells nothing");
@@ -255,7 +257,9 @@ std::vector<ValuedTerm> valued(const TorqueDesign& design, const Fit& fit) {
   return out;
 }
 
-Groundwork groundwork_of(const Problem& problem) {
+namespace {
+
+Groundwork fitted_groundwork(const Problem& problem) {
   TorqueDesign design;
   for (const TorqueEffect& effect : torque_catalogue()) {
     if (effect.traits.standard) add_effect(effect, -1, problem.robot, problem.range, &design);
@@ -282,6 +286,34 @@ Groundwork groundwork_of(const Problem& problem) {
     noise = noise_of(problem.data, model, problem.train);
   }
   return {std::move(design), std::move(sums), std::move(fit), std::move(model), std::move(noise)};
+}
+
+}  // namespace
+
+void choose_turns(Problem* problem, const std::function<std::vector<Noise>()>& noise_with) {
+  constexpr FrictionTurn kTurns[] = {{0.01, 0.0}, {1e-3, 0.0}, {3e-4, 0.0}, {0.01, 1e-6}, {0.01, 1e-5}, {0.01, 1e-4}};
+  const auto set = [&](const std::vector<FrictionTurn>& turns) {
+    problem->range.turns = turns;
+    problem->nominal = problem->nominal.turning(turns);
+  };
+  const std::size_t joints = problem->robot.driven_count();
+  std::vector<double> least(joints, std::numeric_limits<double>::infinity());
+  std::vector<FrictionTurn> chosen(joints);
+  for (const FrictionTurn& turn : kTurns) {
+    set(std::vector<FrictionTurn>(joints, turn));
+    const std::vector<Noise> noise = noise_with();
+    for (std::size_t j = 0; j < joints; ++j) {
+      if (noise[j].sigma >= least[j]) continue;
+      least[j] = noise[j].sigma;
+      chosen[j] = turn;
+    }
+  }
+  set(chosen);
+}
+
+Groundwork groundwork_of(Problem* problem) {
+  if (!problem->fitted_before) choose_turns(problem, [&] { return fitted_groundwork(*problem).noise; });
+  return fitted_groundwork(*problem);
 }
 
 std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vector<int>& columns, const Fit& fit) {
@@ -325,12 +357,12 @@ Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<
     const auto grows = [&] {
       return std::all_of(parameters.begin(), parameters.end(), [&](const Parameter& p) {
         const auto old = same->parameters.find(p.name);
-        return old != same->parameters.end() && (!p.frozen || old->second == p.value);
+        return old == same->parameters.end() ? p.frozen : (!p.frozen || old->second == p.value);
       });
     };
     if (same != out.torque_effects.end() && grows()) {
       for (const Parameter& p : parameters)
-        if (!p.frozen) same->parameters[p.name] += p.value;
+        same->parameters[p.name] = (p.frozen ? 0.0 : same->parameters[p.name]) + p.value;
     } else {
       out.torque_effects.push_back(std::move(effect));
     }

@@ -5,6 +5,7 @@
 // What identification and diagnosis of torques share: which rows are fitted and which are held out, the groundwork, and
 // fits from normal equations.
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -84,7 +85,13 @@ struct Groundwork {
   TorqueModel model;
   std::vector<Noise> noise;
 };
-Groundwork groundwork_of(const Problem& problem);
+/// How friction turns is chosen first (choose_turns).
+Groundwork groundwork_of(Problem* problem);
+
+/// Sets MotionRange::turns, and those of the nominal model, to what leaves the smallest errors at every joint. Friction
+/// that a model turns more slowly than the joint does, or forgets at rest, would look like presliding and like
+/// Stribeck's curve. `noise_with`: the errors with the turns that are set.
+void choose_turns(Problem* problem, const std::function<std::vector<Noise>()>& noise_with);
 
 /// The robot with what a fit found: link inertias added to its links, effects to its torque effects.
 Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<int>& groups, const Fit& fit,

@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/torque_model.hpp"
 
+#include "dynamics/effects/families.hpp"
+#include "dynamics/turn.hpp"
+
 namespace truing::dynamics {
 
 using Eigen::Index;
@@ -29,7 +32,11 @@ void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, cons
 }
 
 TorqueModel::TorqueModel(const Robot& robot, std::vector<ValuedTerm> own)
-    : robot_(robot), links_(link_parameters(robot)), rotors_(rotor_matrix(robot)), terms_(std::move(own)) {}
+    : robot_(robot),
+      links_(link_parameters(robot)),
+      rotors_(rotor_matrix(robot)),
+      terms_(std::move(own)),
+      turns_(turns_of(robot)) {}
 
 TorqueModel TorqueModel::with(const std::vector<ValuedTerm>& more) const {
   TorqueModel out = *this;
@@ -37,7 +44,14 @@ TorqueModel TorqueModel::with(const std::vector<ValuedTerm>& more) const {
   return out;
 }
 
+TorqueModel TorqueModel::turning(const std::vector<FrictionTurn>& turns) const {
+  TorqueModel out = *this;
+  out.turns_ = turns;
+  return out;
+}
+
 MatrixXd TorqueModel::torque(Motion* motion) const {
+  motion->direction = directions_of(*motion, turns_);
   MatrixXd out = motion->qdd * rotors_;  // it is symmetric
   for (Index j = 0; j < out.cols(); ++j) out.col(j) += motion->rigid[static_cast<std::size_t>(j)] * links_;
   add_terms(terms_, false, *motion, &out);

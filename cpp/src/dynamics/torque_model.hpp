@@ -34,8 +34,11 @@ class TorqueModel {
   /// The same with more terms.
   TorqueModel with(const std::vector<ValuedTerm>& more) const;
 
-  /// Torques of every row [Nm | N], shape=(rows, joints). Sets Motion::torque to what the terms that ask for it see:
-  /// the torques of all others.
+  /// The same with friction that turns so.
+  TorqueModel turning(const std::vector<FrictionTurn>& turns) const;
+
+  /// Torques of every row [Nm | N], shape=(rows, joints). Sets Motion::direction to what this robot's friction knows of
+  /// it, and Motion::torque to what the terms that ask for it see: the torques of all others.
   Eigen::MatrixXd torque(Motion* motion) const;
 
   const Robot& robot() const { return robot_; }
@@ -45,6 +48,7 @@ class TorqueModel {
   Eigen::VectorXd links_;   ///< inertial parameters
   Eigen::MatrixXd rotors_;  ///< mass matrix of the rotors
   std::vector<ValuedTerm> terms_;
+  std::vector<FrictionTurn> turns_;
 };
 
 }  // namespace truing::dynamics

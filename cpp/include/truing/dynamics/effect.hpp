@@ -22,12 +22,13 @@ namespace truing {
 /// are those that have a reading, in chain order.
 struct Motion {
   const Robot* robot = nullptr;
-  double step = 0.0;       ///< [s] between rows
-  Eigen::VectorXd time;    ///< shape=(rows,) [s] from the start of the recording
-  Eigen::MatrixXd q;       ///< shape=(rows, joints) [rad | m]
-  Eigen::MatrixXd qd;      ///< shape=(rows, joints) [rad/s | m/s]
-  Eigen::MatrixXd qdd;     ///< shape=(rows, joints) [rad/s^2 | m/s^2]
-  Eigen::MatrixXd torque;  ///< shape=(rows, joints) [Nm | N] that the model predicts in all, friction included
+  double step = 0.0;          ///< [s] between rows
+  Eigen::VectorXd time;       ///< shape=(rows,) [s] from the start of the recording
+  Eigen::MatrixXd q;          ///< shape=(rows, joints) [rad | m]
+  Eigen::MatrixXd qd;         ///< shape=(rows, joints) [rad/s | m/s]
+  Eigen::MatrixXd qdd;        ///< shape=(rows, joints) [rad/s^2 | m/s^2]
+  Eigen::MatrixXd direction;  ///< shape=(rows, joints) -1 ... 1: of the motion, as dry friction knows it
+  Eigen::MatrixXd torque;     ///< shape=(rows, joints) [Nm | N] that the model predicts in all, friction included
   /// Of every joint, shape=(rows, 10 * links) each: torque for an inertial parameter of one (mass, first moments, xx yy
   /// zz xy xz yz about the origin of the frame after the link), link after link.
   std::vector<Eigen::MatrixXd> rigid;
@@ -79,12 +80,20 @@ struct TorqueTraits {
 /// One form of an effect at a joint: its law with its inner constants. A diagnosis tries all forms.
 using TorqueForm = std::vector<TorqueTerm>;
 
+/// How dry friction turns round with the motion: by the speed, tanh(qd / speed), or by the travel, as Prandtl's stop
+/// operator (1928), which remembers at rest where it came from.
+struct FrictionTurn {
+  double speed = 0.01;  ///< [rad/s | m/s]
+  double travel = 0.0;  ///< [rad | m]; 0: by the speed
+};
+
 /// What the recordings hold, and how far they reach.
 struct MotionRange {
   Eigen::VectorXd lower, upper;                              ///< [rad | m] of every joint that has a reading
   Eigen::VectorXd speed;                                     ///< [rad/s | m/s] largest
   Eigen::VectorXd acceleration;                              ///< [rad/s^2 | m/s^2] largest
   Eigen::VectorXd torque;                                    ///< [Nm | N] standard deviation of the measured torque
+  std::vector<FrictionTurn> turns;                           ///< of every joint that has a reading
   double duration = 0.0;                                     ///< [s] of the longest recording
   std::map<std::string, std::pair<double, double>> columns;  ///< smallest and largest value of the further columns
 };

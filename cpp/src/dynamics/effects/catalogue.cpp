@@ -116,8 +116,6 @@ bool is_revolute(const Robot& robot, std::size_t joint) {
 std::string torque_unit(const Robot& robot, std::size_t joint) { return is_revolute(robot, joint) ? "Nm" : "N"; }
 std::string angle_unit(const Robot& robot, std::size_t joint) { return is_revolute(robot, joint) ? "rad" : "m"; }
 
-Eigen::ArrayXd sign_of(const Eigen::VectorXd& speed) { return (speed.array() / kSpeedAtRest).tanh(); }
-
 TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, double prior, Column column,
                    bool needs_torque) {
   TorqueTerm term;

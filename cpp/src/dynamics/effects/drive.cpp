@@ -28,10 +28,10 @@ std::vector<TorqueForm> motor_constant(const Robot& robot, std::size_t joint, co
 }
 
 std::vector<TorqueForm> torque_lag(const Robot& robot, std::size_t joint, const MotionRange&) {
-  return {{term_at(
-      joint, parameter_name("torque_lag", robot, joint), "s", 0.01,
-      [joint](const Motion& m) -> ArrayXd { return -rate_of(m.torque.col(static_cast<Index>(joint)), m.step); },
-      true)}};
+  const auto column = [joint](const Motion& m) -> ArrayXd {
+    return -rate_of(m.torque.col(static_cast<Index>(joint)), m.step);
+  };
+  return {{within(term_at(joint, parameter_name("torque_lag", robot, joint), "s", 0.01, column, true), 0.0)}};
 }
 
 std::vector<TorqueForm> time_offset(const Robot& robot, std::size_t, const MotionRange&) {

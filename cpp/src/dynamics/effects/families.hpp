@@ -36,8 +36,8 @@ std::string angle_unit(const Robot& robot, std::size_t joint);
 /// Standard deviation of a joint's torque [Nm | N], and more than nothing: what effects on it may well make.
 double torque_prior(const MotionRange& range, std::size_t joint);
 
-/// -1 … 1: the sign of a speed beyond the noise of speeds.
-Eigen::ArrayXd sign_of(const Eigen::VectorXd& speed);
+/// How the dry friction that the robot carries turns round, by joint.
+std::vector<FrictionTurn> turns_of(const Robot& robot);
 
 /// One column of one joint's torque.
 using Column = std::function<Eigen::ArrayXd(const Motion&)>;

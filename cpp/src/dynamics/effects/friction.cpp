@@ -7,6 +7,7 @@
 
 #include "dynamics/effects/families.hpp"
 #include "dynamics/prepare.hpp"
+#include "dynamics/turn.hpp"
 
 namespace truing::dynamics {
 namespace {
@@ -19,11 +20,28 @@ double per_speed(const MotionRange& range, std::size_t joint) {
 }
 
 ArrayXd speed(const Motion& motion, std::size_t joint) { return motion.qd.col(static_cast<Index>(joint)); }
-ArrayXd direction(const Motion& motion, std::size_t joint) { return sign_of(motion.qd.col(static_cast<Index>(joint))); }
+ArrayXd direction(const Motion& motion, std::size_t joint) { return motion.direction.col(static_cast<Index>(joint)); }
+
+const char* const kCoulomb = "coulomb";
+const char* const kTurnSpeed = "turn_speed";
+const char* const kTurnTravel = "turn_travel";
+
+/// The direction is that of the motion, which knows how friction turns; the term's constants say it.
+TorqueForm coulomb_turning(const Robot& robot, std::size_t joint, const FrictionTurn& turn, double prior) {
+  TorqueTerm term = term_at(joint, parameter_name(kCoulomb, robot, joint), torque_unit(robot, joint), prior,
+                            [joint](const Motion& m) { return direction(m, joint); });
+  const bool by_travel = turn.travel > 0.0;
+  term.constants[parameter_name(kCoulomb, robot, joint, by_travel ? kTurnTravel : kTurnSpeed)] =
+      by_travel ? turn.travel : turn.speed;
+  return {term};
+}
 
 std::vector<TorqueForm> coulomb(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  return {{term_at(joint, parameter_name("coulomb", robot, joint), torque_unit(robot, joint),
-                   torque_prior(range, joint), [joint](const Motion& m) { return direction(m, joint); })}};
+  return {coulomb_turning(robot, joint, range.turns[joint], torque_prior(range, joint))};
+}
+
+TorqueForm coulomb_with(const Robot& robot, std::size_t joint, const std::map<std::string, double>&) {
+  return coulomb_turning(robot, joint, turns_of(robot)[joint], 1.0);
 }
 
 std::vector<TorqueForm> viscous(const Robot& robot, std::size_t joint, const MotionRange& range) {
@@ -73,7 +91,7 @@ TorqueForm stribeck_at(const Robot& robot, std::size_t joint, double vs, double 
                               return direction(m, joint) * (-(speed(m, joint) / vs).square()).exp();
                             });
   term.constants[parameter_name("stribeck", robot, joint, "vs")] = vs;
-  return {term};
+  return {within(std::move(term), 0.0)};
 }
 
 std::vector<TorqueForm> stribeck(const Robot& robot, std::size_t joint, const MotionRange& range) {
@@ -94,17 +112,9 @@ TorqueForm stribeck_with(const Robot& robot, std::size_t joint, const std::map<s
 // --
 
 TorqueForm presliding_at(const Robot& robot, std::size_t joint, double x0, double prior) {
-  TorqueTerm term = term_at(joint, parameter_name("presliding", robot, joint), torque_unit(robot, joint), prior,
-                            [joint, x0](const Motion& m) {
-                              const auto q = m.q.col(static_cast<Index>(joint));
-                              ArrayXd out(m.rows());
-                              double z = 0.0;
-                              for (Index i = 0; i < m.rows(); ++i) {
-                                if (i > 0) z = std::clamp(z + (q[i] - q[i - 1]) / x0, -1.0, 1.0);
-                                out[i] = z;
-                              }
-                              return out;
-                            });
+  TorqueTerm term = term_at(
+      joint, parameter_name("presliding", robot, joint), torque_unit(robot, joint), prior,
+      [joint, x0](const Motion& m) -> ArrayXd { return stop_operator(m.q.col(static_cast<Index>(joint)), x0); });
   term.constants[parameter_name("presliding", robot, joint, "x0")] = x0;
   return {within(std::move(term), 0.0)};
 }
@@ -161,12 +171,29 @@ TorqueTraits traits(const char* plain, SimulatorPlace mujoco, SimulatorPlace urd
 
 }  // namespace
 
+std::vector<FrictionTurn> turns_of(const Robot& robot) {
+  std::vector<FrictionTurn> out(robot.driven_count());
+  for (std::size_t joint = 0; joint < out.size(); ++joint) {
+    const std::string speed = parameter_name(kCoulomb, robot, joint, kTurnSpeed);
+    const std::string travel = parameter_name(kCoulomb, robot, joint, kTurnTravel);
+    for (const AppliedEffect& effect : robot.torque_effects) {
+      if (effect.parameters.count(speed) > 0) out[joint].speed = constant_of(effect.parameters, speed);
+      if (effect.parameters.count(travel) > 0) out[joint].travel = constant_of(effect.parameters, travel);
+    }
+  }
+  return out;
+}
+
 std::vector<TorqueEffect> friction_effects() {
   using Place = SimulatorPlace;
   std::vector<TorqueEffect> out;
-  out.push_back({"coulomb", "friction of one size, against the motion", coulomb, true,
-                 traits("dry friction", Place::field, Place::field,
-                        {"s = tanh(qd / 0.01)", "`coulomb.J2` [Nm]", "motion both ways"})});
+  out.push_back(
+      {"coulomb", "friction of one size, against the motion", coulomb, true,
+       traits("dry friction", Place::field, Place::field,
+              {"s = tanh(qd / turn_speed), or s <- clip(s + dq / turn_travel, -1, 1), which remembers at rest "
+               "where it came from",
+               "`coulomb.J2` [Nm] with `.turn_speed` [rad/s] or `.turn_travel` [rad]", "motion both ways"}),
+       coulomb_with});
   out.push_back({"viscous", "friction that grows with the speed", viscous, true,
                  traits("viscous friction", Place::field, Place::field, {"qd", "`viscous.J2` [Nm s/rad]", "speed"})});
   for (TorqueEffect& effect : out) effect.traits.standard = effect.traits.usual = true;

@@ -31,7 +31,7 @@ TorqueForm friction_times(const char* effect, const Robot& robot, std::size_t jo
   const double torque = 0.3 * std::max(range.torque[at], 1e-3) / size;
   const std::string unit = torque_unit(robot, joint);
   return {term_at(joint, parameter_name(effect, robot, joint, "coulomb"), unit + "/" + per, torque,
-                  [at, factor](const Motion& m) -> ArrayXd { return sign_of(m.qd.col(at)) * factor(m); }),
+                  [at, factor](const Motion& m) -> ArrayXd { return m.direction.col(at).array() * factor(m); }),
           term_at(joint, parameter_name(effect, robot, joint, "viscous"),
                   unit + " s/(" + angle_unit(robot, joint) + " " + per + ")", torque / std::max(range.speed[at], 0.01),
                   [at, factor](const Motion& m) -> ArrayXd { return m.qd.col(at).array() * factor(m); })};

@@ -29,7 +29,7 @@ std::vector<TorqueForm> coupling(const Robot& robot, std::size_t joint, const Mo
     const double torque = 0.3 * torque_prior(range, joint);
     const std::string unit = torque_unit(robot, joint);
     out.push_back(
-        {term_at(joint, name + "coulomb", unit, torque, [other](const Motion& m) { return sign_of(m.qd.col(other)); }),
+        {term_at(joint, name + "coulomb", unit, torque, [other](const Motion& m) { return m.direction.col(other); }),
          term_at(joint, name + "viscous", unit + " s/" + angle_unit(robot, k),
                  torque / std::max(range.speed[other], 0.01),
                  [other](const Motion& m) -> ArrayXd { return m.qd.col(other); }),

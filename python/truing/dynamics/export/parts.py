@@ -42,6 +42,7 @@ _PER_JOINT = (
     "warmup",
 )
 _PARTS = {
+    "coulomb": ("", "turn_speed", "turn_travel"),
     "viscous_law": ("quadratic", "cubic", "root", "saturating", "v0"),
     "stribeck": ("", "vs"),
     "presliding": ("", "x0"),

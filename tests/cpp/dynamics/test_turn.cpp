@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include <doctest/doctest.h>
+
+#include "dynamics/effects/families.hpp"
+#include "dynamics/turn.hpp"
+#include "math/random.hpp"
+#include "support/sanitized.hpp"
+#include "truing/dynamics.hpp"
+
+using namespace truing;
+using truing::math::Random;
+
+namespace {
+
+Robot one_joint() {
+  Robot out;
+  out.name = "arm";
+  Joint joint;
+  joint.name = "J1";
+  joint.a = 0.4;
+  joint.mass = 3.0;
+  joint.center_of_mass = {-0.2, 0.0, 0.0};
+  joint.inertia = Eigen::Vector3d(0.004, 0.04, 0.04).asDiagonal();
+  out.joints.push_back(joint);
+  out.gravity = {0.0, -9.81, 0.0};
+  out.targets = {{"tool", Eigen::Isometry3d::Identity()}};
+  return out;
+}
+
+/// Slow and fast, with friction that turns where the motion does: nothing else is there.
+std::vector<Recording> recorded(const Robot& robot) {
+  std::vector<Recording> out;
+  for (int k = 0; k < 5; ++k) {
+    Recording one;
+    one.name = "motion" + std::to_string(k);
+    const auto rows = static_cast<Eigen::Index>(200.0 * (kSanitized ? 12.0 : 30.0));
+    one.time = Eigen::VectorXd::LinSpaced(rows, 0.0, 0.005 * static_cast<double>(rows - 1));
+    const Eigen::ArrayXd t = one.time.array(), phase = (0.6 + 0.05 * k) * t + k;
+    one.position = (0.4 * phase.sin() + 0.15 * (2.1 * t + 2.0 * k).cos()).matrix();
+    one.torque = dynamics::predict(robot, one, 40.0).torque;
+    Random random(static_cast<std::uint64_t>(k));
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const double speed = 0.4 * (0.6 + 0.05 * k) * std::cos(phase[i]) - 0.315 * std::sin(2.1 * t[i] + 2.0 * k);
+      one.torque(i, 0) += (speed > 0.0 ? 5.0 : -5.0) + 0.1 * random.normal();
+    }
+    one.test = k > 2;
+    out.push_back(one);
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("the stop operator's rows are means over their time") {
+  // Up by 1, down by 1 in rows of 0.5: z is -1 … 1 over a travel of 0.2.
+  const Eigen::VectorXd q = (Eigen::VectorXd(5) << 0.0, 0.5, 1.0, 0.5, 0.0).finished();
+  const Eigen::VectorXd z = dynamics::stop_operator(q, 0.1);
+  // First quarter of a row: 0 to 1 over 0.1 of its 0.25, then 1.
+  CHECK(std::abs(z[0] - (0.4 * 0.5 + 0.6)) < 1e-12);
+  CHECK(std::abs(z[1] - 1.0) < 1e-12);
+  // Half a row at 1, half a row that goes from 1 to -1 over 0.2 of its 0.25.
+  CHECK(std::abs(z[2] - 0.5 * (1.0 + (0.8 * 0.0 - 0.2))) < 1e-12);
+  CHECK(std::abs(z[4] + 1.0) < 1e-12);
+}
+
+TEST_CASE("a direction by the speed turns at the speed's zero, wherever it lies between rows") {
+  for (const double zero : {2.0, 2.2, 2.5, 2.7}) {
+    Eigen::VectorXd speed(6);
+    for (Eigen::Index i = 0; i < 6; ++i) speed[i] = zero - static_cast<double>(i);
+    const Eigen::VectorXd s = dynamics::direction_by_speed(speed, 1e-6);
+    // The first and the last row stand for half a row each: rows 0 … 5 hold the time from -0.5 to 5.5.
+    CHECK(std::abs(s.sum() - ((zero + 0.5) - (5.5 - zero))) < 1e-4);
+  }
+  const Eigen::VectorXd slow = dynamics::direction_by_speed(Eigen::VectorXd::Constant(3, 0.004), 0.01);
+  CHECK(std::abs(slow[1] - std::tanh(0.4)) < 1e-12);
+}
+
+TEST_CASE("friction that turns sharply is dry friction, and nothing beside it") {
+  const TorqueDiagnosis d = dynamics::diagnose(one_joint(), recorded(one_joint()));
+  for (const FoundTorqueEffect& effect : d.effects) CHECK_MESSAGE(effect.standard, effect.sentence);
+  const FrictionTurn turn = dynamics::turns_of(d.robot).front();
+  CHECK((turn.travel > 0.0 || turn.speed < 0.01));
+  // What is handed over predicts with the turn that was found.
+  const Recording held_out = recorded(one_joint()).back();
+  const Eigen::VectorXd error = dynamics::predict(d.robot, held_out).torque.col(0) - held_out.torque.col(0);
+  CHECK(std::sqrt(error.squaredNorm() / static_cast<double>(error.size())) < 1.0);  // the low-pass rounds the turns
+  CHECK(d.errors[2].held_out.front().rms < 0.1);
+}
+
+TEST_CASE("a turn that the robot does not have is refused") {
+  Robot robot = one_joint();
+  robot.torque_effects = {{"coulomb", {"J1"}, {{"coulomb.J1", 2.0}, {"coulomb.J1.turn_travel", -1e-4}}}};
+  CHECK_THROWS_AS(dynamics::turns_of(robot), std::invalid_argument);
+}
