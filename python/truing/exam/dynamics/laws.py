@@ -38,7 +38,7 @@ class Scene:
 
     def sign(self, j: int) -> Floats:
         """Direction of the friction of a joint."""
-        return stop(self.motion.q[:, j], SHARP)
+        return sharp(self.motion.q[:, j])
 
     def at(self, j: int, column: Floats) -> Floats:
         found = np.zeros_like(self.motion.q)
@@ -75,6 +75,14 @@ def stop(q: Floats, width: float) -> Floats:
     return np.array(found)
 
 
+def sharp(q: Floats) -> Floats:
+    """Direction that friction knows at each row: what it was before and what it is after, in the mean, or it
+    would come half a row late.
+    """
+    z = stop(q, SHARP)
+    return np.asarray(0.5 * (z + np.append(z[1:], z[-1])))
+
+
 def bristles(q: Floats, width: float) -> Floats:
     """Dahl's bristles, dz/dq = (1 - z sign(dq)) / width, integrated exactly over each step."""
     moves = np.diff(q, prepend=q[0])
@@ -88,7 +96,7 @@ def bristles(q: Floats, width: float) -> Floats:
 
 def usual_friction(arm: Arm, motion: Motion) -> Floats:
     """Coulomb and viscous."""
-    sign = np.stack([stop(motion.q[:, j], SHARP) for j in range(arm.n)], axis=1)
+    sign = np.stack([sharp(motion.q[:, j]) for j in range(arm.n)], axis=1)
     return np.asarray(arm.coulomb * sign + arm.viscous * motion.qd)
 
 
