@@ -6629,10 +6629,10 @@ class TorqueDiagnoseOptions:
     cutoff = 8.0: [Hz] of the low-pass without phase that both sides of the equation of motion go through.
     test_share = 0.3: Fraction of the time held out when there is one recording, or none is marked as test.
     max_effects = 40: Maximum number of effects named.
-    least_gain = 0.004: [-] fraction of a joint's squared error on unseen recordings that a name must remove.
+    least_gain = 0.01: [-] fraction of a joint's squared error on unseen recordings that a name must remove.
     threads = 0: 0: as many as the machine has.
     """
-    def __init__(self, *, leave_out: collections.abc.Sequence[str] = [], cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, max_effects: typing.SupportsInt | typing.SupportsIndex = 40, least_gain: typing.SupportsFloat | typing.SupportsIndex = 0.004, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, leave_out: collections.abc.Sequence[str] = [], cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, max_effects: typing.SupportsInt | typing.SupportsIndex = 40, least_gain: typing.SupportsFloat | typing.SupportsIndex = 0.01, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -6896,7 +6896,7 @@ class UnknownTorque:
     @property
     def inputs(self) -> tuple[str, ...]:
         """
-        'angle', 'speed', 'load', 'time', 'direction' or a column.
+        'angle', 'angle J2' (another joint's), 'speed', 'load', 'time', 'direction' or a column.
         """
     @property
     def joint(self) -> str:
@@ -7044,7 +7044,8 @@ class TorqueDiagnosis:
     @property
     def effects(self) -> tuple[FoundTorqueEffect, ...]:
         """
-        Beyond standard practice by share, then what is standard.
+        Beyond standard practice, by share: what `identify` would not have fitted unasked and is likelier
+        than not, then the others; then what is standard.
         """
     @property
     def errors(self) -> tuple[TorqueErrors, ...]:

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include "dynamics/effects/families.hpp"
 #include "math/batch.hpp"
 #include "math/statistics.hpp"
 
@@ -99,19 +100,24 @@ void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, dou
   design->groups.push_back(std::move(group));
 }
 
-std::vector<FreeInput> inputs_at(std::size_t joint, const MotionRange& range) {
+constexpr double kShortest = 5.0;  ///< [s] recordings in which time is an input
+
+std::vector<FreeInput> inputs_at(std::size_t joint, const Robot& robot, const MotionRange& range) {
   const auto j = static_cast<Index>(joint);
   std::vector<FreeInput> out;
-  const auto angle = [j](const Motion& m) -> VectorXd { return m.q.col(j); };
   const auto load = [j](const Motion& m) -> VectorXd { return m.torque.col(j); };
   const double torque = 2.0 * range.torque[j];
-  out.push_back({"angle", range.lower[j], range.upper[j], false, angle});
+  for (Index k = 0; k < range.lower.size(); ++k) {
+    const std::string name = k == j ? "angle" : "angle " + driven_name(robot, static_cast<std::size_t>(k));
+    for (const bool times_direction : {false, true})
+      out.push_back({name, range.lower[k], range.upper[k], false,
+                     [k](const Motion& m) -> VectorXd { return m.q.col(k); }, times_direction});
+  }
   out.push_back(
       {"speed", -range.speed[j], range.speed[j], false, [j](const Motion& m) -> VectorXd { return m.qd.col(j); }});
   out.push_back({"load", -torque, torque, true, load});
-  out.push_back({"angle", range.lower[j], range.upper[j], false, angle, true});
   out.push_back({"load", -torque, torque, true, load, true});
-  if (range.duration >= 30.0)
+  if (range.duration >= kShortest)
     out.push_back({"time", 0.0, range.duration, false, [](const Motion& m) -> VectorXd { return m.time; }});
   for (const auto& [name, bounds] : range.columns) {
     if (name == "enabled" || !(bounds.second > bounds.first)) continue;
@@ -240,7 +246,7 @@ TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::
 void add_free_functions(const Robot& robot, const MotionRange& range, TorqueDesign* design) {
   for (std::size_t j = 0; j < robot.driven_count(); ++j) {
     const double prior = 0.3 * std::max(range.torque[static_cast<Index>(j)], 1e-3);
-    for (const FreeInput& input : inputs_at(j, range)) add_free(input, j, robot, prior, design);
+    for (const FreeInput& input : inputs_at(j, robot, range)) add_free(input, j, robot, prior, design);
   }
 }
 

@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numeric>
+#include <optional>
 
 #include "dynamics/judge.hpp"
 #include "dynamics/name.hpp"
@@ -28,7 +30,7 @@ bool TorqueDiagnoseOptions::is_valid(std::string* error) const {
 namespace dynamics {
 namespace {
 
-/// What all effects together leave: the errors of the groundwork alone go on in time as the effects do that it lacks.
+/// What everything together leaves: the errors of the groundwork alone go on in time as that does which it lacks.
 std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& design,
                                 const std::vector<JointGrams>& grams, const std::vector<Noise>& first) {
   std::vector<int> columns;
@@ -36,7 +38,7 @@ std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& desi
     // Not what needs the torque: with that of another model it would be another column.
     const bool fixed = std::none_of(group.columns.begin(), group.columns.end(),
                                     [&](int c) { return design.terms[static_cast<std::size_t>(c)].needs_torque; });
-    if (!group.effect.empty() && fixed) columns.insert(columns.end(), group.columns.begin(), group.columns.end());
+    if (fixed) columns.insert(columns.end(), group.columns.begin(), group.columns.end());
   }
   std::vector<Noise> noise = first;
   for (int round = 0; round < 2; ++round) {
@@ -48,35 +50,38 @@ std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& desi
   return noise;
 }
 
-/// All effects that there are to find, and the free functions.
 TorqueDesign whole_design(const Problem& problem, const TorqueDiagnoseOptions& options) {
-  TorqueDesign out = design_of(problem.robot, problem.range, options.own_effects,
-                               {options.leave_out.begin(), options.leave_out.end()}, !problem.fitted_before);
-  add_free_functions(problem.robot, problem.range, &out);
-  return out;
+  return design_of(problem.robot, problem.range, options.own_effects,
+                   {options.leave_out.begin(), options.leave_out.end()}, !problem.fitted_before);
 }
 
-/// The terms of a choice alone, and what is always in.
-TorqueDesign part_of(const TorqueDesign& whole, const Choice& choice) {
+/// The columns that are always in, and the terms of a choice; `choice` becomes that of the part.
+TorqueDesign part_of(const TorqueDesign& whole, const std::vector<int>& nuisance, Choice* choice) {
   TorqueDesign out;
+  Choice chosen;
   for (std::size_t g = 0; g < whole.groups.size(); ++g) {
     TorqueGroup group = whole.groups[g];
-    const bool chosen =
-        std::find(choice.groups.begin(), choice.groups.end(), static_cast<int>(g)) != choice.groups.end();
-    if (!group.standard && !chosen) continue;
+    const auto at = std::find(choice->groups.begin(), choice->groups.end(), static_cast<int>(g));
+    const bool always = std::find(nuisance.begin(), nuisance.end(), group.columns.front()) != nuisance.end();
+    if (!always && at == choice->groups.end()) continue;
+    if (at != choice->groups.end()) {
+      chosen.groups.push_back(static_cast<int>(out.groups.size()));
+      chosen.scales.push_back(choice->scales[static_cast<std::size_t>(at - choice->groups.begin())]);
+    }
     for (int& column : group.columns) {
       out.terms.push_back(whole.terms[static_cast<std::size_t>(column)]);
       column = static_cast<int>(out.terms.size()) - 1;
     }
     out.groups.push_back(std::move(group));
   }
+  *choice = chosen;
   return out;
 }
 
 /// What is left where everything chosen is fitted with the turns that are set.
-std::vector<Noise> noise_left(const Problem& problem, const TorqueDesign& whole, const Choice& choice,
-                              const TorqueModel& seen, const std::vector<Noise>& before) {
-  const TorqueDesign design = part_of(whole, choice);
+std::vector<Noise> noise_left(const Problem& problem, const TorqueDesign& whole, Choice choice, const TorqueModel& seen,
+                              const std::vector<Noise>& before) {
+  const TorqueDesign design = part_of(whole, standard_columns(whole), &choice);
   const Sums sums =
       sums_of(sum_grams(problem.data, design, problem.nominal, seen.turning(problem.range.turns), problem.train),
               before, design, inertial_columns(design));
@@ -92,6 +97,59 @@ TorqueModel fitted_model(const Problem& problem, const TorqueDesign& design, con
   return problem.nominal.with(valued(design, fit_of(sums, state.columns, state.precision)));
 }
 
+/// What is usual but the links' inertias.
+std::vector<int> friction_columns(const TorqueDesign& design) {
+  const std::vector<bool> inertial = inertial_columns(design);
+  std::vector<int> out = standard_columns(design);
+  out.erase(std::remove_if(out.begin(), out.end(), [&](int c) { return inertial[static_cast<std::size_t>(c)]; }),
+            out.end());
+  return out;
+}
+
+// The file's inertias as they are, and single links, rotors, loads that differ from it: where that predicts folds as
+// well as inertias that are all free, it says more with less. What free inertias take up is named here.
+std::optional<Account> of_given_inertias(const Problem& problem, const std::vector<JointGrams>& grams,
+                                         const std::vector<JointGrams>& grams_held_out, const std::vector<Noise>& noise,
+                                         const Account& free, const SearchLimits& limits) {
+  const std::vector<bool> none(free.design->terms.size(), false);
+  Account out = account_of(free.design, sums_of(grams, noise, *free.design, none),
+                           sums_of(grams_held_out, noise, *free.design, none), friction_columns(*free.design));
+  SearchLimits more = limits;
+  more.most = static_cast<int>(free.choice.groups.size() + problem.robot.driven_count());
+  out.choice = out.search->run(free.choice, more, false);
+  out.inertias_given = true;
+  if (out.search->squares_of_folds(out.choice).sum() > free.search->squares_of_folds(free.choice).sum()) return {};
+  return out;
+}
+
+/// Beside what was named, free functions of what may drive an unknown effect.
+Account with_functions(const Problem& problem, const Account& of_effects, const TorqueModel& model,
+                       const SearchLimits& limits, std::vector<Noise>* noise) {
+  Choice choice = of_effects.choice;
+  const std::vector<int>& always = of_effects.search->evidence().nuisance();
+  auto design = std::make_shared<TorqueDesign>(part_of(*of_effects.design, always, &choice));
+  std::vector<int> nuisance;
+  for (std::size_t g = 0; g < design->groups.size(); ++g) {
+    const std::vector<int>& columns = design->groups[g].columns;
+    if (std::find(choice.groups.begin(), choice.groups.end(), static_cast<int>(g)) == choice.groups.end())
+      nuisance.insert(nuisance.end(), columns.begin(), columns.end());
+  }
+  add_free_functions(problem.robot, problem.range, design.get());
+  const std::vector<JointGrams> grams = sum_grams(problem.data, *design, problem.nominal, model, problem.train);
+  *noise = noise_of_all(problem, *design, grams, *noise);
+  std::vector<bool> priors = inertial_columns(*design);
+  if (problem.fitted_before || of_effects.inertias_given) priors.assign(priors.size(), false);
+  const std::vector<JointGrams> held_out = sum_grams(problem.data, *design, problem.nominal, model, problem.test);
+  Account out = account_of(design, sums_of(grams, *noise, *design, priors),
+                           sums_of(held_out, *noise, *design, std::vector<bool>(priors.size(), false)), nuisance);
+  SearchLimits few = limits;
+  few.least_gain = std::max(0.05, limits.least_gain);
+  few.most = static_cast<int>(choice.groups.size()) + 6;
+  out.choice = out.search->run(choice, few, true);
+  out.inertias_given = of_effects.inertias_given;
+  return out;
+}
+
 }  // namespace
 
 TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recordings,
@@ -103,9 +161,9 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   require_usable(robot, recordings);
   Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
   const Groundwork groundwork = groundwork_of(&problem);
-  TorqueDesign design = whole_design(problem, options);
-  const std::vector<int> nuisance = problem.fitted_before ? std::vector<int>{} : standard_columns(design);
-  std::vector<bool> priors = inertial_columns(design);
+  auto design = std::make_shared<TorqueDesign>(whole_design(problem, options));
+  const std::vector<int> nuisance = problem.fitted_before ? std::vector<int>{} : standard_columns(*design);
+  std::vector<bool> priors = inertial_columns(*design);
   if (problem.fitted_before) priors.assign(priors.size(), false);  // they are candidates, with priors of their own
 
   SearchLimits limits;
@@ -113,32 +171,37 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   limits.most = options.max_effects;
   limits.plausible_only = !problem.fitted_before;  // departures from what the robot carries have either sign
   TorqueModel model = groundwork.model;
-  std::vector<JointGrams> grams = sum_grams(problem.data, design, problem.nominal, model, problem.train);
-  std::vector<Noise> noise = noise_of_all(problem, design, grams, groundwork.noise);
+  std::vector<JointGrams> grams = sum_grams(problem.data, *design, problem.nominal, model, problem.train);
+  std::vector<Noise> noise = noise_of_all(problem, *design, grams, groundwork.noise);
   Choice choice;
   // What noise is, and the torque that some terms need, are those of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
     if (round > 0 && !problem.fitted_before) {
-      choose_turns(&problem, [&] { return noise_left(problem, design, choice, model, noise); });
-      design = whole_design(problem, options);  // of the same groups
+      choose_turns(&problem, [&] { return noise_left(problem, *design, choice, model, noise); });
+      *design = whole_design(problem, options);  // of the same groups
       model = model.turning(problem.range.turns);
     }
-    if (round > 0) grams = sum_grams(problem.data, design, problem.nominal, model, problem.train);
-    const Sums sums = sums_of(grams, noise, design, priors);
-    const Search search(design, sums, nuisance);
+    if (round > 0) grams = sum_grams(problem.data, *design, problem.nominal, model, problem.train);
+    const Sums sums = sums_of(grams, noise, *design, priors);
+    const Search search(*design, sums, nuisance);
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);
-    model = fitted_model(problem, design, sums, search, choice);
+    model = fitted_model(problem, *design, sums, search, choice);
     noise = noise_of(problem.data, model, problem.train);
   }
-  const Sums sums = sums_of(grams, noise, design, priors);
-  const Sums held_out = sums_of(sum_grams(problem.data, design, problem.nominal, model, problem.test), noise, design,
-                                std::vector<bool>(design.terms.size(), false));
-  const Search search(design, sums, nuisance);
-  SearchLimits few = limits;
-  few.least_gain = std::max(0.01, limits.least_gain);
-  few.most = static_cast<int>(choice.groups.size()) + 6;
-  const Choice with_unknown = search.run(choice, few, true);
-  return named(problem, groundwork, design, sums, held_out, search, choice, with_unknown, noise);
+  const std::vector<JointGrams> held_out = sum_grams(problem.data, *design, problem.nominal, model, problem.test);
+  Account account =
+      account_of(design, sums_of(grams, noise, *design, priors),
+                 sums_of(held_out, noise, *design, std::vector<bool>(design->terms.size(), false)), nuisance);
+  account.choice = choice;
+  if (!problem.fitted_before) {
+    if (auto given = of_given_inertias(problem, grams, held_out, noise, account, limits)) {
+      account = std::move(*given);
+      model = fitted_model(problem, *design, *account.sums, *account.search, account.choice);
+    }
+  }
+  std::vector<Noise> noise_of_functions = noise;
+  const Account functions = with_functions(problem, account, model, limits, &noise_of_functions);
+  return named(problem, groundwork, account, noise, functions, noise_of_functions);
 }
 
 }  // namespace dynamics

@@ -16,10 +16,12 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kClassNats = 3.0;     ///< a rival within this many is in the class
-constexpr double kClassR2 = 0.98;      ///< so is what can make the same torque
+constexpr double kClassNats = 6.0;     ///< a rival within this many is in the class
+constexpr double kClassR2 = 0.95;      ///< so is what can make the same torque
 constexpr double kSameR2 = 0.5;        ///< what makes less of the torque is another matter
 constexpr double kTempered = 0.5;      ///< no model is exact: half a nat counts for one
+constexpr double kOtherLaws = 0.1;     ///< part of a joint's error that other laws than the catalogue's may well be
+constexpr double kNamed = 0.2;         ///< what is less sure is fitted, and not named
 constexpr double kBlocksOfTime = 0.9;  ///< the most that folds of one recording are worth
 
 const TorqueGroup& group_of(const TorqueDesign& design, int g) { return design.groups[static_cast<std::size_t>(g)]; }
@@ -29,15 +31,15 @@ bool same_name(const TorqueGroup& a, const TorqueGroup& b) { return a.effect == 
 /// Everything about one chosen group.
 class Naming {
  public:
-  Naming(const TorqueDesign& design, const Sums& sums, const Sums& held_out, const Search& search, const Choice& choice)
-      : design_(design),
-        sums_(sums),
-        held_out_(held_out),
-        search_(search),
-        choice_(choice),
-        state_(search.state(choice)),
-        fit_(fit_of(sums, state_.columns, state_.precision)) {
-    squares_ = folds_and_held_out(choice);
+  explicit Naming(const Account& account)
+      : design_(*account.design),
+        sums_(*account.sums),
+        held_out_(*account.held_out),
+        search_(*account.search),
+        choice_(account.choice),
+        state_(search_.state(choice_)),
+        fit_(fit_of(sums_, state_.columns, state_.precision)) {
+    squares_ = folds_and_held_out(choice_);
     standard_ = folds_and_held_out({});
   }
 
@@ -57,6 +59,16 @@ class Naming {
     return out;
   }
 
+  /// No law here is exact: what removes a small part of a joint's error on folds that were not fitted may stand for
+  /// something else. All joints count alike in the sum of squares.
+  double not_another_law(std::size_t at) const {
+    const Index folds = static_cast<Index>(sums_.folds.size());
+    const VectorXd less = search_.squares_of_folds(Search::without(choice_, at));
+    const double gain = (less - squares_.head(folds)).sum() / standard_.head(folds).sum();
+    const double part = std::max(0.0, gain) * search_.joints();
+    return part * part / (part * part + kOtherLaws * kOtherLaws);
+  }
+
   /// Posterior of the class, and what is in it.
   double probability(std::size_t at, std::vector<TorqueAlternative>* confounded) const {
     const int g = choice_.groups[at];
@@ -74,19 +86,23 @@ class Naming {
       if (other.effect.empty() || gain.rank == 0 || is_in(gain.group) || same_name(other, mine)) continue;
       if (!seen.insert({other.effect, other.joints}).second) continue;
       const double behind = loss - gain.score;
-      if (behind > 25.0) break;
       const double weight = std::exp(-kTempered * std::max(behind, 0.0));
       const double r2 = search_.evidence().explained(less, mine.columns, theta, other.columns);
       if (r2 < kSameR2) continue;  // it explains something else
       if (behind < kClassNats || r2 > kClassR2) {
         confounded->push_back({other.effect, other.joints, weight});
         in_class += weight;
-      } else {
+      } else if (behind < 25.0) {
         outside += weight;
       }
     }
     for (TorqueAlternative& alternative : *confounded) alternative.probability *= 1.0 / (in_class + outside);
     return in_class / (in_class + outside);
+  }
+
+  /// That it, or one of its class, is there.
+  double sure(std::size_t at, std::vector<TorqueAlternative>* confounded) const {
+    return probability(at, confounded) * not_another_law(at);
   }
 
   VectorXd values_of(const TorqueGroup& group) const {
@@ -156,12 +172,13 @@ double noise_at(const std::vector<Noise>& noise, int joint) {
 }
 
 /// What is usual, by effect: one entry for all joints.
-std::vector<FoundTorqueEffect> standard_effects(const Problem& problem, const TorqueDesign& design,
-                                                const Naming& naming, const std::vector<Noise>& noise) {
+std::vector<FoundTorqueEffect> standard_effects(const Problem& problem, const Account& account, const Naming& naming,
+                                                const std::vector<Noise>& noise) {
   std::vector<FoundTorqueEffect> out;
   if (problem.fitted_before) return out;
+  const TorqueDesign& design = *account.design;
   for (const TorqueGroup& group : design.groups) {
-    if (!group.standard) continue;
+    if (!group.standard || (account.inertias_given && is_inertial(group))) continue;
     auto at = std::find_if(out.begin(), out.end(), [&](const auto& e) { return e.effect == group.effect; });
     if (at == out.end()) {
       FoundTorqueEffect found;
@@ -183,26 +200,38 @@ std::vector<FoundTorqueEffect> standard_effects(const Problem& problem, const To
   return out;
 }
 
-std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const TorqueDesign& design, const Naming& naming,
-                                             const Choice& choice, const std::vector<Noise>& noise,
-                                             const std::vector<TorqueEffect>& own) {
+std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Account& account, const Naming& naming,
+                                             const std::vector<Noise>& noise, const std::vector<TorqueEffect>& own,
+                                             std::vector<std::string>* small) {
   std::vector<FoundTorqueEffect> out;
+  const TorqueDesign& design = *account.design;
+  const Choice& choice = account.choice;
   for (std::size_t k = 0; k < choice.groups.size(); ++k) {
     const TorqueGroup& group = group_of(design, choice.groups[k]);
     FoundTorqueEffect found;
     found.effect = group.effect;
     found.joints = group.joints;
-    found.standard = group.standard && !problem.fitted_before;
-    found.probability = naming.probability(k, &found.confounded_with);
-    if (problem.single) found.probability = std::min(found.probability, kBlocksOfTime);
+    found.standard = group.standard && !problem.fitted_before && !account.inertias_given;
     found.parameters = parameters_of(design, group.columns, naming.fit());
     found.share = naming.share(k);
+    found.probability = naming.sure(k, &found.confounded_with);
+    if (found.probability < kNamed) {
+      small->push_back(group.effect + (group.joints.empty() ? "" : " at " + listed(group.joints)));
+      continue;
+    }
+    if (problem.single) found.probability = std::min(found.probability, kBlocksOfTime);
     found.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     found.plain = find_torque_effect(group.effect, own).traits.plain;
     found.sentence = sentence_of(found);
     out.push_back(std::move(found));
   }
-  std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.share.value > b.share.value; });
+  // By share; but what nobody would have fitted anyway, and is likely, stands before what everybody does.
+  const auto news = [&](const FoundTorqueEffect& e) {
+    return e.probability >= 0.5 && !find_torque_effect(e.effect, own).traits.usual;
+  };
+  std::stable_sort(out.begin(), out.end(), [&](const auto& a, const auto& b) {
+    return news(a) != news(b) ? news(a) : a.share.value > b.share.value;
+  });
   return out;
 }
 
@@ -217,7 +246,8 @@ std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& 
     unknown.inputs = group.inputs;
     unknown.share = naming.share(k);
     std::vector<TorqueAlternative> ignored;
-    unknown.probability = naming.probability(k, &ignored);
+    unknown.probability = naming.sure(k, &ignored);
+    if (unknown.probability < kNamed) continue;
     if (single) unknown.probability = std::min(unknown.probability, kBlocksOfTime);
     unknown.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     const std::vector<Parameter> knots = parameters_of(design, group.columns, naming.fit());
@@ -255,22 +285,27 @@ std::string causes_of(const std::vector<FoundTorqueEffect>& effects) {
   return more > 0 ? text + "; and " + std::to_string(more) + " smaller" : text;
 }
 
-std::string verdict_sentence(const TorqueDiagnosis& d, bool fitted_before) {
+/// What stands beside what was named, in words.
+std::string words_of_usual(const Problem& problem, const Account& account) {
+  if (problem.fitted_before) return "the robot's model";
+  if (account.inertias_given) return "the file's inertias with friction and an offset";
+  return "standard practice (inertias, Coulomb and viscous friction, an offset)";
+}
+
+std::string verdict_sentence(const TorqueDiagnosis& d, const TorqueErrors& before, const std::string& usual) {
   const auto percent = [](const TorqueErrors& errors) { return number(mean_percent(errors), 2) + " %"; };
-  const std::string beside =
-      fitted_before ? "the robot's model" : "standard practice (inertias, Coulomb and viscous friction, an offset)";
   if (d.verdict == Verdict::does_not_hold) return "What was found does not hold on recordings it never saw.";
   const std::string causes = causes_of(d.effects);
   if (!causes.empty()) {
-    return "The error of held-out torques falls from " + percent(d.errors[1]) + ", which " + beside + " leaves, to " +
+    return "The error of held-out torques falls from " + percent(before) + ", which " + usual + " leaves, to " +
            percent(d.errors[2]) + " of their standard deviation: " + causes + ".";
   }
-  return d.unknown.empty() ? "No gap beyond noise is left by " + beside + "."
-                           : "What " + beside + " leaves goes with inputs that no known effect explains.";
+  return d.unknown.empty() ? "No gap beyond noise is left by " + usual + "."
+                           : "What " + usual + " leaves goes with inputs that no known effect explains.";
 }
 
-Verdict verdict_of(const TorqueDiagnosis& d, bool any) {
-  if (any && mean_percent(d.errors[2]) > mean_percent(d.errors[1])) return Verdict::does_not_hold;
+Verdict verdict_of(const TorqueDiagnosis& d, const TorqueErrors& before, bool any) {
+  if (any && mean_percent(d.errors[2]) > mean_percent(before)) return Verdict::does_not_hold;
   if (any) return d.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown;
   return d.unknown.empty() ? Verdict::none : Verdict::unknown;
 }
@@ -315,10 +350,12 @@ std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effect
 }
 
 /// The robot with its groundwork, where it had none, and with further groups, of bodies that there can be.
+/// `inertias_given`: the groundwork has no inertias.
 Robot with_groundwork(const Problem& problem, const TorqueDesign& design, const Sums& sums, const Fit& fit,
-                      std::vector<int> groups, std::vector<std::string>* warnings) {
+                      std::vector<int> groups, bool inertias_given, std::vector<std::string>* warnings) {
   for (std::size_t g = 0; g < design.groups.size() && !problem.fitted_before; ++g) {
-    if (design.groups[g].standard) groups.push_back(static_cast<int>(g));
+    const TorqueGroup& group = design.groups[g];
+    if (group.standard && !(inertias_given && is_inertial(group))) groups.push_back(static_cast<int>(g));
   }
   std::sort(groups.begin(), groups.end());
   const Fit bodies = problem.fitted_before ? fit : with_bodies(problem.robot, design, sums, fit, warnings);
@@ -334,7 +371,8 @@ std::vector<int> effects_in(const Choice& choice, const TorqueDesign& design) {
 }
 
 /// The robot and the free functions, as a model.
-TorqueModel with_functions(const Problem& problem, const Robot& robot, const TorqueDesign& design, const Fit& fit) {
+TorqueModel with_free_functions(const Problem& problem, const Robot& robot, const TorqueDesign& design,
+                                const Fit& fit) {
   std::vector<ValuedTerm> functions;
   for (const TorqueGroup& group : design.groups) {
     if (!group.effect.empty()) continue;
@@ -347,37 +385,56 @@ TorqueModel with_functions(const Problem& problem, const Robot& robot, const Tor
   return model_of(robot, problem).with(functions);
 }
 
+/// The robot of an account, of bodies that there can be.
+Robot robot_of(const Problem& problem, const Account& account, const Naming& naming,
+               std::vector<std::string>* warnings) {
+  return with_groundwork(problem, *account.design, *account.sums, naming.fit(),
+                         effects_in(account.choice, *account.design), account.inertias_given, warnings);
+}
+
+/// What is left without anything that was named.
+TorqueErrors errors_without_names(const Problem& problem, const Account& account) {
+  const Evidence::State state = account.search->state({});
+  const Fit fit = fit_of(*account.sums, state.columns, state.precision);
+  return errors_of(problem, {{"usual", problem.nominal.with(valued(*account.design, fit))}}).front();
+}
+
 }  // namespace
 
-TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const TorqueDesign& design,
-                      const Sums& sums, const Sums& held_out, const Search& search, const Choice& choice,
-                      const Choice& with_unknown, const std::vector<Noise>& noise) {
+TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const Account& account,
+                      const std::vector<Noise>& noise, const Account& functions,
+                      const std::vector<Noise>& noise_of_functions) {
   const std::vector<TorqueEffect>& own = problem.own_effects;
-  const Naming naming(design, sums, held_out, search, choice), all(design, sums, held_out, search, with_unknown);
+  const Naming naming(account), all(functions);
   TorqueDiagnosis out;
   out.warnings = problem.warnings;
-  out.effects = found_effects(problem, design, naming, choice, noise, own);
+  std::vector<std::string> small;
+  out.effects = found_effects(problem, account, naming, noise, own, &small);
+  if (!small.empty()) {
+    out.warnings.push_back("fitted, and too small to be named, as something else may look so: " + listed(small));
+  }
   const bool any = !out.effects.empty();
-  out.unknown = unknown_of(design, all, with_unknown, noise, problem.single);
-  for (FoundTorqueEffect& standard : standard_effects(problem, design, naming, noise))
+  out.unknown = unknown_of(*functions.design, all, functions.choice, noise_of_functions, problem.single);
+  for (FoundTorqueEffect& standard : standard_effects(problem, account, naming, noise))
     out.effects.push_back(std::move(standard));
   // Errors are those of the robot that is handed over.
-  out.robot = with_groundwork(problem, design, sums, naming.fit(), choice.groups, &out.warnings);
+  out.robot = robot_of(problem, account, naming, &out.warnings);
   std::vector<std::string> said_already;
-  const Robot beside =
-      with_groundwork(problem, design, sums, all.fit(), effects_in(with_unknown, design), &said_already);
+  const Robot beside = robot_of(problem, functions, all, &said_already);
   const TorqueModel model = model_of(out.robot, problem);
-  out.errors = errors_of(problem, {{"nominal", problem.nominal},
-                                   {"standard", groundwork.model},
-                                   {"named", model},
-                                   {"with_unknown", with_functions(problem, beside, design, all.fit())}});
-  out.verdict = verdict_of(out, any);
-  out.sentence = verdict_sentence(out, problem.fitted_before);
+  out.errors =
+      errors_of(problem, {{"nominal", problem.nominal},
+                          {"standard", groundwork.model},
+                          {"named", model},
+                          {"with_unknown", with_free_functions(problem, beside, *functions.design, all.fit())}});
+  const TorqueErrors before = account.inertias_given ? errors_without_names(problem, account) : out.errors[1];
+  out.verdict = verdict_of(out, before, any);
+  out.sentence = verdict_sentence(out, before, words_of_usual(problem, account));
   if (out.verdict == Verdict::does_not_hold)
-    out.robot = with_groundwork(problem, groundwork.design, groundwork.sums, groundwork.fit, {}, &said_already);
+    out.robot = with_groundwork(problem, groundwork.design, groundwork.sums, groundwork.fit, {}, false, &said_already);
   out.where = regimes_of(problem, groundwork.model, model);
   out.classes = classes_of(out.effects, own);
-  out.not_testable = design.not_testable;
+  out.not_testable = account.design->not_testable;
   out.traces = traces_of(problem, groundwork.model, model);
   out.cutoff = problem.data.prepare.cutoff;
   for (const Noise& one : noise) out.design_effect.push_back(one.design_effect);

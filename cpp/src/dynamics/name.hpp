@@ -10,8 +10,9 @@
 
 namespace truing::dynamics {
 
-TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const TorqueDesign& design,
-                      const Sums& sums, const Sums& held_out, const Search& search, const Choice& choice,
-                      const Choice& with_unknown, const std::vector<Noise>& noise);
+/// `functions`: the account with free functions beside what was named. Noise is that of either.
+TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const Account& account,
+                      const std::vector<Noise>& noise, const Account& functions,
+                      const std::vector<Noise>& noise_of_functions);
 
 }  // namespace truing::dynamics

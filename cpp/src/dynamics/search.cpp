@@ -13,7 +13,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSureGain = 1.5;  ///< standard errors over the folds
+constexpr double kSureGain = 2.0;  ///< standard errors over the folds
 
 bool same_place(const TorqueGroup& a, const TorqueGroup& b) {
   return a.effect == b.effect && a.joints == b.joints && a.inputs == b.inputs;
@@ -28,6 +28,7 @@ std::vector<ColumnGroup> column_groups(const TorqueDesign& design) {
     ColumnGroup one;
     one.columns = group.columns;
     one.cost = std::log(static_cast<double>(of_a_kind[group.effect]));
+    one.shadow = design.terms[static_cast<std::size_t>(group.columns.front())].only_alternative;
     out.push_back(std::move(one));
   }
   return out;
@@ -79,7 +80,7 @@ double Search::squares_on(const Gram& other, const Choice& choice) const {
 
 bool Search::may_enter(const Choice& choice, int group, bool free_functions) const {
   const TorqueGroup& g = design_.groups[static_cast<std::size_t>(group)];
-  if (g.effect.empty() != free_functions) return false;
+  if (g.effect.empty() != free_functions || groups_[static_cast<std::size_t>(group)].shadow) return false;
   const auto& nuisance = evidence_.nuisance();
   if (!nuisance.empty() && std::find(nuisance.begin(), nuisance.end(), g.columns.front()) != nuisance.end())
     return false;
@@ -124,7 +125,7 @@ Choice Search::better_forms(Choice choice) const {
     const Evidence::State less = evidence_.evaluate(without(choice, at));
     Evidence::Gain best;
     for (std::size_t g = 0; g < groups_.size(); ++g) {
-      if (!same_place(design_.groups[g], mine)) continue;
+      if (!same_place(design_.groups[g], mine) || groups_[g].shadow) continue;
       Evidence::Gain gain = evidence_.gain(less, groups_[g].columns, groups_[g].cost);
       gain.group = static_cast<int>(g);
       if (gain.score > best.score) best = gain;
@@ -183,6 +184,15 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
     choice = better_forms(std::move(choice));
   }
   return less_what_is_idle(std::move(choice), limits);
+}
+
+Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, Sums held_out, std::vector<int> nuisance) {
+  Account out;
+  out.design = std::move(design);
+  out.sums = std::make_shared<const Sums>(std::move(sums));
+  out.held_out = std::make_shared<const Sums>(std::move(held_out));
+  out.search = std::make_shared<const Search>(*out.design, *out.sums, std::move(nuisance));
+  return out;
 }
 
 }  // namespace truing::dynamics

@@ -5,6 +5,7 @@
 // Which effects explain the torques: one after the other by evidence, and only those that predict folds they were not
 // fitted to.
 
+#include <memory>
 #include <vector>
 
 #include "dynamics/problem.hpp"
@@ -14,8 +15,8 @@
 namespace truing::dynamics {
 
 struct SearchLimits {
-  double threshold = 4.0;     ///< nats beyond the cost
-  double least_gain = 0.004;  ///< of the joint's squared error on folds that were not fitted
+  double threshold = 4.0;    ///< nats beyond the cost
+  double least_gain = 0.01;  ///< of the joint's squared error on folds that were not fitted
   int most = 40;
   bool plausible_only = true;  ///< parameters within what machines have
 };
@@ -30,6 +31,7 @@ class Search {
   Choice run(Choice choice, const SearchLimits& limits, bool free_functions) const;
 
   const Evidence& evidence() const { return evidence_; }
+  double joints() const { return static_cast<double>(joints_); }
   double cost(int group) const { return groups_[static_cast<std::size_t>(group)].cost; }
   Evidence::State state(const Choice& choice) const { return evidence_.evaluate(choice); }
 
@@ -54,5 +56,15 @@ class Search {
   Evidence evidence_;
   std::size_t joints_ = 1;
 };
+
+/// A search with all that it stands on, and what it chose.
+struct Account {
+  std::shared_ptr<const TorqueDesign> design;
+  std::shared_ptr<const Sums> sums, held_out;
+  std::shared_ptr<const Search> search;
+  Choice choice{};
+  bool inertias_given = false;  ///< links' inertias are the file's, but for those that were chosen
+};
+Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, Sums held_out, std::vector<int> nuisance);
 
 }  // namespace truing::dynamics

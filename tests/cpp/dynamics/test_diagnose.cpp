@@ -87,6 +87,25 @@ TEST_CASE("a spring that nobody put into the model is named with its stiffness")
   CHECK(d.effects.front().probability > 0.9);
 }
 
+TEST_CASE("a load at the flange is named with its mass, and with the link that looks the same") {
+  Robot truth = with_friction();
+  truth.joints[1].mass = 3.0 + 1.0;  // of a load at the last frame's origin
+  truth.joints[1].center_of_mass = {-0.15, 0.0, 0.0};
+  truth.joints[1].inertia = Eigen::Vector3d(0.004, 0.07, 0.07).asDiagonal();  // 3 kg at -0.2, 1 kg at 0
+  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(truth));
+  REQUIRE(!d.effects.empty());
+  const FoundTorqueEffect& first = d.effects.front();
+  CHECK(!first.standard);
+  CHECK(first.probability > 0.9);
+  std::vector<std::string> members{first.effect};
+  for (const TorqueAlternative& other : first.confounded_with) members.push_back(other.effect);
+  for (const char* member : {"payload", "link_inertia"})
+    CHECK_MESSAGE(std::find(members.begin(), members.end(), member) != members.end(), member);
+  CHECK(std::any_of(d.classes.begin(), d.classes.end(), [](const TorqueClass& c) {
+    return std::find(c.effects.begin(), c.effects.end(), "motor_constant") != c.effects.end();
+  }));
+}
+
 TEST_CASE("an effect of one's own is named like the catalogue's") {
   const TorqueEffect cable{"cable", "a cable that pulls", [](const Robot&, std::size_t joint, const MotionRange&) {
                              TorqueTerm term;

@@ -20,8 +20,8 @@ struct TorqueDiagnoseOptions {
   double cutoff = 8.0;      ///< [Hz] of the low-pass without phase that both sides of the equation of motion go through
   double test_share = 0.3;  ///< fraction of the time held out when there is one recording, or none is marked as test
   int max_effects = 40;     ///< maximum number of effects named
-  double least_gain = 0.004;  ///< [-] fraction of a joint's squared error on unseen recordings that a name must remove
-  int threads = 0;            ///< 0: as many as the machine has
+  double least_gain = 0.01;  ///< [-] fraction of a joint's squared error on unseen recordings that a name must remove
+  int threads = 0;           ///< 0: as many as the machine has
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
@@ -52,8 +52,9 @@ struct FoundTorqueEffect {
 
 /// A part of the torques that goes with an input, and that no effect of the catalogue explains.
 struct UnknownTorque {
-  std::string joint;                         ///< its name
-  std::vector<std::string> inputs;           ///< 'angle', 'speed', 'load', 'time', 'direction' or a column
+  std::string joint;  ///< its name
+  std::vector<std::string>
+      inputs;  ///< 'angle', 'angle J2' (another joint's), 'speed', 'load', 'time', 'direction' or a column
   double probability = 0.0;                  ///< posterior that there is such a thing
   Share share;                               ///< as that of an effect
   double rms = 0.0;                          ///< [Nm | N] of its torque
@@ -92,15 +93,17 @@ struct TorqueTrace {
 struct TorqueDiagnosis {
   Verdict verdict = Verdict::none;  ///< whether there is a gap beyond standard practice, and whether names explain it
   std::string sentence;             ///< the verdict in words
-  std::vector<FoundTorqueEffect> effects;  ///< beyond standard practice by share, then what is standard
-  std::vector<UnknownTorque> unknown;      ///< what no effect explains
-  std::vector<TorqueErrors> errors;        ///< 'nominal', 'standard', 'named', 'with_unknown'
-  std::vector<TorqueRegime> where;         ///< the gap by joint and part of the motion
-  std::vector<TorqueClass> classes;        ///< what cannot be told apart
-  std::vector<NotTestable> not_testable;   ///< what the recordings could not show
-  std::vector<TorqueTrace> traces;         ///< a held-out stretch of every joint
-  double cutoff = 0.0;                     ///< [Hz] of the low-pass
-  std::vector<double> design_effect;       ///< shape=(joints,): rows that count as one
+  /// Beyond standard practice, by share: what `identify` would not have fitted unasked and is likelier than not, then
+  /// the others; then what is standard.
+  std::vector<FoundTorqueEffect> effects;
+  std::vector<UnknownTorque> unknown;     ///< what no effect explains
+  std::vector<TorqueErrors> errors;       ///< 'nominal', 'standard', 'named', 'with_unknown'
+  std::vector<TorqueRegime> where;        ///< the gap by joint and part of the motion
+  std::vector<TorqueClass> classes;       ///< what cannot be told apart
+  std::vector<NotTestable> not_testable;  ///< what the recordings could not show
+  std::vector<TorqueTrace> traces;        ///< a held-out stretch of every joint
+  double cutoff = 0.0;                    ///< [Hz] of the low-pass
+  std::vector<double> design_effect;      ///< shape=(joints,): rows that count as one
   std::vector<std::string>
       held_out;  ///< names of the recordings that were held out; of one recording: 'blocks of time'
   Robot robot;   ///< with what was named

@@ -46,7 +46,9 @@ struct TorqueTerm {
   /// shape=(rows, joints.size()) [Nm | N] for a parameter of one. Rows depend on each other only through what came
   /// shortly before (a play operator); `Motion` begins early enough for that.
   std::function<Eigen::MatrixXd(const Motion&)> basis;
-  bool needs_torque = false;                                ///< the basis depends on Motion::torque
+  bool needs_torque = false;  ///< the basis depends on Motion::torque
+  /// The recordings show too little of it to name it, but it may stand for what they show.
+  bool only_alternative = false;
   double prior = 1.0;                                       ///< size that the parameter may well have
   double least = -std::numeric_limits<double>::infinity();  ///< no machine has less than this
   double most = std::numeric_limits<double>::infinity();    ///< no machine has more

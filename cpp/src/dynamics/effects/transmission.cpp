@@ -48,15 +48,16 @@ std::vector<TorqueForm> ripple(const Robot& robot, std::size_t joint, const Moti
   const double travel = range.upper[at] - range.lower[at];
   std::vector<TorqueForm> out;
   for (const int k : {1, 2, 3, 4, 6, 8, 12, 16, 24}) {
-    if (k * travel < 3.14) continue;  // less than half a wave is no wave
+    const bool seen = k * travel >= 3.14;  // less than half a wave is no wave, but may be what something else is
+    if (!seen && k > 2) continue;
     const std::string name = parameter_name("ripple", robot, joint);
     const double prior = 0.2 * torque_prior(range, joint);
     out.push_back({term_at(joint, name + ".sin" + std::to_string(k), "Nm", prior,
                            [at, k](const Motion& m) -> ArrayXd { return (k * m.q.col(at).array()).sin(); }),
                    term_at(joint, name + ".cos" + std::to_string(k), "Nm", prior,
                            [at, k](const Motion& m) -> ArrayXd { return (k * m.q.col(at).array()).cos(); })});
+    for (TorqueTerm& term : out.back()) term.only_alternative = !seen;
   }
-  if (out.empty()) throw Unsuited("the joint turns too little to tell a wave");
   return out;
 }
 
