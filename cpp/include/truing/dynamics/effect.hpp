@@ -29,7 +29,7 @@ struct Motion {
   Eigen::MatrixXd qdd;     ///< shape=(rows, joints) [rad/s^2 | m/s^2]
   Eigen::MatrixXd torque;  ///< shape=(rows, joints) [Nm | N] that the model predicts in all, friction included
   /// Of every joint, shape=(rows, 10 * links) each: torque for an inertial parameter of one (mass, first moments, xx yy
-  /// zz xy xz yz about the origin of the frame after the link), link after link.
+  /// zz xy xz yz about the origin of the frame after the link), link after link. Empty where no term needs it.
   std::vector<Eigen::MatrixXd> rigid;
   /// shape=(rows,) each: the further columns of the recording.
   std::map<std::string, Eigen::VectorXd> columns;
@@ -46,6 +46,10 @@ struct TorqueTerm {
   /// shortly before (a play operator); `Motion` begins early enough for that.
   std::function<Eigen::MatrixXd(const Motion&)> basis;
   bool needs_torque = false;                                ///< the basis depends on Motion::torque
+  bool needs_rigid = true;                                  ///< the basis may look at Motion::rigid
+  /// The basis is this column of Motion::rigid at `joints`: number of an inertial parameter, 10 * link + part; -1: it is
+  /// none of them. Then it is not called.
+  int link_parameter = -1;
   double prior = 1.0;                                       ///< size that the parameter may well have
   double least = -std::numeric_limits<double>::infinity();  ///< no machine has less than this
   double most = std::numeric_limits<double>::infinity();    ///< no machine has more
