@@ -29,7 +29,7 @@ namespace {
 
 /// What all effects together leave: the errors of the groundwork alone go on in time as the effects do that it lacks.
 std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& design,
-                                const std::vector<JointGrams>& grams, const std::vector<Noise>& first) {
+                                const TorqueGrams& grams, const std::vector<Noise>& first) {
   std::vector<int> columns;
   for (const TorqueGroup& group : design.groups) {
     // Not what needs the torque: with that of another model it would be another column.
@@ -42,7 +42,7 @@ std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& desi
     // Every row counts here: the priors are there for what the rows cannot see, and for nothing else.
     for (Noise& one : noise) one.design_effect = 1.0;
     const Fit all = fit_of(sums_of(grams, noise, design, std::vector<bool>(design.terms.size(), true)), columns);
-    noise = noise_of(problem.data, problem.nominal.with(valued(design, all)), problem.train);
+    noise = noise_of(problem.tiles, problem.nominal.with(valued(design, all)), problem.train);
   }
   return noise;
 }
@@ -77,20 +77,20 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   limits.most = options.max_effects;
   limits.plausible_only = !problem.fitted_before;  // departures from what the robot carries have either sign
   TorqueModel model = groundwork.model;
-  std::vector<JointGrams> grams = sum_grams(problem.data, design, problem.nominal, model, problem.train);
+  TorqueGrams grams = sum_grams(problem.tiles, design, problem.nominal, model, problem.train);
   std::vector<Noise> noise = noise_of_all(problem, design, grams, groundwork.noise);
   Choice choice;
   // What noise is, and the torque that some terms need, are those of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
-    if (round > 0) grams = sum_grams(problem.data, design, problem.nominal, model, problem.train);
+    if (round > 0) grams = sum_grams(problem.tiles, design, problem.nominal, model, problem.train);
     const Sums sums = sums_of(grams, noise, design, priors);
     const Search search(design, sums, nuisance);
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);
     model = fitted_model(problem, design, sums, search, choice);
-    noise = noise_of(problem.data, model, problem.train);
+    noise = noise_of(problem.tiles, model, problem.train);
   }
   const Sums sums = sums_of(grams, noise, design, priors);
-  const Sums held_out = sums_of(sum_grams(problem.data, design, problem.nominal, model, problem.test), noise, design,
+  const Sums held_out = sums_of(sum_grams(problem.tiles, design, problem.nominal, model, problem.test), noise, design,
                                 std::vector<bool>(design.terms.size(), false));
   const Search search(design, sums, nuisance);
   SearchLimits few = limits;

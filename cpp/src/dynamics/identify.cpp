@@ -111,11 +111,11 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   Fit fit;
   // Terms that need the torque see that of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
-    sums = sums_of(sum_grams(problem.data, design, problem.nominal, model, problem.train), noise, design, with_prior);
+    sums = sums_of(sum_grams(problem.tiles, design, problem.nominal, model, problem.train), noise, design, with_prior);
     groups = best_forms(design, sums);
     fit = fit_of(sums, columns_of(design, groups));
     model = problem.nominal.with(valued(design, fit));
-    noise = noise_of(problem.data, model, problem.train);
+    noise = noise_of(problem.tiles, model, problem.train);
   }
   out.warnings = problem.warnings;
   fit = with_bodies(robot, design, sums, fit, &out.warnings);
@@ -123,7 +123,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   out.parameters = parameters_of(design, columns_of(design, groups), fit);
   out.errors = errors_of(
       problem, {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model_of(out.robot, problem)}});
-  out.cutoff = problem.data.prepare.cutoff;
+  out.cutoff = problem.tiles.options().cutoff;
   out.held_out = problem.held_out;
   out.not_testable = design.not_testable;
   return out;

@@ -46,11 +46,13 @@ TorquePrediction predict(const Robot& robot, const Recording& recording, double 
   options.cutoff = cutoff;
   options.torque_per_ampere = drive_constants(robot, recordings, &warnings);
   options.short_stretches = true;  // every row has a prediction
-  const RigidChain chain(robot);
-  const MotionRange range = range_of(recordings, robot, chain, options);
+  const MotionRange range = range_of(Tiles(recordings, robot, options, 1));
   const TorqueModel model(robot, valued_terms(robot, range, own_effects));
+  const RigidChain chain(robot);
   Predicted predicted;
-  for_each_tile(recording, 0, robot, chain, options, [&](Tile& tile) {
+  for_each_tile(recording, 0, robot, options, [&](Tile& tile) {
+    if (model.needs_rigid())
+      tile.motion.rigid = regressor_columns(chain, tile.motion.q, tile.motion.qd, tile.motion.qdd);
     const MatrixXd torque = model.torque(&tile.motion);
     const Index begin = tile.first * tile.stride;
     const Index end = std::min(torque.rows(), (tile.first + tile.count) * tile.stride);

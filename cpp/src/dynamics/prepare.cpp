@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "dynamics/filter.hpp"
+#include "math/batch.hpp"
 #include "math/statistics.hpp"
 #include "math/text.hpp"
 
@@ -160,7 +162,15 @@ Tile tile_of(const Stretch& stretch, Index from, Index to) {
 
 }  // namespace
 
-MatrixXd Tile::filtered_rows(const MatrixXd& values) const { return filtered(values, weights, stride); }
+MatrixXd Tile::own_rows(const MatrixXd& values) const {
+  MatrixXd out(count, values.cols());
+  for (Index c = 0; c < values.cols(); ++c) own_rows(values.col(c).data(), out.col(c).data());
+  return out;
+}
+
+void Tile::own_rows(const double* column, double* out) const {
+  filter_column(column, motion.rows(), weights, stride, first, count, out);
+}
 
 VectorXd Tile::own_time() const {
   VectorXd out(count);
@@ -178,8 +188,8 @@ MatrixXd measured_torque(const Recording& recording, const std::vector<double>& 
   return out;
 }
 
-void for_each_tile(const Recording& recording, std::size_t number, const Robot& robot, const RigidChain& chain,
-                   const PrepareOptions& options, const std::function<void(Tile&)>& use) {
+void for_each_tile(const Recording& recording, std::size_t number, const Robot& robot, const PrepareOptions& options,
+                   const std::function<void(Tile&)>& use) {
   const double step = usual_step(recording.time);
   const MatrixXd torque = measured_torque(recording, options.torque_per_ampere);
   bool any = false;
@@ -194,7 +204,6 @@ void for_each_tile(const Recording& recording, std::size_t number, const Robot& 
       Tile tile = tile_of(stretch, from, std::min(coarse, from + each));
       tile.recording = number;
       tile.motion.robot = &robot;
-      tile.motion.rigid = regressor_columns(chain, tile.motion.q, tile.motion.qd, tile.motion.qdd);
       use(tile);
     }
   }
@@ -203,6 +212,55 @@ void for_each_tile(const Recording& recording, std::size_t number, const Robot& 
                                 math::number(4.0 / options.cutoff, 3) +
                                 " s, which the low-pass needs: record longer, or give a higher cut-off");
   }
+}
+
+Tiles::Tiles(const std::vector<Recording>& recordings, const Robot& robot, PrepareOptions options, int threads)
+    : recordings_(recordings), robot_(robot), options_(std::move(options)), threads_(threads) {
+  constexpr double kMostKept = 100.0 * 1024 * 1024;  ///< [bytes]
+  double numbers = 0.0;
+  for (const Recording& recording : recordings) {
+    const double each = 5.0 * static_cast<double>(recording.position.cols() + 1) +
+                        static_cast<double>(recording.columns.size());
+    numbers += each * static_cast<double>(recording.rows());
+  }
+  kept_ = sizeof(double) * numbers < kMostKept;
+  if (!kept_) return;
+  std::vector<std::vector<Tile>> parts(recordings.size());
+  math::for_each_on_threads(
+      recordings.size(), threads, {},
+      [&](std::size_t r) {
+        for_each_tile(recordings[r], r, robot, options_, [&](Tile& tile) { parts[r].push_back(std::move(tile)); });
+      },
+      1);
+  for (std::vector<Tile>& part : parts) std::move(part.begin(), part.end(), std::back_inserter(tiles_));
+}
+
+void Tiles::for_each(const std::function<bool(std::size_t)>& wanted,
+                     const std::function<void(Tile&, std::size_t)>& work,
+                     const std::function<void(std::size_t)>& done) const {
+  std::vector<Tile*> lot;
+  const auto run = [&] {
+    math::for_each_on_threads(lot.size(), threads_, {}, [&](std::size_t k) { work(*lot[k], k); }, 1);
+    for (std::size_t k = 0; k < lot.size(); ++k) done(k);
+    lot.clear();
+  };
+  if (kept_) {
+    for (Tile& tile : tiles_) {
+      if (wanted(tile.recording)) lot.push_back(&tile);
+      if (lot.size() == kTogether) run();
+    }
+    return run();
+  }
+  std::vector<Tile> made(kTogether);
+  for (std::size_t r = 0; r < recordings_.size(); ++r) {
+    if (!wanted(r)) continue;
+    for_each_tile(recordings_[r], r, robot_, options_, [&](Tile& tile) {
+      made[lot.size()] = std::move(tile);
+      lot.push_back(&made[lot.size()]);
+      if (lot.size() == kTogether) run();
+    });
+  }
+  run();
 }
 
 namespace {
@@ -243,17 +301,17 @@ void widen(const Tile& tile, MotionRange* range, std::vector<TorqueSums>* sums) 
 
 }  // namespace
 
-MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robot, const RigidChain& chain,
-                     const PrepareOptions& options) {
-  const auto joints = static_cast<Index>(robot.driven_count());
+MotionRange range_of(const Tiles& tiles) {
+  const auto joints = static_cast<Index>(tiles.robot().driven_count());
   constexpr double inf = std::numeric_limits<double>::infinity();
   MotionRange out;
   out.lower = VectorXd::Constant(joints, inf);
   out.upper = VectorXd::Constant(joints, -inf);
   out.speed = out.acceleration = out.torque = VectorXd::Zero(joints);
   std::vector<TorqueSums> sums(static_cast<std::size_t>(joints));
-  for (std::size_t r = 0; r < recordings.size(); ++r)
-    for_each_tile(recordings[r], r, robot, chain, options, [&](Tile& tile) { widen(tile, &out, &sums); });
+  std::vector<const Tile*> lot(Tiles::kTogether);
+  tiles.for_each([](std::size_t) { return true; }, [&](Tile& tile, std::size_t k) { lot[k] = &tile; },
+                 [&](std::size_t k) { widen(*lot[k], &out, &sums); });
   for (std::size_t j = 0; j < sums.size(); ++j) out.torque[static_cast<Index>(j)] = sums[j].standard_deviation();
   return out;
 }

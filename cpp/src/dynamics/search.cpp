@@ -39,6 +39,10 @@ VectorXd priors_of(const TorqueDesign& design) {
   return out;
 }
 
+double squares_left(const Gram& gram, const VectorXd& solution) {
+  return gram.yy - 2.0 * solution.dot(gram.xy) + solution.dot(gram.xx * solution);
+}
+
 }  // namespace
 
 Search::Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nuisance)
@@ -66,15 +70,14 @@ VectorXd Search::squares_of_folds(const Choice& choice) const {
     const Gram held = sums_.folds[f].of(state.columns);
     MatrixXd d = all.xx - held.xx;
     d.diagonal() += state.precision;
-    out[static_cast<Index>(f)] =
-        estimation::held_out_squares(sums_.folds[f], state.columns, factorised(std::move(d)).solve(all.xy - held.xy));
+    out[static_cast<Index>(f)] = squares_left(held, factorised(std::move(d)).solve(all.xy - held.xy));
   }
   return out;
 }
 
-double Search::squares_on(const Gram& other, const Choice& choice) const {
+double Search::squares_on(const FoldGram& other, const Choice& choice) const {
   const Evidence::State state = evidence_.evaluate(choice);
-  return estimation::held_out_squares(other, state.columns, state.solution);
+  return squares_left(other.of(state.columns), state.solution);
 }
 
 bool Search::may_enter(const Choice& choice, int group, bool free_functions) const {

@@ -36,7 +36,7 @@ class Search {
   /// Squared error of every fold, by the fit to the others.
   Eigen::VectorXd squares_of_folds(const Choice& choice) const;
   /// Squared error on other rows, by the fit to all folds.
-  double squares_on(const Gram& other, const Choice& choice) const;
+  double squares_on(const FoldGram& other, const Choice& choice) const;
 
   /// The choice less its group number `at`.
   static Choice without(const Choice& choice, std::size_t at);

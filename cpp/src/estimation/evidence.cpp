@@ -127,6 +127,22 @@ void GramSum::push() {
   if (++filled_ == kLength) fold_in();
 }
 
+void GramSum::add(const Eigen::Ref<const Eigen::MatrixXd>& table, const std::vector<Eigen::Index>& rows) {
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  for (Eigen::Index done = 0; done < count;) {
+    const Eigen::Index some = std::min(count - done, kLength - filled_);
+    const Eigen::Index* const of = rows.data() + done;
+    for (Eigen::Index c = 0; c <= columns_; ++c) {
+      const double* const from = table.col(c).data();
+      double* const to = buffer_.col(c).data() + filled_;
+      for (Eigen::Index i = 0; i < some; ++i) to[i] = from[of[i]];
+    }
+    done += some;
+    n_ += static_cast<double>(some);
+    if ((filled_ += some) == kLength) fold_in();
+  }
+}
+
 void GramSum::fold_in() {
   if (filled_ < kLength) buffer_.bottomRows(kLength - filled_).setZero();
   kernel::functions().gram_add(buffer_.data(), kLength, static_cast<int>(columns_ + 1),
@@ -143,6 +159,7 @@ Gram GramSum::finish() {
   out.xy = all.col(columns_).head(columns_);
   out.yy = all(columns_, columns_);
   out.n = n_;
+  n_ = 0.0;
   return out;
 }
 
@@ -205,15 +222,18 @@ struct Evidence::Projected {
   Eigen::VectorXd u;  ///< L^-1 X_S^T y
 };
 
-Evidence::Projected Evidence::project(const State& state) const {
+Evidence::Projected Evidence::project(const State& state, const std::vector<int>& columns) const {
   Projected out;
-  const auto p = static_cast<Eigen::Index>(state.columns.size());
-  out.v.resize(p, gram_.xx.cols());
-  for (Eigen::Index i = 0; i < p; ++i)
-    out.v.row(i) = gram_.xx.col(state.columns[static_cast<std::size_t>(i)]).transpose();
+  out.v = block(gram_.xx, state.columns, columns);
   state.factor.matrixL().solveInPlace(out.v);
   out.u = state.factor.matrixL().solve(part(gram_.xy, state.columns));
   return out;
+}
+
+Evidence::Projected Evidence::project(const State& state) const {
+  std::vector<int> all(static_cast<std::size_t>(gram_.xx.cols()));
+  std::iota(all.begin(), all.end(), 0);
+  return project(state, all);
 }
 
 Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
@@ -258,11 +278,9 @@ Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, c
 }
 
 Evidence::Gain Evidence::gain(const State& state, const std::vector<int>& columns, double cost) const {
-  const Projected projected = project(state);
-  Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
-  for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
+  const auto [v, u] = project(state, columns);
   return gain_of(state, block(gram_.xx, columns, columns) - v.transpose() * v,
-                 part(gram_.xy, columns) - v.transpose() * projected.u, part(prior_, columns), cost);
+                 part(gram_.xy, columns) - v.transpose() * u, part(prior_, columns), cost);
 }
 
 double Evidence::visible(const State& state, int column) const {
@@ -274,13 +292,7 @@ double Evidence::visible(const State& state, int column) const {
 
 double Evidence::explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta,
                            const std::vector<int>& by) const {
-  const Projected projected = project(state);
-  const auto columns = [&](const std::vector<int>& which) {
-    Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(which.size()));
-    for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(which[static_cast<std::size_t>(i)]);
-    return v;
-  };
-  const Eigen::MatrixXd v = columns(what), w = columns(by);
+  const Eigen::MatrixXd v = project(state, what).v, w = project(state, by).v;
   const Eigen::MatrixXd aa = block(gram_.xx, what, what) - v.transpose() * v;
   const Eigen::MatrixXd ab = block(gram_.xx, what, by) - v.transpose() * w;
   Eigen::MatrixXd bb = block(gram_.xx, by, by) - w.transpose() * w;
