@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include "dynamics/effects/families.hpp"
 #include "math/statistics.hpp"
 
 namespace truing::dynamics {
@@ -82,14 +83,12 @@ void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, dou
     term.unit = "Nm";
     term.joints = {joint};
     term.needs_torque = input.needs_torque;
+    term.needs_rigid = false;
     term.prior = prior;
     term.basis = [input, k, joint](const Motion& m) -> MatrixXd {
-      const VectorXd x = input.value(m);
-      MatrixXd out(x.size(), 1);
-      for (Index i = 0; i < x.size(); ++i) {
-        const double side = input.times_direction ? std::tanh(m.qd(i, static_cast<Index>(joint)) / kSpeedAtRest) : 1.0;
-        out(i, 0) = side * hat(x[i], k, input.low, input.high);
-      }
+      MatrixXd out = input.value(m);
+      for (double& x : out.reshaped()) x = hat(x, k, input.low, input.high);
+      if (input.times_direction) out.array() *= sign_of(m.qd.col(static_cast<Index>(joint)));
       return out;
     };
     group.columns.push_back(static_cast<int>(design->terms.size()));
@@ -116,112 +115,6 @@ std::vector<FreeInput> inputs_at(std::size_t joint, const MotionRange& range) {
     if (name == "enabled" || !(bounds.second > bounds.first)) continue;
     out.push_back({name, bounds.first, bounds.second, false,
                    [name = name](const Motion& m) -> VectorXd { return m.columns.at(name); }});
-  }
-  return out;
-}
-
-// --- normal equations ----------------------------------------------------------------------------
-
-/// Columns of the design that a joint's torque has.
-std::vector<std::vector<int>> columns_by_joint(const TorqueDesign& design, std::size_t joints) {
-  std::vector<std::vector<int>> out(joints);
-  for (std::size_t c = 0; c < design.terms.size(); ++c) {
-    for (const std::size_t j : design.terms[c].joints) out[j].push_back(static_cast<int>(c));
-  }
-  return out;
-}
-
-bool needs_rigid(const TorqueDesign& design) {
-  return std::any_of(design.terms.begin(), design.terms.end(),
-                     [](const TorqueTerm& term) { return term.link_parameter < 0 && term.needs_rigid; });
-}
-
-void fill_rigid(const RigidChain& chain, Motion* motion) {
-  motion->rigid = regressor_columns(chain, motion->q, motion->qd, motion->qdd);
-}
-
-/// Columns of the rigid chain at every row of a motion, of the links that a joint feels; made in place of those of the
-/// thread's last motion.
-class LinkColumns {
- public:
-  LinkColumns(const RigidChain& chain, const Motion& motion) : links_(static_cast<std::size_t>(chain.links())) {
-    thread_local std::vector<double> room;
-    const Index rows = RigidChain::padded(motion.rows());
-    blocks_.assign(static_cast<std::size_t>(chain.driven()) * links_, nullptr);
-    stride_ = rows;
-    std::size_t felt = 0;
-    for (Index k = 0; k < chain.driven(); ++k) felt += chain.felt_links(k).size();
-    room.resize(felt * static_cast<std::size_t>(kLinkParameters * rows));
-    double* next = room.data();
-    for (Index k = 0; k < chain.driven(); ++k) {
-      for (const Index link : chain.felt_links(k)) {
-        blocks_[static_cast<std::size_t>(k) * links_ + static_cast<std::size_t>(link)] = next;
-        next += kLinkParameters * rows;
-      }
-    }
-    if (motion.rows() > 0)
-      chain.regressors(motion.q, motion.qd, motion.qdd, 0, motion.rows(), blocks_.data(), stride_);
-  }
-
-  const double* column(std::size_t joint, int parameter) const {
-    return blocks_[joint * links_ + static_cast<std::size_t>(parameter / kLinkParameters)] +
-           stride_ * (parameter % kLinkParameters);
-  }
-
- private:
-  std::size_t links_;
-  Index stride_ = 0;
-  std::vector<double*> blocks_;
-};
-
-/// Filtered columns of every joint, shape=(count, columns of the joint + 1) each; the last is for the measured torque.
-std::vector<MatrixXd> filtered_columns(const Tile& tile, const TorqueDesign& design, const RigidChain& chain,
-                                       const std::vector<std::vector<int>>& by_joint) {
-  const LinkColumns links(chain, tile.motion);
-  std::vector<MatrixXd> out;
-  for (const std::vector<int>& columns : by_joint) out.emplace_back(tile.count, static_cast<Index>(columns.size()) + 1);
-  std::vector<Index> next(by_joint.size(), 0);
-  for (const TorqueTerm& term : design.terms) {
-    const bool of_link = term.link_parameter >= 0;
-    const MatrixXd values = of_link ? MatrixXd() : term.basis(tile.motion);
-    for (std::size_t k = 0; k < term.joints.size(); ++k) {
-      const std::size_t j = term.joints[k];
-      tile.own_rows(of_link ? links.column(j, term.link_parameter) : values.col(static_cast<Index>(k)).data(),
-                    out[j].col(next[j]++).data());
-    }
-  }
-  return out;
-}
-
-/// Sums of one tile, by joint and fold.
-using TileGrams = std::vector<std::vector<Gram>>;
-
-/// The rows of a tile that are fitted, by fold: those of these folds in which the joint moves and its torque was
-/// measured.
-std::vector<std::vector<Index>> fitted_rows(const Tile& tile, Index joint, const Folds& folds) {
-  std::vector<std::vector<Index>> out(static_cast<std::size_t>(folds.count));
-  const VectorXd time = tile.own_time();
-  for (Index i = 0; i < tile.count; ++i) {
-    if (tile.moving(i, joint) == 0.0 || std::isnan(tile.measured(i, joint))) continue;
-    const int fold = folds.fold(tile.recording, time[i]);
-    if (fold >= 0) out[static_cast<std::size_t>(fold)].push_back(i);
-  }
-  return out;
-}
-
-TileGrams grams_of(std::vector<MatrixXd>* columns, const Tile& tile, const MatrixXd& predicted, const Folds& folds) {
-  TileGrams out(columns->size(), std::vector<Gram>(static_cast<std::size_t>(folds.count)));
-  for (std::size_t j = 0; j < columns->size(); ++j) {
-    const auto joint = static_cast<Index>(j);
-    MatrixXd& table = (*columns)[j];
-    table.rightCols(1) = tile.measured.col(joint) - predicted.col(joint);
-    GramSum sum(table.cols() - 1);
-    const std::vector<std::vector<Index>> rows = fitted_rows(tile, joint, folds);
-    for (std::size_t f = 0; f < rows.size(); ++f) {
-      if (rows[f].empty()) continue;
-      sum.add(table, rows[f]);
-      out[j][f] = sum.finish();
-    }
   }
   return out;
 }
@@ -281,40 +174,24 @@ int Folds::fold(std::size_t recording, double time) const {
   return of_block[static_cast<std::size_t>(std::clamp(static_cast<int>(time / block_length), 0, last))];
 }
 
-MatrixXd own_torque(const TorqueModel& model, Tile* tile) {
-  if (model.needs_rigid() && tile->motion.rigid.empty()) fill_rigid(RigidChain(*tile->motion.robot), &tile->motion);
-  const MatrixXd out = tile->own_rows(model.torque(&tile->motion));
+void fill_rigid(Motion* motion) {
+  motion->rigid = regressor_columns(RigidChain(*motion->robot), motion->q, motion->qd, motion->qdd);
+}
+
+namespace {
+
+MatrixXd torque_along(const TorqueModel& model, Tile* tile) {
+  if (model.needs_rigid()) fill_rigid(&tile->motion);
+  MatrixXd out = model.torque(&tile->motion);
   tile->motion.rigid.clear();  // large, and soon made again
   return out;
 }
 
-TorqueGrams sum_grams(const Tiles& tiles, const TorqueDesign& design, const TorqueModel& subtracted,
-                      const TorqueModel& seen, const Folds& folds) {
-  const RigidChain chain(tiles.robot());
-  const auto by_joint = columns_by_joint(design, tiles.robot().driven_count());
-  auto out = std::make_shared<std::vector<JointGrams>>();
-  for (const std::vector<int>& columns : by_joint)
-    out->push_back({columns, std::vector<Gram>(static_cast<std::size_t>(folds.count))});
-  std::vector<TileGrams> lot(Tiles::kTogether);
-  const auto work = [&](Tile& tile, std::size_t k) {
-    const MatrixXd predicted = own_torque(subtracted, &tile);
-    own_torque(seen, &tile);
-    if (needs_rigid(design)) fill_rigid(chain, &tile.motion);
-    std::vector<MatrixXd> columns = filtered_columns(tile, design, chain, by_joint);
-    tile.motion.rigid.clear();
-    lot[k] = grams_of(&columns, tile, predicted, folds);
-  };
-  const auto add = [&](std::size_t k) {
-    for (std::size_t j = 0; j < out->size(); ++j) {
-      for (std::size_t f = 0; f < lot[k][j].size(); ++f) {
-        if (lot[k][j][f].xx.size() > 0) (*out)[j].folds[f].add(lot[k][j][f]);
-      }
-    }
-    lot[k].clear();
-  };
-  tiles.for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; }, work, add);
-  return out;
-}
+}  // namespace
+
+MatrixXd own_torque(const TorqueModel& model, Tile* tile) { return tile->own_rows(torque_along(model, tile)); }
+
+void set_torque(const TorqueModel& model, Tile* tile) { torque_along(model, tile); }
 
 namespace {
 
@@ -395,13 +272,18 @@ VectorXd weights_of_folds(const VectorXd& squares, const VectorXd& rows) {
 }  // namespace
 
 std::vector<Noise> noise_of(const Tiles& tiles, const TorqueModel& model, const Folds& folds) {
+  return noise_of(
+      tiles, [&](Tile& tile) -> MatrixXd { return tile.measured - own_torque(model, &tile); }, folds);
+}
+
+std::vector<Noise> noise_of(const Tiles& tiles, const std::function<MatrixXd(Tile&)>& errors, const Folds& folds) {
   const std::size_t joints = tiles.robot().driven_count();
   std::vector<ErrorSums> lot(Tiles::kTogether);
   ErrorSums all(joints, folds.count);
   tiles.for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; },
                  [&](Tile& tile, std::size_t k) {
                    lot[k] = ErrorSums(joints, folds.count);
-                   lot[k].add(tile, tile.measured - own_torque(model, &tile), folds);
+                   lot[k].add(tile, errors(tile), folds);
                  },
                  [&](std::size_t k) { all.add(lot[k]); });
   std::vector<Noise> out(joints);

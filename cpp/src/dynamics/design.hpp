@@ -75,16 +75,18 @@ struct Noise {
   Eigen::VectorXd weight_of_fold{};
 };
 
-/// Measured torque less that of `subtracted` against the design's columns; rows at rest are left out. Terms that need a
-/// torque see that of `seen`.
-TorqueGrams sum_grams(const Tiles& tiles, const TorqueDesign& design, const TorqueModel& subtracted,
-                      const TorqueModel& seen, const Folds& folds);
-
 /// Standard deviation and design effect (Kish 1965; 1 + 2 sum of autocorrelations) of every joint's errors.
 std::vector<Noise> noise_of(const Tiles& tiles, const TorqueModel& model, const Folds& folds);
+/// The same of errors in the tile's own rows, shape=(count, joints).
+std::vector<Noise> noise_of(const Tiles& tiles, const std::function<Eigen::MatrixXd(Tile&)>& errors,
+                            const Folds& folds);
+
+void fill_rigid(Motion* motion);
 
 /// Torque of the model in the tile's own rows, shape=(count, joints). Sets Motion::torque.
 Eigen::MatrixXd own_torque(const TorqueModel& model, Tile* tile);
+/// Only that.
+void set_torque(const TorqueModel& model, Tile* tile);
 
 /// One fold, all joints together: each in units of its noise and with rows that count as one. As one matrix it would be
 /// mostly zeros.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/columns.hpp"
 #include "dynamics/judge.hpp"
 #include "dynamics/name.hpp"
 #include "dynamics/search.hpp"
@@ -28,21 +29,22 @@ namespace dynamics {
 namespace {
 
 /// What all effects together leave: the errors of the groundwork alone go on in time as the effects do that it lacks.
-std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& design,
-                                const TorqueGrams& grams, const std::vector<Noise>& first) {
-  std::vector<int> columns;
+std::vector<Noise> noise_of_all(const Problem& problem, const DesignColumns& columns, const TorqueGrams& grams,
+                                const std::vector<Noise>& first) {
+  const TorqueDesign& design = columns.design();
+  std::vector<int> which;
   for (const TorqueGroup& group : design.groups) {
     // Not what needs the torque: with that of another model it would be another column.
     const bool fixed = std::none_of(group.columns.begin(), group.columns.end(),
                                     [&](int c) { return design.terms[static_cast<std::size_t>(c)].needs_torque; });
-    if (!group.effect.empty() && fixed) columns.insert(columns.end(), group.columns.begin(), group.columns.end());
+    if (!group.effect.empty() && fixed) which.insert(which.end(), group.columns.begin(), group.columns.end());
   }
   std::vector<Noise> noise = first;
   for (int round = 0; round < 2; ++round) {
     // Every row counts here: the priors are there for what the rows cannot see, and for nothing else.
     for (Noise& one : noise) one.design_effect = 1.0;
-    const Fit all = fit_of(sums_of(grams, noise, design, std::vector<bool>(design.terms.size(), true)), columns);
-    noise = noise_of(problem.tiles, problem.nominal.with(valued(design, all)), problem.train);
+    const Fit all = fit_of(sums_of(grams, noise, design, std::vector<bool>(design.terms.size(), true)), which);
+    noise = noise_of(columns, problem.nominal, all.columns, all.values, problem.train);
   }
   return noise;
 }
@@ -76,13 +78,14 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   limits.least_gain = options.least_gain;
   limits.most = options.max_effects;
   limits.plausible_only = !problem.fitted_before;  // departures from what the robot carries have either sign
+  const DesignColumns columns(problem.tiles, design);
   TorqueModel model = groundwork.model;
-  TorqueGrams grams = sum_grams(problem.tiles, design, problem.nominal, model, problem.train);
-  std::vector<Noise> noise = noise_of_all(problem, design, grams, groundwork.noise);
+  TorqueGrams grams = sum_grams(columns, problem.nominal, model, problem.train);
+  std::vector<Noise> noise = noise_of_all(problem, columns, grams, groundwork.noise);
   Choice choice;
   // What noise is, and the torque that some terms need, are those of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
-    if (round > 0) grams = sum_grams(problem.tiles, design, problem.nominal, model, problem.train);
+    if (round > 0) grams = sum_grams(columns, problem.nominal, model, problem.train);
     const Sums sums = sums_of(grams, noise, design, priors);
     const Search search(design, sums, nuisance);
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);
@@ -90,7 +93,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
     noise = noise_of(problem.tiles, model, problem.train);
   }
   const Sums sums = sums_of(grams, noise, design, priors);
-  const Sums held_out = sums_of(sum_grams(problem.tiles, design, problem.nominal, model, problem.test), noise, design,
+  const Sums held_out = sums_of(sum_grams(columns, problem.nominal, model, problem.test), noise, design,
                                 std::vector<bool>(design.terms.size(), false));
   const Search search(design, sums, nuisance);
   SearchLimits few = limits;

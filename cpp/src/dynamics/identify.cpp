@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/columns.hpp"
 #include "dynamics/effects/families.hpp"
 #include "dynamics/search.hpp"
 #include "math/text.hpp"
@@ -102,6 +103,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   const Groundwork groundwork = groundwork_of(problem);
   const TorqueDesign design = requested_design(problem, options);
   const std::vector<bool> with_prior = inertial_columns(design);
+  const DesignColumns columns(problem.tiles, design);
 
   TorqueFit out;
   TorqueModel model = groundwork.model;
@@ -111,7 +113,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   Fit fit;
   // Terms that need the torque see that of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
-    sums = sums_of(sum_grams(problem.tiles, design, problem.nominal, model, problem.train), noise, design, with_prior);
+    sums = sums_of(sum_grams(columns, problem.nominal, model, problem.train), noise, design, with_prior);
     groups = best_forms(design, sums);
     fit = fit_of(sums, columns_of(design, groups));
     model = problem.nominal.with(valued(design, fit));

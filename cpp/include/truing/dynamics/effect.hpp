@@ -28,6 +28,7 @@ struct Motion {
   Eigen::MatrixXd qd;      ///< shape=(rows, joints) [rad/s | m/s]
   Eigen::MatrixXd qdd;     ///< shape=(rows, joints) [rad/s^2 | m/s^2]
   Eigen::MatrixXd torque;  ///< shape=(rows, joints) [Nm | N] that the model predicts in all, friction included
+  Eigen::MatrixXd links;   ///< shape=(rows, joints) [Nm | N] of the links alone, as `robot` has them
   /// Of every joint, shape=(rows, 10 * links) each: torque for an inertial parameter of one (mass, first moments, xx yy
   /// zz xy xz yz about the origin of the frame after the link), link after link. Empty where no term needs it.
   std::vector<Eigen::MatrixXd> rigid;

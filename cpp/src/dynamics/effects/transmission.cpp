@@ -80,7 +80,7 @@ MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
   q.col(joint) += step * dq;
   qd.col(joint) += step * dqd;
   qdd.col(joint) += step * dqdd;
-  return (chain.torques(q, qd, qdd, pi) - chain.torques(m.q, m.qd, m.qdd, pi)) / step;
+  return (chain.torques(q, qd, qdd, pi) - m.links) / step;
 }
 
 TorqueTerm moved_link(const Robot& robot, std::size_t joint, std::string parameter, std::string unit, double prior,
