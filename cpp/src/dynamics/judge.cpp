@@ -120,7 +120,7 @@ std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& st
   double begin = -1.0;
   for_each_tile(problem.tiles.recordings()[r], r, problem.robot, problem.tiles.options(), [&](Tile& tile) {
     const VectorXd time = tile.own_time();
-    if (begin >= 0.0 && time[0] > begin + seconds) return;
+    if (begin >= 0.0 && time[0] > begin + seconds) return false;
     const MatrixXd nominal = own_torque(problem.nominal, &tile);
     const MatrixXd before = own_torque(standard, &tile);
     const MatrixXd after = own_torque(named, &tile);
@@ -137,6 +137,7 @@ std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& st
         trace.named.push_back(after(i, j));
       }
     }
+    return true;
   });
   for (Index j = 0; j < joints; ++j) {
     out[static_cast<std::size_t>(j)].recording = problem.tiles.recordings()[r].name;

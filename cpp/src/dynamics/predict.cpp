@@ -40,6 +40,9 @@ TorquePrediction predict(const Robot& robot, const Recording& recording, double 
   if (!(cutoff > 0.0) || !std::isfinite(cutoff)) throw std::invalid_argument("cutoff must be above 0 Hz");
   validate(robot);
   validate(recording, robot);
+  if (recording.read)
+    throw std::invalid_argument("recording '" + recording.name +
+                                "' is longer than memory, and so would be its torques: predict parts of it");
   const std::vector<Recording> recordings{recording};
   std::vector<std::string> warnings;
   PrepareOptions options;
@@ -60,6 +63,7 @@ TorquePrediction predict(const Robot& robot, const Recording& recording, double 
       predicted.time.push_back(tile.motion.time[i]);
       predicted.torque.emplace_back(torque.row(i));
     }
+    return true;
   });
   TorquePrediction out;
   out.time = recording.time;

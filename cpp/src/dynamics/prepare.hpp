@@ -22,6 +22,7 @@ constexpr double kSpeedAtRest = 0.01;
 /// give, filtered as the measured torques were.
 struct Tile {
   std::size_t recording = 0;
+  std::size_t number = 0;  ///< among tiles that are kept
   /// As fine as the basis functions need it; Motion::torque and Motion::rigid are for the caller to fill.
   Motion motion;
   Eigen::VectorXd weights;  ///< of the filter
@@ -45,9 +46,10 @@ struct PrepareOptions {
   bool short_stretches = false;           ///< those between gaps that are shorter than the filter, too
 };
 
-/// Calls `use` with each tile of a recording, in order of time. Throws std::invalid_argument: too short to be filtered.
+/// Calls `use` with each tile of a recording, in order of time, as long as it returns true. Of a recording that is read
+/// no more is in memory than a tile and what leads in to it. Throws std::invalid_argument: too short to be filtered.
 void for_each_tile(const Recording& recording, std::size_t number, const Robot& robot, const PrepareOptions& options,
-                   const std::function<void(Tile&)>& use);
+                   const std::function<bool(Tile&)>& use);
 
 /// The tiles of recordings: kept, where they are few, and else made anew in every pass, so that memory does not grow
 /// with the rows.
@@ -66,6 +68,9 @@ class Tiles {
                 const std::function<void(std::size_t k)>& done) const;
 
   const std::vector<Recording>& recordings() const { return recordings_; }
+  /// Rows that the fit sees of all tiles together, where these are kept; -1: they are made anew.
+  Eigen::Index kept_rows() const;
+  std::size_t kept_tiles() const { return tiles_.size(); }
   const Robot& robot() const { return robot_; }
   const PrepareOptions& options() const { return options_; }
 
@@ -77,9 +82,6 @@ class Tiles {
   bool kept_ = false;
   mutable std::vector<Tile> tiles_;
 };
-
-/// Torques measured, or currents times the drives' constants: shape=(n, joints), NaN throughout where there is neither.
-Eigen::MatrixXd measured_torque(const Recording& recording, const std::vector<double>& torque_per_ampere);
 
 /// What the recordings hold together.
 MotionRange range_of(const Tiles& tiles);

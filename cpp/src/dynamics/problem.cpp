@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/columns.hpp"
 #include "dynamics/effects/families.hpp"
 #include "dynamics/physical.hpp"
 #include "math/linear_algebra.hpp"
@@ -20,7 +21,9 @@ using Eigen::VectorXd;
 constexpr int kBlocks = 10;                ///< of time, where recordings cannot be the folds
 constexpr std::size_t kFewRecordings = 4;  ///< fewer unmarked ones are parted into blocks of time
 
-double length_of(const Recording& recording) { return recording.time[recording.time.size() - 1] - recording.time[0]; }
+double length_of(const Recording& recording) {
+  return (recording.read ? recording.end : recording.time[recording.time.size() - 1]) - recording.time[0];
+}
 
 /// Evenly spread: number k of a row is held out when k times the fraction passes a whole number.
 bool is_held_out(double k, double test_share) {
@@ -278,7 +281,7 @@ Groundwork groundwork_of(const Problem& problem) {
   }
   const std::vector<bool> with_prior = inertial_columns(design);
   const std::vector<int> columns = standard_columns(design);
-  const TorqueGrams grams = sum_grams(problem.tiles, design, problem.nominal, problem.nominal, problem.train);
+  const TorqueGrams grams = sum_grams(DesignColumns(problem.tiles, design), problem.nominal, problem.nominal, problem.train);
   // Each joint by the noise that the fit leaves, which depends on it.
   std::vector<Noise> noise(problem.robot.driven_count());
   for (std::size_t j = 0; j < noise.size(); ++j)
