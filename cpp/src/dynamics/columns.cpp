@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernel/kernel.hpp"
+
 namespace truing::dynamics {
 namespace {
 
@@ -55,6 +57,42 @@ class LinkColumns {
   std::vector<double*> blocks_;
 };
 
+/// Normal equations of rows of a table, the measured value its last column.
+class TableSum {
+ public:
+  explicit TableSum(Index columns)
+      : rows_(kTogether, columns), sums_(kernel::functions().gram_size(static_cast<int>(columns)), 0.0) {}
+
+  Gram of(const MatrixXd& table, const std::vector<Index>& rows) {
+    const auto count = static_cast<Index>(rows.size());
+    for (Index done = 0; done < count; done += kTogether) {
+      const Index some = std::min(kTogether, count - done), all = RigidChain::padded(some);
+      for (Index c = 0; c < table.cols(); ++c) {
+        const double* const from = table.col(c).data();
+        double* const to = rows_.col(c).data();
+        for (Index i = 0; i < some; ++i) to[i] = from[rows[static_cast<std::size_t>(done + i)]];
+      }
+      rows_.middleRows(some, all - some).setZero();
+      kernel::functions().gram_add(rows_.data(), kTogether, static_cast<int>(table.cols()), static_cast<int>(all),
+                                   sums_.data());
+    }
+    const Index x = table.cols() - 1;
+    MatrixXd sum = MatrixXd::Zero(x + 1, x + 1);
+    kernel::functions().gram_reduce(sums_.data(), static_cast<int>(x + 1), sum.data());
+    Gram out;
+    out.xx = sum.topLeftCorner(x, x).selfadjointView<Eigen::Upper>();
+    out.xy = sum.col(x).head(x);
+    out.yy = sum(x, x);
+    out.n = static_cast<double>(count);
+    return out;
+  }
+
+ private:
+  static constexpr Index kTogether = 256;
+  MatrixXd rows_;
+  std::vector<double> sums_;  ///< the kernel's own
+};
+
 /// Sums of one tile, by joint and fold.
 using TileGrams = std::vector<std::vector<Gram>>;
 
@@ -77,12 +115,10 @@ TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const Matri
     const auto joint = static_cast<Index>(j);
     MatrixXd& table = (*columns)[j];
     table.rightCols(1) = tile.measured.col(joint) - predicted.col(joint);
-    GramSum sum(table.cols() - 1);
+    TableSum sum(table.cols());
     const std::vector<std::vector<Index>> rows = fitted_rows(tile, joint, folds);
     for (std::size_t f = 0; f < rows.size(); ++f) {
-      if (rows[f].empty()) continue;
-      sum.add(table, rows[f]);
-      out[j][f] = sum.finish();
+      if (!rows[f].empty()) out[j][f] = sum.of(table, rows[f]);
     }
   }
   return out;

@@ -127,22 +127,6 @@ void GramSum::push() {
   if (++filled_ == kLength) fold_in();
 }
 
-void GramSum::add(const Eigen::Ref<const Eigen::MatrixXd>& table, const std::vector<Eigen::Index>& rows) {
-  const auto count = static_cast<Eigen::Index>(rows.size());
-  for (Eigen::Index done = 0; done < count;) {
-    const Eigen::Index some = std::min(count - done, kLength - filled_);
-    const Eigen::Index* const of = rows.data() + done;
-    for (Eigen::Index c = 0; c <= columns_; ++c) {
-      const double* const from = table.col(c).data();
-      double* const to = buffer_.col(c).data() + filled_;
-      for (Eigen::Index i = 0; i < some; ++i) to[i] = from[of[i]];
-    }
-    done += some;
-    n_ += static_cast<double>(some);
-    if ((filled_ += some) == kLength) fold_in();
-  }
-}
-
 void GramSum::fold_in() {
   if (filled_ < kLength) buffer_.bottomRows(kLength - filled_).setZero();
   kernel::functions().gram_add(buffer_.data(), kLength, static_cast<int>(columns_ + 1),
@@ -159,7 +143,6 @@ Gram GramSum::finish() {
   out.xy = all.col(columns_).head(columns_);
   out.yy = all(columns_, columns_);
   out.n = n_;
-  n_ = 0.0;
   return out;
 }
 
@@ -222,18 +205,15 @@ struct Evidence::Projected {
   Eigen::VectorXd u;  ///< L^-1 X_S^T y
 };
 
-Evidence::Projected Evidence::project(const State& state, const std::vector<int>& columns) const {
+Evidence::Projected Evidence::project(const State& state) const {
   Projected out;
-  out.v = block(gram_.xx, state.columns, columns);
+  const auto p = static_cast<Eigen::Index>(state.columns.size());
+  out.v.resize(p, gram_.xx.cols());
+  for (Eigen::Index i = 0; i < p; ++i)
+    out.v.row(i) = gram_.xx.col(state.columns[static_cast<std::size_t>(i)]).transpose();
   state.factor.matrixL().solveInPlace(out.v);
   out.u = state.factor.matrixL().solve(part(gram_.xy, state.columns));
   return out;
-}
-
-Evidence::Projected Evidence::project(const State& state) const {
-  std::vector<int> all(static_cast<std::size_t>(gram_.xx.cols()));
-  std::iota(all.begin(), all.end(), 0);
-  return project(state, all);
 }
 
 Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
@@ -277,8 +257,20 @@ Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, c
   return best;
 }
 
+namespace {
+
+/// L^-1 X_S^T X of some columns.
+Eigen::MatrixXd projected_on(const Evidence::State& state, const Eigen::MatrixXd& xx, const std::vector<int>& columns) {
+  Eigen::MatrixXd out = block(xx, state.columns, columns);
+  state.factor.matrixL().solveInPlace(out);
+  return out;
+}
+
+}  // namespace
+
 Evidence::Gain Evidence::gain(const State& state, const std::vector<int>& columns, double cost) const {
-  const auto [v, u] = project(state, columns);
+  const Eigen::MatrixXd v = projected_on(state, gram_.xx, columns);
+  const Eigen::VectorXd u = state.factor.matrixL().solve(part(gram_.xy, state.columns));
   return gain_of(state, block(gram_.xx, columns, columns) - v.transpose() * v,
                  part(gram_.xy, columns) - v.transpose() * u, part(prior_, columns), cost);
 }
@@ -292,7 +284,7 @@ double Evidence::visible(const State& state, int column) const {
 
 double Evidence::explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta,
                            const std::vector<int>& by) const {
-  const Eigen::MatrixXd v = project(state, what).v, w = project(state, by).v;
+  const Eigen::MatrixXd v = projected_on(state, gram_.xx, what), w = projected_on(state, gram_.xx, by);
   const Eigen::MatrixXd aa = block(gram_.xx, what, what) - v.transpose() * v;
   const Eigen::MatrixXd ab = block(gram_.xx, what, by) - v.transpose() * w;
   Eigen::MatrixXd bb = block(gram_.xx, by, by) - w.transpose() * w;

@@ -38,9 +38,6 @@ class GramSum {
   double* row() { return buffer_.data() + filled_; }
   static constexpr Eigen::Index stride() { return kLength; }
   void push();
-  /// These rows of a table, the measured value its last column.
-  void add(const Eigen::Ref<const Eigen::MatrixXd>& table, const std::vector<Eigen::Index>& rows);
-  /// The sum so far; what comes then begins another.
   Gram finish();
 
  private:
@@ -143,7 +140,6 @@ class Evidence {
  private:
   struct Projected;
   Projected project(const State& state) const;
-  Projected project(const State& state, const std::vector<int>& columns) const;
   bool may_enter(const State& state, int group) const;
 
   const Gram& gram_;
