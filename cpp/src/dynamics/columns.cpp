@@ -42,8 +42,7 @@ class LinkColumns {
         next += kLinkParameters * rows;
       }
     }
-    if (motion.rows() > 0)
-      chain.regressors(motion.q, motion.qd, motion.qdd, 0, motion.rows(), blocks_.data(), stride_);
+    if (motion.rows() > 0) chain.regressors(motion.q, motion.qd, motion.qdd, 0, motion.rows(), blocks_.data(), stride_);
   }
 
   const double* column(std::size_t joint, int parameter) const {
@@ -180,7 +179,8 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
   const auto work = [&](Tile& tile, std::size_t k) {
     const MatrixXd predicted = own_torque(subtracted, &tile);
     set_torque(seen, &tile);
-    columns.use(&tile, true, [&](DesignColumns::Tables& tables) { lot[k] = grams_of(&tables, tile, predicted, folds); });
+    columns.use(&tile, true,
+                [&](DesignColumns::Tables& tables) { lot[k] = grams_of(&tables, tile, predicted, folds); });
   };
   const auto add = [&](std::size_t k) {
     for (std::size_t j = 0; j < out->size(); ++j) {

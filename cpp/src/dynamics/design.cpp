@@ -272,8 +272,7 @@ VectorXd weights_of_folds(const VectorXd& squares, const VectorXd& rows) {
 }  // namespace
 
 std::vector<Noise> noise_of(const Tiles& tiles, const TorqueModel& model, const Folds& folds) {
-  return noise_of(
-      tiles, [&](Tile& tile) -> MatrixXd { return tile.measured - own_torque(model, &tile); }, folds);
+  return noise_of(tiles, [&](Tile& tile) -> MatrixXd { return tile.measured - own_torque(model, &tile); }, folds);
 }
 
 std::vector<Noise> noise_of(const Tiles& tiles, const std::function<MatrixXd(Tile&)>& errors, const Folds& folds) {

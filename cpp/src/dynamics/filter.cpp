@@ -48,8 +48,8 @@ void filter_column(const double* x, Eigen::Index rows, const Eigen::VectorXd& we
   const auto taps = static_cast<int>(weights.size()), step = static_cast<int>(stride);
   for (Eigen::Index done = 0; done < count; done += kTogether) {
     const Eigen::Index some = std::min(kTogether, count - done);
-    const auto all = static_cast<int>((some + kernel::kSampleMultiple - 1) / kernel::kSampleMultiple) *
-                     kernel::kSampleMultiple;
+    const auto all =
+        static_cast<int>((some + kernel::kSampleMultiple - 1) / kernel::kSampleMultiple) * kernel::kSampleMultiple;
     const Eigen::Index needed = (some - 1) * stride + taps, room = (all - 1) * stride + taps;
     reached.resize(static_cast<std::size_t>(room));
     scratch.resize(kernel::filter_scratch(step, taps, all));

@@ -135,8 +135,8 @@ Tiles::Tiles(const std::vector<Recording>& recordings, const Robot& robot, Prepa
   double numbers = 0.0;
   for (const Recording& recording : recordings) {
     if (recording.read) return;
-    const double each = 5.0 * static_cast<double>(recording.position.cols() + 1) +
-                        static_cast<double>(recording.columns.size());
+    const double each =
+        5.0 * static_cast<double>(recording.position.cols() + 1) + static_cast<double>(recording.columns.size());
     numbers += each * static_cast<double>(recording.rows());
   }
   kept_ = sizeof(double) * numbers < kMostKept;

@@ -281,7 +281,8 @@ Groundwork groundwork_of(const Problem& problem) {
   }
   const std::vector<bool> with_prior = inertial_columns(design);
   const std::vector<int> columns = standard_columns(design);
-  const TorqueGrams grams = sum_grams(DesignColumns(problem.tiles, design), problem.nominal, problem.nominal, problem.train);
+  const TorqueGrams grams =
+      sum_grams(DesignColumns(problem.tiles, design), problem.nominal, problem.nominal, problem.train);
   // Each joint by the noise that the fit leaves, which depends on it.
   std::vector<Noise> noise(problem.robot.driven_count());
   for (std::size_t j = 0; j < noise.size(); ++j)

@@ -191,8 +191,9 @@ void RigidChain::passes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, con
         to.tail(all - rows).setConstant(to[rows - 1]);
       }
     }
-    run(program, kernel::RigidTile{static_cast<int>(all), motions.data(), motions.data() + plane,
-                                   motions.data() + 2 * plane, kPassRows, nullptr, 0, scratch.data()},
+    run(program,
+        kernel::RigidTile{static_cast<int>(all), motions.data(), motions.data() + plane, motions.data() + 2 * plane,
+                          kPassRows, nullptr, 0, scratch.data()},
         first, rows);
   }
 }
@@ -223,8 +224,7 @@ Eigen::MatrixXd RigidChain::torques(const Eigen::MatrixXd& q, const Eigen::Matri
            tile.blocks = &block;
            tile.column_stride = tile.samples;
            kernel::rigid_functions().torque(program, tile, parameters.data());
-           out.middleRows(first, rows) =
-               Eigen::Map<const Eigen::MatrixXd>(block, tile.samples, driven()).topRows(rows);
+           out.middleRows(first, rows) = Eigen::Map<const Eigen::MatrixXd>(block, tile.samples, driven()).topRows(rows);
          });
   return out;
 }

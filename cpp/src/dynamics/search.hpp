@@ -20,8 +20,8 @@ struct SearchLimits {
   bool plausible_only = true;  ///< parameters within what machines have
 };
 
-/// Fits to all rows but those of one fold. The columns that are always in are eliminated once (Schur complement): then a
-/// choice costs as much as its own columns do.
+/// Fits to all rows but those of one fold. The columns that are always in are eliminated once (Schur complement): then
+/// a choice costs as much as its own columns do.
 class FoldFit {
  public:
   /// `precision`: of the nuisance columns, the same in every choice.

@@ -67,14 +67,14 @@ class Stretch {
   double start_ = 0.0;       ///< [s] where its recording begins
   bool any_ = false;
 
-  Eigen::Index even_rows_ = -1;    ///< of the whole stretch, known when it has ended
-  std::vector<double> times_;      ///< [s] of the rows in raw_
-  RowWindow raw_;                  ///< positions, torques, further columns: as recorded …
-  RowWindow even_;                 ///< … at even steps …
-  RowWindow smooth_;               ///< … positions filtered …
-  RowWindow measured_;             ///< … torques filtered, as the fit sees them
-  RowWindow motion_;               ///< positions, speeds, accelerations, further columns, at fine steps
-  Eigen::Index next_ = 0;          ///< row of the next tile that the fit sees
+  Eigen::Index even_rows_ = -1;  ///< of the whole stretch, known when it has ended
+  std::vector<double> times_;    ///< [s] of the rows in raw_
+  RowWindow raw_;                ///< positions, torques, further columns: as recorded …
+  RowWindow even_;               ///< … at even steps …
+  RowWindow smooth_;             ///< … positions filtered …
+  RowWindow measured_;           ///< … torques filtered, as the fit sees them
+  RowWindow motion_;             ///< positions, speeds, accelerations, further columns, at fine steps
+  Eigen::Index next_ = 0;        ///< row of the next tile that the fit sees
 };
 
 }  // namespace truing::dynamics

@@ -384,7 +384,8 @@ inline void filter_rows(const double* phases, std::ptrdiff_t length, int step, c
 
 void filter(const double* x, int step, const double* weights, int weight_count, int count, double* scratch,
             double* out) {
-  const std::ptrdiff_t length = count + weight_count / step + 1, last = (count - 1) * std::ptrdiff_t{step} + weight_count;
+  const std::ptrdiff_t length = count + weight_count / step + 1,
+                       last = (count - 1) * std::ptrdiff_t{step} + weight_count;
   for (std::ptrdiff_t phase = 0; phase < step; ++phase) {
     double* to = scratch + phase * length;
     for (std::ptrdiff_t i = 0; i < length; ++i) to[i] = i * step + phase < last ? x[i * step + phase] : 0.0;

@@ -90,8 +90,8 @@ struct Tile {
   double* tip;           ///< out [12][kTilePoses]: p, then R column by column; null: not wanted
 };
 
-/// Numbers that a filter needs beside its rows: every step-th one in a piece, so that neighbours in lanes are neighbours
-/// in memory.
+/// Numbers that a filter needs beside its rows: every step-th one in a piece, so that neighbours in lanes are
+/// neighbours in memory.
 constexpr std::size_t filter_scratch(int step, int weight_count, int count) {
   return static_cast<std::size_t>(step) * static_cast<std::size_t>(count + weight_count / step + 1);
 }

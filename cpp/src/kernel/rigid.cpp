@@ -131,8 +131,8 @@ inline void add_torques(const RigidProgram& program, const RigidTile& tile, int 
   for (int k = 0; k < program.driven_count; ++k) {
     const double* twist = tile.scratch + 6 * kLanes * k;
     double* out = tile.blocks[0] + k * tile.column_stride + first;
-    store(out, (i > 0 ? load(out) : Pack{}) + dot(load_lanes(twist), moment) +
-                   dot(load_lanes(twist + 3 * kLanes), force));
+    store(out,
+          (i > 0 ? load(out) : Pack{}) + dot(load_lanes(twist), moment) + dot(load_lanes(twist + 3 * kLanes), force));
   }
 }
 

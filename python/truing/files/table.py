@@ -82,7 +82,11 @@ class Table:
         """Raises InputError about the file, a column, or the cell in `row` (counted from 0)."""
         where = [str(self.path)]
         if row is not None:
-            where.append(f"row {self._first_row + row + 1}" if self._is_parquet else f"line {self._csv_cell(row, None)[0]}")
+            where.append(
+                f"row {self._first_row + row + 1}"
+                if self._is_parquet
+                else f"line {self._csv_cell(row, None)[0]}"
+            )
         if column is not None:
             where.append(f"column {column!r}")
         raise InputError(f"{', '.join(where)}: {message}")
@@ -95,7 +99,9 @@ class Table:
 
     def read(self, numbers: Collection[str], labels: Collection[str]) -> None:
         """Loads the table. All other columns may hold numbers or nothing; text in them is refused."""
-        self._take(self._read_parquet() if self._is_parquet else self._read_csv(numbers, labels), numbers, labels)
+        self._take(
+            self._read_parquet() if self._is_parquet else self._read_csv(numbers, labels), numbers, labels
+        )
 
     def _take(self, table: Any, numbers: Collection[str], labels: Collection[str]) -> None:
         self.rows = table.num_rows

@@ -143,8 +143,8 @@ TEST_CASE("times that go backwards from one piece to the next are refused") {
       return left-- > 0;
     };
   };
-  CHECK_THROWS_WITH_AS(validate(wrong, arm()),
-                       doctest::Contains("column t, row 1: found 3, expected a time after"), std::invalid_argument);
+  CHECK_THROWS_WITH_AS(validate(wrong, arm()), doctest::Contains("column t, row 1: found 3, expected a time after"),
+                       std::invalid_argument);
 }
 
 TEST_CASE("torques of a recording that is longer than memory are not predicted row by row") {

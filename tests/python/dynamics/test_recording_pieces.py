@@ -92,9 +92,7 @@ def test_residuals_are_written_of_what_is_in_memory(tmp_path: Path, simulated: S
         assert (folder / "residuals.parquet").exists() is there
 
 
-def test_stamps_since_1970_are_counted_from_the_first_row(
-    tmp_path: Path, simulated: SimulatedMotion
-) -> None:
+def test_stamps_since_1970_are_counted_from_the_first_row(tmp_path: Path, simulated: SimulatedMotion) -> None:
     whole = simulated.recordings[0]
     columns = columns_of(whole)
     columns["t_ns"] = (1.7e18 + 1e9 * columns.pop("t_s")).astype(np.int64)

@@ -46,10 +46,10 @@ struct TorqueTerm {
   /// shape=(rows, joints.size()) [Nm | N] for a parameter of one. Rows depend on each other only through what came
   /// shortly before (a play operator); `Motion` begins early enough for that.
   std::function<Eigen::MatrixXd(const Motion&)> basis;
-  bool needs_torque = false;                                ///< the basis depends on Motion::torque
-  bool needs_rigid = true;                                  ///< the basis may look at Motion::rigid
-  /// The basis is this column of Motion::rigid at `joints`: number of an inertial parameter, 10 * link + part; -1: it is
-  /// none of them. Then it is not called.
+  bool needs_torque = false;  ///< the basis depends on Motion::torque
+  bool needs_rigid = true;    ///< the basis may look at Motion::rigid
+  /// The basis is this column of Motion::rigid at `joints`: number of an inertial parameter, 10 * link + part; -1: it
+  /// is none of them. Then it is not called.
   int link_parameter = -1;
   double prior = 1.0;                                       ///< size that the parameter may well have
   double least = -std::numeric_limits<double>::infinity();  ///< no machine has less than this

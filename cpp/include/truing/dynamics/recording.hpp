@@ -43,8 +43,8 @@ struct Recording {
 
 /// Throws std::invalid_argument that names the recording, the column (as files have it, without its unit: q2, tau3) and
 /// the row, counted from 1: tables of another shape, times that do not increase, values that are not finite (but for
-/// joints that are NaN throughout, which a position must not be) or beyond 1e12, fewer than 20 rows. Of a recording that
-/// is read, all of it is.
+/// joints that are NaN throughout, which a position must not be) or beyond 1e12, fewer than 20 rows. Of a recording
+/// that is read, all of it is.
 void validate(const Recording& recording, const Robot& robot);
 
 }  // namespace truing
