@@ -10,7 +10,8 @@ in brackets.
 - Fields of one declaration share its comment. A field of an enum's type lists what the values mean.
 - A double whose default is NaN is `None` in Python as long as it is not given.
 - Own effects (`std::vector<Effect>`, `std::vector<TorqueEffect>`) hold functions: they are arguments of
-  the bound functions, not fields.
+  the bound functions, not fields. Functions (`std::function`) are no fields either: who binds the struct says
+  what they are in Python.
 - An enumerator is its name in Python, or the quoted word that its comment begins with:
   `not_closing,  ///< "not closing": ...`. Enumerators with numbers of their own are left out.
 """
@@ -196,7 +197,7 @@ def table_of_struct(struct: Struct, structs: dict[str, Struct], enums: dict[str,
 
     rows = []
     for f in all_fields(struct):
-        if f.type in ("std::vector<Effect>", "std::vector<TorqueEffect>"):
+        if f.type in ("std::vector<Effect>", "std::vector<TorqueEffect>") or "function<" in f.type:
             continue
         meaning = sentence(f.meaning)
         if f.type in enums and enums[f.type].meanings():

@@ -7,7 +7,6 @@
 #include <memory>
 
 #include "dynamics/effects/families.hpp"
-#include "math/batch.hpp"
 #include "math/statistics.hpp"
 
 namespace truing::dynamics {
@@ -84,14 +83,12 @@ void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, dou
     term.unit = "Nm";
     term.joints = {joint};
     term.needs_torque = input.needs_torque;
+    term.needs_rigid = false;
     term.prior = prior;
     term.basis = [input, k, joint](const Motion& m) -> MatrixXd {
-      const VectorXd x = input.value(m);
-      MatrixXd out(x.size(), 1);
-      for (Index i = 0; i < x.size(); ++i) {
-        const double side = input.times_direction ? m.direction(i, static_cast<Index>(joint)) : 1.0;
-        out(i, 0) = side * hat(x[i], k, input.low, input.high);
-      }
+      MatrixXd out = input.value(m);
+      for (double& x : out.reshaped()) x = hat(x, k, input.low, input.high);
+      if (input.times_direction) out.array() *= m.direction.col(static_cast<Index>(joint)).array();
       return out;
     };
     group.columns.push_back(static_cast<int>(design->terms.size()));
@@ -126,81 +123,6 @@ std::vector<FreeInput> inputs_at(std::size_t joint, const Robot& robot, const Mo
   }
   return out;
 }
-
-// --- normal equations ----------------------------------------------------------------------------
-
-/// Columns of the design that a joint's torque has.
-std::vector<std::vector<int>> columns_by_joint(const TorqueDesign& design, std::size_t joints) {
-  std::vector<std::vector<int>> out(joints);
-  for (std::size_t c = 0; c < design.terms.size(); ++c) {
-    for (const std::size_t j : design.terms[c].joints) out[j].push_back(static_cast<int>(c));
-  }
-  return out;
-}
-
-/// Filtered columns of every joint: shape=(count, columns of the joint) each.
-std::vector<MatrixXd> filtered_columns(const Tile& tile, const TorqueDesign& design,
-                                       const std::vector<std::vector<int>>& by_joint) {
-  std::vector<MatrixXd> out;
-  for (const std::vector<int>& columns : by_joint)
-    out.emplace_back(tile.motion.rows(), static_cast<Index>(columns.size()));
-  std::vector<Index> next(by_joint.size(), 0);
-  for (const TorqueTerm& term : design.terms) {
-    const MatrixXd values = term.basis(tile.motion);
-    for (std::size_t k = 0; k < term.joints.size(); ++k) {
-      const std::size_t j = term.joints[k];
-      out[j].col(next[j]++) = values.col(static_cast<Index>(k));
-    }
-  }
-  for (MatrixXd& columns : out) columns = tile.own_rows(columns);
-  return out;
-}
-
-/// Sums of one recording.
-class RecordingGrams {
- public:
-  RecordingGrams(const TorqueDesign& design, const TorqueModel& subtracted, const TorqueModel& seen, const Folds& folds,
-                 const std::vector<std::vector<int>>& by_joint)
-      : design_(design), subtracted_(subtracted), seen_(seen), folds_(folds), by_joint_(by_joint) {
-    for (const std::vector<int>& columns : by_joint_)
-      sums_.emplace_back(static_cast<std::size_t>(folds.count), GramSum(static_cast<Index>(columns.size())));
-  }
-
-  void add(Tile* tile) {
-    const MatrixXd predicted = tile->own_rows(subtracted_.torque(&tile->motion));
-    seen_.torque(&tile->motion);
-    const VectorXd time = tile->own_time();
-    const std::vector<MatrixXd> columns = filtered_columns(*tile, design_, by_joint_);
-    for (std::size_t j = 0; j < columns.size(); ++j) {
-      const auto col = static_cast<Index>(j);
-      for (Index i = 0; i < tile->count; ++i) {
-        if (tile->moving(i, col) == 0.0 || std::isnan(tile->measured(i, col))) continue;
-        const int fold = folds_.fold(tile->recording, time[i]);
-        if (fold < 0) continue;
-        GramSum& sum = sums_[j][static_cast<std::size_t>(fold)];
-        double* row = sum.row();
-        const Index p = columns[j].cols();
-        for (Index c = 0; c < p; ++c) row[c * GramSum::stride()] = columns[j](i, c);
-        row[p * GramSum::stride()] = tile->measured(i, col) - predicted(i, col);
-        sum.push();
-      }
-    }
-  }
-
-  /// Adds to `all`.
-  void finish(std::vector<JointGrams>* all) {
-    for (std::size_t j = 0; j < sums_.size(); ++j) {
-      for (std::size_t f = 0; f < sums_[j].size(); ++f) (*all)[j].folds[f].add(sums_[j][f].finish());
-    }
-  }
-
- private:
-  const TorqueDesign& design_;
-  const TorqueModel &subtracted_, &seen_;
-  const Folds& folds_;
-  const std::vector<std::vector<int>>& by_joint_;
-  std::vector<std::vector<GramSum>> sums_;
-};
 
 }  // namespace
 
@@ -257,38 +179,32 @@ int Folds::fold(std::size_t recording, double time) const {
   return of_block[static_cast<std::size_t>(std::clamp(static_cast<int>(time / block_length), 0, last))];
 }
 
-std::vector<JointGrams> sum_grams(const Data& data, const TorqueDesign& design, const TorqueModel& subtracted,
-                                  const TorqueModel& seen, const Folds& folds) {
-  const RigidChain chain(data.robot);
-  const auto by_joint = columns_by_joint(design, data.robot.driven_count());
-  std::vector<JointGrams> out;
-  for (const std::vector<int>& columns : by_joint)
-    out.push_back({columns, std::vector<Gram>(static_cast<std::size_t>(folds.count))});
-  // Recordings side by side, and added up in their order.
-  std::vector<std::unique_ptr<RecordingGrams>> parts(data.recordings.size());
-  for_each_recording(data, folds, [&](std::size_t r) {
-    parts[r] = std::make_unique<RecordingGrams>(design, subtracted, seen, folds, by_joint);
-    for_each_tile(data.recordings[r], r, data.robot, chain, data.prepare, [&](Tile& tile) { parts[r]->add(&tile); });
-  });
-  for (const auto& part : parts) {
-    if (part) part->finish(&out);
-  }
-  return out;
-}
-
-void for_each_recording(const Data& data, const Folds& folds, const std::function<void(std::size_t)>& work) {
-  const auto one = [&](std::size_t r) {
-    if (folds.of_recording[r] >= 0) work(r);
-  };
-  for_each_on_threads(data.recordings.size(), data.threads, {}, one, 1);
+void fill_rigid(Motion* motion) {
+  motion->rigid = regressor_columns(RigidChain(*motion->robot), motion->q, motion->qd, motion->qdd);
 }
 
 namespace {
 
-/// Sums over the errors of one recording, joint by joint.
+MatrixXd torque_along(const TorqueModel& model, Tile* tile) {
+  if (model.needs_rigid()) fill_rigid(&tile->motion);
+  MatrixXd out = model.torque(&tile->motion);
+  tile->motion.rigid.clear();  // large, and soon made again
+  return out;
+}
+
+}  // namespace
+
+MatrixXd own_torque(const TorqueModel& model, Tile* tile) { return tile->own_rows(torque_along(model, tile)); }
+
+void set_torque(const TorqueModel& model, Tile* tile) { torque_along(model, tile); }
+
+namespace {
+
+/// Sums over errors, joint by joint.
 struct ErrorSums {
   static constexpr Index kLags = 80;
-  explicit ErrorSums(std::size_t joints, int folds)
+  ErrorSums() = default;
+  ErrorSums(std::size_t joints, int folds)
       : products(joints, VectorXd::Zero(kLags)),
         pairs(joints, VectorXd::Zero(kLags)),
         squares(joints, VectorXd::Zero(folds)),
@@ -296,19 +212,18 @@ struct ErrorSums {
 
   void add(const Tile& tile, const MatrixXd& errors, const Folds& folds) {
     const VectorXd time = tile.own_time();
+    std::vector<int> fold(static_cast<std::size_t>(tile.count));
+    for (Index i = 0; i < tile.count; ++i) fold[static_cast<std::size_t>(i)] = folds.fold(tile.recording, time[i]);
     for (std::size_t j = 0; j < products.size(); ++j) {
       const auto col = static_cast<Index>(j);
-      for (Index i = 0; i < tile.count; ++i) {
-        const int fold = folds.fold(tile.recording, time[i]);
-        const double e = errors(i, col);
-        if (fold < 0 || tile.moving(i, col) == 0.0 || std::isnan(e)) continue;
-        squares[j][fold] += e * e;
-        rows[j][fold] += 1.0;
-        for (Index lag = 0; lag < std::min(kLags, tile.count - i); ++lag) {
-          if (tile.moving(i + lag, col) == 0.0) break;
-          products[j][lag] += e * errors(i + lag, col);
-          pairs[j][lag] += 1.0;
+      for (Index i = 0; i < tile.count;) {
+        if (tile.moving(i, col) == 0.0 || std::isnan(errors(i, col))) {
+          ++i;
+          continue;
         }
+        Index end = i;
+        while (end < tile.count && tile.moving(end, col) != 0.0) ++end;
+        while (i < end) i = add_run(j, errors.col(col), fold, i, end);
       }
     }
   }
@@ -323,6 +238,24 @@ struct ErrorSums {
 
   std::vector<VectorXd> products, pairs;  ///< by lag
   std::vector<VectorXd> squares, rows;    ///< by fold
+
+ private:
+  /// Rows from `begin` on that are of one fold, of a joint that moves up to `end`; returns the first of another fold.
+  Index add_run(std::size_t j, const Eigen::Ref<const VectorXd>& errors, const std::vector<int>& fold, Index begin,
+                Index end) {
+    const int of = fold[static_cast<std::size_t>(begin)];
+    Index next = begin;
+    while (next < end && fold[static_cast<std::size_t>(next)] == of) ++next;
+    if (of < 0) return next;
+    squares[j][of] += errors.segment(begin, next - begin).squaredNorm();
+    rows[j][of] += static_cast<double>(next - begin);
+    for (Index lag = 0; lag < std::min(kLags, end - begin); ++lag) {
+      const Index count = std::min(next, end - lag) - begin;
+      products[j][lag] += errors.segment(begin, count).dot(errors.segment(begin + lag, count));
+      pairs[j][lag] += static_cast<double>(count);
+    }
+    return next;
+  }
 };
 
 /// A fold whose errors are far beyond those of the others (more than twice the median) counts for less.
@@ -343,20 +276,20 @@ VectorXd weights_of_folds(const VectorXd& squares, const VectorXd& rows) {
 
 }  // namespace
 
-std::vector<Noise> noise_of(const Data& data, const TorqueModel& model, const Folds& folds) {
-  const std::size_t joints = data.robot.driven_count();
-  const RigidChain chain(data.robot);
-  std::vector<std::unique_ptr<ErrorSums>> parts(data.recordings.size());
-  for_each_recording(data, folds, [&](std::size_t r) {
-    parts[r] = std::make_unique<ErrorSums>(joints, folds.count);
-    for_each_tile(data.recordings[r], r, data.robot, chain, data.prepare, [&](Tile& tile) {
-      parts[r]->add(tile, tile.measured - tile.own_rows(model.torque(&tile.motion)), folds);
-    });
-  });
+std::vector<Noise> noise_of(const Tiles& tiles, const TorqueModel& model, const Folds& folds) {
+  return noise_of(tiles, [&](Tile& tile) -> MatrixXd { return tile.measured - own_torque(model, &tile); }, folds);
+}
+
+std::vector<Noise> noise_of(const Tiles& tiles, const std::function<MatrixXd(Tile&)>& errors, const Folds& folds) {
+  const std::size_t joints = tiles.robot().driven_count();
+  std::vector<ErrorSums> lot(Tiles::kTogether);
   ErrorSums all(joints, folds.count);
-  for (const auto& part : parts) {
-    if (part) all.add(*part);
-  }
+  tiles.for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; },
+                 [&](Tile& tile, std::size_t k) {
+                   lot[k] = ErrorSums(joints, folds.count);
+                   lot[k].add(tile, errors(tile), folds);
+                 },
+                 [&](std::size_t k) { all.add(lot[k]); });
   std::vector<Noise> out(joints);
   for (std::size_t j = 0; j < joints; ++j) {
     out[j].weight_of_fold = weights_of_folds(all.squares[j], all.rows[j]);
@@ -374,26 +307,71 @@ std::vector<Noise> noise_of(const Data& data, const TorqueModel& model, const Fo
   return out;
 }
 
-std::vector<Gram> weighted(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns) {
+namespace {
+
+double rows_counted(const Noise& noise, std::size_t fold) {
+  const double usual = noise.weight_of_fold.size() > 0 ? noise.weight_of_fold[static_cast<Index>(fold)] : 1.0;
+  return usual / noise.design_effect;
+}
+
+}  // namespace
+
+FoldGram::FoldGram(TorqueGrams grams, std::size_t fold, const std::vector<Noise>& noise)
+    : grams_(std::move(grams)), fold_(fold) {
+  for (std::size_t j = 0; j < grams_->size(); ++j) {
+    const Gram& gram = (*grams_)[j].folds[fold];
+    const double rows = rows_counted(noise[j], fold);
+    weights_.push_back(rows / (noise[j].sigma * noise[j].sigma));
+    yy_ += weights_[j] * gram.yy;
+    n_ += rows * gram.n;
+  }
+}
+
+Gram FoldGram::of(const std::vector<int>& columns) const {
+  const auto p = static_cast<Index>(columns.size());
+  Gram out{MatrixXd::Zero(p, p), VectorXd::Zero(p), yy_, n_};
+  std::vector<std::pair<Index, Index>> at;  // which of the columns, and where it stands in the joint's
+  for (std::size_t j = 0; j < grams_->size(); ++j) {
+    const Gram& gram = (*grams_)[j].folds[fold_];
+    if (gram.xx.size() == 0) continue;
+    const std::vector<int>& mine = (*grams_)[j].columns;  // ascending
+    at.clear();
+    for (Index k = 0; k < p; ++k) {
+      const auto found = std::lower_bound(mine.begin(), mine.end(), columns[static_cast<std::size_t>(k)]);
+      if (found != mine.end() && *found == columns[static_cast<std::size_t>(k)])
+        at.emplace_back(k, static_cast<Index>(found - mine.begin()));
+    }
+    for (const auto& [a, from] : at) {
+      const double* const column = gram.xx.col(from).data();
+      double* const to = out.xx.col(a).data();
+      for (const auto& [b, row] : at) to[b] += weights_[j] * column[row];
+      out.xy[a] += weights_[j] * gram.xy[from];
+    }
+  }
+  return out;
+}
+
+Gram sum_of_folds(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns) {
   const auto p = static_cast<Index>(columns);
-  std::vector<Gram> out;
-  for (std::size_t f = 0; f < grams.front().folds.size(); ++f) {
-    Gram sum{MatrixXd::Zero(p, p), VectorXd::Zero(p), 0.0, 0.0};
-    for (std::size_t j = 0; j < grams.size(); ++j) {
+  Gram out{MatrixXd::Zero(p, p), VectorXd::Zero(p), 0.0, 0.0};
+  for (std::size_t j = 0; j < grams.size(); ++j) {
+    Gram sum;
+    for (std::size_t f = 0; f < grams[j].folds.size(); ++f) {
       const Gram& gram = grams[j].folds[f];
       if (gram.xx.size() == 0) continue;
-      const double usual = noise[j].weight_of_fold.size() > 0 ? noise[j].weight_of_fold[static_cast<Index>(f)] : 1.0;
-      const double rows = usual / noise[j].design_effect, weight = rows / (noise[j].sigma * noise[j].sigma);
-      const std::vector<int>& at = grams[j].columns;
-      for (std::size_t a = 0; a < at.size(); ++a) {
-        for (std::size_t b = 0; b < at.size(); ++b)
-          sum.xx(at[b], at[a]) += weight * gram.xx(static_cast<Index>(b), static_cast<Index>(a));
-        sum.xy[at[a]] += weight * gram.xy[static_cast<Index>(a)];
-      }
-      sum.yy += weight * gram.yy;
-      sum.n += rows * gram.n;
+      const double rows = rows_counted(noise[j], f);
+      sum.add(gram, rows / (noise[j].sigma * noise[j].sigma));
+      out.n += rows * gram.n;
     }
-    out.push_back(std::move(sum));
+    if (sum.xx.size() == 0) continue;
+    const std::vector<int>& at = grams[j].columns;
+    for (std::size_t a = 0; a < at.size(); ++a) {
+      const double* const column = sum.xx.col(static_cast<Index>(a)).data();
+      double* const to = out.xx.col(at[a]).data();
+      for (std::size_t b = 0; b < at.size(); ++b) to[at[b]] += column[b];
+      out.xy[at[a]] += sum.xy[static_cast<Index>(a)];
+    }
+    out.yy += sum.yy;
   }
   return out;
 }

@@ -5,6 +5,7 @@
 // Every effect at every joint as columns, and their normal equations joint by joint: a column of one joint's torque
 // meets those of the same joint alone.
 
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -61,8 +62,9 @@ struct Folds {
 /// Normal equations of one joint's torque, fold by fold; columns are numbers of the design's.
 struct JointGrams {
   std::vector<int> columns;
-  std::vector<Gram> folds;
+  std::vector<Gram> folds;  ///< without rows: empty
 };
+using TorqueGrams = std::shared_ptr<const std::vector<JointGrams>>;  ///< by joint
 
 /// How the errors of a model go on in time.
 struct Noise {
@@ -73,26 +75,34 @@ struct Noise {
   Eigen::VectorXd weight_of_fold{};
 };
 
-/// What all passes share.
-struct Data {
-  const std::vector<Recording>& recordings;
-  const Robot& robot;
-  PrepareOptions prepare;
-  int threads = 0;
+/// Standard deviation and design effect (Kish 1965; 1 + 2 sum of autocorrelations) of every joint's errors.
+std::vector<Noise> noise_of(const Tiles& tiles, const TorqueModel& model, const Folds& folds);
+/// The same of errors in the tile's own rows, shape=(count, joints).
+std::vector<Noise> noise_of(const Tiles& tiles, const std::function<Eigen::MatrixXd(Tile&)>& errors,
+                            const Folds& folds);
+
+void fill_rigid(Motion* motion);
+
+/// Torque of the model in the tile's own rows, shape=(count, joints). Sets Motion::torque.
+Eigen::MatrixXd own_torque(const TorqueModel& model, Tile* tile);
+/// Only that.
+void set_torque(const TorqueModel& model, Tile* tile);
+
+/// One fold, all joints together: each in units of its noise and with rows that count as one. As one matrix it would be
+/// mostly zeros.
+class FoldGram {
+ public:
+  FoldGram(TorqueGrams grams, std::size_t fold, const std::vector<Noise>& noise);
+  Gram of(const std::vector<int>& columns) const;
+
+ private:
+  TorqueGrams grams_;
+  std::size_t fold_;
+  std::vector<double> weights_;  ///< of the joints' squares
+  double yy_ = 0.0, n_ = 0.0;
 };
 
-/// Measured torque less that of `subtracted` against the design's columns; rows at rest are left out. Terms that need a
-/// torque see that of `seen`.
-std::vector<JointGrams> sum_grams(const Data& data, const TorqueDesign& design, const TorqueModel& subtracted,
-                                  const TorqueModel& seen, const Folds& folds);
-
-/// Calls work(r) for every recording that the folds name, on several threads.
-void for_each_recording(const Data& data, const Folds& folds, const std::function<void(std::size_t)>& work);
-
-/// Standard deviation and design effect (Kish 1965; 1 + 2 sum of autocorrelations) of every joint's errors.
-std::vector<Noise> noise_of(const Data& data, const TorqueModel& model, const Folds& folds);
-
-/// All joints together, each in units of its noise and with rows that count as one.
-std::vector<Gram> weighted(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns);
+/// All folds and joints together, in the same units.
+Gram sum_of_folds(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns);
 
 }  // namespace truing::dynamics

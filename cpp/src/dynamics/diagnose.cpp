@@ -11,6 +11,7 @@
 #include <numeric>
 #include <optional>
 
+#include "dynamics/columns.hpp"
 #include "dynamics/judge.hpp"
 #include "dynamics/name.hpp"
 #include "dynamics/search.hpp"
@@ -31,21 +32,22 @@ namespace dynamics {
 namespace {
 
 /// What everything together leaves: the errors of the groundwork alone go on in time as that does which it lacks.
-std::vector<Noise> noise_of_all(const Problem& problem, const TorqueDesign& design,
-                                const std::vector<JointGrams>& grams, const std::vector<Noise>& first) {
-  std::vector<int> columns;
+std::vector<Noise> noise_of_all(const Problem& problem, const DesignColumns& columns, const TorqueGrams& grams,
+                                const std::vector<Noise>& first) {
+  const TorqueDesign& design = columns.design();
+  std::vector<int> which;
   for (const TorqueGroup& group : design.groups) {
     // Not what needs the torque: with that of another model it would be another column.
     const bool fixed = std::none_of(group.columns.begin(), group.columns.end(),
                                     [&](int c) { return design.terms[static_cast<std::size_t>(c)].needs_torque; });
-    if (fixed) columns.insert(columns.end(), group.columns.begin(), group.columns.end());
+    if (fixed) which.insert(which.end(), group.columns.begin(), group.columns.end());
   }
   std::vector<Noise> noise = first;
   for (int round = 0; round < 2; ++round) {
     // Every row counts here: the priors are there for what the rows cannot see, and for nothing else.
     for (Noise& one : noise) one.design_effect = 1.0;
-    const Fit all = fit_of(sums_of(grams, noise, design, std::vector<bool>(design.terms.size(), true)), columns);
-    noise = noise_of(problem.data, problem.nominal.with(valued(design, all)), problem.train);
+    const Fit all = fit_of(sums_of(grams, noise, design, std::vector<bool>(design.terms.size(), true)), which);
+    noise = noise_of(columns, problem.nominal, all.columns, all.values, problem.train);
   }
   return noise;
 }
@@ -82,12 +84,12 @@ TorqueDesign part_of(const TorqueDesign& whole, const std::vector<int>& nuisance
 std::vector<Noise> noise_left(const Problem& problem, const TorqueDesign& whole, Choice choice, const TorqueModel& seen,
                               const std::vector<Noise>& before) {
   const TorqueDesign design = part_of(whole, standard_columns(whole), &choice);
-  const Sums sums =
-      sums_of(sum_grams(problem.data, design, problem.nominal, seen.turning(problem.range.turns), problem.train),
-              before, design, inertial_columns(design));
+  const TorqueGrams grams = sum_grams(DesignColumns(problem.tiles, design), problem.nominal,
+                                      seen.turning(problem.range.turns), problem.train);
+  const Sums sums = sums_of(grams, before, design, inertial_columns(design));
   std::vector<int> columns(design.terms.size());
   std::iota(columns.begin(), columns.end(), 0);
-  return noise_of(problem.data, problem.nominal.with(valued(design, fit_of(sums, columns))), problem.train);
+  return noise_of(problem.tiles, problem.nominal.with(valued(design, fit_of(sums, columns))), problem.train);
 }
 
 /// The choice fitted, as a model beside the nominal one.
@@ -108,8 +110,8 @@ std::vector<int> friction_columns(const TorqueDesign& design) {
 
 // The file's inertias as they are, and single links, rotors, loads that differ from it: where that predicts folds as
 // well as inertias that are all free, it says more with less. What free inertias take up is named here.
-std::optional<Account> of_given_inertias(const Problem& problem, const std::vector<JointGrams>& grams,
-                                         const std::vector<JointGrams>& grams_held_out, const std::vector<Noise>& noise,
+std::optional<Account> of_given_inertias(const Problem& problem, const TorqueGrams& grams,
+                                         const TorqueGrams& grams_held_out, const std::vector<Noise>& noise,
                                          const Account& free, const SearchLimits& limits) {
   const std::vector<bool> none(free.design->terms.size(), false);
   Account out = account_of(free.design, sums_of(grams, noise, *free.design, none),
@@ -135,11 +137,12 @@ Account with_functions(const Problem& problem, const Account& of_effects, const 
       nuisance.insert(nuisance.end(), columns.begin(), columns.end());
   }
   add_free_functions(problem.robot, problem.range, design.get());
-  const std::vector<JointGrams> grams = sum_grams(problem.data, *design, problem.nominal, model, problem.train);
-  *noise = noise_of_all(problem, *design, grams, *noise);
+  const DesignColumns columns(problem.tiles, *design);
+  const TorqueGrams grams = sum_grams(columns, problem.nominal, model, problem.train);
+  *noise = noise_of_all(problem, columns, grams, *noise);
   std::vector<bool> priors = inertial_columns(*design);
   if (problem.fitted_before || of_effects.inertias_given) priors.assign(priors.size(), false);
-  const std::vector<JointGrams> held_out = sum_grams(problem.data, *design, problem.nominal, model, problem.test);
+  const TorqueGrams held_out = sum_grams(columns, problem.nominal, model, problem.test);
   Account out = account_of(design, sums_of(grams, *noise, *design, priors),
                            sums_of(held_out, *noise, *design, std::vector<bool>(priors.size(), false)), nuisance);
   SearchLimits few = limits;
@@ -170,25 +173,28 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   limits.least_gain = options.least_gain;
   limits.most = options.max_effects;
   limits.plausible_only = !problem.fitted_before;  // departures from what the robot carries have either sign
+  auto columns = std::make_unique<DesignColumns>(problem.tiles, *design);
   TorqueModel model = groundwork.model;
-  std::vector<JointGrams> grams = sum_grams(problem.data, *design, problem.nominal, model, problem.train);
-  std::vector<Noise> noise = noise_of_all(problem, *design, grams, groundwork.noise);
+  TorqueGrams grams = sum_grams(*columns, problem.nominal, model, problem.train);
+  std::vector<Noise> noise = noise_of_all(problem, *columns, grams, groundwork.noise);
   Choice choice;
   // What noise is, and the torque that some terms need, are those of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
     if (round > 0 && !problem.fitted_before) {
       choose_turns(&problem, [&] { return noise_left(problem, *design, choice, model, noise); });
       *design = whole_design(problem, options);  // of the same groups
+      columns = std::make_unique<DesignColumns>(problem.tiles, *design);
       model = model.turning(problem.range.turns);
     }
-    if (round > 0) grams = sum_grams(problem.data, *design, problem.nominal, model, problem.train);
+    if (round > 0) grams = sum_grams(*columns, problem.nominal, model, problem.train);
     const Sums sums = sums_of(grams, noise, *design, priors);
     const Search search(*design, sums, nuisance);
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);
     model = fitted_model(problem, *design, sums, search, choice);
-    noise = noise_of(problem.data, model, problem.train);
+    noise = noise_of(problem.tiles, model, problem.train);
   }
-  const std::vector<JointGrams> held_out = sum_grams(problem.data, *design, problem.nominal, model, problem.test);
+  const TorqueGrams held_out = sum_grams(*columns, problem.nominal, model, problem.test);
+  columns.reset();  // large
   Account account =
       account_of(design, sums_of(grams, noise, *design, priors),
                  sums_of(held_out, noise, *design, std::vector<bool>(design->terms.size(), false)), nuisance);

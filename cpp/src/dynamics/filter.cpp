@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
+#include "kernel/kernel.hpp"
+#include "kernel/rigid.hpp"
 #include "math/constants.hpp"
 
 namespace truing::dynamics {
@@ -13,12 +16,14 @@ namespace {
 /// Half the filter's length, in periods of its cut-off.
 constexpr double kHalfLength = 2.0;
 
-/// Row `k` of x, mirrored at the end points: x(-k) = 2 x(0) - x(k).
-double mirrored(const double* x, Eigen::Index rows, Eigen::Index k) {
+/// Rows from `begin` on of a column of so many, `count` of them; beyond its ends it is mirrored at the end points:
+/// x(-k) = 2 x(0) - x(k).
+void copy_mirrored(const double* x, Eigen::Index rows, Eigen::Index begin, Eigen::Index count, double* out) {
   const Eigen::Index last = rows - 1;
-  if (k < 0) return 2.0 * x[0] - x[std::min(-k, last)];
-  if (k > last) return 2.0 * x[last] - x[std::max<Eigen::Index>(0, 2 * last - k)];
-  return x[k];
+  Eigen::Index k = begin;
+  for (; k < std::min<Eigen::Index>(0, begin + count); ++k) *out++ = 2.0 * x[0] - x[std::min(-k, last)];
+  for (; k < std::min(rows, begin + count); ++k) *out++ = x[k];
+  for (; k < begin + count; ++k) *out++ = 2.0 * x[last] - x[std::max<Eigen::Index>(0, 2 * last - k)];
 }
 
 }  // namespace
@@ -36,23 +41,30 @@ Eigen::VectorXd low_pass(double cutoff, double step) {
   return weights / weights.sum();
 }
 
-Eigen::MatrixXd filtered(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, Eigen::Index stride) {
-  const Eigen::Index half = weights.size() / 2, rows = x.rows();
-  const Eigen::Index out_rows = rows == 0 ? 0 : (rows - 1) / stride + 1;
-  Eigen::MatrixXd out(out_rows, x.cols());
-  for (Eigen::Index c = 0; c < x.cols(); ++c) {
-    const double* column = x.data() + c * rows;
-    for (Eigen::Index i = 0; i < out_rows; ++i) {
-      const Eigen::Index at = i * stride, first = at - half;
-      if (first >= 0 && at + half < rows) {
-        out(i, c) = weights.dot(Eigen::Map<const Eigen::VectorXd>(column + first, weights.size()));
-        continue;
-      }
-      double sum = 0.0;
-      for (Eigen::Index k = 0; k < weights.size(); ++k) sum += weights[k] * mirrored(column, rows, first + k);
-      out(i, c) = sum;
-    }
+void filter_column(const double* x, Eigen::Index rows, const Eigen::VectorXd& weights, Eigen::Index stride,
+                   Eigen::Index first, Eigen::Index count, double* out) {
+  constexpr Eigen::Index kTogether = 1024;  // what is filtered stays in the first-level cache
+  thread_local std::vector<double> reached, scratch, sums(kTogether);
+  const auto taps = static_cast<int>(weights.size()), step = static_cast<int>(stride);
+  for (Eigen::Index done = 0; done < count; done += kTogether) {
+    const Eigen::Index some = std::min(kTogether, count - done);
+    const auto all =
+        static_cast<int>((some + kernel::kSampleMultiple - 1) / kernel::kSampleMultiple) * kernel::kSampleMultiple;
+    const Eigen::Index needed = (some - 1) * stride + taps, room = (all - 1) * stride + taps;
+    reached.resize(static_cast<std::size_t>(room));
+    scratch.resize(kernel::filter_scratch(step, taps, all));
+    copy_mirrored(x, rows, (first + done) * stride - taps / 2, needed, reached.data());
+    std::fill(reached.begin() + needed, reached.end(), 0.0);
+    kernel::functions().filter(reached.data(), step, weights.data(), taps, all, scratch.data(), sums.data());
+    std::copy_n(sums.data(), some, out + done);
   }
+}
+
+Eigen::MatrixXd filtered(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, Eigen::Index stride) {
+  const Eigen::Index rows = x.rows(), out_rows = rows == 0 ? 0 : (rows - 1) / stride + 1;
+  Eigen::MatrixXd out(out_rows, x.cols());
+  for (Eigen::Index c = 0; c < x.cols(); ++c)
+    filter_column(x.data() + c * rows, rows, weights, stride, 0, out_rows, out.data() + c * out_rows);
   return out;
 }
 

@@ -16,6 +16,11 @@ Eigen::VectorXd low_pass(double cutoff, double step);
 /// Every `stride`-th row of x, filtered, from row 0 on; beyond its ends x is mirrored at its end points.
 Eigen::MatrixXd filtered(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights, Eigen::Index stride = 1);
 
+/// Rows `first` to `first + count` of the same, of one column. A row's bits do not depend on which others are asked
+/// for.
+void filter_column(const double* x, Eigen::Index rows, const Eigen::VectorXd& weights, Eigen::Index stride,
+                   Eigen::Index first, Eigen::Index count, double* out);
+
 /// Central differences along the rows, one-sided at the ends.
 Eigen::MatrixXd rate_of(const Eigen::MatrixXd& x, double step);
 

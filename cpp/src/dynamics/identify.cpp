@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/columns.hpp"
 #include "dynamics/effects/families.hpp"
 #include "dynamics/search.hpp"
 #include "math/text.hpp"
@@ -102,6 +103,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   const Groundwork groundwork = groundwork_of(&problem);
   const TorqueDesign design = requested_design(problem, options);
   const std::vector<bool> with_prior = inertial_columns(design);
+  const DesignColumns columns(problem.tiles, design);
 
   TorqueFit out;
   TorqueModel model = groundwork.model;
@@ -111,11 +113,11 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   Fit fit;
   // Terms that need the torque see that of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
-    sums = sums_of(sum_grams(problem.data, design, problem.nominal, model, problem.train), noise, design, with_prior);
+    sums = sums_of(sum_grams(columns, problem.nominal, model, problem.train), noise, design, with_prior);
     groups = best_forms(design, sums);
     fit = fit_of(sums, columns_of(design, groups));
     model = problem.nominal.with(valued(design, fit));
-    noise = noise_of(problem.data, model, problem.train);
+    noise = noise_of(problem.tiles, model, problem.train);
   }
   out.warnings = problem.warnings;
   fit = with_bodies(robot, design, sums, fit, &out.warnings);
@@ -123,7 +125,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   out.parameters = parameters_of(design, columns_of(design, groups), fit);
   out.errors = errors_of(
       problem, {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model_of(out.robot, problem)}});
-  out.cutoff = problem.data.prepare.cutoff;
+  out.cutoff = problem.tiles.options().cutoff;
   out.held_out = problem.held_out;
   out.not_testable = design.not_testable;
   return out;

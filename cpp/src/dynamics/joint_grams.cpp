@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <mutex>
 
 #include "kernel/kernel.hpp"
 #include "math/batch.hpp"
@@ -13,6 +14,32 @@ namespace {
 
 // Rows of a tile: longer columns gain the Gram nothing, and would not stay in the cache.
 constexpr Eigen::Index kTile = 256;
+
+/// Clearing pages for new tiles costs as much as filling them: who needs some takes those that others are done with.
+template <class T>
+class Pool {
+ public:
+  template <class Make>
+  std::unique_ptr<T> take(Make make) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!idle_.empty()) {
+        std::unique_ptr<T> out = std::move(idle_.back());
+        idle_.pop_back();
+        return out;
+      }
+    }
+    return make();
+  }
+  void give(std::unique_ptr<T> one) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    idle_.push_back(std::move(one));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<T>> idle_;
+};
 
 /// Tiles of all joints, and their sums.
 class JointSums {
@@ -45,6 +72,7 @@ class JointSums {
     n_ += static_cast<double>(rows);
   }
 
+  /// The sums so far; what comes then begins others.
   std::vector<estimation::Gram> finish() {
     std::vector<estimation::Gram> out;
     for (std::size_t k = 0; k < rows_.size(); ++k) {
@@ -58,6 +86,7 @@ class JointSums {
       gram.n = n_;
       out.push_back(std::move(gram));
     }
+    n_ = 0.0;
     return out;
   }
 
@@ -78,17 +107,18 @@ std::vector<estimation::Gram> joint_grams(const RigidChain& chain, const Eigen::
   constexpr Eigen::Index kMostSlots = 8, kPartsOfSlot = kBatchChunk;
   const Eigen::Index tiles = (q.rows() + kTile - 1) / kTile;
   const Eigen::Index slots = std::clamp<Eigen::Index>(tiles / 4, 1, kMostSlots);
+  Pool<JointSums> pool;
   std::vector<std::unique_ptr<JointSums>> sums(static_cast<std::size_t>(slots));
   std::vector<std::vector<estimation::Gram>> grams(static_cast<std::size_t>(slots));
   for_each_on_threads(static_cast<std::size_t>(slots * kPartsOfSlot), threads, {}, [&](std::size_t at) {
     const std::size_t slot = at / kPartsOfSlot, part = at % kPartsOfSlot;
-    if (part == 0) sums[slot] = std::make_unique<JointSums>(chain, further);
+    if (part == 0) sums[slot] = pool.take([&] { return std::make_unique<JointSums>(chain, further); });
     const auto edge = [&](std::size_t k) { return static_cast<Eigen::Index>(k) * tiles / (slots * kPartsOfSlot); };
     for (Eigen::Index tile = edge(at); tile < edge(at + 1); ++tile)
       sums[slot]->add(q, qd, qdd, tile * kTile, std::min((tile + 1) * kTile, q.rows()), complete);
     if (part + 1 < kPartsOfSlot) return;
     grams[slot] = sums[slot]->finish();
-    sums[slot].reset();
+    pool.give(std::move(sums[slot]));
   });
   std::vector<estimation::Gram> out = std::move(grams[0]);
   for (std::size_t slot = 1; slot < grams.size(); ++slot) {

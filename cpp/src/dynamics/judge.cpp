@@ -49,7 +49,38 @@ std::vector<RegimeInput> inputs_of(const MotionRange& range, Index j) {
 
 struct Cell {
   double standard = 0.0, named = 0.0, n = 0.0;
+
+  void add(const Cell& other) {
+    standard += other.standard;
+    named += other.named;
+    n += other.n;
+  }
 };
+using Cells = std::map<std::tuple<Index, std::size_t, int>, Cell>;  ///< by joint, input and bin
+
+/// Of one tile's held-out rows.
+Cells cells_of(const Problem& problem, const TorqueModel& standard, const TorqueModel& named,
+               const std::vector<std::vector<RegimeInput>>& inputs, Tile* tile) {
+  const MatrixXd after = own_torque(named, tile), before = own_torque(standard, tile);
+  const VectorXd time = tile->own_time();
+  Cells out;
+  for (Index i = 0; i < tile->count; ++i) {
+    if (problem.test.fold(tile->recording, time[i]) < 0) continue;
+    const Index fine = (tile->first + i) * tile->stride;
+    for (Index j = 0; j < before.cols(); ++j) {
+      const double y = tile->measured(i, j);
+      if (std::isnan(y)) continue;
+      const std::vector<RegimeInput>& list = inputs[static_cast<std::size_t>(j)];
+      for (std::size_t k = 0; k < list.size(); ++k) {
+        const RegimeInput& in = list[k];
+        const double part = (in.value(*tile, fine) - in.low) / std::max(in.high - in.low, 1e-300);
+        const int bin = std::clamp(static_cast<int>(part * in.bins), 0, in.bins - 1);
+        out[{j, k, bin}].add({std::pow(y - before(i, j), 2.0), std::pow(y - after(i, j), 2.0), 1.0});
+      }
+    }
+  }
+  return out;
+}
 
 }  // namespace
 
@@ -57,33 +88,13 @@ std::vector<TorqueRegime> regimes_of(const Problem& problem, const TorqueModel& 
   const auto joints = static_cast<Index>(problem.robot.driven_count());
   std::vector<std::vector<RegimeInput>> inputs;
   for (Index j = 0; j < joints; ++j) inputs.push_back(inputs_of(problem.range, j));
-  std::map<std::tuple<Index, std::size_t, int>, Cell> cells;
-  for (std::size_t r = 0; r < problem.data.recordings.size(); ++r) {
-    if (problem.test.of_recording[r] < 0) continue;
-    for_each_tile(problem.data.recordings[r], r, problem.robot, problem.chain, problem.data.prepare, [&](Tile& tile) {
-      const MatrixXd after = tile.own_rows(named.torque(&tile.motion));
-      const MatrixXd before = tile.own_rows(standard.torque(&tile.motion));
-      const VectorXd time = tile.own_time();
-      for (Index i = 0; i < tile.count; ++i) {
-        if (problem.test.fold(r, time[i]) < 0) continue;
-        const Index fine = (tile.first + i) * tile.stride;
-        for (Index j = 0; j < joints; ++j) {
-          const double y = tile.measured(i, j);
-          if (std::isnan(y)) continue;
-          const std::vector<RegimeInput>& list = inputs[static_cast<std::size_t>(j)];
-          for (std::size_t k = 0; k < list.size(); ++k) {
-            const RegimeInput& in = list[k];
-            const double part = (in.value(tile, fine) - in.low) / std::max(in.high - in.low, 1e-300);
-            const int bin = std::clamp(static_cast<int>(part * in.bins), 0, in.bins - 1);
-            Cell& cell = cells[{j, k, bin}];
-            cell.n += 1.0;
-            cell.standard += std::pow(y - before(i, j), 2.0);
-            cell.named += std::pow(y - after(i, j), 2.0);
-          }
-        }
-      }
-    });
-  }
+  std::vector<Cells> lot(Tiles::kTogether);
+  Cells cells;
+  problem.tiles.for_each([&](std::size_t r) { return problem.test.of_recording[r] >= 0; },
+                         [&](Tile& tile, std::size_t k) { lot[k] = cells_of(problem, standard, named, inputs, &tile); },
+                         [&](std::size_t k) {
+                           for (const auto& [key, cell] : lot[k]) cells[key].add(cell);
+                         });
   const std::vector<std::size_t> driven = problem.robot.driven_joints();
   std::vector<TorqueRegime> out;
   for (const auto& [key, cell] : cells) {
@@ -107,12 +118,12 @@ std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& st
   if (first == problem.test.of_recording.end()) return {};
   const auto r = static_cast<std::size_t>(first - problem.test.of_recording.begin());
   double begin = -1.0;
-  for_each_tile(problem.data.recordings[r], r, problem.robot, problem.chain, problem.data.prepare, [&](Tile& tile) {
+  for_each_tile(problem.tiles.recordings()[r], r, problem.robot, problem.tiles.options(), [&](Tile& tile) {
     const VectorXd time = tile.own_time();
-    if (begin >= 0.0 && time[0] > begin + seconds) return;
-    const MatrixXd nominal = tile.own_rows(problem.nominal.torque(&tile.motion));
-    const MatrixXd before = tile.own_rows(standard.torque(&tile.motion));
-    const MatrixXd after = tile.own_rows(named.torque(&tile.motion));
+    if (begin >= 0.0 && time[0] > begin + seconds) return false;
+    const MatrixXd nominal = own_torque(problem.nominal, &tile);
+    const MatrixXd before = own_torque(standard, &tile);
+    const MatrixXd after = own_torque(named, &tile);
     for (Index i = 0; i < tile.count; ++i) {
       if (problem.test.fold(r, time[i]) < 0) continue;
       if (begin < 0.0 && tile.moving.row(i).maxCoeff() > 0.0) begin = time[i];
@@ -126,9 +137,10 @@ std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& st
         trace.named.push_back(after(i, j));
       }
     }
+    return true;
   });
   for (Index j = 0; j < joints; ++j) {
-    out[static_cast<std::size_t>(j)].recording = problem.data.recordings[r].name;
+    out[static_cast<std::size_t>(j)].recording = problem.tiles.recordings()[r].name;
     out[static_cast<std::size_t>(j)].joint = problem.robot.joints[driven[static_cast<std::size_t>(j)]].name;
   }
   return out;

@@ -436,7 +436,7 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   out.classes = classes_of(out.effects, own);
   out.not_testable = account.design->not_testable;
   out.traces = traces_of(problem, groundwork.model, model);
-  out.cutoff = problem.data.prepare.cutoff;
+  out.cutoff = problem.tiles.options().cutoff;
   for (const Noise& one : noise) out.design_effect.push_back(one.design_effect);
   out.held_out = problem.held_out;
   return out;

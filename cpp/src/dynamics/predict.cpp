@@ -40,17 +40,22 @@ TorquePrediction predict(const Robot& robot, const Recording& recording, double 
   if (!(cutoff > 0.0) || !std::isfinite(cutoff)) throw std::invalid_argument("cutoff must be above 0 Hz");
   validate(robot);
   validate(recording, robot);
+  if (recording.read)
+    throw std::invalid_argument("recording '" + recording.name +
+                                "' is longer than memory, and so would be its torques: predict parts of it");
   const std::vector<Recording> recordings{recording};
   std::vector<std::string> warnings;
   PrepareOptions options;
   options.cutoff = cutoff;
   options.torque_per_ampere = drive_constants(robot, recordings, &warnings);
   options.short_stretches = true;  // every row has a prediction
-  const RigidChain chain(robot);
-  const MotionRange range = range_of(recordings, robot, chain, options);
+  const MotionRange range = range_of(Tiles(recordings, robot, options, 1));
   const TorqueModel model(robot, valued_terms(robot, range, own_effects));
+  const RigidChain chain(robot);
   Predicted predicted;
-  for_each_tile(recording, 0, robot, chain, options, [&](Tile& tile) {
+  for_each_tile(recording, 0, robot, options, [&](Tile& tile) {
+    if (model.needs_rigid())
+      tile.motion.rigid = regressor_columns(chain, tile.motion.q, tile.motion.qd, tile.motion.qdd);
     const MatrixXd torque = model.torque(&tile.motion);
     const Index begin = tile.first * tile.stride;
     const Index end = std::min(torque.rows(), (tile.first + tile.count) * tile.stride);
@@ -58,6 +63,7 @@ TorquePrediction predict(const Robot& robot, const Recording& recording, double 
       predicted.time.push_back(tile.motion.time[i]);
       predicted.torque.emplace_back(torque.row(i));
     }
+    return true;
   });
   TorquePrediction out;
   out.time = recording.time;

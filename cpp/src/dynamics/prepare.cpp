@@ -4,9 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <memory>
 
 #include "dynamics/filter.hpp"
+#include "dynamics/regressor.hpp"
+#include "dynamics/stretch.hpp"
+#include "math/batch.hpp"
 #include "math/statistics.hpp"
 #include "math/text.hpp"
 
@@ -17,150 +22,58 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kFinePerCutoff = 12.5;   ///< rows of a motion, per period of the cut-off
-constexpr double kCoarsePerCutoff = 3.1;  ///< rows that the fit sees
-constexpr Index kTileRows = 8192;         ///< of a motion, less what leads in
-constexpr double kForgets = 0.06;         ///< [rad | m] travel after which no play operator knows what was before
-constexpr double kMostLeadIn = 60.0;      ///< [s] of a joint that rests for longer, it is forgotten
-constexpr double kRestWindow = 0.25;      ///< [s] on both sides
-constexpr double kGap = 5.0;              ///< usual steps without a row: here the recording is cut
+constexpr double kGap = 5.0;           ///< usual steps without a row: here the recording is cut
+constexpr Index kPieceRows = 1 << 16;  ///< of a recording that are looked at together
 
 double usual_step(const VectorXd& time) {
+  const Index rows = std::min<Index>(time.size(), kPieceRows);
   std::vector<double> steps;
-  for (Index i = 1; i < time.size(); ++i) steps.push_back(time[i] - time[i - 1]);
+  for (Index i = 1; i < rows; ++i) steps.push_back(time[i] - time[i - 1]);
   return median_of(std::move(steps));
 }
 
-/// First and one past the last row of every stretch without gaps.
-std::vector<std::pair<Index, Index>> stretches_of(const VectorXd& time, double step) {
+/// Calls use(rows, begin, end) for the rows of a recording a piece at a time, until it returns false.
+void for_each_piece(const Recording& recording, const std::function<bool(const Recording&, Index, Index)>& use) {
+  if (!recording.read) {
+    for (Index begin = 0; begin < recording.time.size(); begin += kPieceRows)
+      if (!use(recording, begin, std::min<Index>(begin + kPieceRows, recording.time.size()))) return;
+    return;
+  }
+  const NextRows next = recording.read();
+  Recording rows;
+  while (next(&rows))
+    if (rows.time.size() > 0 && !use(rows, 0, rows.time.size())) return;
+}
+
+/// First and one past the last row of every run without gaps between two rows; `last`: [s] of the row before the first.
+std::vector<std::pair<Index, Index>> runs_of(const VectorXd& time, Index begin, Index end, double last, double step) {
   std::vector<std::pair<Index, Index>> out;
-  Index begin = 0;
-  for (Index i = 1; i <= time.size(); ++i) {
-    if (i < time.size() && time[i] - time[i - 1] <= kGap * step) continue;
-    out.emplace_back(begin, i);
-    begin = i;
+  for (Index i = begin; i < end; ++i) {
+    const bool gap = time[i] - (i == begin ? last : time[i - 1]) > kGap * step;
+    if (gap || i == begin) out.emplace_back(i, i);
+    out.back().second = i + 1;
   }
   return out;
 }
 
-/// Columns at even steps, by straight lines between the rows.
-MatrixXd at_even_steps(const VectorXd& time, const MatrixXd& x, Index begin, Index end, double step) {
-  if (x.cols() == 0) return {};
-  const auto rows = static_cast<Index>(std::floor((time[end - 1] - time[begin]) / step + 1e-6)) + 1;
-  MatrixXd out(rows, x.cols());
-  Index k = begin;
-  for (Index i = 0; i < rows; ++i) {
-    const double t = time[begin] + static_cast<double>(i) * step;
-    while (k + 2 < end && time[k + 1] < t) ++k;
-    const double part = std::clamp((t - time[k]) / (time[k + 1] - time[k]), 0.0, 1.0);
-    out.row(i) = (1.0 - part) * x.row(k) + part * x.row(k + 1);
-  }
-  return out;
-}
-
-/// 1 where the joint was faster than rest at any time close by.
-MatrixXd moving_rows(const MatrixXd& qd, double step, Index stride) {
-  const auto window = static_cast<Index>(std::ceil(kRestWindow / step));
-  const Index rows = (qd.rows() - 1) / stride + 1;
-  MatrixXd out = MatrixXd::Zero(rows, qd.cols());
-  for (Index c = 0; c < qd.cols(); ++c) {
-    Index last_fast = -window - 1;  // sweep forwards and backwards
-    std::vector<bool> fast(static_cast<std::size_t>(qd.rows()));
-    for (Index i = 0; i < qd.rows(); ++i) {
-      if (std::abs(qd(i, c)) > kSpeedAtRest) last_fast = i;
-      fast[static_cast<std::size_t>(i)] = i - last_fast <= window;
-    }
-    last_fast = qd.rows() + window + 1;
-    for (Index i = qd.rows() - 1; i >= 0; --i) {
-      if (std::abs(qd(i, c)) > kSpeedAtRest) last_fast = i;
-      if (i % stride == 0)
-        out(i / stride, c) = fast[static_cast<std::size_t>(i)] || last_fast - i <= window ? 1.0 : 0.0;
-    }
-  }
-  return out;
-}
-
-/// A stretch at the fine rate, whole.
-struct Stretch {
-  Tile whole;  ///< without rigid torques
-  MatrixXd measured;
-};
-
-MatrixXd every(const MatrixXd& x, Index stride) {
-  const Index rows = x.rows() == 0 ? 0 : (x.rows() - 1) / stride + 1;
-  MatrixXd out(rows, x.cols());
-  for (Index i = 0; i < rows; ++i) out.row(i) = x.row(i * stride);
-  return out;
-}
-
-Stretch stretch_of(const Recording& recording, const MatrixXd& torque, Index begin, Index end, double step,
-                   const PrepareOptions& options) {
-  Stretch out;
-  const VectorXd weights = low_pass(options.cutoff, step);
-  const auto fine = std::max<Index>(1, static_cast<Index>(1.0 / (kFinePerCutoff * options.cutoff * step)));
-  const double fine_step = step * static_cast<double>(fine);
-  const MatrixXd q = filtered(at_even_steps(recording.time, recording.position, begin, end, step), weights);
-  const MatrixXd qd = rate_of(q, step);
-  Motion& motion = out.whole.motion;
-  motion.step = fine_step;
-  motion.q = every(q, fine);
-  motion.qd = every(qd, fine);
-  motion.qdd = every(rate_of(qd, step), fine);
-  motion.time.resize(motion.q.rows());
-  for (Index i = 0; i < motion.time.size(); ++i)
-    motion.time[i] = recording.time[begin] - recording.time[0] + static_cast<double>(i) * fine_step;
-  for (const auto& [name, column] : recording.columns)
-    motion.columns[name] = every(at_even_steps(recording.time, column, begin, end, step), fine);
-  out.whole.weights = low_pass(options.cutoff, fine_step);
-  out.whole.stride = std::max<Index>(1, static_cast<Index>(1.0 / (kCoarsePerCutoff * options.cutoff * fine_step)));
-  out.measured = filtered(at_even_steps(recording.time, torque, begin, end, step), weights, fine * out.whole.stride);
-  out.whole.moving = moving_rows(motion.qd, fine_step, out.whole.stride);
-  return out;
-}
-
-VectorXd rows_of(const VectorXd& x, Index begin, Index count) { return x.segment(begin, count); }
-
-/// The row before `begin` from which on every joint has travelled so far that play operators forget what was before.
-Index row_that_forgets(const Motion& motion, Index begin) {
-  const Index earliest = std::max<Index>(0, begin - static_cast<Index>(kMostLeadIn / motion.step));
-  VectorXd low = motion.q.row(begin), high = low;
-  Index row = begin;
-  while (row > earliest && (high - low).minCoeff() < kForgets) {
-    --row;
-    low = low.cwiseMin(motion.q.row(row).transpose());
-    high = high.cwiseMax(motion.q.row(row).transpose());
-  }
-  return row;
-}
-
-/// Coarse rows [from, to) of a stretch, with the rows before and after that filter and play operators reach.
-Tile tile_of(const Stretch& stretch, Index from, Index to) {
-  const Tile& whole = stretch.whole;
-  const Index stride = whole.stride, half = whole.weights.size() / 2;
-  const Index reached = std::max<Index>(0, from * stride - half);
-  const Index coarse_begin = row_that_forgets(whole.motion, reached) / stride;
-  const Index begin = coarse_begin * stride;
-  const Index end = std::min(whole.motion.rows(), (to - 1) * stride + half + 1);
-  Tile out;
-  out.weights = whole.weights;
-  out.stride = stride;
-  out.first = from - coarse_begin;
-  out.count = to - from;
-  out.motion.step = whole.motion.step;
-  out.motion.time = rows_of(whole.motion.time, begin, end - begin);
-  out.motion.q = whole.motion.q.middleRows(begin, end - begin);
-  out.motion.qd = whole.motion.qd.middleRows(begin, end - begin);
-  out.motion.qdd = whole.motion.qdd.middleRows(begin, end - begin);
-  for (const auto& [name, column] : whole.motion.columns)
-    out.motion.columns[name] = rows_of(column, begin, end - begin);
-  out.measured = stretch.measured.middleRows(from, to - from);
-  out.moving = whole.moving.middleRows(from, to - from);
+/// Names of the further columns.
+std::vector<std::string> column_names(const Recording& recording) {
+  std::vector<std::string> out;
+  for (const auto& [name, column] : recording.columns) out.push_back(name);
   return out;
 }
 
 }  // namespace
 
-MatrixXd Tile::filtered_rows(const MatrixXd& values) const { return filtered(values, weights, stride); }
+MatrixXd Tile::own_rows(const MatrixXd& values) const {
+  MatrixXd out(count, values.cols());
+  for (Index c = 0; c < values.cols(); ++c) own_rows(values.col(c).data(), out.col(c).data());
+  return out;
+}
+
+void Tile::own_rows(const double* column, double* out) const {
+  filter_column(column, motion.rows(), weights, stride, first, count, out);
+}
 
 VectorXd Tile::own_time() const {
   VectorXd out(count);
@@ -178,31 +91,103 @@ MatrixXd measured_torque(const Recording& recording, const std::vector<double>& 
   return out;
 }
 
-void for_each_tile(const Recording& recording, std::size_t number, const Robot& robot, const RigidChain& chain,
-                   const PrepareOptions& options, const std::function<void(Tile&)>& use) {
+void for_each_tile(const Recording& recording, std::size_t number, const Robot& robot, const PrepareOptions& options,
+                   const std::function<bool(Tile&)>& use) {
+  const RigidChain chain(robot);
+  const VectorXd links = link_parameters(robot);
   const double step = usual_step(recording.time);
-  const MatrixXd torque = measured_torque(recording, options.torque_per_ampere);
-  bool any = false;
-  for (const auto& [begin, end] : stretches_of(recording.time, step)) {
-    const double length = recording.time[end - 1] - recording.time[begin];
-    if (end - begin < 2 || (!options.short_stretches && length < 4.0 / options.cutoff)) continue;
+  const std::vector<std::string> columns = column_names(recording);
+  bool any = false, more = true;
+  const auto complete = [&](Tile& tile) {
     any = true;
-    const Stretch stretch = stretch_of(recording, torque, begin, end, step, options);
-    const Index coarse = stretch.measured.rows();
-    const Index each = std::max<Index>(1, kTileRows / stretch.whole.stride);
-    for (Index from = 0; from < coarse; from += each) {
-      Tile tile = tile_of(stretch, from, std::min(coarse, from + each));
-      tile.recording = number;
-      tile.motion.robot = &robot;
-      tile.motion.rigid = regressor_columns(chain, tile.motion.q, tile.motion.qd, tile.motion.qdd);
-      use(tile);
+    tile.recording = number;
+    tile.motion.robot = &robot;
+    tile.motion.links = chain.torques(tile.motion.q, tile.motion.qd, tile.motion.qdd, links);
+    return more = use(tile);
+  };
+  std::unique_ptr<Stretch> stretch;
+  const auto finish = [&] {
+    if (stretch && !stretch->is_too_short()) stretch->take(true, complete);
+    stretch.reset();
+  };
+  double last = recording.time[0];
+  for_each_piece(recording, [&](const Recording& rows, Index begin, Index end) {
+    for (const auto& [from, to] : runs_of(rows.time, begin, end, last, step)) {
+      if (rows.time[from] - last > kGap * step) finish();
+      if (!more) return false;
+      if (!stretch) stretch = std::make_unique<Stretch>(robot.driven_count(), columns, step, options);
+      stretch->add(rows, from, to, recording.time[0]);
+      last = rows.time[to - 1];
     }
-  }
+    return stretch->take(false, complete);
+  });
+  if (more) finish();
   if (!any) {
     throw std::invalid_argument("recording '" + recording.name + "': no stretch without gaps is longer than " +
                                 math::number(4.0 / options.cutoff, 3) +
                                 " s, which the low-pass needs: record longer, or give a higher cut-off");
   }
+}
+
+Tiles::Tiles(const std::vector<Recording>& recordings, const Robot& robot, PrepareOptions options, int threads)
+    : recordings_(recordings), robot_(robot), options_(std::move(options)), threads_(threads) {
+  constexpr double kMostKept = 100.0 * 1024 * 1024;  ///< [bytes]
+  double numbers = 0.0;
+  for (const Recording& recording : recordings) {
+    if (recording.read) return;
+    const double each =
+        5.0 * static_cast<double>(recording.position.cols() + 1) + static_cast<double>(recording.columns.size());
+    numbers += each * static_cast<double>(recording.rows());
+  }
+  kept_ = sizeof(double) * numbers < kMostKept;
+  if (!kept_) return;
+  std::vector<std::vector<Tile>> parts(recordings.size());
+  math::for_each_on_threads(
+      recordings.size(), threads, {},
+      [&](std::size_t r) {
+        for_each_tile(recordings[r], r, robot, options_, [&](Tile& tile) {
+          parts[r].push_back(std::move(tile));
+          return true;
+        });
+      },
+      1);
+  for (std::vector<Tile>& part : parts) std::move(part.begin(), part.end(), std::back_inserter(tiles_));
+  for (std::size_t k = 0; k < tiles_.size(); ++k) tiles_[k].number = k;
+}
+
+Index Tiles::kept_rows() const {
+  Index rows = 0;
+  for (const Tile& tile : tiles_) rows += tile.count;
+  return kept_ ? rows : -1;
+}
+
+void Tiles::for_each(const std::function<bool(std::size_t)>& wanted,
+                     const std::function<void(Tile&, std::size_t)>& work,
+                     const std::function<void(std::size_t)>& done) const {
+  std::vector<Tile*> lot;
+  const auto run = [&] {
+    math::for_each_on_threads(lot.size(), threads_, {}, [&](std::size_t k) { work(*lot[k], k); }, 1);
+    for (std::size_t k = 0; k < lot.size(); ++k) done(k);
+    lot.clear();
+  };
+  if (kept_) {
+    for (Tile& tile : tiles_) {
+      if (wanted(tile.recording)) lot.push_back(&tile);
+      if (lot.size() == kTogether) run();
+    }
+    return run();
+  }
+  std::vector<Tile> made(kTogether);
+  for (std::size_t r = 0; r < recordings_.size(); ++r) {
+    if (!wanted(r)) continue;
+    for_each_tile(recordings_[r], r, robot_, options_, [&](Tile& tile) {
+      made[lot.size()] = std::move(tile);
+      lot.push_back(&made[lot.size()]);
+      if (lot.size() == kTogether) run();
+      return true;
+    });
+  }
+  run();
 }
 
 namespace {
@@ -243,9 +228,8 @@ void widen(const Tile& tile, MotionRange* range, std::vector<TorqueSums>* sums) 
 
 }  // namespace
 
-MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robot, const RigidChain& chain,
-                     const PrepareOptions& options) {
-  const auto joints = static_cast<Index>(robot.driven_count());
+MotionRange range_of(const Tiles& tiles) {
+  const auto joints = static_cast<Index>(tiles.robot().driven_count());
   constexpr double inf = std::numeric_limits<double>::infinity();
   MotionRange out;
   out.lower = VectorXd::Constant(joints, inf);
@@ -253,8 +237,9 @@ MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robo
   out.speed = out.acceleration = out.torque = VectorXd::Zero(joints);
   out.turns.resize(static_cast<std::size_t>(joints));
   std::vector<TorqueSums> sums(static_cast<std::size_t>(joints));
-  for (std::size_t r = 0; r < recordings.size(); ++r)
-    for_each_tile(recordings[r], r, robot, chain, options, [&](Tile& tile) { widen(tile, &out, &sums); });
+  std::vector<const Tile*> lot(Tiles::kTogether);
+  tiles.for_each([](std::size_t) { return true; }, [&](Tile& tile, std::size_t k) { lot[k] = &tile; },
+                 [&](std::size_t k) { widen(*lot[k], &out, &sums); });
   for (std::size_t j = 0; j < sums.size(); ++j) out.torque[static_cast<Index>(j)] = sums[j].standard_deviation();
   return out;
 }

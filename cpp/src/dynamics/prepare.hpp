@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "dynamics/regressor.hpp"
 #include "rooms.hpp"
 #include "truing/dynamics/effect.hpp"
 #include "truing/dynamics/recording.hpp"
@@ -22,7 +21,9 @@ constexpr double kSpeedAtRest = 0.01;
 /// give, filtered as the measured torques were.
 struct Tile {
   std::size_t recording = 0;
-  Motion motion;            ///< as fine as the basis functions need it; Motion::torque is for the caller to fill
+  std::size_t number = 0;  ///< among tiles that are kept
+  /// As fine as the basis functions need it; Motion::torque and Motion::rigid are for the caller to fill.
+  Motion motion;
   Eigen::VectorXd weights;  ///< of the filter
   Eigen::Index stride = 1;
   Eigen::Index first = 0;    ///< of the filtered rows those before it only lead in
@@ -31,10 +32,9 @@ struct Tile {
   Eigen::MatrixXd moving;    ///< shape=(count, joints): 1 where the joint moves, 0 where it has been at rest a while
 
   /// The tile's own rows of basis values given at every row of the motion.
-  Eigen::MatrixXd own_rows(const Eigen::MatrixXd& values) const {
-    return filtered_rows(values).middleRows(first, count);
-  }
-  Eigen::MatrixXd filtered_rows(const Eigen::MatrixXd& values) const;
+  Eigen::MatrixXd own_rows(const Eigen::MatrixXd& values) const;
+  /// The same of one column, into `count` numbers.
+  void own_rows(const double* column, double* out) const;
   /// Time of the tile's own rows [s].
   Eigen::VectorXd own_time() const;
 };
@@ -45,15 +45,44 @@ struct PrepareOptions {
   bool short_stretches = false;           ///< those between gaps that are shorter than the filter, too
 };
 
-/// Calls `use` with each tile of a recording, in order of time. Throws std::invalid_argument: too short to be filtered.
-void for_each_tile(const Recording& recording, std::size_t number, const Robot& robot, const RigidChain& chain,
-                   const PrepareOptions& options, const std::function<void(Tile&)>& use);
+/// Calls `use` with each tile of a recording, in order of time, as long as it returns true. Of a recording that is read
+/// no more is in memory than a tile and what leads in to it. Throws std::invalid_argument: too short to be filtered.
+void for_each_tile(const Recording& recording, std::size_t number, const Robot& robot, const PrepareOptions& options,
+                   const std::function<bool(Tile&)>& use);
 
-/// Torques measured, or currents times the drives' constants: shape=(n, joints), NaN throughout where there is neither.
-Eigen::MatrixXd measured_torque(const Recording& recording, const std::vector<double>& torque_per_ampere);
+/// The tiles of recordings: kept, where they are few, and else made anew in every pass, so that memory does not grow
+/// with the rows.
+class Tiles {
+ public:
+  /// Both must outlive it. Throws as for_each_tile.
+  Tiles(const std::vector<Recording>& recordings, const Robot& robot, PrepareOptions options, int threads);
 
-/// What the recordings hold together; throws as for_each_tile.
-MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robot, const RigidChain& chain,
-                     const PrepareOptions& options);
+  /// So many tiles are worked on side by side.
+  static constexpr std::size_t kTogether = 16;
+  /// Calls work(tile, k) for the tiles of the wanted recordings, several at a time on several threads, k below
+  /// kTogether, and after each such lot done(k) for each of them in their order: sums that are added up there do not
+  /// depend on the number of threads.
+  void for_each(const std::function<bool(std::size_t recording)>& wanted,
+                const std::function<void(Tile&, std::size_t k)>& work,
+                const std::function<void(std::size_t k)>& done) const;
+
+  const std::vector<Recording>& recordings() const { return recordings_; }
+  /// Rows that the fit sees of all tiles together, where these are kept; -1: they are made anew.
+  Eigen::Index kept_rows() const;
+  std::size_t kept_tiles() const { return tiles_.size(); }
+  const Robot& robot() const { return robot_; }
+  const PrepareOptions& options() const { return options_; }
+
+ private:
+  const std::vector<Recording>& recordings_;
+  const Robot& robot_;
+  PrepareOptions options_;
+  int threads_ = 0;
+  bool kept_ = false;
+  mutable std::vector<Tile> tiles_;
+};
+
+/// What the recordings hold together.
+MotionRange range_of(const Tiles& tiles);
 
 }  // namespace truing::dynamics

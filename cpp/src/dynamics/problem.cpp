@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/columns.hpp"
 #include "dynamics/effects/families.hpp"
 #include "dynamics/physical.hpp"
 #include "math/linear_algebra.hpp"
@@ -21,7 +22,9 @@ using Eigen::VectorXd;
 constexpr int kBlocks = 10;                ///< of time, where recordings cannot be the folds
 constexpr std::size_t kFewRecordings = 4;  ///< fewer unmarked ones are parted into blocks of time
 
-double length_of(const Recording& recording) { return recording.time[recording.time.size() - 1] - recording.time[0]; }
+double length_of(const Recording& recording) {
+  return (recording.read ? recording.end : recording.time[recording.time.size() - 1]) - recording.time[0];
+}
 
 /// Evenly spread: number k of a row is held out when k times the fraction passes a whole number.
 bool is_held_out(double k, double test_share) {
@@ -123,12 +126,24 @@ std::vector<double> drive_constants(const Robot& robot, const std::vector<Record
   return out;
 }
 
+namespace {
+
+PrepareOptions prepare_options(const Robot& robot, const std::vector<Recording>& recordings, double cutoff,
+                               std::vector<std::string>* warnings) {
+  PrepareOptions out;
+  out.torque_per_ampere = drive_constants(robot, recordings, warnings);
+  out.cutoff = cutoff;
+  return out;
+}
+
+}  // namespace
+
 Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, const ProblemOptions& options)
-    : robot(given), chain(given), data{recordings, robot, {}, options.threads}, nominal(given, {}) {
-  data.prepare.torque_per_ampere = drive_constants(robot, recordings, &warnings);
-  data.prepare.cutoff = options.cutoff;
+    : robot(given),
+      tiles(recordings, robot, prepare_options(robot, recordings, options.cutoff, &warnings), options.threads),
+      nominal(given, {}) {
   split(recordings, options.test_share, this);
-  range = range_of(recordings, robot, chain, data.prepare);
+  range = range_of(tiles);
   range.turns = turns_of(robot);
   if (range.speed.maxCoeff() < kSpeedAtRest) {
     throw std::invalid_argument("nothing moves: no joint of any recording is faster than " +
@@ -157,11 +172,11 @@ std::vector<int> standard_columns(const TorqueDesign& design) {
   return out;
 }
 
-Sums sums_of(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
+Sums sums_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
              const std::vector<bool>& with_prior) {
   Sums out;
-  out.folds = weighted(grams, noise, design.terms.size());
-  for (const Gram& fold : out.folds) out.all.add(fold);
+  for (std::size_t f = 0; f < grams->front().folds.size(); ++f) out.folds.emplace_back(grams, f, noise);
+  out.all = sum_of_folds(*grams, noise, design.terms.size());
   out.precision = VectorXd::Zero(static_cast<Index>(design.terms.size()));
   for (std::size_t c = 0; c < design.terms.size(); ++c) {
     if (with_prior[c]) out.precision[static_cast<Index>(c)] = std::pow(design.terms[c].prior, -2.0);
@@ -265,13 +280,13 @@ Groundwork fitted_groundwork(const Problem& problem) {
     if (effect.traits.standard) add_effect(effect, -1, problem.robot, problem.range, &design);
   }
   if (problem.fitted_before) {
-    const std::vector<Noise> noise = noise_of(problem.data, problem.nominal, problem.train);
+    const std::vector<Noise> noise = noise_of(problem.tiles, problem.nominal, problem.train);
     return {std::move(design), {}, {}, problem.nominal, noise};
   }
   const std::vector<bool> with_prior = inertial_columns(design);
   const std::vector<int> columns = standard_columns(design);
-  const std::vector<JointGrams> grams =
-      sum_grams(problem.data, design, problem.nominal, problem.nominal, problem.train);
+  const TorqueGrams grams =
+      sum_grams(DesignColumns(problem.tiles, design), problem.nominal, problem.nominal, problem.train);
   // Each joint by the noise that the fit leaves, which depends on it.
   std::vector<Noise> noise(problem.robot.driven_count());
   for (std::size_t j = 0; j < noise.size(); ++j)
@@ -283,7 +298,7 @@ Groundwork fitted_groundwork(const Problem& problem) {
     sums = sums_of(grams, noise, design, with_prior);
     fit = fit_of(sums, columns);
     model = problem.nominal.with(valued(design, fit));
-    noise = noise_of(problem.data, model, problem.train);
+    noise = noise_of(problem.tiles, model, problem.train);
   }
   return {std::move(design), std::move(sums), std::move(fit), std::move(model), std::move(noise)};
 }
@@ -408,22 +423,24 @@ struct Moments {
 
 using ModelMoments = std::vector<std::vector<Moments>>;  // by model and joint
 
-/// Of one recording, its rows in these folds.
-void add_moments(const Problem& problem, const std::vector<std::pair<std::string, TorqueModel>>& models,
-                 const Folds& folds, std::size_t r, ModelMoments* out) {
-  for_each_tile(problem.data.recordings[r], r, problem.robot, problem.chain, problem.data.prepare, [&](Tile& tile) {
-    const VectorXd time = tile.own_time();
-    for (std::size_t m = 0; m < models.size(); ++m) {
-      const MatrixXd predicted = tile.own_rows(models[m].second.torque(&tile.motion));
-      for (Index i = 0; i < tile.count; ++i) {
-        if (folds.fold(r, time[i]) < 0) continue;
-        for (Index j = 0; j < predicted.cols(); ++j) {
-          const double y = tile.measured(i, j);
-          if (!std::isnan(y)) (*out)[m][static_cast<std::size_t>(j)].add(y, predicted(i, j));
-        }
+/// Of one tile, its rows in these folds.
+ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& models, const Folds& folds,
+                        Tile* tile) {
+  ModelMoments out;
+  const VectorXd time = tile->own_time();
+  for (const auto& [name, model] : models) {
+    const MatrixXd predicted = own_torque(model, tile);
+    std::vector<Moments> by_joint(static_cast<std::size_t>(predicted.cols()));
+    for (Index i = 0; i < tile->count; ++i) {
+      if (folds.fold(tile->recording, time[i]) < 0) continue;
+      for (Index j = 0; j < predicted.cols(); ++j) {
+        const double y = tile->measured(i, j);
+        if (!std::isnan(y)) by_joint[static_cast<std::size_t>(j)].add(y, predicted(i, j));
       }
     }
-  });
+    out.push_back(std::move(by_joint));
+  }
+  return out;
 }
 
 }  // namespace
@@ -432,17 +449,17 @@ std::vector<TorqueErrors> errors_of(const Problem& problem,
                                     const std::vector<std::pair<std::string, TorqueModel>>& models) {
   const std::size_t joints = problem.robot.driven_count();
   const std::vector<std::size_t> driven = problem.robot.driven_joints();
-  const ModelMoments none(models.size(), std::vector<Moments>(joints));
   std::vector<TorqueErrors> out(models.size());
   for (const bool held : {true, false}) {
     const Folds& folds = held ? problem.test : problem.train;
-    std::vector<ModelMoments> parts(problem.data.recordings.size(), none);
-    for_each_recording(problem.data, folds, [&](std::size_t r) { add_moments(problem, models, folds, r, &parts[r]); });
-    ModelMoments all = none;
-    for (const ModelMoments& part : parts) {
+    std::vector<ModelMoments> lot(Tiles::kTogether);
+    ModelMoments all(models.size(), std::vector<Moments>(joints));
+    const auto add = [&](std::size_t k) {
       for (std::size_t m = 0; m < models.size(); ++m)
-        for (std::size_t j = 0; j < joints; ++j) all[m][j].add(part[m][j]);
-    }
+        for (std::size_t j = 0; j < joints; ++j) all[m][j].add(lot[k][m][j]);
+    };
+    problem.tiles.for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; },
+                           [&](Tile& tile, std::size_t k) { lot[k] = moments_of(models, folds, &tile); }, add);
     for (std::size_t m = 0; m < models.size(); ++m) {
       out[m].model = models[m].first;
       std::vector<TorqueError>& list = held ? out[m].held_out : out[m].train;

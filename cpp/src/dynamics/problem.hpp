@@ -25,12 +25,12 @@ struct ProblemOptions {
 /// Recordings to fit and recordings to judge on.
 struct Problem {
   Problem(const Robot& robot, const std::vector<Recording>& recordings, const ProblemOptions& options);
-  Problem(const Problem&) = delete;  // `data` refers to `robot`
+  Problem(const Problem&) = delete;  // `tiles` refer to `robot`
   Problem& operator=(const Problem&) = delete;
 
   Robot robot;
-  RigidChain chain;
-  Data data;
+  std::vector<std::string> warnings;
+  Tiles tiles;
   MotionRange range;
   Folds train, test;
   bool single = false;  ///< folds are blocks of time
@@ -38,7 +38,6 @@ struct Problem {
   std::vector<TorqueEffect> own_effects;
   TorqueModel nominal;
   bool fitted_before = false;  ///< the robot carries what an earlier fit of torques found
-  std::vector<std::string> warnings;
 };
 
 /// A choice of columns fitted to all training folds.
@@ -51,13 +50,13 @@ struct Fit {
 
 /// Grams of all joints together, and the prior that columns have.
 struct Sums {
-  std::vector<Gram> folds;
+  std::vector<FoldGram> folds;
   Gram all;                   ///< of the folds, with the priors on the diagonal
   Eigen::VectorXd precision;  ///< of the priors, by column; 0: flat
 };
 
 /// `with_prior`: by column, whether its term's prior holds; the others are flat.
-Sums sums_of(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
+Sums sums_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
              const std::vector<bool>& with_prior);
 
 Fit fit_of(const Sums& sums, const std::vector<int>& columns, const Eigen::VectorXd& ridge = {});

@@ -3,6 +3,7 @@
 #include "truing/dynamics/recording.hpp"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "math/text.hpp"
@@ -74,12 +75,9 @@ void require_table(const Recording& recording, const JointTable& table, std::siz
 
 }  // namespace
 
-void validate(const Recording& recording, const Robot& robot) {
-  const std::size_t joints = robot.driven_count();
-  if (recording.rows() < kFewestRows) {
-    refuse(recording, ": has " + std::to_string(recording.rows()) + " rows, expected at least " +
-                          std::to_string(kFewestRows) + ": record a longer motion, or leave it out");
-  }
+namespace {
+
+void require_rows(const Recording& recording, std::size_t joints) {
   require_time(recording);
   require_table(recording, {&recording.position, "position", "q"}, joints, true);
   for (const JointTable& table :
@@ -94,6 +92,29 @@ void validate(const Recording& recording, const Robot& robot) {
                             std::to_string(recording.rows()) + " as there are times");
     }
     require_usable(recording, name, values, "fill the gaps, or leave the column out");
+  }
+}
+
+}  // namespace
+
+void validate(const Recording& recording, const Robot& robot) {
+  const std::size_t joints = robot.driven_count();
+  if (recording.rows() < kFewestRows) {
+    refuse(recording, ": has " + std::to_string(recording.rows()) + " rows, expected at least " +
+                          std::to_string(kFewestRows) + ": record a longer motion, or leave it out");
+  }
+  require_rows(recording, joints);
+  if (!recording.read) return;
+  const NextRows next = recording.read();
+  Recording rows;
+  double last = -std::numeric_limits<double>::infinity();
+  while (next(&rows)) {
+    if (rows.rows() == 0) continue;
+    rows.name = recording.name;
+    require_rows(rows, joints);
+    if (!(rows.time[0] > last))
+      refuse_value(rows, "t", 0, rows.time[0], "a time after " + number(last, 12) + ", the last of the rows before");
+    last = rows.time[rows.time.size() - 1];
   }
 }
 

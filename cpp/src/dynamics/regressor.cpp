@@ -164,16 +164,14 @@ void RigidChain::compile() {
   }
 }
 
-void RigidChain::regressors(const kernel::RigidFunctions& kernel, const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,
-                            const Eigen::MatrixXd& qdd, Eigen::Index begin, Eigen::Index end, double* const* blocks,
-                            Eigen::Index stride) const {
+template <typename Run>
+void RigidChain::passes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
+                        Eigen::Index begin, Eigen::Index end, Run run) const {
   constexpr Eigen::Index kPassRows = 64;  // of a pass: what goes in and the columns of a joint stay in the cache
   thread_local std::vector<double> motions, scratch;
-  thread_local std::vector<double*> out;
   const auto plane = static_cast<std::size_t>(links() * kPassRows);
   motions.resize(3 * plane);
   scratch.resize(kernel::rigid_scratch(static_cast<int>(driven())));
-  out.resize(static_cast<std::size_t>(driven() * links()));
   const kernel::RigidProgram program{compiled_.data(),
                                      static_cast<int>(links()),
                                      static_cast<int>(driven()),
@@ -193,10 +191,42 @@ void RigidChain::regressors(const kernel::RigidFunctions& kernel, const Eigen::M
         to.tail(all - rows).setConstant(to[rows - 1]);
       }
     }
-    for (std::size_t at = 0; at < out.size(); ++at) out[at] = blocks[at] ? blocks[at] + (first - begin) : nullptr;
-    kernel.regressor(program, {static_cast<int>(all), motions.data(), motions.data() + plane,
-                               motions.data() + 2 * plane, kPassRows, out.data(), stride, scratch.data()});
+    run(program,
+        kernel::RigidTile{static_cast<int>(all), motions.data(), motions.data() + plane, motions.data() + 2 * plane,
+                          kPassRows, nullptr, 0, scratch.data()},
+        first, rows);
   }
+}
+
+void RigidChain::regressors(const kernel::RigidFunctions& kernel, const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,
+                            const Eigen::MatrixXd& qdd, Eigen::Index begin, Eigen::Index end, double* const* blocks,
+                            Eigen::Index stride) const {
+  thread_local std::vector<double*> out;
+  out.resize(static_cast<std::size_t>(driven() * links()));
+  passes(q, qd, qdd, begin, end,
+         [&](const kernel::RigidProgram& program, kernel::RigidTile tile, Eigen::Index first, Eigen::Index) {
+           for (std::size_t at = 0; at < out.size(); ++at)
+             out[at] = blocks[at] ? blocks[at] + (first - begin) : nullptr;
+           tile.blocks = out.data();
+           tile.column_stride = stride;
+           kernel.regressor(program, tile);
+         });
+}
+
+Eigen::MatrixXd RigidChain::torques(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
+                                    const Eigen::VectorXd& parameters) const {
+  Eigen::MatrixXd out(q.rows(), driven());
+  thread_local std::vector<double> part;
+  passes(q, qd, qdd, 0, q.rows(),
+         [&](const kernel::RigidProgram& program, kernel::RigidTile tile, Eigen::Index first, Eigen::Index rows) {
+           part.resize(static_cast<std::size_t>(driven() * tile.samples));
+           double* const block = part.data();
+           tile.blocks = &block;
+           tile.column_stride = tile.samples;
+           kernel::rigid_functions().torque(program, tile, parameters.data());
+           out.middleRows(first, rows) = Eigen::Map<const Eigen::MatrixXd>(block, tile.samples, driven()).topRows(rows);
+         });
+  return out;
 }
 
 void RigidChain::regressor(const double* q, const double* qd, const double* qdd, Eigen::Ref<Eigen::MatrixXd> Y) const {

@@ -41,12 +41,19 @@ class RigidChain {
   void regressors(const kernel::RigidFunctions& kernel, const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,
                   const Eigen::MatrixXd& qdd, Eigen::Index begin, Eigen::Index end, double* const* blocks,
                   Eigen::Index stride) const;
+  /// The regressor of every row times `parameters` (10 * links), without forming it: shape=(rows, driven).
+  Eigen::MatrixXd torques(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
+                          const Eigen::VectorXd& parameters) const;
   static constexpr Eigen::Index padded(Eigen::Index rows) {
     return (rows + kernel::kSampleMultiple - 1) / kernel::kSampleMultiple * kernel::kSampleMultiple;
   }
 
  private:
   void compile();
+  /// Calls run(program, tile, first, rows) with what moves in rows first to first + rows, a cacheful at a time.
+  template <typename Run>
+  void passes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd, Eigen::Index begin,
+              Eigen::Index end, Run run) const;
 
   struct Link {
     Eigen::Isometry3d before, after;  ///< the fixed parts: T = before * motion * after

@@ -40,6 +40,10 @@ VectorXd priors_of(const TorqueDesign& design) {
   return out;
 }
 
+double squares_left(const Gram& gram, const VectorXd& solution) {
+  return gram.yy - 2.0 * solution.dot(gram.xy) + solution.dot(gram.xx * solution);
+}
+
 }  // namespace
 
 Search::Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nuisance)
@@ -47,6 +51,8 @@ Search::Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nu
       sums_(sums),
       groups_(column_groups(design)),
       evidence_(sums_.all, groups_, std::move(nuisance), priors_of(design)) {
+  const VectorXd flat = evidence_.evaluate({}).precision;
+  for (std::size_t f = 0; f < sums.folds.size(); ++f) folds_.emplace_back(sums, f, evidence_.nuisance(), flat);
   for (const TorqueTerm& term : design.terms) {
     for (const std::size_t j : term.joints) joints_ = std::max(joints_, j + 1);
   }
@@ -59,23 +65,47 @@ Choice Search::without(const Choice& choice, std::size_t at) {
   return out;
 }
 
-VectorXd Search::squares_of_folds(const Choice& choice) const {
-  const Evidence::State state = evidence_.evaluate(choice);
-  const Gram all = sums_.all.of(state.columns);
-  VectorXd out(static_cast<Index>(sums_.folds.size()));
-  for (std::size_t f = 0; f < sums_.folds.size(); ++f) {
-    const Gram held = sums_.folds[f].of(state.columns);
-    MatrixXd d = all.xx - held.xx;
-    d.diagonal() += state.precision;
-    out[static_cast<Index>(f)] =
-        estimation::held_out_squares(sums_.folds[f], state.columns, factorised(std::move(d)).solve(all.xy - held.xy));
+FoldFit::FoldFit(const Sums& sums, std::size_t fold, const std::vector<int>& nuisance, const VectorXd& precision)
+    : sums_(sums), fold_(sums.folds[fold]), nuisance_(nuisance), known_(sums.all.xx.cols(), false) {
+  const Gram all = sums.all.of(nuisance), held = fold_.of(nuisance);
+  MatrixXd d = all.xx - held.xx;
+  d.diagonal() += precision;
+  factor_ = factorised(std::move(d));
+  right_ = factor_.matrixL().solve(all.xy - held.xy);
+  half_.resize(static_cast<Index>(nuisance.size()), sums.all.xx.cols());
+}
+
+double FoldFit::squares(const Evidence::State& state) {
+  const auto n = static_cast<Index>(nuisance_.size()), m = static_cast<Index>(state.columns.size()) - n;
+  const Gram all = sums_.all.of(state.columns), held = fold_.of(state.columns);
+  const MatrixXd d = all.xx - held.xx;
+  const VectorXd right = all.xy - held.xy;
+  MatrixXd half(n, m);
+  for (Index k = 0; k < m; ++k) {
+    const int column = state.columns[static_cast<std::size_t>(n + k)];
+    if (!known_[static_cast<std::size_t>(column)]) half_.col(column) = factor_.matrixL().solve(d.col(n + k).head(n));
+    known_[static_cast<std::size_t>(column)] = true;
+    half.col(k) = half_.col(column);
   }
+  MatrixXd rest = d.bottomRightCorner(m, m) - half.transpose() * half;
+  rest.diagonal() += state.precision.tail(m);
+  VectorXd solution(n + m);
+  solution.tail(m) = factorised(std::move(rest)).solve(right.tail(m) - half.transpose() * right_);
+  solution.head(n) = factor_.matrixU().solve(right_ - half * solution.tail(m));
+  return squares_left(held, solution);
+}
+
+VectorXd Search::squares_of_folds(const Choice& choice) const { return squares_of_folds(evidence_.evaluate(choice)); }
+
+VectorXd Search::squares_of_folds(const Evidence::State& state) const {
+  VectorXd out(static_cast<Index>(folds_.size()));
+  for (std::size_t f = 0; f < folds_.size(); ++f) out[static_cast<Index>(f)] = folds_[f].squares(state);
   return out;
 }
 
-double Search::squares_on(const Gram& other, const Choice& choice) const {
+double Search::squares_on(const FoldGram& other, const Choice& choice) const {
   const Evidence::State state = evidence_.evaluate(choice);
-  return estimation::held_out_squares(other, state.columns, state.solution);
+  return squares_left(other.of(state.columns), state.solution);
 }
 
 bool Search::may_enter(const Choice& choice, int group, bool free_functions) const {
@@ -107,8 +137,7 @@ bool Search::predicts(const VectorXd& before, const VectorXd& after, const Searc
 }
 
 /// Parameters of the group within what machines have; what is beyond stands for something else.
-bool Search::is_plausible(const Choice& choice, int group) const {
-  const Evidence::State state = evidence_.evaluate(choice);
+bool Search::is_plausible(const Evidence::State& state, int group) const {
   for (const int c : groups_[static_cast<std::size_t>(group)].columns) {
     const auto at = std::find(state.columns.begin(), state.columns.end(), c) - state.columns.begin();
     const double value = state.solution[static_cast<Index>(at)];
@@ -140,14 +169,14 @@ Choice Search::better_forms(Choice choice) const {
 Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits) const {
   for (bool changed = true; changed;) {
     changed = false;
-    const double score = evidence_.evaluate(choice).score;
-    const VectorXd squares = squares_of_folds(choice);
+    const Evidence::State state = evidence_.evaluate(choice);
+    const VectorXd squares = squares_of_folds(state);
     for (std::size_t at = 0; at < choice.groups.size(); ++at) {
-      const Choice less = without(choice, at);
-      const bool possible = !limits.plausible_only || is_plausible(choice, choice.groups[at]);
-      const bool wins = possible && evidence_.evaluate(less).score < score - 0.5 * limits.threshold;
+      const Evidence::State less = evidence_.evaluate(without(choice, at));
+      const bool possible = !limits.plausible_only || is_plausible(state, choice.groups[at]);
+      const bool wins = possible && less.score < state.score - 0.5 * limits.threshold;
       if (wins && predicts(squares_of_folds(less), squares, limits)) continue;
-      choice = less;
+      choice = less.choice;
       changed = true;
       break;
     }
@@ -161,7 +190,7 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
     const Evidence::State state = evidence_.evaluate(choice);
     std::vector<Evidence::Gain> gains = evidence_.gains(state);
     std::sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
-    const VectorXd squares = squares_of_folds(choice);
+    const VectorXd squares = squares_of_folds(state);
     bool taken = false;
     for (const Evidence::Gain& gain : gains) {
       if (gain.score < limits.threshold) break;
@@ -170,8 +199,9 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
       Choice grown = choice;
       grown.groups.push_back(gain.group);
       grown.scales.push_back(gain.scale);
-      const bool possible = !limits.plausible_only || is_plausible(grown, gain.group);
-      if (!possible || !predicts(squares, squares_of_folds(grown), limits)) {
+      const Evidence::State with = evidence_.evaluate(grown);
+      const bool possible = !limits.plausible_only || is_plausible(with, gain.group);
+      if (!possible || !predicts(squares, squares_of_folds(with), limits)) {
         refused.push_back(gain.group);
         continue;
       }

@@ -21,6 +21,26 @@ struct SearchLimits {
   bool plausible_only = true;  ///< parameters within what machines have
 };
 
+/// Fits to all rows but those of one fold. The columns that are always in are eliminated once (Schur complement): then
+/// a choice costs as much as its own columns do.
+class FoldFit {
+ public:
+  /// `precision`: of the nuisance columns, the same in every choice.
+  FoldFit(const Sums& sums, std::size_t fold, const std::vector<int>& nuisance, const Eigen::VectorXd& precision);
+
+  /// Squared error on the fold.
+  double squares(const Evidence::State& state);
+
+ private:
+  const Sums& sums_;
+  const FoldGram& fold_;
+  const std::vector<int>& nuisance_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;  ///< L L^T of the nuisance columns
+  Eigen::VectorXd right_;               ///< L^-1 of their right-hand side
+  Eigen::MatrixXd half_;                ///< L^-1 of their products with every column, where known_
+  std::vector<bool> known_;
+};
+
 /// Candidates over one set of sums.
 class Search {
  public:
@@ -37,8 +57,9 @@ class Search {
 
   /// Squared error of every fold, by the fit to the others.
   Eigen::VectorXd squares_of_folds(const Choice& choice) const;
+  Eigen::VectorXd squares_of_folds(const Evidence::State& state) const;
   /// Squared error on other rows, by the fit to all folds.
-  double squares_on(const Gram& other, const Choice& choice) const;
+  double squares_on(const FoldGram& other, const Choice& choice) const;
 
   /// The choice less its group number `at`.
   static Choice without(const Choice& choice, std::size_t at);
@@ -47,13 +68,14 @@ class Search {
   bool may_enter(const Choice& choice, int group, bool free_functions) const;
   Choice better_forms(Choice choice) const;
   Choice less_what_is_idle(Choice choice, const SearchLimits& limits) const;
-  bool is_plausible(const Choice& choice, int group) const;
+  bool is_plausible(const Evidence::State& state, int group) const;
   bool predicts(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const SearchLimits& limits) const;
 
   const TorqueDesign& design_;
   const Sums& sums_;
   std::vector<ColumnGroup> groups_;
   Evidence evidence_;
+  mutable std::vector<FoldFit> folds_;
   std::size_t joints_ = 1;
 };
 

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/torque_model.hpp"
 
+#include <algorithm>
+
 #include "dynamics/effects/families.hpp"
 #include "dynamics/turn.hpp"
 
@@ -33,14 +35,25 @@ void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, cons
 
 TorqueModel::TorqueModel(const Robot& robot, std::vector<ValuedTerm> own)
     : robot_(robot),
+      chain_(robot),
       links_(link_parameters(robot)),
       rotors_(rotor_matrix(robot)),
-      terms_(std::move(own)),
-      turns_(turns_of(robot)) {}
+      turns_(turns_of(robot)) {
+  add(std::move(own));
+}
+
+void TorqueModel::add(std::vector<ValuedTerm> more) {
+  for (ValuedTerm& valued : more) {
+    if (valued.term.link_parameter >= 0)
+      links_[valued.term.link_parameter] += valued.value;
+    else
+      terms_.push_back(std::move(valued));
+  }
+}
 
 TorqueModel TorqueModel::with(const std::vector<ValuedTerm>& more) const {
   TorqueModel out = *this;
-  out.terms_.insert(out.terms_.end(), more.begin(), more.end());
+  out.add(more);
   return out;
 }
 
@@ -50,10 +63,14 @@ TorqueModel TorqueModel::turning(const std::vector<FrictionTurn>& turns) const {
   return out;
 }
 
+bool TorqueModel::needs_rigid() const {
+  return std::any_of(terms_.begin(), terms_.end(), [](const ValuedTerm& v) { return v.term.needs_rigid; });
+}
+
 MatrixXd TorqueModel::torque(Motion* motion) const {
   motion->direction = directions_of(*motion, turns_);
-  MatrixXd out = motion->qdd * rotors_;  // it is symmetric
-  for (Index j = 0; j < out.cols(); ++j) out.col(j) += motion->rigid[static_cast<std::size_t>(j)] * links_;
+  MatrixXd out = chain_.torques(motion->q, motion->qd, motion->qdd, links_);
+  out += motion->qdd * rotors_;  // it is symmetric
   add_terms(terms_, false, *motion, &out);
   motion->torque = out;
   add_terms(terms_, true, *motion, &out);

@@ -41,13 +41,19 @@ class TorqueModel {
   /// it, and Motion::torque to what the terms that ask for it see: the torques of all others.
   Eigen::MatrixXd torque(Motion* motion) const;
 
+  /// A term may look at Motion::rigid.
+  bool needs_rigid() const;
+
   const Robot& robot() const { return robot_; }
 
  private:
+  void add(std::vector<ValuedTerm> more);
+
   Robot robot_;
-  Eigen::VectorXd links_;   ///< inertial parameters
-  Eigen::MatrixXd rotors_;  ///< mass matrix of the rotors
-  std::vector<ValuedTerm> terms_;
+  RigidChain chain_;
+  Eigen::VectorXd links_;          ///< inertial parameters, those of the terms among them
+  Eigen::MatrixXd rotors_;         ///< mass matrix of the rotors
+  std::vector<ValuedTerm> terms_;  ///< the others
   std::vector<FrictionTurn> turns_;
 };
 

@@ -257,12 +257,22 @@ Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, c
   return best;
 }
 
+namespace {
+
+/// L^-1 X_S^T X of some columns.
+Eigen::MatrixXd projected_on(const Evidence::State& state, const Eigen::MatrixXd& xx, const std::vector<int>& columns) {
+  Eigen::MatrixXd out = block(xx, state.columns, columns);
+  state.factor.matrixL().solveInPlace(out);
+  return out;
+}
+
+}  // namespace
+
 Evidence::Gain Evidence::gain(const State& state, const std::vector<int>& columns, double cost) const {
-  const Projected projected = project(state);
-  Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
-  for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
+  const Eigen::MatrixXd v = projected_on(state, gram_.xx, columns);
+  const Eigen::VectorXd u = state.factor.matrixL().solve(part(gram_.xy, state.columns));
   return gain_of(state, block(gram_.xx, columns, columns) - v.transpose() * v,
-                 part(gram_.xy, columns) - v.transpose() * projected.u, part(prior_, columns), cost);
+                 part(gram_.xy, columns) - v.transpose() * u, part(prior_, columns), cost);
 }
 
 double Evidence::visible(const State& state, int column) const {
@@ -274,13 +284,7 @@ double Evidence::visible(const State& state, int column) const {
 
 double Evidence::explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta,
                            const std::vector<int>& by) const {
-  const Projected projected = project(state);
-  const auto columns = [&](const std::vector<int>& which) {
-    Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(which.size()));
-    for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(which[static_cast<std::size_t>(i)]);
-    return v;
-  };
-  const Eigen::MatrixXd v = columns(what), w = columns(by);
+  const Eigen::MatrixXd v = projected_on(state, gram_.xx, what), w = projected_on(state, gram_.xx, by);
   const Eigen::MatrixXd aa = block(gram_.xx, what, what) - v.transpose() * v;
   const Eigen::MatrixXd ab = block(gram_.xx, what, by) - v.transpose() * w;
   Eigen::MatrixXd bb = block(gram_.xx, by, by) - w.transpose() * w;

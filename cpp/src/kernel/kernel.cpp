@@ -363,11 +363,45 @@ void gram_reduce(double* acc, int columns, double* out) {
   });
 }
 
+// Filter: rows side by side, so that a row's sum goes through the weights in their order whatever its lane.
+constexpr int kFilterPacks = 8 / kLanes > 4 ? 8 / kLanes : 4;
+
+template <int packs>
+inline void filter_rows(const double* phases, std::ptrdiff_t length, int step, const double* weights, int weight_count,
+                        double* out) {
+  Pack sum[packs];
+  for (int m = 0; m < packs; ++m) sum[m] = Pack{};
+  for (int k = 0, phase = 0, row = 0; k < weight_count; ++k) {
+    const double* x = phases + phase * length + row;
+    for (int m = 0; m < packs; ++m) sum[m] += weights[k] * load(x + m * kLanes);
+    if (++phase == step) {
+      phase = 0;
+      ++row;
+    }
+  }
+  for (int m = 0; m < packs; ++m) store(out + m * kLanes, sum[m]);
+}
+
+void filter(const double* x, int step, const double* weights, int weight_count, int count, double* scratch,
+            double* out) {
+  const std::ptrdiff_t length = count + weight_count / step + 1,
+                       last = (count - 1) * std::ptrdiff_t{step} + weight_count;
+  for (std::ptrdiff_t phase = 0; phase < step; ++phase) {
+    double* to = scratch + phase * length;
+    for (std::ptrdiff_t i = 0; i < length; ++i) to[i] = i * step + phase < last ? x[i * step + phase] : 0.0;
+  }
+  int first = 0;
+  for (; first + kFilterPacks * kLanes <= count; first += kFilterPacks * kLanes)
+    filter_rows<kFilterPacks>(scratch + first, length, step, weights, weight_count, out + first);
+  for (; first < count; first += kLanes)
+    filter_rows<1>(scratch + first, length, step, weights, weight_count, out + first);
+}
+
 }  // namespace
 
 #define TRUING_TEXT_OF(x) #x
 #define TRUING_TEXT(x) TRUING_TEXT_OF(x)
 extern const Functions table;
-const Functions table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE), kLanes, evaluate, gram_size, gram_add, gram_reduce};
+const Functions table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE), kLanes, evaluate, gram_size, gram_add, gram_reduce, filter};
 
 }  // namespace truing::kernel::TRUING_KERNEL_NAMESPACE

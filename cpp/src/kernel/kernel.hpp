@@ -90,6 +90,12 @@ struct Tile {
   double* tip;           ///< out [12][kTilePoses]: p, then R column by column; null: not wanted
 };
 
+/// Numbers that a filter needs beside its rows: every step-th one in a piece, so that neighbours in lanes are
+/// neighbours in memory.
+constexpr std::size_t filter_scratch(int step, int weight_count, int count) {
+  return static_cast<std::size_t>(step) * static_cast<std::size_t>(count + weight_count / step + 1);
+}
+
 /// Accumulator of a Gram matrix; `size` doubles, opaque between gram_clear and gram_reduce.
 struct Functions {
   const char* name;
@@ -100,6 +106,10 @@ struct Functions {
   void (*gram_add)(const double* c, std::ptrdiff_t stride, int columns, int length, double* acc);
   /// Sums the lanes: upper triangle of `out` (columns x columns, column-major) += acc; acc is cleared.
   void (*gram_reduce)(double* acc, int columns, double* out);
+  /// out[i] = sum over k of weights[k] x[i * step + k], of `count` rows (a multiple of 8). `x` holds (count - 1) * step
+  /// + weight_count numbers; `scratch`: filter_scratch(...) numbers. An output's bits do not depend on the others.
+  void (*filter)(const double* x, int step, const double* weights, int weight_count, int count, double* scratch,
+                 double* out);
 };
 
 /// The widest copy that this machine can run; TRUING_KERNEL=scalar|sse2|avx2|avx512 in the environment asks for a

@@ -86,6 +86,16 @@ struct Load {
     store(out + 3 * stride, dot(S[2], v) + lever.z);
     for (int k = 0; k < 6; ++k) store(out + (4 + k) * stride, dot(N[k], n));
   }
+
+  /// Of all parameters of a link together.
+  Vec force(const double* p) const {
+    return splat(p[0]) * a + splat(p[1]) * S[0] + splat(p[2]) * S[1] + splat(p[3]) * S[2];
+  }
+  Vec moment(const double* p) const {
+    Vec out = cross(splat_vec(p + 1), a);
+    for (int k = 0; k < 6; ++k) out = out + splat(p[4 + k]) * N[k];
+    return out;
+  }
 };
 
 /// The turning and, at the base's origin, the velocity that a reading's rate of one gives to what is behind joint i:
@@ -113,7 +123,22 @@ inline void add_columns(const RigidProgram& program, const RigidTile& tile, int 
   }
 }
 
-void regressor(const RigidProgram& program, const RigidTile& tile) {
+inline void add_torques(const RigidProgram& program, const RigidTile& tile, int i, int first, const Moving& at,
+                        const double* parameters) {
+  const Load load_of_link(at);
+  const Vec force = at.turned(load_of_link.force(parameters));
+  const Vec moment = at.turned(load_of_link.moment(parameters)) + cross(at.o, force);  // about the base's origin
+  for (int k = 0; k < program.driven_count; ++k) {
+    const double* twist = tile.scratch + 6 * kLanes * k;
+    double* out = tile.blocks[0] + k * tile.column_stride + first;
+    store(out,
+          (i > 0 ? load(out) : Pack{}) + dot(load_lanes(twist), moment) + dot(load_lanes(twist + 3 * kLanes), force));
+  }
+}
+
+/// Calls out(i, first, at) for every link behind its joint, a few samples at a time.
+template <typename Out>
+inline void sweep(const RigidProgram& program, const RigidTile& tile, Out out) {
   const Pack zero{}, one = splat(1.0);
   const Vec nothing{zero, zero, zero};
   for (int first = 0; first < tile.samples; first += kLanes) {
@@ -131,9 +156,19 @@ void regressor(const RigidProgram& program, const RigidTile& tile) {
       else
         at.slide(motion, rate, acc);
       if (link.moves_after) at.pass(link.after);
-      add_columns(program, tile, i, first, at);
+      out(i, first, at);
     }
   }
+}
+
+void regressor(const RigidProgram& program, const RigidTile& tile) {
+  sweep(program, tile, [&](int i, int first, const Moving& at) { add_columns(program, tile, i, first, at); });
+}
+
+void torque(const RigidProgram& program, const RigidTile& tile, const double* parameters) {
+  sweep(program, tile, [&](int i, int first, const Moving& at) {
+    add_torques(program, tile, i, first, at, parameters + kLinkColumns * i);
+  });
 }
 
 }  // namespace
@@ -141,6 +176,6 @@ void regressor(const RigidProgram& program, const RigidTile& tile) {
 #define TRUING_TEXT_OF(x) #x
 #define TRUING_TEXT(x) TRUING_TEXT_OF(x)
 extern const RigidFunctions rigid_table;
-const RigidFunctions rigid_table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE), regressor};
+const RigidFunctions rigid_table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE), regressor, torque};
 
 }  // namespace truing::kernel::TRUING_KERNEL_NAMESPACE

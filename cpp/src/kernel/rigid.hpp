@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The torque regressor of a rigid chain, samples side by side in SIMD lanes. See README.md in this folder.
+// The torques of a rigid chain and their regressor, samples side by side in SIMD lanes. See README.md in this folder.
 
 #include <cstddef>
 
@@ -36,7 +36,7 @@ struct RigidTile {
   const double* acceleration;    ///< [link][stride]
   std::ptrdiff_t stride;         ///< of these three
   double* const* blocks;         ///< out [driven][link]: first of ten columns; null: this joint does not feel this link
-  std::ptrdiff_t column_stride;  ///< of these
+  std::ptrdiff_t column_stride;  ///< of these; of torques: of `blocks[0]`, one column for each driven joint
   double* scratch;               ///< rigid_scratch(program.driven_count) numbers
 };
 
@@ -45,6 +45,8 @@ constexpr std::size_t rigid_scratch(int driven) { return 6 * kSampleMultiple * s
 struct RigidFunctions {
   const char* name;
   void (*regressor)(const RigidProgram&, const RigidTile&);
+  /// The regressor times `parameters`, ten for each link, without its columns.
+  void (*torque)(const RigidProgram&, const RigidTile&, const double* parameters);
 };
 
 /// The copy of the same name as functions().

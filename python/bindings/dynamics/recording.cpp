@@ -33,11 +33,37 @@ Eigen::MatrixXd table_of(const std::optional<ArrayLike>& given, const std::strin
   return array.cast<Eigen::MatrixXd>();
 }
 
+/// Python's objects are let go of under its lock, whichever thread does it.
+template <class Object>
+std::shared_ptr<Object> held(Object object) {
+  return std::shared_ptr<Object>(new Object(std::move(object)), [](Object* one) {
+    const py::gil_scoped_acquire locked;
+    delete one;
+  });
+}
+
+/// What Recording::read is in Python: a callable that returns an iterator of recordings.
+struct Pieces {
+  std::shared_ptr<py::object> callable;
+
+  NextRows operator()() const {
+    const py::gil_scoped_acquire locked;
+    return [rows = held(py::iter((*callable)()))](Recording* out) {
+      const py::gil_scoped_acquire again;
+      if (*rows == py::iterator::sentinel()) return false;
+      *out = py::cast<const Recording&>(**rows);
+      ++*rows;
+      return true;
+    };
+  }
+};
+
 Recording make(std::string name, const ArrayLike& time, const ArrayLike& position,
                const std::optional<ArrayLike>& speed, const std::optional<ArrayLike>& torque,
                const std::optional<ArrayLike>& current, const std::optional<ArrayLike>& command,
                const std::optional<ArrayLike>& speed_command, const std::optional<ArrayLike>& torque_command,
-               const std::map<std::string, ArrayLike>& columns, bool test) {
+               const std::map<std::string, ArrayLike>& columns, bool test, const std::optional<py::object>& pieces,
+               double end) {
   Recording out;
   out.name = std::move(name);
   out.time = vector_of(time, "time");
@@ -57,7 +83,14 @@ Recording make(std::string name, const ArrayLike& time, const ArrayLike& positio
     out.columns.emplace(key, std::move(column));
   }
   out.test = test;
+  if (pieces) out.read = Pieces{held(*pieces)};
+  out.end = end;
   return out;
+}
+
+py::object pieces_of(const Recording& recording) {
+  const Pieces* pieces = recording.read.target<Pieces>();
+  return pieces ? *pieces->callable : py::none();
 }
 
 /// Views that keep `self` alive.
@@ -84,6 +117,7 @@ std::string repr(const Recording& r) {
   add("torque_command", r.torque_command);
   for (const auto& column : r.columns) there.push_back(column.first);
   if (!there.empty()) out += ", with " + joined(there);
+  if (r.read) out += ", and more on disk";
   return out + (r.test ? ", test)" : ")");
 }
 
@@ -95,20 +129,26 @@ void bind_motion_recording(py::module_& m) {
 
 Arrays are copied. Tables have a column for each joint that has a reading, in chain order. A table that was not recorded
 is left out, and then has the shape (n, 0); a joint that was not recorded is NaN throughout.
+pieces: of a recording that is longer than memory a callable that returns an iterator of its rows, some of them each as a
+Recording with the same tables, from the first on whenever it is called; the tables given are then its first rows, and
+end [s] is the time of the last.
 Raises InputError naming the array when shapes or types do not fit; `validate_recording` checks the values.)");
   cls.def(py::init(&make), py::arg("name"), py::kw_only(), py::arg("time"), py::arg("position"),
           py::arg("speed") = py::none(), py::arg("torque") = py::none(), py::arg("current") = py::none(),
           py::arg("command") = py::none(), py::arg("speed_command") = py::none(),
           py::arg("torque_command") = py::none(), py::arg("columns") = std::map<std::string, ArrayLike>{},
-          py::arg("test") = false);
+          py::arg("test") = false, py::arg("pieces") = py::none(), py::arg("end") = 0.0);
   define_read_only_attributes(cls, {"columns"});
   cls.def_property_readonly("columns", &columns_of,
                             "Shape=(n,) each, by name: 'payload_kg', 'temp1_C' … or 'temp_C', 'volt_V', 'enabled', and "
                             "one's own.");
+  cls.def_property_readonly("pieces", &pieces_of,
+                            "Of a recording that is longer than memory: returns an iterator of its rows, as "
+                            "recordings; the tables are then the first rows. None: they are all there is.");
   cls.def("__len__", &Recording::rows);
   cls.def("__repr__", [](const Recording& recording) { return repr(recording); });
   define_value(cls, {"name", "time", "position", "speed", "torque", "current", "command", "speed_command",
-                     "torque_command", "columns", "test"});
+                     "torque_command", "columns", "test", "pieces", "end"});
 
   m.def("validate_recording", py::overload_cast<const Recording&, const Robot&>(&validate), py::arg("recording"),
         py::arg("robot"), py::call_guard<py::gil_scoped_release>(),

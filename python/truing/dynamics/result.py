@@ -318,6 +318,16 @@ def export_dict(
     return found
 
 
+def _write_residuals(
+    folder: Path, found: _core.TorqueDiagnosis | _core.TorqueFit, recordings: Sequence[_core.Recording]
+) -> None:
+    """Of recordings that are in memory: residuals of the others would be as long as they are."""
+    whole = [recording for recording in recordings if recording.pieces is None]
+    if whole:
+        columns = residual_columns(found.robot, whole, found.held_out, found.cutoff)
+        write_table(folder / "residuals.parquet", columns)
+
+
 # ---- Everything ----------------------------------------------------------------------------------
 def write_diagnosis(
     folder: Path,
@@ -334,8 +344,7 @@ def write_diagnosis(
     result: dict[str, Any] = without_nan(diagnosis_dict(found, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
-    columns = residual_columns(found.robot, recordings, found.held_out, found.cutoff)
-    write_table(folder / "residuals.parquet", columns)
+    _write_residuals(folder, found, recordings)
     traces = [
         {
             "recording": t.recording,
@@ -364,8 +373,7 @@ def write_fit(
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
     write_table(folder / "covariance.csv", parameter_columns(found.parameters))
-    columns = residual_columns(found.robot, recordings, found.held_out, found.cutoff)
-    write_table(folder / "residuals.parquet", columns)
+    _write_residuals(folder, found, recordings)
     (folder / "report.html").write_text(fit_report(result, len(recordings)), encoding="utf-8")
     return result
 

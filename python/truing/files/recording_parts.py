@@ -87,8 +87,11 @@ def joints_of_names(
     return [of_joint[k] for k in range(len(names))]
 
 
-def checked_times(t: Floats, refuse: Refuse, column: str) -> Floats:
-    """The stamps [s], from 0 on if they count from 1970. Refuses those that do not increase."""
+def checked_times(t: Floats, refuse: Refuse, column: str, first: float | None = None) -> Floats:
+    """The stamps [s], from 0 on if they count from 1970. Refuses those that do not increase. first: stamp of the
+    recording's first row, where these are later ones.
+    """
+    first = float(t[0]) if first is None else first
     wrong = np.flatnonzero(np.diff(t) <= 0)
     if wrong.size:
         row = int(wrong[0]) + 1
@@ -112,7 +115,7 @@ def checked_times(t: Floats, refuse: Refuse, column: str) -> Floats:
             " another one than that of its numbers",
             column=column,
         )
-    return t - t[0] if abs(t[0]) > _EPOCH else t
+    return t - first if abs(first) > _EPOCH else t
 
 
 def table_of(rows: int, joints: int) -> Floats:

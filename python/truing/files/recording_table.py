@@ -8,8 +8,8 @@ import difflib
 import math
 import re
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -53,6 +53,8 @@ _OF_JOINT = re.compile(r"(qd|ud|q|tau|i|u|temp)([1-9][0-9]*)(?:_(.*))?", re.ASCI
 _SETS = ("train", "test")
 _LARGEST_TIME = 1e11  # [s] seconds since any epoch are fewer
 _LARGEST_COVARIATE = 1e12
+MOST_IN_MEMORY = 25_000_000  # cells: larger Parquet files are read in pieces, in every pass over them anew
+PIECE_ROWS = 65_536
 
 
 @dataclass(frozen=True)
@@ -200,11 +202,22 @@ class _Reader:
         self.layout = layout
 
     def times(self) -> Floats:
+        t = self.stamps()
+        return self.times_from(float(t[0]), t)
+
+    def stamps(self) -> Floats:
+        """The times as the file has them."""
         source = self.layout.time
         assert source is not None
-        t = self.table.numbers(source.column, "a time", largest=_LARGEST_TIME / source.factor)
-        scaled = t if source.factor == 1.0 else (t - _origin(t[0])) * source.factor
-        return checked_times(scaled, self.table.refuse, source.column)
+        return self.table.numbers(source.column, "a time", largest=_LARGEST_TIME / source.factor)
+
+    def times_from(self, first: float, t: Floats) -> Floats:
+        """In seconds; `first`: stamp of the recording's first row."""
+        source = self.layout.time
+        assert source is not None
+        scaled = t if source.factor == 1.0 else (t - _origin(first)) * source.factor
+        begin = first if source.factor == 1.0 else (first - _origin(first)) * source.factor
+        return checked_times(scaled, self.table.refuse, source.column, begin)
 
     def values(self, source: _Source, *, required: bool = False) -> Floats | None:
         """The column in SI units; None: nothing was recorded. Gaps within it are refused."""
@@ -305,8 +318,104 @@ def read_table(
     """The recordings of a CSV or Parquet file: one, or one for each run of rows of a set."""
     table = Table(path, comments=True)
     layout = _Layout(table, robot, joints)
+    if table.is_parquet and table.count_rows() * len(table.names) > MOST_IN_MEMORY:
+        return [read_in_pieces(table, layout, name)]
     table.read(layout.numbers, ["set"] if layout.set else [])
     reader = _Reader(table, layout)
     time = reader.times()
     tables = {"time": time, **reader.tables()}
     return make_recordings(str(path), name, robot, tables, reader.columns(), reader.test())
+
+
+# ---- Recordings longer than memory
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """The rows of a long Parquet file: called, it reads them from the first one on."""
+
+    table: Table
+    layout: _Layout
+    name: str
+    columns: tuple[str, ...]
+    test: bool
+
+    def __call__(self) -> Iterator[_core.Recording]:
+        first: float | None = None
+        for part in self.table.parts(PIECE_ROWS, self.layout.numbers, _labels(self.layout)):
+            reader = _Reader(part, self.layout)
+            t = reader.stamps()
+            first = float(t[0]) if first is None else first
+            with warnings.catch_warnings():  # of columns with gaps: said once
+                warnings.simplefilter("ignore", InputWarning)
+                columns = reader.columns()
+            yield _core.Recording(
+                self.name,
+                time=reader.times_from(first, t),
+                columns={name: columns[name] for name in self.columns},
+                test=self.test,
+                **reader.tables(),
+            )
+
+
+def _labels(layout: _Layout) -> list[str]:
+    return ["set"] if layout.set else []
+
+
+def read_in_pieces(table: Table, layout: _Layout, name: str) -> _core.Recording:
+    """A recording whose rows stay in the file. All of it is read once, and checked; a column with gaps is left
+    out.
+    """
+    survey = _Survey()
+    for part in table.parts(PIECE_ROWS, layout.numbers, _labels(layout)):
+        survey.add(_Reader(part, layout))
+    pieces = _Pieces(table, layout, name, tuple(sorted(survey.columns)), bool(survey.test))
+    return next(iter(pieces())).replace(pieces=pieces, end=survey.end)
+
+
+@dataclass
+class _Survey:
+    """What a long file holds throughout."""
+
+    columns: set[str] = field(default_factory=set)
+    first: float | None = None  # stamp
+    end: float = -math.inf  # [s]
+    test: bool | None = None
+    _recorded: set[tuple[str, int]] = field(default_factory=set)
+
+    def add(self, reader: _Reader) -> None:
+        """The next rows. Raises InputError where they do not go on as those before."""
+        usable, recorded = set(reader.columns()), _recorded(reader.tables())
+        t = reader.stamps()
+        if self.first is None:
+            self.first, self.columns, self._recorded = float(t[0]), usable, recorded
+        if recorded != self._recorded:
+            reader.table.refuse(
+                "a joint's column is empty from here on, or before: fill it, or leave it out", row=0
+            )
+        time = reader.times_from(self.first, t)
+        if time[0] <= self.end:
+            reader.table.refuse("time goes backwards, expected growing times: sort the rows", row=0)
+        self.columns &= usable
+        self.end = float(time[-1])
+        self._add_set(reader)
+
+    def _add_set(self, reader: _Reader) -> None:
+        marked = reader.test()
+        if marked is None:
+            return
+        if (marked != marked[0]).any() or self.test not in (None, bool(marked[0])):
+            reader.table.refuse(
+                "changes within a file that is read in pieces: write a file for each set", column="set"
+            )
+        self.test = bool(marked[0])
+
+
+def _recorded(tables: Mapping[str, Floats]) -> set[tuple[str, int]]:
+    """Which joints of which tables have numbers."""
+    return {
+        (name, joint)
+        for name, values in tables.items()
+        for joint in range(values.shape[1])
+        if not math.isnan(values[0, joint])
+    }

@@ -9,6 +9,7 @@ second time, slowly, to find the place: only a file that is refused anyway costs
 
 from __future__ import annotations
 
+import copy
 import csv
 import math
 import mmap
@@ -59,6 +60,7 @@ class Table:
         self._columns: dict[str, Any] = {}
         self._comments = comments
         self._header = 1  # line of the column names
+        self._first_row = 0  # of the file, where this is a part of it
         self._header_is_comment = False
         require_whole_file(path)
         try:
@@ -80,7 +82,11 @@ class Table:
         """Raises InputError about the file, a column, or the cell in `row` (counted from 0)."""
         where = [str(self.path)]
         if row is not None:
-            where.append(f"row {row + 1}" if self._is_parquet else f"line {self._csv_cell(row, None)[0]}")
+            where.append(
+                f"row {self._first_row + row + 1}"
+                if self._is_parquet
+                else f"line {self._csv_cell(row, None)[0]}"
+            )
         if column is not None:
             where.append(f"column {column!r}")
         raise InputError(f"{', '.join(where)}: {message}")
@@ -93,7 +99,11 @@ class Table:
 
     def read(self, numbers: Collection[str], labels: Collection[str]) -> None:
         """Loads the table. All other columns may hold numbers or nothing; text in them is refused."""
-        table = self._read_parquet() if self._is_parquet else self._read_csv(numbers, labels)
+        self._take(
+            self._read_parquet() if self._is_parquet else self._read_csv(numbers, labels), numbers, labels
+        )
+
+    def _take(self, table: Any, numbers: Collection[str], labels: Collection[str]) -> None:
         self.rows = table.num_rows
         if self.rows == 0:
             self.refuse("has column names but no rows")
@@ -104,6 +114,30 @@ class Table:
                 kind = kind.value_type
             if name not in labels and not _is_number(kind):
                 self._refuse_text(name, str(kind), known=name in numbers)
+
+    @property
+    def is_parquet(self) -> bool:
+        return self._is_parquet
+
+    def count_rows(self) -> int:
+        """Of a Parquet file, without reading it."""
+        return int(self._metadata()[0])
+
+    def parts(self, rows: int, numbers: Collection[str], labels: Collection[str]) -> Iterator[Table]:
+        """A Parquet file as tables of so many rows, one after the other; no more of it is in memory. Messages
+        count rows from the first of the file.
+        """
+        first = 0
+        try:
+            with pa.parquet.ParquetFile(self.path, read_dictionary=self._text_columns()) as file:
+                for batch in file.iter_batches(batch_size=rows):
+                    part = copy.copy(self)
+                    part._first_row = first
+                    part._take(pa.Table.from_batches([batch]), numbers, labels)
+                    first += part.rows
+                    yield part
+        except (pa.ArrowException, OSError) as error:
+            raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
 
     def numbers(
         self,
@@ -244,21 +278,27 @@ class Table:
 
     # ---- Loading
 
-    def _read_parquet(self) -> Any:
+    def _metadata(self) -> tuple[int, Any]:
+        """Number of rows, and the schema, of a Parquet file."""
         try:
             with pa.parquet.ParquetFile(self.path) as file:
-                rows, schema = file.metadata.num_rows, file.schema_arrow
+                return file.metadata.num_rows, file.schema_arrow
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
+
+    def _text_columns(self) -> list[str]:
+        return [field.name for field in self._metadata()[1] if pa.types.is_string(field.type)]
+
+    def _read_parquet(self) -> Any:
+        rows = self.count_rows()
         # Equal values take hardly any room in the file, and all of it in memory.
         if rows * len(self.names) > _MOST_CELLS:
             self.refuse(
                 f"has {rows:,} rows of {len(self.names)} columns, expected at most"
                 f" {_MOST_CELLS // len(self.names):,}: take every n-th row"
             )
-        text = [field.name for field in schema if pa.types.is_string(field.type)]
         try:
-            return pa.parquet.read_table(self.path, partitioning=None, read_dictionary=text)
+            return pa.parquet.read_table(self.path, partitioning=None, read_dictionary=self._text_columns())
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
 

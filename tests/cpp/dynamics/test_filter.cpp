@@ -1,10 +1,12 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <vector>
 
 #include <doctest/doctest.h>
 
 #include "dynamics/filter.hpp"
+#include "kernel/kernel.hpp"
 #include "math/constants.hpp"
 
 using namespace truing::dynamics;
@@ -55,6 +57,23 @@ TEST_CASE("every third row of a filtered record is that row") {
   const Eigen::MatrixXd all = filtered(x, weights), some = filtered(x, weights, 3);
   REQUIRE(some.rows() == 134);
   for (Eigen::Index i = 0; i < some.rows(); ++i) CHECK(some(i, 0) == all(3 * i, 0));
+}
+
+TEST_CASE("every copy of the kernel filters as the sum says, and rows do not depend on each other, to the bit") {
+  const Eigen::VectorXd x = Eigen::VectorXd::Random(700), weights = Eigen::VectorXd::Random(51);
+  for (const char* name : {"scalar", "sse2", "avx2", "avx512"}) {
+    const truing::kernel::Functions* kernel = truing::kernel::functions(name);
+    if (!kernel) continue;
+    for (const int step : {1, 4, 5}) {
+      const int count = 88;
+      std::vector<double> scratch(truing::kernel::filter_scratch(step, 51, count)), out(count), few(8);
+      kernel->filter(x.data(), step, weights.data(), 51, count, scratch.data(), out.data());
+      for (int i = 0; i < count; ++i)
+        CHECK(std::abs(out[static_cast<std::size_t>(i)] - weights.dot(x.segment(i * step, 51))) < 1e-13);
+      kernel->filter(x.data() + 3 * step, step, weights.data(), 51, 8, scratch.data(), few.data());
+      for (std::size_t i = 0; i < few.size(); ++i) CHECK(few[i] == out[i + 3]);
+    }
+  }
 }
 
 TEST_CASE("the rate of a sine is its cosine") {

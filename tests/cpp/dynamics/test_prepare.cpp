@@ -74,9 +74,10 @@ TEST_CASE("the way across a gap is no motion") {
   dynamics::PrepareOptions options;
   options.torque_per_ampere = {1.0, 1.0};
   const Recording whole = recording(20.0, 20.0);
-  const dynamics::RigidChain chain(swinging_arm());
-  const MotionRange smooth = dynamics::range_of({whole}, swinging_arm(), chain, options);
-  const MotionRange cut = dynamics::range_of({with_gap(whole, 6.0, 9.0)}, swinging_arm(), chain, options);
+  const Robot robot = swinging_arm();
+  const std::vector<Recording> one{whole}, other{with_gap(whole, 6.0, 9.0)};
+  const MotionRange smooth = dynamics::range_of(dynamics::Tiles(one, robot, options, 1));
+  const MotionRange cut = dynamics::range_of(dynamics::Tiles(other, robot, options, 1));
   CHECK(std::abs(smooth.speed[0] - 0.65) < 0.01);
   CHECK(cut.speed[0] < 1.02 * smooth.speed[0]);
   CHECK(cut.acceleration[0] < 1.3 * smooth.acceleration[0]);

@@ -215,6 +215,19 @@ TEST_CASE("a row of a tile does not depend on the rows around it, to the bit") {
   }
 }
 
+TEST_CASE("torques without the regressor are those by it, on every kind of robot") {
+  std::mt19937_64 random(27);
+  for (const Robot& robot : robots()) {
+    CAPTURE(robot.name);
+    const RigidChain chain(robot);
+    const States states(chain, 75, &random);
+    const VectorXd parameters = random_vector(kLinkParameters * chain.links(), 1.0, &random);
+    const MatrixXd torques = chain.torques(states.q, states.qd, states.qdd, parameters);
+    for (Index row = 0; row < 75; ++row)
+      CHECK(relative(torques.row(row).transpose(), regressor(chain, states.at(row)) * parameters) < 1e-12);
+  }
+}
+
 TEST_CASE("set_link_parameters is the inverse of link_parameters") {
   const Robot robot = linked_arm(Convention::dh, 7);
   for (const Joint& joint : robot.joints) {

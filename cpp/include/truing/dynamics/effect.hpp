@@ -29,8 +29,9 @@ struct Motion {
   Eigen::MatrixXd qdd;        ///< shape=(rows, joints) [rad/s^2 | m/s^2]
   Eigen::MatrixXd direction;  ///< shape=(rows, joints) -1 ... 1: of the motion, as dry friction knows it
   Eigen::MatrixXd torque;     ///< shape=(rows, joints) [Nm | N] that the model predicts in all, friction included
+  Eigen::MatrixXd links;      ///< shape=(rows, joints) [Nm | N] of the links alone, as `robot` has them
   /// Of every joint, shape=(rows, 10 * links) each: torque for an inertial parameter of one (mass, first moments, xx yy
-  /// zz xy xz yz about the origin of the frame after the link), link after link.
+  /// zz xy xz yz about the origin of the frame after the link), link after link. Empty where no term needs it.
   std::vector<Eigen::MatrixXd> rigid;
   /// shape=(rows,) each: the further columns of the recording.
   std::map<std::string, Eigen::VectorXd> columns;
@@ -49,6 +50,10 @@ struct TorqueTerm {
   bool needs_torque = false;  ///< the basis depends on Motion::torque
   /// The recordings show too little of it to name it, but it may stand for what they show.
   bool only_alternative = false;
+  bool needs_rigid = true;    ///< the basis may look at Motion::rigid
+  /// The basis is this column of Motion::rigid at `joints`: number of an inertial parameter, 10 * link + part; -1: it
+  /// is none of them. Then it is not called.
+  int link_parameter = -1;
   double prior = 1.0;                                       ///< size that the parameter may well have
   double least = -std::numeric_limits<double>::infinity();  ///< no machine has less than this
   double most = std::numeric_limits<double>::infinity();    ///< no machine has more

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -11,6 +12,11 @@
 #include "truing/model/robot.hpp"
 
 namespace truing {
+
+struct Recording;
+
+/// Rows of a recording in order of time, some of them each time that it is called: false when there are no more.
+using NextRows = std::function<bool(Recording* rows)>;
 
 /// A recording of motion: one file, one fold. Columns of the joints that have a reading, in chain order; a table that
 /// was not recorded has no columns, a joint that was not recorded is NaN throughout.
@@ -27,13 +33,18 @@ struct Recording {
   /// shape=(n,) each, by name: 'payload_kg', 'temp1_C' … or 'temp_C', 'volt_V', 'enabled', and one's own.
   std::map<std::string, Eigen::VectorXd> columns;
   bool test = false;  ///< held out: it is judged on, and never fitted to
+  /// Of a recording that is longer than memory: begins to read it, as often as it is called. The tables above are then
+  /// its first rows.
+  std::function<NextRows()> read;
+  double end = 0.0;  ///< [s] of a recording that is read: time of its last row
 
   std::size_t rows() const { return static_cast<std::size_t>(time.size()); }
 };
 
 /// Throws std::invalid_argument that names the recording, the column (as files have it, without its unit: q2, tau3) and
 /// the row, counted from 1: tables of another shape, times that do not increase, values that are not finite (but for
-/// joints that are NaN throughout, which a position must not be) or beyond 1e12, fewer than 20 rows.
+/// joints that are NaN throughout, which a position must not be) or beyond 1e12, fewer than 20 rows. Of a recording
+/// that is read, all of it is.
 void validate(const Recording& recording, const Robot& robot);
 
 }  // namespace truing

@@ -124,6 +124,7 @@ TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, d
   term.joints = {joint};
   term.prior = prior;
   term.needs_torque = needs_torque;
+  term.needs_rigid = false;
   term.basis = [column = std::move(column)](const Motion& m) -> Eigen::MatrixXd { return column(m).matrix(); };
   return term;
 }

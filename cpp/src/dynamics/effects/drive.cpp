@@ -40,6 +40,7 @@ std::vector<TorqueForm> time_offset(const Robot& robot, std::size_t, const Motio
   term.unit = "s";
   term.prior = 0.01;
   term.needs_torque = true;
+  term.needs_rigid = false;
   for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
   term.basis = [](const Motion& m) -> MatrixXd { return rate_of(m.torque, m.step); };
   return {{term}};

@@ -30,6 +30,7 @@ TorqueTerm rigid_term(const RigidChain& chain, std::string parameter, int part, 
   }
   term.prior = prior;
   const Index column = kLinkParameters * static_cast<Index>(link) + part;
+  term.link_parameter = static_cast<int>(column);
   term.basis = [column, joints = term.joints](const Motion& m) {
     MatrixXd out(m.rows(), static_cast<Index>(joints.size()));
     for (std::size_t k = 0; k < joints.size(); ++k) out.col(static_cast<Index>(k)) = m.rigid[joints[k]].col(column);

@@ -73,6 +73,7 @@ std::vector<TorqueForm> spring(const Robot& robot, std::size_t joint, const Moti
 
 /// What the torques change by when the joint stands `dq` further on than it was read: shape=(rows, joints).
 MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
+  const RigidChain chain(*m.robot);
   const VectorXd pi = link_parameters(*m.robot);
   const double step = 1e-4 / std::max(dq.cwiseAbs().maxCoeff(), 1e-12);  // rad: small against any posture
   const MatrixXd dqd = rate_of(dq, m.step), dqdd = rate_of(dqd, m.step);
@@ -80,11 +81,7 @@ MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
   q.col(joint) += step * dq;
   qd.col(joint) += step * dqd;
   qdd.col(joint) += step * dqdd;
-  const std::vector<MatrixXd> moved = regressor_columns(RigidChain(*m.robot), q, qd, qdd);
-  MatrixXd out(m.rows(), m.q.cols());
-  for (std::size_t j = 0; j < moved.size(); ++j)
-    out.col(static_cast<Index>(j)) = (moved[j] * pi - m.rigid[j] * pi) / step;
-  return out;
+  return (chain.torques(q, qd, qdd, pi) - m.links) / step;
 }
 
 TorqueTerm moved_link(const Robot& robot, std::size_t joint, std::string parameter, std::string unit, double prior,
@@ -95,6 +92,7 @@ TorqueTerm moved_link(const Robot& robot, std::size_t joint, std::string paramet
   term.unit = std::move(unit);
   term.prior = prior;
   term.needs_torque = true;
+  term.needs_rigid = false;
   for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
   term.basis = [joint, dq = std::move(dq)](const Motion& m) {
     return torque_change(m, static_cast<Index>(joint), dq(m));
@@ -127,14 +125,11 @@ MatrixXd held_against(const Motion& m, int axis) {
   Robot robot = *m.robot;
   robot.gravity = Eigen::Vector3d::Unit(axis);
   const MatrixXd rest = MatrixXd::Zero(m.rows(), m.q.cols());
-  const std::vector<MatrixXd> columns = regressor_columns(RigidChain(robot), m.q, rest, rest);
-  const Index last = kLinkParameters * (static_cast<Index>(robot.joints.size()) - 1);
-  const Eigen::Vector3d tool = robot.targets.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero())
-                                                     : Eigen::Vector3d(robot.targets[0].T_last_target.translation());
-  MatrixXd out(m.rows(), m.q.cols());
-  for (std::size_t j = 0; j < columns.size(); ++j)
-    out.col(static_cast<Index>(j)) = columns[j].col(last) + columns[j].middleCols<3>(last + 1) * tool;
-  return out;
+  VectorXd mass = VectorXd::Zero(kLinkParameters * static_cast<Index>(robot.joints.size()));
+  mass[mass.size() - kLinkParameters] = 1.0;
+  if (!robot.targets.empty())
+    mass.segment<3>(mass.size() - kLinkParameters + 1) = robot.targets[0].T_last_target.translation();
+  return RigidChain(robot).torques(m.q, rest, rest, mass);
 }
 
 // A cable or hose: a constant force at the tool.
@@ -146,6 +141,7 @@ std::vector<TorqueForm> tool_force(const Robot& robot, std::size_t, const Motion
     term.parameter = std::string("tool_force.") + "xyz"[axis];
     term.unit = "N";
     term.prior = prior;
+    term.needs_rigid = false;
     for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
     term.basis = [axis](const Motion& m) { return held_against(m, axis); };
     form.push_back(std::move(term));

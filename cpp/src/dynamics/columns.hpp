@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The columns of a design along recordings, filtered, and their normal equations.
+
+#include <functional>
+#include <vector>
+
+#include "dynamics/design.hpp"
+#include "rooms.hpp"
+
+namespace truing::dynamics {
+
+/// Tables of columns, tile by tile. Where tiles are kept, so are columns that need no torque.
+class DesignColumns {
+ public:
+  /// By joint, shape=(count, columns of the joint + 1): filtered columns, and room for the torque.
+  using Tables = std::vector<Eigen::MatrixXd>;
+
+  /// Both must outlive it.
+  DesignColumns(const Tiles& tiles, const TorqueDesign& design);
+
+  const Tiles& tiles() const { return tiles_; }
+  const TorqueDesign& design() const { return design_; }
+  /// Numbers of the design's columns that a joint's torque has, ascending.
+  const std::vector<int>& of_joint(std::size_t joint) const { return by_joint_[joint]; }
+
+  /// Calls use(tables) of a tile. Columns that need a torque are there if `with_torque`, by Motion::torque.
+  void use(Tile* tile, bool with_torque, const std::function<void(Tables&)>& use) const;
+
+ private:
+  void fill(Tile* tile, bool that_need_torque, Tables* tables) const;
+
+  const Tiles& tiles_;
+  const TorqueDesign& design_;
+  RigidChain chain_;
+  std::vector<std::vector<int>> by_joint_;
+  bool needs_rigid_ = false;
+  mutable std::vector<Tables> kept_;  ///< by tile; empty: not yet made
+};
+
+/// Measured torque less that of `subtracted` against the design's columns; rows at rest are left out. Terms that need a
+/// torque see that of `seen`.
+TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
+                      const Folds& folds);
+
+/// What the model and these columns times values leave; none of them may need a torque.
+std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const std::vector<int>& which,
+                            const Eigen::VectorXd& values, const Folds& folds);
+
+}  // namespace truing::dynamics

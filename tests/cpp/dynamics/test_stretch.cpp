@@ -1,0 +1,172 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <memory>
+
+#include <doctest/doctest.h>
+
+#include "dynamics/prepare.hpp"
+#include "math/random.hpp"
+#include "truing/dynamics.hpp"
+
+using namespace truing;
+using truing::math::Random;
+
+namespace {
+
+constexpr double kRowStep = 0.002;  // [s]
+
+Robot arm() {
+  Robot out;
+  out.name = "arm";
+  for (const char* name : {"J1", "J2"}) {
+    Joint joint;
+    joint.name = name;
+    joint.a = 0.4;
+    joint.mass = 1.0;
+    joint.center_of_mass = {-0.2, 0.0, 0.0};
+    out.joints.push_back(joint);
+  }
+  out.gravity = {0.0, -9.81, 0.0};
+  out.targets = {{"tool", Eigen::Isometry3d::Identity()}};
+  return out;
+}
+
+/// J1 swings, J2 rests after a while; steps that jitter, a gap, a column, noise on the torques.
+Recording recording(double seconds) {
+  Recording out;
+  out.name = "long";
+  Random random(7);
+  std::vector<double> times;
+  for (double t = 3.0; t < 3.0 + seconds; t += kRowStep * random.uniform(0.9, 1.1))
+    if (t < 40.0 || t > 43.0) times.push_back(t);
+  const auto rows = static_cast<Eigen::Index>(times.size());
+  out.time = Eigen::Map<const Eigen::VectorXd>(times.data(), rows);
+  out.position.resize(rows, 2);
+  out.torque.resize(rows, 2);
+  Eigen::VectorXd temperature(rows);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const double t = out.time[i];
+    out.position.row(i) << 0.5 * std::sin(1.3 * t), 0.5 * (1.0 - std::cos(0.9 * std::min(t, 60.0)));
+    out.torque.row(i) << 3.0 * std::cos(1.3 * t) + 0.1 * random.normal(), 2.0 + 0.1 * random.normal();
+    temperature[i] = 20.0 + 0.1 * t;
+  }
+  out.columns["temp_C"] = temperature;
+  return out;
+}
+
+Recording rows_of(const Recording& whole, Eigen::Index begin, Eigen::Index end) {
+  Recording out;
+  out.name = whole.name;
+  out.time = whole.time.segment(begin, end - begin);
+  out.position = whole.position.middleRows(begin, end - begin);
+  out.torque = whole.torque.middleRows(begin, end - begin);
+  for (const auto& [name, column] : whole.columns) out.columns[name] = column.segment(begin, end - begin);
+  return out;
+}
+
+/// The same recording, so many rows at a time.
+Recording read_in_pieces(const Recording& whole, Eigen::Index rows) {
+  Recording out = rows_of(whole, 0, rows);
+  out.test = whole.test;
+  const auto all = std::make_shared<const Recording>(whole);
+  out.read = [all, rows]() -> NextRows {
+    return [all, rows, begin = Eigen::Index{0}](Recording* next) mutable {
+      if (begin >= all->time.size()) return false;
+      const Eigen::Index end = std::min(all->time.size(), begin + rows);
+      *next = rows_of(*all, begin, end);
+      begin = end;
+      return true;
+    };
+  };
+  out.end = whole.time[whole.time.size() - 1];
+  return out;
+}
+
+std::vector<dynamics::Tile> tiles_of(const Recording& recording, const Robot& robot) {
+  std::vector<dynamics::Tile> out;
+  dynamics::PrepareOptions options;
+  options.torque_per_ampere = {1.0, 1.0};
+  dynamics::for_each_tile(recording, 0, robot, options, [&](dynamics::Tile& tile) {
+    out.push_back(tile);
+    return true;
+  });
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("tiles of a recording that is read are those of one in memory, to the bit") {
+  const Robot robot = arm();
+  const Recording whole = recording(260.0);
+  const std::vector<dynamics::Tile> expected = tiles_of(whole, robot);
+  REQUIRE(expected.size() == 4);  // one before the gap, three behind it
+  // The usual step is that of the first rows: of as many as are looked at together.
+  for (const Eigen::Index rows : {65536, 70001}) {
+    const std::vector<dynamics::Tile> found = tiles_of(read_in_pieces(whole, rows), robot);
+    REQUIRE(found.size() == expected.size());
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      CHECK(found[k].first == expected[k].first);
+      CHECK(found[k].motion.time == expected[k].motion.time);
+      CHECK(found[k].motion.q == expected[k].motion.q);
+      CHECK(found[k].motion.qdd == expected[k].motion.qdd);
+      CHECK(found[k].motion.columns.at("temp_C") == expected[k].motion.columns.at("temp_C"));
+      CHECK(found[k].measured == expected[k].measured);
+      CHECK(found[k].moving == expected[k].moving);
+    }
+  }
+}
+
+TEST_CASE("a recording that comes a few rows at a time has the same tiles but for its usual step") {
+  const Robot robot = arm();
+  const Recording whole = recording(120.0);
+  const std::vector<dynamics::Tile> expected = tiles_of(whole, robot),
+                                    found = tiles_of(read_in_pieces(whole, 997), robot);
+  REQUIRE(found.size() == expected.size());
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    const Eigen::Index rows = std::min(found[k].count, expected[k].count);
+    CHECK(std::abs(found[k].count - expected[k].count) <= expected[k].count / 100);
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const double t = found[k].own_time()[i];
+      REQUIRE(std::abs(found[k].motion.q((found[k].first + i) * found[k].stride, 0) - 0.5 * std::sin(1.3 * (t + 3.0))) <
+              1e-3);
+    }
+  }
+}
+
+TEST_CASE("times that go backwards from one piece to the next are refused") {
+  const Recording whole = recording(20.0);
+  Recording wrong = read_in_pieces(whole, 1000);
+  wrong.read = [whole]() -> NextRows {
+    return [whole, left = 2](Recording* next) mutable {
+      *next = rows_of(whole, 0, 1000);
+      return left-- > 0;
+    };
+  };
+  CHECK_THROWS_WITH_AS(validate(wrong, arm()), doctest::Contains("column t, row 1: found 3, expected a time after"),
+                       std::invalid_argument);
+}
+
+TEST_CASE("torques of a recording that is longer than memory are not predicted row by row") {
+  CHECK_THROWS_WITH_AS(dynamics::predict(arm(), read_in_pieces(recording(20.0), 1000)),
+                       doctest::Contains("longer than memory"), std::invalid_argument);
+}
+
+TEST_CASE("a fit to recordings that are read is that to recordings in memory, on one thread and on two") {
+  Robot robot = arm();
+  for (Joint& joint : robot.joints) joint.inertia = Eigen::Vector3d(0.004, 0.04, 0.04).asDiagonal();
+  const Recording whole = recording(150.0);
+  const auto errors = [&](const Recording& one, int threads) {
+    TorqueOptions options;
+    options.threads = threads;
+    std::vector<double> out;
+    for (const TorqueErrors& of : dynamics::identify(robot, {one}, options).errors) {
+      for (const TorqueError& e : of.held_out) out.push_back(e.rms);
+    }
+    return out;
+  };
+  const std::vector<double> expected = errors(whole, 1);
+  CHECK(errors(whole, 2) == expected);
+  CHECK(errors(read_in_pieces(whole, 65536), 1) == expected);
+  CHECK(errors(read_in_pieces(whole, 65536), 2) == expected);
+}
