@@ -30,7 +30,8 @@ void copy_mirrored(const double* x, Eigen::Index rows, Eigen::Index begin, Eigen
 
 // Oppenheim and Schafer, Discrete-time signal processing, 7.2: the ideal low-pass under a Blackman window.
 Eigen::VectorXd low_pass(double cutoff, double step) {
-  const auto half = static_cast<Eigen::Index>(std::ceil(kHalfLength / (cutoff * step)));
+  // A whole number of steps stays one, whatever rounding made of the step.
+  const auto half = static_cast<Eigen::Index>(std::ceil(kHalfLength / (cutoff * step) - 1e-6));
   Eigen::VectorXd weights(2 * half + 1);
   for (Eigen::Index k = -half; k <= half; ++k) {
     const double x = 2.0 * cutoff * step * static_cast<double>(k);

@@ -42,6 +42,8 @@ std::shared_ptr<Object> held(Object object) {
   });
 }
 
+using ReadPieces = py::typing::Callable<py::typing::Iterator<Recording>()>;
+
 /// What Recording::read is in Python: a callable that returns an iterator of recordings.
 struct Pieces {
   std::shared_ptr<py::object> callable;
@@ -62,7 +64,7 @@ Recording make(std::string name, const ArrayLike& time, const ArrayLike& positio
                const std::optional<ArrayLike>& speed, const std::optional<ArrayLike>& torque,
                const std::optional<ArrayLike>& current, const std::optional<ArrayLike>& command,
                const std::optional<ArrayLike>& speed_command, const std::optional<ArrayLike>& torque_command,
-               const std::map<std::string, ArrayLike>& columns, bool test, const std::optional<py::object>& pieces,
+               const std::map<std::string, ArrayLike>& columns, bool test, const std::optional<ReadPieces>& pieces,
                double end) {
   Recording out;
   out.name = std::move(name);
@@ -83,14 +85,15 @@ Recording make(std::string name, const ArrayLike& time, const ArrayLike& positio
     out.columns.emplace(key, std::move(column));
   }
   out.test = test;
-  if (pieces) out.read = Pieces{held(*pieces)};
+  if (pieces) out.read = Pieces{held(py::object(*pieces))};
   out.end = end;
   return out;
 }
 
-py::object pieces_of(const Recording& recording) {
+std::optional<ReadPieces> pieces_of(const Recording& recording) {
   const Pieces* pieces = recording.read.target<Pieces>();
-  return pieces ? *pieces->callable : py::none();
+  if (!pieces) return std::nullopt;
+  return py::reinterpret_borrow<ReadPieces>(*pieces->callable);
 }
 
 /// Views that keep `self` alive.
