@@ -22,6 +22,7 @@ constexpr double kSameR2 = 0.5;        ///< what makes less of the torque is ano
 constexpr double kTempered = 0.5;      ///< no model is exact: half a nat counts for one
 constexpr double kOtherLaws = 0.1;     ///< part of a joint's error that other laws than the catalogue's may well be
 constexpr double kNamed = 0.2;         ///< what is less sure is fitted, and not named
+constexpr double kUnknown = 0.5;       ///< so sure at least must be that there is what nobody knows
 constexpr double kBlocksOfTime = 0.9;  ///< the most that folds of one recording are worth
 
 const TorqueGroup& group_of(const TorqueDesign& design, int g) { return design.groups[static_cast<std::size_t>(g)]; }
@@ -247,7 +248,7 @@ std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& 
     unknown.share = naming.share(k);
     std::vector<TorqueAlternative> ignored;
     unknown.probability = naming.sure(k, &ignored);
-    if (unknown.probability < kNamed) continue;
+    if (unknown.probability < kUnknown) continue;
     if (single) unknown.probability = std::min(unknown.probability, kBlocksOfTime);
     unknown.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     const std::vector<Parameter> knots = parameters_of(design, group.columns, naming.fit());

@@ -45,7 +45,7 @@ std::vector<TorqueForm> thermal_friction(const Robot& robot, std::size_t joint, 
 }
 
 std::vector<TorqueForm> warmup(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  if (range.duration < 30.0) throw Unsuited("no recording is longer than 30 s");
+  if (range.duration < 5.0) throw Unsuited("no recording is longer than 5 s");
   return {friction_times("warmup", robot, joint, range, range.duration, "s",
                          [](const Motion& m) -> ArrayXd { return m.time.array(); })};
 }
@@ -62,7 +62,7 @@ std::vector<TorqueEffect> thermal_effects() {
   out.push_back({"thermal_friction", "friction changes with temperature", thermal_friction, true, traits});
   traits.plain = "friction that changes as the arm warms up";
   traits.documentation = {"s t, qd t, t from the start of the recording", "`warmup.J2.coulomb` [Nm/s], `.viscous`",
-                          "a recording of more than 30 s"};
+                          "a recording of more than 5 s"};
   out.push_back({"warmup", "friction changes with time while the arm runs", warmup, true, traits});
   return out;
 }
