@@ -51,6 +51,7 @@ FLOORS = {
     "files": [
         "output",
         "common",
+        "brand_frames",
         "table",
         "yaml_tree",
         "plausibility",
