@@ -5,11 +5,16 @@
 Every error names the file, the line or column, what was found and what was expected.
 """
 
+from truing.files.arms import ARMS as ARMS
 from truing.files.boards import (
     Board as Board,
     BoardViews as BoardViews,
     find_board as find_board,
     parse_board as parse_board,
+)
+from truing.files.brand_frames import (
+    frame_from_numbers as frame_from_numbers,
+    numbers_from_frame as numbers_from_frame,
 )
 from truing.files.common import (
     Units as Units,
@@ -17,6 +22,7 @@ from truing.files.common import (
     atomic_write as atomic_write,
     write_table as write_table,
 )
+from truing.files.controller_parts import ControllerModel as ControllerModel
 from truing.files.handeye_file import (
     HandEyeData as HandEyeData,
     Stream as Stream,
@@ -30,10 +36,12 @@ from truing.files.measurement_file import (
     load_measurements as load_measurements,
     save_measurements as save_measurements,
 )
-from truing.files.mjcf_file import is_mjcf as is_mjcf
 from truing.files.recording_file import load_recordings as load_recordings
 from truing.files.robot_file import (
+    any_robot as any_robot,
+    is_urdf as is_urdf,
     load_calibration as load_calibration,
+    load_controller as load_controller,
     load_robot as load_robot,
     load_units as load_units,
     robot_to_yaml as robot_to_yaml,

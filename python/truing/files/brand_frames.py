@@ -148,7 +148,7 @@ def _rotation_vector(rotation: Floats, near: Floats | None) -> Floats:
     axis, angle = q[1:] / sine, 2 * math.atan2(sine, q[0])
     if near is not None:
         angle += 2 * math.pi * round((float(near @ axis) - angle) / (2 * math.pi))
-    return axis * angle
+    return np.asarray(axis * angle)
 
 
 def _nearest_turn(near: Floats) -> Floats:

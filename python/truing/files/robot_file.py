@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robot files: robot.yaml (format truing-robot/1), URDF and MJCF.
+"""Robot files: robot.yaml (format truing-robot/1), URDF, MJCF, and those of controllers.
 
 A number in a file is read with all its digits, converted once and rounded once; it is written with as few
 digits as lead back to the same double. So a saved robot loads bit for bit, in any unit. Frames are written as
@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Context, Decimal
 from pathlib import Path
@@ -21,9 +23,14 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from truing import _core
-from truing.errors import InputError
+from truing.errors import InputError, InputWarning
+from truing.files.abb_file import robot_from_moc
+from truing.files.arms import ARMS
 from truing.files.common import PathLike, Units, atomic_write, decoded, listed, read_bytes, shown
+from truing.files.controller_parts import ControllerModel, split_arm, unknown_arm
+from truing.files.lerobot_calibration import robot_from_lerobot
 from truing.files.mjcf_file import is_mjcf, robot_from_mjcf
+from truing.files.ur_file import robot_from_calibration_conf, robot_from_urp
 from truing.files.yaml_tree import (
     LONGEST_NAME,
     NAME,
@@ -48,6 +55,7 @@ _KIND = "robot file"
 _LARGEST_URDF = 64_000_000
 MOST_JOINTS = 200
 _URDF_SUFFIXES = (".urdf", ".xml")
+_CONTROLLER_SUFFIXES = (".conf", ".urp", ".cfg", ".json")
 _TOOL = "tool"
 # Parameters are called after joints and targets (J2.a, tool.x), and these two are taken (base.x,
 # anchor.zero).
@@ -149,17 +157,31 @@ class _UrdfChain(_RobotFile):
 
 
 def load_robot(
-    path: PathLike, base_link: str = "", tip_link: str = "", *, any_tool: bool = False
+    path: PathLike, base_link: str = "", tip_link: str = "", *, any_tool: bool = False, arm: str = ""
 ) -> _core.Robot:
-    """Read a robot from robot.yaml, URDF (.urdf, .xml) or MJCF (.xml; needs MuJoCo: truing[dynamics]).
+    """Read a robot from robot.yaml, URDF (.urdf, .xml), MJCF (.xml; needs MuJoCo: truing[dynamics]), or from
+    a controller's file: calibration.conf or .urp of Universal Robots, MOC.cfg of ABB, LeRobot's calibration
+    JSON.
 
     `base_link` and `tip_link` choose the chain of a URDF, or of an MJCF (bodies; the tip may be a site);
     empty: its only root and its only leaf. any_tool: of a URDF whose joints form one chain the tip need not
     be named, however many links are fixed to the last one; the tool is then that link (torques know none).
-    Warns (InputWarning) of what an MJCF has and a robot does not: contacts, moving branches.
+    arm: of a controller's file, see `load_controller`; also behind an @ of `path`, "calibration.conf@ur10e".
+    Warns (InputWarning) of what an MJCF has and a robot does not: contacts, moving branches; and of what a
+    controller's file says that changes how its robot is to be calibrated.
     Raises InputError that names the file, the line, what was found and what was expected.
     """
-    path = Path(path)
+    path, arm = split_arm(os.fspath(path), arm)
+    if path.suffix.lower() in _CONTROLLER_SUFFIXES:
+        model = load_controller(path, arm, base_link, tip_link)
+        for text in model.warnings:
+            warnings.warn(text, InputWarning, stacklevel=2)
+        return model.robot
+    if arm:
+        raise InputError(
+            f"{path}: an arm is named for files of controllers ({listed(_CONTROLLER_SUFFIXES)}), and this is"
+            " none"
+        )
     if path.suffix.lower() in _URDF_SUFFIXES:
         if is_mjcf(path):
             robot = robot_from_mjcf(path, base_link, tip_link)
@@ -171,23 +193,102 @@ def load_robot(
         raise InputError(
             f"{path}: base and tip links choose a chain from URDF or MJCF, and this is not one (.urdf, .xml)"
         )
-    document, model = _read(path)
-    _check_names(document, model)
-    _check_joints(document, model)
-    _check_effects(document, model)
-    _check_units_look_right(document, model)
+    document, model_of_file = _read(path)
+    _check_names(document, model_of_file)
+    _check_joints(document, model_of_file)
+    _check_effects(document, model_of_file)
+    _check_units_look_right(document, model_of_file)
     try:
-        robot = _to_robot(model, path.stem)
+        robot = _to_robot(model_of_file, path.stem)
         _core.validate_robot(robot)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
     return robot
 
 
+def load_controller(
+    path: PathLike, arm: str = "", base_link: str = "", tip_link: str = ""
+) -> ControllerModel:
+    """The robot that a controller believes in, and what its file says besides.
+
+    path: calibration.conf or .urp of Universal Robots, MOC.cfg of ABB, LeRobot's calibration JSON; with the
+    arm behind an @, if it is not given. arm: a data sheet ("ur10e"; `truing.files.arms.ARMS`), or a robot
+    file that has the links (a URDF beside LeRobot's calibration; its only one need not be named). base_link,
+    tip_link: of a URDF beside. Raises InputError.
+    """
+    path, arm = split_arm(os.fspath(path), arm)
+    suffix = path.suffix.lower()
+    if suffix == ".conf":
+        return robot_from_calibration_conf(path, arm)
+    if suffix == ".urp":
+        return robot_from_urp(path, arm)
+    is_file = bool(arm) and arm.lower() not in ARMS
+    if suffix == ".cfg":
+        beside = _beside(path, arm, base_link, tip_link) if is_file else None
+        return robot_from_moc(path, arm, beside)
+    if suffix == ".json":
+        name = arm if is_file else str(_only_urdf(path, arm))
+        return robot_from_lerobot(path, _beside(path, name, base_link, tip_link), Path(name).name)
+    raise InputError(f"{path}: is no file of a controller, expected {listed(_CONTROLLER_SUFFIXES)}")
+
+
+def any_robot(path: PathLike, arm: str = "", base_link: str = "", tip_link: str = "") -> ControllerModel:
+    """A robot from any of its files, a controller's or not, with what the file says besides. Raises
+    InputError.
+    """
+    file, name = split_arm(os.fspath(path), arm)
+    if file.suffix.lower() in _CONTROLLER_SUFFIXES:
+        return load_controller(file, name, base_link, tip_link)
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always", InputWarning)
+        robot = load_robot(file, base_link, tip_link, arm=name)
+    masses = sum(joint.mass is not None for joint in robot.joints)
+    return ControllerModel(
+        robot=robot,
+        kind={".urdf": "URDF", ".xml": "URDF or MJCF"}.get(file.suffix.lower(), "robot file"),
+        arm=robot.name,
+        understood=(
+            ("convention", robot.convention),
+            ("joints", f"{len(robot.joints)}, {robot.driven_count} of them with a reading"),
+            ("masses", f"of {masses} links"),
+            ("effects", listed([effect.effect for effect in robot.effects]) or "none"),
+        ),
+        warnings=tuple(str(warning.message) for warning in heard),
+        calibration=load_calibration(file),
+    )
+
+
+def _beside(path: Path, arm: str, base_link: str, tip_link: str) -> _core.Robot:
+    """The robot file that is named beside a controller's file: from here, or from that file's folder."""
+    places = [Path(arm), path.parent / arm]
+    found = next((place for place in places if place.exists()), None)
+    if found is None or found.suffix.lower() in _CONTROLLER_SUFFIXES:
+        raise unknown_arm(path, arm, beside="robot.yaml")
+    return load_robot(found, base_link, tip_link)
+
+
+def _only_urdf(path: Path, arm: str) -> Path:
+    if arm:
+        raise InputError(f"{path}: {arm} is no arm of such servos, expected its URDF ({path.name}@arm.urdf)")
+    files = sorted(path.parent.glob("*.urdf"))
+    if len(files) != 1:
+        raise InputError(
+            f"{path}: holds counts of servos and no links: name the URDF of the arm ({path.name}@arm.urdf);"
+            f" beside it are {len(files)} URDFs"
+        )
+    return files[0]
+
+
+def is_urdf(path: PathLike) -> bool:
+    """Whether a robot file is a URDF: neither robot.yaml nor MJCF nor a controller's."""
+    file, arm = split_arm(os.fspath(path))
+    return not arm and file.suffix.lower() in _URDF_SUFFIXES and not is_mjcf(file)
+
+
 def load_units(path: PathLike) -> Units:
     """The units that a robot file is written in; those of URDF and MJCF are always m and rad."""
-    path = Path(path)
-    if path.suffix.lower() in _URDF_SUFFIXES:
+    path, _ = split_arm(os.fspath(path))
+    if path.suffix.lower() in (*_URDF_SUFFIXES, *_CONTROLLER_SUFFIXES):
         return Units()
     units = _read(path)[1].units
     return Units(length=units.length, angle=units.angle)
@@ -195,7 +296,9 @@ def load_units(path: PathLike) -> Units:
 
 def load_calibration(path: PathLike) -> dict[str, Any]:
     """The `calibration:` mapping of a robot file (source, date, rms_m ...); empty if it has none."""
-    path = Path(path)
+    path, arm = split_arm(os.fspath(path))
+    if path.suffix.lower() in _CONTROLLER_SUFFIXES:
+        return dict(load_controller(path, arm).calibration)
     if path.suffix.lower() in _URDF_SUFFIXES:
         return {}
     plain: dict[str, Any] = _without_decimals(_read(path)[1].calibration)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.errors import InputError
-from truing.files import is_mjcf, load_units, save_robot, write_table
+from truing.files import is_urdf, load_units, save_robot, write_table
 from truing.identification.api import predict, residuals
 from truing.identification.page import identification_report, prediction_report
 from truing.report.json_text import to_json, without_nan
@@ -347,7 +347,7 @@ def write_robot(
             **calibration,
         },
     )
-    if nominal_file is None or nominal_file.suffix.lower() == ".yaml" or is_mjcf(nominal_file):
+    if nominal_file is None or not is_urdf(nominal_file):
         return
     if robot.convention == "urdf":
         text = nominal_file.read_text(encoding="utf-8-sig")

@@ -1,0 +1,453 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files of controllers: what they say comes out as a robot, and what they do not say is said."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truing
+from truing.files import ARMS, load_calibration, load_controller, load_robot, save_robot
+from truing.files.lerobot_calibration import load_lerobot_calibration
+
+# A UR5 and a UR10 whose shoulder, elbow and wrist axes are so nearly parallel that d is far away. Both
+# calibrations are public: ros-industrial-attic/ur_modern_driver #179, and the tests of ur_calibration.
+UR5 = {
+    "theta": "2.07750978653505926e-05 0.96821571555565844 -1.85685385014877657 0.88864790145037664 6e-05 0",
+    "a": "0.000393621049984383038 0.184093300397451837 0.14493953300732923 -6.43297403642304e-05 7.767e-06 0",
+    "d": "4.00263e-05 278.244144925623573 -183.695513914913732 -94.5471513669751289 0.000304783 0.000123738",
+    "alpha": "-0.000271625 0.00125856505456124258 -0.00322052070697146503 0.000651530165303837 -0.000587 0",
+}
+UR10 = {
+    "theta": "-2.414780689e-07 1.60233952386694556 -1.68607190752171299 0.08373311477001187 -1e-07 4e-08",
+    "a": "2.12234865571205891e-05 0.632017132627700651 0.00229833638891230319 -4.61409e-05 -6.3928e-05 0",
+    "d": "-0.00016018828 439.140974079900957 -446.027059806332147 6.88618689642360149 -3.8e-05 -0.00088",
+    "alpha": "-0.0006502465575 0.00139416666825590402 0.00693818880325995126 -0.0008116416 0.0004111205 0",
+}
+
+
+def conf(values: dict[str, str], more: str = "calibration_status = 2 # 2 == Linearised\n") -> str:
+    lines = [f"delta_{key} = [ {', '.join(text.split())}]" for key, text in values.items()]
+    return "[mounting]\n" + "\n".join(lines) + "\n" + more
+
+
+def written(folder: Path, text: str | bytes, name: str = "calibration.conf") -> Path:
+    path = folder / name
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return path
+
+
+def long_way(arm: str, values: dict[str, str], q: np.ndarray) -> np.ndarray:
+    """The chain as the controller multiplies it, with 64 bits of mantissa."""
+    L = np.longdouble
+    T = np.eye(4, dtype=L)
+    pi = L(math.pi) + L(1.2246467991473532e-16)  # to 34 digits
+    for k, row in enumerate(ARMS[arm].rows):
+        alpha = L(round(row.alpha / (math.pi / 2))) * pi / 2 + L(values["alpha"].split()[k])
+        theta = L(q[k]) + L(values["theta"].split()[k])
+        a, d = (L(repr(getattr(row, key))) + L(values[key].split()[k]) for key in ("a", "d"))
+        ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+        link = [
+            [ct, -st * ca, st * sa, a * ct],
+            [st, ct * ca, -ct * sa, a * st],
+            [0, sa, ca, d],
+            [0, 0, 0, 1],
+        ]
+        T = T @ np.array(link, dtype=L)
+    return T
+
+
+@pytest.mark.parametrize(("arm", "values"), [("ur5", UR5), ("ur10", UR10)])
+def test_the_product_of_a_factory_calibration_is_exact(
+    tmp_path: Path, arm: str, values: dict[str, str]
+) -> None:
+    robot = load_robot(written(tmp_path, conf(values)), arm=arm)
+    assert max(abs(joint.d) for joint in robot.joints) < 0.2  # no long way is left
+    for q in np.random.default_rng(1).uniform(-np.pi, np.pi, (50, 6)):
+        found = truing.forward_kinematics(robot, q)[-1]
+        true = long_way(arm, values, q)
+        assert np.abs(found[:3, 3] - true[:3, 3]).max() < 1e-11
+        np.testing.assert_allclose(found[:3, :3], true[:3, :3].astype(float), atol=1e-13)
+
+
+def test_lengths_are_those_of_the_arm_again(tmp_path: Path) -> None:
+    model = load_controller(written(tmp_path, conf(UR10)), "UR10")
+    sheet = ARMS["ur10"].robot()
+    for joint, drawn in zip(model.robot.joints, sheet.joints, strict=True):
+        assert abs(joint.a - drawn.a) < 2e-3
+        assert abs(joint.d - drawn.d) < 2e-3
+        assert joint.mass == drawn.mass
+        assert joint.upper == drawn.upper
+    assert model.warnings == ()
+    assert dict(model.understood)["calibration status"] == "linearised"
+
+
+def test_the_arm_stands_behind_an_at_wherever_a_robot_is_read(tmp_path: Path) -> None:
+    path = written(tmp_path, conf(UR5))
+    by_name, by_option = load_robot(f"{path}@ur5"), load_robot(path, arm="ur5")
+    assert [joint.a for joint in by_name.joints] == [joint.a for joint in by_option.joints]
+    save_robot(tmp_path / "robot.yaml", by_name, calibration=load_calibration(f"{path}@ur5"))
+    again = load_robot(tmp_path / "robot.yaml")
+    q = np.full(6, 0.3)
+    np.testing.assert_array_equal(truing.forward_kinematics(again, q), truing.forward_kinematics(by_name, q))
+    assert load_calibration(tmp_path / "robot.yaml")["arm"] == "ur5"
+
+
+BAD_CONF = [
+    (conf(UR5), "", r"does not say which arm .* its values fit ur5, ur5e"),
+    (conf(UR5), "ur16e", "it is of another arm .ur5, ur5e would fit"),
+    (conf(UR5), "irb120", "there is no data sheet of 'irb120'"),
+    (conf(UR5).replace("delta_d", "delta_x"), "ur5", "delta_d is missing"),
+    (conf(UR5).replace("e-06, 0]", "e-06]"), "ur5", "line 3: delta_a: found 5 numbers, expected six"),
+    (conf(UR5).replace("278.2", "2x8.2"), "ur5", r"line 4: delta_d = .*expected \[six numbers\]"),
+    (conf(UR5).replace("278.2", "nan278.2"), "ur5", r"expected \[six numbers\]"),
+    (conf(UR5).replace("278.244144925623573", "inf"), "ur5", "expected lengths in m"),
+    (conf(UR5) + "delta_a = [0]\n", "ur5", "delta_a is there twice .first in line 3"),
+    ("[mounting]\nfoo\n", "ur5", "line 2: found 'foo', expected `key = value`"),
+    ("x: 1\n", "ur5", "expected `key = value`"),
+    ("", "ur5", r"found no section \[mounting\]"),
+    ("\0\1", "ur5", "is a binary file"),
+]
+
+
+@pytest.mark.parametrize(("text", "arm", "message"), BAD_CONF)
+def test_a_calibration_conf_that_cannot_be_used_is_refused(
+    tmp_path: Path, text: str, arm: str, message: str
+) -> None:
+    with pytest.raises(truing.InputError, match=message):
+        load_robot(written(tmp_path, text), arm=arm)
+
+
+def test_a_controller_that_may_not_use_its_calibration_is_said(tmp_path: Path) -> None:
+    path = written(tmp_path, conf(UR5, "calibration_status = 1\njoint_checksum = [ 0x1, 0x2]\nfoo = 3\n"))
+    with pytest.warns(truing.InputWarning, match="may work with the data sheet"):
+        load_robot(path, arm="ur5")
+    model = load_controller(path, "ur5")
+    assert [text.split(":")[0] for text in model.not_understood] == [
+        "joint_checksum (line 7)",
+        "foo (line 8)",
+    ]
+
+
+# ---- .urp ----------------------------------------------------------------------------------------
+
+KINEMATICS = """<Kinematics status="{status}" validChecksum="{valid}">
+  <deltaTheta value="-8.84E-8, -0.032582961261549755, -0.8772929446404238, 0.9098787703504071, 2.1E-6, 0"/>
+  <a value="1.2280920183406098E-4, -0.6118328650166482, -0.35064142434212725, 6.353E-5, -8.491E-5, 0.0"/>
+  <d value="{d1}, -11.986107840354439, 254.02185121292118, -241.86139249326118, 0.119787, 0.115693"/>
+  <alpha value="1.5705736146, 0.0016638537326948237, -0.0018631164519257151, 1.57066073817, -1.57044735, 0"/>
+  <jointChecksum value="-1858852621, -1856465696, 659529794, -1323325273, -1859399821, -1861357583"/>
+</Kinematics>"""
+
+
+def urp(*kinematics: str, tool: str = "0.0, 0.0, 0.1, 0.0, 0.0, 0.0") -> str:
+    points = "".join(
+        f'<Waypoint type="Fixed" name="Point_{k}"><position><JointAngles angles="0,0,0,0,0,0"/>'
+        f'<TCPOffset pose="{tool}"/>{text}</position></Waypoint>'
+        for k, text in enumerate(kinematics, 1)
+    )
+    return f'<URProgram name="p"><children><MainProgram>{points}</MainProgram></children></URProgram>'
+
+
+def kinematics(status: str = "LINEARIZED", valid: str = "true", d1: str = "0.18107019996630838") -> str:
+    return KINEMATICS.format(status=status, valid=valid, d1=d1)
+
+
+def test_a_program_carries_the_arm_that_it_was_taught_on(tmp_path: Path) -> None:
+    text = urp(kinematics(), '<Kinematics reference="../../../Waypoint/position/Kinematics"/>', kinematics())
+    model = load_controller(written(tmp_path, gzip.compress(text.encode()), "program.urp"))
+    assert model.arm == "ur10e"
+    assert model.warnings == ()
+    assert model.robot.joints[1].a == pytest.approx(-0.6127, abs=1e-3)
+    np.testing.assert_allclose(model.robot.targets[0].T_last_target[:3, 3], [0, 0, 0.1])
+    plain = load_robot(written(tmp_path, text, "plain.urp"))
+    assert plain.joints[2].beta == model.robot.joints[2].beta
+
+
+def test_waypoints_taught_on_another_arm_are_said_with_how_far(tmp_path: Path) -> None:
+    path = written(tmp_path, urp(kinematics(), kinematics(), kinematics(d1="0.18207019996630838")), "p.urp")
+    with pytest.warns(truing.InputWarning, match=r"waypoint Point_3 disagree.* up to 1\.00 mm elsewhere"):
+        robot = load_robot(path)
+    assert robot.joints[0].d == 0.18107019996630838
+
+
+BAD_URP = [
+    (b"\x1f\x8b\x08garbage", "is damaged"),
+    (gzip.compress(urp(kinematics()).encode())[:-20], "is damaged"),
+    (b"<URProgram>", "is no program of PolyScope"),
+    (b"<robot/>", "found <robot>, expected <URProgram>"),
+    (b'<!DOCTYPE a [<!ENTITY b "c">]><URProgram/>', "declares entities"),
+    (urp().encode(), "holds no kinematics"),
+    (urp(kinematics().replace("-11.98", "x")).encode(), "waypoint Point_1: d = .*expected six numbers"),
+    (urp(kinematics().replace("<a value", "<b value")).encode(), "waypoint Point_1: <Kinematics> has no <a>"),
+    (urp(kinematics(), tool="1,2").encode(), "TCPOffset '1,2', expected x, y, z, rx, ry, rz"),
+]
+
+
+@pytest.mark.parametrize(("data", "message"), BAD_URP)
+def test_a_program_that_cannot_be_used_is_refused(tmp_path: Path, data: bytes, message: str) -> None:
+    with pytest.raises(truing.InputError, match=message):
+        load_robot(written(tmp_path, data, "p.urp"))
+
+
+def test_the_kinematics_of_a_data_sheet_are_no_calibration(tmp_path: Path) -> None:
+    path = written(tmp_path, urp(kinematics(status="NOT_INITIALIZED", valid="false")), "p.urp")
+    with pytest.warns(truing.InputWarning, match="are not calibrated"):
+        load_robot(path)
+    with pytest.raises(truing.InputError, match="are not those of ur5, but of ur10e"):
+        load_robot(path, arm="ur5")
+
+
+# ---- MOC.cfg -------------------------------------------------------------------------------------
+
+LIMITS = ((-2.9, 2.9), (-1.9, 1.9), (-1.9, 1.2), (-2.8, 2.8), (-2.1, 2.1), (-6.9, 6.9))
+HEAD = """MOC:CFG_1.0:6:0::
+#
+MOTION_PLANNER:
+
+      -name "motion_planner_1" -use_for_jogging  -repos_installed \\
+      -restricted_circlepoint
+#
+ROBOT:
+
+      -name "ROB_1" -use_robot_serial_number "rob_1"\\
+      -use_robot_type "{type}" -use_robot_calib "{calib}"\\
+      -use_joint_0 "rob1_1" -use_joint_1 "rob1_2" -use_joint_2 "rob1_3"\\
+      -use_joint_3 "rob1_4" -use_joint_4 "rob1_5" -use_joint_5 "rob1_6"{more}
+#
+ROBOT_SERIAL_NUMBER:
+
+      -name "rob_1" -robot_serial_number_high_part " 120" -robot_serial_number_low_part 502362
+#
+"""
+
+
+def moc(
+    type: str = "ROB1_120_0.58_3", calib: str = "r1_uncalib", more: str = "", after: str = "", load: str = ""
+) -> str:
+    arms = "".join(
+        f'      -name "rob1_{k}" -use_arm_type "ROB1_{k}"{load if k == 3 else ""}\\\n'
+        f"      -upper_joint_bound {high} -lower_joint_bound {low}\n\n"
+        for k, (low, high) in enumerate(LIMITS, 1)
+    )
+    motors = "".join(
+        f'      -name "rob1_{k}" -valid_com_offset  -cal_offset {k}.5 -valid_cal_offset \n\n'
+        for k in range(1, 7)
+    )
+    return (
+        HEAD.format(type=type, calib=calib, more=more)
+        + f"ARM:\n\n{arms}#\nMOTOR_CALIB:\n\n{motors}#\n{after}"
+    )
+
+
+def test_limits_and_motors_are_those_of_the_file_and_lengths_those_of_the_data_sheet(tmp_path: Path) -> None:
+    model = load_controller(written(tmp_path, moc(), "MOC.cfg"))
+    assert model.arm == "irb120"
+    assert [(j.lower, j.upper) for j in model.robot.joints] == [*LIMITS]
+    assert model.robot.joints[1].a == pytest.approx(0.27)
+    assert model.calibration["cal_offset_motor_rad"]["rob1_3"] == 3.5
+    assert [joint.offset for joint in model.robot.joints] == [
+        0.0
+    ] * 6  # what the controller subtracts is no error
+    assert "absolute accuracy is off" in model.warnings[0]
+    assert "MOTION_PLANNER" in model.not_understood[-1]
+
+
+def test_gear_ratios_bring_motor_radians_to_the_joint(tmp_path: Path) -> None:
+    after = 'TRANSMISSION:\n\n      -name "rob1_2" -transm_joint 100\n'
+    model = load_controller(written(tmp_path, moc(after=after), "MOC.cfg"))
+    line = dict(model.understood)["motor at calibration, rob1_2"]
+    assert line == f"2.50000 rad at the motor, {math.degrees(0.025):.5f} deg at the joint"
+    assert model.calibration["motor_turns_per_joint_turn"] == {"rob1_2": 100.0}
+
+
+def test_a_controller_that_corrects_itself_is_said(tmp_path: Path) -> None:
+    table = (
+        'ARM_CALIB:\n\n      -name "rob1_2" -error_offset_x 3E-4 -error_offset_y 0.0004 -error_roll 1E-3\n#\n'
+        'JOINT_CALIB:\n\n      -name "rob1_2" -Compl 4.98678E-007\n'
+    )
+    path = written(tmp_path, moc(calib="r1_calib", after=table), "MOC.cfg")
+    with pytest.warns(
+        truing.InputWarning, match=r"absolute accuracy is on .* up to 0\.500 mm and 1\.000 mrad"
+    ):
+        load_robot(path)
+    assert any("4.98678E-007" in text for text in load_controller(path).not_understood)
+
+
+def test_arm_loads_are_told_and_not_guessed_into_a_frame(tmp_path: Path) -> None:
+    after = 'ARM_LOAD:\n\n      -name "r1_load_3" -mass 20 -mass_centre_x 1 -mass_centre_z 0.45\n'
+    path = written(tmp_path, moc(after=after, load=' -use_customer_arm_load "r1_load_3"'), "MOC.cfg")
+    model = load_controller(path)
+    assert dict(model.understood)["arm load r1_load_3"] == "20 kg at 1, 0, 0.45 m, on rob1_3"
+    assert model.not_understood[0].startswith("ARM_LOAD r1_load_3: 20 kg hang on rob1_3")
+    assert model.robot.joints[2].mass is None
+
+
+def test_where_the_robot_stands_is_taken_over(tmp_path: Path) -> None:
+    more = "\\\n      -base_frame_pos_x 1.5 -base_frame_orient_u0 0 -base_frame_orient_u1 1"
+    robot = load_controller(written(tmp_path, moc(more=more), "MOC.cfg")).robot
+    np.testing.assert_allclose(robot.T_measurement_base, np.diag([1, -1, -1, 1]) + 1.5 * np.eye(4, k=3))
+
+
+def test_another_arm_of_this_maker_comes_from_a_robot_file(tmp_path: Path) -> None:
+    path = written(tmp_path, moc(type="ROB1_6660_1.90_205"), "MOC.cfg")
+    with pytest.raises(truing.InputError, match="there is no data sheet of ROB1_6660_1.90_205 here"):
+        load_robot(path)
+    save_robot(tmp_path / "irb6660.yaml", ARMS["irb4600-40"].robot())
+    robot = load_controller(f"{path}@irb6660.yaml").robot  # beside it
+    assert robot.joints[1].a == 1.095
+    assert robot.joints[1].upper == LIMITS[1][1]
+
+
+BAD_MOC = [
+    ("EIO:CFG_1.0:6:0::\n", "line 1: found 'EIO:CFG_1.0:6:0::', expected MOC:CFG_1.0"),
+    ("", "line 1: found '', expected MOC"),
+    (moc().replace("ROBOT:", "ROBOTS:"), "has 0 robots, expected one"),
+    (moc().replace('-use_joint_5 "rob1_6"', ""), "line 10: ROB_1 has 5 joints .* irb120 has 6"),
+    (moc().replace('-name "rob1_4" -use_arm', '-name "x" -use_arm'), 'ARM has no entry of joint "rob1_4"'),
+    (
+        moc().replace("bound -2.9", "bound two"),
+        "line 21: -lower_joint_bound of 'rob1_1' is 'two', expected a number",
+    ),
+    (moc().replace("bound -2.9", "bound 3"), "joint bounds of rob1_1 are 3 and 2.9, expected lower < upper"),
+    (
+        moc().replace("-restricted_circlepoint", '-a "b" "c"'),
+        "line 5: found '\"c\"', expected -key value",
+    ),
+    (moc() + 'X:\n      -name "a"\\\n', "the file is cut off"),
+    (moc(more=" -base_frame_orient_u0 0.5"), "expected a quaternion of length 1"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), BAD_MOC)
+def test_a_moc_cfg_that_cannot_be_used_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(truing.InputError, match=message):
+        load_controller(written(tmp_path, text, "MOC.cfg"))
+
+
+# ---- LeRobot -------------------------------------------------------------------------------------
+
+ARM_URDF = """<robot name="so"><link name="base"/>{links}</robot>"""
+JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex")
+MOTORS = {
+    "shoulder_pan": {"id": 1, "drive_mode": 0, "homing_offset": -46, "range_min": 758, "range_max": 3292},
+    "shoulder_lift": {"id": 2, "drive_mode": 0, "homing_offset": 214, "range_min": 862, "range_max": 3128},
+    "elbow_flex": {"id": 3, "drive_mode": 0, "homing_offset": -1103, "range_min": 921, "range_max": 3100},
+    "gripper": {"id": 6, "drive_mode": 0, "homing_offset": 1407, "range_min": 2031, "range_max": 3476},
+}
+
+
+def small_urdf(names: tuple[str, ...] = JOINTS, low: float = -1.5) -> str:
+    links, parent = "", "base"
+    for name in names:
+        links += (
+            f'<link name="l_{name}"/><joint name="{name}" type="revolute"><parent link="{parent}"/>'
+            f'<child link="l_{name}"/><origin xyz="0.1 0 0.05"/><axis xyz="0 0 1"/>'
+            f'<limit lower="{low}" upper="1.5" effort="1" velocity="1"/></joint>'
+        )
+        parent = f"l_{name}"
+    return ARM_URDF.format(links=links)
+
+
+def follower(folder: Path, motors: object = None, urdf: str = "") -> Path:
+    written(folder, urdf or small_urdf(), "arm.urdf")
+    return written(folder, json.dumps(MOTORS if motors is None else motors), "follower.json")
+
+
+def test_ranges_of_servos_become_limits_about_a_zero_that_somebody_held(tmp_path: Path) -> None:
+    path = follower(tmp_path)
+    with pytest.warns(truing.InputWarning, match="recorded by hand"):
+        robot = load_robot(path)  # the only URDF beside it
+    assert math.degrees(robot.joints[0].upper) == pytest.approx((3292 - 758) / 2 * 360 / 4095)
+    assert robot.joints[0].lower == -robot.joints[0].upper
+    model = load_controller(f"{path}@arm.urdf")
+    assert model.not_understood == ("gripper: no joint of the chain",)
+    assert model.calibration["motors"]["elbow_flex"]["homing_offset"] == -1103
+
+
+def test_numbered_joints_take_motors_in_the_order_of_their_ids(tmp_path: Path) -> None:
+    motors = {name: MOTORS[name] for name in ("elbow_flex", "shoulder_lift", "shoulder_pan")}
+    model = load_controller(follower(tmp_path, motors, small_urdf(("1", "2", "3"))))
+    assert [line[0] for line in model.understood] == ["geometry", "1", "2", "3"]
+    assert "homing offset -46" in model.understood[1][1]
+
+
+def test_a_urdf_whose_zero_is_elsewhere_is_said(tmp_path: Path) -> None:
+    model = load_controller(follower(tmp_path, urdf=small_urdf(low=-0.5)))
+    assert "the two zeros are not the same" in model.warnings[0]
+    assert "+28.6 deg" in model.warnings[0]
+
+
+def changed(**values: object) -> dict[str, object]:
+    return {**MOTORS, "shoulder_pan": {**MOTORS["shoulder_pan"], **values}}
+
+
+BAD_JSON = [
+    ("{", "is no JSON"),
+    ("[]", "expected motors by name"),
+    ('{"motor_names": [], "calib_mode": []}', "a calibration of LeRobot before"),
+    ('{"a": 3}', "'a' is 3, expected id, drive_mode"),
+    (
+        json.dumps(changed(homing_offset=1.5)),
+        "homing_offset of 'shoulder_pan' is 1.5, expected a whole number",
+    ),
+    (json.dumps(changed(range_min=4000)), "the range of 'shoulder_pan' is 4000 to 3292"),
+    (json.dumps(changed(range_max=9000)), "more than the 4096 counts"),
+    (json.dumps(changed(id=2)), "shoulder_lift and shoulder_pan both have id 2"),
+    (json.dumps({"a": MOTORS["gripper"]}), "has no motor for joint shoulder_pan, shoulder_lift, elbow_flex"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), BAD_JSON)
+def test_a_calibration_of_servos_that_cannot_be_used_is_refused(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    written(tmp_path, small_urdf(), "arm.urdf")
+    with pytest.raises(truing.InputError, match=message):
+        load_robot(written(tmp_path, text, "follower.json"))
+
+
+def test_servos_without_a_urdf_are_no_robot(tmp_path: Path) -> None:
+    path = written(tmp_path, json.dumps(MOTORS), "follower.json")
+    with pytest.raises(truing.InputError, match="beside it are 0 URDFs"):
+        load_robot(path)
+    with pytest.raises(truing.InputError, match="there is no data sheet of 'gone.urdf'"):
+        load_robot(f"{path}@gone.urdf")
+    assert list(load_lerobot_calibration(path)) == list(MOTORS)
+
+
+# ---- Data sheets ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", sorted(ARMS))
+def test_a_data_sheet_is_a_robot(name: str) -> None:
+    robot = ARMS[name].robot()
+    assert robot.driven_count == 6
+    assert all(joint.lower < joint.upper for joint in robot.joints)
+
+
+def test_the_tool_of_an_abb_arm_looks_forward_at_zero() -> None:
+    """As its maker draws it: flange in front, z forward, x down; IRB 4600-40/2.55 at 1.27 + 0.135 + 0.175
+    m.
+    """
+    T = truing.forward_kinematics(ARMS["irb4600-40"].robot(), np.zeros(6))[-1]
+    np.testing.assert_allclose(T[:3, 3], [1.58, 0, 0.495 + 1.095 + 0.175], atol=1e-12)
+    np.testing.assert_allclose(T[:3, :3], [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], atol=1e-12)
+
+
+def test_a_ur_arm_at_zero_lies_along_minus_x() -> None:
+    """x = a2 + a3, y = -(d4 + d6), z = d1 - d5."""
+    T = truing.forward_kinematics(ARMS["ur10e"].robot(), np.zeros(6))[-1]
+    np.testing.assert_allclose(T[:3, 3], [-1.18425, -0.2907, 0.06085], atol=1e-12)
+
+
+def test_an_arm_is_for_files_of_controllers_alone(tmp_path: Path) -> None:
+    save_robot(tmp_path / "robot.yaml", ARMS["ur5"].robot())
+    with pytest.raises(truing.InputError, match="an arm is named for files of controllers"):
+        load_robot(tmp_path / "robot.yaml", arm="ur5")
