@@ -8,6 +8,7 @@ verb takes, and what it returns, are in that verb's room.
 
 from truing import (
     common as common,
+    controllers as controllers,
     diagnosis as diagnosis,
     dynamics as dynamics,
     examples as examples,

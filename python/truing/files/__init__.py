@@ -13,6 +13,8 @@ from truing.files.boards import (
     parse_board as parse_board,
 )
 from truing.files.brand_frames import (
+    NOTATIONS as NOTATIONS,
+    Brand as Brand,
     frame_from_numbers as frame_from_numbers,
     numbers_from_frame as numbers_from_frame,
 )
@@ -31,6 +33,12 @@ from truing.files.handeye_file import (
     load_stream as load_stream,
     pair_rows as pair_rows,
     save_camera as save_camera,
+)
+from truing.files.lerobot_calibration import (
+    MotorCalibration as MotorCalibration,
+    load_lerobot_calibration as load_lerobot_calibration,
+    matched_motors as matched_motors,
+    radians_per_count as radians_per_count,
 )
 from truing.files.measurement_file import (
     load_measurements as load_measurements,

@@ -37,6 +37,7 @@ ROOMS: dict[str, set[str]] = {
     "hand_eye": BASIC | {"identification"},
     "inverse_kinematics": BASIC,
     "dynamics": BASIC | {"identification"},
+    "controllers": BASIC | {"identification"},
     "tracking": BASIC | {"hand_eye"},
     "testing": BASIC,
     "exam": {"truing", "model", "report"},  # of both only what test_exam.py allows
