@@ -46,13 +46,15 @@ def poses_of(robot: _core.Robot) -> _core.Measurements:
     """
     rng = np.random.default_rng(_SEED)
     columns = []
-    for index in robot.driven_joints():
+    for k, index in enumerate(robot.driven_joints(), 1):
         joint = robot.joints[index]
         widest = math.pi if joint.type == "revolute" else 1.0
         low = joint.lower if math.isfinite(joint.lower) else -widest
         high = joint.upper if math.isfinite(joint.upper) else widest
         if joint.type == "revolute":  # further turns show nothing new
             low, high = max(low, -math.pi), min(high, math.pi)
+        seen = robot.fitted_range.get(f"q{k}", (low, high))
+        low, high = max(low, seen[0]), min(high, seen[1])
         columns.append(rng.uniform(low, high, POSES) if low < high else np.full(POSES, low))
     shape = (POSES, len(columns))
 

@@ -36,7 +36,9 @@ _CONF_KEYS = ("delta_theta", "delta_a", "delta_d", "delta_alpha")
 _KNOWN_STATUS = {0: "not initialised", 1: "not linearised", 2: "linearised"}
 _LINEARISED = 2
 _LARGEST = 64_000_000  # bytes of a program, unpacked
-_LARGEST_D = 1e5  # [m]
+_LARGEST_D = 1e5  # [m] as written
+_LARGEST_TWIST = 2 * math.pi  # [rad]
+_LONGEST = 3.0  # [m] link of an arm of this maker
 _NEAR_PARALLEL = math.radians(10)
 _FIT = 0.01  # [m] that an arm's lengths are off its data sheet at most
 _FIT_ANGLE = 0.05  # [rad]
@@ -265,13 +267,14 @@ def _numbers(path: Path, entries: Mapping[str, tuple[int, str]], key: str) -> Fl
         values = np.array([float(word) for word in text[1:-1].split(",")])
     except ValueError:
         raise InputError(f"{path}, line {line}: {key} = {shown(text)}, expected [six numbers]") from None
-    return _checked(f"{path}, line {line}: {key}", values, length=key in ("delta_a", "delta_d"))
+    return _checked(f"{path}, line {line}: {key}", values, key.removeprefix("delta_"))
 
 
-def _checked(where: str, values: Floats, length: bool) -> Floats:
+def _checked(where: str, values: Floats, key: str) -> Floats:
+    length = key in ("a", "d")
     if values.shape != (6,):
         raise InputError(f"{where}: found {values.size} numbers, expected six, one for each joint")
-    most = _LARGEST_D if length else 100.0
+    most = _LARGEST_D if length else _LARGEST_TWIST if key == "alpha" else 100.0
     if not (np.abs(values) < most).all():
         raise InputError(
             f"{where}: found {values.tolist()}, expected {'lengths in m' if length else 'angles in rad'}"
@@ -343,6 +346,9 @@ def robot_from_urp(path: Path, arm: str) -> ControllerModel:
             f"{path}: its kinematics are not those of {sheet.name}"
             + (f", but of {nearest.name}" if nearest is not None else "")
         )
+    longest = max(float(np.abs(table.a).max()), float(np.abs(table.d).max()))
+    if longest > _LONGEST:
+        raise InputError(f"{path}: its kinematics have a link of {longest:.1f} m: they are no arm's")
     robot = _robot(path, table, sheet, path.stem)
     tool, tool_said = _tool(path, root)
     robot = robot.replace(targets=[_core.Target("tool", tool)])
@@ -438,7 +444,7 @@ def _row(path: Path, where: str, values: Mapping[str, str], key: str) -> tuple[f
         numbers = np.array([float(word) for word in values[key].split(",")])
     except ValueError:
         raise InputError(f"{path}: {where}: {key} = {shown(values[key])}, expected six numbers") from None
-    return tuple(_checked(f"{path}: {where}: {key}", numbers, length=key in ("a", "d")).tolist())
+    return tuple(_checked(f"{path}: {where}: {key}", numbers, key).tolist())
 
 
 def _chosen(found: Sequence[_Kinematics]) -> tuple[_Kinematics, list[_Kinematics]]:
@@ -491,6 +497,12 @@ def _urp_warnings(
     path: Path, robot: _core.Robot, chosen: _Kinematics, rest: Sequence[_Kinematics], sheet: Arm | None
 ) -> list[str]:
     said = []
+    if sheet is None:
+        said.append(
+            f"{path.name}: its links are of no arm whose data sheet is known here"
+            f" ({listed([a.name for a in arms_of(_MAKER)])}): masses are not known, and limits are one turn"
+            " each way"
+        )
     if not chosen.initialised or not chosen.valid_checksum:
         said.append(
             f"{path.name}: its kinematics are not calibrated (status not LINEARIZED, or checksum not valid):"

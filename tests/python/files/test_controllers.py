@@ -186,6 +186,8 @@ BAD_URP = [
     (urp().encode(), "holds no kinematics"),
     (urp(kinematics().replace("-11.98", "x")).encode(), "waypoint Point_1: d = .*expected six numbers"),
     (urp(kinematics().replace("<a value", "<b value")).encode(), "waypoint Point_1: <Kinematics> has no <a>"),
+    (urp(kinematics(d1="400")).encode(), "have a link of 400.0 m: they are no arm's"),
+    (urp(kinematics().replace("1.5705736146", "90.0")).encode(), "alpha: found .* expected angles in rad"),
     (urp(kinematics(), tool="1,2").encode(), "TCPOffset '1,2', expected x, y, z, rx, ry, rz"),
 ]
 
@@ -194,6 +196,15 @@ BAD_URP = [
 def test_a_program_that_cannot_be_used_is_refused(tmp_path: Path, data: bytes, message: str) -> None:
     with pytest.raises(truing.InputError, match=message):
         load_robot(written(tmp_path, data, "p.urp"))
+
+
+def test_an_arm_without_a_data_sheet_is_still_an_arm(tmp_path: Path) -> None:
+    path = written(tmp_path, urp(kinematics(d1="0.28107019996630838")), "p.urp")
+    with pytest.warns(truing.InputWarning, match="of no arm whose data sheet is known here"):
+        robot = load_robot(path)
+    assert robot.joints[1].a == pytest.approx(-0.6127, abs=1e-3)
+    assert robot.joints[1].d == 0.0
+    assert robot.joints[1].mass is None
 
 
 def test_the_kinematics_of_a_data_sheet_are_no_calibration(tmp_path: Path) -> None:
@@ -451,3 +462,62 @@ def test_an_arm_is_for_files_of_controllers_alone(tmp_path: Path) -> None:
     save_robot(tmp_path / "robot.yaml", ARMS["ur5"].robot())
     with pytest.raises(truing.InputError, match="an arm is named for files of controllers"):
         load_robot(tmp_path / "robot.yaml", arm="ur5")
+
+
+# ---- Faults --------------------------------------------------------------------------------------
+
+FAULTS = [
+    b"0",
+    b"1",
+    b"5",
+    b"9",
+    b"-",
+    b".",
+    b"e",
+    b"nan",
+    b"\0",
+    b"\xff",
+    b'"',
+    b"\\",
+    b"",
+    b"<",
+    b"]",
+    b"1e400",
+]
+
+
+@pytest.mark.filterwarnings("ignore::truing.InputWarning")
+@pytest.mark.parametrize(
+    ("name", "text", "arm"),
+    [
+        ("calibration.conf", conf(UR5), "ur5"),
+        ("program.urp", urp(kinematics(), kinematics(d1="0.19")), ""),
+        (
+            "MOC.cfg",
+            moc(more=" -base_frame_pos_x 1", after='TRANSMISSION:\n\n -name "rob1_1" -transm_joint 4\n'),
+            "",
+        ),
+        ("follower.json", json.dumps(MOTORS), ""),
+    ],
+)
+def test_a_file_with_faults_is_refused_in_one_line_or_is_a_robot_that_can_be_saved(
+    tmp_path: Path, name: str, text: str, arm: str
+) -> None:
+    written(tmp_path, small_urdf(), "arm.urdf")
+    rng = np.random.default_rng(11)
+    refused = 0
+    for _ in range(100):
+        data = bytearray(text.encode())
+        for place in rng.integers(0, len(data), rng.integers(1, 3)):
+            data[place : place + 1] = FAULTS[rng.integers(len(FAULTS))]
+        try:
+            model = load_controller(written(tmp_path, bytes(data), name), arm)
+        except truing.InputError as error:
+            refused += 1
+            assert "\n" not in str(error)
+            continue
+        save_robot(tmp_path / "robot.yaml", model.robot, calibration=model.calibration)
+        again = load_robot(tmp_path / "robot.yaml")
+        q = np.full(again.driven_count, 0.5)
+        assert np.isfinite(truing.forward_kinematics(again, q)).all()
+    assert 20 < refused < 100
