@@ -47,6 +47,7 @@ from truing.files.measurement_file import (
 from truing.files.recording_file import load_recordings as load_recordings
 from truing.files.robot_file import (
     any_robot as any_robot,
+    is_controller as is_controller,
     is_urdf as is_urdf,
     load_calibration as load_calibration,
     load_controller as load_controller,

@@ -232,6 +232,11 @@ def load_controller(
     raise InputError(f"{path}: is no file of a controller, expected {listed(_CONTROLLER_SUFFIXES)}")
 
 
+def is_controller(path: PathLike) -> bool:
+    """Whether a robot file is one of a controller's, by its ending."""
+    return split_arm(os.fspath(path))[0].suffix.lower() in _CONTROLLER_SUFFIXES
+
+
 def any_robot(path: PathLike, arm: str = "", base_link: str = "", tip_link: str = "") -> ControllerModel:
     """A robot from any of its files, a controller's or not, with what the file says besides. Raises
     InputError.
@@ -241,7 +246,7 @@ def any_robot(path: PathLike, arm: str = "", base_link: str = "", tip_link: str 
         return load_controller(file, name, base_link, tip_link)
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", InputWarning)
-        robot = load_robot(file, base_link, tip_link, arm=name)
+        robot = load_robot(file, base_link, tip_link)
     masses = sum(joint.mass is not None for joint in robot.joints)
     return ControllerModel(
         robot=robot,

@@ -43,6 +43,9 @@ def test_two_files_are_compared(conf: Path, capsys: pytest.CaptureFixture[str]) 
     out = conf.with_name("one.yaml")
     assert main(["load", f"{conf}@ur5", "--out", str(out)]) == 0
     capsys.readouterr()
+    other = conf.with_name("other.yaml")
+    assert main(["load", str(conf), str(out), "--arm", "ur5", "--out", str(other), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["apart_m"] == [0.0]
     assert main(["load", f"{conf}@ur5", f"{conf}@ur5e", "--json", "--out", str(out)]) == 0
     result = json.loads(capsys.readouterr().out)
     assert [file["arm"] for file in result["files"]] == ["ur5", "ur5e"]
@@ -57,6 +60,7 @@ def test_two_files_are_compared(conf: Path, capsys: pytest.CaptureFixture[str]) 
         (["calibration.conf@ur5", "--out", "calibration.conf"], "is an input of this run"),
         (["calibration.conf@ur5", "--out", "no/folder.yaml"], "cannot be written"),
         (["calibration.conf@ur5", "calibration.conf"], "does not say which arm"),
+        (["robot.yaml", "--arm", "ur5"], "--arm ur5: names the arm of a controller's file"),
     ],
 )
 def test_nothing_is_written_of_bad_input(

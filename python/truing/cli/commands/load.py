@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Say what a robot file holds, a controller's above all, and write it as robot.yaml.
+"""Say what a robot file holds, a controller's above all, and write it as a robot.yaml.
 
 Reads robot.yaml, URDF, MJCF, calibration.conf and .urp of Universal Robots, MOC.cfg of ABB, LeRobot's
-calibration. Of several files it says how far their robots are apart; robot.yaml is the first one's.
+calibration. Of several files it says how far their robots are apart; what is written is the first one.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ PANEL = "Calibrate"
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    folder: ClassVar[str] = "robot.yaml"
+    folder: ClassVar[str] = "controller.yaml"
 
     files: Annotated[
         Sequence[Path],
@@ -41,9 +41,13 @@ class Command:
 
     def run(self) -> int:
         from truing.errors import InputError
-        from truing.files import save_robot
+        from truing.files import is_controller, save_robot
         from truing.files.output import files_read
 
+        if self.arm and not any(is_controller(str(file)) for file in self.files):
+            raise InputError(
+                f"--arm {self.arm}: names the arm of a controller's file, and none of these is one"
+            )
         with files_read() as read:
             models = [self._load(str(file)) for file in self.files]
         apart = [_apart(models[0], model) for model in models[1:]]
