@@ -17,6 +17,7 @@ from truing import (
     identification as identification,
     inverse_kinematics as inverse_kinematics,
     model as model,
+    performance as performance,
     planning as planning,
     testing as testing,
     tracking as tracking,

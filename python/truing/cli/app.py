@@ -32,7 +32,7 @@ from truing.errors import InputError
 
 COMMANDS = Path(__file__).parent / "commands"
 
-PANELS = ("Calibrate", "Diagnose", "Hand-eye", "Inverse kinematics", "Track", "Dynamics", "Try out")
+PANELS = ("Calibrate", "Diagnose", "Hand-eye", "Inverse kinematics", "Apply", "Track", "Dynamics", "Try out")
 """Headings of `truing --help` in their order; others come last."""
 
 _WIDEST = 24  # characters of a metavar

@@ -44,6 +44,13 @@ from truing.files.measurement_file import (
     load_measurements as load_measurements,
     save_measurements as save_measurements,
 )
+from truing.files.mjcf_file import is_mjcf as is_mjcf
+from truing.files.performance_file import (
+    CommandedPoses as CommandedPoses,
+    MeasuredPoses as MeasuredPoses,
+    load_commanded as load_commanded,
+    load_measured as load_measured,
+)
 from truing.files.recording_file import load_recordings as load_recordings
 from truing.files.robot_file import (
     any_robot as any_robot,

@@ -38,6 +38,7 @@ ROOMS: dict[str, set[str]] = {
     "inverse_kinematics": BASIC,
     "dynamics": BASIC | {"identification"},
     "controllers": BASIC | {"identification"},
+    "performance": BASIC | {"identification", "inverse_kinematics"},
     "tracking": BASIC | {"hand_eye"},
     "testing": BASIC,
     "exam": {"truing", "model", "report"},  # of both only what test_exam.py allows
@@ -70,6 +71,7 @@ FLOORS = {
         "lerobot_calibration",
         "robot_file",
         "measurement_file",
+        "performance_file",
         "recording_parts",
         "recording_table",
         "recording_bag",
