@@ -10,3 +10,13 @@ from truing.performance.api import (
     WarmUp as WarmUp,
     assess as assess,
 )
+from truing.performance.drive import (
+    DriveOptions as DriveOptions,
+    performance_programs as performance_programs,
+)
+from truing.performance.plan import (
+    Cube as Cube,
+    PerformancePlan as PerformancePlan,
+    PlanOptions as PlanOptions,
+    plan_test as plan_test,
+)

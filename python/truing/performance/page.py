@@ -5,12 +5,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations, product
 from typing import Any
 
-from truing.report.charts import AFTER, BEFORE, MUTED
-from truing.report.page import Page, footer, part_of_page, warnings_card
-from truing.report.words import angle_text, escaped, figures_text, length_text
+import numpy as np
+from numpy.typing import NDArray
 
+from truing.report.charts import AFTER, BEFORE, INK, MUTED
+from truing.report.page import Page, footer, part_of_page, warnings_card
+from truing.report.scene import Scene3d, polyline
+from truing.report.words import angle_text, counted, escaped, figures_text, length_text
+
+Floats = NDArray[np.float64]
 Row = Mapping[str, Any]
 
 NAMES = {
@@ -302,4 +308,72 @@ def _not_found(result: Mapping[str, Any]) -> str:
     )
     return (
         f'<section class="card"><h2>Not found</h2><ul class="plain">{items}</ul></section>' if items else ""
+    )
+
+
+# ---- The plan ----------------------------------------------------------------------------------------------
+
+
+def performance_plan_report(
+    result: Mapping[str, Any], names: Sequence[str], paths: Sequence[str], positions: Floats
+) -> str:
+    """The report of ``truing performance plan``. positions: shape=(n, 3) [m] of the poses in the base."""
+    page = Page(f"{result['robot'] or 'Robot'}: performance test", part_of_page("performance"))
+    cube = result["cube"]
+    centre = np.array(cube["centre_m"])
+    place = ", ".join(length_text(value) for value in cube["centre_m"])
+    speeds = ", ".join(f"{speed:g}" for speed in result["speeds_percent"])
+    page.add(
+        f'<header><p class="kicker">truing performance plan · {escaped(result["robot"])} ·'
+        f" {escaped(result['standard'])}</p><h1>A cube of"
+        f' <span class="after">{length_text(cube["edge_m"])}</span>, {counted(result["sheet_rows"], "row")} to'
+        f' measure.</h1><p class="sub">Its centre is at {place} in the robot\'s base. Poses'
+        f" {result['cycles']['pose']} times, paths {result['cycles']['path']} times, at {speeds} % of the rated"
+        " speed, with the rated load; the warm-up comes first, from cold.</p></header>"
+    )
+    page.add('<section class="card"><h2>The cube, its poses and paths</h2>')
+    scene = Scene3d()
+    half = 0.5 * cube["edge_m"]
+    scene.add_line(polyline(_edges(centre, half)), "cube", MUTED, 2, 1)
+    for path, colour in zip(dict.fromkeys(filter(None, paths)), _COLOURS, strict=False):
+        on_path = positions[[one == path for one in paths]]
+        scene.add_line(on_path, path, colour, 5, 2)
+    single = [k for k, path in enumerate(paths) if not path]
+    scene.add_points(
+        positions[single],
+        "poses",
+        {"size": 5, "color": INK},
+        {"text": [names[k] for k in single], "hovertemplate": "%{text}<extra></extra>"},
+        flat_size=7,
+    )
+    scene.draw(page, eye=(1.2, -1.6, 0.8), center=-0.1, size="cloud")
+    page.add("</section>")
+    page.add(_poses_table(names, paths, positions))
+    page.add(warnings_card(result))
+    page.add(footer(result))
+    return page.html()
+
+
+def _edges(centre: Floats, half: float) -> list[Floats]:
+    """The twelve edges of a cube, shape=(2, 3) each."""
+    corners = [np.array(signs) for signs in product((-1.0, 1.0), repeat=3)]
+    return [
+        np.array([centre + half * a, centre + half * b])
+        for a, b in combinations(corners, 2)
+        if np.abs(a - b).sum() == 2
+    ]
+
+
+def _poses_table(names: Sequence[str], paths: Sequence[str], positions: Floats) -> str:
+    rows = "".join(
+        f"<tr><th>{escaped(name)}</th>{''.join(f'<td>{1e3 * value:.3f}</td>' for value in position)}</tr>"
+        for name, path, position in zip(names, paths, positions, strict=True)
+        if not path
+    )
+    return (
+        '<section class="card"><h2>Commanded poses, in the base</h2><div class="scroll"><table'
+        ' class="iso"><thead><tr><th>pose</th><th>x [mm]</th><th>y [mm]</th><th>z [mm]</th></tr></thead>'
+        f'<tbody>{rows}</tbody></table></div><p class="note">P1.1 … are where approaches begin, along x, y,'
+        " z of the base. Orientations and the points of the paths are in poses.csv. Look through the programs at"
+        " low speed first: collisions are not known here.</p></section>"
     )

@@ -13,16 +13,22 @@ from typing import Any
 import numpy as np
 
 from truing import _core
+from truing.errors import InputError
+from truing.files.common import frame_dict, joint_columns, write_table
 from truing.performance.api import USUAL_CYCLES, Assessment, Quantity, WarmUp
-from truing.performance.page import performance_report
+from truing.performance.drive import DriveOptions, performance_programs, program_files
+from truing.performance.page import performance_plan_report, performance_report
+from truing.performance.plan import SHEET, PerformancePlan, sheet_rows
+from truing.programs.write import BRANDS
 from truing.report.json_text import to_json, without_nan
 
 PERFORMANCE_FORMAT = "truing-performance/1"
+PLAN_FORMAT = "truing-performance-plan/1"
 FLOOR_SHARE = 0.25  # an instrument's uncertainty above this share of a value is said
 
 
 @dataclass(frozen=True)
-class TestNotes:
+class ReportNotes:
     """What a report says of how the test was made."""
 
     robot: str = ""
@@ -37,7 +43,7 @@ class TestNotes:
 def performance_dict(
     found: Mapping[str, Assessment],
     files: Mapping[str, Path],
-    notes: TestNotes,
+    notes: ReportNotes,
     *,
     commanded: Path | None = None,
     seed: int = 0,
@@ -114,7 +120,7 @@ def _quantity_dict(one: Quantity) -> dict[str, Any]:
     }
 
 
-def _value_dict(one: Quantity, notes: TestNotes) -> dict[str, Any]:
+def _value_dict(one: Quantity, notes: ReportNotes) -> dict[str, Any]:
     uncertainty = notes.length_uncertainty if one.unit == "m" else notes.angle_uncertainty
     return {
         "value": one.value,
@@ -146,7 +152,7 @@ def write_performance(
     folder: Path,
     found: Mapping[str, Assessment],
     files: Mapping[str, Path],
-    notes: TestNotes,
+    notes: ReportNotes,
     *,
     commanded: Path | None = None,
     seed: int = 0,
@@ -161,3 +167,93 @@ def write_performance(
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     (folder / "report.html").write_text(performance_report(result), encoding="utf-8")
     return result
+
+
+def write_performance_plan(
+    folder: Path,
+    robot: _core.Robot,
+    planned: PerformancePlan,
+    drive: DriveOptions,
+    *,
+    warnings: Iterable[str] = (),
+) -> dict[str, Any]:
+    """Writes everything that ``truing performance plan`` makes into `folder`, and returns what result.json
+    holds.
+    """
+    said = list(warnings)
+    try:
+        programs = program_files(performance_programs(robot, planned, drive))
+    except InputError as error:
+        programs = {}
+        said.append(f"no programs are written: {error}")
+    for name, text in programs.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        # Bytes: lines end as the controller wants them, whatever this machine does.
+        (folder / name).write_bytes(text.encode("ascii"))
+    write_table(folder / "poses.csv", commanded_columns(planned))
+    write_table(folder / "joints.csv", {"pose": list(planned.names), **joint_columns(robot, planned.joints)})
+    sheet = sheet_columns(robot, planned)
+    write_table(folder / "sheet.csv", sheet)
+    cube = planned.cube
+    result: dict[str, Any] = without_nan(
+        {
+            "format": PLAN_FORMAT,
+            "version": _core.version(),
+            "standard": "ISO 9283:1998",
+            "robot": robot.name,
+            "cube": {
+                "centre_m": cube.centre.tolist(),
+                "edge_m": cube.edge,
+                "tool": frame_dict(planned.frame("P1")),
+            },
+            "poses": sum(not path for path in planned.path),
+            "paths": planned.paths(),
+            "cycles": {
+                "pose": planned.options.cycles,
+                "approach": planned.options.cycles,
+                "path": planned.options.path_cycles,
+                "warm-up": planned.options.warm_up_cycles,
+            },
+            "speeds_percent": list(planned.options.speeds),
+            "rated_speed_m_s": drive.rated_speed,
+            "dwell_s": drive.dwell,
+            "sheet_rows": len(next(iter(sheet.values()))),
+            "programs": [brand for brand in BRANDS if any(n.startswith(f"{brand}/") for n in programs)],
+            "warnings": said,
+        }
+    )
+    (folder / "result.json").write_text(to_json(result), encoding="utf-8")
+    page = performance_plan_report(result, planned.names, planned.path, planned.T_base_tool[:, :3, 3])
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    return result
+
+
+def commanded_columns(planned: PerformancePlan) -> dict[str, Any]:
+    """Columns of poses.csv."""
+    frames = [frame_dict(T) for T in planned.T_base_tool]
+    point = np.array([number or np.nan for number in planned.point], dtype=np.float64)
+    return {
+        "pose": list(planned.names),
+        **{name: np.array([frame[name] for frame in frames]) for name in frames[0]},
+        "path": [path or None for path in planned.path],
+        "point": point,
+    }
+
+
+def sheet_columns(robot: _core.Robot, planned: PerformancePlan) -> dict[str, Any]:
+    """Columns of sheet.csv: what is measured in which order, and empty cells for it."""
+    rows = list(sheet_rows(planned))
+    texts = {name: [row[name] or None for row in rows] for name in ("test", "pose", "path")}
+    numbers = {
+        name: np.array([np.nan if row[name] is None else row[name] for row in rows], dtype=np.float64)
+        for name in SHEET[3:]
+    }
+    place = {name: k for k, name in enumerate(planned.names)}
+    joints = planned.joints[[place[row["pose"] or f"{row['path']}.{row['point']}"] for row in rows]]
+    empty = np.full(len(rows), np.nan)
+    return {
+        **texts,
+        **numbers,
+        **joint_columns(robot, joints),
+        **{name: empty for name in ("t_s", "temp_C", "x_mm", "y_mm", "z_mm")},
+    }

@@ -111,9 +111,9 @@ class Command(run.Command[Loaded, "dict[str, Assessment]"]):
     def write(
         self, folder: Path, loaded: Loaded, found: dict[str, Assessment], warnings: list[str]
     ) -> Mapping[str, Any]:
-        from truing.performance.result import TestNotes, write_performance
+        from truing.performance.result import ReportNotes, write_performance
 
-        notes = TestNotes(
+        notes = ReportNotes(
             robot="" if loaded.robot is None else loaded.robot.name,
             instrument=self.instrument,
             length_uncertainty=self.instrument_uncertainty,
