@@ -19,6 +19,7 @@ from truing import (
     model as model,
     performance as performance,
     planning as planning,
+    programs as programs,
     testing as testing,
     tracking as tracking,
 )

@@ -19,6 +19,7 @@ Coverage, measured: tests/python/performance/test_coverage.py and docs/guide/per
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,8 @@ Floats = NDArray[np.float64]
 Interval = tuple[float, float]
 DRAWS = 1000
 TAIL = 0.025
-_NORMAL_TAIL = -1.2816  # a tenth of the normal distribution lies below
+_KNOWN_TAIL = 0.1  # beyond the end as if the place of a maximum were known: it is not, so that less is beyond
+_NORMAL_TENTH = 1.2816  # above it lies a tenth of the normal distribution, as beyond that end
 _STEPS = 26  # of the bisection: the end of an interval to 1e-7 of the bracket
 _LENGTH_DRAWS = 4000
 
@@ -141,13 +143,18 @@ def directions_interval(directions: Sequence[Floats], rng: np.random.Generator) 
     errors = [mean_errors(attained, rng) for attained in directions]
     middle = np.mean(means, axis=0)
     observed = float(largest_distance(means))
-    return inverted(
+    if observed == 0:
+        return 0.0, 0.0
+    low, high = inverted(
         observed,
         lambda size: size * observed,
         lambda size: largest_distance(
             [size * (mean - middle) + error for mean, error in zip(means, errors, strict=True)]
         ),
     )
+    i, j = max(combinations(range(len(means)), 2), key=lambda k: np.linalg.norm(means[k[0]] - means[k[1]]))
+    along = (errors[i] - errors[j]) @ (means[i] - means[j]) / observed
+    return low, max(high, observed + float(np.quantile(along, 1 - _KNOWN_TAIL)))
 
 
 def path_interval(offsets: Floats, rng: np.random.Generator) -> Interval:
@@ -174,16 +181,12 @@ def path_repeatability_interval(attained: Floats, rng: np.random.Generator) -> I
     for k in range(DRAWS):  # all points of a cycle are drawn together: neighbours go together
         drawn = (rng.standard_normal((n, n)) @ centred / np.sqrt(n - 1)).reshape(attained.shape)
         ratios[k] = pose_repeatability(np.moveaxis(drawn, 0, 1)) / true
-    # The lower end for a profile that chance made uneven, the upper end for one that is as uneven as it looks.
-    logarithms = np.log(found / found.mean())
-    ends = [
-        np.quantile(np.log((profile * ratios).max(axis=1) / profile.max()), tail)
-        for profile, tail in (
-            (np.exp(_shrunk(logarithms, np.log(ratios))), 1 - TAIL),
-            (np.exp(logarithms), TAIL),
-        )
-    ]
-    return float(found.max() * np.exp(-ends[0])), float(found.max() * np.exp(-ends[1]))
+    # The lower end for a profile that chance made uneven; the upper end as if it were known which point is
+    # the worst, which a point that is much worse than its neighbours is.
+    profile = np.exp(_shrunk(np.log(found / found.mean()), np.log(ratios)))
+    high = np.quantile(np.log((profile * ratios).max(axis=1) / profile.max()), 1 - TAIL)
+    low = np.quantile(np.log(ratios[:, np.argmax(found)]), _KNOWN_TAIL)
+    return float(found.max() * np.exp(-high)), float(found.max() * np.exp(-low))
 
 
 def accuracy_drift_interval(offsets: Floats, time: Floats, rng: np.random.Generator) -> Interval:
@@ -244,7 +247,7 @@ def _end_at_largest(curve: Floats, drawn: Floats) -> float:
     """
     place = int(np.argmax(np.abs(curve - curve[0])))
     deviation = float((drawn[:, place] - drawn[:, 0]).std())
-    return float(abs(curve[place] - curve[0])) - _NORMAL_TAIL * deviation
+    return float(abs(curve[place] - curve[0])) + _NORMAL_TENTH * deviation
 
 
 # ---- Parts -------------------------------------------------------------------------------------------------

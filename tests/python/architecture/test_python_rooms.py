@@ -38,7 +38,8 @@ ROOMS: dict[str, set[str]] = {
     "inverse_kinematics": BASIC,
     "dynamics": BASIC | {"identification"},
     "controllers": BASIC | {"identification"},
-    "performance": BASIC | {"identification", "inverse_kinematics"},
+    "programs": {"errors", "files"},
+    "performance": BASIC | {"identification", "inverse_kinematics", "programs"},
     "tracking": BASIC | {"hand_eye"},
     "testing": BASIC,
     "exam": {"truing", "model", "report"},  # of both only what test_exam.py allows

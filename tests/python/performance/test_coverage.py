@@ -126,6 +126,21 @@ def test_an_interval_of_95_percent_holds_the_truth_in_93_to_97(name: str) -> Non
     assert 0.93 <= coverage(CASES[name], 500) <= 0.97
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "least"), [("uniform", 0.92), ("heavy", 0.88)])
+def test_a_scatter_that_is_not_normal_is_held_less_often(name: str, least: float) -> None:
+    """The price of normal draws, told in the guide."""
+
+    def draw(rng: Random, rows: int) -> Floats:
+        found = rng.uniform(-1, 1, (rows, 3)) if name == "uniform" else rng.standard_t(6, (rows, 3))
+        return np.asarray(1e-5 * found)
+
+    lengths = np.linalg.norm(draw(np.random.default_rng(11), 1_000_000), axis=-1)
+    truth = float(lengths.mean() + 3 * lengths.std())
+    case = Case(lambda rng: draw(rng, 30), intervals.repeatability_interval, truth)
+    assert least <= coverage(case, 500) <= 0.97
+
+
 def test_an_accuracy_of_nothing_has_an_interval_from_zero() -> None:
     low, high = intervals.length_interval(scatter(np.random.default_rng(5), 30), np.random.default_rng(6))
     assert low == 0 and 0 < high < 2e-5
