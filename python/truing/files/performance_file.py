@@ -78,8 +78,8 @@ class MeasuredPoses:
 
 
 def load_commanded(path: PathLike) -> CommandedPoses:
-    """Reads commanded poses: columns pose, x_m y_m z_m (_mm), qw … qz if orientations count; path and point of
-    path points. Raises InputError for anything else that is amiss, with line and column.
+    """Reads commanded poses: columns pose, x_m y_m z_m (_mm), qw … qz if orientations count; path and point
+    of path points. Raises InputError for anything else that is amiss, with line and column.
     """
     reader = _Reader(Table(Path(path)), ("pose", "path"), ("point",))
     reader.require("pose", "the names of the commanded poses")
@@ -98,8 +98,8 @@ def load_commanded(path: PathLike) -> CommandedPoses:
 
 
 def load_measured(path: PathLike) -> MeasuredPoses:
-    """Reads the measurements of a performance test: columns x_m y_m z_m (_mm), pose (or path), cycle; optional
-    test, approach, point, block, load_percent, speed_percent, qw … qz, t_s, temp_C, q1_rad …. Raises
+    """Reads the measurements of a performance test: columns x_m y_m z_m (_mm), pose (or path), cycle;
+    optional test, approach, point, block, load_percent, speed_percent, qw … qz, t_s, temp_C, q1_rad …. Raises
     InputError for anything else that is amiss, with line and column.
     """
     reader = _Reader(Table(Path(path)), _LABELS, (*_WHOLE, *_PLAIN))

@@ -406,7 +406,7 @@ def _paths(found: _Found) -> None:
 
 
 def _path_points(found: _Found, path: str, rows: Ints) -> tuple[Floats, Floats | None]:
-    """Where every cycle crossed the planes of the path's points, shape=(n, m, 3), and the commanded points."""
+    """Where every cycle crossed the planes of the path's points, shape=(n, m, 3); the commanded points."""
     m = found.measured
     command = None
     if found.commanded is not None and (of_path := found.commanded.path_rows(path)).size:

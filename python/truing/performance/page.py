@@ -289,8 +289,8 @@ def _thermal_words(course: Row) -> str:
     names = ", ".join(escaped(name) for name in course["thermal_effects"])
     return (
         f"{escaped(course['label'])}, {escaped(course['pose'])}: moved by up to"
-        f" {length_text(max(course['travel_m']))}; with the thermal effects of the catalogue compensated, each"
-        " block predicted from others, the farthest block is"
+        f" {length_text(max(course['travel_m']))}; with the thermal effects of the catalogue compensated,"
+        " each block predicted from others, the farthest block is"
         f" {length_text(max(course['compensated_m']))} from the mean ({names})"
     )
 
@@ -326,10 +326,10 @@ def performance_plan_report(
     page.add(
         f'<header><p class="kicker">truing performance plan · {escaped(result["robot"])} ·'
         f" {escaped(result['standard'])}</p><h1>A cube of"
-        f' <span class="after">{length_text(cube["edge_m"])}</span>, {counted(result["sheet_rows"], "row")} to'
-        f' measure.</h1><p class="sub">Its centre is at {place} in the robot\'s base. Poses'
-        f" {result['cycles']['pose']} times, paths {result['cycles']['path']} times, at {speeds} % of the rated"
-        " speed, with the rated load; the warm-up comes first, from cold.</p></header>"
+        f' <span class="after">{length_text(cube["edge_m"])}</span>, {counted(result["sheet_rows"], "row")}'
+        f' to measure.</h1><p class="sub">Its centre is at {place} in the robot\'s base. Poses'
+        f" {result['cycles']['pose']} times, paths {result['cycles']['path']} times, at {speeds} % of the"
+        " rated speed, with the rated load; the warm-up comes first, from cold.</p></header>"
     )
     page.add('<section class="card"><h2>The cube, its poses and paths</h2>')
     scene = Scene3d()
@@ -374,6 +374,6 @@ def _poses_table(names: Sequence[str], paths: Sequence[str], positions: Floats) 
         '<section class="card"><h2>Commanded poses, in the base</h2><div class="scroll"><table'
         ' class="iso"><thead><tr><th>pose</th><th>x [mm]</th><th>y [mm]</th><th>z [mm]</th></tr></thead>'
         f'<tbody>{rows}</tbody></table></div><p class="note">P1.1 … are where approaches begin, along x, y,'
-        " z of the base. Orientations and the points of the paths are in poses.csv. Look through the programs at"
-        " low speed first: collisions are not known here.</p></section>"
+        " z of the base. Orientations and the points of the paths are in poses.csv. Look through the programs"
+        " at low speed first: collisions are not known here.</p></section>"
     )

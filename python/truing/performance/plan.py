@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""What to drive for ISO 9283: the cube, its poses and paths (6.8), and the order of the cycles (6.9, 6.10)."""
+"""What to drive for ISO 9283: the cube, its poses and paths (6.8), the order of the cycles (6.9, 6.10)."""
 
 from __future__ import annotations
 

@@ -56,8 +56,8 @@ def distances(first: Floats, second: Floats) -> Floats:
 def path_accuracy(attained: Floats, commanded: Floats) -> Floats:
     """AT (8.2): the largest distance of the mean path from the commanded one.
 
-    attained: shape=(..., n, m, 3) [m], where cycle j crosses the plane that is normal to the commanded path at
-    its point i. commanded: shape=(m, 3) [m].
+    attained: shape=(..., n, m, 3) [m], where cycle j crosses the plane that is normal to the commanded path
+    at its point i. commanded: shape=(m, 3) [m].
     """
     return np.asarray(np.linalg.norm(attained.mean(axis=-3) - commanded, axis=-1).max(axis=-1))
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""What ``truing performance`` writes: ``result.json``, the report, and of a plan the files to drive and fill in."""
+"""What ``truing performance`` writes: ``result.json``, the report, of a plan what to drive and to fill in."""
 
 from __future__ import annotations
 

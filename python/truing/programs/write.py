@@ -10,9 +10,9 @@
 | ur | URScript | `name.script` |
 | yaskawa | INFORM | `NAME.JBI` |
 
-What is written is plain: Cartesian targets in the robot's base, a stop at each, a first joint motion that sets
-the configuration where the language has one. What a text cannot set (tool numbers of FANUC and Yaskawa, their
-configurations) stands in a comment at its top.
+What is written is plain: Cartesian targets in the robot's base, a stop at each, a first joint motion that
+sets the configuration where the language has one. What a text cannot set (tool numbers of FANUC and Yaskawa,
+their configurations) stands in a comment at its top.
 """
 
 from __future__ import annotations

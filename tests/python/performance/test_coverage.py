@@ -127,8 +127,8 @@ def test_an_interval_of_95_percent_holds_the_truth_in_93_to_97(name: str) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "least"), [("uniform", 0.92), ("heavy", 0.88)])
-def test_a_scatter_that_is_not_normal_is_held_less_often(name: str, least: float) -> None:
+@pytest.mark.parametrize(("name", "least"), [("uniform", 0.93), ("heavy", 0.90)])
+def test_a_scatter_that_is_not_normal_is_held_nearly_as_often(name: str, least: float) -> None:
     """The price of normal draws, told in the guide."""
 
     def draw(rng: Random, rows: int) -> Floats:

@@ -82,7 +82,7 @@ def test_a_cube_may_be_asked_for(robot: truing.Robot) -> None:
 def test_the_files_of_a_plan_are_a_test_from_sheet_to_report(
     robot: truing.Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A simulated robot, its second joint off by 1 mrad, fills in the sheet; the report finds where it went."""
+    """A simulated robot, its second joint off by 1 mrad, fills in the sheet; the report finds where it is."""
     monkeypatch.chdir(tmp_path)
     options = ["--cycles", "5", "--path-cycles", "3", "--warm-up-blocks", "2", "--speeds", "100,10"]
     assert main(["performance", "plan", str(EXAMPLES / "irb120.yaml"), "--out", "plan", *options]) == 0

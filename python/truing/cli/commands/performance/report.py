@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Say how accurate and repeatable a robot is, after ISO 9283, each number with its 95 % interval.
 
-Several files stand side by side, nominal, calibrated and compensated, say. Writes result.json and report.html,
-whose first part prints on one page.
+Several files stand side by side, nominal, calibrated and compensated, say. Writes result.json and
+report.html, whose first part prints on one page.
 """
 
 from __future__ import annotations
