@@ -55,6 +55,7 @@ FLOORS = {
         "output",
         "common",
         "brand_frames",
+        "programs",
         "table",
         "yaml_tree",
         "plausibility",
@@ -83,6 +84,7 @@ FLOORS = {
         "target_file",
         "uncertainty_file",
     ],
+    "files/programs": ["text", "model", "flow", "krl"],
     "exam": [
         "robots",
         "kinematics",
