@@ -84,7 +84,7 @@ FLOORS = {
         "target_file",
         "uncertainty_file",
     ],
-    "files/programs": ["text", "model", "flow", "krl", "rapid", "fanuc"],
+    "files/programs": ["text", "model", "flow", "krl", "rapid", "fanuc", "urscript", "inform", "reading"],
     "exam": [
         "robots",
         "kinematics",
