@@ -1,0 +1,9 @@
+MODULE utf8
+  ! Größe, 位置, naïve
+  CONST robtarget p1:=[[818.7,147.3,858.2],[0,-0.97969618,0,0.20048792],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  PROC main()
+    SyncMoveOn sync1, task_list;
+    TPWrite "Über; MoveL p1,v1,fine,tool0;";
+    movel   p1 , v100 , fine , tool0 ;MoveL p1,v50,fine,tool0;
+  ENDPROC
+ENDMODULE
