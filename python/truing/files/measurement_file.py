@@ -19,6 +19,7 @@ from truing import _core
 from truing.errors import InputError, InputWarning
 from truing.files.common import PathLike, Units, listed, write_table
 from truing.files.plausibility import check_units_look_right
+from truing.files.program_poses import is_program, read_program_poses
 from truing.files.table import Codes, Floats, Table
 from truing.limits import LARGEST_NUMBER
 
@@ -205,8 +206,10 @@ def load_measurements(
 
     set_column: False passes over the column `set`. joints_only: rows need no measurement (for predictions).
     Raises InputError that names the line, the column, what was found and what was expected. Warns
-    (InputWarning) about joints beyond their limits.
+    (InputWarning) about joints beyond their limits. joints_only: a robot program of joints is read as well.
     """
+    if is_program(Path(path)):
+        return _of_program(Path(path), robot, joints_only)
     table = Table(Path(path))
     plan = _Plan(table, robot)
     if not joints_only and not any(plan.has([role]) for role in _MEASURED):
@@ -233,6 +236,24 @@ def load_measurements(
         return _core.Measurements(columns.pop("joints"), **columns)
     except ValueError as error:
         raise InputError(f"{table.path}: {error}") from None
+
+
+def _of_program(path: Path, robot: _core.Robot, joints_only: bool) -> _core.Measurements:
+    """A robot program has joints, and nothing that was measured."""
+    if not joints_only:
+        raise InputError(
+            f"{path}: is a robot program, in which nothing is measured: expected a table with the joints"
+            " of its moves"
+            " (`truing apply --poses-out` writes them) and beside them what was measured there, x_m y_m z_m"
+        )
+    program = read_program_poses(path)
+    if not program.only_joints:
+        raise InputError(
+            f"{path}: has targets that are poses, expected joints: `truing apply --poses-out FILE` writes"
+            " the joints"
+            " that the controller takes for them"
+        )
+    return _core.Measurements(program.joints(robot))
 
 
 class _Reader:

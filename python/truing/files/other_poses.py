@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 """Poses as other programs write them: lines of 16, 12 or 8 numbers, CSV exports of ROS messages, samples of
-easy_handeye, easy_handeye2 and MoveIt, matrices of OpenCV.
+easy_handeye, easy_handeye2 and MoveIt, matrices of OpenCV, programs of robots.
 
 What a file is, is told by what stands in it, not by its name.
 """
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from truing.errors import InputError, InputWarning
 from truing.files.common import decoded, listed, read_bytes, shown
 from truing.files.opencv_file import read_opencv_poses
+from truing.files.program_poses import hand_poses, is_program
 from truing.files.rigid import frames_from_quaternions, frames_from_rows
 from truing.files.table import Table
 from truing.files.yaml_tree import Document, Loc, found
@@ -76,6 +77,8 @@ def read_other_poses(path: Path, setup: Setup | None = None) -> OtherPoses | Non
     setup: what is expected; easy_handeye writes the hand's pose the other way round where the camera stands
     in the cell. Raises InputError that names the line, what was found and what was expected.
     """
+    if is_program(path):
+        return OtherPoses(path, "a robot program", hand=hand_poses(path))
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)

@@ -20,6 +20,7 @@ from truing import _core
 from truing.errors import InputError
 from truing.files.common import PathLike, listed, shown
 from truing.files.plausibility import check_joint_units_look_right, check_targets_look_right
+from truing.files.program_poses import is_program as is_robot_program, wanted_poses
 from truing.files.table import Floats, Table
 from truing.rotations import rotations_from_quaternions
 
@@ -350,8 +351,11 @@ def load_targets(
     like: task of rows that say no other; None: a full pose. program: joints q1_rad … without x_m … are a
     program of joint positions.
     in_base: poses are in the robot's own base frame, not in the measurement frame.
-    Raises InputError that names the line, the column, what was found and what was expected.
+    A robot program (.src, .mod, .ls, .script, .jbi) is read as well: its literal targets, in the order of
+    its moves. Raises InputError that names the line, the column, what was found and what was expected.
     """
+    if is_robot_program(Path(path)):
+        return _of_program(Path(path), robot, like or _core.Task(np.eye(4)), program, in_base)
     table = Table(Path(path))
     plan = _Plan(table, robot)
     joint_roles = plan.joint_roles("q")
@@ -384,6 +388,16 @@ def load_targets(
         positions = np.array([task.T_measurement_target[:3, 3] for task in tasks])
         check_targets_look_right(table, robot, plan.units, positions, in_base=in_base)
     return TargetData(path=table.path, tasks=tasks, joints=joints, conditions=reader.conditions())
+
+
+def _of_program(path: Path, robot: _core.Robot, like: _core.Task, program: bool, in_base: bool) -> TargetData:
+    """Targets of a robot program. One of joints alone is a program of joint positions, where that is asked
+    for."""
+    wanted, joints = wanted_poses(path, robot, in_base=in_base)
+    if program and joints is not None:
+        return TargetData(path=path, tasks=(), joints=joints)
+    tasks = tuple(like.replace(T_measurement_target=T) for T in wanted)
+    return TargetData(path=path, tasks=tasks, joints=joints)
 
 
 def _tasks(reader: _Reader, like: _core.Task) -> tuple[_core.Task, ...]:
