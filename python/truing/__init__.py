@@ -12,8 +12,7 @@
 The package itself holds what every user needs: verbs, readers and writers, `Robot`, `Measurements`, `Effect`,
 errors. What only one verb takes or returns is in the verb's room: `truing.identification.IdentifyOptions`,
 `truing.diagnosis.Diagnosis`. Rooms: model, common, files, examples, identification, planning, diagnosis,
-dynamics, hand_eye, inverse_kinematics, tracking, controllers, testing.
-dynamics, hand_eye, inverse_kinematics, programs, tracking, testing.
+dynamics, hand_eye, inverse_kinematics, programs, controllers, performance, tracking, testing.
 
 SI units throughout: m, rad, kg, s. `T_a_b` maps b-coordinates into a. Quaternions are w x y z.
 """

@@ -1,6 +1,5 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robot programs of five makers."""
 """Robot programs whose targets a real robot reaches: literal targets are replaced by what to command."""
 
 from truing.programs.apply import (

@@ -39,7 +39,6 @@ ROOMS: dict[str, set[str]] = {
     "programs": BASIC | {"inverse_kinematics", "model"},
     "dynamics": BASIC | {"identification"},
     "controllers": BASIC | {"identification"},
-    "programs": {"errors", "files"},
     "performance": BASIC | {"identification", "inverse_kinematics", "programs"},
     "tracking": BASIC | {"hand_eye"},
     "testing": BASIC,
