@@ -20,6 +20,7 @@ from truing import _core
 from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.friction import friction_dict
 from truing.dynamics.page import diagnosis_report, fit_report, prediction_report
+from truing.dynamics.recorded import driven_joints, measured_torque, torque_unit
 from truing.files import load_units, save_robot, write_table
 from truing.identification.result import parameter_dict
 from truing.report.json_text import to_json, without_nan
@@ -163,27 +164,6 @@ def _unevenness(bins: Sequence[_core.TorqueRegime]) -> float:
 
 
 # ---- Tables --------------------------------------------------------------------------------------
-def _driven(robot: _core.Robot) -> list[_core.Joint]:
-    return [robot.joints[index] for index in robot.driven_joints()]
-
-
-def torque_unit(joint: _core.Joint) -> str:
-    return "Nm" if joint.type == "revolute" else "N"
-
-
-def measured_torque(robot: _core.Robot, recording: _core.Recording) -> Floats:
-    """Torques as measured, else currents times the drives' constants (1 Nm/A where none is known); NaN where
-    there is neither. shape=(n, joints) [Nm | N]
-    """
-    joints = _driven(robot)
-    out = np.full((len(recording), len(joints)), np.nan)
-    if recording.current.shape[1]:
-        out = np.asarray(recording.current) * [joint.torque_per_ampere or 1.0 for joint in joints]
-    if recording.torque.shape[1]:
-        out = np.where(np.isnan(recording.torque), out, recording.torque)
-    return out
-
-
 def residual_columns(
     robot: _core.Robot, recordings: Sequence[_core.Recording], held_out: Sequence[str], cutoff: float
 ) -> dict[str, Any]:
@@ -191,7 +171,7 @@ def residual_columns(
     and what is left. Torques are as recorded, not low-passed. `set` is left out where parts of one recording
     were held out.
     """
-    joints = _driven(robot)
+    joints = driven_joints(robot)
     measured = [measured_torque(robot, recording) for recording in recordings]
     predicted = [
         np.asarray(_core.dynamics_predict(robot, recording, cutoff).torque) for recording in recordings
@@ -213,7 +193,7 @@ def residual_columns(
 
 def recording_columns(robot: _core.Robot, recording: _core.Recording) -> dict[str, Any]:
     """A recording as a table that `load_recordings` reads: time, positions, torques, and its set."""
-    joints = _driven(robot)
+    joints = driven_joints(robot)
     columns: dict[str, Any] = {"t_s": np.asarray(recording.time)}
     for k, joint in enumerate(joints):
         unit = "rad" if joint.type == "revolute" else "m"
@@ -240,7 +220,7 @@ def prediction_columns(
     """Columns of ``predicted.csv``, one row per row of `recording`: t_s, and the columns that were measured;
     torques where nothing was.
     """
-    joints = _driven(robot)
+    joints = driven_joints(robot)
     torque = np.asarray(predicted.torque)
     columns: dict[str, Any] = {"t_s": np.asarray(recording.time)}
     by_torque, by_current = (_recorded(table) for table in (recording.torque, recording.current))
@@ -272,7 +252,7 @@ def prediction_dict(
     """
     measured = measured_torque(robot, recording)
     errors = {}
-    for k, joint in enumerate(_driven(robot)):
+    for k, joint in enumerate(driven_joints(robot)):
         torque = measured[:, k]
         if np.isnan(torque).all():
             continue
@@ -402,7 +382,7 @@ def write_prediction(
             "named": np.asarray(predicted.torque[:, k]),
         }
         for k, (joint, measured) in enumerate(
-            zip(_driven(robot), measured_torque(robot, recording).T, strict=True)
+            zip(driven_joints(robot), measured_torque(robot, recording).T, strict=True)
         )
     ]
     (folder / "report.html").write_text(prediction_report(result, traces), encoding="utf-8")
