@@ -4,7 +4,8 @@
 
 robot = truing.load_robot("robot.urdf", any_tool=True)
 recordings = truing.dynamics.load_recordings("recordings/*.csv", robot)
-print(truing.dynamics.diagnose(robot, recordings).summary())
+checked = truing.dynamics.check_recordings(robot, recordings)
+print(truing.dynamics.diagnose(checked.robot, checked.recordings).summary())
 """
 
 from truing._core import (
@@ -28,5 +29,10 @@ from truing.dynamics.api import (
     diagnose as diagnose,
     identify as identify,
     predict as predict,
+)
+from truing.dynamics.sanity import (
+    CheckedRecordings as CheckedRecordings,
+    RecordingFinding as RecordingFinding,
+    check_recordings as check_recordings,
 )
 from truing.files import load_recordings as load_recordings

@@ -1,0 +1,252 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sanity of recordings: every mistake is said with its number, what is certain is corrected, and of clean
+recordings nothing is said.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import truing
+from truing.dynamics import (
+    CheckedRecordings,
+    Recording,
+    RecordingFinding,
+    check_recordings,
+    load_recordings,
+)
+from truing.dynamics.sanity.columns import resolution
+from truing.errors import InputError
+from truing.testing.dynamics import HIDDEN, demo_arm, simulate_motion
+
+Floats = NDArray[np.float64]
+REAL = Path(os.environ.get("TRUING_REALDATA", ""))
+SIMULATED = simulate_motion(seed=5, seconds=14.0, recordings=3, held_out=1)
+ARM, MOTIONS = SIMULATED.nominal, SIMULATED.recordings
+STEP = 0.01  # [s]
+
+
+def with_fields(motions: list[Recording] = MOTIONS, **fields: Callable[[Recording], Any]) -> list[Recording]:
+    """Each recording with fields made anew from it."""
+    return [one.replace(**{name: make(one) for name, make in fields.items()}) for one in motions]
+
+
+def column(table: Any, k: int, change: Callable[[Floats], Any]) -> Floats:
+    """A table with one column changed."""
+    out = np.array(table)
+    out[:, k] = change(out[:, k])
+    return out
+
+
+def speed_of(one: Recording) -> Floats:
+    return np.asarray(np.gradient(one.position, one.time, axis=0))
+
+
+def later(table: Any, rows: int) -> Floats:
+    """Every row so many rows later."""
+    held = np.repeat(np.asarray(table)[:1], rows, axis=0)
+    return np.vstack([held, np.asarray(table)[: len(table) - rows]])
+
+
+def only(checked: CheckedRecordings) -> RecordingFinding:
+    assert len(checked.findings) == 1, [one.evidence for one in checked.findings]
+    return checked.findings[0]
+
+
+def kinds(checked: CheckedRecordings) -> list[str]:
+    return [one.finding for one in checked.findings]
+
+
+# ---- Nothing is wrong ------------------------------------------------------------------------------
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_is_said_of_clean_recordings(seed: int) -> None:
+    simulated = simulate_motion(seed=seed, seconds=12.0, recordings=3, hidden=HIDDEN if seed % 2 else {})
+    recordings = with_fields(simulated.recordings, speed=speed_of)
+    checked = check_recordings(simulated.nominal, recordings)
+    assert checked.findings == ()
+    assert checked.robot is simulated.nominal
+    assert all(one is other for one, other in zip(checked.recordings, recordings, strict=True))
+
+
+@pytest.mark.parametrize("effect", ["spring.J1", "armature.J6", "current_offset.J4"])
+def test_large_effects_that_the_model_lacks_are_no_mistakes(effect: str) -> None:
+    name, joint = effect.split(".")
+    hidden = {name: ([joint], {effect: {"spring": 40.0, "armature": 2.0, "current_offset": 30.0}[name]})}
+    simulated = simulate_motion(seed=6, seconds=12.0, recordings=3, hidden=hidden)
+    assert check_recordings(simulated.nominal, simulated.recordings).findings == ()
+
+
+@pytest.mark.realdata
+@pytest.mark.parametrize("folder", ["dyn_ur10", "dyn_tx40", "dyn_ur10e"])
+def test_of_real_recordings_only_what_is_known_of_them_is_said(folder: str) -> None:
+    if not os.environ.get("TRUING_REALDATA") or not (REAL / folder).exists():
+        pytest.skip(f"TRUING_REALDATA does not hold {folder}")
+    robot = truing.load_robot(REAL / folder / "robot.urdf", any_tool=True)
+    for index, gain in zip(robot.driven_joints(), (10.0, 10.7, 8.5, 9.0, 9.5, 10.1), strict=True):
+        robot.joints[index].torque_per_ampere = gain
+    found = check_recordings(robot, load_recordings(str(REAL / folder / "*.csv"), robot)).findings
+    expected = {
+        "dyn_ur10": ["one_recording"],
+        "dyn_tx40": ["at_rest", "one_recording"],
+        "dyn_ur10e": ["at_rest"],
+    }
+    assert [one.finding for one in found] == expected[folder]
+    rest = found[0]
+    if folder == "dyn_ur10e":  # one joint at a time, point to point
+        assert {"single_j2", "single_j3", "single_j5", "ptp10"} <= set(
+            rest.recordings
+        ) and rest.value == 100.0
+
+
+# ---- Units and scales ------------------------------------------------------------------------------
+@pytest.mark.parametrize(("unit", "size"), [("rpm", 60 / (2 * math.pi)), ("deg/s", 180 / math.pi)])
+def test_speeds_in_another_unit_are_converted(unit: str, size: float) -> None:
+    checked = check_recordings(ARM, with_fields(speed=lambda one: speed_of(one) * size))
+    found = only(checked)
+    assert found.finding == "speed_unit" and found.applied and f"in {unit}" in found.evidence
+    assert found.value == pytest.approx(size, rel=1e-2)
+    assert np.allclose(checked.recordings[0].speed, speed_of(MOTIONS[0]), atol=1e-12)
+
+
+def test_a_speed_with_the_other_sign_is_turned() -> None:
+    checked = check_recordings(ARM, with_fields(speed=lambda one: column(speed_of(one), 2, np.negative)))
+    assert only(checked).finding == "speed_sign" and only(checked).joints == ("J3",)
+    assert np.allclose(checked.recordings[0].speed, speed_of(MOTIONS[0]))
+
+
+def test_a_speed_before_the_gear_is_said_with_its_ratio() -> None:
+    found = only(
+        check_recordings(ARM, with_fields(speed=lambda one: column(speed_of(one), 0, lambda x: 80 * x)))
+    )
+    assert (found.finding, found.applied, found.joints) == ("speed_scale", False, ("J1",))
+    assert found.value == pytest.approx(80.0, rel=0.01)
+
+
+def test_a_speed_of_another_joint_is_said() -> None:
+    swapped = with_fields(speed=lambda one: speed_of(one)[:, [1, 0, 2, 3, 4, 5]])
+    found = only(check_recordings(ARM, swapped))
+    assert (found.finding, found.joints) == ("speed_mismatch", ("J1", "J2"))
+
+
+def test_a_late_speed_is_said() -> None:
+    found = only(check_recordings(ARM, with_fields(speed=lambda one: later(speed_of(one), 5))))
+    assert found.finding == "speed_lag" and found.value == pytest.approx(0.05, abs=0.003)
+
+
+def test_gaps_are_said() -> None:
+    found = only(check_recordings(ARM, with_fields(time=lambda one: one.time + 3.0 * (one.time > 6.0))))
+    assert found.finding == "gaps" and found.applied and found.value == pytest.approx(3.01, abs=0.001)
+    assert "1 gap of up to 3.01 s" in found.evidence
+
+
+def test_stamps_of_the_recorder_give_way_to_even_ones() -> None:
+    random = np.random.default_rng(11)
+    jitter = [np.sort(one.time + random.normal(0.0, 0.002, len(one))) for one in MOTIONS]
+    checked = check_recordings(ARM, [one.replace(time=t) for one, t in zip(MOTIONS, jitter, strict=True)])
+    found = only(checked)
+    assert found.finding == "jitter" and found.applied and 20.0 < found.value < 40.0
+    assert np.abs(checked.recordings[0].time - MOTIONS[0].time).max() < 0.02
+
+
+def test_uneven_stamps_that_are_the_motion_s_stay() -> None:
+    random = np.random.default_rng(12)
+    recordings = []
+    for one in MOTIONS:
+        time = np.sort(one.time + random.normal(0.0, 0.002, len(one)))
+        tables = {
+            name: np.column_stack([np.interp(time, one.time, x) for x in np.asarray(getattr(one, name)).T])
+            for name in ("position", "torque")
+        }
+        recordings.append(Recording(one.name, time=time, **tables))
+    checked = check_recordings(ARM, recordings)
+    assert only(checked).finding == "jitter" and not only(checked).applied
+    assert np.array_equal(checked.recordings[0].time, recordings[0].time)
+
+
+# ---- Values ----------------------------------------------------------------------------------------
+def test_clipped_torques_are_said_with_their_part_of_the_rows() -> None:
+    highest = float(np.quantile(MOTIONS[0].torque[:, 1], 0.9))
+    clipped = with_fields(torque=lambda one: column(one.torque, 1, lambda x: np.minimum(x, highest)))
+    found = next(one for one in check_recordings(ARM, clipped).findings if one.finding == "clipped")
+    assert (
+        found.joints == ("J2",) and found.value >= 8.0 and "tau2 stays at its largest value" in found.evidence
+    )
+
+
+def test_coarse_torques_are_said_with_their_step() -> None:
+    coarse = with_fields(torque=lambda one: column(one.torque, 3, lambda x: np.round(x / 0.9) * 0.9))
+    found = next(one for one in check_recordings(ARM, coarse).findings if one.finding == "coarse_torque")
+    assert found.joints == ("J4",) and found.value == pytest.approx(0.9)
+
+
+def test_coarse_angles_are_said_with_their_step() -> None:
+    coarse = with_fields(position=lambda one: column(one.position, 4, lambda x: np.round(x / 0.01) * 0.01))
+    found = next(one for one in check_recordings(ARM, coarse).findings if one.finding == "coarse_position")
+    assert found.joints == ("J5",) and found.value == pytest.approx(0.01)
+
+
+def test_a_torque_that_never_changes_is_a_mistake() -> None:
+    dead = with_fields(torque=lambda one: column(one.torque, 1, lambda x: 0.0 * x + 3.0))
+    found = check_recordings(ARM, dead).findings[0]
+    assert (found.finding, found.joints, found.mistake) == ("constant", ("J2",), True)
+
+
+def test_the_resolution_is_the_step_between_values() -> None:
+    x = np.sin(np.arange(4000) * 0.01)
+    assert resolution(x) == 0.0
+    assert resolution(np.round(x / 0.02) * 0.02) == pytest.approx(0.02)
+    assert resolution(np.ones(4000)) == 0.0
+    assert resolution(np.round(x, 5)) == 0.0  # digits of a file
+
+
+# ---- Rest ------------------------------------------------------------------------------------------
+def test_rows_at_rest_are_counted() -> None:
+    def hold(one: Recording) -> Floats:
+        return column(one.position, 3, lambda x: np.where(np.arange(len(x)) < len(x) // 2, x[len(x) // 2], x))
+
+    found = next(one for one in check_recordings(ARM, with_fields(position=hold)).findings)
+    assert (
+        found.finding == "at_rest" and found.joints == ("J4",) and found.value == pytest.approx(50.0, abs=4.0)
+    )
+
+
+def test_what_never_moves_is_said() -> None:
+    still = with_fields(position=lambda one: column(one.position, 3, lambda x: x[0] + 0.0 * x))
+    found = {one.finding: one for one in check_recordings(ARM, still).findings}
+    assert found["still"].joints == ("J4",)
+    idle = [*MOTIONS]
+    idle[1] = MOTIONS[1].replace(position=np.tile(MOTIONS[1].position[:1], (len(MOTIONS[1]), 1)))
+    found = {one.finding: one for one in check_recordings(ARM, idle).findings}
+    assert found["idle"].recordings == ("motion2",) and found["idle"].value == 100.0
+
+
+def test_joints_without_a_measured_torque_are_passed_over() -> None:
+    some = with_fields(torque=lambda one: column(one.torque, 2, lambda x: x + np.nan))
+    assert check_recordings(ARM, some).findings == ()
+    none = [Recording(one.name, time=one.time, position=one.position) for one in MOTIONS]
+    assert check_recordings(ARM, none).findings == ()
+
+
+def test_recordings_that_are_too_short_to_be_smoothed_are_no_error() -> None:
+    position = np.asarray(MOTIONS[0].position)[:25]
+    short = [Recording(name, time=STEP * np.arange(25), position=position) for name in ("one", "two")]
+    assert check_recordings(demo_arm(), short).findings == ()
+
+
+def test_one_recording_is_said_to_be_alone() -> None:
+    found = only(check_recordings(ARM, MOTIONS[:1]))
+    assert found.finding == "one_recording" and not found.mistake and "surer than 90 %" in found.evidence
+
+
+def test_recordings_of_another_robot_are_refused() -> None:
+    with pytest.raises(InputError, match="position has shape"):
+        check_recordings(ARM.replace(joints=list(ARM.joints)[:3]), MOTIONS)
