@@ -22,10 +22,14 @@ from truing.dynamics import (
     Recording,
     RecordingFinding,
     check_recordings,
+    diagnose,
     load_recordings,
 )
 from truing.dynamics.sanity.columns import resolution
+from truing.dynamics.sanity.grids import grids_of
+from truing.dynamics.sanity.readings import rows_of
 from truing.errors import InputError
+from truing.files import write_table
 from truing.testing.dynamics import HIDDEN, demo_arm, simulate_motion
 
 Floats = NDArray[np.float64]
@@ -107,6 +111,99 @@ def test_of_real_recordings_only_what_is_known_of_them_is_said(folder: str) -> N
         ) and rest.value == 100.0
 
 
+# ---- Signs -----------------------------------------------------------------------------------------
+@pytest.mark.parametrize("k", [1, 2, 3])
+def test_a_torque_whose_sign_friction_and_weight_contradict_is_turned(k: int) -> None:
+    turned = with_fields(torque=lambda one: column(one.torque, k, np.negative))
+    checked = check_recordings(ARM, turned)
+    found = only(checked)
+    assert (found.finding, found.joints, found.recordings) == ("torque_sign", (f"J{k + 1}",), ())
+    assert found.applied and not found.mistake and found.value > 90.0
+    for one, original in zip(checked.recordings, MOTIONS, strict=True):
+        assert np.array_equal(one.torque, original.torque)
+
+
+def test_a_sign_that_friction_alone_contradicts_is_said_and_left() -> None:
+    checked = check_recordings(ARM, with_fields(torque=lambda one: column(one.torque, 5, np.negative)))
+    found = only(checked)
+    assert found.finding == "torque_sign" and found.joints == ("J6",)
+    assert found.mistake and not found.applied
+    assert "as well if the angle of J6 has the opposite sign" in found.evidence
+    assert np.array_equal(checked.recordings[0].torque[:, 5], -MOTIONS[0].torque[:, 5])
+
+
+@pytest.mark.parametrize(
+    ("fields", "finding"),
+    [(["position"], "position_sign"), (["position", "torque"], "joint_sign")],
+)
+def test_which_sign_is_wrong_is_told_apart(fields: list[str], finding: str) -> None:
+    turned = with_fields(
+        **{name: lambda one, name=name: column(getattr(one, name), 2, np.negative) for name in fields}
+    )
+    found = only(check_recordings(ARM, turned))
+    assert (found.finding, found.joints, found.mistake) == (finding, ("J3",), True)
+
+
+def test_the_sign_of_a_known_drive_is_its_constant() -> None:
+    robot = ARM.copy()
+    for joint in robot.joints:
+        joint.torque_per_ampere = 10.0
+    recordings = [
+        Recording(
+            one.name,
+            time=one.time,
+            position=one.position,
+            current=column(np.asarray(one.torque) / 10.0, 1, np.negative),
+        )
+        for one in MOTIONS
+    ]
+    checked = check_recordings(robot, recordings)
+    assert only(checked).finding == "torque_sign" and only(checked).applied
+    assert [joint.torque_per_ampere for joint in checked.robot.joints] == [
+        10.0,
+        -10.0,
+        10.0,
+        10.0,
+        10.0,
+        10.0,
+    ]
+    assert np.array_equal(checked.recordings[0].current, recordings[0].current)
+
+
+def test_one_recording_of_several_may_have_another_sign() -> None:
+    one_turned = [*MOTIONS]
+    one_turned[1] = with_fields([MOTIONS[1]], torque=lambda one: column(one.torque, 2, np.negative))[0]
+    checked = check_recordings(ARM, one_turned)
+    assert only(checked).recordings == ("motion2",) and only(checked).joints == ("J3",)
+    assert np.array_equal(checked.recordings[1].torque, MOTIONS[1].torque)
+
+
+# ---- Order -----------------------------------------------------------------------------------------
+@pytest.mark.parametrize("order", [(2, 1, 0, 3, 4, 5), (1, 2, 0, 3, 4, 5), (5, 4, 3, 2, 1, 0)])
+def test_joints_in_another_order_are_said_as_one_types_them(order: tuple[int, ...], tmp_path: Path) -> None:
+    columns = list(order)
+    files = []
+    for one in MOTIONS:
+        table: dict[str, Any] = {"t_s": one.time}
+        for number, k in enumerate(columns, 1):
+            table |= {f"q{number}_rad": one.position[:, k], f"tau{number}_Nm": one.torque[:, k]}
+        files.append(tmp_path / f"{one.name}.csv")
+        write_table(files[-1], table)
+    found = only(check_recordings(ARM, load_recordings(files, ARM)))
+    assert found.finding == "joint_order" and found.mistake
+    advice = found.evidence.rpartition("--joints ")[2]
+    again = load_recordings(files, ARM, joints=advice)
+    assert check_recordings(ARM, again).findings == ()
+    assert np.allclose(again[0].torque, MOTIONS[0].torque, rtol=1e-12)
+
+
+def test_torques_in_another_order_are_said() -> None:
+    order = [2, 1, 0, 3, 4, 5]
+    found = only(check_recordings(ARM, with_fields(torque=lambda one: np.asarray(one.torque)[:, order])))
+    assert (found.finding, found.joints, found.mistake) == ("torque_order", ("J1", "J3"), True)
+    assert "J3, J2, J1, J4, J5, J6" in found.evidence
+
+
 # ---- Units and scales ------------------------------------------------------------------------------
 @pytest.mark.parametrize(("unit", "size"), [("rpm", 60 / (2 * math.pi)), ("deg/s", 180 / math.pi)])
 def test_speeds_in_another_unit_are_converted(unit: str, size: float) -> None:
@@ -135,6 +232,112 @@ def test_a_speed_of_another_joint_is_said() -> None:
     swapped = with_fields(speed=lambda one: speed_of(one)[:, [1, 0, 2, 3, 4, 5]])
     found = only(check_recordings(ARM, swapped))
     assert (found.finding, found.joints) == ("speed_mismatch", ("J1", "J2"))
+
+
+@pytest.mark.parametrize("with_speed", [True, False])
+def test_angles_in_degrees_are_converted_where_speeds_or_limits_prove_them(with_speed: bool) -> None:
+    fields: dict[str, Callable[[Recording], Any]] = {"position": lambda one: np.degrees(one.position)}
+    if with_speed:
+        fields["speed"] = speed_of
+    checked = check_recordings(ARM, with_fields(**fields))
+    assert only(checked).finding == "position_unit" and only(checked).applied
+    for one, original in zip(checked.recordings, MOTIONS, strict=True):
+        assert np.allclose(one.position, original.position, atol=1e-12)
+
+
+def test_angles_in_degrees_without_any_proof_but_the_model_are_said() -> None:
+    robot = ARM.copy()
+    for joint in robot.joints:
+        joint.lower, joint.upper = -math.inf, math.inf
+    checked = check_recordings(robot, with_fields(position=lambda one: np.degrees(one.position)))
+    found = checked.findings[0]
+    assert (found.finding, found.applied, found.mistake) == ("position_unit", False, True)
+    assert np.array_equal(checked.recordings[0].position, np.degrees(MOTIONS[0].position))
+
+
+def test_radians_under_a_name_in_degrees_are_said() -> None:
+    checked = check_recordings(ARM, with_fields(position=lambda one: np.radians(one.position)))
+    assert kinds(checked) == ["position_unit"] and checked.findings[0].mistake
+    assert "in rad, not in deg" in checked.findings[0].evidence
+
+
+def test_torques_in_millinewtonmetres_are_said() -> None:
+    found = only(check_recordings(ARM, with_fields(torque=lambda one: 1000.0 * np.asarray(one.torque))))
+    assert found.finding == "torque_unit" and found.mistake and "mNm" in found.evidence
+    assert found.value == pytest.approx(1000.0, rel=0.05)
+
+
+def test_torques_in_per_cent_of_the_joints_limits_are_said() -> None:
+    robot, limits = ARM.copy(), np.array([330.0, 330.0, 150.0, 56.0, 56.0, 56.0])
+    for joint, limit in zip(robot.joints, limits, strict=True):
+        joint.torque_limit = limit
+    percent = with_fields(torque=lambda one: 100.0 * np.asarray(one.torque) / limits)
+    found = only(check_recordings(robot, percent))
+    assert found.finding == "torque_unit" and "per cent of the limit" in found.evidence
+
+
+def test_a_wrong_gain_is_said_with_its_size() -> None:
+    found = only(
+        check_recordings(ARM, with_fields(torque=lambda one: column(one.torque, 1, lambda x: 3 * x)))
+    )
+    assert (found.finding, found.joints, found.applied, found.mistake) == ("gain", ("J2",), False, False)
+    assert found.value == pytest.approx(3.0, rel=0.05)
+
+
+def test_currents_without_constants_say_which_the_masses_would_need() -> None:
+    currents = [
+        Recording(one.name, time=one.time, position=one.position, current=np.asarray(one.torque) / 12.5)
+        for one in MOTIONS
+    ]
+    found = only(check_recordings(ARM, currents))
+    assert found.finding == "gain_unknown" and not found.mistake
+    assert "share one scale" in found.evidence and "--torque-per-ampere" in found.evidence
+    assert found.value == pytest.approx(12.5, rel=0.05)
+
+
+# ---- Clocks ----------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("rows", "applied"), [(1, None), (2, False), (6, True), (20, True)])
+def test_late_torques_are_measured_and_shifted_back_where_no_effect_could_take_it(
+    rows: int, applied: bool | None
+) -> None:
+    checked = check_recordings(ARM, with_fields(torque=lambda one: later(one.torque, rows)))
+    if applied is None:  # within a step, as what drives measure may be
+        assert checked.findings == ()
+        return
+    found = only(checked)
+    assert (found.finding, found.applied, found.unit) == ("torque_shift", applied, "s")
+    assert found.value == pytest.approx(rows * STEP, abs=0.004)
+    if applied:
+        one, original = checked.recordings[0], MOTIONS[0]
+        assert len(original) - 2 * rows <= len(one) < len(original)
+        same = np.asarray(original.torque)[: len(one)]
+        assert np.sqrt(np.mean((one.torque - same) ** 2)) < 0.03 * same.std()
+        assert np.array_equal(one.position, np.asarray(original.position)[: len(one)])
+
+
+def test_torques_of_one_recording_alone_may_be_late() -> None:
+    recordings = [*MOTIONS]
+    recordings[1] = MOTIONS[1].replace(torque=later(MOTIONS[1].torque, 10))
+    checked = check_recordings(ARM, recordings)
+    assert only(checked).recordings == ("motion2",) and only(checked).value == pytest.approx(0.1, abs=0.01)
+    assert len(checked.recordings[0]) == len(MOTIONS[0]) > len(checked.recordings[1])
+
+
+def test_torques_that_are_ahead_are_said_so() -> None:
+    ahead = with_fields(torque=lambda one: later(np.asarray(one.torque)[::-1], 8)[::-1])
+    found = only(check_recordings(ARM, ahead))
+    assert found.value == pytest.approx(-0.08, abs=0.005) and "ahead of the motion" in found.evidence
+
+
+def test_effects_are_named_after_a_shift_as_before_it() -> None:
+    late = with_fields(torque=lambda one: later(one.torque, 10))
+    checked = check_recordings(ARM, late)
+    without, found = diagnose(ARM, late), diagnose(checked.robot, checked.recordings)
+    named, wrong = (
+        {(e.effect, tuple(e.joints)) for e in one.effects if not e.standard} for one in (found, without)
+    )
+    assert {(effect, tuple(joints)) for effect, (joints, _) in HIDDEN.items()} <= named
+    assert "presliding" in {effect for effect, _ in wrong} - {effect for effect, _ in named}
 
 
 def test_a_late_speed_is_said() -> None:
@@ -227,6 +430,15 @@ def test_what_never_moves_is_said() -> None:
     idle[1] = MOTIONS[1].replace(position=np.tile(MOTIONS[1].position[:1], (len(MOTIONS[1]), 1)))
     found = {one.finding: one for one in check_recordings(ARM, idle).findings}
     assert found["idle"].recordings == ("motion2",) and found["idle"].value == 100.0
+
+
+# ---- Parts -----------------------------------------------------------------------------------------
+def test_rows_are_about_as_many_as_asked_for() -> None:
+    rows = rows_of(grids_of(ARM, MOTIONS), 100)
+    assert 50 < len(rows.q) <= 100 + len(MOTIONS) and rows.moving.shape == rows.torque.shape == (
+        len(rows.q),
+        6,
+    )
 
 
 def test_joints_without_a_measured_torque_are_passed_over() -> None:

@@ -14,27 +14,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.sanity import columns
+from truing.dynamics.recorded import driven_joints
+from truing.dynamics.sanity import columns, lag
 from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
 )
-from truing.dynamics.sanity.grids import grids_of
+from truing.dynamics.sanity.grids import gaps_of, grids_of
+from truing.dynamics.sanity.readings import readings
+from truing.dynamics.sanity.scales import scales
 from truing.dynamics.sanity.speeds import speeds
 
 Floats = NDArray[np.float64]
+_TABLES = ("position", "speed", "torque", "current", "command", "speed_command", "torque_command")
 
 
 def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:
-    """Look for mistakes in recordings before something is fitted to them: units and signs of speeds, gaps,
-    clipped and coarse values, rest.
+    """Look for mistakes in recordings before something is fitted to them: shifted streams, signs, order,
+    units and scales of columns, clipped and coarse values, gaps, rest.
 
         checked = truing.dynamics.check_recordings(robot, recordings)
         found = truing.dynamics.diagnose(checked.robot, checked.recordings)
 
     Returns the findings, and robot and recordings with what is certain corrected (`applied`): units and
-    signs of speeds and angles that derivatives prove. A `mistake` is not corrected: until it is, effects
-    that are named are doubtful.
+    signs of speeds and angles that derivatives or limits prove, signs of torques that both friction and
+    weight contradict, and torques that are late by 40 ms or more. A `mistake` is not corrected: until it is,
+    effects that are named are doubtful.
 
     Raises InputError on a robot or recordings that cannot be used.
     """
@@ -48,7 +53,19 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     if _any_change(by_angle):
         grids = grids_of(robot, recordings)
     grids = [grid for grid in grids if len(grid.rows)]
-    found += columns.rest(robot, grids)
+    if grids:
+        read = readings(robot, grids)
+        found += [*read.findings, *scales(robot, read.fit, _scale_known(robot, recordings))]
+        recordings = [_scaled(one, None, read.position.get(one.name)) for one in recordings]
+        robot, recordings = _turned(robot, recordings, read.torque)
+        if _any_change(read.torque) or _any_change(read.position):
+            grids = grids_of(robot, recordings)
+        if not any(one.mistake for one in found):
+            late = lag.shifts(robot, grids)
+            found += lag.findings(late, len(recordings))
+            recordings = [_shifted_back(one, late.get(one.name, 0.0)) for one in recordings]
+    if not any(one.mistake and one.finding == "position_unit" for one in found):
+        found += columns.rest(robot, grids)
     found += [*columns.values(robot, recordings), *columns.alone(recordings)]
     found.sort(key=lambda one: (not one.mistake, one.finding in ("at_rest", "gaps", "one_recording")))
     return CheckedRecordings(robot, tuple(recordings), tuple(found))
@@ -63,5 +80,70 @@ def _scaled(recording: _core.Recording, by_speed: Floats | None, by_angle: Float
     return recording.replace(**fields) if fields else recording
 
 
+def _scale_known(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> list[bool]:
+    """Of every joint, whether its torque was measured, or its current by a drive whose constant is known."""
+    return [
+        joint.torque_per_ampere is not None or not any(_by_current(one, k) for one in recordings)
+        for k, joint in enumerate(driven_joints(robot))
+    ]
+
+
+def _by_current(recording: _core.Recording, k: int) -> bool:
+    current, torque = recording.current, recording.torque
+    there = bool(current.shape[1]) and not np.isnan(current[0, k])
+    return there and (not torque.shape[1] or bool(np.isnan(torque[0, k])))
+
+
 def _any_change(factors: Mapping[str, Floats]) -> bool:
     return any(bool((some != 1.0).any()) for some in factors.values())
+
+
+def _turned(
+    robot: _core.Robot, recordings: Sequence[_core.Recording], factors: Mapping[str, Floats]
+) -> tuple[_core.Robot, list[_core.Recording]]:
+    """Signs of torques changed. Of a drive whose constant is known and all of whose currents have the other
+    sign, the constant changes: it says what sign currents have.
+    """
+    if not _any_change(factors):
+        return robot, list(recordings)
+    robot = robot.copy()
+    joints = driven_joints(robot)
+    of_drive = np.ones(len(joints))
+    for k, index in enumerate(robot.driven_joints()):
+        constant = robot.joints[index].torque_per_ampere
+        if constant is not None and all(
+            _by_current(one, k) and one.name in factors and factors[one.name][k] < 0 for one in recordings
+        ):
+            of_drive[k] = -1.0
+            robot.joints[index].torque_per_ampere = -constant
+    out = []
+    for one in recordings:
+        own = factors.get(one.name, np.ones(len(joints)))
+        fields: dict[str, Any] = {}
+        if one.torque.shape[1]:
+            fields["torque"] = np.asarray(one.torque) * own
+        if one.current.shape[1]:
+            fields["current"] = np.asarray(one.current) * own * of_drive
+        out.append(one.replace(**fields) if fields else one)
+    return robot, out
+
+
+def _shifted_back(recording: _core.Recording, late: float) -> _core.Recording:
+    """Torques and currents as they were `late` seconds later, on the rows that have such."""
+    if abs(late) < lag.APPLIED:
+        return recording
+    time = np.asarray(recording.time)
+    wanted = time + late
+    kept = (wanted >= time[0]) & (wanted <= time[-1])
+    for row in gaps_of(time):
+        kept &= (wanted <= time[row]) | (wanted >= time[row + 1])
+    tables: Mapping[str, Any] = {name: np.asarray(getattr(recording, name)) for name in _TABLES}
+    fields: dict[str, Any] = {}
+    for name, table in tables.items():
+        if not table.shape[1]:
+            continue
+        if name in ("torque", "current"):
+            table = np.column_stack([np.interp(wanted, time, column) for column in table.T])
+        fields[name] = table[kept]
+    rest = {name: np.asarray(values)[kept] for name, values in recording.columns.items()}
+    return _core.Recording(recording.name, time=time[kept], columns=rest, test=recording.test, **fields)

@@ -1,0 +1,424 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Would the recordings fit the robot's model far better if their columns were read otherwise?
+
+Each joint's torque is a multiple of the model's rigid torque, plus friction and an offset. The multiple and
+the friction must not be negative: a motor does not gain energy from friction, nor do masses weigh upwards.
+What such a fit leaves is compared over readings: signs, order and units of columns.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.dynamics.recorded import driven_joints
+from truing.dynamics.sanity.findings import RecordingFinding, listed
+from truing.dynamics.sanity.grids import Grid
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+ROWS = 800  # that readings are compared on
+ROWS_OF_ONE = 300  # the same, of a single recording
+FEWEST = 40  # rows in which a joint moves
+POOR = 0.3  # of the variance: a joint that leaves more is worth a look
+GAIN = 0.4  # of a joint's variance: from here on another reading is far better
+PART = 0.5  # and it must leave at most this part of what the joints in question left
+FITS = 0.25  # of the variance: more must not be left of a joint that is read with another sign
+FAIR = 0.08  # of the variance: where a joint leaves more, other orders are looked at
+GAIN_OF_ORDER, PART_OF_ORDER = 0.08, 1.0 / 3.0  # the same, of all joints together
+RIVAL = 0.8  # of the gain: another reading that reaches this is as good
+NOT_AT_ALL, WELL = 0.8, 0.2  # of the variance: a sign is certain where it takes one to the other
+BEYOND = 4.0  # times the limit of a joint: no angle is there
+BOTH = 0.05  # of the variance: rigid torque and friction both speak of the sign
+DEPENDENT = 1e-9  # determinant of columns of unit length that say the same
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of all recordings, evenly picked. shape=(n, joints)"""
+
+    q: Floats
+    qd: Floats
+    qdd: Floats
+    direction: Floats
+    torque: Floats  # NaN: not measured
+    moving: Bools
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How columns are read: joint j is column `order[j]`; factors are those of the columns."""
+
+    order: tuple[int, ...]
+    torque_order: tuple[int, ...]
+    position: tuple[float, ...]
+    torque: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What friction and a multiple of the rigid torque leave and explain, of each joint's variance."""
+
+    left: Floats  # NaN: the joint does not move, or its torque was not measured
+    scale: Floats  # of the rigid torque
+    by_rigid: Floats
+    by_friction: Floats
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    finding: str
+    joints: tuple[int, ...]  # that it is about; none: all
+    reading: Reading
+
+
+@dataclass(frozen=True)
+class _Found:
+    finding: str
+    joints: tuple[int, ...]
+    before: float  # largest part of the variance that was left of a joint in question
+    after: float
+    rival: str  # another reading that does as well
+    certain: bool
+
+
+# ---- Fit -------------------------------------------------------------------------------------------
+def rows_of(grids: Sequence[Grid], most: int = ROWS) -> Rows:
+    """About so many rows, of each recording its share."""
+    total = sum(len(grid.rows) for grid in grids)
+    every = max(1, math.ceil(total / most))
+    picked = [(grid, grid.rows[::every]) for grid in grids]
+
+    def column(name: str) -> Floats:
+        return np.concatenate([getattr(grid, name)[rows] for grid, rows in picked])
+
+    moving = np.concatenate([grid.moving[rows] for grid, rows in picked])
+    q, qd, qdd, direction, torque = map(column, ("q", "qd", "qdd", "direction", "torque"))
+    return Rows(q, qd, qdd, direction, torque, moving)
+
+
+class _Model:
+    """Fits of one set of rows; rigid torques are computed once for each way to read the angles."""
+
+    def __init__(self, robot: _core.Robot, rows: Rows) -> None:
+        self.robot, self.rows = robot, rows
+        self.rigid: dict[tuple[object, object], Floats] = {}
+        self.parts: dict[tuple[object, ...], tuple[float, ...]] = {}
+
+    def fit(self, reading: Reading) -> Fit:
+        parts = [self._fit_of(reading, j) for j in range(len(reading.order))]
+        return Fit(*(np.array(part) for part in zip(*parts, strict=True)))
+
+    def _fit_of(self, reading: Reading, j: int) -> tuple[float, ...]:
+        """Of one joint; computed once for each torque and each way to read the angles."""
+        column = reading.torque_order[j]
+        key = (reading.order, reading.position, j, column, reading.torque[column])
+        if key not in self.parts:
+            rows, own = self.rows, reading.order[j]
+            factor = reading.position[own]
+            torque = reading.torque[column] * rows.torque[:, column]
+            moves = rows.moving[:, own] & ~np.isnan(torque)
+            columns = (
+                self._rigid_of(reading)[:, j],
+                math.copysign(1.0, factor) * rows.direction[:, own],
+                factor * rows.qd[:, own],
+            )
+            self.parts[key] = _fit_joint(np.column_stack(columns)[moves], torque[moves])
+        return self.parts[key]
+
+    def _rigid_of(self, reading: Reading) -> Floats:
+        key = (reading.order, reading.position)
+        if key not in self.rigid:
+            order, factor = list(reading.order), np.array(reading.position)
+            motion = ((x * factor)[:, order] for x in (self.rows.q, self.rows.qd, self.rows.qdd))
+            self.rigid[key] = np.asarray(_core.rigid_torques(self.robot, *motion))
+        return self.rigid[key]
+
+
+def _not_negative(gram: Floats, right: Floats, there: NDArray[np.intp]) -> Floats:
+    """Factors of least squares that are not negative: the best of all subsets of the columns; the whole comes
+    first, as it is the best where its factors are so.
+    """
+    out, most = np.zeros(len(right)), 0.0
+    for subset in (s for n in (3, 2, 1) for s in itertools.combinations(there, n)):
+        some = list(subset)
+        part = gram[np.ix_(some, some)]
+        if np.linalg.det(part) < DEPENDENT:
+            continue
+        found = np.linalg.solve(part, right[some])
+        explained = float(found @ right[some])
+        if explained > most and (found >= 0.0).all():
+            out, most = np.zeros(len(right)), explained
+            out[some] = found
+            if len(some) == len(there):
+                break
+    return out
+
+
+def _fit_joint(columns: Floats, torque: Floats) -> tuple[float, ...]:
+    """Least squares with an offset, the other factors not negative.
+
+    Returns what is left of the variance, the first factor, and what it and the others explain.
+    """
+    nothing = (math.nan,) * 4
+    if len(torque) < FEWEST:
+        return nothing
+    x, y = columns - columns.mean(axis=0), torque - torque.mean()
+    size = np.sqrt(np.einsum("ij,ij->j", x, x))
+    total = float(y @ y)
+    if not total > 0.0:
+        return nothing
+    x = x / np.where(size > 0.0, size, 1.0)
+    factors = _not_negative(x.T @ x, x.T @ y, np.flatnonzero(size > 0.0))
+    left = float(np.sum((y - x @ factors) ** 2))
+    friction = x[:, 1:] @ factors[1:]
+    scale = factors[0] / size[0] if size[0] > 0.0 else 0.0
+    return left / total, scale, factors[0] ** 2 / total, float(friction @ friction) / total
+
+
+# ---- Readings --------------------------------------------------------------------------------------
+def as_written(joints: int) -> Reading:
+    identity, ones = tuple(range(joints)), (1.0,) * joints
+    return Reading(identity, identity, ones, ones)
+
+
+def _candidates(reading: Reading, revolute: Sequence[bool], poor: Sequence[int]) -> Iterator[_Candidate]:
+    """Other readings, the plainest first: those that concern the joints that fit badly."""
+    for j in poor:
+        column, other = reading.order[j], reading.torque_order[j]
+        torque, position = _turned(reading.torque, other), _turned(reading.position, column)
+        yield _Candidate("torque_sign", (j,), replace(reading, torque=torque))
+        yield _Candidate("position_sign", (j,), replace(reading, position=position))
+        yield _Candidate("joint_sign", (j,), replace(reading, torque=torque, position=position))
+    for kind, size in (("angles_in_deg", math.pi / 180.0), ("angles_in_rad", 180.0 / math.pi)):
+        factors = zip(reading.position, revolute, strict=True)
+        position = tuple(factor * (size if turns else 1.0) for factor, turns in factors)
+        yield _Candidate(kind, (), replace(reading, position=position))
+
+
+def _turned(factors: tuple[float, ...], k: int) -> tuple[float, ...]:
+    return (*factors[:k], -factors[k], *factors[k + 1 :])
+
+
+def _swapped(order: tuple[int, ...], i: int, j: int) -> tuple[int, ...]:
+    out = list(order)
+    out[i], out[j] = out[j], out[i]
+    return tuple(out)
+
+
+def _orders(model: _Model, reading: Reading, names: Sequence[str]) -> Iterator[_Candidate]:
+    """The best order of the torques, and that of all columns of the joints: from the plainest start (as they
+    are, backwards, by the alphabet) by exchanges of two, as long as one helps.
+    """
+    n = len(names)
+    alphabet = tuple(int(k) for k in np.argsort(np.argsort(names)))
+    for kind in ("torque_order", "joint_order"):
+        both = kind == "joint_order"
+
+        def read(order: tuple[int, ...], both: bool = both) -> Reading:
+            columns = tuple(reading.order[k] for k in order) if both else reading.order
+            torques = tuple(reading.torque_order[k] for k in order)
+            return replace(reading, order=columns, torque_order=torques)
+
+        def left(order: tuple[int, ...], read: Callable[[tuple[int, ...]], Reading] = read) -> float:
+            return float(np.nan_to_num(model.fit(read(order)).left, nan=1.0).sum())
+
+        start = min((tuple(range(n)), tuple(range(n))[::-1], alphabet), key=left)
+        best, order = left(start), start
+        while True:
+            tried = {_swapped(order, i, j) for i, j in itertools.combinations(range(n), 2)}
+            other = min(sorted(tried), key=left)
+            if left(other) > best - GAIN_OF_ORDER / n:
+                break
+            best, order = left(other), other
+        changed = tuple(j for j in range(n) if order[j] != j)
+        if changed:
+            yield _Candidate(kind, changed, read(order))
+
+
+def better_reading(
+    robot: _core.Robot, rows: Rows, reading: Reading | None = None
+) -> tuple[list[_Found], Reading, Fit]:
+    """One reading after the other that is far better than the one before; the last; and its fit.
+
+    reading: where to begin, of one recording of several, whose order is questioned only where it fits badly.
+    """
+    joints = driven_joints(robot)
+    names, revolute = [joint.name for joint in joints], [joint.type == "revolute" for joint in joints]
+    model = _Model(robot, rows)
+    few = POOR if reading else FAIR
+    reading = reading or as_written(len(joints))
+    fit = model.fit(reading)
+    found: list[_Found] = []
+    while len(found) < 2 * len(joints):
+        poor = [int(j) for j in np.flatnonzero(fit.left > POOR)]
+        candidates = list(_candidates(reading, revolute, poor)) if poor else []
+        if np.any(fit.left > few):
+            candidates += _orders(model, reading, names)
+        tried = [
+            (gain, candidate, other)
+            for candidate in candidates
+            for other in (model.fit(candidate.reading),)
+            for gain in (_gain(fit, other, candidate),)
+            if gain > 0.0
+        ]
+        if not tried:
+            break
+        best = max(tried, key=lambda one: one[0])
+        gain, candidate, other = best
+        rivals = [
+            one for one in tried if one is not best and one[0] > RIVAL * gain and _alike(one[1], candidate)
+        ]
+        found.append(_what_was_found(candidate, fit, other, rivals[0][1].finding if rivals else ""))
+        reading, fit = candidate.reading, other
+    return found, reading, fit
+
+
+def _gain(fit: Fit, other: Fit, candidate: _Candidate) -> float:
+    """What less is left, over all joints; 0 where that is not far better."""
+    before, after = np.nan_to_num(fit.left, nan=1.0), np.nan_to_num(other.left, nan=1.0)
+    gain = float((before - after).sum())
+    if (np.isnan(other.left) & ~np.isnan(fit.left)).any():
+        return 0.0
+    if candidate.finding in ("torque_order", "joint_order"):
+        # Joints with friction and hardly any weight fit in any order: all of them together decide.
+        return (
+            gain
+            if gain > GAIN_OF_ORDER and np.nansum(other.left) < PART_OF_ORDER * np.nansum(fit.left)
+            else 0.0
+        )
+    about = list(candidate.joints) or list(range(len(before)))
+    if candidate.joints and after[about].max() > FITS:  # a spring, say, that the model lacks
+        return 0.0
+    return gain if gain > GAIN and after[about].sum() < PART * before[about].sum() else 0.0
+
+
+def _alike(one: _Candidate, other: _Candidate) -> bool:
+    """Whether both are about the same joints."""
+    return bool(set(one.joints) & set(other.joints)) or not (one.joints and other.joints)
+
+
+def _what_was_found(candidate: _Candidate, fit: Fit, other: Fit, rival: str) -> _Found:
+    about = list(candidate.joints) or list(range(len(fit.left)))
+    before = float(np.nanmax(fit.left[about]))
+    after = float(np.nanmax(other.left[about]))
+    certain = (
+        candidate.finding == "torque_sign"
+        and not rival
+        and before > NOT_AT_ALL
+        and after < WELL
+        and bool((other.by_rigid[about] > BOTH).all() and (other.by_friction[about] > BOTH).all())
+    )
+    return _Found(candidate.finding, candidate.joints, before, after, rival, certain)
+
+
+# ---- Words -----------------------------------------------------------------------------------------
+_READINGS = {
+    "torque_sign": "the torque of {0} has the opposite sign",
+    "position_sign": "the angle of {0} has the opposite sign",
+    "joint_sign": "{0} turns the other way: angle and torque have the opposite sign",
+    "torque_order": "the torques are in another order: {1}",
+    "joint_order": "the joints are in another order: {1}",
+    "angles_in_deg": "the angles are in deg, not in rad",
+    "angles_in_rad": "the angles are in rad, not in deg",
+}
+_KINDS = {"angles_in_deg": "position_unit", "angles_in_rad": "position_unit"}
+
+
+@dataclass(frozen=True)
+class Read:
+    """What other readings say: findings, factors by which columns are corrected, and the fit with the reading
+    that is best for all recordings together.
+    """
+
+    findings: tuple[RecordingFinding, ...]
+    torque: dict[str, Floats]  # by recording, shape=(joints,)
+    position: dict[str, Floats]
+    fit: Fit
+
+
+def readings(robot: _core.Robot, grids: Sequence[Grid]) -> Read:
+    """All recordings together, then each: one of them may have been written otherwise."""
+    joints = driven_joints(robot)
+    found, reading, fit = better_reading(robot, rows_of(grids))
+    cases = [(one, reading, tuple(grid.name for grid in grids)) for one in found]
+    for grid in grids:
+        if len(grids) > 1 and len(grid.rows):
+            more, own, _ = better_reading(robot, rows_of([grid], ROWS_OF_ONE), reading)
+            cases += [(one, own, (grid.name,)) for one in more]
+    cases = [(_with_limits(one, joints, grids, names), own, names) for one, own, names in cases]
+    torque = {grid.name: np.ones(len(joints)) for grid in grids}
+    position = {grid.name: np.ones(len(joints)) for grid in grids}
+    for one, _, names in cases:
+        for name in names if one.certain else ():
+            if one.finding == "torque_sign":
+                torque[name][list(one.joints)] *= -1.0
+            else:
+                position[name] *= [math.pi / 180.0 if j.type == "revolute" else 1.0 for j in joints]
+    groups: dict[tuple[object, ...], list[tuple[_Found, Reading, tuple[str, ...]]]] = {}
+    for case in cases:
+        one, _, names = case
+        groups.setdefault((one.finding, one.rival, one.certain, len(names) == len(grids)), []).append(case)
+    words = [_finding(group, [joint.name for joint in joints], len(grids)) for group in groups.values()]
+    return Read(tuple(words), torque, position, fit)
+
+
+def _with_limits(
+    one: _Found, joints: Sequence[_core.Joint], grids: Sequence[Grid], names: Sequence[str]
+) -> _Found:
+    """Degrees are certain where the angles as written are beyond the joints' limits, too."""
+    if one.finding != "angles_in_deg" or one.rival:
+        return one
+    beyond = []
+    for k, joint in enumerate(joints):
+        if joint.type != "revolute" or not math.isfinite(joint.upper - joint.lower):
+            continue
+        most = max(float(np.abs(grid.q[:, k]).max()) for grid in grids if grid.name in names)
+        limit = max(abs(joint.lower), abs(joint.upper))
+        beyond.append(most > BEYOND * limit and most * math.pi / 180.0 < 1.1 * limit)
+    return replace(one, certain=len(beyond) > 1 and all(beyond))
+
+
+def _finding(
+    group: Sequence[tuple[_Found, Reading, tuple[str, ...]]], names: Sequence[str], recordings: int
+) -> RecordingFinding:
+    first, reading, _ = group[0]
+    joints = tuple(names[j] for j in sorted({j for one, _, _ in group for j in one.joints}))
+    where = tuple(dict.fromkeys(name for _, _, some in group for name in some))
+    order = reading.order if first.finding == "joint_order" else reading.torque_order
+    said = _READINGS[first.finding].format(listed(joints), ", ".join(names[k] for k in _inverse(order)))
+    before, after = (max(getattr(one, key) for one, _, _ in group) for key in ("before", "after"))
+    words = "" if len(where) == recordings else f"{listed(where)}: "
+    words += (
+        f"{said}: rigid torque and friction then leave {100 * after:.0f} % of the variance in place of"
+        f" {100 * before:.0f} %"
+    )
+    if first.rival:
+        words += f"; as well if {_READINGS[first.rival].format(listed(joints), '(exchanged)')}"
+    words += "; corrected" if first.certain else f". {_advice(first.finding, names, order)}"
+    kind = _KINDS.get(first.finding, first.finding)
+    where = () if len(where) == recordings else where
+    return RecordingFinding(
+        kind, where, joints, words, 100 * before, "% of the variance", first.certain, not first.certain
+    )
+
+
+def _inverse(order: Sequence[int]) -> list[int]:
+    """The joint of every column."""
+    return [int(k) for k in np.argsort(order)]
+
+
+def _advice(finding: str, names: Sequence[str], order: Sequence[int]) -> str:
+    if finding == "joint_order":
+        return f"Run again with --joints {','.join(names[k] for k in _inverse(order))}"
+    if finding in _KINDS:
+        return "Correct the unit in the names of the columns, and run again"
+    return "Correct the columns (or the axis in the model), and run again"
