@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from truing.cli.options import Choice, File, Fraction, Frequency, Kind, Numbers
-from truing.cli.tables import table
+from truing.cli.tables import say, table
 from truing.errors import InputError
 
 if TYPE_CHECKING:
-    from truing.dynamics import Recording
+    from truing.dynamics import CheckedRecordings, Recording
     from truing.model import Robot
 
 READING = "Reading"
@@ -120,6 +120,28 @@ def require_torques(recordings: Sequence[Recording]) -> None:
             f"{recording.name}: there is neither a torque (tau1_Nm …) nor a current (i1_A …)"
             + ("; a diagnosis from commands alone (u1_rad …) is not there yet" if commands else "")
         )
+
+
+def checked(loaded: tuple[Robot, Sequence[Recording]]) -> CheckedRecordings:
+    """Recordings with torques, looked at before anything is fitted to them. Raises InputError."""
+    from truing.dynamics import check_recordings
+
+    require_torques(loaded[1])
+    return check_recordings(*loaded)
+
+
+def mistaken(result: Mapping[str, Any]) -> str:
+    """Why what was found is doubtful: the recordings contradict the model or themselves; "" if not."""
+    if not any(finding["mistake"] for finding in result["sanity"]):
+        return ""
+    return "the robot file or the columns of the recordings are to be corrected first"
+
+
+def print_findings(result: Mapping[str, Any]) -> None:
+    """What looks wrong with the recordings, before anything that was concluded from them."""
+    for finding in result["sanity"]:
+        word = "look at the data first" if finding["mistake"] else "note"
+        say(f"{word}: {finding['evidence']}")
 
 
 def print_errors(result: Mapping[str, Any], models: Sequence[tuple[str, str]]) -> None:

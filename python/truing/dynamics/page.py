@@ -70,6 +70,7 @@ def diagnosis_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, An
     """
     page = Page(f"{result.get('robot') or 'Robot'}: torques", part_of_page("dynamics"))
     page.add(_headline(result, recordings))
+    page.add(_mistakes(result))
     page.add('<div class="first">')
     _trace_card(page, traces, worst_first(result))
     _error_card(page, result)
@@ -80,6 +81,7 @@ def diagnosis_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, An
     _unknown(page, result)
     page.add(_classes(result))
     page.add(_not_testable(result))
+    page.add(_notes(result))
     page.add(warnings_card(result))
     page.add(footer(result))
     return page.html()
@@ -93,12 +95,14 @@ def fit_report(result: Mapping[str, Any], recordings: int) -> str:
         f"<header>{_kicker('identify', result, recordings)}<h1>Held-out torque error: {_percent(before)} with"
         f" the nominal model, {_percent(after)} with what was fitted</h1>{_about(result)}</header>"
     )
+    page.add(_mistakes(result))
     page.add('<div class="first">')
     page.add(_parameters(result))
     _error_card(page, result)
     page.add("</div>")
     _friction(page, result["friction"])
     page.add(_not_testable(result))
+    page.add(_notes(result))
     page.add(warnings_card(result))
     page.add(footer(result))
     return page.html()
@@ -225,7 +229,7 @@ def _about(result: Mapping[str, Any]) -> str:
 
 
 def _headline(result: Mapping[str, Any], recordings: int) -> str:
-    label, tone = TONES[result["verdict"]]
+    label, tone = TONES[result["verdict"]] if not _mistaken(result) else ("data to be corrected", "bad")
     before, after = mean_percent(result, "standard"), mean_percent(result, "named")
     if beyond_standard(result) and result["verdict"] != "does_not_hold":
         text = (
@@ -240,6 +244,36 @@ def _headline(result: Mapping[str, Any], recordings: int) -> str:
     return (
         f"<header>{_kicker('diagnose', result, recordings, badge)}<h1"
         f"{' class=long' if length > LONG else ''}>{text}</h1>{_about(result)}</header>"
+    )
+
+
+# ---- The recordings themselves ---------------------------------------------------------------------
+def _mistakes(result: Mapping[str, Any]) -> str:
+    """What is wrong with the recordings comes before anything that was concluded from them."""
+    return _findings_card("Look at the data first", "card look", _mistaken(result))
+
+
+def _mistaken(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    return [finding for finding in result["sanity"] if finding["mistake"]]
+
+
+def _notes(result: Mapping[str, Any]) -> str:
+    found = [f for f in result["sanity"] if not f["mistake"]]
+    return _findings_card("What the recordings look like", "card", found)
+
+
+def _findings_card(title: str, style: str, found: Sequence[Mapping[str, Any]]) -> str:
+    lines = "".join(
+        f"<tr><td>{escaped(f['finding'].replace('_', ' '))}</td>"
+        f'<td class="wrap">{escaped(f["evidence"])}</td>'
+        f"<td>{'allowed for' if f['applied'] else ''}</td></tr>"
+        for f in found
+    )
+    return (
+        f'<section class="{style}"><h2>{title}</h2><div class="scroll"><table class="causes"><tbody>{lines}'
+        "</tbody></table></div></section>"
+        if lines
+        else ""
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.friction import friction_dict
 from truing.dynamics.page import diagnosis_report, fit_report, prediction_report
 from truing.dynamics.recorded import driven_joints, measured_torque, torque_unit
+from truing.dynamics.sanity.findings import RecordingFinding
 from truing.files import load_units, save_robot, write_table
 from truing.identification.result import parameter_dict
 from truing.report.json_text import to_json, without_nan
@@ -34,8 +36,15 @@ Floats = NDArray[np.float64]
 
 
 # ---- result.json ---------------------------------------------------------------------------------
-def diagnosis_dict(found: _core.TorqueDiagnosis, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
-    """What ``result.json`` of ``truing dynamics diagnose`` holds. `warnings`: more of them, first."""
+def diagnosis_dict(
+    found: _core.TorqueDiagnosis,
+    *,
+    sanity: Iterable[RecordingFinding] = (),
+    warnings: Iterable[str] = (),
+) -> dict[str, Any]:
+    """What ``result.json`` of ``truing dynamics diagnose`` holds. `sanity`: findings of `check_recordings`;
+    `warnings`: more of them, first.
+    """
     return {
         "format": DYNAMICS_FORMAT,
         "version": _core.version(),
@@ -48,7 +57,7 @@ def diagnosis_dict(found: _core.TorqueDiagnosis, *, warnings: Iterable[str] = ()
         **_errors(found.errors),
         "friction": friction_dict(found.robot, found.where),
         "classes": [{"effects": list(c.effects), "sentence": c.sentence} for c in found.classes],
-        "sanity": [],
+        "sanity": [asdict(finding) for finding in sanity],
         "not_testable": [_not_testable(n) for n in found.not_testable],
         "held_out": list(found.held_out),
         "cutoff_hz": found.cutoff,
@@ -57,8 +66,10 @@ def diagnosis_dict(found: _core.TorqueDiagnosis, *, warnings: Iterable[str] = ()
     }
 
 
-def fit_dict(found: _core.TorqueFit, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
-    """What ``result.json`` of ``truing dynamics identify`` holds. `warnings`: more of them, first."""
+def fit_dict(
+    found: _core.TorqueFit, *, sanity: Iterable[RecordingFinding] = (), warnings: Iterable[str] = ()
+) -> dict[str, Any]:
+    """What ``result.json`` of ``truing dynamics identify`` holds; as `diagnosis_dict`."""
     return {
         "format": IDENTIFICATION_FORMAT,
         "version": _core.version(),
@@ -66,6 +77,7 @@ def fit_dict(found: _core.TorqueFit, *, warnings: Iterable[str] = ()) -> dict[st
         "parameters": [parameter_dict(p) for p in found.parameters],
         **_errors(found.errors),
         "friction": friction_dict(found.robot, []),
+        "sanity": [asdict(finding) for finding in sanity],
         "not_testable": [_not_testable(n) for n in found.not_testable],
         "held_out": list(found.held_out),
         "cutoff_hz": found.cutoff,
@@ -314,14 +326,16 @@ def write_diagnosis(
     found: _core.TorqueDiagnosis,
     recordings: Sequence[_core.Recording],
     *,
+    sanity: Iterable[RecordingFinding] = (),
     warnings: Iterable[str] = (),
     nominal_file: Path | None = None,
 ) -> dict[str, Any]:
     """Writes everything that ``truing dynamics diagnose`` found, and returns what result.json holds.
 
-    `nominal_file`: the robot's file, in whose units robot.yaml is written.
+    `sanity`: findings of `check_recordings`. `nominal_file`: the robot's file, in whose units robot.yaml is
+    written.
     """
-    result: dict[str, Any] = without_nan(diagnosis_dict(found, warnings=warnings))
+    result: dict[str, Any] = without_nan(diagnosis_dict(found, sanity=sanity, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
     _write_residuals(folder, found, recordings)
@@ -345,11 +359,12 @@ def write_fit(
     found: _core.TorqueFit,
     recordings: Sequence[_core.Recording],
     *,
+    sanity: Iterable[RecordingFinding] = (),
     warnings: Iterable[str] = (),
     nominal_file: Path | None = None,
 ) -> dict[str, Any]:
     """Writes everything that ``truing dynamics identify`` found, and returns what result.json holds."""
-    result: dict[str, Any] = without_nan(fit_dict(found, warnings=warnings))
+    result: dict[str, Any] = without_nan(fit_dict(found, sanity=sanity, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
     write_table(folder / "covariance.csv", parameter_columns(found.parameters))

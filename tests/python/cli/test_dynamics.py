@@ -5,11 +5,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import truing
+from pages import visible
 from truing.cli import main
 from truing.dynamics.result import recording_columns
 from truing.files import write_table
@@ -140,6 +144,131 @@ def test_files_that_cannot_be_used_are_refused(
     assert "20" in refused(["diagnose", robot, str(short)], tmp_path, capsys)
     said = refused(["diagnose", robot], tmp_path, capsys)
     assert "REC" in said
+
+
+def changed(files: Path, tmp_path: Path, change: Callable[[dict[str, Any]], None]) -> str:
+    """The first recording with other columns, of no set."""
+    table: dict[str, Any] = {k: np.array(v) for k, v in columns_of(files / "motion1.csv").items()}
+    change(table)
+    write_table(tmp_path / "changed.csv", table)
+    return str(tmp_path / "changed.csv")
+
+
+def columns_of(path: Path) -> dict[str, np.ndarray]:
+    """Columns of numbers of a table."""
+    lines = [line.split(",") for line in path.read_text().splitlines()]
+    return {
+        name: np.array([float(line[k]) for line in lines[1:]])
+        for k, name in enumerate(lines[0])
+        if name != "set"
+    }
+
+
+def at_rest(table: dict[str, Any]) -> None:
+    for k in range(1, 7):
+        table[f"q{k}_rad"][:] = 0.3
+
+
+def with_a_run_of_nan(table: dict[str, Any]) -> None:
+    table["tau2_Nm"][100:120] = np.nan
+
+
+def with_time_that_goes_back(table: dict[str, Any]) -> None:
+    table["t_s"][50] = table["t_s"][40]
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (at_rest, "nothing moves: no joint of any recording is faster than 0.01 rad/s"),
+        (with_a_run_of_nan, "line 102, column 'tau2_Nm': found an empty cell"),
+        (with_time_that_goes_back, "line 52, column 't_s': time goes backwards"),
+    ],
+)
+@pytest.mark.parametrize("command", ["diagnose", "identify"])
+def test_recordings_that_cannot_be_used_leave_nothing_behind(
+    command: str,
+    change: Callable[[dict[str, Any]], None],
+    expected: str,
+    files: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    motion = changed(files, tmp_path, change)
+    assert expected in refused([command, str(files / "robot.yaml"), motion], tmp_path, capsys)
+
+
+def test_a_closed_loop_is_refused(files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mujoco")
+    model = tmp_path / "loop.xml"
+    body = '<body name="{0}"><joint name="{0}" axis="0 1 0"/><geom size="0.1" mass="1"/>{1}</body>'
+    model.write_text(
+        f"<mujoco><worldbody>{body.format('a', body.format('b', ''))}{body.format('c', '')}</worldbody>"
+        '<equality><connect body1="b" body2="c" anchor="0 0 0"/></equality></mujoco>'
+    )
+    given = ["diagnose", str(model), str(files / "motion1.csv"), "--tip-link", "b"]
+    said = refused(given, tmp_path, capsys)
+    assert "`connect` between 'b' and 'c' closes a loop" in said
+
+
+def turned(column: str) -> Callable[[dict[str, Any]], None]:
+    def change(table: dict[str, Any]) -> None:
+        table[column] = -table[column]
+
+    return change
+
+
+@pytest.mark.parametrize("command", ["diagnose", "identify"])
+def test_a_mistake_in_the_recordings_comes_first(
+    command: str, files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    motion, out = changed(files, tmp_path, turned("tau6_Nm")), tmp_path / "out"
+    assert main(["dynamics", command, str(files / "robot.yaml"), motion, "--out", str(out)]) == 1
+    said = capsys.readouterr()
+    assert said.out.startswith("look at the data first: the torque of J6 has the opposite sign")
+    assert "the columns of the recordings are to be corrected first" in said.err
+    finding = json.loads((out / "result.json").read_text())["sanity"][0]
+    assert finding["finding"] == "torque_sign" and finding["joints"] == ["J6"] and finding["mistake"]
+    assert set(finding) == {
+        "finding",
+        "recordings",
+        "joints",
+        "evidence",
+        "value",
+        "unit",
+        "applied",
+        "mistake",
+    }
+    page = visible((out / "report.html").read_text(encoding="utf-8"))
+    assert page.index("Look at the data first") < page.index("Error of every joint")
+
+
+def test_what_is_certain_is_corrected_and_said(
+    files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot, out = str(files / "robot.yaml"), tmp_path / "out"
+    motions = [changed(files, tmp_path, turned("tau3_Nm")), str(files / "motion2.csv")]
+    assert main(["dynamics", "diagnose", robot, *motions, "--out", str(out)]) == 0
+    assert "note: changed: the torque of J3 has the opposite sign" in capsys.readouterr().out
+    result = json.loads((out / "result.json").read_text())
+    assert [f["applied"] for f in result["sanity"]] == [True]
+    assert {"coupling", "load_friction"} <= {e["effect"] for e in result["effects"] if not e["standard"]}
+    page = visible((out / "report.html").read_text(encoding="utf-8"))
+    assert "What the recordings look like" in page and "allowed for" in page
+
+
+def test_currents_without_constants_are_said_in_words(
+    files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def currents(table: dict[str, Any]) -> None:
+        for k in range(1, 7):
+            table[f"i{k}_A"] = table.pop(f"tau{k}_Nm") / 10.0
+
+    motion, out = changed(files, tmp_path, currents), str(tmp_path / "out")
+    assert main(["dynamics", "diagnose", str(files / "robot.yaml"), motion, "--out", out]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "masses and drive constants share one scale" in said and "J2 9.9" in said
+    assert "one recording: blocks of its own time are held out" in said
 
 
 def test_a_robot_without_masses_is_refused(

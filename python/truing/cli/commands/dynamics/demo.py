@@ -57,10 +57,12 @@ class Command(run.Command["SimulatedMotion", "TorqueDiagnosis"]):
     def write(
         self, folder: Path, loaded: SimulatedMotion, found: TorqueDiagnosis, warnings: list[str]
     ) -> Mapping[str, Any]:
+        from truing.dynamics import check_recordings
         from truing.dynamics.result import recording_columns, write_diagnosis
         from truing.files import save_robot, write_table
 
-        result = write_diagnosis(folder, found, loaded.recordings, warnings=warnings)
+        sanity = check_recordings(loaded.nominal, loaded.recordings).findings
+        result = write_diagnosis(folder, found, loaded.recordings, sanity=sanity, warnings=warnings)
         save_robot(folder / "nominal.yaml", loaded.nominal)
         save_robot(folder / "truth.yaml", loaded.truth)
         for recording in loaded.recordings:

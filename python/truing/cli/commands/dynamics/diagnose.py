@@ -25,22 +25,23 @@ from truing.cli.recordings import (
     Topic,
     TorquePerAmpere,
     Units,
+    checked,
+    mistaken,
     print_errors,
-    require_torques,
+    print_findings,
     robot_and_recordings,
 )
 from truing.cli.tables import joined, say, table
 
 if TYPE_CHECKING:
-    from truing.dynamics import Recording, TorqueDiagnosis
-    from truing.model import Robot
+    from truing.dynamics import CheckedRecordings, TorqueDiagnosis
 
 PANEL = "Dynamics"
 LISTED = 12  # causes on the terminal; the report has all
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueDiagnosis"]):
+class Command(run.Command["CheckedRecordings", "TorqueDiagnosis"]):
     doing = "diagnosing"
 
     robot: RobotWithMasses
@@ -56,7 +57,7 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueDiagnosis"]):
     base_link: BaseLink = ""
     tip_link: TipLink = ""
 
-    def load(self, progress: run.Progress) -> tuple[Robot, list[Recording]]:
+    def load(self, progress: run.Progress) -> CheckedRecordings:
         loaded = robot_and_recordings(
             self.robot,
             self.recordings,
@@ -67,10 +68,9 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueDiagnosis"]):
             units=self.units,
             torque_per_ampere=self.torque_per_ampere,
         )
-        require_torques(loaded[1])
-        return loaded
+        return checked(loaded)
 
-    def solve(self, loaded: tuple[Robot, list[Recording]], progress: run.Progress) -> TorqueDiagnosis:
+    def solve(self, loaded: CheckedRecordings, progress: run.Progress) -> TorqueDiagnosis:
         from truing.dynamics import diagnose
 
         options: dict[str, Any] = {
@@ -80,22 +80,29 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueDiagnosis"]):
         }
         if self.cutoff is not None:
             options["cutoff"] = self.cutoff
-        return diagnose(*loaded, **options)
+        return diagnose(loaded.robot, loaded.recordings, **options)
 
     def write(
         self,
         folder: Path,
-        loaded: tuple[Robot, list[Recording]],
+        loaded: CheckedRecordings,
         found: TorqueDiagnosis,
         warnings: list[str],
     ) -> Mapping[str, Any]:
         from truing.dynamics.result import write_diagnosis
 
-        return write_diagnosis(folder, found, loaded[1], warnings=warnings, nominal_file=self.robot)
+        return write_diagnosis(
+            folder,
+            found,
+            loaded.recordings,
+            sanity=loaded.findings,
+            warnings=warnings,
+            nominal_file=self.robot,
+        )
 
     def failure(self, result: Mapping[str, Any]) -> str:
-        if result["verdict"] != "does_not_hold":
-            return ""
+        if mistaken(result) or result["verdict"] != "does_not_hold":
+            return mistaken(result)
         return "what was found does not hold on recordings that it was not fitted to"
 
     def table(self, result: Mapping[str, Any], found: TorqueDiagnosis) -> None:
@@ -103,7 +110,8 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueDiagnosis"]):
 
 
 def print_diagnosis(result: Mapping[str, Any]) -> None:
-    """The verdict, the errors, and the causes."""
+    """What looks wrong with the recordings, the verdict, the errors, and the causes."""
+    print_findings(result)
     say(result["sentence"])
     models = [("nominal", "nominal"), ("standard", "standard"), ("named", "named")]
     if result["unknown"]:

@@ -24,21 +24,22 @@ from truing.cli.recordings import (
     Topic,
     TorquePerAmpere,
     Units,
+    checked,
+    mistaken,
     print_errors,
-    require_torques,
+    print_findings,
     robot_and_recordings,
 )
 from truing.cli.tables import say
 
 if TYPE_CHECKING:
-    from truing.dynamics import Recording, TorqueFit
-    from truing.model import Robot
+    from truing.dynamics import CheckedRecordings, TorqueFit
 
 PANEL = "Dynamics"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueFit"]):
+class Command(run.Command["CheckedRecordings", "TorqueFit"]):
     doing = "identifying"
 
     robot: RobotWithMasses
@@ -61,7 +62,7 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueFit"]):
     base_link: BaseLink = ""
     tip_link: TipLink = ""
 
-    def load(self, progress: run.Progress) -> tuple[Robot, list[Recording]]:
+    def load(self, progress: run.Progress) -> CheckedRecordings:
         loaded = robot_and_recordings(
             self.robot,
             self.recordings,
@@ -72,10 +73,9 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueFit"]):
             units=self.units,
             torque_per_ampere=self.torque_per_ampere,
         )
-        require_torques(loaded[1])
-        return loaded
+        return checked(loaded)
 
-    def solve(self, loaded: tuple[Robot, list[Recording]], progress: run.Progress) -> TorqueFit:
+    def solve(self, loaded: CheckedRecordings, progress: run.Progress) -> TorqueFit:
         from truing.dynamics import identify
 
         options: dict[str, Any] = {
@@ -86,16 +86,27 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueFit"]):
         }
         if self.cutoff is not None:
             options["cutoff"] = self.cutoff
-        return identify(*loaded, **options)
+        return identify(loaded.robot, loaded.recordings, **options)
 
     def write(
-        self, folder: Path, loaded: tuple[Robot, list[Recording]], found: TorqueFit, warnings: list[str]
+        self, folder: Path, loaded: CheckedRecordings, found: TorqueFit, warnings: list[str]
     ) -> Mapping[str, Any]:
         from truing.dynamics.result import write_fit
 
-        return write_fit(folder, found, loaded[1], warnings=warnings, nominal_file=self.robot)
+        return write_fit(
+            folder,
+            found,
+            loaded.recordings,
+            sanity=loaded.findings,
+            warnings=warnings,
+            nominal_file=self.robot,
+        )
+
+    def failure(self, result: Mapping[str, Any]) -> str:
+        return mistaken(result)
 
     def table(self, result: Mapping[str, Any], found: TorqueFit) -> None:
+        print_findings(result)
         models = (("nominal", "nominal"), ("standard", "standard"), ("named", "fitted"))
         print_errors(result, models)
         say(f"{len(result['parameters'])} parameters fitted; low-pass at {result['cutoff_hz']:.3g} Hz")
