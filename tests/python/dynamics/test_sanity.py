@@ -204,6 +204,17 @@ def test_torques_in_another_order_are_said() -> None:
     assert "J3, J2, J1, J4, J5, J6" in found.evidence
 
 
+def test_a_sign_is_not_turned_while_the_order_is_wrong() -> None:
+    order = [2, 1, 0, 3, 4, 5]
+    wrong = with_fields(torque=lambda one: column(one.torque, 1, np.negative)[:, order])
+    checked = check_recordings(ARM, wrong)
+    assert sorted(kinds(checked)) == ["torque_order", "torque_sign"]
+    assert all(one.mistake and not one.applied for one in checked.findings)
+    assert all(
+        np.array_equal(one.torque, given.torque) for one, given in zip(checked.recordings, wrong, strict=True)
+    )
+
+
 # ---- Units and scales ------------------------------------------------------------------------------
 @pytest.mark.parametrize(("unit", "size"), [("rpm", 60 / (2 * math.pi)), ("deg/s", 180 / math.pi)])
 def test_speeds_in_another_unit_are_converted(unit: str, size: float) -> None:

@@ -279,6 +279,9 @@ def better_reading(
         ]
         found.append(_what_was_found(candidate, fit, other, rivals[0][1].finding if rivals else ""))
         reading, fit = candidate.reading, other
+    plain = as_written(len(joints))
+    in_order = (reading.order, reading.torque_order) == (plain.order, plain.torque_order)
+    found = [replace(one, certain=one.certain and in_order) for one in found]  # else: of which column?
     return found, reading, fit
 
 
