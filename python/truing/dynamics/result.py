@@ -24,20 +24,20 @@ from truing.files import load_units, save_robot, write_table
 from truing.identification.result import parameter_dict
 from truing.report.json_text import to_json, without_nan
 
-DYNAMICS_FORMAT = "truing-dynamics/1"
-IDENTIFICATION_FORMAT = "truing-dynamics-identification/1"
-PREDICTION_FORMAT = "truing-dynamics-prediction/1"
-EXPORT_FORMAT = "truing-dynamics-export/1"
+DYNAMICS_FORMAT = "truing-dynamics/1"  # of all commands; `command` says which one wrote it
 BLOCKS_OF_TIME = "blocks of time"  # what `held_out` says where parts of the only recording were held out
 Floats = NDArray[np.float64]
 
 
 # ---- result.json ---------------------------------------------------------------------------------
+def _head(command: str) -> dict[str, Any]:
+    return {"format": DYNAMICS_FORMAT, "command": command, "version": _core.version()}
+
+
 def diagnosis_dict(found: _core.TorqueDiagnosis, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
     """What ``result.json`` of ``truing dynamics diagnose`` holds. `warnings`: more of them, first."""
     return {
-        "format": DYNAMICS_FORMAT,
-        "version": _core.version(),
+        **_head("diagnose"),
         "robot": found.robot.name,
         "verdict": found.verdict,
         "sentence": found.sentence,
@@ -59,8 +59,7 @@ def diagnosis_dict(found: _core.TorqueDiagnosis, *, warnings: Iterable[str] = ()
 def fit_dict(found: _core.TorqueFit, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
     """What ``result.json`` of ``truing dynamics identify`` holds. `warnings`: more of them, first."""
     return {
-        "format": IDENTIFICATION_FORMAT,
-        "version": _core.version(),
+        **_head("identify"),
         "robot": found.robot.name,
         "parameters": [parameter_dict(p) for p in found.parameters],
         **_errors(found.errors),
@@ -284,8 +283,7 @@ def prediction_dict(
             "percent": 100.0 * rms / spread if spread > 0 else math.nan,
         }
     return {
-        "format": PREDICTION_FORMAT,
-        "version": _core.version(),
+        **_head("predict"),
         "robot": robot.name,
         "recording": recording.name,
         "rows": len(recording),
@@ -306,8 +304,7 @@ def export_dict(
     """What ``result.json`` of ``truing dynamics export`` holds. model: name of the simulator's file."""
     found: dict[str, Any] = without_nan(
         {
-            "format": EXPORT_FORMAT,
-            "version": _core.version(),
+            **_head("export"),
             "robot": robot.name,
             "to": to,
             "model": model,

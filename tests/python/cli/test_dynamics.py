@@ -192,7 +192,8 @@ def test_export_writes_the_model_and_what_it_lacks(
     assert main(["dynamics", "export", str(tmp_path), "--to", to, "--out", str(out)]) == 0
     assert {path.name for path in out.iterdir()} == names | {"not_written.yaml", "result.json"}
     result = json.loads((out / "result.json").read_text())
-    assert result["format"] == "truing-dynamics-export/1" and result["to"] == to
+    assert (result["format"], result["command"]) == ("truing-dynamics/1", "export")
+    assert result["to"] == to
     assert (out / result["model"]).exists()
     said = capsys.readouterr().out
     assert str(out / result["model"]) in said
