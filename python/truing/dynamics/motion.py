@@ -17,7 +17,7 @@ from truing.errors import InputError
 Floats = NDArray[np.float64]
 
 SMOOTHING = 0.05  # [s] half of the stretch whose cubic gives a smoothed value
-_GAP = 5.0  # of the usual time between rows: a gap
+GAP = 5.0  # of the usual time between rows: a gap
 
 
 class Recorded(Protocol):
@@ -51,6 +51,15 @@ class Track:
     torque: Floats
     temperature: Floats  # shape=(n, joints) [deg C], as the torques; NaN: not known
 
+    def near(self, begin: float, end: float) -> Track:
+        """The rows between two times, and one more on both sides."""
+        rows, more = (
+            slice(max(np.searchsorted(time, begin) - 1, 0), np.searchsorted(time, end, "right") + 1)
+            for time in (self.time, self.torque_time)
+        )
+        motion = (table[rows] for table in (self.time, self.q, self.qd, self.qdd))
+        return Track(*motion, *(table[more] for table in (self.torque_time, self.torque, self.temperature)))
+
 
 def track_of(recording: Recorded, robot: _core.Robot, smoothing: float) -> tuple[Track, NDArray[np.bool_]]:
     """The recording on an even grid, and where that is not across a gap."""
@@ -69,7 +78,7 @@ def track_of(recording: Recorded, robot: _core.Robot, smoothing: float) -> tuple
     else:
         rate = _filtered(table_at(time, q, grid), slope)
     free = np.ones(grid.size, dtype=bool)
-    for k in np.flatnonzero(np.diff(time) > _GAP * step):
+    for k in np.flatnonzero(np.diff(time) > GAP * step):
         free &= (grid < time[k] - smoothing) | (grid > time[k + 1] + smoothing)
     return Track(
         grid, smooth, rate, _filtered(rate, slope), time, torque, temperatures(recording, torque.shape)
@@ -104,6 +113,12 @@ def temperatures(recording: Recorded, shape: tuple[int, int]) -> Floats:
     columns = {name: np.asarray(values, dtype=float) for name, values in recording.columns.items()}
     common = columns.get("temp_C", np.full(shape[0], np.nan))
     return np.column_stack([columns.get(f"temp{j + 1}_C", common) for j in range(shape[1])])
+
+
+def smoothed(table: Floats, step: float, smoothing: float) -> Floats:
+    """Even rows, each by the cubic through those within `smoothing` [s] on both sides."""
+    half = max(int(round(smoothing / step)), 2)
+    return _filtered(table, _kernels(half, step)[0]) if len(table) > 2 * half else table
 
 
 def _kernels(half: int, step: float) -> tuple[Floats, Floats]:
