@@ -29,4 +29,5 @@ from truing.dynamics.api import (
     identify as identify,
     predict as predict,
 )
+from truing.dynamics.rollout import rollout as rollout
 from truing.files import load_recordings as load_recordings

@@ -3,8 +3,9 @@
 """The HTML reports of ``truing dynamics``, in the order in which people ask.
 
 The first screen: how far the error of the torque falls on recordings that nothing was fitted to, by what;
-torque over time, measured and as the models say; the error of every joint. Below: every cause with its
-size; friction over speed; where in the motion something is left; what could not be told apart, or tested.
+torque over time, measured and as the models say; the error of every joint. Below: simulated and real motion;
+every cause with its size; friction over speed; where in the motion something is left; what could not be told
+apart, or tested.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truing.dynamics.rollout.page import joint_menu, rollout_card
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, faded, packed
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.words import counted, escaped, figures_text
@@ -59,7 +61,12 @@ INPUTS = {
 USUAL = "Standard practice: inertias, Coulomb and viscous friction, an offset: what is usually fitted."
 
 
-def diagnosis_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, Any]], recordings: int) -> str:
+def diagnosis_report(
+    result: Mapping[str, Any],
+    traces: Sequence[Mapping[str, Any]],
+    recordings: int,
+    paths: Sequence[Mapping[str, Any]] = (),
+) -> str:
     """The report of ``truing dynamics diagnose``.
 
     Args:
@@ -67,6 +74,7 @@ def diagnosis_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, An
         traces: Of every joint a held-out stretch: recording, joint, and arrays over its rows: time [s],
             measured, nominal, standard, named [Nm | N].
         recordings: How many there were.
+        paths: Of every joint a held-out stretch of motion (`truing.dynamics.rollout.paths_of`).
     """
     page = Page(f"{result.get('robot') or 'Robot'}: torques", part_of_page("dynamics"))
     page.add(_headline(result, recordings))
@@ -74,6 +82,7 @@ def diagnosis_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, An
     _trace_card(page, traces, worst_first(result))
     _error_card(page, result)
     page.add("</div>")
+    rollout_card(page, result, paths)
     page.add(_causes(result))
     _friction(page, result["friction"])
     _where(page, result)
@@ -224,6 +233,14 @@ def _about(result: Mapping[str, Any]) -> str:
     )
 
 
+def _moves(result: Mapping[str, Any]) -> str:
+    """What simulated motion says, in a line."""
+    motion = result["rollout"]
+    if motion["why_not"]:
+        return ""
+    return f'<p class="sub">{escaped(motion["sentence"])}.</p>'
+
+
 def _headline(result: Mapping[str, Any], recordings: int) -> str:
     label, tone = TONES[result["verdict"]]
     before, after = mean_percent(result, "standard"), mean_percent(result, "named")
@@ -237,9 +254,11 @@ def _headline(result: Mapping[str, Any], recordings: int) -> str:
         text = escaped(result["sentence"])
         length = len(text)
     badge = f'<span class="verdict {tone}">{label}</span>'
+    if result["rollout"].get("verdict"):
+        badge += '<span class="verdict bad">worse in motion</span>'
     return (
         f"<header>{_kicker('diagnose', result, recordings, badge)}<h1"
-        f"{' class=long' if length > LONG else ''}>{text}</h1>{_about(result)}</header>"
+        f"{' class=long' if length > LONG else ''}>{text}</h1>{_about(result)}{_moves(result)}</header>"
     )
 
 
@@ -308,25 +327,10 @@ def _trace_card(page: Page, traces: Sequence[Mapping[str, Any]], order: Sequence
 
 
 def _trace_layout(buttons: list[dict[str, Any]]) -> dict[str, Any]:
-    menu = {
-        "type": "buttons",
-        "direction": "right",
-        "buttons": buttons,
-        "x": 0,
-        "xanchor": "left",
-        "y": 1.02,
-        "yanchor": "bottom",
-        "pad": {"t": 0, "b": 4},
-        "bgcolor": "#ffffff",
-        "bordercolor": "#c8ced6",
-        "font": {"size": 12},
-    }
-    if len(buttons) > 8 or sum(len(b["label"]) for b in buttons) > 60:
-        menu["type"] = "dropdown"
     return {
         "xaxis": {"title": {"text": "time [s]"}},
         "yaxis": {"title": {"text": "torque [Nm]"}},
-        "updatemenus": [menu] if len(buttons) > 1 else [],
+        "updatemenus": joint_menu(buttons),
         "margin": {"l": 56, "r": 12, "t": 44, "b": 44},
     }
 

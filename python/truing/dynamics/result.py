@@ -20,12 +20,12 @@ from truing import _core
 from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.friction import friction_dict
 from truing.dynamics.page import diagnosis_report, fit_report, prediction_report
+from truing.dynamics.rollout import BLOCKS_OF_TIME, Rollout, paths_of, rollout_dict
 from truing.files import load_units, save_robot, write_table
 from truing.identification.result import parameter_dict
 from truing.report.json_text import to_json, without_nan
 
 DYNAMICS_FORMAT = "truing-dynamics/1"  # of all commands; `command` says which one wrote it
-BLOCKS_OF_TIME = "blocks of time"  # what `held_out` says where parts of the only recording were held out
 Floats = NDArray[np.float64]
 
 
@@ -34,17 +34,24 @@ def _head(command: str) -> dict[str, Any]:
     return {"format": DYNAMICS_FORMAT, "command": command, "version": _core.version()}
 
 
-def diagnosis_dict(found: _core.TorqueDiagnosis, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
+NOT_JUDGED = Rollout(None, "not asked for")
+
+
+def diagnosis_dict(
+    found: _core.TorqueDiagnosis, rollout: Rollout = NOT_JUDGED, *, warnings: Iterable[str] = ()
+) -> dict[str, Any]:
     """What ``result.json`` of ``truing dynamics diagnose`` holds. `warnings`: more of them, first."""
+    motion = rollout_dict(rollout)
     return {
         **_head("diagnose"),
         "robot": found.robot.name,
         "verdict": found.verdict,
-        "sentence": found.sentence,
+        "sentence": ". ".join([found.sentence.rstrip("."), *motion.get("verdict", ())]),
         "effects": [_effect(e) for e in found.effects],
         "unknown": [_unknown(u) for u in found.unknown],
         "where": where_dict(found.where, found.errors),
         **_errors(found.errors),
+        "rollout": motion,
         "friction": friction_dict(found.robot, found.where),
         "classes": [{"effects": list(c.effects), "sentence": c.sentence} for c in found.classes],
         "sanity": [],
@@ -52,7 +59,7 @@ def diagnosis_dict(found: _core.TorqueDiagnosis, *, warnings: Iterable[str] = ()
         "held_out": list(found.held_out),
         "cutoff_hz": found.cutoff,
         "design_effect": list(found.design_effect),
-        "warnings": [*warnings, *found.warnings],
+        "warnings": [*warnings, *found.warnings, *motion.get("worse", ())],
     }
 
 
@@ -320,15 +327,17 @@ def write_diagnosis(
     folder: Path,
     found: _core.TorqueDiagnosis,
     recordings: Sequence[_core.Recording],
+    rollout: Rollout = NOT_JUDGED,
     *,
     warnings: Iterable[str] = (),
     nominal_file: Path | None = None,
 ) -> dict[str, Any]:
     """Writes everything that ``truing dynamics diagnose`` found, and returns what result.json holds.
 
-    `nominal_file`: the robot's file, in whose units robot.yaml is written.
+    `rollout`: of `truing.dynamics.rollout`. `nominal_file`: the robot's file, in whose units robot.yaml is
+    written.
     """
-    result: dict[str, Any] = without_nan(diagnosis_dict(found, warnings=warnings))
+    result: dict[str, Any] = without_nan(diagnosis_dict(found, rollout, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
     columns = residual_columns(found.robot, recordings, found.held_out, found.cutoff)
@@ -343,7 +352,8 @@ def write_diagnosis(
         }
         for t in found.traces
     ]
-    report = diagnosis_report(result, traces, len(recordings))
+    paths = paths_of(rollout.judgement) if rollout.judgement is not None else []
+    report = diagnosis_report(result, traces, len(recordings), paths)
     (folder / "report.html").write_text(report, encoding="utf-8")
     return result
 
