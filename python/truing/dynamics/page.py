@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truing.dynamics.rollout.page import joint_menu, rollout_card
+from truing.dynamics.rollout.page import joint_menu, response_card, rollout_card
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, faded, packed
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.words import counted, escaped, figures_text
@@ -113,9 +113,14 @@ def fit_report(result: Mapping[str, Any], recordings: int) -> str:
     return page.html()
 
 
-def prediction_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, Any]]) -> str:
+def prediction_report(
+    result: Mapping[str, Any],
+    traces: Sequence[Mapping[str, Any]],
+    paths: Sequence[Mapping[str, Any]] = (),
+) -> str:
     """The report of ``truing dynamics predict``. result: what ``result.json`` holds; traces: of every joint,
-    time [s], measured (NaN: it was not) and named, the prediction [Nm | N].
+    time [s], measured (NaN: it was not) and named, the prediction [Nm | N]; paths: of every joint simulated
+    motion, if there is any.
     """
     page = Page(f"{result.get('robot') or 'Robot'}: predicted torques", part_of_page("dynamics"))
     errors = result["errors"]
@@ -134,6 +139,8 @@ def prediction_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, A
     start = [_stretch(trace) for trace in traces]
     order = sorted(errors, key=lambda joint: -(errors[joint]["percent"] or 0.0))
     _trace_card(page, start, order or [trace["joint"] for trace in traces])
+    if result["simulated"] is not None:
+        response_card(page, result["simulated"], paths)
     lines = "".join(
         f"<tr><td>{escaped(joint)}</td>{table_cell(e['rms'], figures_text(e['rms']) + ' ' + e['unit'])}"
         f"<td>{_percent(e['percent'])}</td></tr>"

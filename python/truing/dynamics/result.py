@@ -20,7 +20,8 @@ from truing import _core
 from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.friction import friction_dict
 from truing.dynamics.page import diagnosis_report, fit_report, prediction_report
-from truing.dynamics.rollout import BLOCKS_OF_TIME, Rollout, paths_of, rollout_dict
+from truing.dynamics.rollout import BLOCKS_OF_TIME, Rollout, paths_of, response_paths, rollout_dict
+from truing.dynamics.simulate import Response
 from truing.files import load_units, save_robot, write_table
 from truing.identification.result import parameter_dict
 from truing.report.json_text import to_json, without_nan
@@ -259,6 +260,14 @@ def prediction_columns(
     return columns
 
 
+def response_columns(robot: _core.Robot, response: Response) -> dict[str, Any]:
+    """Columns that ``predict --simulate`` adds: positions, and the number of the window of each row."""
+    columns: dict[str, Any] = {}
+    for k, joint in enumerate(_driven(robot)):
+        columns[f"q{k + 1}_{'rad' if joint.type == 'revolute' else 'm'}"] = response.position[:, k]
+    return {**columns, "window": response.window}
+
+
 def _recorded(table: Floats) -> set[int]:
     """The joints that a table has values of."""
     return {k for k in range(table.shape[1]) if not np.isnan(table[:, k]).all()}
@@ -268,6 +277,7 @@ def prediction_dict(
     robot: _core.Robot,
     recording: _core.Recording,
     predicted: _core.TorquePrediction,
+    response: Response | None = None,
     *,
     cutoff: float,
     warnings: Iterable[str] = (),
@@ -296,7 +306,26 @@ def prediction_dict(
         "rows": len(recording),
         "cutoff_hz": cutoff,
         "errors": errors,
+        "simulated": None if response is None else _response_dict(robot, recording, response),
         "warnings": list(warnings),
+    }
+
+
+def _response_dict(robot: _core.Robot, recording: _core.Recording, response: Response) -> dict[str, Any]:
+    """How far a simulated motion is off, on all rows and on the last of every window."""
+    off = response.position - np.asarray(recording.position)
+    ends = np.flatnonzero(np.diff(response.window, append=-1) != 0)
+    return {
+        "horizon_s": response.horizon,
+        "windows": int(response.start.size),
+        "errors": {
+            joint.name: {
+                "rms": float(np.sqrt(np.mean(off[:, k] ** 2))),
+                "end_rms": float(np.sqrt(np.mean(off[ends, k] ** 2))),
+                "unit": "rad" if joint.type == "revolute" else "m",
+            }
+            for k, joint in enumerate(_driven(robot))
+        },
     }
 
 
@@ -382,15 +411,22 @@ def write_prediction(
     robot: _core.Robot,
     recording: _core.Recording,
     predicted: _core.TorquePrediction,
+    response: Response | None = None,
     *,
     cutoff: float,
     warnings: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """Writes everything that ``truing dynamics predict`` found, and returns what result.json holds."""
+    """Writes everything that ``truing dynamics predict`` found, and returns what result.json holds.
+
+    `response`: of `truing.dynamics.simulate.simulated_response`.
+    """
     result: dict[str, Any] = without_nan(
-        prediction_dict(robot, recording, predicted, cutoff=cutoff, warnings=warnings)
+        prediction_dict(robot, recording, predicted, response, cutoff=cutoff, warnings=warnings)
     )
-    write_table(folder / "predicted.csv", prediction_columns(robot, recording, predicted))
+    columns = prediction_columns(robot, recording, predicted)
+    if response is not None:
+        columns.update(response_columns(robot, response))
+    write_table(folder / "predicted.csv", columns)
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     traces = [
         {
@@ -404,7 +440,8 @@ def write_prediction(
             zip(_driven(robot), measured_torque(robot, recording).T, strict=True)
         )
     ]
-    (folder / "report.html").write_text(prediction_report(result, traces), encoding="utf-8")
+    paths = [] if response is None else response_paths(robot, recording, response)
+    (folder / "report.html").write_text(prediction_report(result, traces, paths), encoding="utf-8")
     return result
 
 

@@ -25,6 +25,7 @@ from truing.dynamics.export import Exported, coupling_matrix, import_mujoco
 from truing.dynamics.export.parts import drive_torque
 from truing.dynamics.motion import Track, table_at
 from truing.errors import InputError
+from truing.files import is_mjcf
 
 Floats = NDArray[np.float64]
 
@@ -107,6 +108,11 @@ def runnable_mjcf(path: Path, robot: _core.Robot) -> Runnable:
         notes=(f"recorded torques stand in the place of its drives {', '.join(off)}",) if off else (),
         prismatic=tuple(joint.type == "prismatic" for joint in robot.joints if not joint.passive),
     )
+
+
+def simulator_of(path: Path, robot: _core.Robot) -> _core.Robot | Runnable:
+    """What simulates the robot of a file: an MJCF as it is; of others the robot, which is exported."""
+    return runnable_mjcf(path, robot) if is_mjcf(path) else robot
 
 
 def _without_bounds(model: Any) -> Any:
@@ -223,7 +229,7 @@ class Runner:
         for start, t in zip(starts, track, strict=True):
             near = self.tracks[t].near(start, start)
             warm.append(table_at(near.torque_time, near.temperature, np.array([start]))[0])
-        begun = np.array([self.tracks[t].time[0] for t in track])
+        begun = np.array([self.tracks[t].began for t in track])
         return np.array(warm), (starts - begun)[:, None]
 
     def _torques(self, starts: Floats, track: NDArray[np.intp], at: Floats) -> Floats:
@@ -330,7 +336,7 @@ class Runner:
             drive = drive_torque(of.robot, track.torque_time, track.torque, track.time[rows])
             warm = table_at(track.torque_time, track.temperature, track.time[rows])
             warm = np.where(np.isnan(warm), of.beside.REFERENCE_C, warm)
-            now = (q, qd, drive, warm, (track.time[rows] - track.time[0])[:, None])
+            now = (q, qd, drive, warm, (track.time[rows] - track.began)[:, None])
             friction = of.beside.dry_friction(*now) / np.abs(of.ratios)
             smooth = of.beside.smooth_torques(*now)
         out = np.empty_like(q)

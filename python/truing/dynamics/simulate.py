@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,15 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.export import Exported, export, import_mujoco
 from truing.dynamics.export.parts import drive_torque
-from truing.dynamics.motion import GAP, SMOOTHING, Recorded, Track, smoothed, table_at, track_of
+from truing.dynamics.motion import (
+    SMOOTHING,
+    Recorded,
+    Track,
+    smoothed,
+    stretches_of,
+    table_at,
+    track_of,
+)
 from truing.dynamics.runner import Runnable, Runner, runnable
 from truing.errors import InputError
 
@@ -261,6 +269,7 @@ class Response:
     position: Floats  # shape=(n, joints) [rad | m], a row for each of the recording
     window: NDArray[np.intp]  # shape=(n,): the number of each row's window
     start: Floats  # shape=(windows,) [s]
+    horizon: float  # [s] that was asked for
 
 
 def simulated_response(
@@ -272,29 +281,30 @@ def simulated_response(
 ) -> Response:
     """Simulates a whole recording, driven by its torques, in windows of `horizon` [s] one after the other.
 
-    A window begins at the measured state (as in windows_of); so does the first row after a gap. Raises
-    InputError: no torques, joints that were not recorded, a horizon that is not above zero, MuJoCo is not
-    installed.
+    A window begins at the measured state (as in windows_of), the first after a gap with its first row.
+    Raises InputError: no torques, joints that were not recorded, less than 0.2 s between gaps, a horizon
+    that is not above zero, MuJoCo is not installed.
     """
     if not horizon > 0.0:
         raise InputError(f"a horizon of {horizon:g} s: expected one above zero")
     import_mujoco()
     with tempfile.TemporaryDirectory() as folder:
         made = _made(model, Path(folder) / "model", callbacks)
-    track, _ = track_of(recording, made.robot, smoothing)
-    time = np.asarray(recording.time, dtype=float)
-    starts, window = [time[0]], np.zeros(time.size, dtype=np.intp)
-    usual = float(np.median(np.diff(time)))
-    for k in range(1, time.size):
-        if time[k] - starts[-1] >= horizon - 1e-9 or time[k] - time[k - 1] > GAP * usual:
-            starts.append(time[k])
-        window[k] = len(starts) - 1
-    start = np.array(starts)
-    since = time - start[window]
+    began = float(np.asarray(recording.time)[0])
+    starts: list[float] = []
+    tracks, of_track, window = [], [], []
+    for stretch in stretches_of(recording):
+        tracks.append(replace(track_of(stretch, made.robot, smoothing)[0], began=began))
+        number = ((stretch.time - stretch.time[0]) / horizon + 1e-9).astype(int)
+        window.append(len(starts) + number)
+        starts += [stretch.time[0] + k * horizon for k in range(number[-1] + 1)]
+        of_track += [len(tracks) - 1] * (number[-1] + 1)
+    start, rows = np.array(starts), np.concatenate(window)
+    since = np.asarray(recording.time, dtype=float) - start[rows]
     ahead = _FINE * np.arange(int(np.ceil(since.max() / _FINE)) + 1, dtype=np.float64)
     path = np.empty((start.size, ahead.size, len(made.driven)))
-    path[:, 0] = table_at(track.time, track.q, start)
+    path[:, 0] = [table_at(tracks[t].time, tracks[t].q, start[k : k + 1])[0] for k, t in enumerate(of_track)]
     if ahead.size > 1:
-        path[:, 1:] = Runner(made, [track]).run(start, np.zeros(start.size, dtype=np.intp), ahead[1:])
-    position = np.concatenate([table_at(ahead, path[w], since[window == w]) for w in range(start.size)])
-    return Response(position, window, start)
+        path[:, 1:] = Runner(made, tracks).run(start, np.array(of_track, dtype=np.intp), ahead[1:])
+    position = np.concatenate([table_at(ahead, path[w], since[rows == w]) for w in range(start.size)])
+    return Response(position, rows, start, horizon)

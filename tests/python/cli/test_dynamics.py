@@ -4,12 +4,16 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import truing
+from pages import charts_of
 from truing.cli import main
 from truing.dynamics.result import recording_columns
 from truing.files import write_table
@@ -38,6 +42,7 @@ def test_diagnose_names_what_was_hidden(
     assert main(["dynamics", "diagnose", robot, recordings, "--out", str(out)]) == 0
     said = capsys.readouterr().out
     assert "coupling at J5 from J6" in said and "standard   named" in said
+    assert "simulated less measured motion" in said and "worst joint, 2 s" in said
     assert {path.name for path in out.iterdir()} == {
         "result.json",
         "report.html",
@@ -75,6 +80,30 @@ def test_identify_fits_what_is_asked_for(
     assert {"coulomb.J1", "viscous.J6", "load_friction.J2", "load_friction.J3"} <= names
     assert "load_friction.J1" not in names
     assert (tmp_path / "o" / "covariance.csv").exists()
+
+
+def test_predict_simulates_the_motion_too(
+    files: Path, simulated: SimulatedMotion, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truing.save_robot(tmp_path / "truth.yaml", simulated.truth)
+    arguments = ["predict", str(tmp_path / "truth.yaml"), str(files / "motion3.csv"), "--simulate", "0.5s"]
+    assert main(["dynamics", *arguments, "--out", str(tmp_path / "p")]) == 0
+    assert "motion in 28 windows of 0.5 s" in capsys.readouterr().out
+    with (tmp_path / "p" / "predicted.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    recording = simulated.recordings[2]
+    names = [f"q{k}_rad" for k in range(1, 7)]
+    assert set(rows[0]) == {"t_s", *(f"tau{k}_Nm" for k in range(1, 7)), *names, "window"}
+    assert len(rows) == len(recording)
+    off = np.array([[float(row[name]) for name in names] for row in rows]) - recording.position
+    result = json.loads((tmp_path / "p" / "result.json").read_text())["simulated"]
+    assert result["errors"]["J3"]["rms"] == pytest.approx(np.sqrt(np.mean(off[:, 2] ** 2)))
+    assert np.abs(off[:, :4]).max() < math.radians(4.0)
+    assert "motion" in charts_of((tmp_path / "p" / "report.html").read_text(encoding="utf-8"))
+    assert "--simulate: found '0s'" in refused([*arguments[:3], "--simulate", "0s"], tmp_path, capsys)
+    bare = str(without_torques(files, tmp_path))
+    said = refused(["predict", str(files / "robot.yaml"), bare, "--simulate", "0.5s"], tmp_path, capsys)
+    assert "bare: no torques" in said
 
 
 def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> str:

@@ -19,7 +19,7 @@ from truing.dynamics.export import export
 from truing.dynamics.export.parts import drive_torque
 from truing.dynamics.motion import track_of
 from truing.dynamics.runner import Runner, runnable, runnable_mjcf
-from truing.dynamics.simulate import judge, windows_of
+from truing.dynamics.simulate import judge, simulated_response, windows_of
 from truing.model import AppliedEffect, Joint, Robot
 
 Floats = NDArray[np.float64]
@@ -285,3 +285,21 @@ def test_torques_of_a_motion_are_those_that_make_it(tmp_path: Path) -> None:
     fast = np.all(np.abs(speed) > 0.3, axis=1)  # where the bristles are bent to the end, and friction is full
     assert fast.sum() > 30
     assert found[fast] == pytest.approx(expected[fast], abs=0.05)
+
+
+def test_a_response_has_every_row_and_begins_anew_at_measured_states() -> None:
+    recording = move(1, (0.0, 0.0))
+    kept = (recording.time < 2.0) | (recording.time > 2.2)
+    gap = Recording("gap", recording.time[kept], recording.position[kept], recording.torque[kept])
+    found = simulated_response(two_links(*STANDARD), gap, 0.5)
+    assert found.position.shape == gap.position.shape
+    assert found.start[4] == gap.time[gap.time > 2.2][0]  # after the gap, before the fourth window was over
+    for number, start in enumerate(found.start):
+        rows = found.window == number
+        assert np.all((gap.time[rows] >= start - 1e-9) & (gap.time[rows] < start + 0.5))
+        assert found.position[rows][0] == pytest.approx(gap.position[rows][0], abs=1e-3)
+    later = found.window > 0  # the controller began with a jerk, which the smoothing cannot follow
+    assert np.abs(found.position - gap.position)[later].max() < 0.01
+    assert np.abs(simulated_response(two_links(), gap, 0.5).position - gap.position).max() > 0.05
+    with pytest.raises(truing.InputError, match="a horizon of 0 s"):
+        simulated_response(two_links(), gap, 0.0)

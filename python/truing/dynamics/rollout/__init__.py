@@ -23,7 +23,7 @@ from truing import _core
 from truing.dynamics.api import identify
 from truing.dynamics.export import export, import_mujoco
 from truing.dynamics.runner import runnable
-from truing.dynamics.simulate import HORIZONS, Judgement, Spans, judge
+from truing.dynamics.simulate import HORIZONS, Judgement, Response, Spans, judge
 
 Floats = NDArray[np.float64]
 
@@ -250,3 +250,31 @@ def paths_of(judged: Judgement) -> list[Mapping[str, Any]]:
         }
         for j, joint in enumerate(windows.joints)
     ]
+
+
+def response_paths(
+    robot: _core.Robot, recording: _core.Recording, response: Response
+) -> list[Mapping[str, Any]]:
+    """Of every joint the first seconds of a simulated response, to draw."""
+    time = np.asarray(recording.time)
+    rows = np.flatnonzero(time <= time[0] + DRAWN)
+    cuts = np.flatnonzero(np.diff(response.window[rows])) + 1  # a line breaks where a window begins
+    joints = [joint for joint in robot.joints if not joint.passive]
+    out: list[Mapping[str, Any]] = []
+    for j, joint in enumerate(joints):
+        turns = joint.type == "revolute"
+        scale = math.degrees(1.0) if turns else 1e3
+        out.append(
+            {
+                "recording": recording.name,
+                "joint": joint.name,
+                "unit": "°" if turns else "mm",
+                "time": time[rows],
+                "measured": scale * np.asarray(recording.position)[rows, j],
+                "ahead": np.append(np.insert(time[rows], cuts, np.nan), np.nan),
+                "simulated": {
+                    "named": np.append(np.insert(scale * response.position[rows, j], cuts, np.nan), np.nan)
+                },
+            }
+        )
+    return out

@@ -67,6 +67,24 @@ def worst_first(errors: Mapping[str, Sequence[float]], horizons: Sequence[float]
     return sorted(errors, key=lambda joint: -(errors[joint][len(horizons) // 2] or 0.0))
 
 
+def response_card(page: Page, found: Mapping[str, Any], paths: Sequence[Mapping[str, Any]]) -> None:
+    """What ``predict --simulate`` adds: the motion of one joint, and the error of every one."""
+    errors = found["errors"]
+    order = sorted(errors, key=lambda joint: -(errors[joint]["rms"] or 0.0))
+    motion_chart(page, paths, {"named": ("simulated", AFTER)}, {"named": "simulated"}, order)
+    rows = "".join(
+        f"<tr><td>{escaped(joint)}</td><td>{error_text(e['rms'], e['unit'])}</td>"
+        f"<td>{error_text(e['end_rms'], e['unit'])}</td></tr>"
+        for joint, e in errors.items()
+    )
+    page.add(
+        '<section class="card"><h2>Simulated less measured motion <span class="muted">'
+        f"{found['windows']} windows of {found['horizon_s']:g} s</span></h2>"
+        '<div class="scroll"><table><thead><tr><th></th><th>rms</th><th>rms at their ends</th></tr></thead>'
+        f"<tbody>{rows}</tbody></table></div></section>"
+    )
+
+
 # ---- Table -----------------------------------------------------------------------------------------
 def error_text(value: float | None, unit: str) -> str:
     """Degrees or millimetres; "left" where a simulation went away."""
