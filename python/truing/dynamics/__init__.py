@@ -29,5 +29,6 @@ from truing.dynamics.api import (
     identify as identify,
     predict as predict,
 )
+from truing.dynamics.comparison import compare as compare
 from truing.dynamics.rollout import rollout as rollout
 from truing.files import load_recordings as load_recordings

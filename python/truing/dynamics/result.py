@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.comparison import Comparison, comparison_dict
+from truing.dynamics.comparison.page import comparison_report
 from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.friction import friction_dict
 from truing.dynamics.page import diagnosis_report, fit_report, prediction_report
@@ -442,6 +444,28 @@ def write_prediction(
     ]
     paths = [] if response is None else response_paths(robot, recording, response)
     (folder / "report.html").write_text(prediction_report(result, traces, paths), encoding="utf-8")
+    return result
+
+
+def write_comparison(
+    folder: Path, found: Comparison, names: tuple[str, str], *, warnings: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Writes everything that ``truing dynamics compare`` found, and returns what result.json holds.
+
+    names: of the models, as the user wrote them.
+    """
+    notes = [f"{name}: {note}" for name, of in zip(names, found.notes, strict=True) for note in of]
+    result: dict[str, Any] = without_nan(
+        {
+            **_head("compare"),
+            **comparison_dict(found, names),
+            "recordings": sorted(set(found.judgement.windows.recordings)),
+            "warnings": [*warnings, *notes],
+        }
+    )
+    (folder / "result.json").write_text(to_json(result), encoding="utf-8")
+    report = comparison_report(result, paths_of(found.judgement))
+    (folder / "report.html").write_text(report, encoding="utf-8")
     return result
 
 
