@@ -157,6 +157,36 @@ def prediction_report(
     return page.html()
 
 
+def export_report(result: Mapping[str, Any], paths: Sequence[Mapping[str, Any]]) -> str:
+    """The report of ``truing dynamics export``: the written model's motion beside the robot's, and what the
+    model lacks. result: what ``result.json`` holds; paths: of every joint a held-out stretch of motion."""
+    page = Page(f"{result.get('robot') or 'Robot'}: {result['model']}", part_of_page("dynamics"))
+    motion, lacks = result["rollout"], result["not_written"]
+    title = (
+        motion["sentence"] if not motion["why_not"] else f"{result['model']} is written, not judged by motion"
+    )
+    page.add(
+        f'<header><p class="kicker">truing dynamics export · {escaped(result.get("robot"))} ·'
+        f" {escaped(result['to'])} · {escaped(result['model'])}</p>"
+        f'<h1 class="long">{escaped(title)}</h1></header>'
+    )
+    rollout_card(page, result, paths)
+    lines = "".join(
+        f'<tr><td>{escaped(n["name"])}</td><td class="n">'
+        f"{'' if n['size_Nm'] is None else figures_text(n['size_Nm']) + ' Nm'}</td>"
+        f'<td class="wrap">{escaped(n["reason"])}</td></tr>'
+        for n in lacks
+    )
+    if lines:
+        page.add(
+            '<section class="card"><h2>What the model lacks</h2><div class="scroll"><table class="causes">'
+            f"<tbody>{lines}</tbody></table></div></section>"
+        )
+    page.add(warnings_card(result))
+    page.add(footer(result))
+    return page.html()
+
+
 # ---- Words -----------------------------------------------------------------------------------------
 def _percent(value: float | None) -> str:
     return "–" if value is None or not math.isfinite(value) else f"{figures_text(value, 2)}\u202f%"

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.comparison import Comparison, comparison_dict
 from truing.dynamics.comparison.page import comparison_report
+from truing.dynamics.export import Exported
 from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.friction import friction_dict
-from truing.dynamics.page import diagnosis_report, fit_report, prediction_report
-from truing.dynamics.rollout import BLOCKS_OF_TIME, Rollout, paths_of, response_paths, rollout_dict
+from truing.dynamics.page import diagnosis_report, export_report, fit_report, prediction_report
+from truing.dynamics.rollout import Rollout, held_out_rows, paths_of, response_paths, rollout_dict
 from truing.dynamics.simulate import Response
 from truing.files import load_units, save_robot, write_table
 from truing.identification.result import parameter_dict
@@ -194,29 +195,53 @@ def measured_torque(robot: _core.Robot, recording: _core.Recording) -> Floats:
 
 
 def residual_columns(
-    robot: _core.Robot, recordings: Sequence[_core.Recording], held_out: Sequence[str], cutoff: float
+    robot: _core.Robot,
+    recordings: Sequence[_core.Recording],
+    held_out: Sequence[str],
+    cutoff: float,
+    test_share: float = 0.3,
 ) -> dict[str, Any]:
-    """Columns of ``residuals.parquet``: every row with the torque measured, the one that `robot` predicts,
-    and what is left. Torques are as recorded, not low-passed. `set` is left out where parts of one recording
-    were held out.
+    """Columns of ``residuals.parquet``: every row with its motion, the torque measured, the one that `robot`
+    predicts, and what is left. Torques are as recorded, not low-passed. test_share: as it was fitted with.
     """
     joints = _driven(robot)
-    measured = [measured_torque(robot, recording) for recording in recordings]
-    predicted = [
-        np.asarray(_core.dynamics_predict(robot, recording, cutoff).torque) for recording in recordings
-    ]
     counts = [len(recording) for recording in recordings]
     columns: dict[str, Any] = {"recording": np.repeat([recording.name for recording in recordings], counts)}
-    if list(held_out) != [BLOCKS_OF_TIME]:
-        sets = ["test" if recording.name in held_out else "train" for recording in recordings]
-        columns["set"] = np.repeat(sets, counts)
+    held = np.concatenate(held_out_rows(recordings, held_out, test_share))
+    columns["set"] = np.where(held, "test", "train")
     columns["t_s"] = np.concatenate([recording.time for recording in recordings])
-    table, model = np.concatenate(measured), np.concatenate(predicted)
+    columns.update(_motion_columns(joints, recordings))
+    table = np.concatenate([measured_torque(robot, recording) for recording in recordings])
+    model = np.concatenate(
+        [np.asarray(_core.dynamics_predict(robot, recording, cutoff).torque) for recording in recordings]
+    )
     for k, joint in enumerate(joints, 1):
         unit = torque_unit(joint)
         columns[f"tau{k}_{unit}"] = table[:, k - 1]
         columns[f"predicted_tau{k}_{unit}"] = model[:, k - 1]
         columns[f"error_tau{k}_{unit}"] = table[:, k - 1] - model[:, k - 1]
+    return columns
+
+
+def _motion_columns(joints: Sequence[_core.Joint], recordings: Sequence[_core.Recording]) -> dict[str, Any]:
+    """Positions, and speeds and temperatures where any recording has them, NaN in the others."""
+    position = np.concatenate([np.asarray(recording.position) for recording in recordings])
+    speed = np.concatenate(
+        [
+            np.asarray(r.speed) if r.speed.shape[1] else np.full((len(r), len(joints)), np.nan)
+            for r in recordings
+        ]
+    )
+    columns: dict[str, Any] = {}
+    for k, joint in enumerate(joints, 1):
+        unit = "rad" if joint.type == "revolute" else "m"
+        columns[f"q{k}_{unit}"] = position[:, k - 1]
+        if not np.isnan(speed).all():
+            columns[f"qd{k}_{unit}_s"] = speed[:, k - 1]
+    warm = {name for r in recordings for name in r.columns if name.startswith("temp") and name.endswith("_C")}
+    for name in sorted(warm):
+        each = [np.asarray(r.columns.get(name, np.full(len(r), np.nan))) for r in recordings]
+        columns[name] = np.concatenate(each)
     return columns
 
 
@@ -336,10 +361,12 @@ def export_dict(
     to: str,
     model: str,
     not_written: Sequence[NotWritten],
+    rollout: Rollout = NOT_JUDGED,
     *,
     warnings: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """What ``result.json`` of ``truing dynamics export`` holds. model: name of the simulator's file."""
+    """What ``result.json`` of ``truing dynamics export`` holds. model: name of the simulator's file; rollout:
+    the model as it is written beside the robot."""
     found: dict[str, Any] = without_nan(
         {
             **_head("export"),
@@ -347,6 +374,7 @@ def export_dict(
             "to": to,
             "model": model,
             "not_written": [{"name": n.name, "size_Nm": n.size, "reason": n.reason} for n in not_written],
+            "rollout": rollout_dict(rollout, "URDF" if to == "urdf" else "MJCF"),
             "warnings": list(warnings),
         }
     )
@@ -362,16 +390,17 @@ def write_diagnosis(
     *,
     warnings: Iterable[str] = (),
     nominal_file: Path | None = None,
+    test_share: float = 0.3,
 ) -> dict[str, Any]:
     """Writes everything that ``truing dynamics diagnose`` found, and returns what result.json holds.
 
     `rollout`: of `truing.dynamics.rollout`. `nominal_file`: the robot's file, in whose units robot.yaml is
-    written.
+    written. `test_share`: as it was diagnosed with.
     """
     result: dict[str, Any] = without_nan(diagnosis_dict(found, rollout, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
-    columns = residual_columns(found.robot, recordings, found.held_out, found.cutoff)
+    columns = residual_columns(found.robot, recordings, found.held_out, found.cutoff, test_share)
     write_table(folder / "residuals.parquet", columns)
     traces = [
         {
@@ -396,13 +425,14 @@ def write_fit(
     *,
     warnings: Iterable[str] = (),
     nominal_file: Path | None = None,
+    test_share: float = 0.3,
 ) -> dict[str, Any]:
     """Writes everything that ``truing dynamics identify`` found, and returns what result.json holds."""
     result: dict[str, Any] = without_nan(fit_dict(found, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
     write_table(folder / "covariance.csv", parameter_columns(found.parameters))
-    columns = residual_columns(found.robot, recordings, found.held_out, found.cutoff)
+    columns = residual_columns(found.robot, recordings, found.held_out, found.cutoff, test_share)
     write_table(folder / "residuals.parquet", columns)
     (folder / "report.html").write_text(fit_report(result, len(recordings)), encoding="utf-8")
     return result
@@ -444,6 +474,23 @@ def write_prediction(
     ]
     paths = [] if response is None else response_paths(robot, recording, response)
     (folder / "report.html").write_text(prediction_report(result, traces, paths), encoding="utf-8")
+    return result
+
+
+def write_export(
+    folder: Path,
+    robot: _core.Robot,
+    exported: Exported,
+    to: str,
+    rollout: Rollout = NOT_JUDGED,
+    *,
+    warnings: Iterable[str] = (),
+) -> dict[str, Any]:
+    """Writes ``result.json`` and the report of ``truing dynamics export``; returns what result.json holds."""
+    result = export_dict(robot, to, exported.model.name, exported.not_written, rollout, warnings=warnings)
+    (folder / "result.json").write_text(to_json(result), encoding="utf-8")
+    paths = paths_of(rollout.judgement) if rollout.judgement is not None else []
+    (folder / "report.html").write_text(export_report(result, paths), encoding="utf-8")
     return result
 
 

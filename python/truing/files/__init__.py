@@ -32,6 +32,7 @@ from truing.files.measurement_file import (
 )
 from truing.files.mjcf_file import is_mjcf as is_mjcf
 from truing.files.recording_file import load_recordings as load_recordings
+from truing.files.residual_file import load_residual_motion as load_residual_motion
 from truing.files.robot_file import (
     load_calibration as load_calibration,
     load_robot as load_robot,

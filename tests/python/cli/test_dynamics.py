@@ -219,15 +219,49 @@ def test_export_writes_the_model_and_what_it_lacks(
     truing.save_robot(tmp_path / "robot.yaml", simulated.truth)
     out = tmp_path / "model"
     assert main(["dynamics", "export", str(tmp_path), "--to", to, "--out", str(out)]) == 0
-    assert {path.name for path in out.iterdir()} == names | {"not_written.yaml", "result.json"}
+    assert {path.name for path in out.iterdir()} == names | {"not_written.yaml", "result.json", "report.html"}
     result = json.loads((out / "result.json").read_text())
     assert (result["format"], result["command"]) == ("truing-dynamics/1", "export")
     assert result["to"] == to
     assert (out / result["model"]).exists()
+    assert result["rollout"]["held_out"] == {} and result["rollout"]["why_not"]
     said = capsys.readouterr().out
     assert str(out / result["model"]) in said
     if to == "urdf":  # it has no place for friction that grows with the load
         assert any("load_friction" in n["name"] for n in result["not_written"])
+
+
+def test_export_judges_what_it_wrote_on_what_was_held_out(
+    files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = tmp_path / "found"
+    robot, recordings = str(files / "robot.yaml"), str(files / "motion*.csv")
+    assert main(["dynamics", "diagnose", robot, recordings, "--out", str(found)]) == 0
+    diagnosed = json.loads((found / "result.json").read_text())["rollout"]
+    assert main(["dynamics", "export", str(found), "--out", str(tmp_path / "model")]) == 0
+    written = json.loads((tmp_path / "model" / "result.json").read_text())["rollout"]
+    for model in ("named", "exported"):  # the same motion, the same models
+        assert written["held_out"][model]["J5"] == pytest.approx(diagnosed["held_out"][model]["J5"], rel=1e-9)
+    assert "as written" in capsys.readouterr().out
+    assert "motion" in charts_of((tmp_path / "model" / "report.html").read_text(encoding="utf-8"))
+
+    given = ["--held-out", str(files / "motion1.csv")]
+    assert main(["dynamics", "export", str(found), "--to", "urdf", *given, "--out", str(tmp_path / "u")]) == 0
+    urdf = json.loads((tmp_path / "u" / "result.json").read_text())["rollout"]
+    assert urdf["recordings"] == ["motion1"] and "the URDF alone" in urdf["sentence"]
+    assert urdf["held_out"]["exported"]["J3"][1] > 2.0 * urdf["held_out"]["named"]["J3"][1]  # no armature
+
+
+def test_a_residuals_file_of_other_programs_is_refused(
+    simulated: SimulatedMotion, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truing.save_robot(tmp_path / "robot.yaml", simulated.truth)
+    write_table(tmp_path / "residuals.parquet", {"recording": ["a"], "t_s": np.zeros(1)})
+    assert "has no column set, expected the residuals.parquet" in refused(
+        ["export", str(tmp_path)], tmp_path, capsys
+    )
+    (tmp_path / "residuals.parquet").write_text("no Parquet")
+    assert "cannot be read as Parquet" in refused(["export", str(tmp_path)], tmp_path, capsys)
 
 
 def test_a_folder_without_a_robot_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

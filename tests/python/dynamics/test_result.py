@@ -96,6 +96,7 @@ def test_residuals_have_every_row_and_are_small(folder: Path, simulated: Simulat
     measured, error = np.array(table["tau5_Nm"]), np.array(table["error_tau5_Nm"])
     np.testing.assert_allclose(measured - np.array(table["predicted_tau5_Nm"]), error, atol=1e-12)
     assert error.std() < 0.05 * measured.std()
+    assert table["q3_rad"] == np.concatenate([r.position[:, 2] for r in simulated.recordings]).tolist()
 
 
 def test_the_robot_file_predicts_as_the_robot_found(

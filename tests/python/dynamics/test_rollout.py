@@ -16,7 +16,7 @@ import truing
 from pages import charts_of, visible
 from truing.dynamics import Recording, TorqueDiagnosis, diagnose
 from truing.dynamics.result import write_diagnosis
-from truing.dynamics.rollout import Rollout, held_out_blocks, rollout, rollout_dict
+from truing.dynamics.rollout import Rollout, held_out_blocks, held_out_rows, rollout, rollout_dict, spans_of
 from truing.dynamics.simulate import Judgement, judge
 from truing.testing.dynamics import SimulatedMotion, simulate_motion
 
@@ -110,6 +110,15 @@ def test_blocks_held_out_are_those_of_the_core(simulated: SimulatedMotion) -> No
     ends = motion.windows.starts + 0.5
     for start, end in zip(motion.windows.starts, ends, strict=True):
         assert any(begin <= start and end <= last for begin, last in spans)
+
+
+def test_rows_of_blocks_are_marked(simulated: SimulatedMotion) -> None:
+    one = simulated.recordings[0]
+    (rows,) = held_out_rows([one], ["blocks of time"], 0.4)
+    assert rows.mean() == pytest.approx(0.4, abs=0.01)
+    spans, (blocks,) = spans_of(one, rows), held_out_blocks([one], 0.4)
+    assert spans == [pytest.approx(block, abs=0.011) for block in blocks]
+    assert not held_out_rows([one], ["another"], 0.4)[0].any()
 
 
 def test_a_robot_that_was_fitted_is_its_own_standard(

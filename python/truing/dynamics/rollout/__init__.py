@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.api import identify
-from truing.dynamics.export import export, import_mujoco
-from truing.dynamics.runner import runnable
+from truing.dynamics.export import Exported, export, import_mujoco
+from truing.dynamics.runner import Runnable, runnable
 from truing.dynamics.simulate import HORIZONS, Judgement, Response, Spans, judge
 
 Floats = NDArray[np.float64]
@@ -120,6 +120,48 @@ def held_out_blocks(recordings: Sequence[_core.Recording], test_share: float) ->
     ]
 
 
+def held_out_rows(
+    recordings: Sequence[_core.Recording], held_out: Sequence[str], test_share: float
+) -> list[NDArray[np.bool_]]:
+    """Which rows of each recording were held out. held_out: as a diagnosis or fit says."""
+    if list(held_out) != [BLOCKS_OF_TIME]:
+        return [np.full(len(r), r.name in held_out) for r in recordings]
+    return [
+        np.any([(r.time >= begin) & (r.time < end) for begin, end in spans], axis=0)
+        for r, spans in zip(recordings, held_out_blocks(recordings, test_share), strict=True)
+    ]
+
+
+def spans_of(recording: _core.Recording, held: NDArray[np.bool_]) -> Spans:
+    """[s] the stretches of a recording's rows that were held out."""
+    rows = np.flatnonzero(held)
+    return [
+        (float(recording.time[part[0]]), float(recording.time[part[-1]]))
+        for part in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+        if part.size
+    ]
+
+
+def judge_written(
+    ours: Exported, written: Runnable | None, recordings: Sequence[tuple[_core.Recording, NDArray[np.bool_]]]
+) -> Rollout:
+    """A written model beside the robot that it was written from, on rows that were held out.
+
+    ours: the robot's MJCF, which has callbacks.py where it needs them. written: None for that MJCF alone.
+    """
+    held = [(recording, spans_of(recording, rows)) for recording, rows in recordings if rows.any()]
+    if not held:
+        return Rollout(None, "nothing was held out: give recordings that nothing was fitted to (--held-out)")
+    motion, spans = [recording for recording, _ in held], [spans for _, spans in held]
+    alone = runnable(ours, callbacks=False) if written is None else written
+    try:
+        models = {"named": runnable(ours), "exported": alone}
+        horizons = _possible(HORIZONS, motion, spans)
+        return Rollout(judge(models, motion, horizons, within=spans, most=WINDOWS))
+    except (ValueError, RuntimeError) as error:
+        return Rollout(None, str(error))
+
+
 def _possible(
     horizons: Sequence[float], held: Sequence[_core.Recording], spans: Sequence[Spans] | None
 ) -> list[float]:
@@ -130,12 +172,13 @@ def _possible(
 
 
 # ---- What result.json and the report are given ---------------------------------------------------
-def rollout_dict(found: Rollout) -> dict[str, Any]:
-    """The part `rollout` of result.json. Errors: rms over the windows [rad | m], simulated less measured."""
+def rollout_dict(found: Rollout, written: str = "MJCF") -> dict[str, Any]:
+    """The part `rollout` of result.json. Errors: rms over the windows [rad | m], simulated less measured.
+    written: what the model 'exported' is."""
     judged = found.judgement
     if judged is None:
         return {"horizon_s": [], "held_out": {}, "why_not": found.why_not}
-    return {**judgement_dict(judged, "held_out"), "why_not": "", **words_of(judged)}
+    return {**judgement_dict(judged, "held_out"), "why_not": "", **words_of(judged, written)}
 
 
 def judgement_dict(judged: Judgement, key: str) -> dict[str, Any]:
@@ -160,7 +203,7 @@ def judgement_dict(judged: Judgement, key: str) -> dict[str, Any]:
     }
 
 
-def words_of(judged: Judgement) -> dict[str, Any]:
+def words_of(judged: Judgement, written: str = "MJCF") -> dict[str, Any]:
     """sentence: how far every model is off. worse: where what was found moves worse than what was there.
     verdict: of these, what the verdict must say."""
     horizon = main_horizon(judged.windows.horizons)
@@ -169,15 +212,16 @@ def words_of(judged: Judgement) -> dict[str, Any]:
         "nominal": "the nominal model",
         "standard": "standard practice",
         "named": "what was named",
-        "exported": "the MJCF alone",
+        "exported": f"the {written} alone",
     }
+    names = {model: name for model, name in names.items() if model in judged.simulated}
     off = {model: shown(judged.worst_joint(model, horizon), unit) for model in names}
     named = _worse(judged, "named", "what was named", unit)
     return {
         "sentence": f"Simulated {horizon:g} s ahead the robot is off by "
         + ", ".join(f"{off[model]} with {name}" for model, name in names.items())
         + f" (worst joint, median of {judged.windows.starts.size} windows)",
-        "worse": [*named, *_worse(judged, "exported", "the MJCF alone", unit)],
+        "worse": [*named, *_worse(judged, "exported", names["exported"], unit)],
         "verdict": [text[:1].upper() + text[1:] for text in named if text.startswith("in motion")],
     }
 
@@ -186,6 +230,8 @@ def _worse(judged: Judgement, model: str, ours: str, unit: str) -> list[str]:
     """Sentences of horizons, and of joints at the main one, at which `model` moves worse."""
     texts = []
     for other, theirs in (("standard", "standard practice"), ("nominal", "the nominal model")):
+        if other not in judged.simulated:
+            continue
         far = [
             f"{h:g} s ahead by {shown(judged.worst_joint(model, h), unit)} against"
             f" {shown(judged.worst_joint(other, h), unit)}"

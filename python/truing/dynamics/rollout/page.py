@@ -29,7 +29,7 @@ KEYS = {
     "nominal": "nominal model",
     "standard": "standard practice",
     "named": "named effects",
-    "exported": "the MJCF alone",
+    "exported": "the written file alone",
 }
 HEADROOM = 0.6  # of the measured motion's range that simulations may leave it by and still be seen
 TURN = 2.0 * math.pi  # [rad] a simulation that is so far off has left
@@ -46,7 +46,9 @@ def rollout_card(page: Page, result: Mapping[str, Any], paths: Sequence[Mapping[
         )
         return
     page.add('<div class="first">')
-    motion_chart(page, paths, MODELS, KEYS, worst_first(found["held_out"]["standard"], found["horizon_s"]))
+    models = {model: MODELS[model] for model in found["held_out"]}
+    of = found["held_out"].get("standard", found["held_out"]["exported"])
+    motion_chart(page, paths, models, KEYS, worst_first(of, found["horizon_s"]))
     page.add(
         '<section class="card"><h2>Simulated less real motion <span class="muted">held out, rms</span></h2>'
     )
@@ -54,7 +56,7 @@ def rollout_card(page: Page, result: Mapping[str, Any], paths: Sequence[Mapping[
     page.add(
         f'<p class="note">{found["windows"]} simulations of each model (MuJoCo) begin at measured states and'
         " are driven by the measured torques alone; errors grow even of a perfect model. Named: with"
-        " all laws, callbacks.py too. Exported: the MJCF alone.</p>"
+        " all laws, callbacks.py too. Exported: the written file alone.</p>"
     )
     items = "".join(
         f'<div class="apart">{escaped(text[:1].upper() + text[1:])}.</div>' for text in found["worse"]

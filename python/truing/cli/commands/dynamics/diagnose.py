@@ -117,7 +117,13 @@ class Command(run.Command["tuple[Robot, list[Recording]]", Answer]):
         from truing.dynamics.result import write_diagnosis
 
         return write_diagnosis(
-            folder, found.found, loaded[1], found.rollout, warnings=warnings, nominal_file=self.robot
+            folder,
+            found.found,
+            loaded[1],
+            found.rollout,
+            warnings=warnings,
+            nominal_file=self.robot,
+            test_share=self.test_share,
         )
 
     def failure(self, result: Mapping[str, Any]) -> str:

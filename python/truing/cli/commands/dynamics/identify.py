@@ -93,7 +93,14 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueFit"]):
     ) -> Mapping[str, Any]:
         from truing.dynamics.result import write_fit
 
-        return write_fit(folder, found, loaded[1], warnings=warnings, nominal_file=self.robot)
+        return write_fit(
+            folder,
+            found,
+            loaded[1],
+            warnings=warnings,
+            nominal_file=self.robot,
+            test_share=self.test_share,
+        )
 
     def table(self, result: Mapping[str, Any], found: TorqueFit) -> None:
         models = (("nominal", "nominal"), ("standard", "standard"), ("named", "fitted"))
