@@ -295,18 +295,18 @@ class Runner:
         self, beside: Any, states: Floats, applied: Floats, torque: Floats, warm: Floats, begun: Floats
     ) -> Floats:
         """Few steps at a time: each window has a model of its own, whose dry friction changes with its
-        state."""
+        state. On one thread: to wake others for two steps takes longer than the steps on a busy machine."""
         from mujoco import rollout
 
         warm = np.where(np.isnan(warm), beside.REFERENCE_C, warm)
         m, n, ratios = self.model, states.shape[0], self.of.ratios
         models = [copy.copy(m) for _ in range(n)]
         losses = [model.dof_frictionloss for model in models]
-        datas = [self.mujoco.MjData(m) for _ in range(os.cpu_count() or 1)]
+        data = [self.mujoco.MjData(m)]
         spec = int(self.mujoco.mjtState.mjSTATE_QFRC_APPLIED)
         path = np.empty((n, applied.shape[1], states.shape[1]))
         state = states
-        with rollout.Rollout(nthread=len(datas)) as pool:
+        with rollout.Rollout(nthread=0) as pool:
             for k in range(0, applied.shape[1], _HELD_STEPS):
                 end = min(k + _HELD_STEPS, applied.shape[1])
                 q = (state[:, 1 + self.qpos] - self.zero) / ratios
@@ -317,7 +317,7 @@ class Runner:
                     loss[self.dofs] = row
                 smooth = beside.smooth_torques(*now) / ratios
                 applied[:, k:end, self.dofs] += smooth[:, None]
-                part, _ = pool.rollout(models, datas, state, applied[:, k:end], control_spec=spec)
+                part, _ = pool.rollout(models, data, state, applied[:, k:end], control_spec=spec)
                 path[:, k:end] = part
                 state = np.ascontiguousarray(part[:, -1])
         return path
