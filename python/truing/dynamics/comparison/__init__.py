@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.export import Exported
 from truing.dynamics.motion import Recorded
-from truing.dynamics.rollout import WINDOWS, judgement_dict, main_horizon
+from truing.dynamics.rollout import WINDOWS, judgement_dict
+from truing.dynamics.rollout.page import main_horizon
 from truing.dynamics.runner import Runnable
 from truing.dynamics.simulate import HORIZONS, Judgement, judge
 from truing.errors import InputError
@@ -166,7 +167,7 @@ def comparison_dict(found: Comparison, names: tuple[str, str]) -> dict[str, Any]
 def sentence(found: Comparison, names: tuple[str, str]) -> str:
     """The answer in words: which is nearer to the robot, in what, and at which joints most."""
     a, b = names
-    main = found.judgement.windows.horizons.index(main_horizon(found.judgement.windows.horizons))
+    main = main_horizon(found.judgement.windows.horizons)
     ratio = found.motion[main]
     order = np.argsort(-np.abs(np.log(ratio.joints)))
     joint = found.judgement.windows.joints[int(order[0])]

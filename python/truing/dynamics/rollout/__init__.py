@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.api import identify
 from truing.dynamics.export import Exported, export, import_mujoco
+from truing.dynamics.rollout.page import main_horizon
 from truing.dynamics.runner import Runnable, runnable
 from truing.dynamics.simulate import HORIZONS, Judgement, Response, Spans, judge
 
@@ -31,7 +32,6 @@ BLOCKS_OF_TIME = "blocks of time"  # what `held_out` says where parts of the rec
 WINDOWS = 60  # at most: keeps it to some seconds
 STANDARD = "coulomb,viscous,current_offset"  # beside the inertial parameters
 WORSE = 1.05  # times another model's error: worse than it
-MAIN = 0.5  # [s] the horizon of headlines
 DRAWN = 20.0  # [s] of motion in a report
 _BLOCKS = 10  # of time, as cpp/src/dynamics/problem.cpp parts recordings
 
@@ -206,7 +206,7 @@ def judgement_dict(judged: Judgement, key: str) -> dict[str, Any]:
 def words_of(judged: Judgement, written: str = "MJCF") -> dict[str, Any]:
     """sentence: how far every model is off. worse: where what was found moves worse than what was there.
     verdict: of these, what the verdict must say."""
-    horizon = main_horizon(judged.windows.horizons)
+    horizon = judged.windows.horizons[main_horizon(judged.windows.horizons)]
     unit = "rad" if not all(judged.windows.prismatic) else "m"
     names = {
         "nominal": "the nominal model",
@@ -240,7 +240,7 @@ def _worse(judged: Judgement, model: str, ours: str, unit: str) -> list[str]:
         ]
         if far:
             texts.append(f"in motion {ours} is worse than {theirs}: off {', '.join(far)}")
-        h = main_horizon(judged.windows.horizons)
+        h = judged.windows.horizons[main_horizon(judged.windows.horizons)]
         mine, its = judged.rms(model, h), judged.rms(other, h)
         joints = [
             f"{joint} ({shown(float(mine[j]), u)} against {shown(float(its[j]), u)})"
@@ -250,10 +250,6 @@ def _worse(judged: Judgement, model: str, ours: str, unit: str) -> list[str]:
         if joints:
             texts.append(f"{h:g} s ahead {ours} moves worse than {theirs} at {', '.join(joints)}")
     return texts
-
-
-def main_horizon(horizons: Sequence[float]) -> float:
-    return min(horizons, key=lambda h: abs(h - MAIN))
 
 
 def shown(value: float, unit: str) -> str:
