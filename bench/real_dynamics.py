@@ -9,6 +9,7 @@ prints the tables of docs/benchmarks/real-dynamics.md. Sets that are not there a
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
@@ -16,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import truing
-from truing.dynamics import Recording, TorqueDiagnosis, diagnose, load_recordings
+from truing.dynamics import Recording, TorqueDiagnosis, diagnose, load_recordings, rollout
 from truing.model import Robot
 
 UR10E_GAINS = (10.0, 10.6956, 8.4566, 9.0029, 9.4800, 10.1232)  # [Nm/A] published beside the recordings
@@ -58,13 +59,30 @@ def diagnosed(name: str, robot: Robot, recordings: Sequence[Recording], **option
     return found
 
 
+def moved(name: str, robot: Robot, recordings: Sequence[Recording], found: TorqueDiagnosis) -> list[str]:
+    """Lines of simulated motion: median of the worst joint, 0.1, 0.5 and 2 s ahead of held-out states."""
+    start = time.perf_counter()
+    motion = rollout(robot, found, recordings)
+    if motion.judgement is None:
+        return [f"| {name} | not judged: {motion.why_not} |"]
+    judged, lines = motion.judgement, []
+    for model in judged.simulated:
+        degrees = (math.degrees(judged.worst_joint(model, h)) for h in judged.windows.horizons)
+        shown = " | ".join("left" if value > 360.0 else f"{value:.2f}°" for value in degrees)
+        lines.append(f"| {name}, {model} | {shown} |")
+    windows, seconds = judged.windows.starts.size, time.perf_counter() - start
+    return [*lines, f"\n{name}: {windows} windows, {seconds:.1f} s for the four models"]
+
+
 def main() -> int:
     data = Path(os.environ.get("TRUING_REALDATA", "data"))
     lists: list[str] = []
+    motion: list[str] = []
     print("| set | nominal | standard practice | named | s |\n| --- | --- | --- | --- | --- |")
     if (folder := data / "dyn_ur10e").exists():
         found = diagnosed("UR10e, h7_20s + h12_40s", *ur10e(folder, ("h7_20s", "h12_40s")))
         lists.append(f"- UR10e: {causes(found)}")
+        motion = moved("UR10e", *ur10e(folder, ("h7_20s", "h12_40s")), found)
         diagnosed("UR10e, ptp10", *ur10e(folder, ("ptp10",)))
         loaded = load_recordings([folder / "h14_50s_load.csv"], found.robot)
         carried = diagnosed("UR10e with a load, against the robot found", found.robot, loaded)
@@ -79,6 +97,9 @@ def main() -> int:
         found = diagnosed("UR10", robot, load_recordings([folder / "run.csv"], robot))
         lists.append(f"- UR10: {causes(found)}")
     print("\n" + "\n".join(lists))
+    if motion:
+        print("\n| simulated motion | 0.1 s | 0.5 s | 2 s |\n| --- | --- | --- | --- |")
+        print("\n".join(motion))
     return 0 if lists else 1
 
 

@@ -161,3 +161,15 @@ def print_errors(result: Mapping[str, Any], models: Sequence[tuple[str, str]]) -
         ["", *(title for _, title in there)],
         lines,
     )
+
+
+def print_motion(robot: str, found: Mapping[str, Any], key: str, titles: Sequence[str]) -> None:
+    """How far simulations are off at every joint, and the worst joint at every horizon. found: what
+    result.json has of them, errors by model under `key`; titles: of the models."""
+    from truing.dynamics.rollout.page import main_horizon, rollout_lines
+
+    joints, worst = rollout_lines(found, key)
+    main = found["horizon_s"][main_horizon(found["horizon_s"])]
+    head = [f"{main:g} s ahead, rms", *titles]
+    lines = [*joints, *([f"worst joint, {label}", *cells] for label, *cells in worst)]
+    table(f"{robot}: simulated less measured motion, {found['windows']} windows", head, lines)

@@ -30,6 +30,8 @@ from truing.dynamics.api import (
     identify as identify,
     predict as predict,
 )
+from truing.dynamics.comparison import compare as compare
+from truing.dynamics.rollout import rollout as rollout
 from truing.dynamics.sanity import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,

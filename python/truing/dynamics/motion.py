@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,7 +17,7 @@ from truing.errors import InputError
 Floats = NDArray[np.float64]
 
 SMOOTHING = 0.05  # [s] half of the stretch whose cubic gives a smoothed value
-_GAP = 5.0  # of the usual time between rows: a gap
+GAP = 5.0  # of the usual time between rows: a gap
 
 
 class Recorded(Protocol):
@@ -50,6 +50,51 @@ class Track:
     torque_time: Floats
     torque: Floats
     temperature: Floats  # shape=(n, joints) [deg C], as the torques; NaN: not known
+    began: float = field(kw_only=True)  # [s] where the recording begins
+
+    def near(self, begin: float, end: float) -> Track:
+        """The rows between two times, and one more on both sides."""
+        rows, more = (
+            slice(max(np.searchsorted(time, begin) - 1, 0), np.searchsorted(time, end, "right") + 1)
+            for time in (self.time, self.torque_time)
+        )
+        motion = (table[rows] for table in (self.time, self.q, self.qd, self.qdd))
+        others = (table[more] for table in (self.torque_time, self.torque, self.temperature))
+        return Track(*motion, *others, began=self.began)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Rows of a recording, between gaps."""
+
+    name: str
+    time: Floats
+    position: Floats
+    speed: Floats
+    torque: Floats
+    current: Floats
+    columns: Mapping[str, Floats] = field(kw_only=True)
+
+
+def stretches_of(recording: Recorded) -> list[Stretch]:
+    """A recording cut at its gaps."""
+    time = np.asarray(recording.time, dtype=float)
+    cuts = np.flatnonzero(np.diff(time) > GAP * np.median(np.diff(time))) + 1
+    tables = [
+        np.asarray(table, dtype=float)
+        for table in (recording.position, recording.speed, recording.torque, recording.current)
+    ]
+    return [
+        Stretch(
+            f"{recording.name} from {time[rows[0]]:.6g} s on" if cuts.size else recording.name,
+            time[rows],
+            *(table[rows] if len(table) == time.size else table for table in tables),
+            columns={
+                name: np.asarray(values, dtype=float)[rows] for name, values in recording.columns.items()
+            },
+        )
+        for rows in np.split(np.arange(time.size), cuts)
+    ]
 
 
 def track_of(recording: Recorded, robot: _core.Robot, smoothing: float) -> tuple[Track, NDArray[np.bool_]]:
@@ -61,18 +106,18 @@ def track_of(recording: Recorded, robot: _core.Robot, smoothing: float) -> tuple
     grid = np.arange(time[0], time[-1] + 1e-9, step)
     if grid.size < 4 * half:
         raise InputError(f"{recording.name}: {time[-1] - time[0]:.3g} s are too short to be simulated")
-    value, slope = _kernels(half, step)
-    smooth = _filtered(table_at(time, q, grid), value)
+    smooth, slope = _cubics(table_at(time, q, grid), half, step)
     speed = np.asarray(recording.speed, dtype=float)
     if speed.shape == q.shape and np.all(np.isfinite(speed)):
-        rate = _filtered(table_at(time, speed, grid), value)
+        rate = _cubics(table_at(time, speed, grid), half, step)[0]
     else:
-        rate = _filtered(table_at(time, q, grid), slope)
+        rate = slope
     free = np.ones(grid.size, dtype=bool)
-    for k in np.flatnonzero(np.diff(time) > _GAP * step):
+    for k in np.flatnonzero(np.diff(time) > GAP * step):
         free &= (grid < time[k] - smoothing) | (grid > time[k + 1] + smoothing)
+    warm = temperatures(recording, torque.shape)
     return Track(
-        grid, smooth, rate, _filtered(rate, slope), time, torque, temperatures(recording, torque.shape)
+        grid, smooth, rate, _cubics(rate, half, step)[1], time, torque, warm, began=float(time[0])
     ), free
 
 
@@ -106,20 +151,25 @@ def temperatures(recording: Recorded, shape: tuple[int, int]) -> Floats:
     return np.column_stack([columns.get(f"temp{j + 1}_C", common) for j in range(shape[1])])
 
 
-def _kernels(half: int, step: float) -> tuple[Floats, Floats]:
-    """Of a cubic through 2 half + 1 rows: value and slope in the middle. shape=(2 half + 1,)"""
+def smoothed(table: Floats, step: float, smoothing: float) -> Floats:
+    """Even rows, each by the cubic through those within `smoothing` [s] on both sides."""
+    half = max(int(round(smoothing / step)), 2)
+    return _cubics(table, half, step)[0] if len(table) > 2 * half else table
+
+
+def _cubics(table: Floats, half: int, step: float) -> tuple[Floats, Floats]:
+    """Values and slopes of even rows, by the cubic through 2 half + 1 rows around each (Savitzky and Golay
+    1964); of rows at the ends by the cubic through the first or last of them. shape=(n, columns)"""
     t = step * np.arange(-half, half + 1)
-    fit = np.linalg.pinv(np.vander(t, 4, increasing=True))
-    return fit[0], fit[1]
-
-
-def _filtered(table: Floats, kernel: Floats) -> Floats:
-    """Ends are continued by their point reflection."""
-    half = kernel.size // 2
-    before = 2.0 * table[:1] - table[half:0:-1]
-    after = 2.0 * table[-1:] - table[-2 : -half - 2 : -1]
-    long = np.concatenate([before, table, after])
-    return np.column_stack([np.convolve(column, kernel[::-1], mode="valid") for column in long.T])
+    powers = np.vander(t, 4, increasing=True)
+    slopes = np.column_stack([np.zeros_like(t), np.ones_like(t), 2.0 * t, 3.0 * t * t])
+    fit = np.linalg.pinv(powers)
+    out = []
+    for rows in (powers @ fit, slopes @ fit):
+        middle = [np.convolve(column, rows[half, ::-1], mode="valid") for column in table.T]
+        first, last = rows[:half] @ table[: 2 * half + 1], rows[-half:] @ table[-2 * half - 1 :]
+        out.append(np.concatenate([first, np.column_stack(middle), last]))
+    return out[0], out[1]
 
 
 def table_at(time: Floats, table: Floats, at: Floats) -> Floats:

@@ -3,8 +3,9 @@
 """The HTML reports of ``truing dynamics``, in the order in which people ask.
 
 The first screen: how far the error of the torque falls on recordings that nothing was fitted to, by what;
-torque over time, measured and as the models say; the error of every joint. Below: every cause with its
-size; friction over speed; where in the motion something is left; what could not be told apart, or tested.
+torque over time, measured and as the models say; the error of every joint. Below: simulated and real motion;
+every cause with its size; friction over speed; where in the motion something is left; what could not be told
+apart, or tested.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truing.dynamics.rollout.page import joint_menu, response_card, rollout_card
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, faded, packed
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.words import counted, escaped, figures_text
@@ -59,7 +61,12 @@ INPUTS = {
 USUAL = "Standard practice: inertias, Coulomb and viscous friction, an offset: what is usually fitted."
 
 
-def diagnosis_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, Any]], recordings: int) -> str:
+def diagnosis_report(
+    result: Mapping[str, Any],
+    traces: Sequence[Mapping[str, Any]],
+    recordings: int,
+    paths: Sequence[Mapping[str, Any]] = (),
+) -> str:
     """The report of ``truing dynamics diagnose``.
 
     Args:
@@ -67,6 +74,7 @@ def diagnosis_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, An
         traces: Of every joint a held-out stretch: recording, joint, and arrays over its rows: time [s],
             measured, nominal, standard, named [Nm | N].
         recordings: How many there were.
+        paths: Of every joint a held-out stretch of motion (`truing.dynamics.rollout.paths_of`).
     """
     page = Page(f"{result.get('robot') or 'Robot'}: torques", part_of_page("dynamics"))
     page.add(_headline(result, recordings))
@@ -75,6 +83,7 @@ def diagnosis_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, An
     _trace_card(page, traces, worst_first(result))
     _error_card(page, result)
     page.add("</div>")
+    rollout_card(page, result, paths)
     page.add(_causes(result))
     _friction(page, result["friction"])
     _where(page, result)
@@ -108,9 +117,14 @@ def fit_report(result: Mapping[str, Any], recordings: int) -> str:
     return page.html()
 
 
-def prediction_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, Any]]) -> str:
+def prediction_report(
+    result: Mapping[str, Any],
+    traces: Sequence[Mapping[str, Any]],
+    paths: Sequence[Mapping[str, Any]] = (),
+) -> str:
     """The report of ``truing dynamics predict``. result: what ``result.json`` holds; traces: of every joint,
-    time [s], measured (NaN: it was not) and named, the prediction [Nm | N].
+    time [s], measured (NaN: it was not) and named, the prediction [Nm | N]; paths: of every joint simulated
+    motion, if there is any.
     """
     page = Page(f"{result.get('robot') or 'Robot'}: predicted torques", part_of_page("dynamics"))
     errors = result["errors"]
@@ -129,6 +143,8 @@ def prediction_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, A
     start = [_stretch(trace) for trace in traces]
     order = sorted(errors, key=lambda joint: -(errors[joint]["percent"] or 0.0))
     _trace_card(page, start, order or [trace["joint"] for trace in traces])
+    if result["simulated"] is not None:
+        response_card(page, result["simulated"], paths)
     lines = "".join(
         f"<tr><td>{escaped(joint)}</td>{table_cell(e['rms'], figures_text(e['rms']) + ' ' + e['unit'])}"
         f"<td>{_percent(e['percent'])}</td></tr>"
@@ -139,6 +155,36 @@ def prediction_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, A
             '<section class="card"><h2>Error of every joint</h2><div'
             ' class="scroll"><table><thead><tr><th></th>'
             f"<th>rms</th><th>of the torque</th></tr></thead><tbody>{lines}</tbody></table></div></section>"
+        )
+    page.add(warnings_card(result))
+    page.add(footer(result))
+    return page.html()
+
+
+def export_report(result: Mapping[str, Any], paths: Sequence[Mapping[str, Any]]) -> str:
+    """The report of ``truing dynamics export``: the written model's motion beside the robot's, and what the
+    model lacks. result: what ``result.json`` holds; paths: of every joint a held-out stretch of motion."""
+    page = Page(f"{result.get('robot') or 'Robot'}: {result['model']}", part_of_page("dynamics"))
+    motion, lacks = result["rollout"], result["not_written"]
+    title = (
+        motion["sentence"] if not motion["why_not"] else f"{result['model']} is written, not judged by motion"
+    )
+    page.add(
+        f'<header><p class="kicker">truing dynamics export · {escaped(result.get("robot"))} ·'
+        f" {escaped(result['to'])} · {escaped(result['model'])}</p>"
+        f'<h1 class="long">{escaped(title)}</h1></header>'
+    )
+    rollout_card(page, result, paths)
+    lines = "".join(
+        f'<tr><td>{escaped(n["name"])}</td><td class="n">'
+        f"{'' if n['size_Nm'] is None else figures_text(n['size_Nm']) + ' Nm'}</td>"
+        f'<td class="wrap">{escaped(n["reason"])}</td></tr>'
+        for n in lacks
+    )
+    if lines:
+        page.add(
+            '<section class="card"><h2>What the model lacks</h2><div class="scroll"><table class="causes">'
+            f"<tbody>{lines}</tbody></table></div></section>"
         )
     page.add(warnings_card(result))
     page.add(footer(result))
@@ -228,6 +274,14 @@ def _about(result: Mapping[str, Any]) -> str:
     )
 
 
+def _moves(result: Mapping[str, Any]) -> str:
+    """What simulated motion says, in a line."""
+    motion = result["rollout"]
+    if motion["why_not"]:
+        return ""
+    return f'<p class="sub">{escaped(motion["sentence"])}.</p>'
+
+
 def _headline(result: Mapping[str, Any], recordings: int) -> str:
     label, tone = TONES[result["verdict"]] if not _mistaken(result) else ("data to be corrected", "bad")
     before, after = mean_percent(result, "standard"), mean_percent(result, "named")
@@ -241,9 +295,11 @@ def _headline(result: Mapping[str, Any], recordings: int) -> str:
         text = escaped(result["sentence"])
         length = len(text)
     badge = f'<span class="verdict {tone}">{label}</span>'
+    if result["rollout"].get("verdict"):
+        badge += '<span class="verdict bad">worse in motion</span>'
     return (
         f"<header>{_kicker('diagnose', result, recordings, badge)}<h1"
-        f"{' class=long' if length > LONG else ''}>{text}</h1>{_about(result)}</header>"
+        f"{' class=long' if length > LONG else ''}>{text}</h1>{_about(result)}{_moves(result)}</header>"
     )
 
 
@@ -342,25 +398,10 @@ def _trace_card(page: Page, traces: Sequence[Mapping[str, Any]], order: Sequence
 
 
 def _trace_layout(buttons: list[dict[str, Any]]) -> dict[str, Any]:
-    menu = {
-        "type": "buttons",
-        "direction": "right",
-        "buttons": buttons,
-        "x": 0,
-        "xanchor": "left",
-        "y": 1.02,
-        "yanchor": "bottom",
-        "pad": {"t": 0, "b": 4},
-        "bgcolor": "#ffffff",
-        "bordercolor": "#c8ced6",
-        "font": {"size": 12},
-    }
-    if len(buttons) > 8 or sum(len(b["label"]) for b in buttons) > 60:
-        menu["type"] = "dropdown"
     return {
         "xaxis": {"title": {"text": "time [s]"}},
         "yaxis": {"title": {"text": "torque [Nm]"}},
-        "updatemenus": [menu] if len(buttons) > 1 else [],
+        "updatemenus": joint_menu(buttons),
         "margin": {"l": 56, "r": 12, "t": 44, "b": 44},
     }
 

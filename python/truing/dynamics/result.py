@@ -18,26 +18,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.comparison import Comparison, comparison_dict
+from truing.dynamics.comparison.page import comparison_report
+from truing.dynamics.export import Exported
 from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.friction import friction_dict
-from truing.dynamics.page import diagnosis_report, fit_report, prediction_report
+from truing.dynamics.page import diagnosis_report, export_report, fit_report, prediction_report
 from truing.dynamics.recorded import driven_joints, measured_torque, torque_unit
+from truing.dynamics.rollout import Rollout, held_out_rows, paths_of, response_paths, rollout_dict
 from truing.dynamics.sanity.findings import RecordingFinding
+from truing.dynamics.simulate import Response
 from truing.files import load_units, save_robot, write_table
 from truing.identification.result import parameter_dict
 from truing.report.json_text import to_json, without_nan
 
-DYNAMICS_FORMAT = "truing-dynamics/1"
-IDENTIFICATION_FORMAT = "truing-dynamics-identification/1"
-PREDICTION_FORMAT = "truing-dynamics-prediction/1"
-EXPORT_FORMAT = "truing-dynamics-export/1"
-BLOCKS_OF_TIME = "blocks of time"  # what `held_out` says where parts of the only recording were held out
+DYNAMICS_FORMAT = "truing-dynamics/1"  # of all commands; `command` says which one wrote it
 Floats = NDArray[np.float64]
 
 
 # ---- result.json ---------------------------------------------------------------------------------
+def _head(command: str) -> dict[str, Any]:
+    return {"format": DYNAMICS_FORMAT, "command": command, "version": _core.version()}
+
+
+NOT_JUDGED = Rollout(None, "not asked for")
+
+
 def diagnosis_dict(
     found: _core.TorqueDiagnosis,
+    rollout: Rollout = NOT_JUDGED,
     *,
     sanity: Iterable[RecordingFinding] = (),
     warnings: Iterable[str] = (),
@@ -45,16 +54,17 @@ def diagnosis_dict(
     """What ``result.json`` of ``truing dynamics diagnose`` holds. `sanity`: findings of `check_recordings`;
     `warnings`: more of them, first.
     """
+    motion = rollout_dict(rollout)
     return {
-        "format": DYNAMICS_FORMAT,
-        "version": _core.version(),
+        **_head("diagnose"),
         "robot": found.robot.name,
         "verdict": found.verdict,
-        "sentence": found.sentence,
+        "sentence": ". ".join([found.sentence.rstrip("."), *motion.get("verdict", ())]),
         "effects": [_effect(e) for e in found.effects],
         "unknown": [_unknown(u) for u in found.unknown],
         "where": where_dict(found.where, found.errors),
         **_errors(found.errors),
+        "rollout": motion,
         "friction": friction_dict(found.robot, found.where),
         "classes": [{"effects": list(c.effects), "sentence": c.sentence} for c in found.classes],
         "sanity": [asdict(finding) for finding in sanity],
@@ -62,7 +72,7 @@ def diagnosis_dict(
         "held_out": list(found.held_out),
         "cutoff_hz": found.cutoff,
         "design_effect": list(found.design_effect),
-        "warnings": [*warnings, *found.warnings],
+        "warnings": [*warnings, *found.warnings, *motion.get("worse", ())],
     }
 
 
@@ -71,8 +81,7 @@ def fit_dict(
 ) -> dict[str, Any]:
     """What ``result.json`` of ``truing dynamics identify`` holds; as `diagnosis_dict`."""
     return {
-        "format": IDENTIFICATION_FORMAT,
-        "version": _core.version(),
+        **_head("identify"),
         "robot": found.robot.name,
         "parameters": [parameter_dict(p) for p in found.parameters],
         **_errors(found.errors),
@@ -177,29 +186,53 @@ def _unevenness(bins: Sequence[_core.TorqueRegime]) -> float:
 
 # ---- Tables --------------------------------------------------------------------------------------
 def residual_columns(
-    robot: _core.Robot, recordings: Sequence[_core.Recording], held_out: Sequence[str], cutoff: float
+    robot: _core.Robot,
+    recordings: Sequence[_core.Recording],
+    held_out: Sequence[str],
+    cutoff: float,
+    test_share: float = 0.3,
 ) -> dict[str, Any]:
-    """Columns of ``residuals.parquet``: every row with the torque measured, the one that `robot` predicts,
-    and what is left. Torques are as recorded, not low-passed. `set` is left out where parts of one recording
-    were held out.
+    """Columns of ``residuals.parquet``: every row with its motion, the torque measured, the one that `robot`
+    predicts, and what is left. Torques are as recorded, not low-passed. test_share: as it was fitted with.
     """
     joints = driven_joints(robot)
-    measured = [measured_torque(robot, recording) for recording in recordings]
-    predicted = [
-        np.asarray(_core.dynamics_predict(robot, recording, cutoff).torque) for recording in recordings
-    ]
     counts = [len(recording) for recording in recordings]
     columns: dict[str, Any] = {"recording": np.repeat([recording.name for recording in recordings], counts)}
-    if list(held_out) != [BLOCKS_OF_TIME]:
-        sets = ["test" if recording.name in held_out else "train" for recording in recordings]
-        columns["set"] = np.repeat(sets, counts)
+    held = np.concatenate(held_out_rows(recordings, held_out, test_share))
+    columns["set"] = np.where(held, "test", "train")
     columns["t_s"] = np.concatenate([recording.time for recording in recordings])
-    table, model = np.concatenate(measured), np.concatenate(predicted)
+    columns.update(_motion_columns(joints, recordings))
+    table = np.concatenate([measured_torque(robot, recording) for recording in recordings])
+    model = np.concatenate(
+        [np.asarray(_core.dynamics_predict(robot, recording, cutoff).torque) for recording in recordings]
+    )
     for k, joint in enumerate(joints, 1):
         unit = torque_unit(joint)
         columns[f"tau{k}_{unit}"] = table[:, k - 1]
         columns[f"predicted_tau{k}_{unit}"] = model[:, k - 1]
         columns[f"error_tau{k}_{unit}"] = table[:, k - 1] - model[:, k - 1]
+    return columns
+
+
+def _motion_columns(joints: Sequence[_core.Joint], recordings: Sequence[_core.Recording]) -> dict[str, Any]:
+    """Positions, and speeds and temperatures where any recording has them, NaN in the others."""
+    position = np.concatenate([np.asarray(recording.position) for recording in recordings])
+    speed = np.concatenate(
+        [
+            np.asarray(r.speed) if r.speed.shape[1] else np.full((len(r), len(joints)), np.nan)
+            for r in recordings
+        ]
+    )
+    columns: dict[str, Any] = {}
+    for k, joint in enumerate(joints, 1):
+        unit = "rad" if joint.type == "revolute" else "m"
+        columns[f"q{k}_{unit}"] = position[:, k - 1]
+        if not np.isnan(speed).all():
+            columns[f"qd{k}_{unit}_s"] = speed[:, k - 1]
+    warm = {name for r in recordings for name in r.columns if name.startswith("temp") and name.endswith("_C")}
+    for name in sorted(warm):
+        each = [np.asarray(r.columns.get(name, np.full(len(r), np.nan))) for r in recordings]
+        columns[name] = np.concatenate(each)
     return columns
 
 
@@ -245,6 +278,14 @@ def prediction_columns(
     return columns
 
 
+def response_columns(robot: _core.Robot, response: Response) -> dict[str, Any]:
+    """Columns that ``predict --simulate`` adds: positions, and the number of the window of each row."""
+    columns: dict[str, Any] = {}
+    for k, joint in enumerate(driven_joints(robot)):
+        columns[f"q{k + 1}_{'rad' if joint.type == 'revolute' else 'm'}"] = response.position[:, k]
+    return {**columns, "window": response.window}
+
+
 def _recorded(table: Floats) -> set[int]:
     """The joints that a table has values of."""
     return {k for k in range(table.shape[1]) if not np.isnan(table[:, k]).all()}
@@ -254,6 +295,7 @@ def prediction_dict(
     robot: _core.Robot,
     recording: _core.Recording,
     predicted: _core.TorquePrediction,
+    response: Response | None = None,
     *,
     cutoff: float,
     warnings: Iterable[str] = (),
@@ -276,14 +318,32 @@ def prediction_dict(
             "percent": 100.0 * rms / spread if spread > 0 else math.nan,
         }
     return {
-        "format": PREDICTION_FORMAT,
-        "version": _core.version(),
+        **_head("predict"),
         "robot": robot.name,
         "recording": recording.name,
         "rows": len(recording),
         "cutoff_hz": cutoff,
         "errors": errors,
+        "simulated": None if response is None else _response_dict(robot, recording, response),
         "warnings": list(warnings),
+    }
+
+
+def _response_dict(robot: _core.Robot, recording: _core.Recording, response: Response) -> dict[str, Any]:
+    """How far a simulated motion is off, on all rows and on the last of every window."""
+    off = response.position - np.asarray(recording.position)
+    ends = np.flatnonzero(np.diff(response.window, append=-1) != 0)
+    return {
+        "horizon_s": response.horizon,
+        "windows": int(response.start.size),
+        "errors": {
+            joint.name: {
+                "rms": float(np.sqrt(np.mean(off[:, k] ** 2))),
+                "end_rms": float(np.sqrt(np.mean(off[ends, k] ** 2))),
+                "unit": "rad" if joint.type == "revolute" else "m",
+            }
+            for k, joint in enumerate(driven_joints(robot))
+        },
     }
 
 
@@ -292,18 +352,20 @@ def export_dict(
     to: str,
     model: str,
     not_written: Sequence[NotWritten],
+    rollout: Rollout = NOT_JUDGED,
     *,
     warnings: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """What ``result.json`` of ``truing dynamics export`` holds. model: name of the simulator's file."""
+    """What ``result.json`` of ``truing dynamics export`` holds. model: name of the simulator's file; rollout:
+    the model as it is written beside the robot."""
     found: dict[str, Any] = without_nan(
         {
-            "format": EXPORT_FORMAT,
-            "version": _core.version(),
+            **_head("export"),
             "robot": robot.name,
             "to": to,
             "model": model,
             "not_written": [{"name": n.name, "size_Nm": n.size, "reason": n.reason} for n in not_written],
+            "rollout": rollout_dict(rollout, "URDF" if to == "urdf" else "MJCF"),
             "warnings": list(warnings),
         }
     )
@@ -311,12 +373,15 @@ def export_dict(
 
 
 def _write_residuals(
-    folder: Path, found: _core.TorqueDiagnosis | _core.TorqueFit, recordings: Sequence[_core.Recording]
+    folder: Path,
+    found: _core.TorqueDiagnosis | _core.TorqueFit,
+    recordings: Sequence[_core.Recording],
+    test_share: float,
 ) -> None:
     """Of recordings that are in memory: residuals of the others would be as long as they are."""
     whole = [recording for recording in recordings if recording.pieces is None]
     if whole:
-        columns = residual_columns(found.robot, whole, found.held_out, found.cutoff)
+        columns = residual_columns(found.robot, whole, found.held_out, found.cutoff, test_share)
         write_table(folder / "residuals.parquet", columns)
 
 
@@ -325,20 +390,22 @@ def write_diagnosis(
     folder: Path,
     found: _core.TorqueDiagnosis,
     recordings: Sequence[_core.Recording],
+    rollout: Rollout = NOT_JUDGED,
     *,
     sanity: Iterable[RecordingFinding] = (),
     warnings: Iterable[str] = (),
     nominal_file: Path | None = None,
+    test_share: float = 0.3,
 ) -> dict[str, Any]:
     """Writes everything that ``truing dynamics diagnose`` found, and returns what result.json holds.
 
-    `sanity`: findings of `check_recordings`. `nominal_file`: the robot's file, in whose units robot.yaml is
-    written.
+    `rollout`: of `truing.dynamics.rollout`. `sanity`: findings of `check_recordings`. `nominal_file`: the
+    robot's file, in whose units robot.yaml is written. `test_share`: as it was diagnosed with.
     """
-    result: dict[str, Any] = without_nan(diagnosis_dict(found, sanity=sanity, warnings=warnings))
+    result: dict[str, Any] = without_nan(diagnosis_dict(found, rollout, sanity=sanity, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
-    _write_residuals(folder, found, recordings)
+    _write_residuals(folder, found, recordings, test_share)
     traces = [
         {
             "recording": t.recording,
@@ -349,7 +416,8 @@ def write_diagnosis(
         }
         for t in found.traces
     ]
-    report = diagnosis_report(result, traces, len(recordings))
+    paths = paths_of(rollout.judgement) if rollout.judgement is not None else []
+    report = diagnosis_report(result, traces, len(recordings), paths)
     (folder / "report.html").write_text(report, encoding="utf-8")
     return result
 
@@ -362,13 +430,14 @@ def write_fit(
     sanity: Iterable[RecordingFinding] = (),
     warnings: Iterable[str] = (),
     nominal_file: Path | None = None,
+    test_share: float = 0.3,
 ) -> dict[str, Any]:
     """Writes everything that ``truing dynamics identify`` found, and returns what result.json holds."""
     result: dict[str, Any] = without_nan(fit_dict(found, sanity=sanity, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
     write_table(folder / "covariance.csv", parameter_columns(found.parameters))
-    _write_residuals(folder, found, recordings)
+    _write_residuals(folder, found, recordings, test_share)
     (folder / "report.html").write_text(fit_report(result, len(recordings)), encoding="utf-8")
     return result
 
@@ -378,15 +447,22 @@ def write_prediction(
     robot: _core.Robot,
     recording: _core.Recording,
     predicted: _core.TorquePrediction,
+    response: Response | None = None,
     *,
     cutoff: float,
     warnings: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """Writes everything that ``truing dynamics predict`` found, and returns what result.json holds."""
+    """Writes everything that ``truing dynamics predict`` found, and returns what result.json holds.
+
+    `response`: of `truing.dynamics.simulate.simulated_response`.
+    """
     result: dict[str, Any] = without_nan(
-        prediction_dict(robot, recording, predicted, cutoff=cutoff, warnings=warnings)
+        prediction_dict(robot, recording, predicted, response, cutoff=cutoff, warnings=warnings)
     )
-    write_table(folder / "predicted.csv", prediction_columns(robot, recording, predicted))
+    columns = prediction_columns(robot, recording, predicted)
+    if response is not None:
+        columns.update(response_columns(robot, response))
+    write_table(folder / "predicted.csv", columns)
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     traces = [
         {
@@ -400,7 +476,47 @@ def write_prediction(
             zip(driven_joints(robot), measured_torque(robot, recording).T, strict=True)
         )
     ]
-    (folder / "report.html").write_text(prediction_report(result, traces), encoding="utf-8")
+    paths = [] if response is None else response_paths(robot, recording, response)
+    (folder / "report.html").write_text(prediction_report(result, traces, paths), encoding="utf-8")
+    return result
+
+
+def write_export(
+    folder: Path,
+    robot: _core.Robot,
+    exported: Exported,
+    to: str,
+    rollout: Rollout = NOT_JUDGED,
+    *,
+    warnings: Iterable[str] = (),
+) -> dict[str, Any]:
+    """Writes ``result.json`` and the report of ``truing dynamics export``; returns what result.json holds."""
+    result = export_dict(robot, to, exported.model.name, exported.not_written, rollout, warnings=warnings)
+    (folder / "result.json").write_text(to_json(result), encoding="utf-8")
+    paths = paths_of(rollout.judgement) if rollout.judgement is not None else []
+    (folder / "report.html").write_text(export_report(result, paths), encoding="utf-8")
+    return result
+
+
+def write_comparison(
+    folder: Path, found: Comparison, names: tuple[str, str], *, warnings: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Writes everything that ``truing dynamics compare`` found, and returns what result.json holds.
+
+    names: of the models, as the user wrote them.
+    """
+    notes = [f"{name}: {note}" for name, of in zip(names, found.notes, strict=True) for note in of]
+    result: dict[str, Any] = without_nan(
+        {
+            **_head("compare"),
+            **comparison_dict(found, names),
+            "recordings": sorted(set(found.judgement.windows.recordings)),
+            "warnings": [*warnings, *notes],
+        }
+    )
+    (folder / "result.json").write_text(to_json(result), encoding="utf-8")
+    report = comparison_report(result, paths_of(found.judgement))
+    (folder / "report.html").write_text(report, encoding="utf-8")
     return result
 
 

@@ -51,6 +51,7 @@ from truing.files.performance_file import (
     load_measured as load_measured,
 )
 from truing.files.recording_file import load_recordings as load_recordings
+from truing.files.residual_file import load_residual_motion as load_residual_motion
 from truing.files.robot_file import (
     any_robot as any_robot,
     is_controller as is_controller,

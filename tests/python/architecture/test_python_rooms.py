@@ -80,6 +80,7 @@ FLOORS = {
         "recording_bag",
         "recording_lerobot",
         "recording_file",
+        "residual_file",
         "scene_file",
         "stream_file",
         "target_file",

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ import numpy as np
 import pytest
 
 import truing
-from pages import visible
+from pages import charts_of, visible
 from truing.cli import main
 from truing.dynamics.result import recording_columns
 from truing.files import write_table
@@ -42,6 +44,7 @@ def test_diagnose_names_what_was_hidden(
     assert main(["dynamics", "diagnose", robot, recordings, "--out", str(out)]) == 0
     said = capsys.readouterr().out
     assert "coupling at J5 from J6" in said and "standard   named" in said
+    assert "simulated less measured motion" in said and "worst joint, 2 s" in said
     assert {path.name for path in out.iterdir()} == {
         "result.json",
         "report.html",
@@ -79,6 +82,30 @@ def test_identify_fits_what_is_asked_for(
     assert {"coulomb.J1", "viscous.J6", "load_friction.J2", "load_friction.J3"} <= names
     assert "load_friction.J1" not in names
     assert (tmp_path / "o" / "covariance.csv").exists()
+
+
+def test_predict_simulates_the_motion_too(
+    files: Path, simulated: SimulatedMotion, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truing.save_robot(tmp_path / "truth.yaml", simulated.truth)
+    arguments = ["predict", str(tmp_path / "truth.yaml"), str(files / "motion3.csv"), "--simulate", "0.5s"]
+    assert main(["dynamics", *arguments, "--out", str(tmp_path / "p")]) == 0
+    assert "motion in 28 windows of 0.5 s" in capsys.readouterr().out
+    with (tmp_path / "p" / "predicted.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    recording = simulated.recordings[2]
+    names = [f"q{k}_rad" for k in range(1, 7)]
+    assert set(rows[0]) == {"t_s", *(f"tau{k}_Nm" for k in range(1, 7)), *names, "window"}
+    assert len(rows) == len(recording)
+    off = np.array([[float(row[name]) for name in names] for row in rows]) - recording.position
+    result = json.loads((tmp_path / "p" / "result.json").read_text())["simulated"]
+    assert result["errors"]["J3"]["rms"] == pytest.approx(np.sqrt(np.mean(off[:, 2] ** 2)))
+    assert np.abs(off[:, :4]).max() < math.radians(4.0)
+    assert "motion" in charts_of((tmp_path / "p" / "report.html").read_text(encoding="utf-8"))
+    assert "--simulate: found '0s'" in refused([*arguments[:3], "--simulate", "0s"], tmp_path, capsys)
+    bare = str(without_torques(files, tmp_path))
+    said = refused(["predict", str(files / "robot.yaml"), bare, "--simulate", "0.5s"], tmp_path, capsys)
+    assert "bare: no torques" in said
 
 
 def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> str:
@@ -319,14 +346,49 @@ def test_export_writes_the_model_and_what_it_lacks(
     truing.save_robot(tmp_path / "robot.yaml", simulated.truth)
     out = tmp_path / "model"
     assert main(["dynamics", "export", str(tmp_path), "--to", to, "--out", str(out)]) == 0
-    assert {path.name for path in out.iterdir()} == names | {"not_written.yaml", "result.json"}
+    assert {path.name for path in out.iterdir()} == names | {"not_written.yaml", "result.json", "report.html"}
     result = json.loads((out / "result.json").read_text())
-    assert result["format"] == "truing-dynamics-export/1" and result["to"] == to
+    assert (result["format"], result["command"]) == ("truing-dynamics/1", "export")
+    assert result["to"] == to
     assert (out / result["model"]).exists()
+    assert result["rollout"]["held_out"] == {} and result["rollout"]["why_not"]
     said = capsys.readouterr().out
     assert str(out / result["model"]) in said
     if to == "urdf":  # it has no place for friction that grows with the load
         assert any("load_friction" in n["name"] for n in result["not_written"])
+
+
+def test_export_judges_what_it_wrote_on_what_was_held_out(
+    files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = tmp_path / "found"
+    robot, recordings = str(files / "robot.yaml"), str(files / "motion*.csv")
+    assert main(["dynamics", "diagnose", robot, recordings, "--out", str(found)]) == 0
+    diagnosed = json.loads((found / "result.json").read_text())["rollout"]
+    assert main(["dynamics", "export", str(found), "--out", str(tmp_path / "model")]) == 0
+    written = json.loads((tmp_path / "model" / "result.json").read_text())["rollout"]
+    for model in ("named", "exported"):  # the same motion, the same models
+        assert written["held_out"][model]["J5"] == pytest.approx(diagnosed["held_out"][model]["J5"], rel=1e-9)
+    assert "as written" in capsys.readouterr().out
+    assert "motion" in charts_of((tmp_path / "model" / "report.html").read_text(encoding="utf-8"))
+
+    given = ["--held-out", str(files / "motion1.csv")]
+    assert main(["dynamics", "export", str(found), "--to", "urdf", *given, "--out", str(tmp_path / "u")]) == 0
+    urdf = json.loads((tmp_path / "u" / "result.json").read_text())["rollout"]
+    assert urdf["recordings"] == ["motion1"] and "the URDF alone" in urdf["sentence"]
+    assert urdf["held_out"]["exported"]["J3"][1] > 2.0 * urdf["held_out"]["named"]["J3"][1]  # no armature
+
+
+def test_a_residuals_file_of_other_programs_is_refused(
+    simulated: SimulatedMotion, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truing.save_robot(tmp_path / "robot.yaml", simulated.truth)
+    write_table(tmp_path / "residuals.parquet", {"recording": ["a"], "t_s": np.zeros(1)})
+    assert "has no column set, expected the residuals.parquet" in refused(
+        ["export", str(tmp_path)], tmp_path, capsys
+    )
+    (tmp_path / "residuals.parquet").write_text("no Parquet")
+    assert "cannot be read as Parquet" in refused(["export", str(tmp_path)], tmp_path, capsys)
 
 
 def test_a_folder_without_a_robot_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -59,7 +59,7 @@ def test_hidden_effects_are_named_within_their_errors(result: dict[str, Any]) ->
 
 
 def test_result_has_what_the_contract_lists(result: dict[str, Any]) -> None:
-    assert result["format"] == "truing-dynamics/1"
+    assert (result["format"], result["command"]) == ("truing-dynamics/1", "diagnose")
     assert result["verdict"] in ("effects", "effects+unknown")
     assert {"effect", "joints", "standard", "probability", "parameters", "share", "ci", "rms_Nm"} < set(
         result["effects"][0]
@@ -96,6 +96,7 @@ def test_residuals_have_every_row_and_are_small(folder: Path, simulated: Simulat
     measured, error = np.array(table["tau5_Nm"]), np.array(table["error_tau5_Nm"])
     np.testing.assert_allclose(measured - np.array(table["predicted_tau5_Nm"]), error, atol=1e-12)
     assert error.std() < 0.05 * measured.std()
+    assert table["q3_rad"] == np.concatenate([r.position[:, 2] for r in simulated.recordings]).tolist()
 
 
 def test_the_robot_file_predicts_as_the_robot_found(
@@ -126,7 +127,7 @@ def test_the_report_says_it_in_its_first_lines(folder: Path, result: dict[str, A
 def test_a_fit_writes_its_parameters_with_errors(simulated: SimulatedMotion, tmp_path: Path) -> None:
     fit = identify(simulated.nominal, simulated.recordings, effects="coulomb,viscous,load_friction:J2")
     result = write_fit(tmp_path, fit, simulated.recordings)
-    assert result["format"] == "truing-dynamics-identification/1"
+    assert (result["format"], result["command"]) == ("truing-dynamics/1", "identify")
     with (tmp_path / "covariance.csv").open(encoding="utf-8") as file:
         rows = {row["parameter"]: row for row in csv.DictReader(file)}
     assert float(rows["load_friction.J2"]["value"]) == pytest.approx(0.09, abs=0.02)
@@ -144,6 +145,7 @@ def test_a_prediction_has_the_columns_that_were_measured(simulated: SimulatedMot
     assert rows[0] == ["t_s", *(f"tau{k}_Nm" for k in range(1, 7))]
     assert len(rows) == 1 + len(recording)
     result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    assert (result["format"], result["command"]) == ("truing-dynamics/1", "predict")
     assert result["rows"] == len(recording) and result["errors"]["J2"]["percent"] < 10
 
 

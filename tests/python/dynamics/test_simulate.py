@@ -16,7 +16,10 @@ from numpy.typing import NDArray
 
 import truing
 from truing.dynamics.export import export
-from truing.dynamics.simulate import drive_torque, judge, windows_of
+from truing.dynamics.export.parts import drive_torque
+from truing.dynamics.motion import track_of
+from truing.dynamics.runner import Runner, runnable, runnable_mjcf
+from truing.dynamics.simulate import judge, simulated_response, windows_of
 from truing.model import AppliedEffect, Joint, Robot
 
 Floats = NDArray[np.float64]
@@ -225,3 +228,78 @@ def test_windows_leave_gaps_out_and_say_what_is_missing() -> None:
         windows_of([nothing], two_links())
     with pytest.raises(truing.InputError, match="was not judged: models right, horizons 0.5 s"):
         judge({"right": two_links(*STANDARD)}, [recording], horizons=(0.5,)).errors("right", 0.1)
+
+
+MJCF = """<mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast"/>
+<worldbody><body>
+<joint name="J1" axis="0 1 0" ref="0.3" armature="0.2" damping="3" frictionloss="4" solreffriction="0.004 1"/>
+<inertial pos="0 0 0.25" mass="5" diaginertia="0.10416666666666667 0.10416666666666667 0.005208333333333333"/>
+<body pos="0 0 0.5"><joint name="J2" axis="0 1 0" armature="0.2" damping="1" frictionloss="2"
+ solreffriction="0.004 1"/>
+<inertial pos="0 0 0.2" mass="3" diaginertia="0.04 0.04 0.002"/></body></body></worldbody>
+<actuator>{}</actuator></mujoco>"""
+
+
+def an_mjcf(folder: Path, actuators: str = "") -> Path:
+    """The arm that the recordings were made with, its first joint counted from 0.3 rad."""
+    path = folder / "own.xml"
+    path.write_text(MJCF.format(actuators), encoding="utf-8")
+    return path
+
+
+def test_an_mjcf_runs_as_it_is_and_its_drives_give_way(tmp_path: Path) -> None:
+    recording = move(1, (0.0, 0.0))
+    recording.position[:, 0] += 0.3  # its readings count from ref
+    path = an_mjcf(tmp_path, '<position name="servo" joint="J1" kp="500"/><motor name="plain" joint="J2"/>')
+    own = runnable_mjcf(path, truing.load_robot(path))
+    assert own.notes == ("recorded torques stand in the place of its drives servo",)
+    found = judge({"own": own}, [recording], horizons=(0.1, 0.5), torques=True)
+    assert found.worst_joint("own", 0.5) < 2e-3
+    assert np.all(found.torque_error["own"] < 0.03 * found.torque_spread["own"])
+
+
+def test_torques_of_a_motion_are_those_that_make_it(tmp_path: Path) -> None:
+    # Against the core's rigid torques, and the laws by hand: bristles, ripple, friction of the callbacks.
+    recording = move(3, LOAD)
+    bristles = {
+        "presliding.J1": 3.0,
+        "presliding.J1.x0": 1e-3,
+        "presliding.J2": 1.0,
+        "presliding.J2.x0": 1e-3,
+    }
+    presliding = AppliedEffect("presliding", ["J1", "J2"], bristles)
+    ripple = AppliedEffect("ripple", ["J1"], {"ripple.J1.sin3": 2.0, "ripple.J1.cos3": 1.0})
+    robot = two_links(*STANDARD, presliding, ripple, applied("load_friction", LOAD))
+    model = runnable(export(robot, "mjcf", tmp_path))
+    track, _ = track_of(recording, robot, 0.05)
+    runner = Runner(model, [track])
+    rows = np.arange(0, track.time.size, 7)
+    found = runner.torques(0, rows)
+    rigid = truing._core.rigid_torques(robot, track.q[rows], track.qd[rows], track.qdd[rows])
+    drive = drive_torque(robot, track.torque_time, track.torque, track.time[rows])
+    speed = track.qd[rows]
+    dry = (np.array(COULOMB) + np.array(LOAD) * np.abs(drive)) * np.sign(speed)
+    bent = np.array([3.0, 1.0]) * runner.bristles[0][rows] / 1e-3
+    wave = np.outer(2.0 * np.sin(3.0 * track.q[rows, 0]) + np.cos(3.0 * track.q[rows, 0]), [1.0, 0.0])
+    expected = rigid + np.array(VISCOUS) * speed + dry + bent + wave
+    fast = np.all(np.abs(speed) > 0.3, axis=1)  # where the bristles are bent to the end, and friction is full
+    assert fast.sum() > 30
+    assert found[fast] == pytest.approx(expected[fast], abs=0.05)
+
+
+def test_a_response_has_every_row_and_begins_anew_at_measured_states() -> None:
+    recording = move(1, (0.0, 0.0))
+    kept = (recording.time < 2.0) | (recording.time > 2.2)
+    gap = Recording("gap", recording.time[kept], recording.position[kept], recording.torque[kept])
+    found = simulated_response(two_links(*STANDARD), gap, 0.5)
+    assert found.position.shape == gap.position.shape
+    assert found.start[4] == gap.time[gap.time > 2.2][0]  # after the gap, before the fourth window was over
+    for number, start in enumerate(found.start):
+        rows = found.window == number
+        assert np.all((gap.time[rows] >= start - 1e-9) & (gap.time[rows] < start + 0.5))
+        assert found.position[rows][0] == pytest.approx(gap.position[rows][0], abs=1e-3)
+    later = found.window > 0  # the controller began with a jerk, which the smoothing cannot follow
+    assert np.abs(found.position - gap.position)[later].max() < 0.01
+    assert np.abs(simulated_response(two_links(), gap, 0.5).position - gap.position).max() > 0.05
+    with pytest.raises(truing.InputError, match="a horizon of 0 s"):
+        simulated_response(two_links(), gap, 0.0)

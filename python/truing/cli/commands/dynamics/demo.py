@@ -17,14 +17,14 @@ from truing.cli.options import Seed
 from truing.cli.tables import say, table
 
 if TYPE_CHECKING:
-    from truing.dynamics import TorqueDiagnosis
+    from truing.cli.commands.dynamics.diagnose import Answer
     from truing.testing.dynamics import SimulatedMotion
 
 PANEL = "Dynamics"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["SimulatedMotion", "TorqueDiagnosis"]):
+class Command(run.Command["SimulatedMotion", "Answer"]):
     doing = "diagnosing"
     folder = "dynamics-demo"
 
@@ -49,20 +49,25 @@ class Command(run.Command["SimulatedMotion", "TorqueDiagnosis"]):
             say("3. The torques are diagnosed from the model and the recordings alone.")
         return simulated
 
-    def solve(self, loaded: SimulatedMotion, progress: run.Progress) -> TorqueDiagnosis:
-        from truing.dynamics import diagnose
+    def solve(self, loaded: SimulatedMotion, progress: run.Progress) -> Answer:
+        from truing.cli.commands.dynamics.diagnose import Answer
+        from truing.dynamics import diagnose, rollout
 
-        return diagnose(loaded.nominal, loaded.recordings)
+        found = diagnose(loaded.nominal, loaded.recordings)
+        progress.now("simulating")
+        return Answer(found, rollout(loaded.nominal, found, loaded.recordings))
 
     def write(
-        self, folder: Path, loaded: SimulatedMotion, found: TorqueDiagnosis, warnings: list[str]
+        self, folder: Path, loaded: SimulatedMotion, found: Answer, warnings: list[str]
     ) -> Mapping[str, Any]:
         from truing.dynamics import check_recordings
         from truing.dynamics.result import recording_columns, write_diagnosis
         from truing.files import save_robot, write_table
 
         sanity = check_recordings(loaded.nominal, loaded.recordings).findings
-        result = write_diagnosis(folder, found, loaded.recordings, sanity=sanity, warnings=warnings)
+        result = write_diagnosis(
+            folder, found.found, loaded.recordings, found.rollout, sanity=sanity, warnings=warnings
+        )
         save_robot(folder / "nominal.yaml", loaded.nominal)
         save_robot(folder / "truth.yaml", loaded.truth)
         for recording in loaded.recordings:
@@ -74,7 +79,7 @@ class Command(run.Command["SimulatedMotion", "TorqueDiagnosis"]):
             return ""
         return "what was found does not hold on recordings that it was not fitted to"
 
-    def table(self, result: Mapping[str, Any], found: TorqueDiagnosis) -> None:
+    def table(self, result: Mapping[str, Any], found: Answer) -> None:
         from truing.cli.commands.dynamics.diagnose import print_diagnosis
         from truing.testing.dynamics import HIDDEN
 

@@ -3,8 +3,8 @@
 """Name the effects that the model lacks: friction laws, rotor inertia, payload, couplings …
 
 Inertias, Coulomb and viscous friction and an offset are fitted in any case; what is named comes on top, and
-is judged on recordings that nothing was fitted to. Writes result.json, report.html, robot.yaml (with what was
-named), residuals.parquet.
+is judged on recordings that nothing was fitted to: by torque, and by simulated motion (MuJoCo). Writes
+result.json, report.html, robot.yaml (with what was named), residuals.parquet.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
-from truing.cli.options import BaseLink, Names, Threads, TipLink, core
+from truing.cli.options import BaseLink, Flag, Names, Threads, TipLink, core
 from truing.cli.recordings import (
     CutOff,
     Joints,
@@ -29,19 +29,30 @@ from truing.cli.recordings import (
     mistaken,
     print_errors,
     print_findings,
+    print_motion,
+    require_torques,
     robot_and_recordings,
 )
 from truing.cli.tables import joined, say, table
 
 if TYPE_CHECKING:
     from truing.dynamics import CheckedRecordings, TorqueDiagnosis
+    from truing.dynamics.rollout import Rollout
 
 PANEL = "Dynamics"
 LISTED = 12  # causes on the terminal; the report has all
 
 
+@dataclass(frozen=True)
+class Answer:
+    """What was found, and what motion says of it."""
+
+    found: TorqueDiagnosis
+    rollout: Rollout
+
+
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["CheckedRecordings", "TorqueDiagnosis"]):
+class Command(run.Command["CheckedRecordings", Answer]):
     doing = "diagnosing"
 
     robot: RobotWithMasses
@@ -49,6 +60,9 @@ class Command(run.Command["CheckedRecordings", "TorqueDiagnosis"]):
     leave_out: Annotated[str, Names("Effects that are not to be considered: 'coupling,ripple'.")] = ""
     cutoff: CutOff = None
     test_share: TestShare = core("TorqueDiagnoseOptions", "test_share")
+    no_rollout: Annotated[
+        bool, Flag("Not judged by simulated motion, which takes some seconds and needs truing[dynamics].")
+    ] = False
     threads: Threads = core("TorqueDiagnoseOptions", "threads")
     joints: Joints = ""
     torque_per_ampere: TorquePerAmpere = None
@@ -70,7 +84,7 @@ class Command(run.Command["CheckedRecordings", "TorqueDiagnosis"]):
         )
         return checked(loaded)
 
-    def solve(self, loaded: CheckedRecordings, progress: run.Progress) -> TorqueDiagnosis:
+    def solve(self, loaded: CheckedRecordings, progress: run.Progress) -> Answer:
         from truing.dynamics import diagnose
 
         options: dict[str, Any] = {
@@ -80,24 +94,35 @@ class Command(run.Command["CheckedRecordings", "TorqueDiagnosis"]):
         }
         if self.cutoff is not None:
             options["cutoff"] = self.cutoff
-        return diagnose(loaded.robot, loaded.recordings, **options)
+        found = diagnose(loaded.robot, loaded.recordings, **options)
+        return Answer(found, self._judged(loaded, found, progress))
+
+    def _judged(self, loaded: CheckedRecordings, found: TorqueDiagnosis, progress: run.Progress) -> Rollout:
+        from truing.dynamics.rollout import Rollout, rollout
+
+        if self.no_rollout:
+            return Rollout(None, "not asked for (--no-rollout)")
+        progress.now("simulating")
+        return rollout(loaded.robot, found, loaded.recordings, test_share=self.test_share)
 
     def write(
         self,
         folder: Path,
         loaded: CheckedRecordings,
-        found: TorqueDiagnosis,
+        found: Answer,
         warnings: list[str],
     ) -> Mapping[str, Any]:
         from truing.dynamics.result import write_diagnosis
 
         return write_diagnosis(
             folder,
-            found,
+            found.found,
             loaded.recordings,
+            found.rollout,
             sanity=loaded.findings,
             warnings=warnings,
             nominal_file=self.robot,
+            test_share=self.test_share,
         )
 
     def failure(self, result: Mapping[str, Any]) -> str:
@@ -105,7 +130,7 @@ class Command(run.Command["CheckedRecordings", "TorqueDiagnosis"]):
             return mistaken(result)
         return "what was found does not hold on recordings that it was not fitted to"
 
-    def table(self, result: Mapping[str, Any], found: TorqueDiagnosis) -> None:
+    def table(self, result: Mapping[str, Any], found: Answer) -> None:
         print_diagnosis(result)
 
 
@@ -117,6 +142,7 @@ def print_diagnosis(result: Mapping[str, Any]) -> None:
     if result["unknown"]:
         models.append(("with_unknown", "+ unknown"))
     print_errors(result, models)
+    print_rollout(result)
     lines = cause_lines(result)
     if lines:
         head = ("", "removes", "sure", "size")
@@ -132,6 +158,15 @@ def print_diagnosis(result: Mapping[str, Any]) -> None:
     if result["not_testable"]:
         words = list(dict.fromkeys(n["effect"].replace("_", " ") for n in result["not_testable"]))
         say(f"not testable with these recordings (why: report.html): {joined(words, 12)}")
+
+
+def print_rollout(result: Mapping[str, Any]) -> None:
+    """How far simulations are off, joint by joint and at every horizon; or why there are none."""
+    found = result["rollout"]
+    if found["why_not"]:
+        say(f"not judged by motion: {found['why_not']}")
+        return
+    print_motion(result["robot"], found, "held_out", tuple(found["held_out"]))
 
 
 def cause_lines(result: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:

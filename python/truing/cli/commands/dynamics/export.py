@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Write what was found as a simulator's model, and list what could not be written.
 
-Writes the model (MJCF and perhaps callbacks.py; URDF; URDF and actuators.py), not_written.yaml, result.json.
+Writes the model (MJCF and perhaps callbacks.py; URDF; URDF and actuators.py), not_written.yaml, result.json,
+report.html: how far the model, as it is written, is from held-out motion.
 """
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,12 +17,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from truing.cli import run
 from truing.cli.options import Choice, File
+from truing.cli.recordings import print_motion
 from truing.cli.tables import say, table
 from truing.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from truing.dynamics import Recording
     from truing.dynamics.export import Exported
+    from truing.dynamics.rollout import Rollout
     from truing.model import Robot
 
 PANEL = "Dynamics"
@@ -30,12 +37,14 @@ PANEL = "Dynamics"
 class Loaded:
     robot: Robot
     recordings: list[Recording]
+    held_out: list[tuple[Recording, NDArray[np.bool_]]]  # and which of their rows
 
 
 @dataclass(frozen=True)
 class Found:
     exported: Exported
     files: dict[str, str]  # text by name
+    rollout: Rollout
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,15 +71,24 @@ class Command(run.Command[Loaded, Found]):
     recording: Annotated[
         Sequence[Path],
         File(
-            "Motion on which sizes of what is not written are stated. May be repeated. Default: a motion"
-            " through the robot's range.",
+            "Motion on which sizes of what is not written are stated. May be repeated. Default: what RESULT"
+            " was fitted to; of a robot.yaml a motion through the robot's range.",
+            metavar="REC",
+            several=True,
+        ),
+    ] = ()
+    held_out: Annotated[
+        Sequence[Path],
+        File(
+            "Motion on which the written model is judged (MuJoCo). May be repeated. Default: what RESULT held"
+            " out.",
             metavar="REC",
             several=True,
         ),
     ] = ()
 
     def load(self, progress: run.Progress) -> Loaded:
-        from truing.files import load_recordings, load_robot
+        from truing.files import load_recordings, load_residual_motion, load_robot
 
         file = self.result / "robot.yaml" if self.result.is_dir() else self.result
         if not file.exists():
@@ -79,8 +97,15 @@ class Command(run.Command[Loaded, Found]):
                 " `identify` wrote, or a robot.yaml"
             )
         robot = load_robot(file)
-        found = load_recordings(self.recording, robot) if self.recording else ()
-        return Loaded(robot, list(found))
+        residuals = self.result / "residuals.parquet"
+        motion = load_residual_motion(residuals, robot) if residuals.exists() else []
+        train = [recording for recording, held in motion if not held.all()]
+        if self.recording:
+            train = list(load_recordings(self.recording, robot))
+        if self.held_out:
+            given = load_recordings(self.held_out, robot)
+            motion = [(recording, recording.time > -math.inf) for recording in given]
+        return Loaded(robot, train, motion)
 
     def solve(self, loaded: Loaded, progress: run.Progress) -> Found:
         from truing.dynamics.export import export
@@ -94,19 +119,34 @@ class Command(run.Command[Loaded, Found]):
                 recordings=loaded.recordings,
             )
             files = {path.name: path.read_text(encoding="utf-8") for path in exported.folder.iterdir()}
-        return Found(exported, files)
+            return Found(exported, files, self._judged(loaded, exported, Path(folder), progress))
+
+    def _judged(self, loaded: Loaded, exported: Exported, folder: Path, progress: run.Progress) -> Rollout:
+        from truing.dynamics.export import export
+        from truing.dynamics.rollout import Rollout, judge_written
+        from truing.dynamics.runner import runnable
+        from truing.files import load_robot
+
+        if self.to == "isaaclab":
+            return Rollout(None, "Isaac Lab is not here to run it")
+        progress.now("simulating")
+        if self.to == "mjcf":
+            return judge_written(exported, None, loaded.held_out)
+        if not any(held.any() for _, held in loaded.held_out):  # do not write two models for nothing
+            return judge_written(exported, None, [])
+        try:
+            ours = export(loaded.robot, "mjcf", folder / "ours", recordings=loaded.recordings)
+            written = load_robot(exported.model, any_tool=True)
+            return judge_written(ours, runnable(export(written, "mjcf", folder / "urdf")), loaded.held_out)
+        except InputError as error:
+            return Rollout(None, str(error))
 
     def write(self, folder: Path, loaded: Loaded, found: Found, warnings: list[str]) -> Mapping[str, Any]:
-        from truing.dynamics.result import export_dict
-        from truing.report.json_text import to_json
+        from truing.dynamics.result import write_export
 
         for name, text in found.files.items():
             (folder / name).write_text(text, encoding="utf-8")
-        result = export_dict(
-            loaded.robot, self.to, found.exported.model.name, found.exported.not_written, warnings=warnings
-        )
-        (folder / "result.json").write_text(to_json(result), encoding="utf-8")
-        return result
+        return write_export(folder, loaded.robot, found.exported, self.to, found.rollout, warnings=warnings)
 
     def table(self, result: Mapping[str, Any], found: Found) -> None:
         lines = [
@@ -115,6 +155,12 @@ class Command(run.Command[Loaded, Found]):
         ]
         if lines:
             table("what the model lacks", ("", "size", "why"), lines, words=True)
+        motion = result["rollout"]
+        if motion["why_not"]:
+            say(f"not judged by motion: {motion['why_not']}")
+        else:
+            titles = ("with callbacks.py" if self.to == "mjcf" else "MJCF, callbacks.py", "as written")
+            print_motion(result["robot"], motion, "held_out", titles)
         if "callbacks.py" in found.files:
             say(f"torques that MuJoCo has no field for: {self.out / 'callbacks.py'}")
         say(f"model: {self.out / result['model']}")

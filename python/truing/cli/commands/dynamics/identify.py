@@ -100,6 +100,7 @@ class Command(run.Command["CheckedRecordings", "TorqueFit"]):
             sanity=loaded.findings,
             warnings=warnings,
             nominal_file=self.robot,
+            test_share=self.test_share,
         )
 
     def failure(self, result: Mapping[str, Any]) -> str:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compute the torques of a recording, row by row: links, rotors, and the effects that the robot carries.
 
-Writes predicted.csv (t_s and the columns that were measured, under their names; one row per row),
-result.json, report.html.
+With --simulate also the motion that its torques make of the robot in MuJoCo. Writes predicted.csv (t_s and
+the columns that were measured, under their names; one row per row), result.json, report.html.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
-from truing.cli.options import BaseLink, File, Frequency, TipLink, keyword
+from truing.cli.options import BaseLink, File, Frequency, Time, TipLink, keyword
 from truing.cli.recordings import (
     Joints,
     RobotWithMasses,
@@ -28,13 +28,22 @@ from truing.errors import InputError
 
 if TYPE_CHECKING:
     from truing.dynamics import Recording, TorquePrediction
+    from truing.dynamics.simulate import Response
     from truing.model import Robot
 
 PANEL = "Dynamics"
 
 
+@dataclass(frozen=True)
+class Found:
+    """Torques, and with --simulate the motion."""
+
+    torques: TorquePrediction
+    response: Response | None
+
+
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["tuple[Robot, Recording]", "TorquePrediction"]):
+class Command(run.Command["tuple[Robot, Recording]", Found]):
     doing = "predicting"
 
     robot: RobotWithMasses
@@ -46,6 +55,15 @@ class Command(run.Command["tuple[Robot, Recording]", "TorquePrediction"]):
         float,
         Frequency("Of the low-pass that the angles go through for their derivatives.", above=0),
     ] = keyword("truing.dynamics.api:predict", "cutoff")
+    simulate: Annotated[
+        float | None,
+        Time(
+            "Also simulates the motion that the recorded torques make (MuJoCo), begun anew at the measured"
+            " state after every HORIZON.",
+            metavar="HORIZON",
+            above=0,
+        ),
+    ] = None
     joints: Joints = ""
     torque_per_ampere: TorquePerAmpere = None
     topic: Topic = ""
@@ -70,19 +88,29 @@ class Command(run.Command["tuple[Robot, Recording]", "TorquePrediction"]):
             )
         return robot, recordings[0]
 
-    def solve(self, loaded: tuple[Robot, Recording], progress: run.Progress) -> TorquePrediction:
+    def solve(self, loaded: tuple[Robot, Recording], progress: run.Progress) -> Found:
         from truing.dynamics import predict
 
-        return predict(*loaded, cutoff=self.cutoff)
+        torques = predict(*loaded, cutoff=self.cutoff)
+        if self.simulate is None:
+            return Found(torques, None)
+        from truing.dynamics.runner import simulator_of
+        from truing.dynamics.simulate import simulated_response
+
+        progress.now("simulating")
+        robot, recording = loaded
+        return Found(torques, simulated_response(simulator_of(self.robot, robot), recording, self.simulate))
 
     def write(
-        self, folder: Path, loaded: tuple[Robot, Recording], found: TorquePrediction, warnings: list[str]
+        self, folder: Path, loaded: tuple[Robot, Recording], found: Found, warnings: list[str]
     ) -> Mapping[str, Any]:
         from truing.dynamics.result import write_prediction
 
-        return write_prediction(folder, *loaded, found, cutoff=self.cutoff, warnings=warnings)
+        return write_prediction(
+            folder, *loaded, found.torques, found.response, cutoff=self.cutoff, warnings=warnings
+        )
 
-    def table(self, result: Mapping[str, Any], found: TorquePrediction) -> None:
+    def table(self, result: Mapping[str, Any], found: Found) -> None:
         lines = [
             (joint, f"{e['rms']:.4g} {e['unit']}", "-" if e["percent"] is None else f"{e['percent']:.1f} %")
             for joint, e in result["errors"].items()
@@ -92,3 +120,13 @@ class Command(run.Command["tuple[Robot, Recording]", "TorquePrediction"]):
             table(f"{result['robot']}: prediction against {result['recording']}", head, lines)
         else:
             table(f"{result['robot']}: prediction", ("", ""), [("rows predicted", str(result["rows"]))])
+        motion = result["simulated"]
+        if motion is not None:
+            from truing.dynamics.rollout.page import error_text
+
+            lines = [
+                (joint, error_text(e["rms"], e["unit"]), error_text(e["end_rms"], e["unit"]))
+                for joint, e in motion["errors"].items()
+            ]
+            title = f"motion in {motion['windows']} windows of {motion['horizon_s']:g} s, less measured"
+            table(title, ("", "rms", "rms at their ends"), lines)

@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Compare two simulator models on the same recordings: which is nearer to the robot, and at which joints.
+
+Both run in MuJoCo from measured states, driven by the measured torques. Writes result.json, report.html.
+Exits with 1 where MODEL_B is worse than MODEL_A by more than --margin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from truing.cli import run
+from truing.cli.options import BaseLink, File, Fraction, Seed, TipLink, keyword
+from truing.cli.recordings import (
+    Joints,
+    RecordingFiles,
+    Topic,
+    TorquePerAmpere,
+    Units,
+    require_masses,
+    require_torques,
+    robot_and_recordings,
+    with_drives,
+)
+from truing.cli.tables import say, table
+
+if TYPE_CHECKING:
+    from truing.dynamics import Recording
+    from truing.dynamics.comparison import Comparison
+    from truing.model import Robot
+
+PANEL = "Dynamics"
+
+
+def model_file(which: str) -> File:
+    return File(f"{which}: MJCF, which runs as it is, URDF or robot.yaml.", argument=True, metavar=which)
+
+
+@dataclass(frozen=True)
+class Loaded:
+    a: Robot
+    b: Robot
+    recordings: Sequence[Recording]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command(run.Command[Loaded, "Comparison"]):
+    doing = "simulating"
+
+    model_a: Annotated[Path, model_file("MODEL_A")]
+    model_b: Annotated[Path, model_file("MODEL_B")]
+    recordings: RecordingFiles
+    margin: Annotated[float, Fraction("By which errors of MODEL_B may be larger than those of MODEL_A.")] = (
+        keyword("truing.dynamics.comparison:compare", "margin")
+    )
+    seed: Seed = 0
+    joints: Joints = ""
+    torque_per_ampere: TorquePerAmpere = None
+    topic: Topic = ""
+    units: Units = None
+    base_link: BaseLink = ""
+    tip_link: TipLink = ""
+
+    def load(self, progress: run.Progress) -> Loaded:
+        from truing.files import load_robot
+
+        a, recordings = robot_and_recordings(
+            self.model_a,
+            self.recordings,
+            base_link=self.base_link,
+            tip_link=self.tip_link,
+            joints=self.joints,
+            topic=self.topic,
+            units=self.units,
+            torque_per_ampere=self.torque_per_ampere,
+        )
+        require_torques(recordings)
+        b = load_robot(self.model_b, self.base_link, self.tip_link, any_tool=True)
+        require_masses(self.model_b, b)
+        if self.torque_per_ampere is not None:
+            b = with_drives(b, self.torque_per_ampere)
+        return Loaded(a, b, recordings)
+
+    def solve(self, loaded: Loaded, progress: run.Progress) -> Comparison:
+        from truing.dynamics.comparison import compare
+        from truing.dynamics.runner import simulator_of
+
+        a, b = simulator_of(self.model_a, loaded.a), simulator_of(self.model_b, loaded.b)
+        return compare(a, b, loaded.recordings, margin=self.margin, seed=self.seed)
+
+    def write(
+        self, folder: Path, loaded: Loaded, found: Comparison, warnings: list[str]
+    ) -> Mapping[str, Any]:
+        from truing.dynamics.result import write_comparison
+
+        names = (self.model_a.name, self.model_b.name)
+        if names[0] == names[1]:
+            names = (str(self.model_a), str(self.model_b))
+        return write_comparison(folder, found, names, warnings=warnings)
+
+    def failure(self, result: Mapping[str, Any]) -> str:
+        if not result["worse"]:
+            return ""
+        margin, what = f"{100 * self.margin:g} %", ", ".join(result["worse"])
+        return f"MODEL_B is worse than MODEL_A by more than {margin}: {what}"
+
+    def table(self, result: Mapping[str, Any], found: Comparison) -> None:
+        from truing.dynamics.comparison.page import interval, joint_lines
+        from truing.dynamics.rollout.page import main_horizon
+
+        say(result["sentence"])
+        main = main_horizon(result["rollout"]["horizon_s"])
+        head, lines = joint_lines(result, [main])
+        table("rms errors of A and B: torque in % of its standard deviation, motion", head, lines)
+        ratios = [(r["of"], f"{r['B_over_A']:.3g}", interval(r)) for r in result["ratios"]]
+        table("error of B over that of A, mean over the joints", ("", "ratio", "90 % interval"), ratios)

@@ -1,0 +1,355 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""A model as MuJoCo runs it: forward from many states at once (`mujoco.rollout`, on all cores), and backward
+from a motion to the torques that it takes.
+
+Torques of the drives enter as forces at the joints, in place of the model's own drives.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import importlib.util
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.dynamics.export import Exported, coupling_matrix, import_mujoco
+from truing.dynamics.export.parts import drive_torque
+from truing.dynamics.motion import Track, table_at
+from truing.errors import InputError
+from truing.files import is_mjcf
+
+Floats = NDArray[np.float64]
+
+_AT_ONCE = 256  # windows: bounds memory
+_HELD_STEPS = 2  # for which callbacks' torques are held
+_OUT = 1e3  # [rad | m]: a simulation that has left
+_NEAR = 1.0  # [s] of a track on both sides of a window, for torques at other clocks
+_OFF_GROUP = 30  # of MuJoCo's groups of actuators: the one that is switched off
+
+
+@dataclass(frozen=True)
+class Runnable:
+    """A compiled model, and how readings and torques of a robot enter it."""
+
+    robot: _core.Robot
+    """Its effects on the measurement are taken out of measured torques."""
+    model: Any  # mujoco.MjModel
+    links: tuple[str, ...]  # joints of the chain
+    driven: tuple[str, ...]  # those with a reading
+    ratios: Floats  # shape=(driven,): joint = ratio * reading
+    coupling: Floats  # shape=(links, driven): motion of the joints for readings
+    start: Floats  # shape=(links,) [rad | m]: the joints at readings of zero
+    beside: Any = None  # the module of callbacks.py
+    notes: tuple[str, ...] = ()
+    """What of the model was left out, in words."""
+    prismatic: tuple[bool, ...] = field(default=(), kw_only=True)
+
+
+def runnable(exported: Exported, callbacks: bool = True) -> Runnable:
+    """What `export(to="mjcf")` wrote, loaded again. callbacks: with callbacks.py, if there is one."""
+    model = _without_bounds(import_mujoco().MjModel.from_xml_path(str(exported.model)))
+    chain = exported.chain
+    beside = _module(exported.callbacks) if callbacks and exported.callbacks is not None else None
+    if beside is not None:
+        beside.prepare(model)
+    return Runnable(
+        exported.robot,
+        model,
+        tuple(link.name for link in chain.links),
+        tuple(link.name for link in chain.driven),
+        np.array([link.ratio for link in chain.driven]),
+        coupling_matrix(chain),
+        np.zeros(len(chain.links)),
+        beside,
+        prismatic=tuple(link.prismatic for link in chain.driven),
+    )
+
+
+def runnable_mjcf(path: Path, robot: _core.Robot) -> Runnable:
+    """An MJCF as it is, step, solver and passive elements included. robot: of the same file (`load_robot`).
+
+    Actuators that drive the chain's joints are switched off: the recorded torques stand in their place.
+    Contacts and limits do not act.
+    """
+    mujoco = import_mujoco()
+    model = _without_bounds(mujoco.MjModel.from_xml_path(str(path)))
+    values: dict[str, float] = {}
+    zeros: dict[str, float] = {}
+    rows: dict[str, Floats] = {}
+    driven = [joint.name for joint in robot.joints if not joint.passive]
+    for joint in robot.joints:
+        if joint.passive:
+            rows[joint.name] = np.sum([weight * rows[driver] for driver, weight in joint.driven_by], axis=0)
+            led = (w * zeros[driver] for driver, w in joint.driven_by)
+            zeros[joint.name] = joint.offset + sum(led, 0.0)
+        else:
+            rows[joint.name] = np.eye(len(driven))[driven.index(joint.name)]
+            zeros[joint.name] = joint.offset
+        # The robot counts motion from `ref`.
+        values[joint.name] = zeros[joint.name] + float(model.qpos0[model.joint(joint.name).qposadr[0]])
+    off = _drives_off(mujoco, model, [joint.name for joint in robot.joints])
+    return Runnable(
+        robot,
+        model,
+        tuple(joint.name for joint in robot.joints),
+        tuple(driven),
+        np.ones(len(driven)),
+        np.array([rows[joint.name] for joint in robot.joints]),
+        np.array([values[joint.name] for joint in robot.joints]),
+        notes=(f"recorded torques stand in the place of its drives {', '.join(off)}",) if off else (),
+        prismatic=tuple(joint.type == "prismatic" for joint in robot.joints if not joint.passive),
+    )
+
+
+def simulator_of(path: Path, robot: _core.Robot) -> _core.Robot | Runnable:
+    """What simulates the robot of a file: an MJCF as it is; of others the robot, which is exported."""
+    return runnable_mjcf(path, robot) if is_mjcf(path) else robot
+
+
+def _without_bounds(model: Any) -> Any:
+    """Measured torques are not clamped, and ranges may be narrower than the motion was. What has left does
+    not begin anew."""
+    off = import_mujoco().mjtDisableBit
+    for bit in (off.mjDSBL_CONTACT, off.mjDSBL_CLAMPCTRL, off.mjDSBL_LIMIT, off.mjDSBL_AUTORESET):
+        model.opt.disableflags |= int(bit)
+    return model
+
+
+def _drives_off(mujoco: Any, model: Any, joints: Sequence[str]) -> list[str]:
+    """Switches actuators of these joints off that take an input, and names those that do more than pass it
+    on. Passive ones (friction, cogging) take none, and stay."""
+    numbers = {int(model.joint(name).id) for name in joints}
+    at_joints = {int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)}
+    named = []
+    for i in range(model.actuator_ctrlnum.size):
+        here = int(model.actuator_trntype[i]) in at_joints and int(model.actuator_trnid[i, 0]) in numbers
+        if not here or model.actuator_ctrlnum[i] == 0:
+            continue
+        model.actuator_group[i] = _OFF_GROUP
+        if int(model.actuator_biastype[i]) != int(mujoco.mjtBias.mjBIAS_NONE):
+            named.append(model.actuator(i).name or str(i))
+    model.opt.disableactuator |= 1 << _OFF_GROUP
+    return named
+
+
+def _module(path: Path) -> Any:
+    spec = importlib.util.spec_from_file_location("truing_callbacks", path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{path}: cannot be loaded")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@contextlib.contextmanager
+def _quiet(mujoco: Any) -> Iterator[None]:
+    """A simulation that leaves is told by its result, not by MuJoCo in a file of the working folder."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+class Runner:
+    """One model, run from measured states or along a measured motion."""
+
+    def __init__(self, of: Runnable, tracks: Sequence[Track]) -> None:
+        self.mujoco = import_mujoco()
+        self.of, self.model, self.tracks = of, of.model, tracks
+        self.links = np.array([self.model.joint(name).qposadr[0] for name in of.links])
+        self.link_dofs = np.array([self.model.joint(name).dofadr[0] for name in of.links])
+        self.qpos = np.array([self.model.joint(name).qposadr[0] for name in of.driven])
+        self.dofs = np.array([self.model.joint(name).dofadr[0] for name in of.driven])
+        rows = [of.links.index(name) for name in of.driven]
+        self.zero = of.start[rows]
+        self.spec = int(self.mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        self.bristles = [self._bristles(track) for track in tracks]
+
+    # ---- where windows begin
+
+    def states(self, starts: Floats, track: NDArray[np.intp]) -> Floats:
+        """shape=(n, states): measured positions and speeds at times of tracks, bristles as the motion before
+        has bent them."""
+        data = self.mujoco.MjData(self.model)
+        out = np.empty((starts.size, self.mujoco.mj_stateSize(self.model, self.spec)))
+        for k, (start, t) in enumerate(zip(starts, track, strict=True)):
+            near = self.tracks[t].near(start, start)
+            now = np.array([start])
+            self.mujoco.mj_resetData(self.model, data)
+            q, qd = (table_at(near.time, table, now)[0] for table in (near.q, near.qd))
+            data.qpos[self.links] = self.of.start + self.of.coupling @ q
+            data.qvel[self.link_dofs] = self.of.coupling @ qd
+            if self.model.na:
+                data.act[:] = table_at(self.tracks[t].time, self.bristles[t], now)[0]
+            self.mujoco.mj_getState(self.model, data, out[k], self.spec)
+        return out
+
+    def _bristles(self, track: Track) -> Floats:
+        """Deflection of every LuGre bristle along a recording. shape=(n, activations) [rad | m]
+
+        dz/dt = v - s0 |v| / g(v) z, solved exactly over a row of constant v (Canudas de Wit et al. 1995,
+        eq. 2).
+        """
+        m = self.model
+        kind = int(self.mujoco.mjtDyn.mjDYN_DCMOTOR)
+        out = np.zeros((track.time.size, m.na))
+        step = float(track.time[1] - track.time[0])
+        row = {int(m.joint(name).id): k for k, name in enumerate(self.of.links)}
+        bent = (m.actuator_dyntype == kind) & (m.actuator_actnum > 0) & (m.actuator_dynprm[:, 5] > 0.0)
+        for i in np.flatnonzero(bent):
+            if int(m.actuator_trnid[i, 0]) not in row:
+                continue
+            level, still, speed = m.actuator_biasprm[i, 3:6]
+            v = m.actuator_gear[i, 0] * (track.qd @ self.of.coupling[row[int(m.actuator_trnid[i, 0])]])
+            g = level + (still - level) * np.exp(-((v / speed) ** 2))
+            rate = m.actuator_dynprm[i, 5] * np.abs(v) / g
+            fade = np.exp(-rate * step)
+            push = np.where(rate * step > 1e-9, (1.0 - fade) / np.maximum(rate, 1e-12), step) * v
+            z = 0.0
+            for k in range(1, track.time.size):
+                z = fade[k - 1] * z + push[k - 1]
+                out[k, m.actuator_actadr[i]] = z
+        return out
+
+    def _warmth(self, starts: Floats, track: NDArray[np.intp]) -> tuple[Floats, Floats]:
+        """Temperatures of the joints [deg C; NaN: not known] and time since the recording began [s].
+        shape=(windows, joints), (windows, 1)"""
+        warm = []
+        for start, t in zip(starts, track, strict=True):
+            near = self.tracks[t].near(start, start)
+            warm.append(table_at(near.torque_time, near.temperature, np.array([start]))[0])
+        begun = np.array([self.tracks[t].began for t in track])
+        return np.array(warm), (starts - begun)[:, None]
+
+    def _torques(self, starts: Floats, track: NDArray[np.intp], at: Floats) -> Floats:
+        """Torques of the drives of each window, shape=(windows, times, joints) [Nm | N]."""
+        out = np.empty((starts.size, at.size, self.qpos.size))
+        for k, (start, t) in enumerate(zip(starts, track, strict=True)):
+            near = self.tracks[t].near(start - _NEAR, start + at[-1] + _NEAR)
+            out[k] = drive_torque(self.of.robot, near.torque_time, near.torque, start + at)
+        return out
+
+    # ---- forward
+
+    def run(
+        self, starts: Floats, track: NDArray[np.intp], times: Floats, step: float | None = None
+    ) -> Floats:
+        """Readings at `times` [s] after `starts` of tracks. shape=(n, times, joints) [rad | m]
+
+        step: [s] other than the model's own.
+        """
+        usual = float(self.model.opt.timestep)
+        self.model.opt.timestep = usual if step is None else step
+        try:
+            with _quiet(self.mujoco):
+                parts = [
+                    self._run(starts[k : k + _AT_ONCE], track[k : k + _AT_ONCE], times)
+                    for k in range(0, starts.size, _AT_ONCE)
+                ]
+        finally:
+            self.model.opt.timestep = usual
+        return np.concatenate(parts)
+
+    def _run(self, starts: Floats, track: NDArray[np.intp], times: Floats) -> Floats:
+        h = float(self.model.opt.timestep)
+        # A step need not divide the times: between two steps the path is a straight line.
+        number = np.maximum(np.ceil(times / h - 1e-6).astype(int), 1)
+        torque = self._torques(starts, track, h * (np.arange(number[-1]) + 0.5))
+        states = self.states(starts, track)
+        applied = np.zeros((starts.size, number[-1], self.model.nv))
+        applied[:, :, self.dofs] = torque / self.of.ratios
+        if self.of.beside is None:
+            path = self._rollout(states, applied)
+        else:
+            path = self._with_callbacks(self.of.beside, states, applied, torque, *self._warmth(starts, track))
+        stopped = path[:, :, 0] < h * (np.arange(number[-1]) + 0.5)  # where MuJoCo gave up
+        path[stopped] = np.nan
+        whole = np.concatenate([states[:, None], path], axis=1)[:, :, 1 + self.qpos]
+        part = (times / h - (number - 1))[:, None]
+        found = (1.0 - part) * whole[:, number - 1] + part * whole[:, number]
+        found = (found - self.zero) / self.of.ratios
+        return np.asarray(
+            np.where(np.abs(found) < _OUT, found, np.nan_to_num(np.sign(found), nan=1.0) * _OUT)
+        )
+
+    def _rollout(self, states: Floats, applied: Floats) -> Floats:
+        from mujoco import rollout
+
+        datas = [self.mujoco.MjData(self.model) for _ in range(os.cpu_count() or 1)]
+        spec = int(self.mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+        path, _ = rollout.rollout(self.model, datas, states, applied, control_spec=spec)
+        return np.asarray(path)
+
+    def _with_callbacks(
+        self, beside: Any, states: Floats, applied: Floats, torque: Floats, warm: Floats, begun: Floats
+    ) -> Floats:
+        """Few steps at a time: each window has a model of its own, whose dry friction changes with its
+        state. On one thread: to wake others for two steps takes longer than the steps on a busy machine."""
+        from mujoco import rollout
+
+        warm = np.where(np.isnan(warm), beside.REFERENCE_C, warm)
+        m, n, ratios = self.model, states.shape[0], self.of.ratios
+        models = [copy.copy(m) for _ in range(n)]
+        losses = [model.dof_frictionloss for model in models]
+        data = [self.mujoco.MjData(m)]
+        spec = int(self.mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+        path = np.empty((n, applied.shape[1], states.shape[1]))
+        state = states
+        with rollout.Rollout(nthread=0) as pool:
+            for k in range(0, applied.shape[1], _HELD_STEPS):
+                end = min(k + _HELD_STEPS, applied.shape[1])
+                q = (state[:, 1 + self.qpos] - self.zero) / ratios
+                qd = state[:, 1 + m.nq + self.dofs] / ratios
+                now = (q, qd, torque[:, k], warm, begun + k * m.opt.timestep)
+                friction = beside.dry_friction(*now) / np.abs(ratios)
+                for loss, row in zip(losses, friction, strict=True):
+                    loss[self.dofs] = row
+                smooth = beside.smooth_torques(*now) / ratios
+                applied[:, k:end, self.dofs] += smooth[:, None]
+                part, _ = pool.rollout(models, data, state, applied[:, k:end], control_spec=spec)
+                path[:, k:end] = part
+                state = np.ascontiguousarray(part[:, -1])
+        return path
+
+    # ---- backward
+
+    def torques(self, t: int, rows: NDArray[np.intp]) -> Floats:
+        """What the drives must give for rows of a track's motion, at the readings (mj_inverse).
+        shape=(rows, joints) [Nm | N]"""
+        track, of = self.tracks[t], self.of
+        model = copy.copy(self.model)
+        data = self.mujoco.MjData(model)
+        q, qd, qdd = (table[rows] for table in (track.q, track.qd, track.qdd))
+        smooth, friction = np.zeros_like(q), None
+        if of.beside is not None:
+            drive = drive_torque(of.robot, track.torque_time, track.torque, track.time[rows])
+            warm = table_at(track.torque_time, track.temperature, track.time[rows])
+            warm = np.where(np.isnan(warm), of.beside.REFERENCE_C, warm)
+            now = (q, qd, drive, warm, (track.time[rows] - track.began)[:, None])
+            friction = of.beside.dry_friction(*now) / np.abs(of.ratios)
+            smooth = of.beside.smooth_torques(*now)
+        out = np.empty_like(q)
+        for k, row in enumerate(rows):
+            data.qpos[self.links] = of.start + of.coupling @ q[k]
+            data.qvel[self.link_dofs] = of.coupling @ qd[k]
+            data.qacc[self.link_dofs] = of.coupling @ qdd[k]
+            if model.na:
+                data.act[:] = self.bristles[t][row]
+            if friction is not None:
+                model.dof_frictionloss[self.dofs] = friction[k]
+            self.mujoco.mj_inverse(model, data)
+            self.mujoco.mj_fwdActuation(model, data)
+            left = data.qfrc_inverse - data.qfrc_actuator  # the passive ones give their part
+            out[k] = of.coupling.T @ left[self.link_dofs] - smooth[k]
+        return out
