@@ -53,8 +53,8 @@ def load_recordings(
     """
     names = split_joints(joints)
     found = _expanded([paths] if isinstance(paths, (str, os.PathLike)) else list(paths))
-    _refuse_idle("topic= is of bags", topic, found, is_bag)
-    _refuse_idle("units= is of LeRobot data sets", units, found, is_lerobot)
+    _refuse_idle("--topic (in Python: topic=) is of bags", topic, found, is_bag)
+    _refuse_idle("--units (in Python: units=) is of LeRobot data sets", units, found, is_lerobot)
     out: list[_core.Recording] = []
     for path, name in zip(found, _names(found), strict=True):
         if is_bag(path):

@@ -15,20 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
-from truing.cli.options import BaseLink, Names, Threads, TipLink, core
-from truing.cli.recordings import (
-    CutOff,
-    Joints,
-    RecordingFiles,
-    RobotWithMasses,
-    TestShare,
-    Topic,
-    TorquePerAmpere,
-    Units,
-    print_errors,
-    require_torques,
-    robot_and_recordings,
-)
+from truing.cli.options import Threads, TorqueEffectNames, core
+from truing.cli.recordings import TestShare, TorqueCommand, print_errors
 from truing.cli.tables import joined, say, table
 
 if TYPE_CHECKING:
@@ -40,35 +28,14 @@ LISTED = 12  # causes on the terminal; the report has all
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueDiagnosis"]):
+class Command(TorqueCommand["TorqueDiagnosis"]):
     doing = "diagnosing"
 
-    robot: RobotWithMasses
-    recordings: RecordingFiles
-    leave_out: Annotated[str, Names("Effects that are not to be considered: 'coupling,ripple'.")] = ""
-    cutoff: CutOff = None
+    leave_out: Annotated[
+        str, TorqueEffectNames("Effects that are not to be considered: 'coupling,ripple'.")
+    ] = ""
     test_share: TestShare = core("TorqueDiagnoseOptions", "test_share")
     threads: Threads = core("TorqueDiagnoseOptions", "threads")
-    joints: Joints = ""
-    torque_per_ampere: TorquePerAmpere = None
-    topic: Topic = ""
-    units: Units = None
-    base_link: BaseLink = ""
-    tip_link: TipLink = ""
-
-    def load(self, progress: run.Progress) -> tuple[Robot, list[Recording]]:
-        loaded = robot_and_recordings(
-            self.robot,
-            self.recordings,
-            base_link=self.base_link,
-            tip_link=self.tip_link,
-            joints=self.joints,
-            topic=self.topic,
-            units=self.units,
-            torque_per_ampere=self.torque_per_ampere,
-        )
-        require_torques(loaded[1])
-        return loaded
 
     def solve(self, loaded: tuple[Robot, list[Recording]], progress: run.Progress) -> TorqueDiagnosis:
         from truing.dynamics import diagnose

@@ -14,15 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
-from truing.cli.options import BaseLink, File, Frequency, TipLink, keyword
-from truing.cli.recordings import (
-    Joints,
-    RobotWithMasses,
-    Topic,
-    TorquePerAmpere,
-    Units,
-    robot_and_recordings,
-)
+from truing.cli.options import File, Frequency, keyword
+from truing.cli.recordings import MotionCommand
 from truing.cli.tables import table
 from truing.errors import InputError
 
@@ -34,10 +27,9 @@ PANEL = "Dynamics"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["tuple[Robot, Recording]", "TorquePrediction"]):
+class Command(MotionCommand["tuple[Robot, Recording]", "TorquePrediction"]):
     doing = "predicting"
 
-    robot: RobotWithMasses
     recording: Annotated[
         Path,
         File("One recording of motion, with torques or without.", argument=True, metavar="REC"),
@@ -46,24 +38,9 @@ class Command(run.Command["tuple[Robot, Recording]", "TorquePrediction"]):
         float,
         Frequency("Of the low-pass that the angles go through for their derivatives.", above=0),
     ] = keyword("truing.dynamics.api:predict", "cutoff")
-    joints: Joints = ""
-    torque_per_ampere: TorquePerAmpere = None
-    topic: Topic = ""
-    units: Units = None
-    base_link: BaseLink = ""
-    tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> tuple[Robot, Recording]:
-        robot, recordings = robot_and_recordings(
-            self.robot,
-            [self.recording],
-            base_link=self.base_link,
-            tip_link=self.tip_link,
-            joints=self.joints,
-            topic=self.topic,
-            units=self.units,
-            torque_per_ampere=self.torque_per_ampere,
-        )
+        robot, recordings = self.read([self.recording])
         if len(recordings) != 1:
             raise InputError(
                 f"{self.recording}: holds {len(recordings)} recordings, expected one: predict them one by one"
