@@ -231,7 +231,7 @@ def boosted(rows: Rows, base: Floats, torque: Floats) -> Floats:
 
 def figaroh(rows: Rows, python: Path | None) -> Floats:
     """FIGAROH itself, in an environment of its own (peers/peer_figaroh_torques.py), on those rows of
-    training in which any joint moves.
+    training in which every joint moves.
     """
     if python is None or not python.is_file():
         raise NotInstalledError("not installed: bench/peers/setup_peers.sh makes its environment")
@@ -243,7 +243,7 @@ def figaroh(rows: Rows, python: Path | None) -> Floats:
             qd=rows.qd,
             qdd=rows.qdd,
             torque=rows.torque,
-            train=(rows.train >= 0) & rows.moving.any(axis=1),
+            train=(rows.train >= 0) & rows.moving.all(axis=1),  # its Coulomb column is a bare sign
         )
         script = Path(__file__).with_name("peers") / "peer_figaroh_torques.py"
         done = subprocess.run(
