@@ -6,14 +6,12 @@
 // there, which bench/dynamics.py gives to the peers.
 
 #include <algorithm>
-#include <chrono>
-#include <cstdio>
 #include <fstream>
-#include <functional>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "common.hpp"
 #include "dynamics/joint_grams.hpp"
 #include "dynamics/regressor.hpp"
 #include "kernel/kernel.hpp"
@@ -22,43 +20,21 @@
 namespace {
 
 using namespace truing;
+using namespace truing::bench;
 using namespace truing::dynamics;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
 constexpr Index kJoints = 6, kEffects = 70;
 
-double best_seconds(int runs, const std::function<void()>& work) {
-  double best = 1e300;
-  for (int k = 0; k < runs; ++k) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-  }
-  return best;
-}
-
-void report(const std::string& name, double value, const char* unit) {
-  std::printf("{\"name\": \"%s\", \"value\": %.9g, \"unit\": \"%s\"}\n", name.c_str(), value, unit);
-  std::fflush(stdout);
-}
-
-Robot ur10() {
-  const double table[6][3] = {{0, 0, 0.1273},         {M_PI / 2, 0, 0},      {0, -0.612, 0},
-                              {0, -0.5723, 0.163941}, {M_PI / 2, 0, 0.1157}, {-M_PI / 2, 0, 0.0922}};
-  Robot robot;
-  robot.name = "ur10";
-  robot.convention = Convention::mdh;
-  for (int k = 0; k < 6; ++k) {
-    Joint joint;
-    joint.name = "J" + std::to_string(k + 1);
-    joint.alpha = table[k][0];
-    joint.a = table[k][1];
-    joint.d = table[k][2];
-    joint.mass = 8.0 - k;
-    joint.center_of_mass = {0.1, 0.02 * k, -0.05};
+Robot with_masses(Robot robot) {
+  double mass = 8.0, across = 0.0;
+  for (Joint& joint : robot.joints) {
+    joint.mass = mass;
+    joint.center_of_mass = {0.1, across, -0.05};
     joint.inertia = Eigen::Vector3d(0.04, 0.05, 0.06).asDiagonal();
-    robot.joints.push_back(joint);
+    mass -= 1.0;
+    across += 0.02;
   }
   return robot;
 }
@@ -173,10 +149,10 @@ void write_states(const char* path, const Robot& robot, const Tables& t) {
 
 int main(int argc, char** argv) {
   std::mt19937_64 random(1);
-  const Robot robot = ur10();
+  const Robot robot = with_masses(ur10());
   const RigidChain chain(robot);
   const Tables tables(16384, &random);
-  std::printf("{\"name\": \"kernel\", \"value\": \"%s\", \"unit\": \"\"}\n", kernel::functions().name);
+  report("kernel", kernel::functions().name);
   time_regressor(chain, tables);
   time_grams(chain, tables);
   time_limit(tables.q.rows());

@@ -8,55 +8,24 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
-#include <functional>
 #include <numeric>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "common.hpp"
 #include "estimation/evaluate.hpp"
 #include "truing/truing.hpp"
 
 namespace {
 
 using namespace truing;
+using namespace truing::bench;
 
-double seconds(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-/// Best of so many runs, as the peers and BLAS are timed: what the code takes when nothing else runs on the machine.
-double best_seconds(int runs, const std::function<void()>& work) {
-  double best = seconds(work);
-  for (int k = 1; k < runs; ++k) best = std::min(best, seconds(work));
-  return best;
-}
-
-void report(const std::string& name, double value, const char* unit) {
-  std::printf("{\"name\": \"%s\", \"value\": %.9g, \"unit\": \"%s\"}\n", name.c_str(), value, unit);
-  std::fflush(stdout);
-}
-
-Robot ur10() {
-  const double table[6][3] = {{0, 0, 0.1273},         {M_PI / 2, 0, 0},      {0, -0.612, 0},
-                              {0, -0.5723, 0.163941}, {M_PI / 2, 0, 0.1157}, {-M_PI / 2, 0, 0.0922}};
-  Robot robot;
-  robot.name = "ur10";
-  robot.convention = Convention::mdh;
-  for (int k = 0; k < 6; ++k) {
-    Joint joint;
-    joint.name = "J" + std::to_string(k + 1);
-    joint.alpha = table[k][0];
-    joint.a = table[k][1];
-    joint.d = table[k][2];
-    robot.joints.push_back(joint);
-  }
+Robot with_tool(Robot robot) {
   robot.targets = {{"tool", frame_from_xyz_rpy({0.03, -0.02, 0.15}, Eigen::Vector3d::Zero())}};
   return robot;
 }
@@ -246,9 +215,9 @@ void accuracy(const Robot& nominal) {
 
 int main() {
   std::mt19937_64 random(1);
-  const Robot nominal = ur10();
+  const Robot nominal = with_tool(ur10());
   const Robot truth = with_errors(nominal, &random);
-  std::printf("{\"name\": \"kernel\", \"value\": \"%s\", \"unit\": \"\"}\n", kernel::functions().name);
+  report("kernel", kernel::functions().name);
   time_kernel(truth, &random);
   time_identify(nominal, truth, &random);
   accuracy(nominal);

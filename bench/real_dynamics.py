@@ -1,27 +1,54 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Torques of real arms diagnosed: held-out errors of the nominal model, standard practice and what was named.
+"""Torques of real arms: held-out errors of truing and of other methods, on the same rows.
 
-    TRUING_REALDATA=... python bench/real_dynamics.py
+    python bench/real_dynamics.py [--data FOLDER] [--rows PROGRAM] [--peers ENVS] [--write PAGE]
 
-prints the tables of docs/benchmarks/real-dynamics.md. Sets that are not there are left out.
+FOLDER as for bench/real_data.py; sets that are not there are left out. PROGRAM: bench_dynamics_rows, which
+writes the rows for the others (dynamics_peers.py); ENVS: what peers/setup_peers.sh made, for FIGAROH.
+--write: the page whose markers take the tables.
 """
 
 from __future__ import annotations
 
+import argparse
+import functools
 import math
 import os
+import resource
 import sys
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+
+import dynamics_peers as peers
+import numpy as np
+from numpy.typing import NDArray
 
 import truing
 from truing.dynamics import Recording, TorqueDiagnosis, diagnose, load_recordings, rollout
 from truing.model import Robot
 
+ROOT = Path(__file__).resolve().parent.parent
 UR10E_GAINS = (10.0, 10.6956, 8.4566, 9.0029, 9.4800, 10.1232)  # [Nm/A] published beside the recordings
-MODELS = ("nominal", "standard", "named")
+START, END = "<!-- table -->", "<!-- end -->"
+HEADER = (
+    "| | J1 … J6, held out [%] | × truing | processor s |",
+    "| --- | --- | --- | --- |",
+)
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A set: what is fitted to what."""
+
+    name: str
+    urdf: Path
+    robot: Robot
+    recordings: list[Recording]
+    cutoff: float = 8.0  # [Hz]
 
 
 def robot_of(folder: Path, torque_per_ampere: Sequence[float] = ()) -> Robot:
@@ -31,17 +58,43 @@ def robot_of(folder: Path, torque_per_ampere: Sequence[float] = ()) -> Robot:
     return robot
 
 
-def ur10e(folder: Path, held_out: Sequence[str]) -> tuple[Robot, list[Recording]]:
+def ur10e(folder: Path, held_out: Sequence[str]) -> Arm:
     """All recordings without a load that are not marked as test, and these of the marked ones."""
     robot = robot_of(folder, UR10E_GAINS)
     files = [file for file in sorted(folder.glob("*.csv")) if not file.stem.endswith("_load")]
-    recordings = load_recordings(files, robot)
-    return robot, [r for r in recordings if not r.test or r.name in held_out]
+    recordings = [r for r in load_recordings(files, robot) if not r.test or r.name in held_out]
+    return Arm(f"UR10e, {' + '.join(held_out)}", folder / "robot.urdf", robot, recordings)
 
 
-def row(name: str, found: TorqueDiagnosis, seconds: float) -> str:
-    errors = {e.model: " ".join(f"{joint.percent:.1f}" for joint in e.held_out) for e in found.errors}
-    return f"| {name} | " + " | ".join(errors[model] for model in MODELS) + f" | {seconds:.1f} |"
+def one_recording(name: str, folder: Path, cutoff: float = 8.0) -> Arm:
+    robot = robot_of(folder)
+    return Arm(name, folder / "robot.urdf", robot, list(load_recordings([folder / "run.csv"], robot)), cutoff)
+
+
+def arms(data: Path) -> list[Arm]:
+    found = []
+    if (folder := data / "dyn_ur10e").exists():
+        found += [ur10e(folder, ("h7_20s", "h12_40s")), ur10e(folder, ("ptp10",))]
+    if (folder := data / "dyn_tx40").exists():
+        found.append(one_recording("TX40", folder, cutoff=20.0))
+    if (folder := data / "dyn_ur10").exists():
+        found.append(one_recording("UR10", folder))
+    return found
+
+
+# ---- Tables ------------------------------------------------------------------------------------------
+
+
+def line(name: str, percent: Floats, named: Floats, seconds: float | None = None) -> str:
+    """A row of the table: × truing is the geometric mean over the joints."""
+    times = float(np.exp(np.mean(np.log(percent / named))))
+    took = "" if seconds is None else f"{seconds:.1f}"
+    return f"| {name} | {' '.join(f'{one:.1f}' for one in percent)} | {times:.2f} | {took} |"
+
+
+def percent_of(found: TorqueDiagnosis, model: str) -> Floats:
+    errors = next(e for e in found.errors if e.model == model)
+    return np.array([joint.percent for joint in errors.held_out])
 
 
 def causes(found: TorqueDiagnosis, most: int = 6) -> str:
@@ -52,16 +105,79 @@ def causes(found: TorqueDiagnosis, most: int = 6) -> str:
     )
 
 
-def diagnosed(name: str, robot: Robot, recordings: Sequence[Recording], **options: float) -> TorqueDiagnosis:
-    start = time.perf_counter()
-    found = diagnose(robot, recordings, **options)
-    print(row(name, found, time.perf_counter() - start))
-    return found
+def processor_seconds() -> float:
+    """Of this process and those that it has waited for: other work on the machine does not count."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+def methods(figaroh: Path | None) -> list[tuple[str, Callable[[peers.Rows], Floats]]]:
+    return [
+        ("base parameters, Coulomb, viscous, offset, weighted", peers.standard),
+        ("the same and rotor inertias", peers.with_rotors),
+        ("FIGAROH", functools.partial(peers.figaroh, python=figaroh)),
+        ("every column of the catalogue, one ridge", peers.ridge),
+        ("boosted trees", peers.trees),
+        ("boosted trees on standard practice", peers.trees_on_standard),
+    ]
+
+
+def compared(arm: Arm, program: Path | None, figaroh: Path | None) -> tuple[TorqueDiagnosis, list[str]]:
+    """The diagnosis, and the table of everybody."""
+    start = processor_seconds()
+    found = diagnose(arm.robot, arm.recordings, cutoff=arm.cutoff)
+    seconds = processor_seconds() - start
+    named = percent_of(found, "named")
+    lines = [f"**{arm.name}**", "", *HEADER]
+    lines.append(line("the URDF", percent_of(found, "nominal"), named))
+    lines.append(line("truing, its standard practice", percent_of(found, "standard"), named))
+    lines.append(line("**truing, named**", named, named, seconds))
+    if program is None:
+        return found, lines
+    rows = peers.rows_of(program, arm.urdf, arm.robot, arm.recordings, arm.cutoff)
+    if not np.allclose(rows.percent(rows.nominal), percent_of(found, "nominal"), rtol=1e-6):
+        raise SystemExit(
+            f"{arm.name}: {program} writes other rows than those of the diagnosis: build it again"
+        )
+    for name, method in methods(figaroh):
+        start = processor_seconds()
+        try:
+            percent = rows.percent(method(rows))
+        except peers.NotInstalledError as error:
+            lines.append(f"| {name} | {error} | | |")
+        else:
+            lines.append(line(name, percent, named, processor_seconds() - start))
+    return found, lines
+
+
+def loaded(robot: Robot, file: Path) -> list[str]:
+    """The recording with a load that nobody told, against the robot that was found."""
+    found = diagnose(robot, load_recordings([file], robot))
+    mass = next((p.value for p in found.effects[0].parameters if p.name.endswith(".m")), float("nan"))
+    named = percent_of(found, "named")
+    lines = ["**UR10e with a load, against the robot found**", "", *HEADER]
+    lines += [line("the robot found", percent_of(found, "nominal"), named), line("**named**", named, named)]
+    return [*lines, "", f"Named: {causes(found, 1)}: {mass:.2f} kg.", ""]
+
+
+def report(data: Path, program: Path | None, figaroh: Path | None) -> list[str]:
+    lines: list[str] = []
+    for number, arm in enumerate(arms(data)):
+        found, table = compared(arm, program, figaroh)
+        lines += [*table, "", f"Named: {causes(found)}.", ""]
+        print("\n".join(lines[-len(table) - 3 :]), flush=True)
+        file = data / "dyn_ur10e" / "h14_50s_load.csv"
+        if number == 0:
+            lines += ["| simulated motion | 0.1 s | 0.5 s | 2 s |", "| --- | --- | --- | --- |"]
+            lines += [*moved(arm.name, arm.robot, arm.recordings, found), ""]
+        if number == 0 and file.exists():
+            lines += loaded(found.robot, file)
+    return lines
 
 
 def moved(name: str, robot: Robot, recordings: Sequence[Recording], found: TorqueDiagnosis) -> list[str]:
     """Lines of simulated motion: median of the worst joint, 0.1, 0.5 and 2 s ahead of held-out states."""
-    start = time.perf_counter()
+    start = processor_seconds()
     motion = rollout(robot, found, recordings)
     if motion.judgement is None:
         return [f"| {name} | not judged: {motion.why_not} |"]
@@ -70,37 +186,32 @@ def moved(name: str, robot: Robot, recordings: Sequence[Recording], found: Torqu
         degrees = (math.degrees(judged.worst_joint(model, h)) for h in judged.windows.horizons)
         shown = " | ".join("left" if value > 360.0 else f"{value:.2f}°" for value in degrees)
         lines.append(f"| {name}, {model} | {shown} |")
-    windows, seconds = judged.windows.starts.size, time.perf_counter() - start
-    return [*lines, f"\n{name}: {windows} windows, {seconds:.1f} s for the four models"]
+    windows, seconds = judged.windows.starts.size, processor_seconds() - start
+    return [*lines, f"\n{name}: {windows} windows, {seconds:.1f} s of processor time for the four models"]
 
 
 def main() -> int:
-    data = Path(os.environ.get("TRUING_REALDATA", "data"))
-    lists: list[str] = []
-    motion: list[str] = []
-    print("| set | nominal | standard practice | named | s |\n| --- | --- | --- | --- | --- |")
-    if (folder := data / "dyn_ur10e").exists():
-        found = diagnosed("UR10e, h7_20s + h12_40s", *ur10e(folder, ("h7_20s", "h12_40s")))
-        lists.append(f"- UR10e: {causes(found)}")
-        motion = moved("UR10e", *ur10e(folder, ("h7_20s", "h12_40s")), found)
-        diagnosed("UR10e, ptp10", *ur10e(folder, ("ptp10",)))
-        loaded = load_recordings([folder / "h14_50s_load.csv"], found.robot)
-        carried = diagnosed("UR10e with a load, against the robot found", found.robot, loaded)
-        mass = next((p.value for p in carried.effects[0].parameters if p.name.endswith(".m")), float("nan"))
-        lists.append(f"- the load: {causes(carried, 1)}, {mass:.2f} kg")
-    if (folder := data / "dyn_tx40").exists():
-        robot = robot_of(folder)
-        found = diagnosed("TX40", robot, load_recordings([folder / "run.csv"], robot), cutoff=20.0)
-        lists.append(f"- TX40: {causes(found)}")
-    if (folder := data / "dyn_ur10").exists():
-        robot = robot_of(folder)
-        found = diagnosed("UR10", robot, load_recordings([folder / "run.csv"], robot))
-        lists.append(f"- UR10: {causes(found)}")
-    print("\n" + "\n".join(lists))
-    if motion:
-        print("\n| simulated motion | 0.1 s | 0.5 s | 2 s |\n| --- | --- | --- | --- |")
-        print("\n".join(motion))
-    return 0 if lists else 1
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("TRUING_REALDATA", "data")))
+    parser.add_argument("--rows", type=Path, help="bench_dynamics_rows; without it truing alone is judged")
+    parser.add_argument("--peers", type=Path, default=ROOT / "build" / "peers")
+    parser.add_argument(
+        "--write", type=Path, help=f"the page whose markers {START} and {END} take the tables"
+    )
+    arguments = parser.parse_args()
+    page = arguments.write.read_text(encoding="utf-8") if arguments.write else f"{START}{END}"
+    if START not in page or END not in page:
+        parser.error(f"{arguments.write} has no markers {START} and {END}")
+    figaroh = arguments.peers / "numpy2" / "bin" / "python"
+    lines = report(arguments.data, arguments.rows, figaroh)
+    if not lines:
+        print(f"{arguments.data}: none of the recordings is there", file=sys.stderr)
+        return 1
+    if arguments.write:
+        begin, end = page.index(START) + len(START), page.index(END)
+        text = page[:begin] + "\n" + "\n".join(lines) + page[end:]
+        arguments.write.write_text(text, encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":

@@ -2,7 +2,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Builds every bench/*.cpp, sets up the peers' environments (build/peers, about 2 GB), and runs bench/run.py.
+# Builds every bench/*.cpp, sets up the peers' environments (build/peers, about 2 GB), and runs bench/run.py. Where
+# TRUING_REALDATA names the recordings of bench/README.md, torques of real arms are diagnosed beside other methods.
 #
 #   scripts/bench.sh             everything; the slowest peer takes several minutes
 #   scripts/bench.sh --quick     without peers that take more than 20 s
@@ -25,6 +26,15 @@ if [[ " $* " != *" --no-peers "* ]] && ! cmp -s bench/peers/setup_peers.sh "$sta
   fi
 fi
 
+if [[ " $* " != *" --no-peers "* ]]; then
+  .venv/bin/python -m pip install --quiet --disable-pip-version-check "scikit-learn>=1.5" ||
+    echo "scikit-learn could not be installed" >&2
+fi
+
 mkdir -p build/run/bench
 cd build/run/bench  # not the source tree: only the installed truing is to be imported
 "$root/.venv/bin/python" "$root/bench/run.py" "$@"
+if [[ -n ${TRUING_REALDATA:-} ]]; then
+  "$root/.venv/bin/python" "$root/bench/real_dynamics.py" --rows "$root/$release/bench/bench_dynamics_rows" \
+    --peers "$root/build/peers" --write "$root/docs/benchmarks/real-dynamics.md"
+fi

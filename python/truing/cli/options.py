@@ -400,15 +400,15 @@ class Words(Kind):
 
 
 class Numbers(Kind):
-    """Numbers between commas, of a unit that the help states, each above zero; the field holds a list."""
+    """Numbers between commas, of a unit that the help states, none of them zero; the field holds a list."""
 
     metavar = "NUMBERS"
 
     def read(self, text: str, option: str) -> list[float]:
-        number = Number(noun="numbers between commas, each above 0", example="10,10.7,8.5")
+        number = Number(noun="numbers between commas, none of them 0", example="10,10.7,-8.5")
         values = [number.read(word.strip(), option) for word in text.split(",")]
         for word, value in zip(text.split(","), values, strict=True):
-            if value <= 0:
+            if value == 0:
                 raise refused(option, word.strip(), f"{number.noun}, such as {number.example}")
         return values
 
@@ -426,6 +426,25 @@ class EffectNames(Names):
         from truing.model import catalogue
 
         return continued(incomplete, [name for name, _ in catalogue()])
+
+
+class TorqueEffectNames(Names):
+    """Effects on torques between commas, perhaps with their joints: "coulomb,load_friction:J2+J3"."""
+
+    def read(self, text: str, option: str) -> str:
+        known = self._known()
+        for word in words_of(text):
+            if word.partition(":")[0].strip() not in known:
+                raise refused(option, word, f"effects on torques, of {', '.join(known)}")
+        return text
+
+    def complete(self, incomplete: str) -> list[str]:
+        return continued(incomplete, self._known())
+
+    def _known(self) -> list[str]:
+        from truing.dynamics.api import effect_names
+
+        return effect_names()
 
 
 def continued(incomplete: str, names: Sequence[str]) -> list[str]:

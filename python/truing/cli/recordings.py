@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from truing.cli.options import Choice, File, Fraction, Frequency, Kind, Numbers
+from truing.cli import run
+from truing.cli.options import BaseLink, Choice, File, Fraction, Frequency, Kind, Numbers, TipLink
+from truing.cli.run import Found, Loaded
 from truing.cli.tables import say, table
 from truing.errors import InputError
 
@@ -48,8 +51,8 @@ Units = Annotated[
 TorquePerAmpere = Annotated[
     list[float] | None,
     Numbers(
-        "Torque at the joint for one ampere [Nm/A], one for each joint with a reading: '10,10.7,8.5'."
-        " Default: the robot's.",
+        "Torque at the joint for one ampere [Nm/A], one for each joint with a reading: '10,10.7,-8.5';"
+        " negative where the current has the other sign. Default: the robot's.",
         panel=READING,
     ),
 ]
@@ -63,25 +66,58 @@ TestShare = Annotated[
 ]
 
 
-def robot_and_recordings(
-    robot: Path,
-    recordings: Sequence[Path],
-    *,
-    base_link: str,
-    tip_link: str,
-    joints: str,
-    topic: str,
-    units: Literal["deg", "rad", "percent"] | None,
-    torque_per_ampere: Sequence[float] | None,
-) -> tuple[Robot, list[Recording]]:
-    from truing.files import load_recordings, load_robot
+@dataclass(frozen=True, kw_only=True)
+class ReadMotion:
+    """What reading a robot and recordings of its motion takes."""
 
-    model = load_robot(robot, base_link, tip_link, any_tool=True)
-    if torque_per_ampere is not None:
-        model = with_drives(model, torque_per_ampere)
-    require_masses(robot, model)
-    found = load_recordings(recordings, model, joints=joints or None, topic=topic or None, units=units)
-    return model, list(found)
+    joints: Joints = ""
+    torque_per_ampere: TorquePerAmpere = None
+    topic: Topic = ""
+    units: Units = None
+    base_link: BaseLink = ""
+    tip_link: TipLink = ""
+
+    def read_robot(self, file: Path) -> Robot:
+        """With masses, and the drive constants that were given."""
+        from truing.files import load_robot
+
+        robot = load_robot(file, self.base_link, self.tip_link, any_tool=True)
+        if self.torque_per_ampere is not None:
+            robot = with_drives(robot, self.torque_per_ampere)
+        require_masses(file, robot)
+        return robot
+
+    def read_recordings(self, robot: Robot, files: Sequence[Path]) -> list[Recording]:
+        from truing.files import load_recordings
+
+        return list(
+            load_recordings(
+                files, robot, joints=self.joints or None, topic=self.topic or None, units=self.units
+            )
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionCommand(ReadMotion, run.Command[Loaded, Found]):
+    """A command on a robot and recordings of its motion."""
+
+    robot: RobotWithMasses
+
+    def read(self, files: Sequence[Path]) -> tuple[Robot, list[Recording]]:
+        """Robot and recordings, by the options above."""
+        robot = self.read_robot(self.robot)
+        return robot, self.read_recordings(robot, files)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueCommand(MotionCommand["CheckedRecordings", Found]):
+    """A command that compares torques with recorded ones."""
+
+    recordings: RecordingFiles
+    cutoff: CutOff = None
+
+    def load(self, progress: run.Progress) -> CheckedRecordings:
+        return checked(self.read(self.recordings))
 
 
 def with_drives(robot: Robot, torque_per_ampere: Sequence[float]) -> Robot:
@@ -90,9 +126,8 @@ def with_drives(robot: Robot, torque_per_ampere: Sequence[float]) -> Robot:
     if len(driven) != len(torque_per_ampere):
         names = ", ".join(robot.joints[index].name for index in driven)
         raise InputError(
-            f"--torque-per-ampere: found {len(torque_per_ampere)} numbers, expected {len(driven)}, one"
-            " for each"
-            f" joint with a reading ({names})"
+            f"--torque-per-ampere: found {len(torque_per_ampere)} numbers, expected {len(driven)}, one for"
+            f" each joint with a reading ({names})"
         )
     out = robot.copy()
     for index, value in zip(driven, torque_per_ampere, strict=True):
@@ -105,8 +140,7 @@ def require_masses(file: Path, robot: Robot) -> None:
     if not any(joint.mass for joint in robot.joints):
         raise InputError(
             f"{file}: no link has a mass: expected <inertial> of the links in a URDF, or mass, com and"
-            " inertia"
-            " of the joints in robot.yaml"
+            " inertia of the joints in robot.yaml"
         )
 
 

@@ -72,6 +72,11 @@ def diagnose(
     return _core.dynamics_diagnose(robot, list(recordings), made(_core.TorqueDiagnoseOptions, options))
 
 
+def effect_names() -> list[str]:
+    """Of the catalogue of effects on torques."""
+    return [effect["name"] for effect in _core.torque_effects()]
+
+
 def markdown_table() -> str:
     """The table of docs/reference/torque_effects.md: what every effect of the catalogue is."""
     lines = ["| effect | adds to the torque | parameters | needs |", "| --- | --- | --- | --- |"]

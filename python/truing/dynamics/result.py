@@ -243,7 +243,7 @@ def recording_columns(robot: _core.Robot, recording: _core.Recording) -> dict[st
     for k, joint in enumerate(joints):
         unit = "rad" if joint.type == "revolute" else "m"
         columns[f"q{k + 1}_{unit}"] = np.asarray(recording.position[:, k])
-    for k in sorted(_recorded(recording.torque)):
+    for k in _recorded(recording.torque):
         columns[f"tau{k + 1}_{torque_unit(joints[k])}"] = np.asarray(recording.torque[:, k])
     columns["set"] = ["test" if recording.test else "train"] * len(recording)
     return columns
@@ -286,9 +286,22 @@ def response_columns(robot: _core.Robot, response: Response) -> dict[str, Any]:
     return {**columns, "window": response.window}
 
 
-def _recorded(table: Floats) -> set[int]:
+def assumed_drives(robot: _core.Robot, recording: _core.Recording) -> list[str]:
+    """What is to be said of joints whose currents were recorded and whose drive's constant is not known."""
+    joints = driven_joints(robot)
+    unknown = [joints[k].name for k in _recorded(recording.current) if joints[k].torque_per_ampere is None]
+    if not unknown:
+        return []
+    return [
+        f"torque_per_ampere is not known of {', '.join(unknown)}: 1 Nm/A is assumed, so that their currents"
+        " are their torques in numbers: say the drives' constants in the robot file or with"
+        " --torque-per-ampere"
+    ]
+
+
+def _recorded(table: Floats) -> list[int]:
     """The joints that a table has values of."""
-    return {k for k in range(table.shape[1]) if not np.isnan(table[:, k]).all()}
+    return [k for k in range(table.shape[1]) if not np.isnan(table[:, k]).all()]
 
 
 def prediction_dict(
@@ -325,7 +338,7 @@ def prediction_dict(
         "cutoff_hz": cutoff,
         "errors": errors,
         "simulated": None if response is None else _response_dict(robot, recording, response),
-        "warnings": list(warnings),
+        "warnings": [*warnings, *assumed_drives(robot, recording)],
     }
 
 

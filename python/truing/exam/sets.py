@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-import numpy as np
-
 import truing
 from truing.exam import families, field_families, recordings
+from truing.exam.numbering import Numbering, parts_of
 from truing.exam.scenes import SMALL, Case, Label, Request
 
 COUNTS = {
@@ -49,40 +48,11 @@ QUICK = {
     "several": 3,
     "companion": 2,
 }
-WHICH = ("development", "examination")
 FAMILIES: dict[str, Callable[[Request], Case]] = {**families.FAMILIES, **field_families.FAMILIES}
 
 
-def ids(
-    which: str,
-    *,
-    quick: bool = False,
-    families: Sequence[str] | None = None,
-    only: Sequence[str] | None = None,
-    seed: int = 0,
-) -> list[str]:
-    """Names of all sets of an examination. Quick: a few small ones of each family, that the whole examination
-    does not have. only: "single/12", these sets.
-    """
-    after = f"@{seed}" if seed else ""
-    if only:
-        for name in only:
-            family, _, number = name.partition("/")
-            _known(family)
-            if not number.isdecimal():
-                raise truing.InputError(f"no set {name!r}: expected a family and a number, 'single/12'")
-        return [f"{which}/{name}{after}" for name in only]
-    found = []
-    for family in families or COUNTS:
-        _known(family)
-        first, count = (SMALL, QUICK[family]) if quick else (0, COUNTS[family])
-        found += [f"{which}/{family}/{k}{after}" for k in range(first, first + count)]
-    return found
-
-
-def _known(family: str) -> None:
-    if family not in COUNTS:
-        raise truing.InputError(f"no family of sets {family!r}: expected some of {', '.join(COUNTS)}")
+NUMBERING = Numbering(COUNTS, QUICK, SMALL, 77)
+ids = NUMBERING.ids
 
 
 def make(id: str) -> tuple[truing.Robot, truing.Measurements, Label]:
@@ -92,17 +62,9 @@ def make(id: str) -> tuple[truing.Robot, truing.Measurements, Label]:
 
 
 def build(id: str) -> Case:
-    """A set with everything about it. id: "development/single/12", with "@7" after it for another seed than
-    0.
-    """
-    words, _, seed = id.partition("@")
-    which, family, number = words.split("/")
-    if which not in WHICH or family not in COUNTS:
-        raise ValueError(f"no set {id!r}: expected {'|'.join(WHICH)}/{'|'.join(COUNTS)}/number")
-    rng = np.random.default_rng(
-        [int(seed or 0), WHICH.index(which), list(COUNTS).index(family), int(number), 77]
-    )
-    return FAMILIES[family](Request(id, which, family, int(number), rng))
+    """A set with everything about it."""
+    request = NUMBERING.request(id)
+    return FAMILIES[request.family](request)
 
 
 _SOURCES = {"single": families.source_of_single, "missing": families.source_of_missing}
@@ -115,7 +77,7 @@ def skipped(which: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
     if not why:
         return
     for name in names:
-        _, family, number = name.partition("@")[0].split("/")
+        family, number = parts_of(name)
         source_of = _SOURCES.get(family)
-        if source_of and source_of(int(number)) == "spike":
+        if source_of and source_of(number) == "spike":
             yield name, why

@@ -97,7 +97,8 @@ def _topic(path: Path, topic: str | None, types: dict[str, str]) -> str:
         )
     if len(there) > 1:
         raise InputError(
-            f"{path}: holds several topics of joint states, {listed(there)}: choose one with topic="
+            f"{path}: holds several topics of joint states, {listed(there)}: choose one with"
+            " --topic (in Python: topic=)"
         )
     return there[0]
 

@@ -238,13 +238,13 @@ class _Scale:
         if units not in ("deg", "rad", "percent"):
             raise InputError(
                 f"{path}: does not say in which unit positions are (the largest is {largest:.4g}): say"
-                " units='deg' for degrees, 'rad' for radians, or 'percent' for -100 to 100 of each joint's"
-                " range, as LeRobot normalises them by default"
+                " --units deg for degrees, rad for radians, or percent for -100 to 100 of each joint's range,"
+                " as LeRobot normalises them by default (in Python: units=)"
             )
         if units == "rad" and largest > _MOST_TURNS:
             raise InputError(
-                f"{path}: the largest position is {largest:.4g}, expected radians as units= says: it looks"
-                " like degrees or percent"
+                f"{path}: the largest position is {largest:.4g}, expected radians as --units (in"
+                " Python: units=) says: it looks like degrees or percent"
             )
         self.lowest, self.size, self.ranges = [], [], []
         for name, joint in zip(names, self.joints, strict=True):

@@ -47,16 +47,16 @@ def joints_of_numbers(robot: _core.Robot, joints: Sequence[str] | None) -> dict[
             continue
         if name not in place:
             raise InputError(
-                f"joints: the robot has no joint {name!r} with a reading; it has {listed(names)} (write"
+                f"--joints: the robot has no joint {name!r} with a reading; it has {listed(names)} (write"
                 f" {NO_JOINT!r} for a joint of the file that is none of the robot's)"
             )
         if place[name] in found.values():
-            raise InputError(f"joints: {name!r} is there twice")
+            raise InputError(f"--joints: found {name!r} twice, expected each joint once")
         found[number] = place[name]
     missing = [name for name in names if name not in joints]
     if missing:
         raise InputError(
-            f"joints: there is no {listed(missing)}: name the robot's joint of every column of the file, in"
+            f"--joints: there is no {listed(missing)}: name the robot's joint of every column of the file, in"
             " the file's order"
         )
     return found
@@ -74,22 +74,22 @@ def joints_of_names(
         if missing:
             raise InputError(
                 f"{where}: there is no joint {listed(missing)}; the joints there are {listed(list(there))}:"
-                " say with joints= what each of these is called in the robot, in this order"
-                f" ({NO_JOINT!r} for none)"
+                " say with --joints (in Python: joints=) what each of these is called in the robot, in this"
+                f" order ({NO_JOINT!r} for none)"
             )
         return [list(there).index(name) for name in names]
     numbers = joints_of_numbers(robot, joints)
     if max(numbers) > len(there):
         raise InputError(
-            f"{where}: has {len(there)} joints, {listed(list(there))}; joints names {len(joints)}"
+            f"{where}: has {len(there)} joints, {listed(list(there))}; --joints names {len(joints)}"
         )
     of_joint = {joint: number - 1 for number, joint in numbers.items()}
     return [of_joint[k] for k in range(len(names))]
 
 
 def checked_times(t: Floats, refuse: Refuse, column: str, first: float | None = None) -> Floats:
-    """The stamps [s], from 0 on if they count from 1970. Refuses those that do not increase. first: stamp of the
-    recording's first row, where these are later ones.
+    """The stamps [s], from 0 on if they count from 1970. Refuses those that do not increase. first: stamp of
+    the recording's first row, where these are later ones.
     """
     first = float(t[0]) if first is None else first
     wrong = np.flatnonzero(np.diff(t) <= 0)

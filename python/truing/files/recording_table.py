@@ -125,10 +125,10 @@ class _Layout:
             self._place_with(name, f"temp{index + 1}_C", f"temp{number}", unit, _TEMPERATURES)
             return
         expected: list[str] = []
-        for field, turning, sliding in _OF_JOINTS[stem]:
+        for table_name, turning, sliding in _OF_JOINTS[stem]:
             units = turning if joint.type == "revolute" else sliding
             if unit in units:
-                self._take(self.tables.setdefault(field, {}), index, _Source(name, units[unit]), name)
+                self._take(self.tables.setdefault(table_name, {}), index, _Source(name, units[unit]), name)
                 return
             expected += [f"{stem}{number}_{word}" for word in units]
         found = f"found the unit {unit!r} in the name" if unit else "there is no unit in the name"
@@ -245,16 +245,16 @@ class _Reader:
     def tables(self) -> dict[str, Floats]:
         """Positions and what else was recorded of the joints."""
         out: dict[str, Floats] = {}
-        for field, sources in self.layout.tables.items():
+        for name, sources in self.layout.tables.items():
             found = {
-                index: self.values(source, required=field == "position") for index, source in sources.items()
+                index: self.values(source, required=name == "position") for index, source in sources.items()
             }
             if all(values is None for values in found.values()):
                 continue
-            out[field] = table_of(self.table.rows, len(self.layout.joints))
+            out[name] = table_of(self.table.rows, len(self.layout.joints))
             for index, values in found.items():
                 if values is not None:
-                    out[field][:, index] = values
+                    out[name][:, index] = values
         return out
 
     def columns(self) -> dict[str, Floats]:
@@ -363,8 +363,8 @@ def _labels(layout: _Layout) -> list[str]:
 
 
 def read_in_pieces(table: Table, layout: _Layout, name: str) -> _core.Recording:
-    """A recording whose rows stay in the file. All of it is read once, and checked; a column with gaps is left
-    out.
+    """A recording whose rows stay in the file. All of it is read once, and checked; a column with gaps is
+    left out.
     """
     survey = _Survey()
     for part in table.parts(PIECE_ROWS, layout.numbers, _labels(layout)):

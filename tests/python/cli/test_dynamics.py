@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as parquet
 import pytest
 
 import truing
@@ -144,12 +145,16 @@ def test_a_recording_without_torques_is_refused(
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["identify", "--effects", "coulmob"], "'coulmob'"),
-        (["diagnose", "--leave-out", "ghost"], "'ghost'"),
+        (
+            ["identify", "--effects", "coulmob:J2"],
+            "--effects: found 'coulmob:J2', expected effects on torques",
+        ),
+        (["diagnose", "--leave-out", "ghost"], "--leave-out: found 'ghost', expected effects on torques"),
         (["diagnose", "--cutoff", "8"], "--cutoff: found '8', expected a frequency with its unit"),
-        (["diagnose", "--torque-per-ampere", "1,2"], "found 2 numbers, expected 6"),
-        (["diagnose", "--torque-per-ampere", "1,2,3,4,5,-6"], "found '-6'"),
-        (["diagnose", "--joints", "J1,J2"], "J3"),
+        (["diagnose", "--torque-per-ampere", "1,2"], "--torque-per-ampere: found 2 numbers, expected 6"),
+        (["diagnose", "--torque-per-ampere", "1,2,3,4,5,0"], "--torque-per-ampere: found '0'"),
+        (["diagnose", "--joints", "J1,J2"], "--joints: there is no J3"),
+        (["predict", "--topic", "/states"], "--topic (in Python: topic=) is of bags"),
     ],
 )
 def test_options_that_cannot_be_used_are_refused(
@@ -317,6 +322,87 @@ def test_drive_constants_given_are_those_of_the_robot(files: Path, tmp_path: Pat
 
     robot = with_drives(demo_arm(), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
     assert [joint.torque_per_ampere for joint in robot.joints] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+
+
+def by_current(simulated: SimulatedMotion, folder: Path, constants: list[float]) -> Path:
+    """The first recording with currents in place of torques."""
+    columns = recording_columns(simulated.nominal, simulated.recordings[0])
+    for k, constant in enumerate(constants, 1):
+        columns[f"i{k}_A"] = columns.pop(f"tau{k}_Nm") / constant
+    write_table(folder / "currents.csv", columns)
+    return folder / "currents.csv"
+
+
+def test_drive_constants_have_either_sign(
+    simulated: SimulatedMotion, files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    constants = [10.0, -8.0, 9.0, -5.0, 4.0, 3.0]
+    recording = str(by_current(simulated, tmp_path, constants))
+    given = ["--torque-per-ampere", ",".join(map(str, constants))]
+    for name, motion, more in (("i", recording, given), ("tau", str(files / "motion1.csv"), [])):
+        arguments = ["predict", str(files / "robot.yaml"), motion, *more, "--out", str(tmp_path / name)]
+        assert main(["dynamics", *arguments]) == 0
+    assert "1 Nm/A is assumed" not in capsys.readouterr().err
+    currents, torques = (read_columns(tmp_path / name / "predicted.csv") for name in ("i", "tau"))
+    assert list(currents) == ["t_s", *(f"i{k}_A" for k in range(1, 7))]
+    for k, constant in enumerate(constants, 1):
+        assert np.allclose(currents[f"i{k}_A"] * constant, torques[f"tau{k}_Nm"], atol=1e-6)
+    errors = [json.loads((tmp_path / name / "result.json").read_text())["errors"] for name in ("i", "tau")]
+    assert errors[0]["J2"]["percent"] == pytest.approx(errors[1]["J2"]["percent"], rel=1e-6)
+
+
+def test_an_assumed_drive_constant_is_said(
+    simulated: SimulatedMotion, files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot = simulated.nominal.copy()
+    robot.joints[0].torque_per_ampere = 10.0
+    truing.save_robot(tmp_path / "robot.yaml", robot)
+    recording = str(by_current(simulated, tmp_path, [10.0, *[1.0] * 5]))
+    out = tmp_path / "o"
+    assert main(["dynamics", "predict", str(tmp_path / "robot.yaml"), recording, "--out", str(out)]) == 0
+    warning = "torque_per_ampere is not known of J2, J3, J4, J5, J6: 1 Nm/A is assumed"
+    assert warning in capsys.readouterr().err
+    assert warning in json.loads((out / "result.json").read_text())["warnings"][0]
+    assert warning in (out / "report.html").read_text()
+
+
+def read_columns(path: Path) -> dict[str, np.ndarray]:
+    with path.open(encoding="utf-8") as text:
+        names = text.readline().strip().split(",")
+        table = np.loadtxt(text, delimiter=",")
+    return dict(zip(names, table.T, strict=True))
+
+
+def test_what_identify_writes_belongs_together(
+    simulated: SimulatedMotion, files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The parameters of result.json, covariance.csv and robot.yaml, and rows of residuals.parquet."""
+    recordings = [str(files / f"motion{k}.csv") for k in (1, 2, 3)]
+    out = tmp_path / "o"
+    arguments = ["identify", str(files / "robot.yaml"), *recordings, "--effects", "coulomb,viscous"]
+    assert main(["dynamics", *arguments, "--out", str(out)]) == 0
+    assert "parameters fitted; low-pass at 8 Hz" in capsys.readouterr().out
+    names = {"result.json", "report.html", "robot.yaml", "covariance.csv", "residuals.parquet"}
+    assert {path.name for path in out.iterdir()} == names
+    fitted = {p["name"]: p for p in json.loads((out / "result.json").read_text())["parameters"]}
+    with (out / "covariance.csv").open(encoding="utf-8") as text:
+        listed = {row["parameter"]: row for row in csv.DictReader(text)}
+    assert set(listed) == set(fitted)
+    friction = [name for name in fitted if name.startswith(("coulomb.", "viscous."))]
+    assert len(friction) == 12
+    carried = truing.load_robot(out / "robot.yaml").torque_effects
+    values = {name: value for effect in carried for name, value in effect.parameters.items()}
+    for name in friction:
+        assert float(listed[name]["value"]) == pytest.approx(fitted[name]["value"], rel=1e-6)
+        assert values[name] == pytest.approx(fitted[name]["value"], rel=1e-6)
+        assert float(listed[name]["sigma"]) > 0.0
+    table = parquet.read_table(out / "residuals.parquet").to_pydict()
+    assert len(table["t_s"]) == sum(len(recording) for recording in simulated.recordings)
+    assert {
+        kind for kind, name in zip(table["set"], table["recording"], strict=True) if name == "motion3"
+    } == {"test"}
+    left = np.array(table["tau2_Nm"]) - np.array(table["predicted_tau2_Nm"])
+    assert np.allclose(left, table["error_tau2_Nm"])
 
 
 def test_the_demonstration_ends_with_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

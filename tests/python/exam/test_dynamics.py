@@ -31,11 +31,12 @@ from truing.exam.dynamics.bodies import numbers, regressor, torques
 from truing.exam.dynamics.departures import DEPARTURES, FAR, UNLISTED
 from truing.exam.dynamics.laws import LISTED
 from truing.exam.dynamics.robots import Arm, Floats, arms, loaded, misjudged
-from truing.exam.dynamics.run import has_candidate, run_exam
-from truing.exam.dynamics.scenes import Case, Request, Stage, stage
+from truing.exam.dynamics.run import run_exam
+from truing.exam.dynamics.scenes import Case, Stage, stage
 from truing.exam.dynamics.score import LINES, MORE, score
 from truing.exam.dynamics.sizing import low_pass, orthonormal
-from truing.exam.score import Row, Sheet, markdown, plain
+from truing.exam.scenes import Request
+from truing.exam.score import Row, Scores, Sheet, markdown, plain
 
 EVERY = [arm for which in ("development", "examination") for arm in arms(which)]
 NAMES = [arm.name for arm in EVERY]
@@ -172,10 +173,21 @@ def test_a_lag_and_a_shift_delay_a_ramp_by_themselves() -> None:
     assert np.allclose(moved[:3900] - ramp[:3900], 0.0043)
 
 
+def correlation_length(series: Floats) -> float:
+    """Samples that count as one: 1 + 2 times the autocorrelation up to where it first falls below 0.05."""
+    x = series - series.mean()
+    spectrum = np.abs(np.fft.rfft(x, 2 * len(x))) ** 2
+    r = np.fft.irfft(spectrum)[: len(x)]
+    r = r / r[0]
+    below = np.flatnonzero(r < 0.05)
+    end = int(below[0]) if len(below) else len(r)
+    return float(1.0 + 2.0 * r[1:end].sum())
+
+
 def test_coloured_noise_is_as_correlated_as_that_of_real_arms() -> None:
     rng = np.random.default_rng(2)
     series = noise.coloured(60_000, 6, 0.04, rng)
-    lengths = [noise.correlation_length(column) for column in series.T]
+    lengths = [correlation_length(column) for column in series.T]
     assert 9.0 < min(lengths) and max(lengths) < 26.0
     assert np.allclose(series.std(axis=0), 1.0, atol=0.1)
     shuffled = noise.reshuffled(series, rng)
@@ -612,23 +624,28 @@ def test_made_up_candidates_are_judged(tmp_path: Path) -> None:
     assert promising.row("rollout").value == pytest.approx(10.0) and promising.row("rollout").met is False
 
 
-@pytest.mark.skipif(has_candidate(), reason="truing.dynamics.diagnose is there")
-def test_without_a_dynamic_diagnosis_the_sitting_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(truing.InputError, match="no dynamic diagnosis"):
-        run_exam(out=tmp_path / "never")
-    assert not (tmp_path / "never").exists()
+# What the quick development examination must reach at least (shares), or at most, in how many sets at least.
+# Far from the targets: docs/method/exam.md has what the first sitting showed.
+AT_LEAST = {"joint": (0.75, 3)}
+AT_MOST = {"failed": (0.0, 20)}
 
 
-# What the quick development examination must reach at least (shares), or at most. Far from the targets:
-# docs/method/exam.md has what the first sitting showed.
-AT_LEAST = {"joint": 0.75}
-AT_MOST = {"failed": 0.0}
+def shortfalls(found: Scores) -> list[str]:
+    """Rows that miss what they must reach, or in which too few sets count: a diagnosis that names nothing has
+    no joints that could be wrong.
+    """
+    wanted = [(key, least, 1.0, few) for key, (least, few) in AT_LEAST.items()]
+    wanted += [(key, 0.0, most, few) for key, (most, few) in AT_MOST.items()]
+    rows = [(found.row(key), least, most, few) for key, least, most, few in wanted]
+    return [row.key for row, least, most, few in rows if row.n < few or not least <= row.value <= most]
 
 
-@pytest.mark.skipif(not has_candidate(), reason="truing.dynamics.diagnose is not there yet")
+def test_who_names_nothing_or_fails_does_not_pass() -> None:
+    for answer in (NOTHING, Answer("error", error="no")):
+        sheets = [sheet("single", answer, number, effects=RIPPLE) for number in range(24)]
+        assert "joint" in shortfalls(score(sheets))
+
+
 def test_truing_passes_the_quick_examination(tmp_path: Path) -> None:
     found = run_exam(quick=True, out=tmp_path)
-    for key, least in AT_LEAST.items():
-        assert found.row(key).value >= least or not found.row(key).n, plain(found)
-    for key, most in AT_MOST.items():
-        assert found.row(key).value <= most or not found.row(key).n, plain(found)
+    assert not shortfalls(found), plain(found)

@@ -31,7 +31,7 @@ pytest.importorskip("mujoco")
 
 import candidates
 from candidates import crashing, endless, environment, leaving, misnaming, silent, without_robot
-from truing.exam import families, laws, machine_laws, names, recordings, run, sealing, sets, surprises
+from truing.exam import families, laws, machine_laws, names, recordings, sealing, sets, surprises
 from truing.exam.answers import (
     Answer,
     Named,
@@ -44,9 +44,10 @@ from truing.exam.answers import (
 from truing.exam.builds import package_build
 from truing.exam.design import draw, usual_plan
 from truing.exam.kinematics import Chain, Floats, chain_of, gravity_torques, no_changes, sweep
+from truing.exam.numbering import WHICH
 from truing.exam.physics import Mechanism, Parts, Play, link_frames
 from truing.exam.robots import Specimen, specimens
-from truing.exam.run import LeftOut, Paper, run_exam
+from truing.exam.run import Statics, run_exam
 from truing.exam.scenes import NoSetError
 from truing.exam.score import (
     LINES,
@@ -62,6 +63,7 @@ from truing.exam.score import (
     wilson,
     write_markdown,
 )
+from truing.exam.sitting import LeftOut, Paper, sit as sit_one
 from truing.exam.sizing import View
 from truing.exam.workers import Lost, dealt
 from truing.exam.worlds import Truth
@@ -79,7 +81,7 @@ AT_LEAST = {
 }
 AT_MOST = {"class_wrong": 0.35, "alarm_white": 0.34, "alarm_other": 0.23, "unknown_of_listed": 0.1}
 
-EVERY = [(which, specimen) for which in sets.WHICH for specimen in specimens(which)]
+EVERY = [(which, specimen) for which in WHICH for specimen in specimens(which)]
 NAMES = [specimen.name for _, specimen in EVERY]
 
 
@@ -325,7 +327,7 @@ def test_an_effect_of_size_zero_moves_nothing(name: str) -> None:
             assert np.abs(truth.observe(inputs, [hidden])[0] - truth.observe(inputs, [])[0]).max() < 1e-12
 
 
-@pytest.mark.parametrize("which", sets.WHICH)
+@pytest.mark.parametrize("which", WHICH)
 def test_linear_columns_agree_with_differences(which: str) -> None:
     """Sizes and look-alikes are judged by them."""
     for specimen in specimens(which):
@@ -389,12 +391,12 @@ def test_one_cause_sits_on_several_joints_and_companions_are_small() -> None:
 
 
 def test_development_and_examination_have_nothing_in_common() -> None:
-    robots = [{specimen.name for specimen in specimens(which)} for which in sets.WHICH]
-    unlisted = [{kind.__name__ for kind in surprises.surprises(which)} for which in sets.WHICH]
+    robots = [{specimen.name for specimen in specimens(which)} for which in WHICH]
+    unlisted = [{kind.__name__ for kind in surprises.surprises(which)} for which in WHICH]
     assert not robots[0] & robots[1] and not unlisted[0] & unlisted[1]
     assert not set(machine_laws.RATIOS["development"]) & set(machine_laws.RATIOS["examination"])
     assert min(len(group) for group in (*robots, *unlisted)) >= 3
-    one, other = (sets.make(f"{which}/single/0")[1] for which in sets.WHICH)
+    one, other = (sets.make(f"{which}/single/0")[1] for which in WHICH)
     assert one.joints.shape != other.joints.shape or np.abs(one.joints - other.joints).max() > 0.1
 
 
@@ -481,7 +483,7 @@ def test_a_changed_label_breaks_its_seal() -> None:
 
 def sit(id: str, candidate: Any) -> Paper:
     """One set, which can be made."""
-    paper = run.sit(id, candidate)
+    paper = sit_one(id, Statics(candidate))
     assert isinstance(paper, Paper)
     return paper
 
@@ -630,7 +632,7 @@ def test_a_set_without_its_recording_is_left_out_and_nothing_takes_its_place(
 
 def test_a_set_of_which_no_draw_fits_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(families, "TRIES", 0)
-    left_out = run.sit("development/single/0", silent)
+    left_out = sit_one("development/single/0", Statics(silent))
     assert isinstance(left_out, LeftOut) and "no effect fits" in left_out.why
 
 

@@ -136,12 +136,12 @@ def test_joints_says_what_the_message_s_joints_are(tmp_path: Path) -> None:
     assert "there is no joint lift, elbow, turn; the joints there are a, b, c, d" in message
     (found,) = load_recordings(path, ROBOT, joints=["elbow", "-", "lift", "turn"])
     assert np.array_equal(found.torque[:, 1], 5.0 + np.arange(ROWS))
-    assert "has 4 joints, a, b, c, d; joints names 5" in refusal(path, joints="-,-,lift,elbow,turn")
+    assert "has 4 joints, a, b, c, d; --joints names 5" in refusal(path, joints="-,-,lift,elbow,turn")
 
 
 def test_of_several_topics_one_has_to_be_chosen(tmp_path: Path) -> None:
     path = bag(tmp_path, topics=("/joint_states", "/left"))
-    assert "several topics of joint states, /joint_states, /left: choose one with topic=" in refusal(path)
+    assert "several topics of joint states, /joint_states, /left: choose one with --topic" in refusal(path)
     (found,) = load_recordings(path, ROBOT, topic="/left")
     assert len(found) == ROWS
     assert "'/note' holds std_msgs/msg/String, expected one of" in refusal(path, topic="/note")

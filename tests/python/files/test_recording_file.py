@@ -184,7 +184,7 @@ def test_joints_says_which_joint_each_number_is(tmp_path: Path) -> None:
     assert "column 'q1_rad'" not in message and "column 'q3_deg': the robot has 2 joints" in message
     assert "no joint 'P' with a reading; it has J1, S" in refusal(csv(tmp_path, columns), joints=["J1", "P"])
     assert "there is no S" in refusal(csv(tmp_path, columns), joints=["J1"])
-    assert "'J1' is there twice" in refusal(csv(tmp_path, columns), joints=["J1", "J1", "S"])
+    assert "--joints: found 'J1' twice" in refusal(csv(tmp_path, columns), joints=["J1", "J1", "S"])
 
 
 def test_comments_are_passed_over_and_lines_still_counted(tmp_path: Path) -> None:

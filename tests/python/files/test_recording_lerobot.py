@@ -225,8 +225,8 @@ def test_faults_end_in_one_error(tmp_path_factory: pytest.TempPathFactory, data:
 
 def test_options_of_other_files_are_refused(tmp_path: Path) -> None:
     path = data_set(tmp_path, [episode_table(0)])
-    assert "topic= is of bags" in refusal(path, units="deg", topic="/joint_states")
+    assert "--topic (in Python: topic=) is of bags" in refusal(path, units="deg", topic="/joint_states")
     (tmp_path / "run.csv").write_text("t_s\n0\n")
-    assert "units= is of LeRobot data sets" in refusal(tmp_path / "run.csv", units="deg")
+    assert "--units (in Python: units=) is of LeRobot data sets" in refusal(tmp_path / "run.csv", units="deg")
     (tmp_path / "empty").mkdir()
     assert "is a folder, and neither a bag" in refusal(tmp_path / "empty")

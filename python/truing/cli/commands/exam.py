@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from truing.exam.score import Scores
 
 PANEL = "Diagnose"
-_RUN = "truing.exam.run:run_exam"
-
-
 SITTING = "sitting"
 """Folder within the output's that grows meanwhile: what was sealed, answered and opened."""
 

@@ -186,7 +186,7 @@ def _check(robot: _core.Robot, chain: Chain, reference: Reference, text: str) ->
                 f"the written model's tool is at {data.site_xpos[site]}, the robot's at {pose[:3, 3]}"
             )
         if fitted or chain.adjusted:
-            continue  # gravity_torques knows the bodies that the robot had before
+            continue  # rigid_torques knows the bodies that the robot had before
         held = np.zeros(model.nv)
         mujoco.mj_rne(model, data, 0, held)
         found = coupling_matrix(chain).T @ held

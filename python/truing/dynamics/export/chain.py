@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 _LEAST = 1e-9  # of a body's largest second moment: the smallest one that is written
 _TINY_MASS = 1e-6  # [kg]
 _TINY_RADIUS = 1e-3  # [m] of gyration, of a body that has a mass and no inertia
+_TEN = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")  # as in link_parameters
 
 
 @dataclass(frozen=True)
@@ -162,23 +163,22 @@ def _steiner(mass: float, r: Floats) -> Floats:
 def _fitted_body(robot: _core.Robot, joint: _core.Joint) -> Body:
     """What the robot says, with the effects that are changes of bodies: link_inertia, and payload at the
     last."""
-    mass = joint.mass or 0.0
-    first = mass * np.array(joint.center_of_mass)
-    about_origin = _steiner(mass, np.array(joint.center_of_mass))
-    if joint.inertia is not None:
-        about_origin = about_origin + np.array(joint.inertia)
-    last = joint.name == robot.joints[-1].name
+    number = [one.name for one in robot.joints].index(joint.name)
+    ten = np.array(_core.link_parameters(robot))[10 * number : 10 * (number + 1)]
+    last = number == len(robot.joints) - 1
+    known = joint.inertia is not None
     for effect in robot.torque_effects:
         prefix = f"link_inertia.{joint.name}." if effect.effect == "link_inertia" else "payload."
-        if effect.effect != "link_inertia" and not (effect.effect == "payload" and last):
-            continue
-        part = {key[len(prefix) :]: v for key, v in effect.parameters.items() if key.startswith(prefix)}
-        mass += part.get("m", 0.0)
-        first = first + np.array([part.get(key, 0.0) for key in ("mx", "my", "mz")])
-        xx, yy, zz, xy, xz, yz = (part.get(key, 0.0) for key in ("xx", "yy", "zz", "xy", "xz", "yz"))
-        about_origin = about_origin + np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    center = first / mass if mass != 0.0 else np.zeros(3)
-    return Body(mass, center, about_origin - _steiner(mass, center))
+        if effect.effect == "link_inertia" or (effect.effect == "payload" and last):
+            part = np.array([effect.parameters.get(prefix + key, 0.0) for key in _TEN])
+            ten += part
+            known = known or bool(part.any())
+    mass = float(ten[0])
+    center = ten[1:4] / mass if mass != 0.0 else np.zeros(3)
+    xx, yy, zz, xy, xz, yz = ten[4:]
+    about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    # Of an inertia that nobody states rounding would be left.
+    return Body(mass, center, about_origin - _steiner(mass, center) if known else np.zeros((3, 3)))
 
 
 def _possible(joint: str, body: Body) -> tuple[Body, Adjusted | None]:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from truing import _core
-from truing.dynamics.export.chain import Chain
-from truing.dynamics.export.parts import NotWritten, Parts, Reference, rms, stand_in
+from truing.dynamics.export.chain import Chain, Floats
+from truing.dynamics.export.parts import JointParts, NotWritten, Parts, Reference, negative, rms, stand_ins
 
 _HEAD = '''"""Actuators of {name} for Isaac Lab, written by truing.
 
@@ -28,27 +28,16 @@ def write(
     robot: _core.Robot, chain: Chain, parts: Parts, reference: Reference
 ) -> tuple[str, list[NotWritten]]:
     """The text of the Python file, and what Isaac Lab has no place for."""
-    left = list(parts.not_written)
     implicit, motors = [], []
-    extra = [(0.0, 0.0)] * len(chain.driven)
-    for effect in parts.beside:
-        j, name = effect[1], chain.driven[effect[1]].name
-        if effect[0] == "coupling":
-            name += f".{chain.driven[effect[2]].name}"
-        instead = stand_in(effect, reference)
-        extra[j] = (extra[j][0] + instead.coulomb, extra[j][1] + instead.viscous)
-        reason = "no place in Isaac Lab" + ("; friction stands for it" if instead.coulomb else "")
-        left.append(NotWritten(f"{effect[0]}.{name}", instead.left, reason))
-    for (a, b), c in parts.coupled_inertia.items():
-        name = f"coupling.{chain.driven[a].name}.{chain.driven[b].name}.inertia"
-        left.append(NotWritten(name, abs(c) * rms(reference.qdd[:, b]), "no place in Isaac Lab"))
-    if parts.tool_force.any():
-        left.append(NotWritten("tool_force", float("nan"), "no place in Isaac Lab"))
+    extra, no_place = stand_ins(chain, parts, reference, "no place in Isaac Lab")
+    left = [*parts.not_written, *no_place]
     for j, (link, own) in enumerate(zip(chain.driven, parts.joints, strict=True)):
-        moving = own.coulomb + extra[j][0] + sum(size for size, _ in own.presliding)
+        moving = own.coulomb + float(extra[j, 0]) + sum(size for size, _ in own.presliding)
         still = moving + sum(size for size, _ in own.stribeck)
-        viscous = float(own.damping[0]) + extra[j][1]
-        left += _without_place(link.name, j, parts, reference, still < moving, viscous)
+        viscous = float(own.damping[0] + extra[j, 1])
+        left += _at_rest_alone(link.name, own, reference.qd[:, j], still < moving)
+        left += negative("viscous", link.name, viscous * rms(reference.qd[:, j]))
+        left += negative("armature", link.name, own.armature * rms(reference.qdd[:, j]))
         r = link.ratio
         common = {
             "joint_names_expr": [link.name],
@@ -74,32 +63,8 @@ def _entry(name: str, kind: str, values: dict[str, object]) -> str:
     return f"    {name!r}: {kind}(\n{lines}        stiffness=None,\n        damping=None,\n    ),\n"
 
 
-def _without_place(
-    name: str, j: int, parts: Parts, reference: Reference, weak_start: bool, viscous: float
-) -> list[NotWritten]:
-    own = parts.joints[j]
-    q, qd = reference.q[:, j], reference.qd[:, j]
-    reason = "no place in Isaac Lab"
-    sizes = {
-        f"viscous_law.{name}.quadratic": own.damping[1] * rms(qd * qd),
-        f"viscous_law.{name}.cubic": own.damping[2] * rms(qd**3),
-        f"current_offset.{name}": own.offset,
-        f"spring.{name}": own.spring * rms(q),
-    }
-    for order, (s, c) in own.ripple.items():
-        sizes[f"ripple.{name}.{order}"] = rms(s * np.sin(order * q) + c * np.cos(order * q))
-    out = [NotWritten(key, float(abs(size)), reason) for key, size in sizes.items() if size]
-    for size, speed in own.stribeck:
-        left = size * rms(np.exp(-((qd / speed) ** 2)))
-        why = (
-            "less friction at rest than in motion cannot be said" if weak_start else "written for rest alone"
-        )
-        out.append(NotWritten(f"stribeck.{name}", abs(left), why))
-    for size, _ in own.presliding:
-        out.append(NotWritten(f"presliding.{name}", abs(size), "written as friction, without its build-up"))
-    if viscous < 0.0:
-        out.append(NotWritten(f"viscous.{name}", -viscous * rms(qd), "negative: none written"))
-    if own.armature < 0.0:
-        size = -own.armature * rms(reference.qdd[:, j])
-        out.append(NotWritten(f"armature.{name}", size, "negative: none written"))
-    return out
+def _at_rest_alone(name: str, own: JointParts, qd: Floats, weak_start: bool) -> list[NotWritten]:
+    """Stribeck friction is static friction in Isaac Lab, and falls at once."""
+    why = "less friction at rest than in motion cannot be said" if weak_start else "written for rest alone"
+    sizes = [abs(size) * rms(np.exp(-((qd / speed) ** 2))) for size, speed in own.stribeck]
+    return [NotWritten(f"stribeck.{name}", size, why) for size in sizes]

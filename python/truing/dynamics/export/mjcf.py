@@ -24,7 +24,16 @@ import numpy as np
 from truing import _core
 from truing.dynamics.export.beside import Effect
 from truing.dynamics.export.chain import Body, Chain, Floats, Link, body_in, plain
-from truing.dynamics.export.parts import JointParts, NotWritten, Parts, Reference, rms, stand_in
+from truing.dynamics.export.parts import (
+    JointParts,
+    NotWritten,
+    Parts,
+    Reference,
+    name_of,
+    negative,
+    rms,
+    stand_in,
+)
 from truing.rotations import quaternions_from_rotations
 
 STEP = 0.001  # [s] of the model
@@ -88,14 +97,12 @@ def model_of(chain: Chain, parts: Parts, reference: Reference) -> Model:
     }
     for effect in model.beside:
         instead = stand_in(effect, reference)
-        fields, name = model.joints[effect[1]], names[effect[1]]
+        fields = model.joints[effect[1]]
         fields.frictionloss += instead.coulomb
         fields.damping[0] += instead.viscous
         with_which = "; Coulomb friction and damping stand for it without them" if instead.coulomb else ""
-        whose = f"{name}.{names[effect[2]]}" if effect[0] == "coupling" else name
-        model.not_written.append(
-            NotWritten(f"{effect[0]}.{whose}", instead.left, f"in callbacks.py{with_which}")
-        )
+        reason = f"in callbacks.py{with_which}"
+        model.not_written.append(NotWritten(name_of(effect, names), instead.left, reason))
     for j, fields in enumerate(model.joints):
         if fields.frictionloss < 0.0:
             reason = "MuJoCo has no negative dry friction: none written"
@@ -125,8 +132,7 @@ def _fields(j: int, name: str, own: JointParts, model: Model, reference: Referen
             model.beside.append(("stribeck", j, j, {"": size, "vs": speed}))
     out.coulomb = out.frictionloss = coulomb
     if own.armature < 0.0:
-        size = -own.armature * rms(reference.qdd[:, j])
-        model.not_written.append(NotWritten(f"armature.{name}", size, "negative: none written"))
+        model.not_written += negative("armature", name, own.armature * rms(reference.qdd[:, j]))
         out.armature = 0.0
     # The drive must give these, so the joint feels them with the other sign.
     for order, (s, c) in sorted(own.ripple.items()):

@@ -143,11 +143,8 @@ def reference_motion(robot: _core.Robot, chain: Chain) -> Reference:
         q[:, j] = middle + reach * np.sin(phase)
         qd[:, j] = reach * w * np.cos(phase)
         qdd[:, j] = -reach * w * w * np.sin(phase)
-    every = {link.name: k for k, link in enumerate(chain.links)}
-    driven = [every[link.name] for link in chain.driven]
-    # What gravity does to the joints themselves; the drives hold against it, at their readings.
-    ratios = np.array([link.ratio for link in chain.driven])
-    torque = np.array([-ratios * _core.gravity_torques(robot, row)[driven] for row in q])
+    still = np.zeros_like(q)
+    torque = np.asarray(_core.rigid_torques(robot, q, still, still))
     return Reference(time, q, qd, qdd, torque)
 
 
@@ -352,6 +349,60 @@ def stand_in(effect: Effect, reference: Reference) -> StandIn:
     elif slope * mean < 0.0:
         constant, slope = mean, 0.0
     return StandIn(constant, slope, rms(wanted - constant - slope * speed))
+
+
+def stand_ins(
+    chain: Chain, parts: Parts, reference: Reference, place: str
+) -> tuple[Floats, list[NotWritten]]:
+    """Coulomb friction and damping that stand for what only a callback can do, shape=(joints, 2), and what a
+    format without callbacks, tendons and forces at the tool has no place for. place: "no place in URDF".
+    """
+    names = [link.name for link in chain.driven]
+    extra = np.zeros((len(names), 2))
+    left = []
+    for effect in parts.beside:
+        instead = stand_in(effect, reference)
+        extra[effect[1]] += instead.coulomb, instead.viscous
+        reason = place + ("; friction and damping stand for it" if instead.coulomb else "")
+        left.append(NotWritten(name_of(effect, names), instead.left, reason))
+    for (a, b), c in parts.coupled_inertia.items():
+        size = abs(c) * rms(reference.qdd[:, b])
+        left.append(NotWritten(f"coupling.{names[a]}.{names[b]}.inertia", size, place))
+    if parts.tool_force.any():
+        left.append(NotWritten("tool_force", float("nan"), place))
+    for j, (name, own) in enumerate(zip(names, parts.joints, strict=True)):
+        left += _without_place(name, own, reference.q[:, j], reference.qd[:, j], place)
+    return extra, left
+
+
+def name_of(effect: Effect, names: Sequence[str]) -> str:
+    """ "load_friction.J2", "coupling.J5.J6"."""
+    joints = effect[1:3] if effect[0] == "coupling" else effect[1:2]
+    return ".".join([effect[0], *(names[j] for j in joints)])
+
+
+def _without_place(name: str, own: JointParts, q: Floats, qd: Floats, place: str) -> list[NotWritten]:
+    """Fields of a joint that MJCF has, and neither URDF nor Isaac Lab."""
+    sizes = {
+        f"viscous_law.{name}.quadratic": own.damping[1] * rms(qd * qd),
+        f"viscous_law.{name}.cubic": own.damping[2] * rms(qd**3),
+        f"current_offset.{name}": own.offset,
+        f"spring.{name}": own.spring * rms(q),
+    }
+    for order, (s, c) in own.ripple.items():
+        sizes[f"ripple.{name}.{order}"] = rms(s * np.sin(order * q) + c * np.cos(order * q))
+    out = [NotWritten(key, float(abs(size)), place) for key, size in sizes.items() if size]
+    out += [
+        NotWritten(f"presliding.{name}", abs(size), "written as friction, without its build-up over x0")
+        for size, _ in own.presliding
+        if size
+    ]
+    return out
+
+
+def negative(what: str, joint: str, size: float) -> list[NotWritten]:
+    """Of a field that may not be below zero: what is not written of it. size: [Nm | N] with its sign."""
+    return [NotWritten(f"{what}.{joint}", -size, "negative: none written")] if size < 0.0 else []
 
 
 def drive_torque(robot: _core.Robot, time: Floats, torque: Floats, at: Floats) -> Floats:

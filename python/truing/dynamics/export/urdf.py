@@ -12,10 +12,11 @@ import numpy as np
 
 from truing import _core
 from truing.dynamics.export.chain import Body, Chain, Floats, Link, body_in, plain
-from truing.dynamics.export.parts import JointParts, NotWritten, Parts, Reference, rms, stand_in
+from truing.dynamics.export.parts import NotWritten, Parts, Reference, negative, rms, stand_ins
 from truing.errors import InputError
 
 Element = ElementTree.Element
+_NO_PLACE = "no place in URDF"
 _NO_LIMIT = 1e9  # [Nm, rad/s]: URDF demands limits where there are none
 
 
@@ -44,55 +45,19 @@ def _dynamics(
 ) -> dict[str, tuple[float, float]]:
     """Damping and friction by joint, at the simulator's joints; what they cannot say is added to `left`."""
     out: dict[str, tuple[float, float]] = {}
-    extra = {j: (0.0, 0.0) for j in range(len(chain.driven))}
-    for effect in parts.beside:
-        j, name = effect[1], chain.driven[effect[1]].name
-        if effect[0] == "coupling":
-            name += f".{chain.driven[effect[2]].name}"
-        instead = stand_in(effect, reference)
-        extra[j] = (extra[j][0] + instead.coulomb, extra[j][1] + instead.viscous)
-        reason = "no place in URDF" + ("; friction and damping stand for it" if instead.coulomb else "")
-        left.append(NotWritten(f"{effect[0]}.{name}", instead.left, reason))
-    for (a, b), c in parts.coupled_inertia.items():
-        name = f"coupling.{chain.driven[a].name}.{chain.driven[b].name}.inertia"
-        left.append(NotWritten(name, abs(c) * rms(reference.qdd[:, b]), "no place in URDF"))
-    if parts.tool_force.any():
-        left.append(NotWritten("tool_force", float("nan"), "no place in URDF"))
+    extra, no_place = stand_ins(chain, parts, reference, _NO_PLACE)
+    left += no_place
     for j, (link, own) in enumerate(zip(chain.driven, parts.joints, strict=True)):
-        friction, damping = own.coulomb + extra[j][0], float(own.damping[0]) + extra[j][1]
-        friction += sum(size for size, _ in own.presliding)
-        left += _without_place(link.name, j, own, reference)
-        for what, value, size in (
-            ("coulomb", friction, friction),
-            ("viscous", damping, damping * rms(reference.qd[:, j])),
-        ):
-            if value < 0.0:
-                left.append(NotWritten(f"{what}.{link.name}", -size, "negative: none written"))
+        qd, qdd = reference.qd[:, j], reference.qdd[:, j]
+        friction = own.coulomb + float(extra[j, 0]) + sum(size for size, _ in own.presliding)
+        damping = float(own.damping[0] + extra[j, 1])
+        sizes = {f"armature.{link.name}": own.armature * rms(qdd)}
+        for size, speed in own.stribeck:
+            sizes[f"stribeck.{link.name}"] = size * rms(np.exp(-((qd / speed) ** 2)))
+        left += [NotWritten(key, abs(size), _NO_PLACE) for key, size in sizes.items() if size]
+        left += negative("coulomb", link.name, friction) + negative("viscous", link.name, damping * rms(qd))
         out[link.name] = (max(damping, 0.0) / link.ratio**2, max(friction, 0.0) / abs(link.ratio))
     return out
-
-
-def _without_place(name: str, j: int, own: JointParts, reference: Reference) -> list[NotWritten]:
-    """Fields of a joint that MJCF has and URDF has not."""
-    q, qd, qdd = reference.q[:, j], reference.qd[:, j], reference.qdd[:, j]
-    reason = "no place in URDF"
-    sizes = {
-        f"viscous_law.{name}.quadratic": own.damping[1] * rms(qd * qd),
-        f"viscous_law.{name}.cubic": own.damping[2] * rms(qd**3),
-        f"current_offset.{name}": own.offset,
-        f"armature.{name}": own.armature * rms(qdd),
-        f"spring.{name}": own.spring * rms(q),
-    }
-    for order, (s, c) in own.ripple.items():
-        sizes[f"ripple.{name}.{order}"] = rms(s * np.sin(order * q) + c * np.cos(order * q))
-    for size, speed in own.stribeck:
-        sizes[f"stribeck.{name}"] = size * rms(np.exp(-((qd / speed) ** 2)))
-    out = [NotWritten(key, float(abs(size)), reason) for key, size in sizes.items() if size]
-    return out + [
-        NotWritten(f"presliding.{name}", abs(size), "written as friction, without its build-up over x0")
-        for size, _ in own.presliding
-        if size
-    ]
 
 
 def _origin(T: Floats) -> dict[str, str]:

@@ -22,7 +22,6 @@ from truing.exam.dynamics.scenes import (
     Case,
     Drive,
     Placed,
-    Request,
     Stage,
     draw_hidden,
     draw_size,
@@ -33,7 +32,7 @@ from truing.exam.dynamics.scenes import (
     usual_drives,
 )
 from truing.exam.dynamics.sizing import best_share, rivals
-from truing.exam.scenes import NoSetError
+from truing.exam.scenes import NoSetError, Request
 
 _BEYOND = 0.75
 """Share of an unlisted effect that no listed one may explain."""

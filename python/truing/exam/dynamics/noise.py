@@ -45,14 +45,3 @@ def reshuffled(residual: Floats, rng: Generator) -> Floats:
     phase = np.exp(2j * np.pi * rng.random(spectrum.shape))
     phase[0] = 1.0
     return np.asarray(np.fft.irfft(np.abs(spectrum) * phase, n=len(residual), axis=0))
-
-
-def correlation_length(series: Floats) -> float:
-    """Samples that count as one: 1 + 2 times the autocorrelation up to where it first falls below 0.05."""
-    x = series - series.mean()
-    spectrum = np.abs(np.fft.rfft(x, 2 * len(x))) ** 2
-    r = np.fft.irfft(spectrum)[: len(x)]
-    r = r / r[0]
-    below = np.flatnonzero(r < 0.05)
-    end = int(below[0]) if len(below) else len(r)
-    return float(1.0 + 2.0 * r[1:end].sum())

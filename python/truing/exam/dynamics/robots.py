@@ -264,8 +264,3 @@ def misjudged(arm: Arm, rng: Generator, low: float, high: float, only: int | Non
         center = link.com * np.array([off(), off(), off()])
         links[k] = Link(link.mass * factor, center, link.inertia * factor * off())
     return replace(arm, links=tuple(links))
-
-
-def heavier(arm: Arm, factor: float) -> Arm:
-    """All masses and inertias times a factor, as of another casting."""
-    return replace(arm, links=tuple(Link(k.mass * factor, k.com, k.inertia * factor) for k in arm.links))

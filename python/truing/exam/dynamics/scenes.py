@@ -6,9 +6,8 @@ and what may be known is written down as files. The label stays with the examine
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,7 @@ from truing.exam.dynamics.physics import (
 )
 from truing.exam.dynamics.robots import Arm, Floats, arms, misjudged
 from truing.exam.dynamics.sizing import SAME, View, best_share, low_pass, rivals
-from truing.exam.scenes import NoSetError
+from truing.exam.scenes import NoSetError, Request
 
 SIZES = (0.5, 1.0, 2.0, 3.0)
 """Of effects, over the noise."""
@@ -44,21 +43,6 @@ ARM_WIDE = frozenset({"payload", "tool_force", "time_offset"})
 
 Label = dict[str, Any]
 Table = dict[str, Floats]
-
-
-@dataclass
-class Request:
-    """Which set is wanted, and the dice for it."""
-
-    id: str
-    which: str
-    family: str
-    number: int
-    rng: Generator
-    thrown_away: Counter[str] = field(default_factory=Counter)
-
-    def throw_away(self, why: str) -> None:
-        self.thrown_away[why] += 1
 
 
 @dataclass(frozen=True)
@@ -484,7 +468,7 @@ def make_case(
         "rate": st.rate,
         "geometry_underneath": st.inertials,
         "underneath": sorted(INERTIAL) if st.inertials else [],
-        "drawn_anew": dict(st.request.thrown_away),
+        "drawn_anew": dict(st.request.anew),
         **more,
     }
     recorded = [record(st, played, k) for k in range(len(st.drives))]

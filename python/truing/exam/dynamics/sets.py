@@ -6,12 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
-import truing
 from truing.exam.dynamics import families, recordings
-from truing.exam.dynamics.scenes import Case, Request
-from truing.exam.sets import WHICH
+from truing.exam.dynamics.scenes import Case
+from truing.exam.numbering import Numbering, parts_of
 
 COUNTS = {
     "none": 120,
@@ -32,62 +29,21 @@ QUICK = {
     "unlisted": 2,
     "missing": 2,
 }
-_QUICK_FROM = 100_000
-"""Number of the first quick set of a family, beyond all others."""
-
-
-def ids(
-    which: str,
-    *,
-    quick: bool = False,
-    families: Sequence[str] | None = None,
-    only: Sequence[str] | None = None,
-    seed: int = 0,
-) -> list[str]:
-    """Names of all sets. Quick: a few of each family, that the whole examination does not have. only:
-    "single/12", these sets.
-    """
-    after = f"@{seed}" if seed else ""
-    if only:
-        for name in only:
-            family, _, number = name.partition("/")
-            _known(family)
-            if not number.isdecimal():
-                raise truing.InputError(f"no set {name!r}: expected a family and a number, 'single/12'")
-        return [f"{which}/{name}{after}" for name in only]
-    found = []
-    for family in families or COUNTS:
-        _known(family)
-        first, count = (_QUICK_FROM, QUICK[family]) if quick else (0, COUNTS[family])
-        found += [f"{which}/{family}/{k}{after}" for k in range(first, first + count)]
-    return found
-
-
-def _known(family: str) -> None:
-    if family not in COUNTS:
-        raise truing.InputError(
-            f"no family of sets {family!r} in the dynamic half: expected some of {', '.join(COUNTS)}"
-        )
+NUMBERING = Numbering(COUNTS, QUICK, 100_000, 78, " in the dynamic half")
+ids = NUMBERING.ids
 
 
 def build(id: str) -> Case:
-    """A set. id: "development/single/12", with "@7" after it for another seed than 0."""
-    words, _, seed = id.partition("@")
-    which, family, number = words.split("/")
-    if which not in WHICH or family not in COUNTS:
-        raise ValueError(f"no set {id!r}: expected {'|'.join(WHICH)}/{'|'.join(COUNTS)}/number")
-    rng = np.random.default_rng(
-        [int(seed or 0), WHICH.index(which), list(COUNTS).index(family), int(number), 78]
-    )
-    return families.FAMILIES[family](Request(id, which, family, int(number), rng))
+    """A set."""
+    request = NUMBERING.request(id)
+    return families.FAMILIES[request.family](request)
 
 
 def skipped(which: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Sets that cannot be made here, and why."""
     why = recordings.missing(which)
     for name in names:
-        _, family, text = name.partition("@")[0].split("/")
-        number = int(text)
+        family, number = parts_of(name)
         loaded = family == "missing" and families.source_of_missing(number) == "spike"
         real = family == "single" and families.source_of_single(number) == "spike"
         real = real or (family == "none" and families.kind_of_none(number) == "recorded")

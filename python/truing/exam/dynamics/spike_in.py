@@ -19,7 +19,6 @@ from truing.exam.dynamics.scenes import (
     Case,
     Label,
     Recorded,
-    Request,
     Table,
     looks_like,
     told,
@@ -27,7 +26,7 @@ from truing.exam.dynamics.scenes import (
     urdf,
 )
 from truing.exam.dynamics.sizing import View
-from truing.exam.scenes import NoSetError
+from truing.exam.scenes import NoSetError, Request
 
 _LEFT_OUT = frozenset({"thermal_friction", "joint_elasticity", "backlash", "link_inertia", "warmup"})
 NAMES = tuple(name for name in LISTED if name not in _LEFT_OUT)
@@ -137,7 +136,7 @@ def _label(request: Request, arm: str, sigma: Floats) -> Label:
         "payload_kg": None,
         "geometry_underneath": False,
         "underneath": [],
-        "drawn_anew": dict(request.thrown_away),
+        "drawn_anew": dict(request.anew),
     }
 
 

@@ -14,18 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
-from truing.cli.options import BaseLink, File, Fraction, Seed, TipLink, keyword
-from truing.cli.recordings import (
-    Joints,
-    RecordingFiles,
-    Topic,
-    TorquePerAmpere,
-    Units,
-    require_masses,
-    require_torques,
-    robot_and_recordings,
-    with_drives,
-)
+from truing.cli.options import File, Fraction, Seed, keyword
+from truing.cli.recordings import ReadMotion, RecordingFiles, require_torques
 from truing.cli.tables import say, table
 
 if TYPE_CHECKING:
@@ -48,7 +38,7 @@ class Loaded:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command[Loaded, "Comparison"]):
+class Command(ReadMotion, run.Command[Loaded, "Comparison"]):
     doing = "simulating"
 
     model_a: Annotated[Path, model_file("MODEL_A")]
@@ -58,31 +48,11 @@ class Command(run.Command[Loaded, "Comparison"]):
         keyword("truing.dynamics.comparison:compare", "margin")
     )
     seed: Seed = 0
-    joints: Joints = ""
-    torque_per_ampere: TorquePerAmpere = None
-    topic: Topic = ""
-    units: Units = None
-    base_link: BaseLink = ""
-    tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> Loaded:
-        from truing.files import load_robot
-
-        a, recordings = robot_and_recordings(
-            self.model_a,
-            self.recordings,
-            base_link=self.base_link,
-            tip_link=self.tip_link,
-            joints=self.joints,
-            topic=self.topic,
-            units=self.units,
-            torque_per_ampere=self.torque_per_ampere,
-        )
+        a, b = self.read_robot(self.model_a), self.read_robot(self.model_b)
+        recordings = self.read_recordings(a, self.recordings)
         require_torques(recordings)
-        b = load_robot(self.model_b, self.base_link, self.tip_link, any_tool=True)
-        require_masses(self.model_b, b)
-        if self.torque_per_ampere is not None:
-            b = with_drives(b, self.torque_per_ampere)
         return Loaded(a, b, recordings)
 
     def solve(self, loaded: Loaded, progress: run.Progress) -> Comparison:

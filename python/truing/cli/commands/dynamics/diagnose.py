@@ -15,23 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
-from truing.cli.options import BaseLink, Flag, Names, Threads, TipLink, core
+from truing.cli.options import Flag, Threads, TorqueEffectNames, core
 from truing.cli.recordings import (
-    CutOff,
-    Joints,
-    RecordingFiles,
-    RobotWithMasses,
     TestShare,
-    Topic,
-    TorquePerAmpere,
-    Units,
-    checked,
+    TorqueCommand,
     mistaken,
     print_errors,
     print_findings,
     print_motion,
-    require_torques,
-    robot_and_recordings,
 )
 from truing.cli.tables import joined, say, table
 
@@ -52,37 +43,17 @@ class Answer:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["CheckedRecordings", Answer]):
+class Command(TorqueCommand[Answer]):
     doing = "diagnosing"
 
-    robot: RobotWithMasses
-    recordings: RecordingFiles
-    leave_out: Annotated[str, Names("Effects that are not to be considered: 'coupling,ripple'.")] = ""
-    cutoff: CutOff = None
+    leave_out: Annotated[
+        str, TorqueEffectNames("Effects that are not to be considered: 'coupling,ripple'.")
+    ] = ""
     test_share: TestShare = core("TorqueDiagnoseOptions", "test_share")
     no_rollout: Annotated[
         bool, Flag("Not judged by simulated motion, which takes some seconds and needs truing[dynamics].")
     ] = False
     threads: Threads = core("TorqueDiagnoseOptions", "threads")
-    joints: Joints = ""
-    torque_per_ampere: TorquePerAmpere = None
-    topic: Topic = ""
-    units: Units = None
-    base_link: BaseLink = ""
-    tip_link: TipLink = ""
-
-    def load(self, progress: run.Progress) -> CheckedRecordings:
-        loaded = robot_and_recordings(
-            self.robot,
-            self.recordings,
-            base_link=self.base_link,
-            tip_link=self.tip_link,
-            joints=self.joints,
-            topic=self.topic,
-            units=self.units,
-            torque_per_ampere=self.torque_per_ampere,
-        )
-        return checked(loaded)
 
     def solve(self, loaded: CheckedRecordings, progress: run.Progress) -> Answer:
         from truing.dynamics import diagnose

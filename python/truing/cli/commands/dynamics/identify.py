@@ -14,22 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
-from truing.cli.options import BaseLink, Flag, Names, Threads, TipLink, core
-from truing.cli.recordings import (
-    CutOff,
-    Joints,
-    RecordingFiles,
-    RobotWithMasses,
-    TestShare,
-    Topic,
-    TorquePerAmpere,
-    Units,
-    checked,
-    mistaken,
-    print_errors,
-    print_findings,
-    robot_and_recordings,
-)
+from truing.cli.options import Flag, Threads, TorqueEffectNames, core
+from truing.cli.recordings import TestShare, TorqueCommand, mistaken, print_errors, print_findings
 from truing.cli.tables import say
 
 if TYPE_CHECKING:
@@ -39,41 +25,19 @@ PANEL = "Dynamics"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["CheckedRecordings", "TorqueFit"]):
+class Command(TorqueCommand["TorqueFit"]):
     doing = "identifying"
 
-    robot: RobotWithMasses
-    recordings: RecordingFiles
     effects: Annotated[
         str,
-        Names(
+        TorqueEffectNames(
             "Effects to fit: 'coulomb,viscous,load_friction:J2+J3'. Default: armature, Coulomb and viscous"
             " friction, an offset at every joint."
         ),
     ] = ""
     keep_inertias: Annotated[bool, Flag("Masses and inertias of the links stay as they are.")] = False
-    cutoff: CutOff = None
     test_share: TestShare = core("TorqueOptions", "test_share")
     threads: Threads = core("TorqueOptions", "threads")
-    joints: Joints = ""
-    torque_per_ampere: TorquePerAmpere = None
-    topic: Topic = ""
-    units: Units = None
-    base_link: BaseLink = ""
-    tip_link: TipLink = ""
-
-    def load(self, progress: run.Progress) -> CheckedRecordings:
-        loaded = robot_and_recordings(
-            self.robot,
-            self.recordings,
-            base_link=self.base_link,
-            tip_link=self.tip_link,
-            joints=self.joints,
-            topic=self.topic,
-            units=self.units,
-            torque_per_ampere=self.torque_per_ampere,
-        )
-        return checked(loaded)
 
     def solve(self, loaded: CheckedRecordings, progress: run.Progress) -> TorqueFit:
         from truing.dynamics import identify

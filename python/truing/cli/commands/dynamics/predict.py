@@ -14,15 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
-from truing.cli.options import BaseLink, File, Frequency, Time, TipLink, keyword
-from truing.cli.recordings import (
-    Joints,
-    RobotWithMasses,
-    Topic,
-    TorquePerAmpere,
-    Units,
-    robot_and_recordings,
-)
+from truing.cli.options import File, Frequency, Time, keyword
+from truing.cli.recordings import MotionCommand
 from truing.cli.tables import table
 from truing.errors import InputError
 
@@ -43,10 +36,9 @@ class Found:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command["tuple[Robot, Recording]", Found]):
+class Command(MotionCommand["tuple[Robot, Recording]", Found]):
     doing = "predicting"
 
-    robot: RobotWithMasses
     recording: Annotated[
         Path,
         File("One recording of motion, with torques or without.", argument=True, metavar="REC"),
@@ -64,24 +56,9 @@ class Command(run.Command["tuple[Robot, Recording]", Found]):
             above=0,
         ),
     ] = None
-    joints: Joints = ""
-    torque_per_ampere: TorquePerAmpere = None
-    topic: Topic = ""
-    units: Units = None
-    base_link: BaseLink = ""
-    tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> tuple[Robot, Recording]:
-        robot, recordings = robot_and_recordings(
-            self.robot,
-            [self.recording],
-            base_link=self.base_link,
-            tip_link=self.tip_link,
-            joints=self.joints,
-            topic=self.topic,
-            units=self.units,
-            torque_per_ampere=self.torque_per_ampere,
-        )
+        robot, recordings = self.read([self.recording])
         if len(recordings) != 1:
             raise InputError(
                 f"{self.recording}: holds {len(recordings)} recordings, expected one: predict them one by one"
