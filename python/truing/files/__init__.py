@@ -44,6 +44,7 @@ from truing.files.measurement_file import (
     load_measurements as load_measurements,
     save_measurements as save_measurements,
 )
+from truing.files.mjcf_file import is_mjcf as is_mjcf
 from truing.files.performance_file import (
     CommandedPoses as CommandedPoses,
     MeasuredPoses as MeasuredPoses,

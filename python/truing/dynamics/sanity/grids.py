@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.motion import _filtered, _kernels
 from truing.dynamics.recorded import measured_torque
 
 Floats = NDArray[np.float64]
@@ -93,6 +92,22 @@ def grid_of(robot: _core.Robot, recording: _core.Recording) -> Grid | None:
         speed,
         torque,
     )
+
+
+def _kernels(half: int, step: float) -> tuple[Floats, Floats]:
+    """Of a cubic through 2 half + 1 rows: value and slope in the middle. shape=(2 half + 1,)"""
+    t = step * np.arange(-half, half + 1)
+    fit = np.linalg.pinv(np.vander(t, 4, increasing=True))
+    return fit[0], fit[1]
+
+
+def _filtered(table: Floats, kernel: Floats) -> Floats:
+    """Ends are continued by their point reflection."""
+    half = kernel.size // 2
+    before = 2.0 * table[:1] - table[half:0:-1]
+    after = 2.0 * table[-1:] - table[-2 : -half - 2 : -1]
+    long = np.concatenate([before, table, after])
+    return np.column_stack([np.convolve(column, kernel[::-1], mode="valid") for column in long.T])
 
 
 def acceleration_kernel(step: float) -> Floats:
