@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "dynamics/filter.hpp"
+#include "dynamics/payload.hpp"
 #include "math/statistics.hpp"
 #include "math/text.hpp"
 
@@ -241,6 +242,20 @@ void widen(const Tile& tile, MotionRange* range, std::vector<TorqueSums>* sums) 
   }
 }
 
+/// Columns that not all recordings have cannot be asked for; a payload that is not stated is none.
+void keep_common_columns(const std::vector<Recording>& recordings, MotionRange* range) {
+  for (auto at = range->columns.begin(); at != range->columns.end();) {
+    const bool everywhere = std::all_of(recordings.begin(), recordings.end(),
+                                        [&](const Recording& r) { return r.columns.count(at->first) > 0; });
+    if (everywhere || at->first == kPayload) {
+      if (!everywhere) at->second.first = std::min(at->second.first, 0.0);
+      ++at;
+    } else {
+      at = range->columns.erase(at);
+    }
+  }
+}
+
 }  // namespace
 
 MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robot, const RigidChain& chain,
@@ -254,6 +269,7 @@ MotionRange range_of(const std::vector<Recording>& recordings, const Robot& robo
   std::vector<TorqueSums> sums(static_cast<std::size_t>(joints));
   for (std::size_t r = 0; r < recordings.size(); ++r)
     for_each_tile(recordings[r], r, robot, chain, options, [&](Tile& tile) { widen(tile, &out, &sums); });
+  keep_common_columns(recordings, &out);
   for (std::size_t j = 0; j < sums.size(); ++j) out.torque[static_cast<Index>(j)] = sums[j].standard_deviation();
   return out;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "dynamics/effects/families.hpp"
+#include "dynamics/payload.hpp"
 #include "dynamics/physical.hpp"
 #include "math/linear_algebra.hpp"
 #include "math/text.hpp"
@@ -122,11 +123,25 @@ std::vector<double> drive_constants(const Robot& robot, const std::vector<Record
   return out;
 }
 
+namespace {
+
+/// A payload that is stated in some recordings only is none in the others, which may be an oversight.
+void warn_of_payloads(const std::vector<Recording>& recordings, std::vector<std::string>* warnings) {
+  std::vector<std::string> without;
+  for (const Recording& recording : recordings)
+    if (recording.columns.count(kPayload) == 0) without.push_back(recording.name);
+  if (without.empty() || without.size() == recordings.size()) return;
+  warnings->push_back("no payload_kg in " + listed(without) + ": taken to be without a payload");
+}
+
+}  // namespace
+
 Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, const ProblemOptions& options)
     : robot(given), chain(given), data{recordings, robot, {}, options.threads}, nominal(given, {}) {
   data.prepare.torque_per_ampere = drive_constants(robot, recordings, &warnings);
   data.prepare.cutoff = options.cutoff;
   split(recordings, options.test_share, this);
+  warn_of_payloads(recordings, &warnings);
   range = range_of(recordings, robot, chain, data.prepare);
   if (range.speed.maxCoeff() < kSpeedAtRest) {
     throw std::invalid_argument("nothing moves: no joint of any recording is faster than " +

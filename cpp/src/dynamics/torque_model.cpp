@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/torque_model.hpp"
 
+#include "dynamics/payload.hpp"
+
 namespace truing::dynamics {
 
 using Eigen::Index;
@@ -40,6 +42,7 @@ TorqueModel TorqueModel::with(const std::vector<ValuedTerm>& more) const {
 MatrixXd TorqueModel::torque(Motion* motion) const {
   MatrixXd out = motion->qdd * rotors_;  // it is symmetric
   for (Index j = 0; j < out.cols(); ++j) out.col(j) += motion->rigid[static_cast<std::size_t>(j)] * links_;
+  add_payload(*motion, &out);
   add_terms(terms_, false, *motion, &out);
   motion->torque = out;
   add_terms(terms_, true, *motion, &out);

@@ -8,7 +8,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from truing.cli.options import Choice, File, Fraction, Frequency, Kind, Numbers
+from truing.cli.options import (
+    Choice,
+    File,
+    Fraction,
+    Frequency,
+    Kind,
+    Length,
+    Mass,
+    Numbers,
+    read_with_common_units,
+    refused,
+)
 from truing.cli.tables import table
 from truing.errors import InputError
 
@@ -37,6 +48,30 @@ Joints = Annotated[
         "Which of the robot's joints each joint of the files is, in their order: 'J1,J2,-,J3'; '-' for none."
         " Default: the same joints in the same order.",
         metavar="NAMES",
+        panel=READING,
+    ),
+]
+
+
+class PayloadAt(Kind):
+    """A mass, and where its centre is: "2.8kg", "2.8kg@0,0,60mm"; the field holds (mass, (x, y, z))."""
+
+    metavar = "MASS[@X,Y,Z]"
+
+    def read(self, text: str, option: str) -> tuple[float, tuple[float, float, float]]:
+        mass, at, place = text.partition("@")
+        numbers = place.split(",") if at else ["0", "0", "0"]
+        if len(numbers) != 3:
+            raise refused(option, text, "a mass, or a mass and its place, such as 2.8kg or 2.8kg@0,0,60mm")
+        x, y, z = read_with_common_units(numbers, [Length()] * 3, [option] * 3)
+        return Mass(least=0.0).read(mass, option), (x, y, z)
+
+
+KnownPayload = Annotated[
+    tuple[float, tuple[float, float, float]] | None,
+    PayloadAt(
+        "Known payload of recordings that have no column payload_kg, a point at the tool, or at X,Y,Z in its"
+        " frame: '2.8kg@0,0,60mm'.",
         panel=READING,
     ),
 ]
@@ -73,7 +108,9 @@ def robot_and_recordings(
     topic: str,
     units: Literal["deg", "rad", "percent"] | None,
     torque_per_ampere: Sequence[float] | None,
+    payload: tuple[float, tuple[float, float, float]] | None = None,
 ) -> tuple[Robot, list[Recording]]:
+    from truing.dynamics import with_payload
     from truing.files import load_recordings, load_robot
 
     model = load_robot(robot, base_link, tip_link, any_tool=True)
@@ -81,7 +118,7 @@ def robot_and_recordings(
         model = with_drives(model, torque_per_ampere)
     require_masses(robot, model)
     found = load_recordings(recordings, model, joints=joints or None, topic=topic or None, units=units)
-    return model, list(found)
+    return model, list(found) if payload is None else with_payload(found, *payload)
 
 
 def with_drives(robot: Robot, torque_per_ampere: Sequence[float]) -> Robot:

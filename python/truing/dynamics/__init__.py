@@ -28,5 +28,6 @@ from truing.dynamics.api import (
     diagnose as diagnose,
     identify as identify,
     predict as predict,
+    with_payload as with_payload,
 )
 from truing.files import load_recordings as load_recordings

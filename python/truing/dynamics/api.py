@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from truing import _core
 from truing._core import Recording, Robot, TorqueDiagnosis, TorqueFit, TorquePrediction
 from truing.effects import Effect, Effects, parse_effects
@@ -17,6 +19,9 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from truing._keywords import TorqueDiagnoseKeywords, TorqueKeywords
+
+
+PAYLOAD_COLUMNS = ("payload_kg", "payload_x_m", "payload_y_m", "payload_z_m")
 
 
 @takes(_core.TorqueOptions)
@@ -70,6 +75,31 @@ def diagnose(
     Raises InputError on recordings or options that cannot be used.
     """
     return _core.dynamics_diagnose(robot, list(recordings), made(_core.TorqueDiagnoseOptions, options))
+
+
+def with_payload(
+    recordings: Sequence[Recording], mass: float, place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> list[Recording]:
+    """The recordings with a payload that is known, in those that do not state one (column payload_kg).
+
+    mass: [kg], a point. place: [m] of its centre in the tool's frame.
+
+    Raises InputError: a negative mass, numbers that are not finite.
+    """
+    if not (np.isfinite([mass, *place]).all() and mass >= 0.0):
+        raise InputError(f"payload: found {mass:g} kg at {place}, expected a mass of zero or more at a place")
+    stated = dict(zip(PAYLOAD_COLUMNS, (mass, *place), strict=True))
+    return [
+        recording
+        if "payload_kg" in recording.columns
+        else recording.replace(
+            columns={
+                **recording.columns,
+                **{name: np.full(len(recording), value) for name, value in stated.items()},
+            }
+        )
+        for recording in recordings
+    ]
 
 
 def markdown_table() -> str:

@@ -119,6 +119,9 @@ def test_a_recording_without_torques_is_refused(
         (["diagnose", "--torque-per-ampere", "1,2"], "found 2 numbers, expected 6"),
         (["diagnose", "--torque-per-ampere", "1,2,3,4,5,-6"], "found '-6'"),
         (["diagnose", "--joints", "J1,J2"], "J3"),
+        (["diagnose", "--payload", "2"], "--payload: found '2', expected a mass with its unit"),
+        (["predict", "--payload", "2kg@1,2"], "--payload: found '2kg@1,2'"),
+        (["identify", "--payload", "2kg@0,0,6"], "expected a length with its unit"),
     ],
 )
 def test_options_that_cannot_be_used_are_refused(
@@ -202,3 +205,21 @@ def test_export_writes_the_model_and_what_it_lacks(
 
 def test_a_folder_without_a_robot_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "robot.yaml: there is no such file" in refused(["export", str(tmp_path)], tmp_path, capsys)
+
+
+def test_a_payload_on_the_command_line_weighs_as_one_in_the_file(
+    files: Path, simulated: SimulatedMotion, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = recording_columns(simulated.nominal, simulated.recordings[0])
+    stated = {"payload_kg": [2.0] * len(columns["t_s"]), "payload_z_mm": [60.0] * len(columns["t_s"])}
+    write_table(tmp_path / "motion1.csv", {**columns, **stated})
+    robot, bare = str(files / "robot.yaml"), str(files / "motion1.csv")
+    predicted = []
+    for name, arguments in {
+        "without": [bare],
+        "option": [bare, "--payload", "2kg@0,0,60mm"],
+        "column": [str(tmp_path / "motion1.csv"), "--payload", "9kg"],
+    }.items():
+        assert main(["dynamics", "predict", robot, *arguments, "--out", str(tmp_path / name)]) == 0
+        predicted.append((tmp_path / name / "predicted.csv").read_text())
+    assert predicted[1] == predicted[2] != predicted[0]

@@ -19,6 +19,7 @@ from truing.cli.options import BaseLink, Names, Threads, TipLink, core
 from truing.cli.recordings import (
     CutOff,
     Joints,
+    KnownPayload,
     RecordingFiles,
     RobotWithMasses,
     TestShare,
@@ -51,6 +52,7 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueDiagnosis"]):
     threads: Threads = core("TorqueDiagnoseOptions", "threads")
     joints: Joints = ""
     torque_per_ampere: TorquePerAmpere = None
+    payload: KnownPayload = None
     topic: Topic = ""
     units: Units = None
     base_link: BaseLink = ""
@@ -66,6 +68,7 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueDiagnosis"]):
             topic=self.topic,
             units=self.units,
             torque_per_ampere=self.torque_per_ampere,
+            payload=self.payload,
         )
         require_torques(loaded[1])
         return loaded

@@ -18,6 +18,7 @@ from truing.cli.options import BaseLink, Flag, Names, Threads, TipLink, core
 from truing.cli.recordings import (
     CutOff,
     Joints,
+    KnownPayload,
     RecordingFiles,
     RobotWithMasses,
     TestShare,
@@ -56,6 +57,7 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueFit"]):
     threads: Threads = core("TorqueOptions", "threads")
     joints: Joints = ""
     torque_per_ampere: TorquePerAmpere = None
+    payload: KnownPayload = None
     topic: Topic = ""
     units: Units = None
     base_link: BaseLink = ""
@@ -71,6 +73,7 @@ class Command(run.Command["tuple[Robot, list[Recording]]", "TorqueFit"]):
             topic=self.topic,
             units=self.units,
             torque_per_ampere=self.torque_per_ampere,
+            payload=self.payload,
         )
         require_torques(loaded[1])
         return loaded

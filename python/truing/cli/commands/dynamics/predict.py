@@ -17,6 +17,7 @@ from truing.cli import run
 from truing.cli.options import BaseLink, File, Frequency, TipLink, keyword
 from truing.cli.recordings import (
     Joints,
+    KnownPayload,
     RobotWithMasses,
     Topic,
     TorquePerAmpere,
@@ -48,6 +49,7 @@ class Command(run.Command["tuple[Robot, Recording]", "TorquePrediction"]):
     ] = keyword("truing.dynamics.api:predict", "cutoff")
     joints: Joints = ""
     torque_per_ampere: TorquePerAmpere = None
+    payload: KnownPayload = None
     topic: Topic = ""
     units: Units = None
     base_link: BaseLink = ""
@@ -63,6 +65,7 @@ class Command(run.Command["tuple[Robot, Recording]", "TorquePrediction"]):
             topic=self.topic,
             units=self.units,
             torque_per_ampere=self.torque_per_ampere,
+            payload=self.payload,
         )
         if len(recordings) != 1:
             raise InputError(
