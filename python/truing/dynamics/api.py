@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truing import _core
-from truing._core import Recording, Robot, TorqueDiagnosis, TorqueFit, TorquePrediction
+from truing._core import Recording, Robot, TorqueDiagnosis, TorqueFit, TorquePlan, TorquePrediction
 from truing.effects import Effect, Effects, parse_effects
 from truing.errors import InputError
 from truing.keywords import made, takes
@@ -18,7 +18,7 @@ from truing.keywords import made, takes
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from truing._keywords import TorqueDiagnoseKeywords, TorqueKeywords
+    from truing._keywords import TorqueDiagnoseKeywords, TorqueKeywords, TorquePlanKeywords
 
 
 PAYLOAD_COLUMNS = ("payload_kg", "payload_x_m", "payload_y_m", "payload_z_m")
@@ -75,6 +75,27 @@ def diagnose(
     Raises InputError on recordings or options that cannot be used.
     """
     return _core.dynamics_diagnose(robot, list(recordings), made(_core.TorqueDiagnoseOptions, options))
+
+
+@takes(_core.TorquePlanOptions)
+def plan(
+    robot: Robot, recordings: Sequence[Recording] = (), **options: Unpack[TorquePlanKeywords]
+) -> TorquePlan:
+    """A motion that tells effects on torques apart, within the joints' limits, and what it could show.
+
+        planned = truing.dynamics.plan(robot, columns="current,payload", separate="stribeck,presliding:J2")
+        print(planned.summary())
+
+    Fourier trajectories, then slow reversals: of random ones the best is refined. Needs no data.
+
+    robot: with masses, centres of mass and inertias of its links. recordings: looked at as well, for what
+    they can show; with torques or without.
+    options: fields of `TorquePlanOptions`. `columns` and `separate` may be one text.
+
+    Raises InputError: options, names or recordings that cannot be used, a joint without room to move.
+    """
+    chosen = made(_core.TorquePlanOptions, {**options, "separate": requests(options.get("separate", ()))})
+    return _core.dynamics_plan(robot, chosen, list(recordings))
 
 
 def with_payload(
