@@ -44,4 +44,5 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_calibrate(m);
   truing::python::bind_rigid(m);
   truing::python::bind_torque(m);
+  truing::python::bind_torque_plan(m);
 }

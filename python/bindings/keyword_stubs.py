@@ -24,6 +24,7 @@ TAKEN = (
     "Path",
     "Torque",
     "TorqueDiagnose",
+    "TorquePlan",
 )
 
 HEAD = '''# Made by python/bindings/keyword_stubs.py from _core.pyi: run scripts/stubs.sh.
@@ -83,7 +84,8 @@ def keywords_of(cls: ast.ClassDef, classes: set[str]) -> str:
 def main(stub: Path, output: Path) -> None:
     body = [n for n in ast.parse(stub.read_text(encoding="utf-8")).body if isinstance(n, ast.ClassDef)]
     classes = {cls.name for cls in body}
-    tables = [keywords_of(cls, classes) for cls in body if cls.name.removesuffix("Options") in TAKEN]
+    options = {f"{name}Options" for name in TAKEN}
+    tables = [keywords_of(cls, classes) for cls in body if cls.name in options]
     output.write_text("\n\n".join([HEAD, *tables]) + "\n", encoding="utf-8")
 
 

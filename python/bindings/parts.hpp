@@ -14,6 +14,7 @@ void bind_effect_traits(py::module_& m);
 void bind_effect(py::module_& m);
 void bind_motion_recording(py::module_& m);
 void bind_torque(py::module_& m);
+void bind_torque_plan(py::module_& m);
 void bind_urdf(py::module_& m);
 void bind_torque_regressor(py::module_& m);
 void bind_scene(py::module_& m);

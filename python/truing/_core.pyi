@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueClass', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'torque_effects', 'torque_regressor', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueClass', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'torque_effects', 'torque_regressor', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -7116,6 +7116,432 @@ class TorqueDiagnosis:
         """
         The gap by joint and part of the motion.
         """
+class TorquePlanOptions:
+    """
+    Which motions to plan, within which limits, and what will be recorded along them.
+    
+    duration = 40.0: [s] of the motion.
+    rate = 100.0: [Hz] of its rows.
+    speed = 0.8: Fraction of the joints' speed limits that is used.
+    usual_speed = 1.5: [rad/s | m/s] speed limit of joints that state none.
+    acceleration = 5.0: [rad/s^2 | m/s^2] largest acceleration of a joint.
+    reach = 1.5: [rad | m] farthest to either side of `home`, within 95 % of the joint's range.
+    home = []: [rad | m] around which the joints move; none: the middle of their limits, or zero.
+    columns = []: What is recorded beside joints and torques: 'current' (torques are drives' currents), 'torque' (they
+        are sensors'), 'payload' (a known one, in half of the recordings), 'temp'.
+    payload = 2.0: [kg] at the tool in half of the recordings, if 'payload' is recorded.
+    temperature_low = 20.0: [deg C] of cold recordings, if 'temp' is recorded.
+    temperature_high = 35.0: [deg C] of warm ones.
+    separate = []: Effects to be told from each other; none: all effects count alike.
+    noise = 0.02: Standard deviation of the torques' noise, as a fraction of that of the torque along a random motion
+        (of a joint with little torque: of 5 % of the largest joint's).
+    torque_noise = []: [Nm | N] of every joint, instead of `noise`.
+    noise_time = 0.2: [s] correlation time of the noise.
+    cutoff = 8.0: [Hz] of the low-pass that a diagnosis will use.
+    alike = 0.98: An effect of which another explains a larger fraction is not told from it.
+    starts = 12: Random motions, the best of which is refined.
+    rounds = 24: Of refinement, four proposals each.
+    seed = 0: Of all random choices.
+    threads = 0: 0: as many as the machine has.
+    """
+    def __init__(self, *, duration: typing.SupportsFloat | typing.SupportsIndex = 40.0, rate: typing.SupportsFloat | typing.SupportsIndex = 100.0, speed: typing.SupportsFloat | typing.SupportsIndex = 0.8, usual_speed: typing.SupportsFloat | typing.SupportsIndex = 1.5, acceleration: typing.SupportsFloat | typing.SupportsIndex = 5.0, reach: typing.SupportsFloat | typing.SupportsIndex = 1.5, home: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], columns: collections.abc.Sequence[str] = [], payload: typing.SupportsFloat | typing.SupportsIndex = 2.0, temperature_low: typing.SupportsFloat | typing.SupportsIndex = 20.0, temperature_high: typing.SupportsFloat | typing.SupportsIndex = 35.0, separate: collections.abc.Sequence[EffectRequest] = [], noise: typing.SupportsFloat | typing.SupportsIndex = 0.02, torque_noise: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], noise_time: typing.SupportsFloat | typing.SupportsIndex = 0.2, cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0, alike: typing.SupportsFloat | typing.SupportsIndex = 0.98, starts: typing.SupportsInt | typing.SupportsIndex = 12, rounds: typing.SupportsInt | typing.SupportsIndex = 24, seed: typing.SupportsInt | typing.SupportsIndex = 0, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> TorquePlanOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> TorquePlanOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def acceleration(self) -> float:
+        """
+        [rad/s^2 | m/s^2] largest acceleration of a joint.
+        """
+    @acceleration.setter
+    def acceleration(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def alike(self) -> float:
+        """
+        An effect of which another explains a larger fraction is not told from it.
+        """
+    @alike.setter
+    def alike(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """
+        What is recorded beside joints and torques: 'current' (torques are drives' currents), 'torque' (they
+        are sensors'), 'payload' (a known one, in half of the recordings), 'temp'.
+        """
+    @columns.setter
+    def columns(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
+    def cutoff(self) -> float:
+        """
+        [Hz] of the low-pass that a diagnosis will use.
+        """
+    @cutoff.setter
+    def cutoff(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def duration(self) -> float:
+        """
+        [s] of the motion.
+        """
+    @duration.setter
+    def duration(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def home(self) -> tuple[float, ...]:
+        """
+        [rad | m] around which the joints move; none: the middle of their limits, or zero.
+        """
+    @home.setter
+    def home(self, arg1: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def noise(self) -> float:
+        """
+        Standard deviation of the torques' noise, as a fraction of that of the torque along a random motion
+        (of a joint with little torque: of 5 % of the largest joint's).
+        """
+    @noise.setter
+    def noise(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def noise_time(self) -> float:
+        """
+        [s] correlation time of the noise.
+        """
+    @noise_time.setter
+    def noise_time(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def payload(self) -> float:
+        """
+        [kg] at the tool in half of the recordings, if 'payload' is recorded.
+        """
+    @payload.setter
+    def payload(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rate(self) -> float:
+        """
+        [Hz] of its rows.
+        """
+    @rate.setter
+    def rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reach(self) -> float:
+        """
+        [rad | m] farthest to either side of `home`, within 95 % of the joint's range.
+        """
+    @reach.setter
+    def reach(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rounds(self) -> int:
+        """
+        Of refinement, four proposals each.
+        """
+    @rounds.setter
+    def rounds(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of all random choices.
+        """
+    @seed.setter
+    def seed(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def separate(self) -> tuple[EffectRequest, ...]:
+        """
+        Effects to be told from each other; none: all effects count alike.
+        """
+    @separate.setter
+    def separate(self, arg1: collections.abc.Sequence[EffectRequest]) -> None:
+        ...
+    @property
+    def speed(self) -> float:
+        """
+        Fraction of the joints' speed limits that is used.
+        """
+    @speed.setter
+    def speed(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def starts(self) -> int:
+        """
+        Random motions, the best of which is refined.
+        """
+    @starts.setter
+    def starts(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def temperature_high(self) -> float:
+        """
+        [deg C] of warm ones.
+        """
+    @temperature_high.setter
+    def temperature_high(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def temperature_low(self) -> float:
+        """
+        [deg C] of cold recordings, if 'temp' is recorded.
+        """
+    @temperature_low.setter
+    def temperature_low(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def threads(self) -> int:
+        """
+        0: as many as the machine has.
+        """
+    @threads.setter
+    def threads(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def torque_noise(self) -> tuple[float, ...]:
+        """
+        [Nm | N] of every joint, instead of `noise`.
+        """
+    @torque_noise.setter
+    def torque_noise(self, arg1: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def usual_speed(self) -> float:
+        """
+        [rad/s | m/s] speed limit of joints that state none.
+        """
+    @usual_speed.setter
+    def usual_speed(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class TorqueEffectSize:
+    """
+    The smallest size of an effect that motions would show.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def closest(self) -> str:
+        """
+        That effect, 'none' where no other shows.
+        """
+    @property
+    def closest_joints(self) -> tuple[str, ...]:
+        """
+        Where that is.
+        """
+    @property
+    def effect(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def joint(self) -> str:
+        """
+        The joint at whose torque it shows most.
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Where; empty: it belongs to no joint.
+        """
+    @property
+    def parameter(self) -> str:
+        """
+        The one of its parameters that shows best.
+        """
+    @property
+    def r2(self) -> float:
+        """
+        Fraction of its torque that that one explains.
+        """
+    @property
+    def size(self) -> float:
+        """
+        In `unit`: seen beside inertias, Coulomb and viscous friction, and an offset.
+        """
+    @property
+    def size_apart(self) -> float:
+        """
+        In `unit`: told from the effect that is most like it; NaN: never.
+        """
+    @property
+    def torque(self) -> float:
+        """
+        [Nm | N] rms of its torque there at this size.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        Of `size`.
+        """
+class TorqueEffectPair:
+    """
+    Two effects that motions do not tell apart.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def effect(self) -> str:
+        """
+        The first.
+        """
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Where.
+        """
+    @property
+    def other(self) -> str:
+        """
+        The other.
+        """
+    @property
+    def other_joints(self) -> tuple[str, ...]:
+        """
+        Where the other is.
+        """
+    @property
+    def r2(self) -> float:
+        """
+        Fraction of the first's torque that the other explains.
+        """
+    @property
+    def separated_by(self) -> str:
+        """
+        What to record to tell.
+        """
+class TorqueOutlook:
+    """
+    What motions could show, before any torque is measured.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def alike(self) -> tuple[TorqueEffectPair, ...]:
+        """
+        Not told apart, largest r2 first.
+        """
+    @property
+    def effects(self) -> tuple[TorqueEffectSize, ...]:
+        """
+        The smallest sizes, by effect and joint.
+        """
+    @property
+    def not_testable(self) -> tuple[NotTestable, ...]:
+        """
+        Effects that would not show, and why.
+        """
+class TorqueRun:
+    """
+    One recording to make.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def payload(self) -> float:
+        """
+        [kg] at the tool.
+        """
+    @property
+    def temperature(self) -> float:
+        """
+        [deg C] of the joints; NaN: any.
+        """
+class TorquePlan:
+    """
+    What `truing::dynamics::plan` found.
+    """
+    def __repr__(self) -> str:
+        ...
+    def summary(self) -> str:
+        """
+        A few lines for people.
+        """
+    @property
+    def acceleration(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [rad/s^2 | m/s^2]
+        """
+    @property
+    def evaluated(self) -> int:
+        """
+        Number of motions looked at.
+        """
+    @property
+    def given(self) -> TorqueOutlook:
+        """
+        What the recordings that were given can show.
+        """
+    @property
+    def information(self) -> float:
+        """
+        [nats] along the planned motion.
+        """
+    @property
+    def information_random(self) -> float:
+        """
+        [nats] along the random motion (Chaloner and Verdinelli 1995)
+        """
+    @property
+    def planned(self) -> TorqueOutlook:
+        """
+        What these recordings would show.
+        """
+    @property
+    def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [rad | m]
+        """
+    @property
+    def random(self) -> TorqueOutlook:
+        """
+        What recordings along a random motion as long would show.
+        """
+    @property
+    def runs(self) -> tuple[TorqueRun, ...]:
+        """
+        Recordings to make, each along the whole motion.
+        """
+    @property
+    def separated(self) -> tuple[TorqueEffectPair, ...]:
+        """
+        Pairs that were to be told apart, along the planned motion.
+        """
+    @property
+    def speed(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(n, joints) [rad/s | m/s]
+        """
+    @property
+    def time(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shape=(n,) [s]
+        """
+    @property
+    def torque_noise(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        [Nm | N] of every joint that sizes are for.
+        """
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """
+        What to know before moving.
+        """
 def assemble_setup(frames: FramesResult, inertial: InertialResult, tool: ToolResult | None = None) -> tuple[TrackSetup, list[str]]:
     """
     The parts put together, gravity in the base frame; and what to know, as a base that is not level. Without `tool` it is the flange.
@@ -7184,6 +7610,13 @@ def dynamics_identify(robot: Robot, recordings: collections.abc.Sequence[Recordi
     Finds inertial parameters and the effects asked for from recordings with torques or currents.
     
     Raises InputError on recordings or options that cannot be used.
+    """
+def dynamics_plan(robot: Robot, options: TorquePlanOptions | None = None, recordings: collections.abc.Sequence[Recording] = []) -> TorquePlan:
+    """
+    A motion that tells effects on torques apart, within the joints' limits, and what it could show.
+    
+    recordings: looked at as well, for what they can show. Raises InputError: options, names or recordings that cannot be
+    used, a robot without masses, a joint without room to move.
     """
 def dynamics_predict(robot: Robot, recording: Recording, cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0) -> TorquePrediction:
     """

@@ -274,3 +274,49 @@ class TorqueDiagnoseKeywords(TypedDict, total=False):
     """[-] fraction of a joint's squared error on unseen recordings that a name must remove."""
     threads: int
     """0: as many as the machine has."""
+
+class TorquePlanKeywords(TypedDict, total=False):
+    duration: float
+    """[s] of the motion."""
+    rate: float
+    """[Hz] of its rows."""
+    speed: float
+    """Fraction of the joints' speed limits that is used."""
+    usual_speed: float
+    """[rad/s | m/s] speed limit of joints that state none."""
+    acceleration: float
+    """[rad/s^2 | m/s^2] largest acceleration of a joint."""
+    reach: float
+    """[rad | m] farthest to either side of `home`, within 95 % of the joint's range."""
+    home: Sequence[float]
+    """[rad | m] around which the joints move; none: the middle of their limits, or zero."""
+    columns: str | Sequence[str]
+    """What is recorded beside joints and torques: 'current' (torques are drives' currents), 'torque' (they
+    are sensors'), 'payload' (a known one, in half of the recordings), 'temp'."""
+    payload: float
+    """[kg] at the tool in half of the recordings, if 'payload' is recorded."""
+    temperature_low: float
+    """[deg C] of cold recordings, if 'temp' is recorded."""
+    temperature_high: float
+    """[deg C] of warm ones."""
+    separate: Effects
+    """Effects to be told from each other; none: all effects count alike."""
+    noise: float
+    """Standard deviation of the torques' noise, as a fraction of that of the torque along a random motion
+    (of a joint with little torque: of 5 % of the largest joint's)."""
+    torque_noise: Sequence[float]
+    """[Nm | N] of every joint, instead of `noise`."""
+    noise_time: float
+    """[s] correlation time of the noise."""
+    cutoff: float
+    """[Hz] of the low-pass that a diagnosis will use."""
+    alike: float
+    """An effect of which another explains a larger fraction is not told from it."""
+    starts: int
+    """Random motions, the best of which is refined."""
+    rounds: int
+    """Of refinement, four proposals each."""
+    seed: int
+    """Of all random choices."""
+    threads: int
+    """0: as many as the machine has."""

@@ -6,6 +6,7 @@
 #include "truing/dynamics/diagnose.hpp"
 #include "truing/dynamics/effect.hpp"
 #include "truing/dynamics/identify.hpp"
+#include "truing/dynamics/plan.hpp"
 #include "truing/dynamics/recording.hpp"
 #include "truing/dynamics/regressor.hpp"
 #include "truing/dynamics/rigid.hpp"

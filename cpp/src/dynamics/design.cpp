@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "dynamics/effects/families.hpp"
+#include "dynamics/payload.hpp"
 #include "math/statistics.hpp"
 
 namespace truing::dynamics {
@@ -117,7 +118,7 @@ std::vector<FreeInput> inputs_at(std::size_t joint, const Robot& robot, const Mo
   if (range.duration >= kShortest)
     out.push_back({"time", 0.0, range.duration, false, [](const Motion& m) -> VectorXd { return m.time; }});
   for (const auto& [name, bounds] : range.columns) {
-    if (name == "enabled" || !(bounds.second > bounds.first)) continue;
+    if (name == "enabled" || is_of_payload(name) || !(bounds.second > bounds.first)) continue;
     out.push_back({name, bounds.first, bounds.second, false,
                    [name = name](const Motion& m) -> VectorXd { return m.columns.at(name); }});
   }
@@ -151,11 +152,13 @@ TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::
   for (const auto* effects : {&torque_catalogue(), &own}) {
     for (const TorqueEffect& effect : *effects) {
       if (leave_out.count(effect.name) > 0) continue;
-      if (fits_masses && effect.traits.scales_masses) {
-        out.not_testable.push_back({effect.name,
-                                    {},
-                                    "the same as all masses times a factor: needs a known payload",
-                                    Untestable::same_as_masses});
+      if (fits_masses && effect.traits.scales_masses && !payload_varies(range)) {
+        out.not_testable.push_back(
+            {effect.name,
+             {},
+             "the same as all masses times a factor: needs a known payload (column payload_kg) that differs between "
+             "recordings",
+             Untestable::same_as_masses});
         continue;
       }
       const std::size_t times = effect.per_joint ? robot.driven_count() : 1;

@@ -11,6 +11,7 @@
 
 #include "dynamics/columns.hpp"
 #include "dynamics/effects/families.hpp"
+#include "dynamics/payload.hpp"
 #include "dynamics/search.hpp"
 #include "math/text.hpp"
 
@@ -92,6 +93,12 @@ std::vector<int> columns_of(const TorqueDesign& design, const std::vector<int>& 
   return out;
 }
 
+bool scales_masses(const TorqueDesign& design, const TorqueOptions& options) {
+  return std::any_of(design.groups.begin(), design.groups.end(), [&](const TorqueGroup& group) {
+    return find_torque_effect(group.effect, options.own_effects).traits.scales_masses;
+  });
+}
+
 }  // namespace
 
 TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings, const TorqueOptions& options) {
@@ -111,8 +118,11 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   std::vector<int> groups;
   Sums sums;
   Fit fit;
-  // Terms that need the torque see that of the model found in the round before.
-  for (int round = 0; round < 2; ++round) {
+  // Terms that need the torque see that of the model found in the round before. Beside the links' masses a drive's
+  // constant k comes nearer by the factor k in a round.
+  const bool scaled = scales_masses(design, options);
+  const int rounds = scaled ? 6 : 2;
+  for (int round = 0; round < rounds; ++round) {
     sums = sums_of(sum_grams(columns, problem.nominal, model, problem.train), noise, design, with_prior);
     groups = best_forms(design, sums);
     fit = fit_of(sums, columns_of(design, groups));
@@ -120,6 +130,10 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
     noise = noise_of(problem.tiles, model, problem.train);
   }
   out.warnings = problem.warnings;
+  if (scaled && options.fit_inertials && !payload_varies(problem.range))
+    out.warnings.push_back(
+        "motor_constant and all masses share one scale, which the prior of the masses alone decides here: a known "
+        "payload (column payload_kg) that differs between recordings tells");
   fit = with_bodies(robot, design, sums, fit, &out.warnings);
   out.robot = applied(robot, design, groups, fit, problem.range);
   out.parameters = parameters_of(design, columns_of(design, groups), fit);

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "dynamics/judge.hpp"
+#include "dynamics/payload.hpp"
 #include "math/text.hpp"
 
 namespace truing::dynamics {
@@ -329,10 +330,10 @@ void add_scale_of_masses(const std::vector<FoundTorqueEffect>& effects, const st
   out->push_back(std::move(one));
 }
 
-std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effects,
-                                    const std::vector<TorqueEffect>& own) {
+std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effects, const std::vector<TorqueEffect>& own,
+                                    bool scale_is_known) {
   std::vector<TorqueClass> out;
-  add_scale_of_masses(effects, own, &out);
+  if (!scale_is_known) add_scale_of_masses(effects, own, &out);
   const auto name = [](const std::string& effect, const std::vector<std::string>& joints) {
     std::string text = effect;
     for (std::size_t k = 0; k < joints.size(); ++k) text += (k == 0 ? ":" : "+") + joints[k];
@@ -434,7 +435,7 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   if (out.verdict == Verdict::does_not_hold)
     out.robot = with_groundwork(problem, groundwork.design, groundwork.sums, groundwork.fit, {}, false, &said_already);
   out.where = regimes_of(problem, groundwork.model, model);
-  out.classes = classes_of(out.effects, own);
+  out.classes = classes_of(out.effects, own, payload_varies(problem.range));
   out.not_testable = account.design->not_testable;
   out.traces = traces_of(problem, groundwork.model, model);
   out.cutoff = problem.tiles.options().cutoff;

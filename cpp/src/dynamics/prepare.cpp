@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "dynamics/filter.hpp"
+#include "dynamics/payload.hpp"
 #include "dynamics/regressor.hpp"
 #include "dynamics/stretch.hpp"
 #include "math/batch.hpp"
@@ -226,6 +227,20 @@ void widen(const Tile& tile, MotionRange* range, std::vector<TorqueSums>* sums) 
   }
 }
 
+/// Columns that not all recordings have cannot be asked for; a payload that is not stated is none.
+void keep_common_columns(const std::vector<Recording>& recordings, MotionRange* range) {
+  for (auto at = range->columns.begin(); at != range->columns.end();) {
+    const bool everywhere = std::all_of(recordings.begin(), recordings.end(),
+                                        [&](const Recording& r) { return r.columns.count(at->first) > 0; });
+    if (everywhere || at->first == kPayload) {
+      if (!everywhere) at->second.first = std::min(at->second.first, 0.0);
+      ++at;
+    } else {
+      at = range->columns.erase(at);
+    }
+  }
+}
+
 }  // namespace
 
 MotionRange range_of(const Tiles& tiles) {
@@ -240,6 +255,7 @@ MotionRange range_of(const Tiles& tiles) {
   std::vector<const Tile*> lot(Tiles::kTogether);
   tiles.for_each([](std::size_t) { return true; }, [&](Tile& tile, std::size_t k) { lot[k] = &tile; },
                  [&](std::size_t k) { widen(*lot[k], &out, &sums); });
+  keep_common_columns(tiles.recordings(), &out);
   for (std::size_t j = 0; j < sums.size(); ++j) out.torque[static_cast<Index>(j)] = sums[j].standard_deviation();
   return out;
 }

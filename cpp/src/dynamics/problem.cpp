@@ -8,6 +8,7 @@
 
 #include "dynamics/columns.hpp"
 #include "dynamics/effects/families.hpp"
+#include "dynamics/payload.hpp"
 #include "dynamics/physical.hpp"
 #include "math/linear_algebra.hpp"
 #include "math/text.hpp"
@@ -136,6 +137,15 @@ PrepareOptions prepare_options(const Robot& robot, const std::vector<Recording>&
   return out;
 }
 
+/// A payload that is stated in some recordings only is none in the others, which may be an oversight.
+void warn_of_payloads(const std::vector<Recording>& recordings, std::vector<std::string>* warnings) {
+  std::vector<std::string> without;
+  for (const Recording& recording : recordings)
+    if (recording.columns.count(kPayload) == 0) without.push_back(recording.name);
+  if (without.empty() || without.size() == recordings.size()) return;
+  warnings->push_back("no payload_kg in " + listed(without) + ": taken to be without a payload");
+}
+
 }  // namespace
 
 Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, const ProblemOptions& options)
@@ -143,6 +153,7 @@ Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, c
       tiles(recordings, robot, prepare_options(robot, recordings, options.cutoff, &warnings), options.threads),
       nominal(given, {}) {
   split(recordings, options.test_share, this);
+  warn_of_payloads(recordings, &warnings);
   range = range_of(tiles);
   range.turns = turns_of(robot);
   if (range.speed.maxCoeff() < kSpeedAtRest) {

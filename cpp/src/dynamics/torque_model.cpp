@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "dynamics/effects/families.hpp"
+#include "dynamics/payload.hpp"
 #include "dynamics/turn.hpp"
 
 namespace truing::dynamics {
@@ -71,6 +72,7 @@ MatrixXd TorqueModel::torque(Motion* motion) const {
   motion->direction = directions_of(*motion, turns_);
   MatrixXd out = chain_.torques(motion->q, motion->qd, motion->qdd, links_);
   out += motion->qdd * rotors_;  // it is symmetric
+  add_payload(*motion, &out);
   add_terms(terms_, false, *motion, &out);
   motion->torque = out;
   add_terms(terms_, true, *motion, &out);

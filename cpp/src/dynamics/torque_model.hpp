@@ -26,7 +26,7 @@ std::vector<ValuedTerm> valued_terms(const Robot& robot, const MotionRange& rang
 void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, const Motion& motion,
                Eigen::MatrixXd* torque);
 
-/// A robot's torques, and a correction beside them.
+/// A robot's torques with the payload that the recording states, and a correction beside them.
 class TorqueModel {
  public:
   TorqueModel(const Robot& robot, std::vector<ValuedTerm> own);

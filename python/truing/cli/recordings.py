@@ -10,7 +10,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from truing.cli import run
-from truing.cli.options import BaseLink, Choice, File, Fraction, Frequency, Kind, Numbers, TipLink
+from truing.cli.options import (
+    BaseLink,
+    Choice,
+    File,
+    Fraction,
+    Frequency,
+    Kind,
+    Length,
+    Mass,
+    Numbers,
+    TipLink,
+    read_with_common_units,
+    refused,
+)
 from truing.cli.run import Found, Loaded
 from truing.cli.tables import say, table
 from truing.errors import InputError
@@ -40,6 +53,30 @@ Joints = Annotated[
         "Which of the robot's joints each joint of the files is, in their order: 'J1,J2,-,J3'; '-' for none."
         " Default: the same joints in the same order.",
         metavar="NAMES",
+        panel=READING,
+    ),
+]
+
+
+class PayloadAt(Kind):
+    """A mass, and where its centre is: "2.8kg", "2.8kg@0,0,60mm"; the field holds (mass, (x, y, z))."""
+
+    metavar = "MASS[@X,Y,Z]"
+
+    def read(self, text: str, option: str) -> tuple[float, tuple[float, float, float]]:
+        mass, at, place = text.partition("@")
+        numbers = place.split(",") if at else ["0", "0", "0"]
+        if len(numbers) != 3:
+            raise refused(option, text, "a mass, or a mass and its place, such as 2.8kg or 2.8kg@0,0,60mm")
+        x, y, z = read_with_common_units(numbers, [Length()] * 3, [option] * 3)
+        return Mass(least=0.0).read(mass, option), (x, y, z)
+
+
+KnownPayload = Annotated[
+    tuple[float, tuple[float, float, float]] | None,
+    PayloadAt(
+        "Known payload of recordings that have no column payload_kg, a point at the tool, or at X,Y,Z in its"
+        " frame: '2.8kg@0,0,60mm'.",
         panel=READING,
     ),
 ]
@@ -102,11 +139,15 @@ class MotionCommand(ReadMotion, run.Command[Loaded, Found]):
     """A command on a robot and recordings of its motion."""
 
     robot: RobotWithMasses
+    payload: KnownPayload = None
 
     def read(self, files: Sequence[Path]) -> tuple[Robot, list[Recording]]:
         """Robot and recordings, by the options above."""
+        from truing.dynamics import with_payload
+
         robot = self.read_robot(self.robot)
-        return robot, self.read_recordings(robot, files)
+        found = self.read_recordings(robot, files)
+        return robot, found if self.payload is None else with_payload(found, *self.payload)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,12 +15,18 @@ from truing._core import (
     TorqueClass as TorqueClass,
     TorqueDiagnoseOptions as TorqueDiagnoseOptions,
     TorqueDiagnosis as TorqueDiagnosis,
+    TorqueEffectPair as TorqueEffectPair,
+    TorqueEffectSize as TorqueEffectSize,
     TorqueError as TorqueError,
     TorqueErrors as TorqueErrors,
     TorqueFit as TorqueFit,
     TorqueOptions as TorqueOptions,
+    TorqueOutlook as TorqueOutlook,
+    TorquePlan as TorquePlan,
+    TorquePlanOptions as TorquePlanOptions,
     TorquePrediction as TorquePrediction,
     TorqueRegime as TorqueRegime,
+    TorqueRun as TorqueRun,
     TorqueTrace as TorqueTrace,
     UnknownTorque as UnknownTorque,
     validate_recording as validate_recording,
@@ -28,7 +34,9 @@ from truing._core import (
 from truing.dynamics.api import (
     diagnose as diagnose,
     identify as identify,
+    plan as plan,
     predict as predict,
+    with_payload as with_payload,
 )
 from truing.dynamics.comparison import compare as compare
 from truing.dynamics.rollout import rollout as rollout

@@ -7,8 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from truing import _core
-from truing._core import Recording, Robot, TorqueDiagnosis, TorqueFit, TorquePrediction
+from truing._core import Recording, Robot, TorqueDiagnosis, TorqueFit, TorquePlan, TorquePrediction
 from truing.effects import Effect, Effects, parse_effects
 from truing.errors import InputError
 from truing.keywords import made, takes
@@ -16,7 +18,10 @@ from truing.keywords import made, takes
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from truing._keywords import TorqueDiagnoseKeywords, TorqueKeywords
+    from truing._keywords import TorqueDiagnoseKeywords, TorqueKeywords, TorquePlanKeywords
+
+
+PAYLOAD_COLUMNS = ("payload_kg", "payload_x_m", "payload_y_m", "payload_z_m")
 
 
 @takes(_core.TorqueOptions)
@@ -75,6 +80,52 @@ def diagnose(
 def effect_names() -> list[str]:
     """Of the catalogue of effects on torques."""
     return [effect["name"] for effect in _core.torque_effects()]
+
+
+@takes(_core.TorquePlanOptions)
+def plan(
+    robot: Robot, recordings: Sequence[Recording] = (), **options: Unpack[TorquePlanKeywords]
+) -> TorquePlan:
+    """A motion that tells effects on torques apart, within the joints' limits, and what it could show.
+
+        planned = truing.dynamics.plan(robot, columns="current,payload", separate="stribeck,presliding:J2")
+        print(planned.summary())
+
+    Fourier trajectories, then slow reversals: of random ones the best is refined. Needs no data.
+
+    robot: with masses, centres of mass and inertias of its links. recordings: looked at as well, for what
+    they can show; with torques or without.
+    options: fields of `TorquePlanOptions`. `columns` and `separate` may be one text.
+
+    Raises InputError: options, names or recordings that cannot be used, a joint without room to move.
+    """
+    chosen = made(_core.TorquePlanOptions, {**options, "separate": requests(options.get("separate", ()))})
+    return _core.dynamics_plan(robot, chosen, list(recordings))
+
+
+def with_payload(
+    recordings: Sequence[Recording], mass: float, place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> list[Recording]:
+    """The recordings with a payload that is known, in those that do not state one (column payload_kg).
+
+    mass: [kg], a point. place: [m] of its centre in the tool's frame.
+
+    Raises InputError: a negative mass, numbers that are not finite.
+    """
+    if not (np.isfinite([mass, *place]).all() and mass >= 0.0):
+        raise InputError(f"payload: found {mass:g} kg at {place}, expected a mass of zero or more at a place")
+    stated = dict(zip(PAYLOAD_COLUMNS, (mass, *place), strict=True))
+    return [
+        recording
+        if "payload_kg" in recording.columns
+        else recording.replace(
+            columns={
+                **recording.columns,
+                **{name: np.full(len(recording), value) for name, value in stated.items()},
+            }
+        )
+        for recording in recordings
+    ]
 
 
 def markdown_table() -> str:

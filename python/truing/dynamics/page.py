@@ -780,7 +780,7 @@ def _not_testable(result: Mapping[str, Any]) -> str:
     """One line for each reason."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for n in result["not_testable"]:
-        reasons.setdefault((n["effect"], _without_joint_number(n["why"])), []).extend(n["joints"])
+        reasons.setdefault((n["effect"], without_joint_number(n["why"])), []).extend(n["joints"])
     lines = "".join(
         f'<tr><td>{escaped(effect.replace("_", " "))}</td><td class="wrap">{escaped(", ".join(joints))}</td>'
         f'<td class="wrap">{escaped(why)}</td></tr>'
@@ -794,6 +794,6 @@ def _not_testable(result: Mapping[str, Any]) -> str:
     )
 
 
-def _without_joint_number(why: str) -> str:
+def without_joint_number(why: str) -> str:
     """Reasons that differ in the number of a column alone are one: "temp3_C" is any joint's "temp1_C"."""
     return re.sub(r"\b(temp|qd|q|tau|i)[0-9]+_", r"\g<1>1_", why)

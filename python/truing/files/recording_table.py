@@ -47,6 +47,7 @@ _TEMPERATURES = {"C": 0.0, "K": -273.15}  # what is added to come to degrees Cel
 # Columns of the whole robot, and their units; what they are called in the recording.
 _OF_ROBOT = {"payload": {"kg": 1.0, "g": 1e-3}, "volt": {"V": 1.0, "mV": 1e-3}}
 _SI_NAMES = {"payload": "payload_kg", "volt": "volt_V"}
+_OF_PAYLOAD = re.compile(r"(payload_[xyz])(?:_(.*))?")  # where its centre is in the tool's frame
 _TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _TIME_STEMS = ("t", "time", "timestamp")
 _OF_JOINT = re.compile(r"(qd|ud|q|tau|i|u|temp)([1-9][0-9]*)(?:_(.*))?", re.ASCII)
@@ -102,6 +103,8 @@ class _Layout:
             self.set = True
         elif name == "enabled":
             self._take(self.known, name, _Source(name), name)
+        elif of_payload := _OF_PAYLOAD.fullmatch(name):
+            self._place_with(name, f"{of_payload[1]}_m", of_payload[1], of_payload[2] or "", _LENGTH)
         elif stem == "temp" and "_" not in unit:
             self._place_with(name, "temp_C", stem, unit, _TEMPERATURES)
         elif stem in _OF_ROBOT and "_" not in unit:

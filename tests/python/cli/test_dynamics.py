@@ -18,6 +18,7 @@ import pytest
 import truing
 from pages import charts_of, visible
 from truing.cli import main
+from truing.dynamics import load_recordings
 from truing.dynamics.result import recording_columns
 from truing.files import write_table
 from truing.testing.dynamics import SimulatedMotion, demo_arm, simulate_motion
@@ -154,6 +155,9 @@ def test_a_recording_without_torques_is_refused(
         (["diagnose", "--torque-per-ampere", "1,2"], "--torque-per-ampere: found 2 numbers, expected 6"),
         (["diagnose", "--torque-per-ampere", "1,2,3,4,5,0"], "--torque-per-ampere: found '0'"),
         (["diagnose", "--joints", "J1,J2"], "--joints: there is no J3"),
+        (["diagnose", "--payload", "2"], "--payload: found '2', expected a mass with its unit"),
+        (["predict", "--payload", "2kg@1,2"], "--payload: found '2kg@1,2'"),
+        (["identify", "--payload", "2kg@0,0,6"], "expected a length with its unit"),
         (["predict", "--topic", "/states"], "--topic (in Python: topic=) is of bags"),
     ],
 )
@@ -479,3 +483,73 @@ def test_a_residuals_file_of_other_programs_is_refused(
 
 def test_a_folder_without_a_robot_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "robot.yaml: there is no such file" in refused(["export", str(tmp_path)], tmp_path, capsys)
+
+
+def test_a_payload_on_the_command_line_weighs_as_one_in_the_file(
+    files: Path, simulated: SimulatedMotion, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = recording_columns(simulated.nominal, simulated.recordings[0])
+    stated = {"payload_kg": [2.0] * len(columns["t_s"]), "payload_z_mm": [60.0] * len(columns["t_s"])}
+    write_table(tmp_path / "motion1.csv", {**columns, **stated})
+    robot, bare = str(files / "robot.yaml"), str(files / "motion1.csv")
+    predicted = []
+    for name, arguments in {
+        "without": [bare],
+        "option": [bare, "--payload", "2kg@0,0,60mm"],
+        "column": [str(tmp_path / "motion1.csv"), "--payload", "9kg"],
+    }.items():
+        assert main(["dynamics", "predict", robot, *arguments, "--out", str(tmp_path / name)]) == 0
+        predicted.append((tmp_path / name / "predicted.csv").read_text())
+    assert predicted[1] == predicted[2] != predicted[0]
+
+
+PLAN = ["--duration", "12s", "--starts", "2", "--rounds", "1", "--seed", "3", "--threads", "1"]
+
+
+def test_plan_writes_a_motion_that_can_be_read_as_a_recording(
+    files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot = str(files / "robot.yaml")
+    given = [
+        robot,
+        str(files / "motion1.csv"),
+        "--columns",
+        "current,payload",
+        "--separate",
+        "stribeck:J1,backlash:J1",
+    ]
+    assert main(["dynamics", "plan", *given, *PLAN, "--out", str(tmp_path / "plan")]) == 0
+    result = json.loads((tmp_path / "plan" / "result.json").read_text())
+    assert result["format"] == "truing-dynamics/1"
+    assert [run["payload_kg"] for run in result["runs"]] == [0.0, 2.0]
+    assert {(p["effect"], p["other"]) for p in result["separated"]} == {
+        ("stribeck", "backlash"),
+        ("backlash", "stribeck"),
+    }
+    assert "given" in result
+    arm = demo_arm()
+    (motion,) = load_recordings(tmp_path / "plan" / "motion.csv", arm)
+    assert motion.speed.shape == (result["rows"], arm.driven_count)
+    page = (tmp_path / "plan" / "report.html").read_text()
+    assert "The smallest effects that would be seen" in page and "The recordings that there are" in page
+    assert "effects seen" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--columns", "volts"], "words of current, torque, payload, temp"),
+        (["--separate", "ghost"], "'ghost'"),
+        (["--separate", "coulomb"], "is fitted in any case"),
+        (["--separate", "thermal_friction"], "temp_C"),
+        (["--home", "0deg,0deg"], "home has 2 numbers, expected 6"),
+        (["--home", "0deg,0deg,300deg,0deg,0deg,0deg"], "joint 'J3' has no room to move"),
+        (["--torque-noise", "1,2"], "torque_noise has 2 numbers, expected 6"),
+        (["--duration", "2s"], "--duration"),
+    ],
+)
+def test_plans_that_cannot_be_are_refused(
+    arguments: list[str], expected: str, files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["plan", str(files / "robot.yaml"), "--starts", "1", "--rounds", "0", *arguments]
+    assert expected in refused(given, tmp_path, capsys)

@@ -140,7 +140,8 @@ def test_ur10e_held_out_torque_and_the_payload_that_nobody_told() -> None:
     ) in names
     assert ("presliding", ("wrist_2_joint",)) in names[:3]
 
-    loaded = diagnose(found.robot, load_recordings([folder / "h14_50s_load.csv"], found.robot))
+    load = load_recordings([folder / "h14_50s_load.csv"], found.robot)
+    loaded = diagnose(found.robot, [recording.replace(columns={}) for recording in load])
     first = loaded.effects[0]
     assert first.effect == "payload" and first.probability >= 0.9
     mass = next(p.value for p in first.parameters if p.name == "payload.m")

@@ -22,9 +22,11 @@ std::vector<TorqueForm> current_offset(const Robot& robot, std::size_t joint, co
 }
 
 std::vector<TorqueForm> motor_constant(const Robot& robot, std::size_t joint, const MotionRange&) {
-  return {{term_at(
-      joint, parameter_name("motor_constant", robot, joint), "-", 0.2,
-      [joint](const Motion& m) -> ArrayXd { return m.torque.col(static_cast<Index>(joint)); }, true)}};
+  // A constant that is further off is another unit, or was never stated.
+  return {{within(term_at(
+                      joint, parameter_name("motor_constant", robot, joint), "-", 0.2,
+                      [joint](const Motion& m) -> ArrayXd { return m.torque.col(static_cast<Index>(joint)); }, true),
+                  -0.5, 1.0)}};
 }
 
 std::vector<TorqueForm> torque_lag(const Robot& robot, std::size_t joint, const MotionRange&) {
@@ -62,7 +64,7 @@ std::vector<TorqueEffect> drive_effects() {
   traits.scales_masses = true;
   traits.plain = "a motor constant that is off";
   traits.documentation = {"tau, the whole torque that the model predicts", "`motor_constant.J2` [-]",
-                          "a known payload"};
+                          "a known payload: a column `payload_kg` that differs between recordings"};
   out.push_back(
       {"motor_constant", "the drive gives another torque per ampere than assumed", motor_constant, true, traits});
   traits.scales_masses = false;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "dynamics/effects/families.hpp"
+#include "dynamics/payload.hpp"
 #include "dynamics/regressor.hpp"
 
 namespace truing::dynamics {
@@ -91,6 +92,23 @@ std::vector<TorqueForm> payload(const Robot& robot, std::size_t, const MotionRan
   return forms;
 }
 
+std::vector<TorqueForm> payload_place(const Robot& robot, std::size_t, const MotionRange& range) {
+  const auto stated = range.columns.find(kPayload);
+  if (stated == range.columns.end() || !(stated->second.second > 0.0))
+    throw MissingColumn("needs the column payload_kg, a payload of known mass");
+  TorqueForm form;
+  for (int axis = 0; axis < 3; ++axis) {
+    TorqueTerm term;
+    term.parameter = std::string("payload_place.") + "xyz"[axis];
+    term.unit = "m";
+    for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
+    term.prior = 0.1;
+    term.basis = [axis](const Motion& m) { return payload_shifted(m, axis); };
+    form.push_back(std::move(term));
+  }
+  return {form};
+}
+
 std::vector<TorqueForm> armature(const Robot& robot, std::size_t joint, const MotionRange& range) {
   const auto at = static_cast<Index>(joint);
   const double prior = std::max(range.torque[at], 1e-3) / std::max(range.acceleration[at], 0.1);
@@ -120,6 +138,14 @@ std::vector<TorqueEffect> inertia_effects() {
                           "`payload.m` [kg], `.mx .my .mz` [kg m], of a large load `.xx` … [kg m²]",
                           "a robot whose links are known"};
   out.push_back({"payload", "a load at the flange that the model does not have", payload, false, traits});
+  traits.mujoco = traits.urdf = SimulatorPlace::none;  // it hangs there while it is recorded
+  traits.plain = "another place of the known load";
+  traits.documentation = {"the last link's columns times `payload_kg`",
+                          "`payload_place.x`, `.y`, `.z` [m] in the tool's frame, from where the recording has it",
+                          "a column `payload_kg`"};
+  out.push_back({"payload_place", "the centre of mass of the payload that is known is elsewhere than stated",
+                 payload_place, false, traits});
+  traits.mujoco = SimulatorPlace::field;
   traits.usual = true;
   traits.plain = "inertia of the motor's rotor";
   traits.urdf = SimulatorPlace::none;

@@ -51,6 +51,7 @@ _PARTS = {
     "warmup": ("coulomb", "viscous"),
     "coupling": ("viscous", "coulomb", "inertia"),
     "tool_force": ("x", "y", "z"),
+    "payload_place": ("x", "y", "z"),
 }
 """What follows the joint in the names of an effect's parameters; nothing where it is not listed."""
 _IN_BODIES = ("link_inertia", "payload")
@@ -58,6 +59,7 @@ _ONLY_MEASURED = {
     "motor_constant": "belongs to the measurement: divide measured torques by one plus this",
     "torque_lag": "belongs to the measurement: the torque was read so much later than the motion",
     "time_offset": "belongs to the measurement: torques and positions have other clocks",
+    "payload_place": "belongs to the recordings: the payload that they state is no part of the robot",
 }
 _NO_PLACE = {
     "joint_elasticity": "needs a further hinge and a motor body in every joint: the model's joints would no"
