@@ -913,9 +913,12 @@ class Recording:
     
     Arrays are copied. Tables have a column for each joint that has a reading, in chain order. A table that was not recorded
     is left out, and then has the shape (n, 0); a joint that was not recorded is NaN throughout.
+    pieces: of a recording that is longer than memory a callable that returns an iterator of its rows, some of them each as a
+    Recording with the same tables, from the first on whenever it is called; the tables given are then its first rows, and
+    end [s] is the time of the last.
     Raises InputError naming the array when shapes or types do not fit; `validate_recording` checks the values.
     """
-    def __init__(self, name: str, *, time: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, speed: numpy.typing.ArrayLike | None = None, torque: numpy.typing.ArrayLike | None = None, current: numpy.typing.ArrayLike | None = None, command: numpy.typing.ArrayLike | None = None, speed_command: numpy.typing.ArrayLike | None = None, torque_command: numpy.typing.ArrayLike | None = None, columns: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, test: bool = False) -> None:
+    def __init__(self, name: str, *, time: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, speed: numpy.typing.ArrayLike | None = None, torque: numpy.typing.ArrayLike | None = None, current: numpy.typing.ArrayLike | None = None, command: numpy.typing.ArrayLike | None = None, speed_command: numpy.typing.ArrayLike | None = None, torque_command: numpy.typing.ArrayLike | None = None, columns: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, test: bool = False, pieces: typing.Any | None = None, end: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     def __len__(self) -> int:
         ...
@@ -947,9 +950,19 @@ class Recording:
         Shape=(n, joints) [A] of the drives, measured, if it was.
         """
     @property
+    def end(self) -> float:
+        """
+        [s] of a recording that is read: time of its last row.
+        """
+    @property
     def name(self) -> str:
         """
         Of the file, in messages and results.
+        """
+    @property
+    def pieces(self) -> typing.Any:
+        """
+        Of a recording that is longer than memory: returns an iterator of its rows, as recordings; the tables are then the first rows. None: they are all there is.
         """
     @property
     def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:

@@ -105,9 +105,9 @@ def test_stamps_since_1970_are_counted_from_the_first_row(tmp_path: Path, simula
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"t_s": (900, -1.0)}, r"row 901: time goes backwards"),
+        ({"t_s": (900, -1.0)}, r"row 901, column 't_s': time goes backwards"),
         ({"t_s": (1000, -1.0)}, r"row 1001.*time goes backwards"),
-        ({"q2_rad": (1234, np.nan)}, r"row 1235, column 'q2_rad': found nan"),
+        ({"q2_rad": (1234, np.nan)}, r"row 1235, column 'q2_rad': found 'nan'"),
     ],
 )
 def test_faults_are_found_where_they_are_in_the_file(
