@@ -42,7 +42,7 @@ def columns_of(recording: Recording) -> dict[str, np.ndarray]:
 
 
 def written(path: Path, columns: dict[str, np.ndarray]) -> Path:
-    pa.parquet.write_table(pa.table(columns), path, row_group_size=700)
+    pa.parquet.write_table(pa.table(columns), path, row_group_size=2 * ROWS)
     return path
 
 
