@@ -918,7 +918,7 @@ class Recording:
     end [s] is the time of the last.
     Raises InputError naming the array when shapes or types do not fit; `validate_recording` checks the values.
     """
-    def __init__(self, name: str, *, time: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, speed: numpy.typing.ArrayLike | None = None, torque: numpy.typing.ArrayLike | None = None, current: numpy.typing.ArrayLike | None = None, command: numpy.typing.ArrayLike | None = None, speed_command: numpy.typing.ArrayLike | None = None, torque_command: numpy.typing.ArrayLike | None = None, columns: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, test: bool = False, pieces: typing.Any | None = None, end: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, name: str, *, time: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, speed: numpy.typing.ArrayLike | None = None, torque: numpy.typing.ArrayLike | None = None, current: numpy.typing.ArrayLike | None = None, command: numpy.typing.ArrayLike | None = None, speed_command: numpy.typing.ArrayLike | None = None, torque_command: numpy.typing.ArrayLike | None = None, columns: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, test: bool = False, pieces: collections.abc.Callable[[], collections.abc.Iterator[Recording]] | None = None, end: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     def __len__(self) -> int:
         ...
@@ -960,7 +960,7 @@ class Recording:
         Of the file, in messages and results.
         """
     @property
-    def pieces(self) -> typing.Any:
+    def pieces(self) -> collections.abc.Callable[[], collections.abc.Iterator[Recording]] | None:
         """
         Of a recording that is longer than memory: returns an iterator of its rows, as recordings; the tables are then the first rows. None: they are all there is.
         """
