@@ -43,8 +43,8 @@ def load_recordings(
     effort of the joints by name. Every episode of a LeRobot data set (its folder) is a recording: the state
     of the joints by name, and the actions as commands.
 
-    A Parquet file of more than 25 million cells stays on disk: every pass over the recording reads it again, a
-    piece at a time (`Recording.pieces`). It is one recording, of one set.
+    A Parquet file of more than 25 million cells stays on disk: every pass over the recording reads it again,
+    a piece at a time (`Recording.pieces`). It is one recording, of one set.
 
     joints: which of the robot's joints each joint of the file is, in the file's order, "-" for none; absent:
     a table has the robot's joints in chain order, and names are the robot's.

@@ -88,8 +88,8 @@ def joints_of_names(
 
 
 def checked_times(t: Floats, refuse: Refuse, column: str, first: float | None = None) -> Floats:
-    """The stamps [s], from 0 on if they count from 1970. Refuses those that do not increase. first: stamp of the
-    recording's first row, where these are later ones.
+    """The stamps [s], from 0 on if they count from 1970. Refuses those that do not increase. first: stamp of
+    the recording's first row, where these are later ones.
     """
     first = float(t[0]) if first is None else first
     wrong = np.flatnonzero(np.diff(t) <= 0)

@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import math
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -363,8 +364,8 @@ def _labels(layout: _Layout) -> list[str]:
 
 
 def read_in_pieces(table: Table, layout: _Layout, name: str) -> _core.Recording:
-    """A recording whose rows stay in the file. All of it is read once, and checked; a column with gaps is left
-    out.
+    """A recording whose rows stay in the file. All of it is read once, and checked; a column with gaps is
+    left out.
     """
     survey = _Survey()
     for part in table.parts(PIECE_ROWS, layout.numbers, _labels(layout)):
@@ -377,11 +378,11 @@ def read_in_pieces(table: Table, layout: _Layout, name: str) -> _core.Recording:
 class _Survey:
     """What a long file holds throughout."""
 
-    columns: set[str] = field(default_factory=set)
+    columns: set[str] = dataclasses.field(default_factory=set)
     first: float | None = None  # stamp
     end: float = -math.inf  # [s]
     test: bool | None = None
-    _recorded: set[tuple[str, int]] = field(default_factory=set)
+    _recorded: set[tuple[str, int]] = dataclasses.field(default_factory=set)
 
     def add(self, reader: _Reader) -> None:
         """The next rows. Raises InputError where they do not go on as those before."""

@@ -48,8 +48,8 @@ _NUMBER = re.compile(
 
 
 def _lots_of_groups(metadata: Any, rows: int) -> Iterator[list[int]]:
-    """Row groups of a Parquet file one after the other, together where they are small: Arrow keeps what it reads
-    of all that it is given until the last batch.
+    """Row groups of a Parquet file one after the other, together where they are small: Arrow keeps what it
+    reads of all that it is given until the last batch.
     """
     lot: list[int] = []
     count = 0
