@@ -350,13 +350,9 @@ class _Pieces:
             with warnings.catch_warnings():  # of columns with gaps: said once
                 warnings.simplefilter("ignore", InputWarning)
                 columns = reader.columns()
-            yield _core.Recording(
-                self.name,
-                time=reader.times_from(first, t),
-                columns={name: columns[name] for name in self.columns},
-                test=self.test,
-                **reader.tables(),
-            )
+            tables: dict[str, Any] = reader.tables()
+            tables["columns"] = {name: columns[name] for name in self.columns}
+            yield _core.Recording(self.name, time=reader.times_from(first, t), test=self.test, **tables)
 
 
 def _labels(layout: _Layout) -> list[str]:
