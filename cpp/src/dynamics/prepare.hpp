@@ -58,7 +58,7 @@ class Tiles {
   Tiles(const std::vector<Recording>& recordings, const Robot& robot, PrepareOptions options, int threads);
 
   /// So many tiles are worked on side by side.
-  static constexpr std::size_t kTogether = 16;
+  static constexpr std::size_t kTogether = 8;
   /// Calls work(tile, k) for the tiles of the wanted recordings, several at a time on several threads, k below
   /// kTogether, and after each such lot done(k) for each of them in their order: sums that are added up there do not
   /// depend on the number of threads.

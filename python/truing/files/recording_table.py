@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import math
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -352,13 +353,9 @@ class _Pieces:
             with warnings.catch_warnings():  # of columns with gaps: said once
                 warnings.simplefilter("ignore", InputWarning)
                 columns = reader.columns()
-            yield _core.Recording(
-                self.name,
-                time=reader.times_from(first, t),
-                columns={name: columns[name] for name in self.columns},
-                test=self.test,
-                **reader.tables(),
-            )
+            tables: dict[str, Any] = reader.tables()
+            tables["columns"] = {name: columns[name] for name in self.columns}
+            yield _core.Recording(self.name, time=reader.times_from(first, t), test=self.test, **tables)
 
 
 def _labels(layout: _Layout) -> list[str]:
@@ -380,11 +377,11 @@ def read_in_pieces(table: Table, layout: _Layout, name: str) -> _core.Recording:
 class _Survey:
     """What a long file holds throughout."""
 
-    columns: set[str] = field(default_factory=set)
+    columns: set[str] = dataclasses.field(default_factory=set)
     first: float | None = None  # stamp
     end: float = -math.inf  # [s]
     test: bool | None = None
-    _recorded: set[tuple[str, int]] = field(default_factory=set)
+    _recorded: set[tuple[str, int]] = dataclasses.field(default_factory=set)
 
     def add(self, reader: _Reader) -> None:
         """The next rows. Raises InputError where they do not go on as those before."""

@@ -47,6 +47,22 @@ _NUMBER = re.compile(
 )
 
 
+def _lots_of_groups(metadata: Any, rows: int) -> Iterator[list[int]]:
+    """Row groups of a Parquet file one after the other, together where they are small: Arrow keeps what it
+    reads of all that it is given until the last batch.
+    """
+    lot: list[int] = []
+    count = 0
+    for group in range(metadata.num_row_groups):
+        lot.append(group)
+        count += metadata.row_group(group).num_rows
+        if count >= rows:
+            yield lot
+            lot, count = [], 0
+    if lot:
+        yield lot
+
+
 class Table:
     """A table on disk. `names` is known at once; `read` loads it; then columns are taken out one by one.
 
@@ -130,12 +146,13 @@ class Table:
         first = 0
         try:
             with pa.parquet.ParquetFile(self.path, read_dictionary=self._text_columns()) as file:
-                for batch in file.iter_batches(batch_size=rows):
-                    part = copy.copy(self)
-                    part._first_row = first
-                    part._take(pa.Table.from_batches([batch]), numbers, labels)
-                    first += part.rows
-                    yield part
+                for groups in _lots_of_groups(file.metadata, rows):
+                    for batch in file.iter_batches(batch_size=rows, row_groups=groups):
+                        part = copy.copy(self)
+                        part._first_row = first
+                        part._take(pa.Table.from_batches([batch]), numbers, labels)
+                        first += part.rows
+                        yield part
         except (pa.ArrowException, OSError) as error:
             raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
 
