@@ -30,7 +30,9 @@ struct Place {
   std::size_t usual = 0;  ///< the one of middling visibility
 };
 
-bool same_place(const TorqueGroup& a, const TorqueGroup& b) { return a.effect == b.effect && a.joints == b.joints; }
+bool same_effect_there(const TorqueGroup& a, const TorqueGroup& b) {
+  return a.effect == b.effect && a.joints == b.joints;
+}
 
 MatrixXd block(const MatrixXd& all, const std::vector<int>& rows, const std::vector<int>& columns) {
   return all(rows, columns);
@@ -97,7 +99,7 @@ std::vector<Place> places_of(const Information& information, const TorqueDesign&
     const TorqueGroup& group = design.groups[g];
     if (group.standard) continue;
     const auto at = std::find_if(out.begin(), out.end(), [&](const Place& place) {
-      return same_place(design.groups[place.groups.front()], group);
+      return same_effect_there(design.groups[place.groups.front()], group);
     });
     if (at == out.end()) {
       out.push_back({{g}, g});

@@ -56,9 +56,9 @@ MatrixXd point_mass_moved(const MatrixXd& place, const Eigen::Vector3d& along) {
 /// Torques of a last link with these parameters, shape=(rows, 10), in every row.
 MatrixXd torques_of(const Motion& motion, const MatrixXd& parameters) {
   const Index last = kLinkParameters * (static_cast<Index>(motion.robot->joints.size()) - 1);
-  const std::vector<MatrixXd> made =
-      motion.rigid.empty() ? regressor_columns(RigidChain(*motion.robot), motion.q, motion.qd, motion.qdd)
-                           : std::vector<MatrixXd>{};
+  const std::vector<MatrixXd> made = motion.rigid.empty()
+                                         ? regressor_columns(RigidChain(*motion.robot), motion.q, motion.qd, motion.qdd)
+                                         : std::vector<MatrixXd>{};
   const std::vector<MatrixXd>& columns = motion.rigid.empty() ? made : motion.rigid;
   MatrixXd out(motion.rows(), motion.q.cols());
   for (Index j = 0; j < out.cols(); ++j) {

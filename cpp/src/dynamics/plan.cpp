@@ -135,10 +135,7 @@ bool keeps_passive_limits(const Robot& robot, const MatrixXd& position) {
 class Planner {
  public:
   Planner(const Robot& robot, const TorquePlanOptions& options)
-      : robot_(robot),
-        options_(options),
-        limits_(motion_limits(robot, options)),
-        runs_(runs_of(options)) {
+      : robot_(robot), options_(options), limits_(motion_limits(robot, options)), runs_(runs_of(options)) {
     start_ = draw(0);
     set_noise();
     design_ = design_within(planned_range());
@@ -165,7 +162,8 @@ class Planner {
     const MatrixXd position = positions(trajectory);
     if (!keeps_passive_limits(robot_, position)) return -std::numeric_limits<double>::infinity();
     const std::vector<Recording> recordings = recorded(position, runs_, options_);
-    const Information information = information_of(Tiles(recordings, robot_, prepare(), 1), design_, noise_, options_.noise_time);
+    const Information information =
+        information_of(Tiles(recordings, robot_, prepare(), 1), design_, noise_, options_.noise_time);
     return options_.separate.empty() ? nats(information, design_, all_) : nats_apart(information);
   }
 

@@ -15,7 +15,7 @@ using truing::math::Random;
 namespace {
 
 /// Two links that turn about parallel, level axes, and a tool beside the last frame.
-Robot arm() {
+Robot lever() {
   Robot out;
   out.name = "arm";
   for (const char* name : {"J1", "J2"}) {
@@ -47,7 +47,7 @@ Robot loaded(const Robot& robot, double mass, const Eigen::Vector3d& place) {
   return out;
 }
 
-Recording motion(int number, double seconds) {
+Recording swing(int number, double seconds) {
   Recording out;
   out.name = "motion" + std::to_string(number);
   const auto rows = static_cast<Eigen::Index>(100.0 * seconds);
@@ -67,7 +67,7 @@ void put_on(double mass, Recording* recording) {
 
 /// Heavier links than in the file, friction, and drives that give another torque per ampere.
 Robot hidden() {
-  Robot out = arm();
+  Robot out = lever();
   out.joints[0].mass = 3.6;
   out.joints[1].mass = 2.5;
   for (const char* name : {"J1", "J2"}) {
@@ -82,7 +82,7 @@ Robot hidden() {
 std::vector<Recording> recorded(const Robot& truth, const std::vector<double>& payloads) {
   std::vector<Recording> out;
   for (std::size_t k = 0; k < payloads.size(); ++k) {
-    Recording one = motion(static_cast<int>(k), kSanitized ? 8.0 : 20.0);
+    Recording one = swing(static_cast<int>(k), kSanitized ? 8.0 : 20.0);
     put_on(payloads[k], &one);
     one.torque = dynamics::predict(truth, one, 30.0).torque;
     Random random(k);
@@ -108,22 +108,22 @@ double moment_about_joint(const Robot& robot) {
 }  // namespace
 
 TEST_CASE("a payload that is stated weighs as much as a last link that has grown by it") {
-  Recording bare = motion(0, 8.0), carrying = bare;
+  Recording bare = swing(0, 8.0), carrying = bare;
   const Eigen::Vector3d place(0.03, 0.0, 0.08);
   put_on(2.0, &carrying);
   carrying.columns["payload_x_m"] = Eigen::VectorXd::Constant(bare.time.size(), place.x());
   carrying.columns["payload_z_m"] = Eigen::VectorXd::Constant(bare.time.size(), place.z());
-  const Eigen::MatrixXd stated = dynamics::predict(arm(), carrying).torque;
-  const Eigen::MatrixXd grown = dynamics::predict(loaded(arm(), 2.0, place), bare).torque;
+  const Eigen::MatrixXd stated = dynamics::predict(lever(), carrying).torque;
+  const Eigen::MatrixXd grown = dynamics::predict(loaded(lever(), 2.0, place), bare).torque;
   CHECK((stated - grown).cwiseAbs().maxCoeff() < 1e-9);
-  CHECK((stated - dynamics::predict(arm(), bare).torque).cwiseAbs().maxCoeff() > 1.0);
+  CHECK((stated - dynamics::predict(lever(), bare).torque).cwiseAbs().maxCoeff() > 1.0);
 }
 
 TEST_CASE("known payloads tell masses from the drives' constants, to 3 %") {
   const Robot truth = hidden();
   TorqueOptions options;
   options.effects = {{"coulomb", {}}, {"viscous", {}}, {"motor_constant", {}}};
-  const TorqueFit fit = dynamics::identify(arm(), recorded(truth, {0.0, 4.0, 0.0, 4.0, 2.0}), options);
+  const TorqueFit fit = dynamics::identify(lever(), recorded(truth, {0.0, 4.0, 0.0, 4.0, 2.0}), options);
   CHECK(1.0 + value_of(fit.parameters, "motor_constant.J1") == doctest::Approx(1.15).epsilon(0.03));
   CHECK(1.0 + value_of(fit.parameters, "motor_constant.J2") == doctest::Approx(0.88).epsilon(0.03));
   CHECK(moment_about_joint(fit.robot) == doctest::Approx(moment_about_joint(truth)).epsilon(0.03));
@@ -132,7 +132,7 @@ TEST_CASE("known payloads tell masses from the drives' constants, to 3 %") {
 TEST_CASE("one payload everywhere leaves masses and drives' constants one scale, and that is said") {
   TorqueOptions options;
   options.effects = {{"coulomb", {}}, {"viscous", {}}, {"motor_constant", {}}};
-  const TorqueFit fit = dynamics::identify(arm(), recorded(hidden(), {4.0, 4.0, 4.0, 4.0}), options);
+  const TorqueFit fit = dynamics::identify(lever(), recorded(hidden(), {4.0, 4.0, 4.0, 4.0}), options);
   CHECK(std::any_of(fit.warnings.begin(), fit.warnings.end(),
                     [](const std::string& w) { return w.find("share one scale") != std::string::npos; }));
 }
@@ -142,9 +142,11 @@ TEST_CASE("a diagnosis names the drives' constants where known payloads differ, 
     return std::any_of(d.not_testable.begin(), d.not_testable.end(),
                        [](const NotTestable& n) { return n.reason == Untestable::same_as_masses; });
   };
-  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(hidden(), {0.0, 4.0, 2.0, 0.0, 4.0, 3.0, 2.0}));
+  const TorqueDiagnosis d = dynamics::diagnose(lever(), recorded(hidden(), {0.0, 4.0, 2.0, 0.0, 4.0, 3.0, 2.0}));
   CHECK(!has_scale(d));
-  for (const auto& [joint, constant] : {std::pair{"J1", 1.15}, std::pair{"J2", 0.88}}) {
+  for (const auto& hidden_one : {std::pair{std::string("J1"), 1.15}, std::pair{std::string("J2"), 0.88}}) {
+    const std::string& joint = hidden_one.first;
+    const double constant = hidden_one.second;
     const auto at = std::find_if(d.effects.begin(), d.effects.end(), [&](const FoundTorqueEffect& e) {
       return e.effect == "motor_constant" && e.joints.front() == joint;
     });
@@ -153,7 +155,7 @@ TEST_CASE("a diagnosis names the drives' constants where known payloads differ, 
   }
   CHECK(std::none_of(d.classes.begin(), d.classes.end(),
                      [](const TorqueClass& c) { return c.sentence.find("share one scale") != std::string::npos; }));
-  CHECK(has_scale(dynamics::diagnose(arm(), recorded(hidden(), {4.0, 4.0, 4.0, 4.0, 4.0}))));
+  CHECK(has_scale(dynamics::diagnose(lever(), recorded(hidden(), {4.0, 4.0, 4.0, 4.0, 4.0}))));
 }
 
 TEST_CASE("a known payload whose centre is elsewhere than stated is found there") {
@@ -169,9 +171,9 @@ TEST_CASE("a known payload whose centre is elsewhere than stated is found there"
   }
   TorqueOptions options;
   options.effects = {{"coulomb", {}}, {"viscous", {}}, {"motor_constant", {}}, {"payload_place", {}}};
-  const TorqueFit fit = dynamics::identify(arm(), recordings, options);
+  const TorqueFit fit = dynamics::identify(lever(), recordings, options);
   // Where the axes are parallel what lies along them does not show: compared is what does.
-  const Eigen::Matrix3d to_last = arm().targets.front().T_last_target.linear();
+  const Eigen::Matrix3d to_last = lever().targets.front().T_last_target.linear();
   const Eigen::Vector3d found = to_last * Eigen::Vector3d(value_of(fit.parameters, "payload_place.x"),
                                                           value_of(fit.parameters, "payload_place.y"),
                                                           value_of(fit.parameters, "payload_place.z"));
@@ -181,8 +183,8 @@ TEST_CASE("a known payload whose centre is elsewhere than stated is found there"
 TEST_CASE("a payload that only some recordings state is none in the others, and that is said") {
   std::vector<Recording> recordings = recorded(hidden(), {0.0, 4.0, 0.0, 4.0, 2.0});
   recordings[2].columns.clear();
-  const TorqueFit fit = dynamics::identify(arm(), recordings);
+  const TorqueFit fit = dynamics::identify(lever(), recordings);
   CHECK(std::find(fit.warnings.begin(), fit.warnings.end(),
                   "no payload_kg in motion2: taken to be without a payload") != fit.warnings.end());
-  CHECK_NOTHROW(dynamics::diagnose(arm(), recordings));
+  CHECK_NOTHROW(dynamics::diagnose(lever(), recordings));
 }

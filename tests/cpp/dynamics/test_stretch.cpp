@@ -14,9 +14,9 @@ using truing::math::Random;
 
 namespace {
 
-constexpr double kRowStep = 0.002;  // [s]
+constexpr double kFineStep = 0.002;  // [s]
 
-Robot arm() {
+Robot streamed_arm() {
   Robot out;
   out.name = "arm";
   for (const char* name : {"J1", "J2"}) {
@@ -38,7 +38,7 @@ Recording recording(double seconds) {
   out.name = "long";
   Random random(7);
   std::vector<double> times;
-  for (double t = 3.0; t < 3.0 + seconds; t += kRowStep * random.uniform(0.9, 1.1))
+  for (double t = 3.0; t < 3.0 + seconds; t += kFineStep * random.uniform(0.9, 1.1))
     if (t < 40.0 || t > 43.0) times.push_back(t);
   const auto rows = static_cast<Eigen::Index>(times.size());
   out.time = Eigen::Map<const Eigen::VectorXd>(times.data(), rows);
@@ -97,7 +97,7 @@ std::vector<dynamics::Tile> tiles_of(const Recording& recording, const Robot& ro
 }  // namespace
 
 TEST_CASE("tiles of a recording that is read are those of one in memory, to the bit") {
-  const Robot robot = arm();
+  const Robot robot = streamed_arm();
   const Recording whole = recording(260.0);
   const std::vector<dynamics::Tile> expected = tiles_of(whole, robot);
   REQUIRE(expected.size() == 4);  // one before the gap, three behind it
@@ -118,7 +118,7 @@ TEST_CASE("tiles of a recording that is read are those of one in memory, to the 
 }
 
 TEST_CASE("a recording that comes a few rows at a time has the same tiles but for its usual step") {
-  const Robot robot = arm();
+  const Robot robot = streamed_arm();
   const Recording whole = recording(120.0);
   const std::vector<dynamics::Tile> expected = tiles_of(whole, robot),
                                     found = tiles_of(read_in_pieces(whole, 997), robot);
@@ -143,17 +143,17 @@ TEST_CASE("times that go backwards from one piece to the next are refused") {
       return left-- > 0;
     };
   };
-  CHECK_THROWS_WITH_AS(validate(wrong, arm()), doctest::Contains("column t, row 1: found 3, expected a time after"),
-                       std::invalid_argument);
+  CHECK_THROWS_WITH_AS(validate(wrong, streamed_arm()),
+                       doctest::Contains("column t, row 1: found 3, expected a time after"), std::invalid_argument);
 }
 
 TEST_CASE("torques of a recording that is longer than memory are not predicted row by row") {
-  CHECK_THROWS_WITH_AS(dynamics::predict(arm(), read_in_pieces(recording(20.0), 1000)),
+  CHECK_THROWS_WITH_AS(dynamics::predict(streamed_arm(), read_in_pieces(recording(20.0), 1000)),
                        doctest::Contains("longer than memory"), std::invalid_argument);
 }
 
 TEST_CASE("a fit to recordings that are read is that to recordings in memory, on one thread and on two") {
-  Robot robot = arm();
+  Robot robot = streamed_arm();
   for (Joint& joint : robot.joints) joint.inertia = Eigen::Vector3d(0.004, 0.04, 0.04).asDiagonal();
   const Recording whole = recording(150.0);
   const auto errors = [&](const Recording& one, int threads) {

@@ -16,7 +16,7 @@ using truing::math::Random;
 
 namespace {
 
-Robot one_joint() {
+Robot dry_joint() {
   Robot out;
   out.name = "arm";
   Joint joint;
@@ -32,7 +32,7 @@ Robot one_joint() {
 }
 
 /// Slow and fast, with friction that turns where the motion does: nothing else is there.
-std::vector<Recording> recorded(const Robot& robot) {
+std::vector<Recording> recorded_dry(const Robot& robot) {
   std::vector<Recording> out;
   for (int k = 0; k < 5; ++k) {
     Recording one;
@@ -80,19 +80,19 @@ TEST_CASE("a direction by the speed turns at the speed's zero, wherever it lies 
 }
 
 TEST_CASE("friction that turns sharply is dry friction, and nothing beside it") {
-  const TorqueDiagnosis d = dynamics::diagnose(one_joint(), recorded(one_joint()));
+  const TorqueDiagnosis d = dynamics::diagnose(dry_joint(), recorded_dry(dry_joint()));
   for (const FoundTorqueEffect& effect : d.effects) CHECK_MESSAGE(effect.standard, effect.sentence);
   const FrictionTurn turn = dynamics::turns_of(d.robot).front();
   CHECK((turn.travel > 0.0 || turn.speed < 0.01));
   // What is handed over predicts with the turn that was found.
-  const Recording held_out = recorded(one_joint()).back();
+  const Recording held_out = recorded_dry(dry_joint()).back();
   const Eigen::VectorXd error = dynamics::predict(d.robot, held_out).torque.col(0) - held_out.torque.col(0);
   CHECK(std::sqrt(error.squaredNorm() / static_cast<double>(error.size())) < 1.0);  // the low-pass rounds the turns
   CHECK(d.errors[2].held_out.front().rms < 0.1);
 }
 
 TEST_CASE("a turn that the robot does not have is refused") {
-  Robot robot = one_joint();
+  Robot robot = dry_joint();
   robot.torque_effects = {{"coulomb", {"J1"}, {{"coulomb.J1", 2.0}, {"coulomb.J1.turn_travel", -1e-4}}}};
   CHECK_THROWS_AS(dynamics::turns_of(robot), std::invalid_argument);
 }
