@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/columns.hpp"
 #include "dynamics/problem.hpp"
 #include "truing/truing.hpp"
 
@@ -78,50 +79,49 @@ Given read_given(const std::string& folder) {
   return out;
 }
 
-void write_row(const RowMajor& row, std::ofstream* out) {
-  out->write(reinterpret_cast<const char*>(row.data()), static_cast<std::streamsize>(sizeof(double)) * row.size());
+void write_table(const RowMajor& table, std::ofstream* out) {
+  out->write(reinterpret_cast<const char*>(table.data()), static_cast<std::streamsize>(sizeof(double)) * table.size());
 }
 
-/// Filtered values of every column at the joints that it acts on: shape=(count, columns of the joint) each.
-std::vector<MatrixXd> columns_of(const Tile& tile, const TorqueDesign& design, std::size_t joints) {
-  std::vector<std::vector<VectorXd>> lists(joints);
-  for (const TorqueTerm& term : design.terms) {
-    const MatrixXd values = tile.own_rows(term.basis(tile.motion));
-    for (std::size_t k = 0; k < term.joints.size(); ++k)
-      lists[term.joints[k]].emplace_back(values.col(static_cast<Index>(k)));
-  }
-  std::vector<MatrixXd> out;
-  for (const std::vector<VectorXd>& list : lists) {
-    out.emplace_back(tile.count, static_cast<Index>(list.size()));
-    for (std::size_t c = 0; c < list.size(); ++c) out.back().col(static_cast<Index>(c)) = list[c];
+/// Of one tile, before it is its turn to be written.
+struct TileRows {
+  RowMajor rows;
+  std::vector<RowMajor> columns;  ///< by joint
+};
+
+TileRows rows_of(const Problem& problem, const DesignColumns& columns, const TorqueModel& seen, Tile* tile) {
+  const auto joints = static_cast<Index>(problem.robot.driven_count());
+  const MatrixXd nominal = own_torque(problem.nominal, tile);
+  set_torque(seen, tile);  // what columns that need the torque see
+  TileRows out;
+  columns.use(tile, true, [&](const DesignColumns::Tables& tables) {
+    for (const MatrixXd& table : tables) out.columns.emplace_back(table.leftCols(table.cols() - 1));
+  });
+  const VectorXd time = tile->own_time();
+  out.rows.resize(tile->count, 4 + 6 * joints);
+  for (Index i = 0; i < tile->count; ++i) {
+    const Index fine = (tile->first + i) * tile->stride;
+    out.rows.row(i) << static_cast<double>(tile->recording), problem.train.fold(tile->recording, time[i]),
+        problem.test.fold(tile->recording, time[i]), time[i], tile->motion.q.row(fine), tile->motion.qd.row(fine),
+        tile->motion.qdd.row(fine), tile->measured.row(i), nominal.row(i), tile->moving.row(i);
   }
   return out;
 }
 
 void write_rows(const std::string& folder, const Problem& problem, const TorqueDesign& design,
                 const TorqueModel& seen) {
-  const auto joints = static_cast<Index>(problem.robot.driven_count());
   std::ofstream rows(folder + "/rows.out", std::ios::binary);
-  std::vector<std::ofstream> columns;
-  for (Index j = 0; j < joints; ++j) columns.emplace_back(folder + "/" + std::to_string(j) + ".out", std::ios::binary);
-  const Data& data = problem.data;
-  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-    for_each_tile(data.recordings[r], r, problem.robot, problem.chain, data.prepare, [&](Tile& tile) {
-      const MatrixXd nominal = tile.own_rows(problem.nominal.torque(&tile.motion));
-      seen.torque(&tile.motion);  // what columns that need the torque see
-      const VectorXd time = tile.own_time();
-      const std::vector<MatrixXd> values = columns_of(tile, design, static_cast<std::size_t>(joints));
-      for (Index i = 0; i < tile.count; ++i) {
-        const Index fine = (tile.first + i) * tile.stride;
-        RowMajor row(1, 4 + 6 * joints);
-        row << static_cast<double>(r), problem.train.fold(r, time[i]), problem.test.fold(r, time[i]), time[i],
-            tile.motion.q.row(fine), tile.motion.qd.row(fine), tile.motion.qdd.row(fine), tile.measured.row(i),
-            nominal.row(i), tile.moving.row(i);
-        write_row(row, &rows);
-        for (std::size_t j = 0; j < columns.size(); ++j) write_row(values[j].row(i), &columns[j]);
-      }
-    });
-  }
+  std::vector<std::ofstream> files;
+  for (std::size_t j = 0; j < problem.robot.driven_count(); ++j)
+    files.emplace_back(folder + "/" + std::to_string(j) + ".out", std::ios::binary);
+  const DesignColumns columns(problem.tiles, design);
+  std::vector<TileRows> lot(Tiles::kTogether);
+  problem.tiles.for_each([](std::size_t) { return true; },
+                         [&](Tile& tile, std::size_t k) { lot[k] = rows_of(problem, columns, seen, &tile); },
+                         [&](std::size_t k) {
+                           write_table(lot[k].rows, &rows);
+                           for (std::size_t j = 0; j < files.size(); ++j) write_table(lot[k].columns[j], &files[j]);
+                         });
 }
 
 void print_columns(const TorqueDesign& design) {
@@ -142,8 +142,8 @@ int main(int argc, char** argv) {
   if (argc != 2) return std::cerr << "usage: bench_dynamics_rows FOLDER\n", 2;
   const std::string folder = argv[1];
   const Given given = read_given(folder);
-  const Problem problem(given.robot, given.recordings, {given.cutoff, given.test_share});
-  const Groundwork groundwork = groundwork_of(problem);
+  Problem problem(given.robot, given.recordings, {given.cutoff, given.test_share});
+  const Groundwork groundwork = groundwork_of(&problem);
   const TorqueDesign design = design_of(problem.robot, problem.range, {}, {}, true);
   write_rows(folder, problem, design, groundwork.model);
   print_columns(design);

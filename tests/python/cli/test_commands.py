@@ -56,7 +56,7 @@ def test_help_names_every_option_with_its_default(
     assert place.about()[0].splitlines()[0] in text
     for one in bound(place):
         name = one.kind.metavar if one.kind.argument else one.flag
-        assert re.search(rf"{re.escape(name)}\b", text), name
+        assert re.search(rf"{re.escape(name)}(?!\w)", text), name
         if one.shown_default is not None:
             assert f"[default: {one.shown_default}]" in text, name
 
