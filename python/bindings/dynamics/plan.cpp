@@ -11,7 +11,7 @@ namespace truing::python {
 
 namespace {
 
-std::string summary(const TorquePlan& p) {
+std::string plan_summary(const TorquePlan& p) {
   std::string out = std::to_string(p.time.size()) + " rows, " + std::to_string(p.runs.size()) + " recordings to make\n";
   for (const TorqueEffectSize& e : p.planned.effects) {
     out += at_joints(e.effect, e.joints) + ": seen from " + text(e.size) + " " + e.unit + " on";
@@ -48,7 +48,7 @@ void bind_torque_plan(py::module_& m) {
   define_options<TorquePlanOptions>(m, "TorquePlanOptions");
   bind_parts(m);
   auto plan = define_result<TorquePlan>(m, "TorquePlan");
-  plan.def("summary", &summary, "A few lines for people.");
+  plan.def("summary", &plan_summary, "A few lines for people.");
   plan.def("__repr__", [](const TorquePlan& p) {
     return "TorquePlan(" + std::to_string(p.time.size()) + " rows, " + std::to_string(p.planned.effects.size()) +
            " effects)";
