@@ -21,7 +21,7 @@ constexpr double kClassNats = 6.0;     ///< a rival within this many is in the c
 constexpr double kClassR2 = 0.95;      ///< so is what can make the same torque
 constexpr double kSameR2 = 0.5;        ///< what makes less of the torque is another matter
 constexpr double kTempered = 0.5;      ///< no model is exact: half a nat counts for one
-constexpr double kOtherLaws = 0.1;     ///< part of a joint's error that other laws than the catalogue's may well be
+constexpr double kOtherLaws = 0.2;     ///< part of a joint's error that other laws than the catalogue's may well be
 constexpr double kNamed = 0.2;         ///< what is less sure is fitted, and not named
 constexpr double kUnknown = 0.5;       ///< so sure at least must be that there is what nobody knows
 constexpr double kBlocksOfTime = 0.9;  ///< the most that folds of one recording are worth
@@ -61,12 +61,12 @@ class Naming {
     return out;
   }
 
-  /// No law here is exact: what removes a small part of a joint's error on folds that were not fitted may stand for
-  /// something else. All joints count alike in the sum of squares.
+  /// No law here is exact: what removes a small part of the error that a joint has without it, on folds that were not
+  /// fitted, may stand for something else. All joints count alike in the sum of squares.
   double not_another_law(std::size_t at) const {
     const Index folds = static_cast<Index>(sums_.folds.size());
     const VectorXd less = search_.squares_of_folds(Search::without(choice_, at));
-    const double gain = (less - squares_.head(folds)).sum() / standard_.head(folds).sum();
+    const double gain = (less - squares_.head(folds)).sum() / less.sum();
     const double part = std::max(0.0, gain) * search_.joints();
     return part * part / (part * part + kOtherLaws * kOtherLaws);
   }
