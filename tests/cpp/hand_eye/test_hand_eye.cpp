@@ -397,7 +397,7 @@ void check_agreement(const LeftOutBothWays& e, double tolerance) {
 }  // namespace
 
 TEST_CASE("left out of images with an unknown lens, poses are predicted as by a fit without them") {
-  for (const int n : {6, 10, 16})
+  for (const int n : kSanitized ? std::vector<int>{6, 10} : std::vector<int>{6, 10, 16})
     for (std::uint64_t seed = 1; seed <= (kSanitized ? 1 : 2); ++seed)
       for (const double tilt : {0.6, 0.15}) {
         CAPTURE(n);

@@ -51,9 +51,11 @@ void check_said(const Robot& robot, const Measurements& data, const std::string&
 
 }  // namespace
 
+constexpr std::size_t kEvery = kSanitized ? 3 : 1;  ///< joint of an arm that is tried
+
 TEST_CASE("a joint column with the wrong sign is found on every arm") {
   for (const Robot& robot : some_arms()) {
-    for (std::size_t k = 0; k < robot.driven_count(); ++k) {
+    for (std::size_t k = 0; k < robot.driven_count(); k += kEvery) {
       const auto table = measured(robot, 150, 100 + static_cast<unsigned>(k));
       scale(table.get(), &table->data.joints[k], -1.0);
       check_said(robot, table->data, "joint_sign", "sign of joint column " + std::to_string(k + 1));
@@ -63,7 +65,7 @@ TEST_CASE("a joint column with the wrong sign is found on every arm") {
 
 TEST_CASE("exchanged joint columns are found on every arm") {
   for (const Robot& robot : some_arms()) {
-    for (std::size_t k = 0; k + 1 < robot.driven_count(); ++k) {
+    for (std::size_t k = 0; k + 1 < robot.driven_count(); k += kEvery) {
       if (robot.joints[k].type == JointType::prismatic) continue;
       const auto table = measured(robot, 150, 200 + static_cast<unsigned>(k));
       std::swap(table->data.joints[k], table->data.joints[k + 1]);
