@@ -33,13 +33,19 @@ run_ctest() {
   ctest --test-dir "$1" "${which[@]}"
 }
 
-step_cpp() {
+build_tests() {
   configure "$release" -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DTRUING_UNITY="$unity" -DCMAKE_BUILD_TYPE=Release
   cmake --build "$release"
+}
+
+step_cpp() {
+  build_tests
   run_ctest "$release"
 }
 
+# The library alone is compiled with sanitizers: the test objects are those of the optimised build.
 step_sanitize() {
+  build_tests
   local compiler=()
   if clang_sanitizes; then
     compiler=(-DCMAKE_CXX_COMPILER=clang++)
@@ -47,7 +53,7 @@ step_sanitize() {
     echo "clang++ cannot link the sanitizers' runtime here: the default compiler is used, which takes longer"
   fi
   configure build/sanitize "${compiler[@]}" -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DTRUING_SANITIZE=ON -DTRUING_UNITY=ON \
-    -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1"
+    -DBUILD_SHARED_LIBS=ON -DTRUING_TEST_OBJECTS="$root/$release" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1"
   cmake --build build/sanitize
   run_ctest build/sanitize
 }
@@ -129,6 +135,7 @@ step_examples() {
 
 step_docs() {
   "$python" tests/check_links.py
+  scripts/site.sh
 }
 
 # ---- Running them ----------------------------------------------------------------------------------------------------
@@ -144,7 +151,7 @@ title() {
     stubs) echo "stubs: committed against generated" ;;
     types) echo "types of the installed package and the examples" ;;
     examples) echo "examples, C++ and Python" ;;
-    docs) echo "links of the documentation" ;;
+    docs) echo "links of the documentation, and its site" ;;
     *) return 1 ;;
   esac
 }

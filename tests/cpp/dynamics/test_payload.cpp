@@ -5,32 +5,21 @@
 
 #include <doctest/doctest.h>
 
-#include "math/random.hpp"
 #include "support/sanitized.hpp"
+#include "support/swung_arm.hpp"
 #include "truing/dynamics.hpp"
 
 using namespace truing;
-using truing::math::Random;
+using swung::swing;
 
 namespace {
 
-/// Two links that turn about parallel, level axes, and a tool beside the last frame.
+/// With a tool beside the last frame.
 Robot lever() {
-  Robot out;
-  out.name = "arm";
-  for (const char* name : {"J1", "J2"}) {
-    Joint joint;
-    joint.name = name;
-    joint.a = 0.4;
-    joint.mass = 3.0;
-    joint.center_of_mass = {-0.2, 0.0, 0.0};
-    joint.inertia = Eigen::Vector3d(0.004, 0.04, 0.04).asDiagonal();
-    out.joints.push_back(joint);
-  }
-  out.gravity = {0.0, -9.81, 0.0};
-  Eigen::Isometry3d T_last_tool = Eigen::Isometry3d::Identity();
-  T_last_tool.translate(Eigen::Vector3d(0.05, -0.02, 0.1)).rotate(Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitX()));
-  out.targets = {{"tool", T_last_tool}};
+  Robot out = swung::level_arm();
+  out.targets.front()
+      .T_last_target.translate(Eigen::Vector3d(0.05, -0.02, 0.1))
+      .rotate(Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitX()));
   return out;
 }
 
@@ -47,33 +36,15 @@ Robot loaded(const Robot& robot, double mass, const Eigen::Vector3d& place) {
   return out;
 }
 
-Recording swing(int number, double seconds) {
-  Recording out;
-  out.name = "motion" + std::to_string(number);
-  const auto rows = static_cast<Eigen::Index>(100.0 * seconds);
-  out.time = Eigen::VectorXd::LinSpaced(rows, 0.0, 0.01 * static_cast<double>(rows - 1));
-  out.position.resize(rows, 2);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const double t = out.time[i], phase = 1.3 * number;
-    out.position(i, 0) = 0.8 * std::sin(0.9 * t + phase) + 0.3 * std::sin(2.3 * t);
-    out.position(i, 1) = 0.9 * std::sin(1.1 * t + 2.0 * phase) + 0.3 * std::cos(2.9 * t + phase);
-  }
-  return out;
-}
-
 void put_on(double mass, Recording* recording) {
   recording->columns["payload_kg"] = Eigen::VectorXd::Constant(recording->time.size(), mass);
 }
 
 /// Heavier links than in the file, friction, and drives that give another torque per ampere.
 Robot hidden() {
-  Robot out = lever();
+  Robot out = swung::with_friction(lever());
   out.joints[0].mass = 3.6;
   out.joints[1].mass = 2.5;
-  for (const char* name : {"J1", "J2"}) {
-    out.torque_effects.push_back({"coulomb", {name}, {{std::string("coulomb.") + name, 1.5}}});
-    out.torque_effects.push_back({"viscous", {name}, {{std::string("viscous.") + name, 0.8}}});
-  }
   out.torque_effects.push_back({"motor_constant", {"J1"}, {{"motor_constant.J1", 0.15}}});
   out.torque_effects.push_back({"motor_constant", {"J2"}, {{"motor_constant.J2", -0.12}}});
   return out;
@@ -84,11 +55,8 @@ std::vector<Recording> recorded(const Robot& truth, const std::vector<double>& p
   for (std::size_t k = 0; k < payloads.size(); ++k) {
     Recording one = swing(static_cast<int>(k), kSanitized ? 8.0 : 20.0);
     put_on(payloads[k], &one);
-    one.torque = dynamics::predict(truth, one, 30.0).torque;
-    Random random(k);
-    for (double& value : one.torque.reshaped()) value += 0.05 * random.normal();
-    one.test = k + 1 == payloads.size();
-    out.push_back(one);
+    out.push_back(swung::measured(truth, one, k));
+    out.back().test = k + 1 == payloads.size();
   }
   return out;
 }

@@ -5,6 +5,7 @@
 #include <doctest/doctest.h>
 
 #include "dynamics/prepare.hpp"
+#include "support/swung_arm.hpp"
 #include "truing/dynamics.hpp"
 
 using namespace truing;
@@ -12,21 +13,6 @@ using namespace truing;
 namespace {
 
 constexpr double kRowStep = 0.01;  // [s]
-
-Robot swinging_arm() {
-  Robot out;
-  out.name = "arm";
-  for (const char* name : {"J1", "J2"}) {
-    Joint joint;
-    joint.name = name;
-    joint.a = 0.4;
-    joint.mass = 1.0;
-    out.joints.push_back(joint);
-  }
-  out.gravity.setZero();
-  out.targets = {{"tool", Eigen::Isometry3d::Identity()}};
-  return out;
-}
 
 /// J1 swings all the time, J2 until it stops.
 Recording recording(double seconds, double stops) {
@@ -60,11 +46,11 @@ Recording with_gap(const Recording& whole, double from, double to) {
 }  // namespace
 
 TEST_CASE("a joint that came to rest keeps the friction of its last motion, however a recording is parted") {
-  Robot robot = swinging_arm();
+  Robot robot = swung::level_arm();
   robot.torque_effects = {{"presliding", {"J2"}, {{"presliding.J2", 2.0}, {"presliding.J2.x0", 1e-3}}}};
   const Recording motion = recording(110.0, 60.0);
   const Eigen::MatrixXd torque = dynamics::predict(robot, motion).torque;
-  const Eigen::MatrixXd bare = dynamics::predict(swinging_arm(), motion).torque;
+  const Eigen::MatrixXd bare = dynamics::predict(swung::level_arm(), motion).torque;
   const double last = torque(6200, 1) - bare(6200, 1);
   REQUIRE(std::abs(last) > 0.5);
   for (Eigen::Index i = 6200; i < torque.rows(); ++i) REQUIRE(std::abs(torque(i, 1) - bare(i, 1) - last) < 1e-6);
@@ -74,7 +60,7 @@ TEST_CASE("the way across a gap is no motion") {
   dynamics::PrepareOptions options;
   options.torque_per_ampere = {1.0, 1.0};
   const Recording whole = recording(20.0, 20.0);
-  const Robot robot = swinging_arm();
+  const Robot robot = swung::level_arm();
   const std::vector<Recording> one{whole}, other{with_gap(whole, 6.0, 9.0)};
   const MotionRange smooth = dynamics::range_of(dynamics::Tiles(one, robot, options, 1));
   const MotionRange cut = dynamics::range_of(dynamics::Tiles(other, robot, options, 1));
@@ -84,11 +70,12 @@ TEST_CASE("the way across a gap is no motion") {
 }
 
 TEST_CASE("rows between gaps are predicted by their own motion, however few they are") {
-  Robot robot = swinging_arm();
+  Robot robot = swung::level_arm();
   robot.torque_effects = {{"viscous", {"J1"}, {{"viscous.J1", 3.0}}}};
   const Recording whole = recording(20.0, 20.0);
   const Recording cut = with_gap(with_gap(whole, 6.0, 9.0), 9.3, 12.0);  // 0.3 s are left between
-  const Eigen::MatrixXd torque = dynamics::predict(robot, cut).torque - dynamics::predict(swinging_arm(), cut).torque;
+  const Eigen::MatrixXd torque =
+      dynamics::predict(robot, cut).torque - dynamics::predict(swung::level_arm(), cut).torque;
   REQUIRE(torque.rows() == cut.time.size());
   for (Eigen::Index i = 0; i < torque.rows(); ++i) {
     const double t = cut.time[i];

@@ -7,6 +7,7 @@
 
 #include "dynamics/prepare.hpp"
 #include "math/random.hpp"
+#include "support/swung_arm.hpp"
 #include "truing/dynamics.hpp"
 
 using namespace truing;
@@ -15,22 +16,6 @@ using truing::math::Random;
 namespace {
 
 constexpr double kFineStep = 0.002;  // [s]
-
-Robot streamed_arm() {
-  Robot out;
-  out.name = "arm";
-  for (const char* name : {"J1", "J2"}) {
-    Joint joint;
-    joint.name = name;
-    joint.a = 0.4;
-    joint.mass = 1.0;
-    joint.center_of_mass = {-0.2, 0.0, 0.0};
-    out.joints.push_back(joint);
-  }
-  out.gravity = {0.0, -9.81, 0.0};
-  out.targets = {{"tool", Eigen::Isometry3d::Identity()}};
-  return out;
-}
 
 /// J1 swings, J2 rests after a while; steps that jitter, a gap, a column, noise on the torques.
 Recording recording(double seconds) {
@@ -97,7 +82,7 @@ std::vector<dynamics::Tile> tiles_of(const Recording& recording, const Robot& ro
 }  // namespace
 
 TEST_CASE("tiles of a recording that is read are those of one in memory, to the bit") {
-  const Robot robot = streamed_arm();
+  const Robot robot = swung::level_arm();
   const Recording whole = recording(260.0);
   const std::vector<dynamics::Tile> expected = tiles_of(whole, robot);
   REQUIRE(expected.size() == 4);  // one before the gap, three behind it
@@ -118,7 +103,7 @@ TEST_CASE("tiles of a recording that is read are those of one in memory, to the 
 }
 
 TEST_CASE("a recording that comes a few rows at a time has the same tiles but for its usual step") {
-  const Robot robot = streamed_arm();
+  const Robot robot = swung::level_arm();
   const Recording whole = recording(120.0);
   const std::vector<dynamics::Tile> expected = tiles_of(whole, robot),
                                     found = tiles_of(read_in_pieces(whole, 997), robot);
@@ -143,17 +128,17 @@ TEST_CASE("times that go backwards from one piece to the next are refused") {
       return left-- > 0;
     };
   };
-  CHECK_THROWS_WITH_AS(validate(wrong, streamed_arm()),
+  CHECK_THROWS_WITH_AS(validate(wrong, swung::level_arm()),
                        doctest::Contains("column t, row 1: found 3, expected a time after"), std::invalid_argument);
 }
 
 TEST_CASE("torques of a recording that is longer than memory are not predicted row by row") {
-  CHECK_THROWS_WITH_AS(dynamics::predict(streamed_arm(), read_in_pieces(recording(20.0), 1000)),
+  CHECK_THROWS_WITH_AS(dynamics::predict(swung::level_arm(), read_in_pieces(recording(20.0), 1000)),
                        doctest::Contains("longer than memory"), std::invalid_argument);
 }
 
 TEST_CASE("a fit to recordings that are read is that to recordings in memory, on one thread and on two") {
-  Robot robot = streamed_arm();
+  Robot robot = swung::level_arm();
   for (Joint& joint : robot.joints) joint.inertia = Eigen::Vector3d(0.004, 0.04, 0.04).asDiagonal();
   const Recording whole = recording(150.0);
   const auto errors = [&](const Recording& one, int threads) {

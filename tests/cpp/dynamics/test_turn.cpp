@@ -9,27 +9,13 @@
 #include "dynamics/turn.hpp"
 #include "math/random.hpp"
 #include "support/sanitized.hpp"
+#include "support/swung_arm.hpp"
 #include "truing/dynamics.hpp"
 
 using namespace truing;
 using truing::math::Random;
 
 namespace {
-
-Robot dry_joint() {
-  Robot out;
-  out.name = "arm";
-  Joint joint;
-  joint.name = "J1";
-  joint.a = 0.4;
-  joint.mass = 3.0;
-  joint.center_of_mass = {-0.2, 0.0, 0.0};
-  joint.inertia = Eigen::Vector3d(0.004, 0.04, 0.04).asDiagonal();
-  out.joints.push_back(joint);
-  out.gravity = {0.0, -9.81, 0.0};
-  out.targets = {{"tool", Eigen::Isometry3d::Identity()}};
-  return out;
-}
 
 /// Slow and fast, with friction that turns where the motion does: nothing else is there.
 std::vector<Recording> recorded_dry(const Robot& robot) {
@@ -80,19 +66,19 @@ TEST_CASE("a direction by the speed turns at the speed's zero, wherever it lies 
 }
 
 TEST_CASE("friction that turns sharply is dry friction, and nothing beside it") {
-  const TorqueDiagnosis d = dynamics::diagnose(dry_joint(), recorded_dry(dry_joint()));
+  const TorqueDiagnosis d = dynamics::diagnose(swung::level_arm(1), recorded_dry(swung::level_arm(1)));
   for (const FoundTorqueEffect& effect : d.effects) CHECK_MESSAGE(effect.standard, effect.sentence);
   const FrictionTurn turn = dynamics::turns_of(d.robot).front();
   CHECK((turn.travel > 0.0 || turn.speed < 0.01));
   // What is handed over predicts with the turn that was found.
-  const Recording held_out = recorded_dry(dry_joint()).back();
+  const Recording held_out = recorded_dry(swung::level_arm(1)).back();
   const Eigen::VectorXd error = dynamics::predict(d.robot, held_out).torque.col(0) - held_out.torque.col(0);
   CHECK(std::sqrt(error.squaredNorm() / static_cast<double>(error.size())) < 1.0);  // the low-pass rounds the turns
   CHECK(d.errors[2].held_out.front().rms < 0.1);
 }
 
 TEST_CASE("a turn that the robot does not have is refused") {
-  Robot robot = dry_joint();
+  Robot robot = swung::level_arm(1);
   robot.torque_effects = {{"coulomb", {"J1"}, {{"coulomb.J1", 2.0}, {"coulomb.J1.turn_travel", -1e-4}}}};
   CHECK_THROWS_AS(dynamics::turns_of(robot), std::invalid_argument);
 }
