@@ -31,6 +31,8 @@ bool TorqueDiagnoseOptions::is_valid(std::string* error) const {
 namespace dynamics {
 namespace {
 
+using Eigen::VectorXd;
+
 /// What everything together leaves: the errors of the groundwork alone go on in time as that does which it lacks.
 std::vector<Noise> noise_of_all(const Problem& problem, const DesignColumns& columns, const TorqueGrams& grams,
                                 const std::vector<Noise>& first) {
@@ -80,16 +82,16 @@ TorqueDesign part_of(const TorqueDesign& whole, const std::vector<int>& nuisance
   return out;
 }
 
-/// What is left where everything chosen is fitted with the turns that are set.
-std::vector<Noise> noise_left(const Problem& problem, const TorqueDesign& whole, Choice choice, const TorqueModel& seen,
-                              const std::vector<Noise>& before) {
+/// Everything chosen, fitted with the turns that are set. `seen`: the model whose torque some terms need.
+TorqueModel fitted_with_turns(const Problem& problem, const TorqueDesign& whole, Choice choice, const TorqueModel& seen,
+                              const std::vector<Noise>& noise) {
   const TorqueDesign design = part_of(whole, standard_columns(whole), &choice);
   const TorqueGrams grams = sum_grams(DesignColumns(problem.tiles, design), problem.nominal,
                                       seen.turning(problem.range.turns), problem.train);
-  const Sums sums = sums_of(grams, before, design, inertial_columns(design));
+  const Sums sums = sums_of(grams, noise, design, inertial_columns(design));
   std::vector<int> columns(design.terms.size());
   std::iota(columns.begin(), columns.end(), 0);
-  return noise_of(problem.tiles, problem.nominal.with(valued(design, fit_of(sums, columns))), problem.train);
+  return problem.nominal.with(valued(design, fit_of(sums, columns)));
 }
 
 /// The choice fitted, as a model beside the nominal one.
@@ -108,6 +110,33 @@ std::vector<int> friction_columns(const TorqueDesign& design) {
   return out;
 }
 
+constexpr double kOfBodies = 1.1;  ///< squares that inertias of real bodies may leave, to those of any numbers
+
+/// Squares that a fit leaves on the training rows.
+double squares_of(const Sums& sums, const Fit& fit) {
+  const Gram gram = sums.all.of(fit.columns);
+  return sums.all.yy - 2.0 * fit.values.dot(gram.xy) + fit.values.dot(gram.xx * fit.values);
+}
+
+/// Masses below zero and the like may fit as well as anything, but no robot has them.
+bool bodies_can_do_it(const Problem& problem, const Account& account) {
+  const Evidence::State state = account.search->state(account.choice);
+  const Fit fit = fit_of(*account.sums, state.columns, state.precision);
+  std::vector<std::string> said_later;
+  const Fit bodies = with_bodies(problem.robot, *account.design, *account.sums, fit, &said_later);
+  return squares_of(*account.sums, bodies) <= kOfBodies * squares_of(*account.sums, fit);
+}
+
+/// The one-standard-error rule (Breiman et al., Classification and Regression Trees, 1984, section 3.4.3): of two
+/// models the one that says less is worse only where its squares on folds that were not fitted are larger by more than
+/// that.
+bool as_good(const VectorXd& simple, const VectorXd& flexible) {
+  const VectorXd more = simple - flexible;
+  const auto n = static_cast<double>(more.size());
+  const double variance = (more.array() - more.mean()).square().sum() / std::max(1.0, n - 1.0);
+  return more.mean() <= std::sqrt(variance / n);
+}
+
 // The file's inertias as they are, and single links, rotors, loads that differ from it: where that predicts folds as
 // well as inertias that are all free, it says more with less. What free inertias take up is named here.
 std::optional<Account> of_given_inertias(const Problem& problem, const TorqueGrams& grams,
@@ -120,9 +149,13 @@ std::optional<Account> of_given_inertias(const Problem& problem, const TorqueGra
   more.most = static_cast<int>(free.choice.groups.size() + problem.robot.driven_count());
   out.choice = out.search->run(free.choice, more, false);
   out.inertias_given = true;
-  if (out.search->squares_of_folds(out.choice).sum() > free.search->squares_of_folds(free.choice).sum()) return {};
+  if (!as_good(out.search->squares_of_folds(out.choice), free.search->squares_of_folds(free.choice))) return {};
+  if (!bodies_can_do_it(problem, out)) return {};
   return out;
 }
+
+constexpr double kLeastGainOfFunctions = 0.05;  ///< a free function bends to anything: it must remove more than a law
+constexpr int kMostFunctions = 6;               ///< more of them are no answer that anybody reads
 
 /// Beside what was named, free functions of what may drive an unknown effect.
 Account with_functions(const Problem& problem, const Account& of_effects, const TorqueModel& model,
@@ -145,10 +178,10 @@ Account with_functions(const Problem& problem, const Account& of_effects, const 
   const TorqueGrams held_out = sum_grams(columns, problem.nominal, model, problem.test);
   Account out = account_of(design, sums_of(grams, *noise, *design, priors),
                            sums_of(held_out, *noise, *design, std::vector<bool>(priors.size(), false)), nuisance);
-  SearchLimits few = limits;
-  few.least_gain = std::max(0.05, limits.least_gain);
-  few.most = static_cast<int>(choice.groups.size()) + 6;
-  out.choice = out.search->run(choice, few, true);
+  SearchLimits of_functions = limits;
+  of_functions.least_gain = std::max(kLeastGainOfFunctions, limits.least_gain);
+  of_functions.most = static_cast<int>(choice.groups.size()) + kMostFunctions;
+  out.choice = out.search->run(choice, of_functions, true);
   out.inertias_given = of_effects.inertias_given;
   return out;
 }
@@ -181,7 +214,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   // What noise is, and the torque that some terms need, are those of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
     if (round > 0 && !problem.fitted_before) {
-      choose_turns(&problem, [&] { return noise_left(problem, *design, choice, model, noise); });
+      choose_turns(&problem, [&] { return fitted_with_turns(problem, *design, choice, model, noise); });
       *design = whole_design(problem, options);  // of the same groups
       columns = std::make_unique<DesignColumns>(problem.tiles, *design);
       model = model.turning(problem.range.turns);
@@ -195,19 +228,22 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   }
   const TorqueGrams held_out = sum_grams(*columns, problem.nominal, model, problem.test);
   columns.reset();  // large
-  Account account =
+  Account free =
       account_of(design, sums_of(grams, noise, *design, priors),
                  sums_of(held_out, noise, *design, std::vector<bool>(design->terms.size(), false)), nuisance);
-  account.choice = choice;
+  free.choice = choice;
+  const auto answer = [&](const Account& account, const TorqueModel& of_account) {
+    std::vector<Noise> noise_of_functions = noise;
+    const Account functions = with_functions(problem, account, of_account, limits, &noise_of_functions);
+    return named(problem, groundwork, account, noise, functions, noise_of_functions);
+  };
   if (!problem.fitted_before) {
-    if (auto given = of_given_inertias(problem, grams, held_out, noise, account, limits)) {
-      account = std::move(*given);
-      model = fitted_model(problem, *design, *account.sums, *account.search, account.choice);
+    if (const auto given = of_given_inertias(problem, grams, held_out, noise, free, limits)) {
+      TorqueDiagnosis out = answer(*given, fitted_model(problem, *design, *given->sums, *given->search, given->choice));
+      if (out.verdict != Verdict::does_not_hold) return out;
     }
   }
-  std::vector<Noise> noise_of_functions = noise;
-  const Account functions = with_functions(problem, account, model, limits, &noise_of_functions);
-  return named(problem, groundwork, account, noise, functions, noise_of_functions);
+  return answer(free, model);
 }
 
 }  // namespace dynamics

@@ -137,6 +137,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   fit = with_bodies(robot, design, sums, fit, &out.warnings);
   out.robot = applied(robot, design, groups, fit, problem.range);
   out.parameters = parameters_of(design, columns_of(design, groups), fit);
+  out.covariance = covariance_of(design, fit, out.parameters);
   out.errors = errors_of(
       problem, {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model_of(out.robot, problem)}});
   out.cutoff = problem.tiles.options().cutoff;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "math/text.hpp"
+
 namespace truing::dynamics {
 namespace {
 
@@ -142,6 +144,17 @@ std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& st
   for (Index j = 0; j < joints; ++j) {
     out[static_cast<std::size_t>(j)].recording = problem.tiles.recordings()[r].name;
     out[static_cast<std::size_t>(j)].joint = problem.robot.joints[driven[static_cast<std::size_t>(j)]].name;
+  }
+  return out;
+}
+
+std::vector<std::string> worse_joints(const TorqueErrors& standard, const TorqueErrors& named) {
+  std::vector<std::string> out;
+  for (std::size_t j = 0; j < named.held_out.size(); ++j) {
+    const double before = standard.held_out[j].percent, after = named.held_out[j].percent;
+    if (after > kWorse * before)
+      out.push_back(named.held_out[j].joint + " (" + math::number(after, 3) + " % in place of " +
+                    math::number(before, 3) + " %)");
   }
   return out;
 }

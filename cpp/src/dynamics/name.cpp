@@ -22,9 +22,11 @@ constexpr double kClassR2 = 0.95;      ///< so is what can make the same torque
 constexpr double kSameR2 = 0.5;        ///< what makes less of the torque is another matter
 constexpr double kTempered = 0.5;      ///< no model is exact: half a nat counts for one
 constexpr double kOtherLaws = 0.2;     ///< part of a joint's error that other laws than the catalogue's may well be
-constexpr double kNamed = 0.2;         ///< what is less sure is fitted, and not named
+constexpr double kNamed = 0.5;         ///< what is less likely than not is fitted, and not named
 constexpr double kUnknown = 0.5;       ///< so sure at least must be that there is what nobody knows
 constexpr double kBlocksOfTime = 0.9;  ///< the most that folds of one recording are worth
+constexpr double kMuchWorse = 1.5;     ///< a joint's error that is larger by this factor contradicts what was found
+constexpr double kContradicted = 0.5;  ///< the most that names are worth which held-out recordings contradict
 
 const TorqueGroup& group_of(const TorqueDesign& design, int g) { return design.groups[static_cast<std::size_t>(g)]; }
 
@@ -261,15 +263,17 @@ std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& 
   return out;
 }
 
-/// Root mean square over the joints of errors in parts of their torques' standard deviations.
+/// Geometric mean over the joints of errors in parts of their torques' standard deviations: what is a tenth better at a
+/// joint counts alike at all of them, and no joint that hardly has a torque decides for the others.
 double mean_percent(const TorqueErrors& errors) {
-  double squares = 0.0, n = 0.0;
+  constexpr double kExact = 1e-9;  // [%]
+  double logs = 0.0, n = 0.0;
   for (const TorqueError& e : errors.held_out) {
     if (!(e.n > 0.0)) continue;
-    squares += e.percent * e.percent;
+    logs += std::log(std::max(e.percent, kExact));
     n += 1.0;
   }
-  return std::sqrt(squares / std::max(n, 1.0));
+  return std::exp(logs / std::max(n, 1.0));
 }
 
 /// What was found, the largest first, in plain words; and how many more.
@@ -306,8 +310,20 @@ std::string verdict_sentence(const TorqueDiagnosis& d, const TorqueErrors& befor
                            : "What " + usual + " leaves goes with inputs that no known effect explains.";
 }
 
+/// Worse than `before`, or clearly worse than standard practice (errors[1]), on recordings that were not fitted: it
+/// does not hold. Standard practice may have inertias that are free where names have few: then it is as good as what is
+/// true. Nor does it where a single joint is much worse.
+bool holds(const TorqueErrors& named, const TorqueErrors& before, const TorqueErrors& standard) {
+  if (mean_percent(named) > std::min(mean_percent(before), kWorse * mean_percent(standard))) return false;
+  for (std::size_t j = 0; j < named.held_out.size(); ++j) {
+    const double least = std::min(before.held_out[j].percent, standard.held_out[j].percent);
+    if (named.held_out[j].percent > kMuchWorse * least) return false;
+  }
+  return true;
+}
+
 Verdict verdict_of(const TorqueDiagnosis& d, const TorqueErrors& before, bool any) {
-  if (any && mean_percent(d.errors[2]) > mean_percent(before)) return Verdict::does_not_hold;
+  if (any && !holds(d.errors[2], before, d.errors[1])) return Verdict::does_not_hold;
   if (any) return d.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown;
   return d.unknown.empty() ? Verdict::none : Verdict::unknown;
 }
@@ -394,6 +410,13 @@ Robot robot_of(const Problem& problem, const Account& account, const Naming& nam
                          effects_in(account.choice, *account.design), account.inertias_given, warnings);
 }
 
+std::vector<Parameter> parameters_in(const std::vector<FoundTorqueEffect>& effects) {
+  std::vector<Parameter> out;
+  for (const FoundTorqueEffect& effect : effects)
+    out.insert(out.end(), effect.parameters.begin(), effect.parameters.end());
+  return out;
+}
+
 /// What is left without anything that was named.
 TorqueErrors errors_without_names(const Problem& problem, const Account& account) {
   const Evidence::State state = account.search->state({});
@@ -419,6 +442,7 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   out.unknown = unknown_of(*functions.design, all, functions.choice, noise_of_functions, problem.single);
   for (FoundTorqueEffect& standard : standard_effects(problem, account, naming, noise))
     out.effects.push_back(std::move(standard));
+  out.covariance = covariance_of(*account.design, naming.fit(), parameters_in(out.effects));
   // Errors are those of the robot that is handed over.
   out.robot = robot_of(problem, account, naming, &out.warnings);
   std::vector<std::string> said_already;
@@ -432,8 +456,18 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   const TorqueErrors before = account.inertias_given ? errors_without_names(problem, account) : out.errors[1];
   out.verdict = verdict_of(out, before, any);
   out.sentence = verdict_sentence(out, before, words_of_usual(problem, account));
-  if (out.verdict == Verdict::does_not_hold)
+  const std::vector<std::string> worse = worse_joints(out.errors[1], out.errors[2]);
+  if (!problem.fitted_before && !worse.empty())
+    out.warnings.push_back(
+        "on held-out recordings standard practice, with inertias that are all free, is better than "
+        "this model at " +
+        listed(worse));
+  if (out.verdict == Verdict::does_not_hold) {
+    for (FoundTorqueEffect& e : out.effects)
+      if (!e.standard) e.probability = std::min(e.probability, kContradicted);
+    for (UnknownTorque& u : out.unknown) u.probability = std::min(u.probability, kContradicted);
     out.robot = with_groundwork(problem, groundwork.design, groundwork.sums, groundwork.fit, {}, false, &said_already);
+  }
   out.where = regimes_of(problem, groundwork.model, model);
   out.classes = classes_of(out.effects, own, payload_varies(problem.range));
   out.not_testable = account.design->not_testable;

@@ -316,32 +316,6 @@ Groundwork fitted_groundwork(const Problem& problem) {
 
 }  // namespace
 
-void choose_turns(Problem* problem, const std::function<std::vector<Noise>()>& noise_with) {
-  constexpr FrictionTurn kTurns[] = {{0.01, 0.0}, {1e-3, 0.0}, {3e-4, 0.0}, {0.01, 1e-6}, {0.01, 1e-5}, {0.01, 1e-4}};
-  const auto set = [&](const std::vector<FrictionTurn>& turns) {
-    problem->range.turns = turns;
-    problem->nominal = problem->nominal.turning(turns);
-  };
-  const std::size_t joints = problem->robot.driven_count();
-  std::vector<double> least(joints, std::numeric_limits<double>::infinity());
-  std::vector<FrictionTurn> chosen(joints);
-  for (const FrictionTurn& turn : kTurns) {
-    set(std::vector<FrictionTurn>(joints, turn));
-    const std::vector<Noise> noise = noise_with();
-    for (std::size_t j = 0; j < joints; ++j) {
-      if (noise[j].sigma >= least[j]) continue;
-      least[j] = noise[j].sigma;
-      chosen[j] = turn;
-    }
-  }
-  set(chosen);
-}
-
-Groundwork groundwork_of(Problem* problem) {
-  if (!problem->fitted_before) choose_turns(problem, [&] { return fitted_groundwork(*problem).noise; });
-  return fitted_groundwork(*problem);
-}
-
 std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vector<int>& columns, const Fit& fit) {
   std::vector<Parameter> out;
   for (const int c : columns) {
@@ -358,6 +332,19 @@ std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vect
     for (const auto& [name, value] : term.constants) out.push_back({name, value, value, 0.0, "", true});
   }
   return out;
+}
+
+MatrixXd covariance_of(const TorqueDesign& design, const Fit& fit, const std::vector<Parameter>& parameters) {
+  std::vector<Index> at;
+  for (const Parameter& parameter : parameters) {
+    if (parameter.frozen) continue;
+    const auto is_it = [&](int c) { return design.terms[static_cast<std::size_t>(c)].parameter == parameter.name; };
+    const auto found = std::find_if(fit.columns.begin(), fit.columns.end(), is_it);
+    if (found == fit.columns.end()) throw std::logic_error("no column of the fit is " + parameter.name);
+    at.push_back(static_cast<Index>(found - fit.columns.begin()));
+  }
+  const MatrixXd out = fit.covariance(at, at);
+  return 0.5 * (out + out.transpose());
 }
 
 Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<int>& groups, const Fit& fit,
@@ -456,28 +443,68 @@ ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& 
 
 }  // namespace
 
+namespace {
+
+/// By model and joint.
+std::vector<std::vector<TorqueError>> errors_on(const Folds& folds, const Problem& problem,
+                                                const std::vector<std::pair<std::string, TorqueModel>>& models) {
+  const std::vector<std::size_t> driven = problem.robot.driven_joints();
+  std::vector<ModelMoments> lot(Tiles::kTogether);
+  ModelMoments all(models.size(), std::vector<Moments>(driven.size()));
+  const auto add = [&](std::size_t k) {
+    for (std::size_t m = 0; m < models.size(); ++m)
+      for (std::size_t j = 0; j < driven.size(); ++j) all[m][j].add(lot[k][m][j]);
+  };
+  problem.tiles.for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; },
+                         [&](Tile& tile, std::size_t k) { lot[k] = moments_of(models, folds, &tile); }, add);
+  std::vector<std::vector<TorqueError>> out(models.size());
+  for (std::size_t m = 0; m < models.size(); ++m)
+    for (std::size_t j = 0; j < driven.size(); ++j)
+      out[m].push_back(all[m][j].error(problem.robot.joints[driven[j]].name));
+  return out;
+}
+
+}  // namespace
+
 std::vector<TorqueErrors> errors_of(const Problem& problem,
                                     const std::vector<std::pair<std::string, TorqueModel>>& models) {
-  const std::size_t joints = problem.robot.driven_count();
-  const std::vector<std::size_t> driven = problem.robot.driven_joints();
+  std::vector<std::vector<TorqueError>> held_out = errors_on(problem.test, problem, models);
+  std::vector<std::vector<TorqueError>> train = errors_on(problem.train, problem, models);
   std::vector<TorqueErrors> out(models.size());
-  for (const bool held : {true, false}) {
-    const Folds& folds = held ? problem.test : problem.train;
-    std::vector<ModelMoments> lot(Tiles::kTogether);
-    ModelMoments all(models.size(), std::vector<Moments>(joints));
-    const auto add = [&](std::size_t k) {
-      for (std::size_t m = 0; m < models.size(); ++m)
-        for (std::size_t j = 0; j < joints; ++j) all[m][j].add(lot[k][m][j]);
-    };
-    problem.tiles.for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; },
-                           [&](Tile& tile, std::size_t k) { lot[k] = moments_of(models, folds, &tile); }, add);
-    for (std::size_t m = 0; m < models.size(); ++m) {
-      out[m].model = models[m].first;
-      std::vector<TorqueError>& list = held ? out[m].held_out : out[m].train;
-      for (std::size_t j = 0; j < joints; ++j) list.push_back(all[m][j].error(problem.robot.joints[driven[j]].name));
-    }
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    out[m].model = models[m].first;
+    out[m].held_out = std::move(held_out[m]);
+    out[m].train = std::move(train[m]);
   }
   return out;
+}
+
+// --- the turn of friction ------------------------------------------------------------------------
+
+void choose_turns(Problem* problem, const std::function<TorqueModel()>& model_with) {
+  constexpr FrictionTurn kTurns[] = {{0.01, 0.0}, {1e-3, 0.0}, {3e-4, 0.0}, {0.01, 1e-6}, {0.01, 1e-5}, {0.01, 1e-4}};
+  const auto set = [&](const std::vector<FrictionTurn>& turns) {
+    problem->range.turns = turns;
+    problem->nominal = problem->nominal.turning(turns);
+  };
+  const std::size_t joints = problem->robot.driven_count();
+  std::vector<double> least(joints, std::numeric_limits<double>::infinity());
+  std::vector<FrictionTurn> chosen(joints);
+  for (const FrictionTurn& turn : kTurns) {
+    set(std::vector<FrictionTurn>(joints, turn));
+    const std::vector<TorqueError> errors = errors_on(problem->train, *problem, {{"", model_with()}}).front();
+    for (std::size_t j = 0; j < joints; ++j) {
+      if (errors[j].rms >= least[j]) continue;
+      least[j] = errors[j].rms;
+      chosen[j] = turn;
+    }
+  }
+  set(chosen);
+}
+
+Groundwork groundwork_of(Problem* problem) {
+  if (!problem->fitted_before) choose_turns(problem, [&] { return fitted_groundwork(*problem).model; });
+  return fitted_groundwork(*problem);
 }
 
 }  // namespace truing::dynamics

@@ -87,10 +87,11 @@ struct Groundwork {
 /// How friction turns is chosen first (choose_turns).
 Groundwork groundwork_of(Problem* problem);
 
-/// Sets MotionRange::turns, and those of the nominal model, to what leaves the smallest errors at every joint. Friction
-/// that a model turns more slowly than the joint does, or forgets at rest, would look like presliding and like
-/// Stribeck's curve. `noise_with`: the errors with the turns that are set.
-void choose_turns(Problem* problem, const std::function<std::vector<Noise>()>& noise_with);
+/// Sets MotionRange::turns, and those of the nominal model, to what leaves the smallest errors at every joint on the
+/// training rows, those at rest included: how friction is left at rest is part of how it turns. Friction that a model
+/// turns more slowly than the joint does, or forgets at rest, would look like presliding and like Stribeck's curve.
+/// `model_with`: the model fitted with the turns that are set.
+void choose_turns(Problem* problem, const std::function<TorqueModel()>& model_with);
 
 /// The robot with what a fit found: link inertias added to its links, effects to its torque effects.
 Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<int>& groups, const Fit& fit,
@@ -101,6 +102,9 @@ TorqueModel model_of(const Robot& robot, const Problem& problem);
 
 /// Names, values and standard errors of some columns, constants among them.
 std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vector<int>& columns, const Fit& fit);
+
+/// Covariance of those of a fit's parameters that are not frozen.
+Eigen::MatrixXd covariance_of(const TorqueDesign& design, const Fit& fit, const std::vector<Parameter>& parameters);
 
 /// Errors of models on held-out and training rows, both sides low-passed, rows at rest included.
 std::vector<TorqueErrors> errors_of(const Problem& problem,

@@ -3,59 +3,28 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
+
 #include <doctest/doctest.h>
 
-#include "math/random.hpp"
+#include "dynamics/judge.hpp"
 #include "support/sanitized.hpp"
+#include "support/swung_arm.hpp"
 #include "truing/dynamics.hpp"
 
 using namespace truing;
-using truing::math::Random;
+using swung::level_arm;
+using swung::measured;
+using swung::swing;
+using swung::with_friction;
 
 namespace {
-
-/// Two links that turn about parallel, level axes.
-Robot arm() {
-  Robot out;
-  out.name = "arm";
-  for (const char* name : {"J1", "J2"}) {
-    Joint joint;
-    joint.name = name;
-    joint.a = 0.4;
-    joint.alpha = 0.0;
-    joint.mass = 3.0;
-    joint.center_of_mass = {-0.2, 0.0, 0.0};
-    joint.inertia = Eigen::Vector3d(0.004, 0.04, 0.04).asDiagonal();
-    out.joints.push_back(joint);
-  }
-  out.gravity = {0.0, -9.81, 0.0};
-  out.targets = {{"tool", Eigen::Isometry3d::Identity()}};
-  return out;
-}
-
-Recording motion(int number, double seconds) {
-  Recording out;
-  out.name = "motion" + std::to_string(number);
-  const auto rows = static_cast<Eigen::Index>(100.0 * seconds);
-  out.time = Eigen::VectorXd::LinSpaced(rows, 0.0, 0.01 * static_cast<double>(rows - 1));
-  out.position.resize(rows, 2);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const double t = out.time[i], phase = 1.3 * number;
-    out.position(i, 0) = 0.8 * std::sin(0.9 * t + phase) + 0.3 * std::sin(2.3 * t);
-    out.position(i, 1) = 0.9 * std::sin(1.1 * t + 2.0 * phase) + 0.3 * std::cos(2.9 * t + phase);
-  }
-  return out;
-}
 
 std::vector<Recording> recorded(const Robot& truth, const std::vector<TorqueEffect>& own = {}) {
   std::vector<Recording> out;
   for (int k = 0; k < 5; ++k) {
-    Recording one = motion(k, kSanitized ? 8.0 : 20.0);
-    one.torque = dynamics::predict(truth, one, 30.0, own).torque;
-    Random random(static_cast<std::uint64_t>(k));
-    for (double& value : one.torque.reshaped()) value += 0.05 * random.normal();
-    one.test = k > 2;
-    out.push_back(one);
+    out.push_back(measured(truth, swing(k, kSanitized ? 8.0 : 20.0), static_cast<std::uint64_t>(k), own));
+    out.back().test = k > 2;
   }
   return out;
 }
@@ -65,21 +34,12 @@ const FoundTorqueEffect* found(const TorqueDiagnosis& d, const std::string& effe
   return at == d.effects.end() ? nullptr : &*at;
 }
 
-Robot with_friction() {
-  Robot out = arm();
-  for (const char* name : {"J1", "J2"}) {
-    out.torque_effects.push_back({"coulomb", {name}, {{std::string("coulomb.") + name, 1.5}}});
-    out.torque_effects.push_back({"viscous", {name}, {{std::string("viscous.") + name, 0.8}}});
-  }
-  return out;
-}
-
 }  // namespace
 
 TEST_CASE("a spring that nobody put into the model is named with its stiffness") {
-  Robot truth = with_friction();
+  Robot truth = with_friction(level_arm());
   truth.torque_effects.push_back({"spring", {"J2"}, {{"spring.J2", 4.0}}});
-  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(truth));
+  const TorqueDiagnosis d = dynamics::diagnose(level_arm(), recorded(truth));
   REQUIRE(!d.effects.empty());
   CHECK(d.effects.front().effect == "spring");
   CHECK(d.effects.front().joints == std::vector<std::string>{"J2"});
@@ -88,11 +48,11 @@ TEST_CASE("a spring that nobody put into the model is named with its stiffness")
 }
 
 TEST_CASE("a load at the flange is named with its mass, and with the link that looks the same") {
-  Robot truth = with_friction();
+  Robot truth = with_friction(level_arm());
   truth.joints[1].mass = 3.0 + 1.0;  // of a load at the last frame's origin
   truth.joints[1].center_of_mass = {-0.15, 0.0, 0.0};
   truth.joints[1].inertia = Eigen::Vector3d(0.004, 0.07, 0.07).asDiagonal();  // 3 kg at -0.2, 1 kg at 0
-  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(truth));
+  const TorqueDiagnosis d = dynamics::diagnose(level_arm(), recorded(truth));
   REQUIRE(!d.effects.empty());
   const FoundTorqueEffect& first = d.effects.front();
   CHECK(!first.standard);
@@ -117,11 +77,11 @@ TEST_CASE("an effect of one's own is named like the catalogue's") {
                              };
                              return std::vector<TorqueForm>{{term}};
                            }};
-  Robot truth = with_friction();
+  Robot truth = with_friction(level_arm());
   truth.torque_effects.push_back({"cable", {"J1"}, {{"cable.J1", 5.0}}});
   TorqueDiagnoseOptions options;
   options.own_effects = {cable};
-  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(truth, {cable}), options);
+  const TorqueDiagnosis d = dynamics::diagnose(level_arm(), recorded(truth, {cable}), options);
   const FoundTorqueEffect* named = found(d, "cable");
   REQUIRE(named != nullptr);
   CHECK(named->joints == std::vector<std::string>{"J1"});
@@ -129,42 +89,42 @@ TEST_CASE("an effect of one's own is named like the catalogue's") {
 }
 
 TEST_CASE("friction alone is standard practice, and no gap beyond it is named") {
-  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(with_friction()));
+  const TorqueDiagnosis d = dynamics::diagnose(level_arm(), recorded(with_friction(level_arm())));
   CHECK(d.verdict == Verdict::none);
   for (const FoundTorqueEffect& effect : d.effects) CHECK(effect.standard);
 }
 
 TEST_CASE("drives' constants are not searched for beside masses that are fitted") {
-  const TorqueDiagnosis d = dynamics::diagnose(arm(), recorded(with_friction()));
+  const TorqueDiagnosis d = dynamics::diagnose(level_arm(), recorded(with_friction(level_arm())));
   CHECK(std::any_of(d.not_testable.begin(), d.not_testable.end(),
                     [](const NotTestable& n) { return n.reason == Untestable::same_as_masses; }));
 }
 
 TEST_CASE("what cannot be used is refused in words") {
-  std::vector<Recording> recordings = recorded(with_friction());
+  std::vector<Recording> recordings = recorded(with_friction(level_arm()));
   TorqueDiagnoseOptions options;
   options.cutoff = 0.0;
-  CHECK_THROWS_WITH_AS(dynamics::diagnose(arm(), recordings, options), "cutoff must be above 0 Hz",
+  CHECK_THROWS_WITH_AS(dynamics::diagnose(level_arm(), recordings, options), "cutoff must be above 0 Hz",
                        std::invalid_argument);
-  CHECK_THROWS_WITH_AS(dynamics::diagnose(arm(), {}), "there are no recordings", std::invalid_argument);
-  Robot massless = arm();
+  CHECK_THROWS_WITH_AS(dynamics::diagnose(level_arm(), {}), "there are no recordings", std::invalid_argument);
+  Robot massless = level_arm();
   for (Joint& joint : massless.joints) joint.mass.reset();
   CHECK_THROWS_AS(dynamics::diagnose(massless, recordings), std::invalid_argument);
   recordings.front().torque.resize(0, 0);
-  CHECK_THROWS_AS(dynamics::diagnose(arm(), recordings), std::invalid_argument);
+  CHECK_THROWS_AS(dynamics::diagnose(level_arm(), recordings), std::invalid_argument);
 }
 
 TEST_CASE("recordings are parted so that some are fitted and some are held out") {
-  std::vector<Recording> recordings = recorded(with_friction());
+  std::vector<Recording> recordings = recorded(with_friction(level_arm()));
   for (Recording& one : recordings) one.test = true;
-  CHECK_THROWS_WITH_AS(dynamics::diagnose(arm(), recordings),
+  CHECK_THROWS_WITH_AS(dynamics::diagnose(level_arm(), recordings),
                        "all recordings are marked as test (column set): none is left to be fitted",
                        std::invalid_argument);
   for (Recording& one : recordings) one.test = false;
-  const TorqueFit five = dynamics::identify(arm(), recordings);
+  const TorqueFit five = dynamics::identify(level_arm(), recordings);
   CHECK(five.held_out.size() == 2);
   recordings.resize(3);
-  const TorqueFit three = dynamics::identify(arm(), recordings);
+  const TorqueFit three = dynamics::identify(level_arm(), recordings);
   CHECK(three.held_out == std::vector<std::string>{"blocks of time"});
   for (const TorqueFit* fit : {&five, &three}) {
     for (const TorqueErrors& errors : fit->errors) CHECK(errors.held_out.front().n > 0.0);
@@ -172,13 +132,13 @@ TEST_CASE("recordings are parted so that some are fitted and some are held out")
 }
 
 TEST_CASE("recordings in which nothing moves are refused") {
-  std::vector<Recording> recordings = recorded(with_friction());
+  std::vector<Recording> recordings = recorded(with_friction(level_arm()));
   for (Recording& one : recordings) one.position.setConstant(0.3);
-  CHECK_THROWS_AS(dynamics::diagnose(arm(), recordings), std::invalid_argument);
+  CHECK_THROWS_AS(dynamics::diagnose(level_arm(), recordings), std::invalid_argument);
 }
 
 TEST_CASE("what does not hold on held-out recordings is said first, and is not in the robot") {
-  Robot one = with_friction(), other = with_friction();
+  Robot one = with_friction(level_arm()), other = with_friction(level_arm());
   one.torque_effects.push_back({"spring", {"J2"}, {{"spring.J2", 4.0}}});
   other.torque_effects.push_back({"spring", {"J2"}, {{"spring.J2", -4.0}}});
   std::vector<Recording> recordings = recorded(one);
@@ -186,11 +146,43 @@ TEST_CASE("what does not hold on held-out recordings is said first, and is not i
   for (std::size_t k = 0; k < recordings.size(); ++k) {
     if (recordings[k].test) recordings[k] = others[k];
   }
-  const TorqueDiagnosis d = dynamics::diagnose(arm(), recordings);
+  const TorqueDiagnosis d = dynamics::diagnose(level_arm(), recordings);
   REQUIRE(found(d, "spring") != nullptr);
   CHECK(d.verdict == Verdict::does_not_hold);
   CHECK(std::none_of(d.robot.torque_effects.begin(), d.robot.torque_effects.end(),
                      [](const AppliedEffect& e) { return e.effect == "spring"; }));
   CHECK(std::any_of(d.robot.torque_effects.begin(), d.robot.torque_effects.end(),
                     [](const AppliedEffect& e) { return e.effect == "coulomb"; }));
+}
+
+TEST_CASE("joints at which standard practice predicts better are said with both errors") {
+  const auto errors = [](double first, double second) {
+    TorqueErrors out;
+    out.held_out = {{"J1", 1.0, first, 100.0}, {"J2", 1.0, second, 100.0}};
+    return out;
+  };
+  CHECK(dynamics::worse_joints(errors(5.0, 24.3), errors(3.0, 31.4)) ==
+        std::vector<std::string>{"J2 (31.4 % in place of 24.3 %)"});
+  CHECK(dynamics::worse_joints(errors(5.0, 24.3), errors(5.1, 24.0)).empty());  // rounding is not worse
+}
+
+TEST_CASE("the covariance is that of the parameters, whose standard errors are on its diagonal") {
+  const auto agree = [](const std::vector<Parameter>& parameters, const Eigen::MatrixXd& covariance) {
+    Eigen::Index k = 0;
+    for (const Parameter& parameter : parameters) {
+      if (parameter.frozen) continue;
+      CHECK(std::sqrt(covariance(k, k)) == doctest::Approx(parameter.sigma).epsilon(1e-12));
+      ++k;
+    }
+    CHECK(covariance.rows() == k);
+    CHECK(covariance.isApprox(covariance.transpose(), 1e-9));
+    CHECK(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(covariance).eigenvalues().minCoeff() > 0.0);
+  };
+  const auto recordings = recorded(with_friction(level_arm()));
+  const TorqueFit fit = dynamics::identify(level_arm(), recordings);
+  agree(fit.parameters, fit.covariance);
+  const TorqueDiagnosis found = dynamics::diagnose(level_arm(), recordings);
+  std::vector<Parameter> all;
+  for (const FoundTorqueEffect& e : found.effects) all.insert(all.end(), e.parameters.begin(), e.parameters.end());
+  agree(all, found.covariance);
 }

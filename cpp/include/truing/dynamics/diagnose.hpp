@@ -96,6 +96,7 @@ struct TorqueDiagnosis {
   /// Beyond standard practice, by share: what `identify` would not have fitted unasked and is likelier than not, then
   /// the others; then what is standard.
   std::vector<FoundTorqueEffect> effects;
+  Eigen::MatrixXd covariance;  ///< shape=(m, m): of the effects' parameters that are not frozen, one after the other
   std::vector<UnknownTorque> unknown;     ///< what no effect explains
   std::vector<TorqueErrors> errors;       ///< 'nominal', 'standard', 'named', 'with_unknown'
   std::vector<TorqueRegime> where;        ///< the gap by joint and part of the motion

@@ -52,6 +52,7 @@ struct TorqueErrors {
 struct TorqueFit {
   Robot robot;                        ///< with the inertial parameters and Robot::torque_effects that were found
   std::vector<Parameter> parameters;  ///< of the effects, with standard errors; 'link_inertia…': change from nominal
+  Eigen::MatrixXd covariance;         ///< shape=(m, m): of the parameters that are not frozen, in their order
   std::vector<TorqueErrors> errors;   ///< 'nominal', 'standard' (what is usual), 'named' (what was asked for)
   double cutoff = 0.0;                ///< [Hz] of the low-pass
   std::vector<std::string>
