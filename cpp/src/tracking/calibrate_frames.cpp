@@ -392,6 +392,10 @@ TrackSetup assemble_setup(const FramesResult& frames, const ToolResult& tool, co
   out.gravity = frames.T_tracker_base.T.linear().transpose() * inertial.gravity;
   out.clock_offset = inertial.clock_offset;
   out.clock_offset_sigma = inertial.clock_offset_sigma;
+  out.gyro_bias = inertial.gyro_bias;
+  out.accel_bias = inertial.accel_bias;
+  out.gyro_bias_sigma = inertial.gyro_bias_sigma;
+  out.accel_bias_sigma = inertial.accel_bias_sigma;
   if (notes) {
     const double tilt = std::acos(std::clamp(-out.gravity.z() / out.gravity.norm(), -1.0, 1.0));
     if (tilt > kDegree)

@@ -505,6 +505,8 @@ void set_values(const Unknowns& x, const GlobalMatrix& covariance, InertialResul
   out->clock_offset_sigma = std::sqrt(covariance(kTau, kTau));
   out->gyro_bias = x.gyro_bias;
   out->accel_bias = x.accel_bias;
+  out->gyro_bias_sigma = std::sqrt(covariance.diagonal().segment<3>(kGyroBias).mean());
+  out->accel_bias_sigma = std::sqrt(covariance.diagonal().segment<3>(kAccelBias).mean());
 }
 
 void set_words(const Fit& fit, const InertialOptions& options, InertialResult* out) {

@@ -583,11 +583,19 @@ void PoseFilter::start_from(const Event& first) {
   const auto set = [&](int place, int n, double sigma) {
     base_.P.diagonal().segment(place, n).setConstant(sigma * sigma);
   };
+  // A bias that was calibrated has changed since: switched off and on, warmed up. Never less is known than of any
+  // sensor.
+  const auto start_bias = [&](const Vector3d& known, double sigma, double change, int place, double unknown,
+                              Vector3d* bias) {
+    if (sigma > 0.0) *bias = known;
+    set(place, 3, sigma > 0.0 ? std::min(unknown, std::hypot(sigma, change)) : unknown);
+  };
   set(kP, 3, 100.0 * o.position_sigma);
   set(kV, 3, 1.0);
   set(kTheta, 3, 100.0 * o.rotation_sigma);
-  set(kGyroBias, 3, o.gyro_bias);
-  set(kAccelBias, 3, o.accel_bias);
+  start_bias(setup_.gyro_bias, setup_.gyro_bias_sigma, o.gyro_bias_change, kGyroBias, o.gyro_bias, &base_.x.gyro_bias);
+  start_bias(setup_.accel_bias, setup_.accel_bias_sigma, o.accel_bias_change, kAccelBias, o.accel_bias,
+             &base_.x.accel_bias);
   set(kClock, 1, setup_.clock_offset_sigma);
   set(kDrift, 1, setup_.clock_offset_sigma > 0.0 ? o.clock_drift : 0.0);
   set(kSlowP, 3, o.slow_position);

@@ -55,6 +55,10 @@ _FARTHEST = 100.0  # [m] no tracker sees farther, no arm reaches farther
 _FASTEST = 35.0  # [rad/s] what gyros end at: 2000 deg/s
 _GRAVITY = (7.0, 13.0)  # [m/s^2] median of the specific force's length
 _FASTEST_DRIFT = 0.01  # [s/s]
+_LARGEST_BIAS = {
+    "gyro_bias_rad_s": 0.5,
+    "accel_bias_m_s2": 3.0,
+}  # beyond those of cheap sensors, far below motion
 _FEWEST = 2
 
 
@@ -614,6 +618,10 @@ class _SetupFile(Strict):
     clock_reference_s: Number = Decimal(0)
     controller_clock_offset_s: Number = Decimal(0)
     actuator_lag_s: Annotated[Decimal, PlainValidator(_not_negative)] = Decimal(0)
+    gyro_bias_rad_s: Vector3 = (Decimal(0), Decimal(0), Decimal(0))
+    gyro_bias_sigma_rad_s: Annotated[Decimal, PlainValidator(_not_negative)] = Decimal(0)
+    accel_bias_m_s2: Vector3 = (Decimal(0), Decimal(0), Decimal(0))
+    accel_bias_sigma_m_s2: Annotated[Decimal, PlainValidator(_not_negative)] = Decimal(0)
     modes: list[_Mode] = []
     filter: FreeMapping = {}
     limits: FreeMapping = {}
@@ -657,6 +665,10 @@ def load_setup(path: PathLike) -> SetupData:
         clock_offset_sigma=float(file.clock_offset_sigma_s),
         controller_clock_offset=float(file.controller_clock_offset_s),
         actuator_lag=float(file.actuator_lag_s),
+        gyro_bias=_bias(document, file, "gyro_bias_rad_s"),
+        accel_bias=_bias(document, file, "accel_bias_m_s2"),
+        gyro_bias_sigma=float(file.gyro_bias_sigma_rad_s),
+        accel_bias_sigma=float(file.accel_bias_sigma_m_s2),
     )
     options = {
         "filter": _numbers(document, "filter", file.filter, _core.FilterOptions()),
@@ -704,6 +716,17 @@ def _gravity(document: Document, file: _SetupFile) -> Floats:
             f"has length {np.linalg.norm(gravity):.4g}, expected about 9.81 m/s^2, such as [0, 0, -9.81]",
         )
     return gravity
+
+
+def _bias(document: Document, file: _SetupFile, name: str) -> Floats:
+    bias = np.array([float(value) for value in getattr(file, name)])
+    largest = _LARGEST_BIAS[name]
+    if np.abs(bias).max() > largest:
+        document.refuse(
+            (name,),
+            f"found {np.abs(bias).max():.4g}, expected at most {largest:g}: no inertial sensor is so far off",
+        )
+    return bias
 
 
 def _modes(document: Document, modes: Sequence[_Mode]) -> _core.ModalModel:
@@ -775,6 +798,12 @@ def save_setup(path: PathLike, data: SetupData) -> None:
         ),
         f"actuator_lag_s: {setup.actuator_lag!r}  # joints are where the plan was so long ago",
     ]
+    for bias, unit in (("gyro_bias", "rad_s"), ("accel_bias", "m_s2")):
+        if getattr(setup, f"{bias}_sigma") > 0:
+            lines += [
+                f"{bias}_{unit}: {_row(np.asarray(getattr(setup, bias)))}  # when it was calibrated",
+                f"{bias}_sigma_{unit}: {getattr(setup, f'{bias}_sigma')!r}  # standard error; 0: not known",
+            ]
     modes = data.modes
     if modes.count:
         lines.append("modes:")

@@ -279,6 +279,34 @@ TEST_CASE("inertial sensor, gravity and clock without noise: seed 1") {
   CHECK(r.position_rms < 2e-5);
 }
 
+TEST_CASE("biases of the inertial sensor are within their standard errors, and go into the set-up: seeds 1 to 4") {
+  const Vector3d gyro(4e-3, -3e-3, 2e-3), accel(0.05, -0.04, 0.03);
+  for (std::uint64_t seed = 1; seed <= (kSanitized ? 1 : 4); ++seed) {
+    StreamSimulationOptions options;
+    options.motion = SimulatedMotion::stop_and_go;
+    options.tip_speed = 1.0;
+    options.seconds = 40.0;
+    options.seed = seed;
+    options.imu.gyro_bias = options.imu.accel_bias = options.imu.gyro_bias_walk = options.imu.accel_bias_walk = 0.0;
+    SimulatedStreams s = simulate_streams(large_boom(), options);
+    for (ImuSample& sample : s.imu) {
+      sample.gyro += gyro;
+      sample.accel += accel;
+    }
+    const InertialResult r = calibrate_inertial(s.imu, in_order(s.tracker));
+    REQUIRE(r.status == CalibrationStatus::done);
+    CHECK((r.gyro_bias - gyro).norm() < 4.0 * std::sqrt(3.0) * r.gyro_bias_sigma);
+    CHECK((r.accel_bias - accel).norm() < 4.0 * std::sqrt(3.0) * r.accel_bias_sigma);
+    CHECK(r.gyro_bias_sigma < 1e-3);
+    CHECK(r.accel_bias_sigma < 0.1);
+    const TrackSetup setup = assemble_setup(FramesResult{}, ToolResult{}, r);
+    CHECK(setup.gyro_bias == r.gyro_bias);
+    CHECK(setup.accel_bias == r.accel_bias);
+    CHECK(setup.gyro_bias_sigma == r.gyro_bias_sigma);
+    CHECK(setup.accel_bias_sigma == r.accel_bias_sigma);
+  }
+}
+
 TEST_CASE("standard errors of clock, lever arm and orientation hold over 24 seeds") {
   double clock = 0.0, lever = 0.0, turn = 0.0;
   const int seeds = kSanitized ? 1 : 24;

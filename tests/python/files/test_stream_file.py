@@ -362,7 +362,14 @@ def setup_data() -> SetupData:
     A = rng.normal(size=(6, 6))
     modes = ModalModel([0.6, 1.4], [0.02, 0.015], rng.normal(size=(2, 6, 3)), [0.01, 0.02])
     setup = recording().setup.replace(
-        clock_offset=0.008, clock_offset_sigma=0.001, controller_clock_offset=-0.5, gravity=[0.1, 0.0, -9.80]
+        clock_offset=0.008,
+        clock_offset_sigma=0.001,
+        controller_clock_offset=-0.5,
+        gravity=[0.1, 0.0, -9.80],
+        gyro_bias=[1e-3, -2e-3, 3e-4],
+        gyro_bias_sigma=2e-5,
+        accel_bias=[0.02, 0.01, -0.05],
+        accel_bias_sigma=4e-3,
     )
     return SetupData(
         setup,
@@ -384,6 +391,9 @@ def test_a_set_up_comes_back_as_it_was_written(tmp_path: Path) -> None:
         assert np.allclose(getattr(read.setup, name), getattr(given_data.setup, name), atol=1e-14)
     for name in ("clock_offset", "clock_offset_sigma", "controller_clock_offset", "actuator_lag"):
         assert getattr(read.setup, name) == getattr(given_data.setup, name)
+    for name in ("gyro_bias", "accel_bias"):
+        assert (getattr(read.setup, name) == getattr(given_data.setup, name)).all()
+        assert getattr(read.setup, f"{name}_sigma") == getattr(given_data.setup, f"{name}_sigma")
     assert np.allclose(
         read.covariance["T_tracker_base"], given_data.covariance["T_tracker_base"], rtol=1e-12, atol=0
     )
@@ -445,6 +455,11 @@ def test_millimetres_of_a_set_up_are_read_as_metres(tmp_path: Path) -> None:
             "frequency_hz: 0.6",
             "frequency_hz: 60",
             r"modes\[0\] frequency_hz: found 60, expected a frequency between 0 and 25 Hz",
+        ),
+        (
+            "gyro_bias_rad_s: [0.001,",
+            "gyro_bias_rad_s: [1.0,",
+            r"gyro_bias_rad_s: found 1, expected at most 0\.5: no inertial sensor is so far off",
         ),
         ("damping: 0.02", "damping: .nan", r"modes\[0\] damping: found NaN"),
         ("  qw: ", "  qw: 3", r"qw: the quaternion has length .*, expected 1"),

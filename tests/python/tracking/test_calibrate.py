@@ -161,6 +161,15 @@ def test_three_clocks_are_told_apart() -> None:
     assert found.actuator_lag == pytest.approx(TRUE.actuator_lag, abs=2e-3)
 
 
+def test_the_biases_that_were_found_stand_in_the_set_up() -> None:
+    found, setup = calibrated(), calibrated().where.setup
+    assert found.inertial is not None
+    assert (setup.gyro_bias == found.inertial.gyro_bias).all()
+    assert (setup.accel_bias == found.inertial.accel_bias).all()
+    assert 0 < setup.gyro_bias_sigma < 1e-3
+    assert 0 < setup.accel_bias_sigma < 0.1
+
+
 def test_devices_that_began_at_other_times_are_aligned_and_it_is_said() -> None:
     r = recording()
     imu = dataclasses.replace(r.imu, t=r.imu.t + 600.0)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -332,5 +333,12 @@ def test_ctrl_c_leaves_nothing(recording: Path, tmp_path: Path, monkeypatch: pyt
         raise KeyboardInterrupt
 
     monkeypatch.setattr(truing, "replay", interrupted)
-    assert main(arguments(recording, "--out", str(tmp_path / "out"))) == 130
+    done = threading.Event()
+    other = threading.Thread(target=done.wait)  # the caller's, who goes on
+    other.start()
+    try:
+        assert main(arguments(recording, "--out", str(tmp_path / "out"))) == 130
+    finally:
+        done.set()
+        other.join()
     assert not (tmp_path / "out").exists() and not list(tmp_path.iterdir())

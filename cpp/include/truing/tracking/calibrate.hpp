@@ -127,6 +127,8 @@ struct InertialResult {
   std::string advice;                                            ///< what would make it so
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();           ///< shape=(3,) [rad/s]
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();          ///< shape=(3,) [m/s^2]
+  double gyro_bias_sigma = 0.0;                                  ///< [rad/s] standard error, rms over the components
+  double accel_bias_sigma = 0.0;                                 ///< [m/s^2] likewise
   /// shape=(3,) [rad/s] rms about the three principal axes, descending.
   Eigen::Vector3d rotation_rate = Eigen::Vector3d::Zero();
   double position_rms = 0.0;  ///< [m] residual of one component

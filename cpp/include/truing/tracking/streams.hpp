@@ -47,6 +47,10 @@ struct TrackSetup {
   double clock_offset_sigma = 0.0;       ///< [s] standard error of `clock_offset`; 0: known, and not estimated
   double controller_clock_offset = 0.0;  ///< [s] t_imu = t_controller - controller_clock_offset
   double actuator_lag = 0.0;             ///< [s] delay of the joints behind the plan
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< shape=(3,) [rad/s] as it was when it was calibrated
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< shape=(3,) [m/s^2] likewise
+  double gyro_bias_sigma = 0.0;                          ///< [rad/s] its standard error, one component; 0: not known
+  double accel_bias_sigma = 0.0;                         ///< [m/s^2] likewise
 };
 
 }  // namespace truing

@@ -52,8 +52,10 @@ struct FilterOptions {
   double highest_pose_rate = 400.0;  ///< [Hz] likewise
   double gyro_noise = 1e-4;          ///< [rad/s/sqrt(Hz)] noise density
   double accel_noise = 1e-3;         ///< [m/s^2/sqrt(Hz)] noise density
-  double gyro_bias = 1e-2;           ///< [rad/s] standard deviation before any data
-  double accel_bias = 1e-1;          ///< [m/s^2] standard deviation before any data
+  double gyro_bias = 1e-2;           ///< [rad/s] standard deviation before any data, of a sensor not calibrated
+  double accel_bias = 1e-1;          ///< [m/s^2] likewise
+  double gyro_bias_change = 2e-3;    ///< [rad/s] standard deviation of its change since it was calibrated
+  double accel_bias_change = 3e-2;   ///< [m/s^2] likewise
   double gyro_bias_walk = 2e-5;      ///< [rad/s/sqrt(s)] random walk of the bias
   double accel_bias_walk = 2e-4;     ///< [m/s^2/sqrt(s)] random walk of the bias
   double imu_scale = 5e-4;           ///< standard deviation of the relative scale error of gyro and accelerometer
