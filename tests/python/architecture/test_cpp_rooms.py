@@ -35,7 +35,7 @@ PUBLIC_OF = {
     "math": COMMON,
     "model": (*COMMON, MODEL),
     "estimation": (*COMMON, MODEL),
-    "identification": (*COMMON, MODEL, "truing/identify.hpp", "truing/review.hpp"),
+    "identification": (*COMMON, MODEL, "truing/identify.hpp", "truing/review.hpp", "truing/fleet.hpp"),
     "planning": (*COMMON, MODEL, "truing/identify.hpp", "truing/diagnose.hpp", "truing/plan.hpp"),
     "diagnosis": (*COMMON, MODEL, "truing/identify.hpp", "truing/diagnose.hpp"),
     "inverse_kinematics": (
@@ -62,6 +62,7 @@ PUBLIC_OF = {
 ROOM_OF_PUBLIC = {
     "truing/identify.hpp": "identification",
     "truing/review.hpp": "identification",
+    "truing/fleet.hpp": "identification",
     "truing/diagnose.hpp": "diagnosis",
     "truing/plan.hpp": "planning",
     "truing/inverse.hpp": "inverse_kinematics",
