@@ -32,6 +32,7 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_scene(m);
   truing::python::bind_identify(m);
   truing::python::bind_review(m);
+  truing::python::bind_fleet(m);
   truing::python::bind_plan(m);
   truing::python::bind_diagnose(m);
   truing::python::bind_handeye(m);
@@ -45,4 +46,5 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_rigid(m);
   truing::python::bind_torque(m);
   truing::python::bind_torque_plan(m);
+  truing::python::bind_servo(m);
 }

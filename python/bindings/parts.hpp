@@ -20,6 +20,7 @@ void bind_torque_regressor(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_identify(py::module_& m);
 void bind_review(py::module_& m);
+void bind_fleet(py::module_& m);
 void bind_plan(py::module_& m);
 void bind_diagnose(py::module_& m);
 void bind_handeye(py::module_& m);
@@ -30,6 +31,7 @@ void bind_tracker(py::module_& m);
 void bind_replay(py::module_& m);
 void bind_simulation(py::module_& m);
 void bind_rigid(py::module_& m);
+void bind_servo(py::module_& m);
 void bind_calibrate(py::module_& m);
 
 }  // namespace truing::python

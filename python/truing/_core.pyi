@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'Frozen', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'SanityFinding', 'Scene', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueClass', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'simulate_streams', 'torque_effects', 'torque_regressor', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'ColumnGain', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'FreeParameter', 'Frozen', 'GroupChoice', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'RowSums', 'SanityFinding', 'Scene', 'SeenColumns', 'ServoArm', 'ServoBodies', 'ServoRecording', 'ServoSet', 'ServoWindow', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueClass', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'choose_groups', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'free_parameters', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'rank_columns', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_at', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'seen_columns', 'servo_fields', 'servo_inputs', 'simulate_servos', 'simulate_streams', 'sum_rows', 'torque_effects', 'torque_regressor', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -1568,6 +1568,126 @@ class Mistake:
     def text(self) -> str:
         """
         What is wrong, and what to do, in sentences.
+        """
+class FreeParameter:
+    """
+    A parameter that some rows may determine, and where a fit of it starts.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        """
+        Full name, as in a result: J2.a, base.rz, backlash.J3.
+        """
+    @property
+    def role(self) -> str:
+        """
+        Base, geometry, offset, ratio, target, anchor or effect.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        m, rad, - ….
+        """
+    @property
+    def value(self) -> float:
+        """
+        Of the robot as given, in `unit`; frames turn from where they stand, so rx ry rz are 0.
+        """
+class RowSums:
+    """
+    Normal equations of rows, and the errors of each.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def gradient(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shape=(p,): J^T W r, r predicted minus measured.
+        """
+    @property
+    def gram(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(p, p): J^T W J.
+        """
+    @property
+    def position_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(n,) [m] length of every row's position or distance error.
+        """
+    @property
+    def rotation_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(n,) [rad] of its rotation error, NaN: not measured; empty: none is.
+        """
+    @property
+    def scores(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(p, p): sum over poses of g g^T, g = J^T W r of the pose's rows; empty: not asked.
+        """
+    @property
+    def squares(self) -> float:
+        """
+        r^T W r.
+        """
+    @property
+    def units(self) -> tuple[str, ...]:
+        """
+        Of the parameters.
+        """
+    @property
+    def values(self) -> int:
+        """
+        Measured numbers that went in.
+        """
+class SeenColumns:
+    """
+    Which columns of a Gram matrix it can see.
+    """
+    @property
+    def combination(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(kept, frozen): a frozen column is the kept ones times this.
+        """
+    @property
+    def frozen(self) -> tuple[int, ...]:
+        """
+        Columns that those kept explain.
+        """
+    @property
+    def kept(self) -> tuple[int, ...]:
+        """
+        Columns to fit, in increasing order.
+        """
+class GroupChoice:
+    """
+    Which groups of columns explain y, from normal equations of y = X theta + noise alone.
+    """
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """
+        Indices of those chosen.
+        """
+    @property
+    def nats(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        For each of these: log Bayes factor against the choice without it, less its cost.
+        """
+    @property
+    def rivals(self) -> tuple[list[int], ...]:
+        """
+        For each of these: groups that would lose less than 3 nats in its place.
+        """
+    @property
+    def sigma(self) -> float:
+        """
+        Of the noise of one value, in its unit.
+        """
+    @property
+    def solution(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shape=(p,): theta, 0 for columns that are not chosen.
         """
 class PlanOptions:
     """
@@ -4567,8 +4687,12 @@ class TrackSetup:
     clock_offset_sigma = 0.0: [s] standard error of `clock_offset`; 0: known, and not estimated.
     controller_clock_offset = 0.0: [s] t_imu = t_controller - controller_clock_offset.
     actuator_lag = 0.0: [s] delay of the joints behind the plan.
+    gyro_bias = [0.0, 0.0, 0.0]: Shape=(3,) [rad/s] as it was when it was calibrated.
+    accel_bias = [0.0, 0.0, 0.0]: Shape=(3,) [m/s^2] likewise.
+    gyro_bias_sigma = 0.0: [rad/s] its standard error, one component; 0: not known.
+    accel_bias_sigma = 0.0: [m/s^2] likewise.
     """
-    def __init__(self, *, T_tracker_base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_receiver: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_tool: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_imu: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, clock_offset_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0, controller_clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, actuator_lag: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, *, T_tracker_base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_receiver: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_tool: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., T_flange_imu: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] = ..., gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, clock_offset_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0, controller_clock_offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, actuator_lag: typing.SupportsFloat | typing.SupportsIndex = 0.0, gyro_bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., accel_bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ..., gyro_bias_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0, accel_bias_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -4615,6 +4739,22 @@ class TrackSetup:
     def T_tracker_base(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> None:
         ...
     @property
+    def accel_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(3,) [m/s^2] likewise.
+        """
+    @accel_bias.setter
+    def accel_bias(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def accel_bias_sigma(self) -> float:
+        """
+        [m/s^2] likewise.
+        """
+    @accel_bias_sigma.setter
+    def accel_bias_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def actuator_lag(self) -> float:
         """
         [s] delay of the joints behind the plan.
@@ -4653,6 +4793,22 @@ class TrackSetup:
         """
     @gravity.setter
     def gravity(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def gyro_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Shape=(3,) [rad/s] as it was when it was calibrated.
+        """
+    @gyro_bias.setter
+    def gyro_bias(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def gyro_bias_sigma(self) -> float:
+        """
+        [rad/s] its standard error, one component; 0: not known.
+        """
+    @gyro_bias_sigma.setter
+    def gyro_bias_sigma(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
 class ModalModel:
     """
@@ -4712,8 +4868,10 @@ class FilterOptions:
     highest_pose_rate = 400.0: [Hz] likewise.
     gyro_noise = 0.0001: [rad/s/sqrt(Hz)] noise density.
     accel_noise = 0.001: [m/s^2/sqrt(Hz)] noise density.
-    gyro_bias = 0.01: [rad/s] standard deviation before any data.
-    accel_bias = 0.1: [m/s^2] standard deviation before any data.
+    gyro_bias = 0.01: [rad/s] standard deviation before any data, of a sensor not calibrated.
+    accel_bias = 0.1: [m/s^2] likewise.
+    gyro_bias_change = 0.002: [rad/s] standard deviation of its change since it was calibrated.
+    accel_bias_change = 0.03: [m/s^2] likewise.
     gyro_bias_walk = 2e-05: [rad/s/sqrt(s)] random walk of the bias.
     accel_bias_walk = 0.0002: [m/s^2/sqrt(s)] random walk of the bias.
     imu_scale = 0.0005: Standard deviation of the relative scale error of gyro and accelerometer.
@@ -4742,7 +4900,7 @@ class FilterOptions:
     slow_position_walk = 0.003: [m/sqrt(s)] random walk of that deviation.
     slow_rotation_walk = 0.0005: [rad/sqrt(s)] likewise.
     """
-    def __init__(self, *, window: typing.SupportsFloat | typing.SupportsIndex = 0.5, future_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, highest_imu_rate: typing.SupportsFloat | typing.SupportsIndex = 2000.0, highest_pose_rate: typing.SupportsFloat | typing.SupportsIndex = 400.0, gyro_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0001, accel_noise: typing.SupportsFloat | typing.SupportsIndex = 0.001, gyro_bias: typing.SupportsFloat | typing.SupportsIndex = 0.01, accel_bias: typing.SupportsFloat | typing.SupportsIndex = 0.1, gyro_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 2e-05, accel_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0002, imu_scale: typing.SupportsFloat | typing.SupportsIndex = 0.0005, gyro_range: typing.SupportsFloat | typing.SupportsIndex = 34.0, accel_range: typing.SupportsFloat | typing.SupportsIndex = 156.0, largest_gap: typing.SupportsFloat | typing.SupportsIndex = 0.02, restart_gap: typing.SupportsFloat | typing.SupportsIndex = 5.0, gap_acceleration: typing.SupportsFloat | typing.SupportsIndex = 2.0, gap_rate: typing.SupportsFloat | typing.SupportsIndex = 0.2, position_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001, rotation_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001, noise_time: typing.SupportsFloat | typing.SupportsIndex = 10.0, noise_range: typing.SupportsFloat | typing.SupportsIndex = 10.0, gate: typing.SupportsFloat | typing.SupportsIndex = 50.0, reacquire_after: typing.SupportsInt | typing.SupportsIndex = 25, frozen_after: typing.SupportsInt | typing.SupportsIndex = 3, clock_walk: typing.SupportsFloat | typing.SupportsIndex = 2e-05, clock_drift: typing.SupportsFloat | typing.SupportsIndex = 0.0001, clock_drift_walk: typing.SupportsFloat | typing.SupportsIndex = 1e-06, sway_position: typing.SupportsFloat | typing.SupportsIndex = 0.02, sway_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.003, sway_correlation: typing.SupportsFloat | typing.SupportsIndex = 0.5, slow_position: typing.SupportsFloat | typing.SupportsIndex = 0.05, slow_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.02, slow_position_walk: typing.SupportsFloat | typing.SupportsIndex = 0.003, slow_rotation_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0005) -> None:
+    def __init__(self, *, window: typing.SupportsFloat | typing.SupportsIndex = 0.5, future_limit: typing.SupportsFloat | typing.SupportsIndex = 0.1, highest_imu_rate: typing.SupportsFloat | typing.SupportsIndex = 2000.0, highest_pose_rate: typing.SupportsFloat | typing.SupportsIndex = 400.0, gyro_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0001, accel_noise: typing.SupportsFloat | typing.SupportsIndex = 0.001, gyro_bias: typing.SupportsFloat | typing.SupportsIndex = 0.01, accel_bias: typing.SupportsFloat | typing.SupportsIndex = 0.1, gyro_bias_change: typing.SupportsFloat | typing.SupportsIndex = 0.002, accel_bias_change: typing.SupportsFloat | typing.SupportsIndex = 0.03, gyro_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 2e-05, accel_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0002, imu_scale: typing.SupportsFloat | typing.SupportsIndex = 0.0005, gyro_range: typing.SupportsFloat | typing.SupportsIndex = 34.0, accel_range: typing.SupportsFloat | typing.SupportsIndex = 156.0, largest_gap: typing.SupportsFloat | typing.SupportsIndex = 0.02, restart_gap: typing.SupportsFloat | typing.SupportsIndex = 5.0, gap_acceleration: typing.SupportsFloat | typing.SupportsIndex = 2.0, gap_rate: typing.SupportsFloat | typing.SupportsIndex = 0.2, position_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001, rotation_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001, noise_time: typing.SupportsFloat | typing.SupportsIndex = 10.0, noise_range: typing.SupportsFloat | typing.SupportsIndex = 10.0, gate: typing.SupportsFloat | typing.SupportsIndex = 50.0, reacquire_after: typing.SupportsInt | typing.SupportsIndex = 25, frozen_after: typing.SupportsInt | typing.SupportsIndex = 3, clock_walk: typing.SupportsFloat | typing.SupportsIndex = 2e-05, clock_drift: typing.SupportsFloat | typing.SupportsIndex = 0.0001, clock_drift_walk: typing.SupportsFloat | typing.SupportsIndex = 1e-06, sway_position: typing.SupportsFloat | typing.SupportsIndex = 0.02, sway_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.003, sway_correlation: typing.SupportsFloat | typing.SupportsIndex = 0.5, slow_position: typing.SupportsFloat | typing.SupportsIndex = 0.05, slow_rotation: typing.SupportsFloat | typing.SupportsIndex = 0.02, slow_position_walk: typing.SupportsFloat | typing.SupportsIndex = 0.003, slow_rotation_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0005) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -4759,10 +4917,18 @@ class FilterOptions:
     @property
     def accel_bias(self) -> float:
         """
-        [m/s^2] standard deviation before any data.
+        [m/s^2] likewise.
         """
     @accel_bias.setter
     def accel_bias(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accel_bias_change(self) -> float:
+        """
+        [m/s^2] likewise.
+        """
+    @accel_bias_change.setter
+    def accel_bias_change(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def accel_bias_walk(self) -> float:
@@ -4855,10 +5021,18 @@ class FilterOptions:
     @property
     def gyro_bias(self) -> float:
         """
-        [rad/s] standard deviation before any data.
+        [rad/s] standard deviation before any data, of a sensor not calibrated.
         """
     @gyro_bias.setter
     def gyro_bias(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyro_bias_change(self) -> float:
+        """
+        [rad/s] standard deviation of its change since it was calibrated.
+        """
+    @gyro_bias_change.setter
+    def gyro_bias_change(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def gyro_bias_walk(self) -> float:
@@ -6491,6 +6665,11 @@ class InertialResult:
         Shape=(3,) [m/s^2]
         """
     @property
+    def accel_bias_sigma(self) -> float:
+        """
+        [m/s^2] likewise.
+        """
+    @property
     def advice(self) -> str:
         """
         What would make it so.
@@ -6519,6 +6698,11 @@ class InertialResult:
     def gyro_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Shape=(3,) [rad/s]
+        """
+    @property
+    def gyro_bias_sigma(self) -> float:
+        """
+        [rad/s] standard error, rms over the components.
         """
     @property
     def iterations(self) -> int:
@@ -6760,6 +6944,11 @@ class TorqueFit:
     """
     def __repr__(self) -> str:
         ...
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(m, m): of the parameters that are not frozen, in their order.
+        """
     @property
     def cutoff(self) -> float:
         """
@@ -7043,6 +7232,11 @@ class TorqueDiagnosis:
     def classes(self) -> tuple[TorqueClass, ...]:
         """
         What cannot be told apart.
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(m, m): of the effects' parameters that are not frozen, one after the other.
         """
     @property
     def cutoff(self) -> float:
@@ -7542,6 +7736,75 @@ class TorquePlan:
         """
         What to know before moving.
         """
+class ServoArm:
+    """
+    Where the joints of an arm are in the simulator.
+    """
+    def __init__(self, qpos: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], dof: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], step: typing.SupportsFloat | typing.SupportsIndex, bodies: typing.SupportsInt | typing.SupportsIndex, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], torque_command: bool = False) -> None:
+        ...
+class ServoBodies:
+    """
+    Masses of all bodies of the simulator.
+    """
+    def __init__(self, mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], ipos: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], iquat: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], inertia: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        ...
+class ServoRecording:
+    """
+    A recording as the simulation takes it, rows at even times.
+    """
+    def __init__(self, step: typing.SupportsFloat | typing.SupportsIndex, command: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], speed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], gain: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], supply: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], enabled: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], warmth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> None:
+        ...
+class ServoWindow:
+    """
+    Rows of a recording that are simulated from the state of the first.
+    """
+    def __init__(self, recording: typing.SupportsInt | typing.SupportsIndex, first: typing.SupportsInt | typing.SupportsIndex, rows: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class ServoSet:
+    """
+    Values of the chain of every joint, shape=(joints, fields).
+    """
+    def __init__(self, chain: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], weight_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, bodies: typing.SupportsInt | typing.SupportsIndex = -1, functions: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]]] = []) -> None:
+        ...
+class ColumnGain:
+    """
+    What adding a candidate's columns would win.
+    """
+    @property
+    def explains_best(self) -> float:
+        """
+        Of what the candidate of the best score does, the part that this one can do.
+        """
+    @property
+    def folds(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Squares of each fold, by the fit to the others.
+        """
+    @property
+    def rank(self) -> int:
+        """
+        Columns that the data can see.
+        """
+    @property
+    def scale(self) -> float:
+        """
+        Of the prior, the most likely one.
+        """
+    @property
+    def score(self) -> float:
+        """
+        Log Bayes factor less the candidate's cost [nats].
+        """
+    @property
+    def share(self) -> float:
+        """
+        Of the squares that are left, the part that it removes.
+        """
+    @property
+    def values(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Of its columns.
+        """
 def assemble_setup(frames: FramesResult, inertial: InertialResult, tool: ToolResult | None = None) -> tuple[TrackSetup, list[str]]:
     """
     The parts put together, gravity in the base frame; and what to know, as a base that is not level. Without `tool` it is the flange.
@@ -7586,6 +7849,14 @@ def catalogue() -> list[tuple[str, str]]:
 def catalogue_effects() -> tuple[CatalogueEffect, ...]:
     """
     The effects that truing knows, with what they say of themselves.
+    """
+def choose_groups(gram: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], right: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], squares: typing.SupportsFloat | typing.SupportsIndex, values: typing.SupportsFloat | typing.SupportsIndex, groups: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]], prior: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], cost: typing.SupportsFloat | typing.SupportsIndex, threshold: typing.SupportsFloat | typing.SupportsIndex = 4.0) -> GroupChoice:
+    """
+    Which groups of columns explain y, from the normal equations of y = X theta + noise alone.
+    
+    gram: shape=(p, p) X^T X. right: shape=(p,) X^T y. squares: y^T y. values: how many. groups: column numbers of each.
+    prior: shape=(p,), the size that each parameter may have. cost: nats for having looked at as many groups. threshold: nats
+    that a group must win beyond that. Raises InputError on shapes that do not fit.
     """
 def diagnose(robot: Robot, data: Measurements, options: DiagnoseOptions | None = None, own_effects: collections.abc.Sequence[OwnEffect] = []) -> Diagnosis:
     """
@@ -7653,6 +7924,12 @@ def forward_kinematics(robot: Robot, q: typing.Annotated[numpy.typing.ArrayLike,
 def frame_from_xyz_rpy(xyz: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], rpy: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
     """
     Frame, shape=(4, 4), of a position, shape=(3,) [m], and roll, pitch, yaw, shape=(3,) [rad].
+    """
+def free_parameters(robot: Robot, data: Measurements, *, free: collections.abc.Sequence[str] = [], hold: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = []) -> list[FreeParameter]:
+    """
+    The parameters that `identify` would fit to these rows, before anything is known of what the rows can see.
+    
+    Raises InputError on rows that touch fixed points, and on names or effects that are not known.
     """
 def gravity_torque_rows(robot: Robot, data: Measurements) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
@@ -7779,6 +8056,12 @@ def project(camera: Camera, points: numpy.typing.ArrayLike) -> numpy.typing.NDAr
     Pixels, shape=(m, 2), of points in the camera frame, shape=(m, 3) [m]; z points out of the lens, x right, y
     down.
     """
+def rank_columns(folds: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]], always: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], candidates: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]], costs: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], prior: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> list[ColumnGain]:
+    """
+    Evidence of candidates beside columns that are always in; the first entry is that of none.
+    
+    folds: of each X^T X, X^T y, y^T y and the number of rows that count. Raises InputError: other shapes.
+    """
 def replay(streams: RecordedStreams, setup: TrackSetup, options: TrackOptions | None = None, *, horizons: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [0.02, 0.04, 0.08], learn_modes: typing.SupportsFloat | typing.SupportsIndex = 0.0, progress: collections.abc.Callable[[float], bool] | None = None) -> ReplayResult:
     """
     Plays a recording as it would have gone on the day: nothing is used before it arrived.
@@ -7808,6 +8091,10 @@ def rigid_torques(robot: Robot, q: numpy.typing.ArrayLike, qd: numpy.typing.Arra
     q, qd, qdd: shape=(n, driven joints) [rad | m, per s, per s^2]. Returns shape=(n, driven joints) [Nm | N]. Raises
     InputError: other shapes, values that are not finite.
     """
+def robot_at(robot: Robot, data: Measurements, names: collections.abc.Sequence[str], values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], effects: collections.abc.Sequence[EffectRequest] = []) -> Robot:
+    """
+    The robot with these parameters at these values, which count from `robot` as those of `free_parameters` do. Raises InputError on names that the model does not have.
+    """
 def robot_from_urdf(urdf_text: str, base_link: str = '', tip_link: str = '') -> Robot:
     """
     The chain from `base_link` to `tip_link` of a URDF text, as a robot of convention 'urdf'.
@@ -7827,9 +8114,35 @@ def rpy_from_rotation(rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.f
     """
     Roll, pitch and yaw of a rotation: shape=(3, 3) to shape=(3,) [rad]. At pitch = +-pi/2 roll is 0.
     """
+def seen_columns(gram: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], priority: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> SeenColumns:
+    """
+    Which columns of a Gram matrix, shape=(p, p), it can see, as `identify` decides it: of two that cannot be told apart the one of lower `priority` stays, or the first.
+    """
+def servo_fields() -> list[str]:
+    """
+    Names of the columns of ServoSet's chain.
+    """
+def servo_inputs() -> list[str]:
+    """
+    Names of what a torque added at a joint may be a function of.
+    """
+def simulate_servos(calls: collections.abc.Mapping[str, typing.SupportsInt | typing.SupportsIndex], workspaces: collections.abc.Sequence[collections.abc.Mapping[str, typing.SupportsInt | typing.SupportsIndex]], arm: ServoArm, bodies: collections.abc.Sequence[ServoBodies], recordings: collections.abc.Sequence[ServoRecording], windows: collections.abc.Sequence[ServoWindow], sets: collections.abc.Sequence[ServoSet], torques: bool = False) -> tuple[list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]], list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]]:
+    """
+    Simulates every set over every window: positions and torques, a list of shape=(rows, joints) each.
+    
+    calls, workspaces: addresses of the simulator's functions, and of each thread's model, data and arrays, which must live
+    as long as the call takes. Raises InputError: shapes that do not fit, addresses that are missing.
+    """
 def simulate_streams(robot: Robot, options: StreamSimulationOptions | None = None) -> SimulatedStreams:
     """
     Streams of an arm that sways, with known truth; shares no equation with the filter. Raises InputError on options that make no sense.
+    """
+def sum_rows(robot: Robot, data: Measurements, names: collections.abc.Sequence[str], values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], counts: typing.Annotated[numpy.typing.ArrayLike, numpy.bool] | None = None, *, effects: collections.abc.Sequence[EffectRequest] = [], rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, scores: bool = False, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> RowSums:
+    """
+    Normal equations of the rows that count at these values of these parameters, and the errors of every row.
+    
+    counts: shape=(n,), False for rows of which only the errors are told. rotation_length: [m] a rotation error of 1 rad
+    counts as this length, where rows give no sigma. The same bits for any number of threads. Raises InputError.
     """
 def torque_effects() -> list[dict[str, str]]:
     """

@@ -13,6 +13,8 @@
 #include "truing/dynamics/recording.hpp"
 #include "truing/dynamics/regressor.hpp"
 #include "truing/dynamics/rigid.hpp"
+#include "truing/dynamics/servo.hpp"
+#include "truing/fleet.hpp"
 #include "truing/handeye.hpp"
 #include "truing/identify.hpp"
 #include "truing/inverse.hpp"
