@@ -23,6 +23,7 @@ from truing.controllers.written import Written
 from truing.errors import InputError
 from truing.files import Brand, load_robot
 from truing.files.common import PathLike, decoded, read_bytes, shown
+from truing.limits import UNIT_LENGTH_OFF
 from truing.rotations import rotations_from_quaternions
 
 Floats = NDArray[np.float64]
@@ -212,7 +213,7 @@ def _frame(path: Path, name: str, entry: Any) -> Floats:
         values = [float(entry[key]) for key in ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")]
     except (KeyError, TypeError, ValueError):
         values = [math.nan]
-    if not np.isfinite(values).all() or abs(float(np.linalg.norm(values[3:])) - 1.0) > 1e-3:
+    if not np.isfinite(values).all() or abs(float(np.linalg.norm(values[3:])) - 1.0) > UNIT_LENGTH_OFF:
         raise InputError(
             f"{path}: {name} is {shown(entry)}, expected x_m y_m z_m and a quaternion qw qx qy qz"
         )

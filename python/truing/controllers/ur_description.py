@@ -14,7 +14,8 @@ import hashlib
 import numpy as np
 
 from truing import _core
-from truing.controllers.chain import Floats, about_z, links_of, origins, robot_of
+from truing.chains import fixed_frames
+from truing.controllers.chain import Floats, about_z, origins, robot_of
 from truing.controllers.distances import between, dropped_effects, dropped_ratios, poses_of
 from truing.controllers.written import Written
 from truing.errors import InputError
@@ -32,7 +33,7 @@ def written(robot: _core.Robot) -> Written:
             f"{robot.name}: ur_description is for six revolute joints in a row, found {len(robot.joints)}"
             " joints"
         )
-    frames = origins(about_z(links_of(robot)))
+    frames = origins(about_z(fixed_frames(robot)))
     rows = {name: _row(T) for name, T in zip(LINKS, frames, strict=False)}
     text = _text(robot.name, rows)
     read = [_frame(row) for row in rows.values()]

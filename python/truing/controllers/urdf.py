@@ -12,7 +12,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from truing import _core
-from truing.controllers.chain import Floats, Link, links_of, origins, robot_of
+from truing.chains import FixedFrames, fixed_frames
+from truing.controllers.chain import Floats, origins, robot_of
 from truing.controllers.distances import between, dropped_effects, dropped_ratios, poses_of
 from truing.controllers.written import Written
 from truing.errors import InputError
@@ -28,7 +29,8 @@ def written(robot: _core.Robot, source: Path | None, base_link: str = "", tip_li
     """source: the URDF that the robot was read from; its meshes and names are kept. base_link, tip_link: the
     chain in it. Raises InputError.
     """
-    frames, links = origins(links_of(robot)), links_of(robot)
+    links = fixed_frames(robot)
+    frames = origins(links)
     if source is None:
         text = _anew(robot, links, frames)
         exported = robot_of(frames, robot, [link.axis for link in links])
@@ -59,7 +61,7 @@ def written(robot: _core.Robot, source: Path | None, base_link: str = "", tip_li
     )
 
 
-def _anew(robot: _core.Robot, links: Sequence[Link], frames: Sequence[Floats]) -> str:
+def _anew(robot: _core.Robot, links: Sequence[FixedFrames], frames: Sequence[Floats]) -> str:
     root = ElementTree.Element("robot", name=robot.name or "robot")
     ElementTree.SubElement(root, "link", name=BASE)
     parent = BASE
@@ -83,7 +85,7 @@ def _ends(joint: ElementTree.Element, T: Floats, parent: str, child: str) -> Non
     ElementTree.SubElement(joint, "child", link=child)
 
 
-def _joint(root: ElementTree.Element, link: Link, origin: Floats, parent: str, child: str) -> None:
+def _joint(root: ElementTree.Element, link: FixedFrames, origin: Floats, parent: str, child: str) -> None:
     joint = link.joint
     limited = math.isfinite(joint.lower) and math.isfinite(joint.upper)
     kind = "prismatic" if joint.type == "prismatic" else "revolute" if limited else "continuous"

@@ -154,6 +154,26 @@ def test_a_urdf_gives_the_arm_through_pinocchio(convention: str, tmp_path: Path)
     assert out.remaining.largest < 1e-12
 
 
+def test_a_mimic_joint_takes_along_its_leaders_zero(tmp_path: Path) -> None:
+    leader, follower = "shoulder_lift", "elbow"
+    robot = calibrated()
+    robot = robot.replace(
+        joints=[
+            joint.replace(driven_by=[(leader, -1.0)], lower=-np.inf, upper=np.inf)
+            if joint.name == follower
+            else joint
+            for joint in robot.joints
+        ]
+    )
+    robot.joint(leader).offset, robot.joint(follower).offset = 0.02, -0.01
+    out = exported(robot, "urdf")
+    (tmp_path / "arm.urdf").write_text(out.files["robot.urdf"], encoding="utf-8")
+    read = truing.load_robot(tmp_path / "arm.urdf", tip_link="tool")
+    for q in joints()[:, :5]:
+        np.testing.assert_allclose(tool_in_base(read, q), tool_in_base(robot, q), atol=1e-12)
+    assert out.remaining.largest < 1e-12
+
+
 def test_what_a_urdf_cannot_hold_is_counted_in_millimetres() -> None:
     robot = calibrated()
     robot.joints[1].ratio = 1.001

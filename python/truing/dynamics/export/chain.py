@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot as simulators hold one: fixed frames between plain joints, and bodies that can exist.
 
-    T_link = before @ (motion about or along axis) @ after
-
-Joint zeros are folded into `before`, so that a simulator's joint is at `ratio * reading`. `after` is where
-the robot's file has its link frame; of URDF conventions it is the identity.
+Joint zeros are in the frames (`truing.chains`), so that a simulator's joint is at `ratio * reading`.
 """
 
 from __future__ import annotations
@@ -18,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.chains import fixed_frames
 from truing.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -85,17 +83,10 @@ def chain_of(robot: _core.Robot) -> Chain:
             " which a simulator needs: take a URDF with <inertial>, or state mass, center_of_mass and"
             " inertia in robot.yaml"
         )
-    zeros: dict[str, float] = {}
     links: list[Link] = []
     adjusted: list[Adjusted] = []
-    for joint in robot.joints:
-        zero = (
-            sum(weight * zeros[driver] for driver, weight in joint.driven_by)
-            if joint.passive
-            else joint.offset
-        )
-        zeros[joint.name] = zero
-        before, after, axis = _fixed_frames(robot, joint)
+    for frames in fixed_frames(robot):
+        joint = frames.joint
         body, change = _possible(joint.name, _fitted_body(robot, joint))
         if change is not None:
             adjusted.append(change)
@@ -105,9 +96,9 @@ def chain_of(robot: _core.Robot) -> Chain:
             Link(
                 name=joint.name,
                 prismatic=joint.type == "prismatic",
-                axis=axis,
-                before=before @ _moved(axis, zero, joint.type == "prismatic"),
-                after=after,
+                axis=frames.axis,
+                before=frames.before,
+                after=frames.after,
                 body=body,
                 ratio=ratio,
                 drivers=tuple(joint.driven_by),
@@ -118,41 +109,6 @@ def chain_of(robot: _core.Robot) -> Chain:
             )
         )
     return Chain(tuple(links), tuple(adjusted))
-
-
-def _fixed_frames(robot: _core.Robot, joint: _core.Joint) -> tuple[Floats, Floats, Floats]:
-    """Before and after the motion, and its axis. The motion of a (modified) DH joint is about or along z and
-    commutes with theta and d: all of a DH link comes after it, of a modified DH link theta and d do."""
-    identity = np.eye(4)
-    if robot.convention == "urdf":
-        return np.array(joint.T_parent_joint), identity, np.array(joint.axis)
-    z = np.array([0.0, 0.0, 1.0])
-    values = {"theta": joint.theta, "d": joint.d, "a": joint.a, "alpha": joint.alpha, "beta": joint.beta}
-    if robot.convention == "dh":
-        return identity, _link_frame("dh", values), z
-    across = _link_frame("mdh", {**values, "theta": 0.0, "d": 0.0})
-    along = _link_frame("mdh", {**values, "a": 0.0, "alpha": 0.0, "beta": 0.0})
-    return across, along, z
-
-
-def _link_frame(convention: str, values: dict[str, float]) -> Floats:
-    one = _core.Robot("one", convention=convention, joints=[_core.Joint("J", **values)])  # type: ignore[arg-type]
-    return np.array(_core.forward_kinematics(one, np.zeros(1))[0])
-
-
-def _moved(axis: Floats, by: float, prismatic: bool) -> Floats:
-    """shape=(4, 4): Rodrigues' formula, or a shift."""
-    T = np.eye(4)
-    if prismatic:
-        T[:3, 3] = by * axis
-    else:
-        K = cross_matrix(axis)
-        T[:3, :3] += np.sin(by) * K + (1.0 - np.cos(by)) * (K @ K)
-    return T
-
-
-def cross_matrix(v: Floats) -> Floats:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
 def _steiner(mass: float, r: Floats) -> Floats:
