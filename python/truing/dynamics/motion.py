@@ -6,37 +6,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.api import PAYLOAD_COLUMNS
+from truing.dynamics.recorded import Recorded, driven_joints, measured_torque
+from truing.dynamics.smoothing import cubics, even_times, rows_within
 from truing.errors import InputError
 
 Floats = NDArray[np.float64]
 
 SMOOTHING = 0.05  # [s] half of the stretch whose cubic gives a smoothed value
 GAP = 5.0  # of the usual time between rows: a gap
-
-
-class Recorded(Protocol):
-    """What of a recording is used; tables without columns were not recorded."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def time(self) -> Any: ...
-    @property
-    def position(self) -> Any: ...
-    @property
-    def speed(self) -> Any: ...
-    @property
-    def torque(self) -> Any: ...
-    @property
-    def current(self) -> Any: ...
-    @property
-    def columns(self) -> Mapping[str, Any]: ...
+PAYLOAD_STEP = 0.01  # of the heaviest payload: a change, of which a simulation at one payload knows nothing
+_SAME_TIME = 1e-9  # [s] by which times that were added up may miss a row
 
 
 @dataclass(frozen=True)
@@ -50,7 +35,16 @@ class Track:
     torque_time: Floats
     torque: Floats
     temperature: Floats  # shape=(n, joints) [deg C], as the torques; NaN: not known
+    payload: Floats  # shape=(n, 4) [kg, m], as the torques: a point mass and its place in the tool's frame
+    step: float = field(kw_only=True)  # [s] between rows of the motion, gaps aside
     began: float = field(kw_only=True)  # [s] where the recording begins
+
+    @property
+    def stretches(self) -> list[tuple[float, float]]:
+        """[s] begin and end of what is between gaps."""
+        cuts = np.flatnonzero(np.diff(self.time) > GAP * self.step)
+        begins, ends = self.time[[0, *(cuts + 1)]], self.time[[*cuts, -1]]
+        return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
     def near(self, begin: float, end: float) -> Track:
         """The rows between two times, and one more on both sides."""
@@ -59,13 +53,24 @@ class Track:
             for time in (self.time, self.torque_time)
         )
         motion = (table[rows] for table in (self.time, self.q, self.qd, self.qdd))
-        others = (table[more] for table in (self.torque_time, self.torque, self.temperature))
-        return Track(*motion, *others, began=self.began)
+        others = (table[more] for table in (self.torque_time, self.torque, self.temperature, self.payload))
+        return Track(*motion, *others, step=self.step, began=self.began)
+
+    def payload_at(self, time: float) -> Floats:
+        """That of the last row until `time` [s], as rows of `payload`. shape=(4,)"""
+        row = int(np.searchsorted(self.torque_time, time + _SAME_TIME, "right")) - 1
+        return np.asarray(self.payload[max(row, 0)])
+
+    def one_payload(self, begin: float, end: float) -> bool:
+        """Whether it does not change between two times [s]."""
+        mass = self.payload[:, 0]
+        rows = (self.torque_time >= begin - _SAME_TIME) & (self.torque_time <= end + _SAME_TIME)
+        return not rows.any() or bool(np.ptp(mass[rows]) <= PAYLOAD_STEP * mass.max())
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Rows of a recording, between gaps."""
+    """Rows of a recording, between gaps and changes of its payload."""
 
     name: str
     time: Floats
@@ -77,9 +82,11 @@ class Stretch:
 
 
 def stretches_of(recording: Recorded) -> list[Stretch]:
-    """A recording cut at its gaps."""
+    """A recording cut at its gaps, and where its payload changes."""
     time = np.asarray(recording.time, dtype=float)
-    cuts = np.flatnonzero(np.diff(time) > GAP * np.median(np.diff(time))) + 1
+    mass = payloads(recording)[:, 0]
+    gaps = np.diff(time) > GAP * np.median(np.diff(time))
+    cuts = np.flatnonzero(gaps | (np.abs(np.diff(mass)) > PAYLOAD_STEP * mass.max())) + 1
     tables = [
         np.asarray(table, dtype=float)
         for table in (recording.position, recording.speed, recording.torque, recording.current)
@@ -99,48 +106,52 @@ def stretches_of(recording: Recorded) -> list[Stretch]:
 
 def track_of(recording: Recorded, robot: _core.Robot, smoothing: float) -> tuple[Track, NDArray[np.bool_]]:
     """The recording on an even grid, and where that is not across a gap."""
+    return even_track(recording, driving_torque(recording, robot), smoothing)
+
+
+def even_track(recording: Recorded, torque: Floats, smoothing: float) -> tuple[Track, NDArray[np.bool_]]:
+    """The same with torques of its rows, shape=(n, joints) [Nm | N]; (n, 0): without any."""
     time, q = np.asarray(recording.time, dtype=float), np.asarray(recording.position, dtype=float)
-    torque = measured_torque(recording, robot)
-    step = float(np.median(np.diff(time)))
-    half = max(int(round(smoothing / step)), 2)
-    grid = np.arange(time[0], time[-1] + 1e-9, step)
+    step = float(np.median(np.diff(time))) if time.size > 1 else np.inf
+    half, gaps = rows_within(smoothing, step), np.flatnonzero(np.diff(time) > GAP * step)
+    grid = even_times(time, step, gaps) if time.size > 1 else time
     if grid.size < 4 * half:
         raise InputError(f"{recording.name}: {time[-1] - time[0]:.3g} s are too short to be simulated")
-    smooth, slope = _cubics(table_at(time, q, grid), half, step)
+    smooth, slope = cubics(table_at(time, q, grid), half, step)
     speed = np.asarray(recording.speed, dtype=float)
     if speed.shape == q.shape and np.all(np.isfinite(speed)):
-        rate = _cubics(table_at(time, speed, grid), half, step)[0]
+        rate = cubics(table_at(time, speed, grid), half, step)[0]
     else:
         rate = slope
     free = np.ones(grid.size, dtype=bool)
-    for k in np.flatnonzero(np.diff(time) > GAP * step):
+    for k in gaps:
         free &= (grid < time[k] - smoothing) | (grid > time[k + 1] + smoothing)
-    warm = temperatures(recording, torque.shape)
-    return Track(
-        grid, smooth, rate, _cubics(rate, half, step)[1], time, torque, warm, began=float(time[0])
-    ), free
+    warm = temperatures(recording, (time.size, torque.shape[1]))
+    motion = (grid, smooth, rate, cubics(rate, half, step)[1])
+    drives = (time, torque, warm, payloads(recording))
+    return Track(*motion, *drives, step=step, began=float(time[0])), free
 
 
-def measured_torque(recording: Recorded, robot: _core.Robot) -> Floats:
-    """shape=(n, joints) [Nm | N]: torques as recorded, or currents times the robot's torque_per_ampere."""
-    driven = [joint for joint in robot.joints if not joint.passive]
-    shape = (len(np.asarray(recording.time)), len(driven))
-    torque = np.asarray(recording.torque, dtype=float)
-    if torque.shape != shape:
-        current = np.asarray(recording.current, dtype=float)
-        gains = [joint.torque_per_ampere for joint in driven]
-        if current.shape != shape or any(gain is None for gain in gains):
-            raise InputError(
-                f"{recording.name}: no torques, and no currents with the robot's torque_per_ampere, of all"
-                f" {len(driven)} joints: a simulation of torques cannot be driven"
-            )
-        torque = current * np.array(gains, dtype=float)
-    for what, table in (("positions", np.asarray(recording.position, dtype=float)), ("torques", torque)):
-        if table.shape != shape or not np.all(np.isfinite(table)):
-            raise InputError(
-                f"{recording.name}: {what} of shape {table.shape}, or not all numbers, expected {shape}"
-                " numbers"
-            )
+def driving_torque(recording: Recorded, robot: _core.Robot) -> Floats:
+    """shape=(n, joints) [Nm | N]: torques as recorded, or currents times the robot's torque_per_ampere.
+    Raises InputError where neither, or a position, is a number in every row."""
+    torque = measured_torque(robot, recording, unknown=np.nan)
+    position = np.asarray(recording.position, dtype=float)
+    if position.shape != torque.shape or not np.all(np.isfinite(position)):
+        raise InputError(
+            f"{recording.name}: positions of shape {position.shape}, or not all numbers, expected"
+            f" {torque.shape} numbers"
+        )
+    missing = [
+        joint.name
+        for joint, column in zip(driven_joints(robot), torque.T, strict=True)
+        if not np.all(np.isfinite(column))
+    ]
+    if missing:
+        raise InputError(
+            f"{recording.name}: no torques, and no currents with the robot's torque_per_ampere, in every row"
+            f" of {', '.join(missing)}: a simulation of torques cannot be driven"
+        )
     return torque
 
 
@@ -148,28 +159,21 @@ def temperatures(recording: Recorded, shape: tuple[int, int]) -> Floats:
     """shape=(n, joints) [deg C]: columns 'temp1_C' … of the joints, or 'temp_C' of all; NaN without."""
     columns = {name: np.asarray(values, dtype=float) for name, values in recording.columns.items()}
     common = columns.get("temp_C", np.full(shape[0], np.nan))
-    return np.column_stack([columns.get(f"temp{j + 1}_C", common) for j in range(shape[1])])
+    return np.array([columns.get(f"temp{j + 1}_C", common) for j in range(shape[1])]).reshape(shape[::-1]).T
+
+
+def payloads(recording: Recorded) -> Floats:
+    """shape=(n, 4) [kg, m]: columns 'payload_kg' and 'payload_x_m' … where it hangs; zero without."""
+    n = np.size(recording.time)
+    return np.column_stack(
+        [np.asarray(recording.columns.get(name, np.zeros(n)), dtype=float) for name in PAYLOAD_COLUMNS]
+    )
 
 
 def smoothed(table: Floats, step: float, smoothing: float) -> Floats:
     """Even rows, each by the cubic through those within `smoothing` [s] on both sides."""
-    half = max(int(round(smoothing / step)), 2)
-    return _cubics(table, half, step)[0] if len(table) > 2 * half else table
-
-
-def _cubics(table: Floats, half: int, step: float) -> tuple[Floats, Floats]:
-    """Values and slopes of even rows, by the cubic through 2 half + 1 rows around each (Savitzky and Golay
-    1964); of rows at the ends by the cubic through the first or last of them. shape=(n, columns)"""
-    t = step * np.arange(-half, half + 1)
-    powers = np.vander(t, 4, increasing=True)
-    slopes = np.column_stack([np.zeros_like(t), np.ones_like(t), 2.0 * t, 3.0 * t * t])
-    fit = np.linalg.pinv(powers)
-    out = []
-    for rows in (powers @ fit, slopes @ fit):
-        middle = [np.convolve(column, rows[half, ::-1], mode="valid") for column in table.T]
-        first, last = rows[:half] @ table[: 2 * half + 1], rows[-half:] @ table[-2 * half - 1 :]
-        out.append(np.concatenate([first, np.column_stack(middle), last]))
-    return out[0], out[1]
+    half = rows_within(smoothing, step)
+    return cubics(table, half, step)[0] if len(table) > 2 * half else table
 
 
 def table_at(time: Floats, table: Floats, at: Floats) -> Floats:

@@ -4,12 +4,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any, Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
 
 Floats = NDArray[np.float64]
+
+
+class Recorded(Protocol):
+    """What of a recording is used; tables without columns were not recorded."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def time(self) -> Any: ...
+    @property
+    def position(self) -> Any: ...
+    @property
+    def speed(self) -> Any: ...
+    @property
+    def torque(self) -> Any: ...
+    @property
+    def current(self) -> Any: ...
+    @property
+    def columns(self) -> Mapping[str, Any]: ...
 
 
 def driven_joints(robot: _core.Robot) -> list[_core.Joint]:
@@ -21,14 +43,20 @@ def torque_unit(joint: _core.Joint) -> str:
     return "Nm" if joint.type == "revolute" else "N"
 
 
-def measured_torque(robot: _core.Robot, recording: _core.Recording) -> Floats:
-    """Torques as measured, else currents times the drives' constants (1 Nm/A where none is known); NaN where
-    there is neither. shape=(n, joints) [Nm | N]
+def measured_torque(robot: _core.Robot, recording: Recorded, unknown: float = 1.0) -> Floats:
+    """Torques as measured, else currents times the drives' constants; NaN where there is neither.
+    shape=(n, joints) [Nm | N]
+
+    unknown: [Nm/A | N/A] constant of a drive whose own is not known.
     """
-    joints = driven_joints(robot)
-    out = np.full((len(recording), len(joints)), np.nan)
-    if recording.current.shape[1]:
-        out = np.asarray(recording.current) * [joint.torque_per_ampere or 1.0 for joint in joints]
-    if recording.torque.shape[1]:
-        out = np.where(np.isnan(recording.torque), out, recording.torque)
+    gains = [
+        unknown if joint.torque_per_ampere is None else joint.torque_per_ampere
+        for joint in driven_joints(robot)
+    ]
+    out = np.full((np.size(recording.time), len(gains)), np.nan)
+    torque, current = (np.asarray(table, dtype=float) for table in (recording.torque, recording.current))
+    if current.shape == out.shape:
+        out = current * gains
+    if torque.shape == out.shape:
+        out = np.where(np.isnan(torque), out, torque)
     return out

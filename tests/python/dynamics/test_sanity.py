@@ -256,6 +256,19 @@ def test_angles_in_degrees_are_converted_where_speeds_or_limits_prove_them(with_
         assert np.allclose(one.position, original.position, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("size", "words"),
+    [(math.degrees(1.0), "angles are in deg"), (60 / (2 * math.pi), "deg and the speed in rpm")],
+)
+def test_speeds_are_converted_with_their_angles(size: float, words: str) -> None:
+    wrong = with_fields(speed=lambda one: size * speed_of(one), position=lambda one: np.degrees(one.position))
+    checked = check_recordings(ARM, wrong)
+    assert words in only(checked).evidence
+    for mended, one in zip(checked.recordings, MOTIONS, strict=True):
+        assert mended.position == pytest.approx(np.asarray(one.position))
+        assert mended.speed == pytest.approx(speed_of(one), rel=1e-9, abs=1e-9)
+
+
 def test_angles_in_degrees_without_any_proof_but_the_model_are_said() -> None:
     robot = ARM.copy()
     for joint in robot.joints:
@@ -360,6 +373,13 @@ def test_gaps_are_said() -> None:
     found = only(check_recordings(ARM, with_fields(time=lambda one: one.time + 3.0 * (one.time > 6.0))))
     assert found.finding == "gaps" and found.applied and found.value == pytest.approx(3.01, abs=0.001)
     assert "1 gap of up to 3.01 s" in found.evidence
+
+
+def test_a_clock_that_jumped_is_a_gap_and_no_day_of_rows() -> None:
+    jumped = with_fields(time=lambda one: one.time + np.where(one.time > 7.0, 1e8, 0.0))
+    checked = check_recordings(ARM, jumped)
+    assert "gap of up to 1e+08 s" in only(checked).evidence
+    assert all(len(grid.q) <= len(MOTIONS[0].time) for grid in grids_of(ARM, jumped))
 
 
 def test_stamps_of_the_recorder_give_way_to_even_ones() -> None:

@@ -56,7 +56,10 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     if grids:
         read = readings(robot, grids)
         found += [*read.findings, *scales(robot, read.fit, _scale_known(robot, recordings))]
-        recordings = [_scaled(one, None, read.position.get(one.name)) for one in recordings]
+        # Recorded speeds are by now the derivatives of the angles, and go with them.
+        recordings = [
+            _scaled(one, read.position.get(one.name), read.position.get(one.name)) for one in recordings
+        ]
         robot, recordings = _turned(robot, recordings, read.torque)
         if _any_change(read.torque) or _any_change(read.position):
             grids = grids_of(robot, recordings)
@@ -73,7 +76,7 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
 
 def _scaled(recording: _core.Recording, by_speed: Floats | None, by_angle: Floats | None) -> _core.Recording:
     fields: dict[str, Any] = {}
-    if by_speed is not None and (by_speed != 1.0).any():
+    if by_speed is not None and (by_speed != 1.0).any() and recording.speed.shape[1]:
         fields["speed"] = np.asarray(recording.speed) * by_speed
     if by_angle is not None and (by_angle != 1.0).any():
         fields["position"] = np.asarray(recording.position) * by_angle

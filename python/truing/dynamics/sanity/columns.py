@@ -15,13 +15,14 @@ from truing.dynamics.sanity.findings import RecordingFinding, listed, together
 from truing.dynamics.sanity.grids import (
     MOVES,
     REST_WINDOW,
+    SMOOTHING,
     SPEED_AT_REST,
     STILL,
     Grid,
-    acceleration_kernel,
     gaps_of,
     usual_step,
 )
+from truing.dynamics.smoothing import acceleration_kernel, rows_within
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +37,11 @@ CROWDED = 3.0  # times as many rows at the end of the range as a step from it
 LOOKED_AT = 5000  # rows of a column, evenly picked, that its steps are taken from
 COARSE_TORQUE = 0.05  # of the torque's standard deviation: rms error by rounding
 COARSE_POSITION = 0.2  # of the acceleration: rms error by rounding of the angle
+_SAME = 1e-6  # of a column's range: values nearer to each other are one
+_SMALL = 0.05  # of the differences of neighbouring values are smaller than its step
+_WHOLE = 0.1  # steps by which a difference may miss a whole number of them
+_MOST = 0.9  # of the differences do
+_REPEATED = 0.25  # different values a row: with more of them the column comes in no steps
 _ROUNDING = 12.0**-0.5  # rms error of rounding to steps of 1
 
 
@@ -164,7 +170,8 @@ def values(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> list[Re
 
 
 def _values_of(robot: _core.Robot, recording: _core.Recording) -> Iterator[RecordingFinding]:
-    kernel = acceleration_kernel(usual_step(np.asarray(recording.time)))
+    step = usual_step(np.asarray(recording.time))
+    kernel = acceleration_kernel(rows_within(SMOOTHING, step), step)
     for k, joint in enumerate(driven_joints(robot)):
         position = np.asarray(recording.position[:, k])
         moves = bool(np.ptp(position) > STILL)
@@ -222,13 +229,13 @@ def resolution(x: Floats) -> float:
     """The step between values, if they come in steps; else 0."""
     some = x[:: max(1, len(x) // LOOKED_AT)]
     different = np.unique(some)
-    if len(different) < 2 or len(different) > len(some) / 4:
+    if len(different) < 2 or len(different) > _REPEATED * len(some):
         return 0.0
     steps = np.diff(different)
-    steps = steps[steps > 1e-6 * np.ptp(different)]
-    step = float(np.quantile(steps, 0.05))
+    steps = steps[steps > _SAME * np.ptp(different)]
+    step = float(np.quantile(steps, _SMALL))
     whole = steps / step
-    return step if float(np.mean(np.abs(whole - np.round(whole)) < 0.1)) > 0.9 else 0.0
+    return step if float(np.mean(np.abs(whole - np.round(whole)) < _WHOLE)) > _MOST else 0.0
 
 
 def _coarse_position(

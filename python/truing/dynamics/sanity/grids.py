@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.recorded import measured_torque
+from truing.dynamics.smoothing import cubics, even_times, rows_within
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -68,14 +69,14 @@ def grids_of(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> list[
 def grid_of(robot: _core.Robot, recording: _core.Recording) -> Grid | None:
     time = np.asarray(recording.time, dtype=np.float64)
     step = max(usual_step(time), STEP)
-    half = max(int(round(SMOOTHING / step)), 2)
-    grid = np.arange(time[0], time[-1] + 1e-9, step)
+    half = rows_within(SMOOTHING, step)
+    grid = even_times(time, step, gaps_of(time))
     if len(grid) < 6 * half:
         return None
-    value, slope = _kernels(half, step)
-    tables = [np.asarray(recording.position), np.asarray(recording.speed), measured_torque(robot, recording)]
-    q, speed, torque = (_smoothed(_on_grid(time, table, grid), value) for table in tables)
-    qd = _filtered(_on_grid(time, tables[0], grid), slope)
+    tables = (np.asarray(recording.position), np.asarray(recording.speed), measured_torque(robot, recording))
+    even = [_on_grid(time, table, grid) for table in tables]
+    q, qd = cubics(even[0], half, step)
+    speed, torque = (cubics(table, half, step)[0] for table in even[1:])
     free = np.ones(len(grid), dtype=np.bool_)
     free[: 2 * half] = free[-2 * half :] = False  # ends that smoothing made up
     for row in gaps_of(time):
@@ -87,37 +88,11 @@ def grid_of(robot: _core.Robot, recording: _core.Recording) -> Grid | None:
         np.flatnonzero(free),
         q,
         qd,
-        _filtered(qd, slope),
-        _filtered(np.tanh(qd / SPEED_AT_REST), value),
+        cubics(qd, half, step)[1],
+        cubics(np.tanh(qd / SPEED_AT_REST), half, step)[0],
         speed,
         torque,
     )
-
-
-def _kernels(half: int, step: float) -> tuple[Floats, Floats]:
-    """Of a cubic through 2 half + 1 rows: value and slope in the middle. shape=(2 half + 1,)"""
-    t = step * np.arange(-half, half + 1)
-    fit = np.linalg.pinv(np.vander(t, 4, increasing=True))
-    return fit[0], fit[1]
-
-
-def _filtered(table: Floats, kernel: Floats) -> Floats:
-    """Ends are continued by their point reflection."""
-    half = kernel.size // 2
-    before = 2.0 * table[:1] - table[half:0:-1]
-    after = 2.0 * table[-1:] - table[-2 : -half - 2 : -1]
-    long = np.concatenate([before, table, after])
-    return np.column_stack([np.convolve(column, kernel[::-1], mode="valid") for column in long.T])
-
-
-def acceleration_kernel(step: float) -> Floats:
-    """That gives the acceleration of rows `step` apart, as the smoothing does."""
-    _, slope = _kernels(max(int(round(SMOOTHING / step)), 2), step)
-    return np.convolve(slope, slope)
-
-
-def _smoothed(table: Floats, kernel: Floats) -> Floats:
-    return _filtered(table, kernel) if table.shape[1] else table
 
 
 def _on_grid(time: Floats, table: Floats, grid: Floats) -> Floats:

@@ -33,6 +33,7 @@ _TURNING = {
 _SLIDING = {1e3: ("mm/s", ""), 1e-3: ("", "mm")}
 _SIZE = {"deg/s": DEGREE, "rpm": 2.0 * math.pi / 60.0, "turns/s": 2.0 * math.pi, "mm/s": 1e-3}
 _POSITION_SIZE = {"deg": DEGREE, "mm": 1e-3}
+_FEWEST = 50  # rows: of fewer a correlation says nothing
 ROWS = 500  # of a recording, evenly picked
 ALIKE = 0.95  # correlation of a speed with the derivative: it is that joint's
 OTHER = 0.8  # correlation below which a speed is not that of its joint
@@ -69,12 +70,13 @@ def speeds(
             if match is None:
                 continue
             units = _TURNING if joints[k].type == "revolute" else _SLIDING
-            kind, word, factor = _judged(match, units, grid, k)
+            kind, word, of_speed, of_angle = _judged(match, units)
             if not kind:
                 continue
             value = match.correlation if kind == "speed_mismatch" else match.ratio
             kinds.setdefault((kind, word), []).append((grid.name, k, value))
-            (by_angle if kind == "position_unit" else by_speed)[grid.name][k] *= factor
+            by_speed[grid.name][k] *= of_speed
+            by_angle[grid.name][k] *= of_angle
         late = [m.lag for m in matches.values() if m is not None and abs(m.correlation) > ALIKE]
         lag = _common(late, max(LAG, grid.raw_step))
         if lag:
@@ -88,12 +90,12 @@ def _match(grid: Grid, k: int) -> _Match | None:
     """None: the joint does not move, or its speed was not recorded."""
     rows = grid.rows[grid.moving[grid.rows, k]]
     speed, rate = grid.speed[:, k], grid.qd[:, k]
-    if len(rows) < 50 or np.isnan(speed[0]) or np.ptp(speed) == 0.0:
+    if len(rows) < _FEWEST or np.isnan(speed[0]) or np.ptp(speed) == 0.0:
         return None
     reach = int(LATEST / grid.step)
     rows = rows[(rows >= reach) & (rows < len(rate) - reach)]
     rows = rows[:: max(1, len(rows) // ROWS)]
-    if len(rows) < 50:
+    if len(rows) < _FEWEST:
         return None
     shifts = np.arange(-reach, reach + 1)
     coarse = shifts[:: max(1, reach // 8)]
@@ -121,24 +123,20 @@ def vertex(scores: Floats, best: int) -> float:
     return float(0.5 * (before - after) / bend) if bend < 0.0 else 0.0
 
 
-def _judged(
-    match: _Match, units: Mapping[float, tuple[str, str]], grid: Grid, k: int
-) -> tuple[str, str, float]:
-    """Kind, words, and the factor that mends it (of the angle where the kind is position_unit)."""
+def _judged(match: _Match, units: Mapping[float, tuple[str, str]]) -> tuple[str, str, float, float]:
+    """Kind, words, and the factors that mend it, of the speed and of the angle."""
     if abs(match.correlation) < ALIKE:
-        if abs(match.correlation) > OTHER:
-            return "", "", 1.0
-        return "speed_mismatch", "", 1.0
+        return ("" if abs(match.correlation) > OTHER else "speed_mismatch"), "", 1.0, 1.0
     sign, size = math.copysign(1.0, match.ratio), abs(match.ratio)
     for ratio, (speed, angle) in units.items():
         if abs(size / ratio - 1.0) > UNIT:
             continue
-        if angle:
-            return "position_unit", angle, _POSITION_SIZE[angle]
-        return "speed_unit", speed, sign * _SIZE[speed]
+        words = " and the speed in ".join(word for word in (angle, speed) if word)
+        kind = "position_unit" if angle else "speed_unit"
+        return kind, words, sign * _SIZE.get(speed, 1.0), _POSITION_SIZE.get(angle, 1.0)
     if abs(size - 1.0) > RATIO:
-        return "speed_scale", "", 1.0
-    return ("speed_sign", "", -1.0) if sign < 0 else ("", "", 1.0)
+        return "speed_scale", "", 1.0, 1.0
+    return ("speed_sign" if sign < 0 else ""), "", sign, 1.0
 
 
 def _common(late: Sequence[float], least: float) -> float:
