@@ -32,17 +32,18 @@ from truing._core import (
     validate_recording as validate_recording,
 )
 from truing.dynamics.api import (
-    diagnose as diagnose,
     identify as identify,
     plan as plan,
     predict as predict,
     with_payload as with_payload,
 )
 from truing.dynamics.comparison import compare as compare
+from truing.dynamics.diagnosing import diagnose as diagnose
 from truing.dynamics.rollout import rollout as rollout
 from truing.dynamics.sanity import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
     check_recordings as check_recordings,
 )
+from truing.dynamics.uncertainty import Randomisation as Randomisation, randomisation as randomisation
 from truing.files import load_recordings as load_recordings

@@ -14,6 +14,7 @@ from truing._core import Recording, Robot, TorqueDiagnosis, TorqueFit, TorquePla
 from truing.effects import Effect, Effects, parse_effects
 from truing.errors import InputError
 from truing.keywords import made, takes
+from truing.report.notebook import shown
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -74,7 +75,8 @@ def diagnose(
 
     Raises InputError on recordings or options that cannot be used.
     """
-    return _core.dynamics_diagnose(robot, list(recordings), made(_core.TorqueDiagnoseOptions, options))
+    found = _core.dynamics_diagnose(robot, list(recordings), made(_core.TorqueDiagnoseOptions, options))
+    return shown(found, "truing.dynamics.result:diagnosis_page", len(recordings))
 
 
 def effect_names() -> list[str]:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.api import PAYLOAD_COLUMNS
 from truing.dynamics.comparison import Comparison, comparison_dict
 from truing.dynamics.comparison.page import comparison_report
 from truing.dynamics.export import Exported
@@ -26,7 +27,11 @@ from truing.dynamics.friction import friction_dict
 from truing.dynamics.page import diagnosis_report, export_report, fit_report, prediction_report
 from truing.dynamics.recorded import driven_joints, measured_torque, torque_unit
 from truing.dynamics.rollout import Rollout, held_out_rows, paths_of, response_paths, rollout_dict
+from truing.dynamics.rollout.arm import arm_picture
+from truing.dynamics.rollout.page import KEYS as MODEL_NAMES
 from truing.dynamics.sanity.findings import RecordingFinding
+from truing.dynamics.servo.export import ServoExported
+from truing.dynamics.servo.export.verified import servo_rollout_dict
 from truing.dynamics.simulate import Response
 from truing.files import load_units, save_robot, write_table
 from truing.identification.result import parameter_dict
@@ -61,6 +66,7 @@ def diagnosis_dict(
         "verdict": found.verdict,
         "sentence": ". ".join([found.sentence.rstrip("."), *motion.get("verdict", ())]),
         "effects": [_effect(e) for e in found.effects],
+        "covariance": covariance_dict(parameters_of(found), found.covariance),
         "unknown": [_unknown(u) for u in found.unknown],
         "where": where_dict(found.where, found.errors),
         **_errors(found.errors),
@@ -84,6 +90,7 @@ def fit_dict(
         **_head("identify"),
         "robot": found.robot.name,
         "parameters": [parameter_dict(p) for p in found.parameters],
+        "covariance": covariance_dict(found.parameters, found.covariance),
         **_errors(found.errors),
         "friction": friction_dict(found.robot, []),
         "sanity": [asdict(finding) for finding in sanity],
@@ -92,6 +99,16 @@ def fit_dict(
         "cutoff_hz": found.cutoff,
         "warnings": [*warnings, *found.warnings],
     }
+
+
+def parameters_of(found: _core.TorqueDiagnosis) -> list[_core.Parameter]:
+    """Of all effects, one after the other."""
+    return [p for effect in found.effects for p in effect.parameters]
+
+
+def covariance_dict(parameters: Iterable[_core.Parameter], covariance: Floats) -> dict[str, Any]:
+    """shape=(m, m), of the parameters that are not frozen; unit of an entry: the product of both units."""
+    return {"names": [p.name for p in parameters if not p.frozen], "matrix": covariance.tolist()}
 
 
 def _effect(e: _core.FoundTorqueEffect) -> dict[str, Any]:
@@ -215,7 +232,9 @@ def residual_columns(
 
 
 def _motion_columns(joints: Sequence[_core.Joint], recordings: Sequence[_core.Recording]) -> dict[str, Any]:
-    """Positions, and speeds and temperatures where any recording has them, NaN in the others."""
+    """Positions; speeds and temperatures where any recording has them, NaN in the others; payloads, 0 in the
+    others.
+    """
     position = np.concatenate([np.asarray(recording.position) for recording in recordings])
     speed = np.concatenate(
         [
@@ -233,6 +252,10 @@ def _motion_columns(joints: Sequence[_core.Joint], recordings: Sequence[_core.Re
     for name in sorted(warm):
         each = [np.asarray(r.columns.get(name, np.full(len(r), np.nan))) for r in recordings]
         columns[name] = np.concatenate(each)
+    for name in PAYLOAD_COLUMNS:
+        if any(name in r.columns for r in recordings):
+            each = [np.asarray(r.columns.get(name, np.zeros(len(r)))) for r in recordings]
+            columns[name] = np.concatenate(each)
     return columns
 
 
@@ -249,14 +272,10 @@ def recording_columns(robot: _core.Robot, recording: _core.Recording) -> dict[st
     return columns
 
 
-def parameter_columns(parameters: Sequence[_core.Parameter]) -> dict[str, Any]:
-    """Columns of ``covariance.csv``: parameters with their standard errors."""
-    return {
-        "parameter": [p.name for p in parameters],
-        "value": np.array([p.value for p in parameters], dtype=np.float64),
-        "sigma": np.array([p.sigma for p in parameters], dtype=np.float64),
-        "unit": [p.unit for p in parameters],
-    }
+def covariance_columns(parameters: Iterable[_core.Parameter], covariance: Floats) -> dict[str, Any]:
+    """Columns of ``covariance.csv``: the names, then one column per fitted parameter (`covariance_dict`)."""
+    names = [p.name for p in parameters if not p.frozen]
+    return {"name": names, **{name: covariance[:, k] for k, name in enumerate(names)}}
 
 
 def prediction_columns(
@@ -418,21 +437,28 @@ def write_diagnosis(
     result: dict[str, Any] = without_nan(diagnosis_dict(found, rollout, sanity=sanity, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
+    write_table(folder / "covariance.csv", covariance_columns(parameters_of(found), found.covariance))
     _write_residuals(folder, found, recordings, test_share)
-    traces = [
-        {
-            "recording": t.recording,
-            "joint": t.joint,
-            **{
-                key: np.array(getattr(t, key)) for key in ("time", "measured", "nominal", "standard", "named")
-            },
-        }
-        for t in found.traces
-    ]
+    traces = _traces(found)
     paths = paths_of(rollout.judgement) if rollout.judgement is not None else []
-    report = diagnosis_report(result, traces, len(recordings), paths)
+    arm = arm_picture(found.robot, paths, MODEL_NAMES)
+    report = diagnosis_report(result, traces, len(recordings), paths, arm)
     (folder / "report.html").write_text(report, encoding="utf-8")
     return result
+
+
+def _traces(found: _core.TorqueDiagnosis) -> list[dict[str, Any]]:
+    keys = ("time", "measured", "nominal", "standard", "named")
+    return [
+        {"recording": t.recording, "joint": t.joint, **{key: np.array(getattr(t, key)) for key in keys}}
+        for t in found.traces
+    ]
+
+
+def diagnosis_page(found: _core.TorqueDiagnosis, recordings: int) -> str:
+    """The report of ``truing dynamics diagnose`` without its files, not judged by motion."""
+    result: dict[str, Any] = without_nan(diagnosis_dict(found, NOT_JUDGED))
+    return diagnosis_report(result, _traces(found), recordings)
 
 
 def write_fit(
@@ -449,7 +475,7 @@ def write_fit(
     result: dict[str, Any] = without_nan(fit_dict(found, sanity=sanity, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     _write_robot(folder, found.robot, recordings, nominal_file)
-    write_table(folder / "covariance.csv", parameter_columns(found.parameters))
+    write_table(folder / "covariance.csv", covariance_columns(found.parameters, found.covariance))
     _write_residuals(folder, found, recordings, test_share)
     (folder / "report.html").write_text(fit_report(result, len(recordings)), encoding="utf-8")
     return result
@@ -490,7 +516,8 @@ def write_prediction(
         )
     ]
     paths = [] if response is None else response_paths(robot, recording, response)
-    (folder / "report.html").write_text(prediction_report(result, traces, paths), encoding="utf-8")
+    arm = arm_picture(robot, paths, {"named": "simulated"})
+    (folder / "report.html").write_text(prediction_report(result, traces, paths, arm), encoding="utf-8")
     return result
 
 
@@ -505,6 +532,38 @@ def write_export(
 ) -> dict[str, Any]:
     """Writes ``result.json`` and the report of ``truing dynamics export``; returns what result.json holds."""
     result = export_dict(robot, to, exported.model.name, exported.not_written, rollout, warnings=warnings)
+    (folder / "result.json").write_text(to_json(result), encoding="utf-8")
+    paths = paths_of(rollout.judgement) if rollout.judgement is not None else []
+    arm = arm_picture(robot, paths, MODEL_NAMES)
+    (folder / "report.html").write_text(export_report(result, paths, arm), encoding="utf-8")
+    return result
+
+
+def write_servo_export(
+    folder: Path,
+    robot: str,
+    exported: Exported | ServoExported,
+    to: str,
+    rollout: Rollout = NOT_JUDGED,
+    *,
+    warnings: Iterable[str] = (),
+) -> dict[str, Any]:
+    """The same of a diagnosis from commands. robot: its name."""
+    motion = servo_rollout_dict(rollout)
+    result: dict[str, Any] = without_nan(
+        {
+            **_head("export"),
+            "robot": robot,
+            "to": to,
+            "model": exported.model if isinstance(exported, ServoExported) else exported.model.name,
+            "driven_by": "commands",
+            "not_written": [
+                {"name": n.name, "size_Nm": n.size, "reason": n.reason} for n in exported.not_written
+            ],
+            "rollout": motion,
+            "warnings": [*warnings, *motion.get("worse", ())],
+        }
+    )
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     paths = paths_of(rollout.judgement) if rollout.judgement is not None else []
     (folder / "report.html").write_text(export_report(result, paths), encoding="utf-8")

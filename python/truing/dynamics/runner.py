@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.chains import coupling_of, zeros_of
 from truing.dynamics.export import Exported, coupling_matrix, import_mujoco
 from truing.dynamics.export.parts import drive_torque
 from truing.dynamics.motion import Track, table_at
@@ -33,6 +34,7 @@ _AT_ONCE = 256  # windows: bounds memory
 _HELD_STEPS = 2  # for which callbacks' torques are held
 _OUT = 1e3  # [rad | m]: a simulation that has left
 _NEAR = 1.0  # [s] of a track on both sides of a window, for torques at other clocks
+_AT_REST = 1e-9  # of a bristle that bends back in a row: it does not
 _OFF_GROUP = 30  # of MuJoCo's groups of actuators: the one that is switched off
 
 
@@ -52,6 +54,8 @@ class Runnable:
     notes: tuple[str, ...] = ()
     """What of the model was left out, in words."""
     prismatic: tuple[bool, ...] = field(default=(), kw_only=True)
+    T_body_tool: Floats = field(default_factory=lambda: np.eye(4), kw_only=True)
+    """The tool's frame in the body that the last joint of the chain moves: there a payload hangs."""
 
 
 def runnable(exported: Exported, callbacks: bool = True) -> Runnable:
@@ -71,6 +75,7 @@ def runnable(exported: Exported, callbacks: bool = True) -> Runnable:
         np.zeros(len(chain.links)),
         beside,
         prismatic=tuple(link.prismatic for link in chain.driven),
+        T_body_tool=chain.links[-1].after @ _tool(exported.robot),
     )
 
 
@@ -82,32 +87,36 @@ def runnable_mjcf(path: Path, robot: _core.Robot) -> Runnable:
     """
     mujoco = import_mujoco()
     model = _without_bounds(mujoco.MjModel.from_xml_path(str(path)))
-    values: dict[str, float] = {}
-    zeros: dict[str, float] = {}
-    rows: dict[str, Floats] = {}
-    driven = [joint.name for joint in robot.joints if not joint.passive]
-    for joint in robot.joints:
-        if joint.passive:
-            rows[joint.name] = np.sum([weight * rows[driver] for driver, weight in joint.driven_by], axis=0)
-            led = (w * zeros[driver] for driver, w in joint.driven_by)
-            zeros[joint.name] = joint.offset + sum(led, 0.0)
-        else:
-            rows[joint.name] = np.eye(len(driven))[driven.index(joint.name)]
-            zeros[joint.name] = joint.offset
-        # The robot counts motion from `ref`.
-        values[joint.name] = zeros[joint.name] + float(model.qpos0[model.joint(joint.name).qposadr[0]])
     off = _drives_off(mujoco, model, [joint.name for joint in robot.joints])
+    notes = (f"recorded torques stand in the place of its drives {', '.join(off)}",) if off else ()
+    return mjcf_as_it_is(model, robot, notes)
+
+
+def mjcf_as_it_is(model: Any, robot: _core.Robot, notes: tuple[str, ...]) -> Runnable:
+    """How readings enter a compiled MJCF. robot: of the same file."""
+    driven = [joint.name for joint in robot.joints if not joint.passive]
+    coupling = coupling_of([(joint.name, joint.driven_by) for joint in robot.joints])
+    # The robot counts motion from `ref`.
+    refs = [float(model.qpos0[model.joint(joint.name).qposadr[0]]) for joint in robot.joints]
+    anchor = np.eye(4)  # the reader has the frame of a link at its joint's anchor, with the axes of its body
+    anchor[:3, 3] = model.jnt_pos[model.joint(robot.joints[-1].name).id]
     return Runnable(
         robot,
         model,
         tuple(joint.name for joint in robot.joints),
         tuple(driven),
         np.ones(len(driven)),
-        np.array([rows[joint.name] for joint in robot.joints]),
-        np.array([values[joint.name] for joint in robot.joints]),
-        notes=(f"recorded torques stand in the place of its drives {', '.join(off)}",) if off else (),
+        coupling[:, robot.driven_joints()],
+        zeros_of(robot) + refs,
+        notes=notes,
         prismatic=tuple(joint.type == "prismatic" for joint in robot.joints if not joint.passive),
+        T_body_tool=anchor @ _tool(robot),
     )
+
+
+def _tool(robot: _core.Robot) -> Floats:
+    """T_last_tool, as cpp/src/dynamics/payload.cpp has it: the first target, or the last link's frame."""
+    return np.array(robot.targets[0].T_last_target) if robot.targets else np.eye(4)
 
 
 def simulator_of(path: Path, robot: _core.Robot) -> _core.Robot | Runnable:
@@ -150,6 +159,31 @@ def _module(path: Path) -> Any:
     return module
 
 
+def _with_point_mass(mujoco: Any, model: Any, joint: str, mass: float, place: Floats) -> Any:
+    """A copy of a model with a point mass [kg] at `place`, shape=(3,) [m], of the body that a joint moves."""
+    loaded = copy.copy(model)
+    body = int(loaded.jnt_bodyid[loaded.joint(joint).id])
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, loaded.body_iquat[body])
+    axes = turn.reshape(3, 3)
+    before, center = float(loaded.body_mass[body]), loaded.body_ipos[body].copy()
+    inertia = axes @ np.diag(loaded.body_inertia[body]) @ axes.T
+    # Two masses about their common centre: that of the reduced mass at their distance (Steiner).
+    apart = place - center
+    reduced = before * mass / (before + mass)
+    inertia += reduced * (apart @ apart * np.eye(3) - np.outer(apart, apart))
+    values, vectors = np.linalg.eigh(inertia)
+    vectors[:, 0] *= np.linalg.det(vectors)
+    loaded.body_mass[body] = before + mass
+    loaded.body_ipos[body] = center + mass / (before + mass) * apart
+    loaded.body_inertia[body] = values
+    mujoco.mju_mat2Quat(loaded.body_iquat[body], vectors.ravel())
+    # What MuJoCo leaves out for bodies whose inertia stands in their own frame.
+    loaded.body_sameframe[body] = loaded.body_simple[body] = 0
+    mujoco.mj_setConst(loaded, mujoco.MjData(loaded))
+    return loaded
+
+
 @contextlib.contextmanager
 def _quiet(mujoco: Any) -> Iterator[None]:
     """A simulation that leaves is told by its result, not by MuJoCo in a file of the working folder."""
@@ -175,6 +209,28 @@ class Runner:
         self.zero = of.start[rows]
         self.spec = int(self.mujoco.mjtState.mjSTATE_FULLPHYSICS)
         self.bristles = [self._bristles(track) for track in tracks]
+        self._loaded: dict[tuple[float, ...], Any] = {}
+
+    # ---- what hangs at the tool
+
+    def _with_payload(self, payload: Floats) -> Any:
+        """The model with a point mass at the tool. payload: shape=(4,) [kg, m], as in `Track`"""
+        mass = float(payload[0])
+        if mass == 0.0:
+            return self.model
+        key = tuple(payload.tolist())
+        if key not in self._loaded:
+            place = (self.of.T_body_tool @ [*payload[1:], 1.0])[:3]
+            self._loaded[key] = _with_point_mass(self.mujoco, self.model, self.of.links[-1], mass, place)
+        self._loaded[key].opt.timestep = self.model.opt.timestep
+        return self._loaded[key]
+
+    def _models(self, starts: Floats, track: NDArray[np.intp]) -> list[Any]:
+        """Of every window, with the payload that it begins with."""
+        return [
+            self._with_payload(self.tracks[t].payload_at(start))
+            for start, t in zip(starts, track, strict=True)
+        ]
 
     # ---- where windows begin
 
@@ -192,8 +248,12 @@ class Runner:
             data.qvel[self.link_dofs] = self.of.coupling @ qd
             if self.model.na:
                 data.act[:] = table_at(self.tracks[t].time, self.bristles[t], now)[0]
+            self._prepare(data, float(start), int(t))
             self.mujoco.mj_getState(self.model, data, out[k], self.spec)
         return out
+
+    def _prepare(self, data: Any, start: float, t: int) -> None:
+        """What else a state has where a window begins at `start` [s] of track t; here nothing."""
 
     def _bristles(self, track: Track) -> Floats:
         """Deflection of every LuGre bristle along a recording. shape=(n, activations) [rad | m]
@@ -204,7 +264,7 @@ class Runner:
         m = self.model
         kind = int(self.mujoco.mjtDyn.mjDYN_DCMOTOR)
         out = np.zeros((track.time.size, m.na))
-        step = float(track.time[1] - track.time[0])
+        step = track.step
         row = {int(m.joint(name).id): k for k, name in enumerate(self.of.links)}
         bent = (m.actuator_dyntype == kind) & (m.actuator_actnum > 0) & (m.actuator_dynprm[:, 5] > 0.0)
         for i in np.flatnonzero(bent):
@@ -215,7 +275,7 @@ class Runner:
             g = level + (still - level) * np.exp(-((v / speed) ** 2))
             rate = m.actuator_dynprm[i, 5] * np.abs(v) / g
             fade = np.exp(-rate * step)
-            push = np.where(rate * step > 1e-9, (1.0 - fade) / np.maximum(rate, 1e-12), step) * v
+            push = np.where(rate * step > _AT_REST, (1.0 - fade) / np.maximum(rate, 1e-12), step) * v
             z = 0.0
             for k in range(1, track.time.size):
                 z = fade[k - 1] * z + push[k - 1]
@@ -265,14 +325,7 @@ class Runner:
         h = float(self.model.opt.timestep)
         # A step need not divide the times: between two steps the path is a straight line.
         number = np.maximum(np.ceil(times / h - 1e-6).astype(int), 1)
-        torque = self._torques(starts, track, h * (np.arange(number[-1]) + 0.5))
-        states = self.states(starts, track)
-        applied = np.zeros((starts.size, number[-1], self.model.nv))
-        applied[:, :, self.dofs] = torque / self.of.ratios
-        if self.of.beside is None:
-            path = self._rollout(states, applied)
-        else:
-            path = self._with_callbacks(self.of.beside, states, applied, torque, *self._warmth(starts, track))
+        states, path = self._paths(starts, track, int(number[-1]))
         stopped = path[:, :, 0] < h * (np.arange(number[-1]) + 0.5)  # where MuJoCo gave up
         path[stopped] = np.nan
         whole = np.concatenate([states[:, None], path], axis=1)[:, :, 1 + self.qpos]
@@ -283,16 +336,37 @@ class Runner:
             np.where(np.abs(found) < _OUT, found, np.nan_to_num(np.sign(found), nan=1.0) * _OUT)
         )
 
-    def _rollout(self, states: Floats, applied: Floats) -> Floats:
+    def _paths(self, starts: Floats, track: NDArray[np.intp], steps: int) -> tuple[Floats, Floats]:
+        """States at the starts, and after each of so many steps. shape=(n, states), (n, steps, states)"""
+        h = float(self.model.opt.timestep)
+        torque = self._torques(starts, track, h * (np.arange(steps, dtype=np.float64) + 0.5))
+        states, models = self.states(starts, track), self._models(starts, track)
+        applied = np.zeros((starts.size, steps, self.model.nv))
+        applied[:, :, self.dofs] = torque / self.of.ratios
+        if self.of.beside is None:
+            spec = self.mujoco.mjtState.mjSTATE_QFRC_APPLIED
+            return states, self._rollout(models, states, applied, spec)
+        warmth = self._warmth(starts, track)
+        return states, self._with_callbacks(self.of.beside, models, states, applied, torque, *warmth)
+
+    def _rollout(self, models: list[Any], states: Floats, inputs: Floats, spec: Any) -> Floats:
+        """models: of each window. spec: which part of MuJoCo's state the inputs are.
+        shape=(n, steps, states)"""
         from mujoco import rollout
 
         datas = [self.mujoco.MjData(self.model) for _ in range(os.cpu_count() or 1)]
-        spec = int(self.mujoco.mjtState.mjSTATE_QFRC_APPLIED)
-        path, _ = rollout.rollout(self.model, datas, states, applied, control_spec=spec)
+        path, _ = rollout.rollout(models, datas, states, inputs, control_spec=int(spec))
         return np.asarray(path)
 
     def _with_callbacks(
-        self, beside: Any, states: Floats, applied: Floats, torque: Floats, warm: Floats, begun: Floats
+        self,
+        beside: Any,
+        models: list[Any],
+        states: Floats,
+        applied: Floats,
+        torque: Floats,
+        warm: Floats,
+        begun: Floats,
     ) -> Floats:
         """Few steps at a time: each window has a model of its own, whose dry friction changes with its
         state. On one thread: to wake others for two steps takes longer than the steps on a busy machine."""
@@ -300,7 +374,7 @@ class Runner:
 
         warm = np.where(np.isnan(warm), beside.REFERENCE_C, warm)
         m, n, ratios = self.model, states.shape[0], self.of.ratios
-        models = [copy.copy(m) for _ in range(n)]
+        models = [copy.copy(model) for model in models]
         losses = [model.dof_frictionloss for model in models]
         data = [self.mujoco.MjData(m)]
         spec = int(self.mujoco.mjtState.mjSTATE_QFRC_APPLIED)
@@ -328,8 +402,7 @@ class Runner:
         """What the drives must give for rows of a track's motion, at the readings (mj_inverse).
         shape=(rows, joints) [Nm | N]"""
         track, of = self.tracks[t], self.of
-        model = copy.copy(self.model)
-        data = self.mujoco.MjData(model)
+        data = self.mujoco.MjData(self.model)
         q, qd, qdd = (table[rows] for table in (track.q, track.qd, track.qdd))
         smooth, friction = np.zeros_like(q), None
         if of.beside is not None:
@@ -340,7 +413,12 @@ class Runner:
             friction = of.beside.dry_friction(*now) / np.abs(of.ratios)
             smooth = of.beside.smooth_torques(*now)
         out = np.empty_like(q)
+        copies: dict[int, Any] = {}  # that friction is written into
         for k, row in enumerate(rows):
+            loaded = self._with_payload(track.payload_at(track.time[row]))
+            if id(loaded) not in copies:
+                copies[id(loaded)] = copy.copy(loaded)
+            model = copies[id(loaded)]
             data.qpos[self.links] = of.start + of.coupling @ q[k]
             data.qvel[self.link_dofs] = of.coupling @ qd[k]
             data.qacc[self.link_dofs] = of.coupling @ qdd[k]

@@ -9,8 +9,9 @@ wrote, loaded again, or an MJCF as it is, and all windows run at once (`mujoco.r
 
 from __future__ import annotations
 
+import math
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -19,17 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.commanded import Commanded, CommandedTrack, CommandRunner, commanded_track
 from truing.dynamics.export import Exported, export, import_mujoco
 from truing.dynamics.export.parts import drive_torque
 from truing.dynamics.motion import (
     SMOOTHING,
-    Recorded,
     Track,
     smoothed,
     stretches_of,
     table_at,
     track_of,
 )
+from truing.dynamics.recorded import Recorded
 from truing.dynamics.runner import Runnable, Runner, runnable
 from truing.errors import InputError
 
@@ -38,10 +40,12 @@ Spans = Sequence[tuple[float, float]]
 """[s] of a recording: stretches, begin and end."""
 
 HORIZONS = (0.1, 0.5, 2.0)
+COMMANDED_HORIZONS = (0.1, 0.5, 2.0, 5.0)  # a servo pulls its model back, so that longer ones say something
 _SAMPLE = 0.02  # [s] between the samples of simulated paths
 _CHECKED = 16  # windows on which the integration step is halved
 _CHECKED_AHEAD = 0.5  # [s]
 _FINE = 0.002  # [s] the same where rows of a recording are asked for: between them straight lines
+_SAME = 1e-9  # of a step: rounding
 _TORQUE_STEP = 0.01  # [s] between the rows of a motion whose torques are computed, or the recording's own
 
 
@@ -128,34 +132,37 @@ def windows_of(
     smoothing: float = SMOOTHING,
     within: Sequence[Spans] | None = None,
     most: int | None = None,
+    track: Callable[[Any, _core.Robot, float], tuple[Track, NDArray[np.bool_]]] = track_of,
 ) -> Windows:
-    """Stretches as long as the longest horizon, one beginning `every` seconds, without gaps.
+    """Stretches as long as the longest horizon, one beginning `every` seconds, without gaps and with one
+    payload.
 
     smoothing: [s] half of the stretch whose cubic gives start and end positions (Savitzky and Golay 1964),
     and speeds where none were recorded. Torques, or else currents times torque_per_ampere, are taken as
     they are. within: [s] of each recording, stretches that windows must lie in. most: of more windows so
-    many are taken, evenly. Raises InputError: no torques, joints that were not recorded, nothing as long as
-    the longest horizon.
+    many are taken, evenly. track: what drives the models, `commanded_track` for commands. Raises InputError:
+    no torques (commands), joints that were not recorded, nothing as long as the longest horizon.
     """
     driven = [joint for joint in robot.joints if not joint.passive]
     if not horizons or min(horizons) <= 0.0 or every <= 0.0 or smoothing <= 0.0:
         raise InputError("horizons, every and smoothing are seconds, expected to be larger than zero")
     longest = max(horizons)
     times = np.unique(np.round([*np.arange(_SAMPLE, longest + 1e-9, _SAMPLE), *horizons], 9))
-    tracks, track, starts = [], [], []
+    tracks, numbers, starts = [], [], []
     for number, recording in enumerate(recordings):
-        made, free = track_of(recording, robot, smoothing)
+        made, free = track(recording, robot, smoothing)
         tracks.append(made)
         spans = [(float(made.time[0]), float(made.time[-1]))] if within is None else within[number]
         for begin, end in spans:
-            for start in np.arange(begin + smoothing, end - smoothing - longest + 1e-9, every):
-                if np.all(free[(made.time >= start) & (made.time <= start + longest)]):
-                    track.append(number)
+            for start in _starts(made, begin + smoothing, end - smoothing - longest, longest, every):
+                whole = np.all(free[(made.time >= start) & (made.time <= start + longest)])
+                if whole and made.one_payload(start, start + longest):
+                    numbers.append(number)
                     starts.append(start)
     if not starts:
         raise InputError(
-            f"no recording has {longest + 2 * smoothing:g} s without a gap, the longest horizon: give longer"
-            " recordings, or shorter horizons"
+            f"no recording has {longest + 2 * smoothing:g} s without a gap or a change of its payload, the"
+            " longest horizon: give longer recordings, or shorter horizons"
         )
     kept = np.arange(len(starts))
     if most is not None and kept.size > most:
@@ -163,14 +170,24 @@ def windows_of(
     return Windows(
         tuple(joint.name for joint in driven),
         tuple(joint.type == "prismatic" for joint in driven),
-        tuple(recordings[track[k]].name for k in kept),
+        tuple(recordings[numbers[k]].name for k in kept),
         np.array(starts)[kept],
         times,
-        np.array([table_at(tracks[track[k]].time, tracks[track[k]].q, starts[k] + times) for k in kept]),
+        np.array([table_at(tracks[numbers[k]].time, tracks[numbers[k]].q, starts[k] + times) for k in kept]),
         tuple(float(h) for h in horizons),
         tuple(tracks),
-        np.array(track, dtype=np.intp)[kept],
+        np.array(numbers, dtype=np.intp)[kept],
     )
+
+
+def _starts(track: Track, first: float, last: float, longest: float, every: float) -> list[float]:
+    """`first`, and every so many seconds until `last`, where windows as long as `longest` are in no gap."""
+    out: list[float] = []
+    for begin, end in track.stretches:
+        low = max(math.ceil((begin - first) / every - _SAME), 0)
+        high = math.floor((min(end - longest, last) - first) / every + _SAME)
+        out += [first + k * every for k in range(low, high + 1)]
+    return out
 
 
 def judge(
@@ -186,9 +203,10 @@ def judge(
 ) -> Judgement:
     """Simulates every model over the same windows of recordings.
 
-    models: robots, exported to a temporary folder, what `export(to="mjcf")` gave, or a `runnable`. callbacks:
-    run callbacks.py where a robot or an export has one. Horizons, every, smoothing, within, most: as in
-    windows_of, whose errors are raised; joints are those of the first model, the same number in every other.
+    models: robots, exported to a temporary folder, what `export(to="mjcf")` gave, or a `runnable`; driven by
+    torques, unless all are `commanded_mjcf`. callbacks: run callbacks.py where a robot or an export has one.
+    Horizons, every, smoothing, within, most: as in windows_of, whose errors are raised; joints are those of
+    the first model, the same number in every other.
     torques: also of the torques that each model needs for the windows' motion.
     """
     if not models:
@@ -203,14 +221,15 @@ def judge(
             for k, (name, model) in enumerate(models.items())
         }
         first = next(iter(made.values()))
-        windows = windows_of(recordings, first.robot, horizons, every, smoothing, within, most)
+        track = commanded_track if isinstance(first, Commanded) else track_of
+        windows = windows_of(recordings, first.robot, horizons, every, smoothing, within, most, track)
         for name, model in made.items():
             if len(model.driven) != len(windows.joints):
                 raise InputError(
                     f"model {name} has the joints {', '.join(model.driven)}, the first one"
                     f" {', '.join(windows.joints)}: expected the same number"
                 )
-            runner = Runner(model, windows.tracks)
+            runner = runner_of(model, windows.tracks)
             simulated[name] = runner.run(windows.starts, windows.track, windows.times)
             step_error[name] = _step_error(runner, windows)
             if torques:
@@ -222,6 +241,16 @@ def _made(model: _core.Robot | Exported | Runnable, folder: Path, callbacks: boo
     if isinstance(model, _core.Robot):
         model = export(model, "mjcf", folder)
     return model if isinstance(model, Runnable) else runnable(model, callbacks)
+
+
+def runner_of(model: Runnable, tracks: Sequence[Track]) -> Runner:
+    """By torques, or of a `Commanded` by commands."""
+    if not isinstance(model, Commanded):
+        return Runner(model, tracks)
+    commanded = [track for track in tracks if isinstance(track, CommandedTrack)]
+    if len(commanded) < len(tracks):
+        raise InputError("some models are driven by commands and some by torques: expected all alike")
+    return CommandRunner(model, commanded)
 
 
 def _step_error(runner: Runner, windows: Windows) -> float:
@@ -240,12 +269,11 @@ def _torque_error(runner: Runner, windows: Windows, smoothing: float) -> tuple[F
     deviation, both smoothed as the motion is. shape=(joints,) [Nm | N]"""
     errors, measured = [], []
     for t, track in enumerate(windows.tracks):
-        usual = float(track.time[1] - track.time[0])
-        stride = max(int(round(_TORQUE_STEP / usual)), 1)
+        stride = max(int(round(_TORQUE_STEP / track.step)), 1)
         for rows in _stretches(windows, t, stride):
             at = track.time[rows]
             drive = drive_torque(runner.of.robot, track.torque_time, track.torque, at)
-            step = stride * usual
+            step = stride * track.step
             measured.append(smoothed(drive, step, smoothing))
             errors.append(smoothed(drive - runner.torques(t, rows), step, smoothing))
     together = np.concatenate(errors)
@@ -281,8 +309,9 @@ def simulated_response(
 ) -> Response:
     """Simulates a whole recording, driven by its torques, in windows of `horizon` [s] one after the other.
 
-    A window begins at the measured state (as in windows_of), the first after a gap with its first row.
-    Raises InputError: no torques, joints that were not recorded, less than 0.2 s between gaps, a horizon
+    A window begins at the measured state (as in windows_of), the first after a gap or a change of the payload
+    with its first row.
+    Raises InputError: no torques, joints that were not recorded, less than 0.2 s between these, a horizon
     that is not above zero, MuJoCo is not installed.
     """
     if not horizon > 0.0:

@@ -51,6 +51,7 @@ def test_diagnose_names_what_was_hidden(
         "result.json",
         "report.html",
         "robot.yaml",
+        "covariance.csv",
         "residuals.parquet",
     }
     assert json.loads((out / "result.json").read_text())["held_out"] == ["motion3"]
@@ -138,7 +139,7 @@ def test_a_recording_without_torques_is_refused(
     said = refused(["diagnose", robot, str(without_torques(files, tmp_path))], tmp_path, capsys)
     assert "bare" in said and "tau1_Nm" in said and "commands" not in said
     said = refused(["diagnose", robot, str(without_torques(files, tmp_path, "u1_rad"))], tmp_path, capsys)
-    assert "from commands alone (u1_rad …) is not there yet" in said
+    assert "bare: command of joint 2, row 1" in said  # commands alone are enough, of all joints
     bare = str(without_torques(files, tmp_path))
     assert main(["dynamics", "predict", robot, bare, "--out", str(tmp_path / "p")]) == 0
 
@@ -388,18 +389,18 @@ def test_what_identify_writes_belongs_together(
     assert "parameters fitted; low-pass at 8 Hz" in capsys.readouterr().out
     names = {"result.json", "report.html", "robot.yaml", "covariance.csv", "residuals.parquet"}
     assert {path.name for path in out.iterdir()} == names
-    fitted = {p["name"]: p for p in json.loads((out / "result.json").read_text())["parameters"]}
+    parameters = json.loads((out / "result.json").read_text())["parameters"]
+    fitted = {p["name"]: p for p in parameters if not p["frozen"]}
     with (out / "covariance.csv").open(encoding="utf-8") as text:
-        listed = {row["parameter"]: row for row in csv.DictReader(text)}
+        listed = {row["name"]: row for row in csv.DictReader(text)}
     assert set(listed) == set(fitted)
     friction = [n for n in fitted if n.startswith(("coulomb.", "viscous.")) and n.count(".") == 1]
     assert len(friction) == 12
     carried = truing.load_robot(out / "robot.yaml").torque_effects
     values = {name: value for effect in carried for name, value in effect.parameters.items()}
     for name in friction:
-        assert float(listed[name]["value"]) == pytest.approx(fitted[name]["value"], rel=1e-6)
+        assert float(listed[name][name]) == pytest.approx(fitted[name]["sigma"] ** 2, rel=1e-6)
         assert values[name] == pytest.approx(fitted[name]["value"], rel=1e-6)
-        assert float(listed[name]["sigma"]) > 0.0
     table = parquet.read_table(out / "residuals.parquet").to_pydict()
     assert len(table["t_s"]) == sum(len(recording) for recording in simulated.recordings)
     assert {

@@ -215,12 +215,13 @@ def test_a_joint_that_follows_two_others_does_so(tmp_path: Path) -> None:
     robot = arm("urdf", seed=3)
     joints = [joint.copy() for joint in robot.joints]
     joints[2] = joints[2].replace(type="revolute", ratio=1.0, rotor_inertia=0.0)
-    joints[3] = joints[3].replace(offset=0.0, ratio=1.0, rotor_inertia=0.0, driven_by={"J2": -1.0, "J3": 0.5})
+    leads = {"J2": -1.0, "J3": 0.5}
+    joints[3] = joints[3].replace(offset=0.03, ratio=1.0, rotor_inertia=0.0, driven_by=leads)
     robot = robot.replace(joints=joints)
     exported = export(robot, "mjcf", tmp_path)
     free = robot.replace(joints=[*joints[:3], joints[3].replace(driven_by=[], offset=0.0)])
     C = np.vstack([np.eye(3), [0.0, -1.0 * joints[1].ratio, 0.5]])
-    zero = -joints[1].offset + 0.5 * joints[2].offset
+    zero = -joints[1].offset + 0.5 * joints[2].offset + joints[3].offset
     for q, qd, qdd in states(5, 3):
         all_q = C @ q
         all_q[3] += zero

@@ -99,6 +99,19 @@ def test_residuals_have_every_row_and_are_small(folder: Path, simulated: Simulat
     assert table["q3_rad"] == np.concatenate([r.position[:, 2] for r in simulated.recordings]).tolist()
 
 
+def test_residuals_carry_the_payloads_that_recordings_state(
+    tmp_path: Path, simulated: SimulatedMotion
+) -> None:
+    free, *others = simulated.recordings
+    (loaded,) = truing.dynamics.with_payload([others[0]], 2.0, (0.0, 0.0, 0.1))
+    found = identify(simulated.nominal, simulated.recordings, effects="coulomb,viscous")
+    write_fit(tmp_path, found, [free, loaded])
+    table = pq.read_table(tmp_path / "residuals.parquet").to_pydict()
+    n = len(free)
+    assert table["payload_kg"] == [0.0] * n + [2.0] * len(loaded)
+    assert table["payload_z_m"][n - 1 : n + 1] == [0.0, 0.1]
+
+
 def test_the_robot_file_predicts_as_the_robot_found(
     folder: Path, found: TorqueDiagnosis, simulated: SimulatedMotion
 ) -> None:
@@ -128,10 +141,14 @@ def test_a_fit_writes_its_parameters_with_errors(simulated: SimulatedMotion, tmp
     fit = identify(simulated.nominal, simulated.recordings, effects="coulomb,viscous,load_friction:J2")
     result = write_fit(tmp_path, fit, simulated.recordings)
     assert (result["format"], result["command"]) == ("truing-dynamics/1", "identify")
+    fitted = {p["name"]: p for p in result["parameters"]}
+    assert fitted["load_friction.J2"]["value"] == pytest.approx(0.09, abs=0.02)
     with (tmp_path / "covariance.csv").open(encoding="utf-8") as file:
-        rows = {row["parameter"]: row for row in csv.DictReader(file)}
-    assert float(rows["load_friction.J2"]["value"]) == pytest.approx(0.09, abs=0.02)
-    assert float(rows["coulomb.J1"]["sigma"]) > 0 and rows["coulomb.J1"]["unit"] == "Nm"
+        rows = {row["name"]: row for row in csv.DictReader(file)}
+    assert list(rows) == result["covariance"]["names"]
+    variance = float(rows["coulomb.J1"]["coulomb.J1"])
+    assert variance == pytest.approx(fitted["coulomb.J1"]["sigma"] ** 2, rel=1e-6)
+    assert rows["coulomb.J1"]["viscous.J1"] == rows["viscous.J1"]["coulomb.J1"] != "0"
     assert truing.load_robot(tmp_path / "robot.yaml").torque_effects
     assert "coulomb.J1" in visible((tmp_path / "report.html").read_text(encoding="utf-8"))
 

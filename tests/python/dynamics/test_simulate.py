@@ -20,7 +20,7 @@ from truing.dynamics.export.parts import drive_torque
 from truing.dynamics.motion import track_of
 from truing.dynamics.runner import Runner, runnable, runnable_mjcf
 from truing.dynamics.simulate import judge, simulated_response, windows_of
-from truing.model import AppliedEffect, Joint, Robot
+from truing.model import AppliedEffect, Joint, Robot, Target
 
 Floats = NDArray[np.float64]
 COULOMB, VISCOUS, LOAD = (4.0, 2.0), (3.0, 1.0), (0.1, 0.0)
@@ -230,6 +230,19 @@ def test_windows_leave_gaps_out_and_say_what_is_missing() -> None:
         judge({"right": two_links(*STANDARD)}, [recording], horizons=(0.5,)).errors("right", 0.1)
 
 
+def test_a_clock_that_jumped_takes_neither_time_nor_memory() -> None:
+    recording = move(1, (0.0, 0.0))
+    later = recording.time + np.where(recording.time > 3.0, 1e8, 0.0)
+    jumped = Recording("jumped", later, recording.position, recording.torque)
+    windows = windows_of([jumped], two_links(), horizons=(0.5,), every=0.25)
+    assert windows.tracks[0].time.size == recording.time.size
+    plain = windows_of([recording], two_links(), horizons=(0.5,), every=0.25)
+    assert 0.7 * plain.starts.size < windows.starts.size < plain.starts.size
+    single = Recording("single", later[:1], recording.position[:1], recording.torque[:1])
+    with pytest.raises(truing.InputError, match="single: 0 s are too short to be simulated"):
+        windows_of([single], two_links())
+
+
 MJCF = """<mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast"/>
 <worldbody><body>
 <joint name="J1" axis="0 1 0" ref="0.3" armature="0.2" damping="3" frictionloss="4" solreffriction="0.004 1"/>
@@ -303,3 +316,101 @@ def test_a_response_has_every_row_and_begins_anew_at_measured_states() -> None:
     assert np.abs(simulated_response(two_links(), gap, 0.5).position - gap.position).max() > 0.05
     with pytest.raises(truing.InputError, match="a horizon of 0 s"):
         simulated_response(two_links(), gap, 0.0)
+
+
+# ---- Known payloads: a point mass at the tool, as the torque half has it ---------------------------------
+
+PLACE = (0.02, -0.05, 0.1)  # [m] of the payload in the tool's frame
+
+
+def with_a_tool(robot: Robot) -> Robot:
+    """Beside the last frame, and turned."""
+    T = np.eye(4)
+    T[:3, 3] = [0.03, 0.02, 0.4]
+    T[:3, :3] = [[0.0, -1.0, 0.0], [0.8, 0.0, -0.6], [0.6, 0.0, 0.8]]
+    return robot.replace(targets=[Target("tool", T)])
+
+
+def loaded(recording: Recording, mass: Floats) -> Recording:
+    columns = {"payload_kg": mass} | {
+        f"payload_{axis}_m": np.full(mass.size, value) for axis, value in zip("xyz", PLACE, strict=True)
+    }
+    return Recording(recording.name, recording.time, recording.position, recording.torque, columns=columns)
+
+
+def link_of_dh(robot: Robot) -> Robot:
+    """An arm whose bodies do not stand in their joints' frames."""
+    joints = [
+        Joint(
+            joint.name,
+            theta=0.3 * k,
+            d=0.1,
+            a=0.5,
+            alpha=0.4 - k,
+            mass=joint.mass,
+            center_of_mass=[-0.2, 0.03, 0.01],
+            inertia=joint.inertia,
+        )
+        for k, joint in enumerate(robot.joints)
+    ]
+    return Robot("dh", joints=joints, convention="dh", gravity=[1.0, -2.0, -9.0])
+
+
+@pytest.mark.parametrize("convention", ["urdf", "dh", "mjcf"])
+def test_a_payload_weighs_in_simulations_as_it_does_in_torques(convention: str, tmp_path: Path) -> None:
+    recording = move(1, (0.0, 0.0))
+    recording = loaded(recording, np.where(recording.time < 2.0, 0.0, 1.5))
+    if convention == "mjcf":
+        # The last joint turns about a point beside its body's frame, and the site is turned against it.
+        path = tmp_path / "arm.xml"
+        path.write_text(
+            """<mujoco><worldbody><body><joint name="J1" axis="0 1 0"/>
+<inertial pos="0 0 0.2" mass="5" diaginertia="0.1 0.1 0.01"/><body pos="0 0 0.5" euler="10 20 30">
+<joint name="J2" axis="0 1 0" pos="0.02 0.1 0.03"/>
+<inertial pos="0 0 0.2" mass="3" diaginertia="0.04 0.04 0.002"/>
+<site name="tool" pos="0.1 0 0.3" euler="40 10 0"/></body></body></worldbody></mujoco>""",
+            encoding="utf-8",
+        )
+        robot = truing.load_robot(path)
+        model = runnable_mjcf(path, robot)
+    else:
+        robot = with_a_tool(two_links() if convention == "urdf" else link_of_dh(two_links()))
+        model = runnable(export(robot, "mjcf", tmp_path))
+    track, _ = track_of(recording, robot, 0.05)
+    rows = np.arange(0, track.time.size, 40)
+    found = Runner(model, [track]).torques(0, rows)
+    grown = robot.copy()
+    T = np.array(robot.targets[0].T_last_target)
+    place = (T @ [*PLACE, 1.0])[:3]
+    last = grown.joints[-1]
+    assert last.mass is not None and last.center_of_mass is not None and last.inertia is not None
+    apart = place - np.array(last.center_of_mass)
+    reduced = last.mass * 1.5 / (last.mass + 1.5)
+    last.inertia = np.array(last.inertia) + reduced * (apart @ apart * np.eye(3) - np.outer(apart, apart))
+    last.center_of_mass = np.array(last.center_of_mass) + 1.5 / (last.mass + 1.5) * apart
+    last.mass += 1.5
+    motion = track.q[rows], track.qd[rows], track.qdd[rows]
+    bare, heavy = (np.asarray(truing._core.rigid_torques(one, *motion)) for one in (robot, grown))
+    carries = (track.time[rows] > 1.9999)[:, None]
+    assert found == pytest.approx(np.where(carries, heavy, bare), abs=1e-6)
+    assert np.abs(heavy - bare).max() > 1.0
+
+
+def test_windows_run_with_the_payload_that_they_begin_with(tmp_path: Path) -> None:
+    recording = move(1, (0.0, 0.0))
+    robot = with_a_tool(two_links(*STANDARD))
+    everywhere = loaded(recording, np.full(recording.time.size, 1.5))
+    later = loaded(recording, np.where(recording.time < 3.0, 0.0, 1.5))
+    with_it = judge({"arm": robot}, [everywhere], horizons=(0.5,))
+    without = judge({"arm": robot}, [recording], horizons=(0.5,))
+    both = judge({"arm": robot}, [later], horizons=(0.5,))
+    starts = both.windows.starts
+    assert not np.any((starts < 3.0) & (starts + 0.5 >= 3.0))  # none in which it changes
+    for found, rows in ((without, starts < 3.0), (with_it, starts > 3.0)):
+        same = np.searchsorted(found.windows.starts, starts[rows])
+        assert both.errors("arm", 0.5)[rows] == pytest.approx(found.errors("arm", 0.5)[same], abs=1e-12)
+    assert with_it.worst_joint("arm", 0.5) > 3.0 * without.worst_joint("arm", 0.5)
+    response = simulated_response(robot, later, 0.8)
+    assert np.any(np.abs(response.start - 3.0) < 0.006)  # begun anew where the payload came
+    exported = export(robot, "mjcf", tmp_path)
+    assert mujoco.MjModel.from_xml_path(str(exported.model)).body("J2_link").mass == pytest.approx(3.0)

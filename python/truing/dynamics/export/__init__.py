@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.chains import coupling_of
 from truing.dynamics.export import beside, isaaclab, mjcf, urdf
 from truing.dynamics.export.chain import Chain, chain_of, file_name
 from truing.dynamics.export.parts import (
@@ -27,7 +28,7 @@ from truing.dynamics.export.parts import (
     recorded_motion,
     reference_motion,
 )
-from truing.dynamics.motion import Recorded
+from truing.dynamics.recorded import Recorded
 from truing.errors import InputError
 from truing.files.output import atomic_output_dir
 
@@ -106,7 +107,7 @@ def export(
             files["actuators.py"], left = isaaclab.write(robot, chain, parts, reference)
     left = sorted(left, key=lambda item: -item.size if math.isfinite(item.size) else -math.inf)
     where = "the recordings" if recordings else "a motion through the robot's range at the torques of gravity"
-    files[NOT_WRITTEN] = _listed(robot, to, left, where)
+    files[NOT_WRITTEN] = listed(robot.name, to, left, where)
     inputs = [] if source is None else [Path(source)]
     with atomic_output_dir(out, inputs=inputs, obsolete=[CALLBACKS]) as folder:
         for file, text in files.items():
@@ -142,10 +143,10 @@ def _callbacks_text(chain: Chain, model: mjcf.Model) -> str:
     return text
 
 
-def _listed(robot: _core.Robot, to: str, left: Sequence[NotWritten], where: str) -> str:
+def listed(robot: str, to: str, left: Sequence[NotWritten], where: str) -> str:
     """YAML of what was not written (JSON strings are YAML strings)."""
     lines = [
-        f"robot: {json.dumps(robot.name)}",
+        f"robot: {json.dumps(robot)}",
         f"simulator: {to}",
         f"# size: root mean square over {where}; thermal effects 10 degrees and 600 s from where they count",
         "not_written:" + ("" if left else " []"),
@@ -196,16 +197,9 @@ def _check(robot: _core.Robot, chain: Chain, reference: Reference, text: str) ->
 
 def coupling_matrix(chain: Chain) -> NDArray[np.float64]:
     """Motion of every joint of the model for readings of one. shape=(links, driven)"""
-    number = {link.name: k for k, link in enumerate(chain.driven)}
-    rows: dict[str, NDArray[np.float64]] = {}
-    for link in chain.links:
-        row = np.zeros(len(number))
-        if link.drivers:
-            row += sum(weight * rows[driver] for driver, weight in link.drivers)
-        else:
-            row[number[link.name]] = link.ratio
-        rows[link.name] = row
-    return np.array([rows[link.name] for link in chain.links])
+    coupling = coupling_of([(link.name, link.drivers) for link in chain.links])
+    driven = [k for k, link in enumerate(chain.links) if not link.drivers]
+    return np.asarray(coupling[:, driven] * [link.ratio for link in chain.driven])
 
 
 def set_readings(chain: Chain, model: Any, data: Any, q: NDArray[np.float64]) -> None:

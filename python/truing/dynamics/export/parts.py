@@ -15,11 +15,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from truing import _core
-from truing.dynamics.export.beside import Effect, dry_friction, smooth_torques
+from truing.dynamics.export.beside import REFERENCE_C, Effect, dry_friction, smooth_torques
 from truing.dynamics.export.chain import Chain, Floats
-from truing.dynamics.motion import SMOOTHING, Recorded, track_of
+from truing.dynamics.motion import SMOOTHING, track_of
+from truing.dynamics.recorded import Recorded
 from truing.errors import InputError
 
+_WARM, _LATER = REFERENCE_C + 10.0, 600.0  # [deg C], [s] at which sizes of thermal effects are stated
+_GRAVITY = 9.81  # [m/s^2]
+_REFERENCE = (20.0, 0.05)  # [s] of the reference motion where nothing was recorded, and between its rows
+_USUAL_REACH = (np.pi / 2, 0.25)  # [rad], [m] of a joint without limits
+_SHARE = 0.25  # of a joint's range to both sides of its middle
+_APART, _PHASE = 0.13, 0.7  # share and [rad] by which a joint's sine differs from that of the one before
 _USUAL_SPEED = 1.0  # [rad/s | m/s] of a joint without a speed limit
 _PER_JOINT = (
     "coulomb",
@@ -54,8 +61,8 @@ _PARTS = {
     "payload_place": ("x", "y", "z"),
 }
 """What follows the joint in the names of an effect's parameters; nothing where it is not listed."""
-_IN_BODIES = ("link_inertia", "payload")
-_ONLY_MEASURED = {
+IN_BODIES = ("link_inertia", "payload")
+ONLY_MEASURED = {
     "motor_constant": "belongs to the measurement: divide measured torques by one plus this",
     "torque_lag": "belongs to the measurement: the torque was read so much later than the motion",
     "time_offset": "belongs to the measurement: torques and positions have other clocks",
@@ -113,10 +120,14 @@ class Reference:
     def size(self, effect: Effect) -> float:
         """[Nm | N] root mean square of an effect of `beside`."""
         zero = np.zeros(self.q.shape[1])
-        smooth = smooth_torques(self.q, self.qd, self.torque, 30.0, 600.0, [effect])[:, effect[1]]
-        positive = dry_friction(self.q, self.qd, self.torque, 30.0, 600.0, [effect], list(zero))[:, effect[1]]
+        smooth = smooth_torques(self.q, self.qd, self.torque, _WARM, _LATER, [effect])[:, effect[1]]
+        positive = dry_friction(self.q, self.qd, self.torque, _WARM, _LATER, [effect], list(zero))[
+            :, effect[1]
+        ]
         minus = (effect[0], effect[1], effect[2], _turned(effect[3]))
-        negative = dry_friction(self.q, self.qd, self.torque, 30.0, 600.0, [minus], list(zero))[:, effect[1]]
+        negative = dry_friction(self.q, self.qd, self.torque, _WARM, _LATER, [minus], list(zero))[
+            :, effect[1]
+        ]
         return rms(np.sign(self.qd[:, effect[1]]) * (positive - negative) - smooth)
 
 
@@ -131,17 +142,21 @@ def rms(values: Floats) -> float:
 def reference_motion(robot: _core.Robot, chain: Chain) -> Reference:
     """20 s of sines, at every joint another frequency, through half its range and up to half its speed
     limit."""
-    time = np.arange(0.0, 20.0, 0.05)
+    time = np.arange(0.0, *_REFERENCE)
     q, qd, qdd = (np.zeros((time.size, len(chain.driven))) for _ in range(3))
     for j, link in enumerate(chain.driven):
         ends = np.sort(np.array([link.lower, link.upper]) / link.ratio)
-        usual = 0.25 if link.prismatic else np.pi / 2
+        usual = _USUAL_REACH[int(link.prismatic)]
         middle, reach = 0.0, usual
         if np.all(np.isfinite(ends)):
-            middle, reach = float(ends.mean()), min(usual, 0.25 * float(ends[1] - ends[0]))
+            middle, reach = float(ends.mean()), min(usual, _SHARE * float(ends[1] - ends[0]))
         speed = 0.5 * (link.speed_limit if np.isfinite(link.speed_limit) else 2.0 * _USUAL_SPEED)
-        w = min(speed / max(reach, 1e-9), 2.0 * np.pi) * (1.0 + 0.13 * j) / (1.0 + 0.13 * len(chain.driven))
-        phase = w * time + 0.7 * j
+        w = (
+            min(speed / max(reach, 1e-9), 2.0 * np.pi)
+            * (1.0 + _APART * j)
+            / (1.0 + _APART * len(chain.driven))
+        )
+        phase = w * time + _PHASE * j
         q[:, j] = middle + reach * np.sin(phase)
         qd[:, j] = reach * w * np.cos(phase)
         qdd[:, j] = -reach * w * w * np.sin(phase)
@@ -159,7 +174,7 @@ def recorded_motion(robot: _core.Robot, recordings: Sequence[Recorded]) -> Refer
         track, free = track_of(recording, robot, SMOOTHING)
         rows.append(np.asarray(np.stack([track.q, track.qd, track.qdd])[:, free], dtype=float))
         torques.append(drive_torque(robot, track.torque_time, track.torque, track.time)[free])
-        steps.append(float(track.time[1] - track.time[0]))
+        steps.append(track.step)
     q, qd, qdd = (np.asarray(np.concatenate([table[k] for table in rows]), dtype=float) for k in range(3))
     time = float(np.median(steps)) * np.arange(len(q), dtype=np.float64)
     return Reference(time, q, qd, qdd, np.concatenate(torques))
@@ -177,7 +192,7 @@ def parts_of(robot: _core.Robot, chain: Chain, reference: Reference) -> Parts:
                 NotWritten(f"{joint.name}.rotor_inertia", np.nan, "of a joint that has no motor")
             )
     for change in chain.adjusted:
-        size = change.inertia * (rms(reference.qdd) if reference.qdd.size else 0.0) + 9.81 * change.mass
+        size = change.inertia * (rms(reference.qdd) if reference.qdd.size else 0.0) + _GRAVITY * change.mass
         parts.not_written.append(
             NotWritten(f"inertia.{change.joint}", size, change.reason + ": nearest written")
         )
@@ -195,7 +210,7 @@ def parts_of(robot: _core.Robot, chain: Chain, reference: Reference) -> Parts:
 
 def _check_parts(robot: _core.Robot, name: str, joint: str, values: dict[str, float]) -> None:
     """Raises InputError for a parameter that the effect has not."""
-    if name in _IN_BODIES:
+    if name in IN_BODIES:
         known = {joint.name for joint in robot.joints}
         for key in values if name == "link_inertia" else ():
             if key.split(".")[0] not in known:
@@ -246,10 +261,10 @@ def _add(
     joint: str,
     reference: Reference,
 ) -> None:
-    if name in _IN_BODIES:
+    if name in IN_BODIES:
         return
-    if name in _ONLY_MEASURED or name in _NO_PLACE:
-        reason = _ONLY_MEASURED.get(name) or _NO_PLACE[name]
+    if name in ONLY_MEASURED or name in _NO_PLACE:
+        reason = ONLY_MEASURED.get(name) or _NO_PLACE[name]
         full = f"{name}.{joint}" if joint else name
         parts.not_written.append(NotWritten(full, _measured_size(name, j, values, reference), reason))
     elif name == "tool_force":
@@ -339,7 +354,7 @@ def stand_in(effect: Effect, reference: Reference) -> StandIn:
         return StandIn(0.0, 0.0, reference.size(effect))
     zero = [0.0] * reference.q.shape[1]
     positive, negative = (
-        dry_friction(reference.q, reference.qd, reference.torque, 20.0, 0.0, [one], zero)[:, j]
+        dry_friction(reference.q, reference.qd, reference.torque, REFERENCE_C, 0.0, [one], zero)[:, j]
         for one in (effect, (*effect[:3], _turned(effect[3])))
     )
     wanted, speed = positive - negative, np.abs(reference.qd[:, j])
