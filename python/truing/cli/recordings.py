@@ -193,7 +193,7 @@ def require_torques(recordings: Sequence[Recording]) -> None:
         commands = recording.command.shape[1] or recording.torque_command.shape[1]
         raise InputError(
             f"{recording.name}: there is neither a torque (tau1_Nm …) nor a current (i1_A …)"
-            + ("; a diagnosis from commands alone (u1_rad …) is not there yet" if commands else "")
+            + ("; from commands alone (u1_rad …) there is `truing dynamics diagnose`" if commands else "")
         )
 
 

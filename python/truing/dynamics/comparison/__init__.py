@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Two simulator models on the same recordings: which moves more like the robot, at which joints, and which
-needs the torques that were measured.
+"""Two simulator models on the same recordings: which moves more like the robot, at which joints, and,
+where torques were recorded, which needs those that were measured.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.commanded import Commanded
 from truing.dynamics.export import Exported
-from truing.dynamics.motion import Recorded
-from truing.dynamics.rollout import WINDOWS, judgement_dict
+from truing.dynamics.recorded import Recorded
+from truing.dynamics.rollout import WINDOWS, judgement_dict, possible
 from truing.dynamics.rollout.page import main_horizon
 from truing.dynamics.runner import Runnable
-from truing.dynamics.simulate import HORIZONS, Judgement, judge
+from truing.dynamics.simulate import COMMANDED_HORIZONS, HORIZONS, Judgement, judge
 from truing.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -46,8 +47,8 @@ class Ratio:
 class Comparison:
     """What `compare` found."""
 
-    judgement: Judgement  # of the models "A" and "B", with torques
-    torque: Ratio
+    judgement: Judgement  # of the models "A" and "B", with torques where they were recorded
+    torque: Ratio | None  # None: driven by commands, no torque was recorded
     motion: tuple[Ratio, ...]  # of each horizon
     margin: float
     notes: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())  # what of each model was left out
@@ -55,7 +56,8 @@ class Comparison:
     @property
     def ratios(self) -> list[tuple[str, Ratio]]:
         horizons = (f"motion {h:g} s ahead" for h in self.judgement.windows.horizons)
-        return [("torque", self.torque), *zip(horizons, self.motion, strict=True)]
+        motion = list(zip(horizons, self.motion, strict=True))
+        return motion if self.torque is None else [("torque", self.torque), *motion]
 
     @property
     def worse(self) -> list[str]:
@@ -80,28 +82,37 @@ def compare(
     recordings: Sequence[Recorded],
     *,
     margin: float = MARGIN,
-    horizons: Sequence[float] = HORIZONS,
+    horizons: Sequence[float] | None = None,
     windows: int = WINDOWS,
     seed: int = 0,
 ) -> Comparison:
     """Judges two models by torque and by motion over the same windows of recordings (`judge`).
 
+    Driven by the recorded torques; `commanded_mjcf` models by the recorded commands, and by motion alone.
+
     a, b: robots, exports, or MJCF files as they are (`truing.dynamics.runner.runnable_mjcf`), with the same
-    number of joints. recordings: with torques, or currents and the models' torque_per_ampere; best ones that
-    neither model was fitted to. margin: ratio of errors beyond one that counts as a difference. horizons:
-    [s]. windows: at most so many, evenly taken. seed: of the bootstrap of the intervals.
+    number of joints. recordings: with torques, or currents and the models' torque_per_ampere, or commands for
+    `commanded_mjcf`; best ones that neither model was fitted to. margin: ratio of errors beyond one that
+    counts as a difference. horizons: [s]; default: 0.1, 0.5, 2, of commands also 5, as far as recordings are
+    long enough. windows: at most so many, evenly taken. seed: of the bootstrap of the intervals.
 
     Raises InputError: no such torques, other numbers of joints, nothing as long as the longest horizon,
     MuJoCo is not installed.
     """
     if not margin >= 0.0:
         raise InputError(f"a margin of {margin:g}: expected zero or more")
-    judged = judge({"A": a, "B": b}, recordings, horizons, most=windows, torques=True)
+    commanded = isinstance(a, Commanded)
+    usual = COMMANDED_HORIZONS if commanded else HORIZONS
+    wanted = possible(usual, recordings) if horizons is None else horizons
+    judged = judge({"A": a, "B": b}, recordings, wanted, most=windows, torques=not commanded)
     groups = _groups(judged)
     motion = tuple(_motion_ratio(judged, h, groups, seed) for h in judged.windows.horizons)
-    torque_a, torque_b = (judged.torque_error[m] / judged.torque_spread[m] for m in ("A", "B"))
+    torque = None
+    if not commanded:
+        torque_a, torque_b = (judged.torque_error[m] / judged.torque_spread[m] for m in ("A", "B"))
+        torque = _ratio(torque_a, torque_b, [])
     notes = tuple(m.notes if isinstance(m, Runnable) else () for m in (a, b))
-    return Comparison(judged, _ratio(torque_a, torque_b, []), motion, margin, (notes[0], notes[1]))
+    return Comparison(judged, torque, motion, margin, (notes[0], notes[1]))
 
 
 def _groups(judged: Judgement) -> list[NDArray[np.intp]]:
@@ -160,6 +171,7 @@ def comparison_dict(found: Comparison, names: tuple[str, str]) -> dict[str, Any]
         "torque_rms_Nm": {
             model: dict(zip(joints, e.tolist(), strict=True)) for model, e in judged.torque_error.items()
         },
+        "driven_by": "commands" if found.torque is None else "torques",
         "rollout": judgement_dict(judged, "models"),
     }
 
@@ -173,8 +185,9 @@ def sentence(found: Comparison, names: tuple[str, str]) -> str:
     joint = found.judgement.windows.joints[int(order[0])]
     each = f"{100 * ratio.joints[int(order[0])]:.3g} % at {joint}"
     ahead = f"{found.judgement.windows.horizons[main]:g} s ahead"
-    moved = f"{ahead} its error of motion is {100 * ratio.value:.3g} % of that of the other one, {each};"
-    moved += f" that of torque {100 * found.torque.value:.3g} %"
+    moved = f"{ahead} its error of motion is {100 * ratio.value:.3g} % of that of the other one, {each}"
+    if found.torque is not None:
+        moved += f"; that of torque {100 * found.torque.value:.3g} %"
     if found.nearer == "neither":
         return f"{a} and {b} are as near to the robot, within {100 * found.margin:g} %"
     if found.nearer == "mixed":

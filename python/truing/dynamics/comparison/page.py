@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 """The HTML report of ``truing dynamics compare``: which model is nearer to the robot; both drawn over the
-measured motion; every joint's error of both, by torque and by motion.
+measured motion; every joint's error of both, by motion and, where it was recorded, by torque.
 """
 
 from __future__ import annotations
@@ -29,12 +29,13 @@ def comparison_report(result: Mapping[str, Any], paths: Sequence[Mapping[str, An
     page = Page(f"{names['A']} and {names['B']}", part_of_page("dynamics"))
     label, tone = TONES[result["nearer"]]
     recordings, runs = len(result["recordings"]), result["rollout"]["windows"]
+    drive = "recorded commands" if result["driven_by"] == "commands" else "measured torques"
     page.add(
         f'<header><p class="kicker">truing dynamics compare · {counted(recordings, "recording")} ·'
         f' margin {100 * result["margin"]:g} %<span class="verdict {tone}">{label}</span></p>'
         f'<h1 class="long">{escaped(result["sentence"])}</h1><p class="sub">A is'
         f" <b>{escaped(names['A'])}</b>, B <b>{escaped(names['B'])}</b>. {counted(runs, 'simulation')} of"
-        " each begin at measured states and are driven by the measured torques.</p></header>"
+        f" each begin at measured states and are driven by the {drive}.</p></header>"
     )
     page.add('<div class="first">')
     models = {"A": ("A", BEFORE), "B": ("B", AFTER)}
@@ -77,10 +78,10 @@ def joint_lines(
     errors, torque = result["rollout"]["models"], result["torque"]
     chosen = range(len(horizons)) if numbers is None else numbers
     titles = [title for k in chosen for title in (f"{horizons[k]:g} s ahead A", "B")]
-    head = ["", "torque A", "B", *titles]
+    head = ["", *(["torque A", "B"] if torque else []), *titles]
     lines = []
     for joint, unit in units.items():
-        line = [joint, *(f"{torque[model][joint]:.1f} %" for model in ("A", "B"))]
+        line = [joint, *(f"{of[joint]:.1f} %" for of in torque.values())]
         for k in chosen:
             line += [error_text(errors[model][joint][k], unit) for model in ("A", "B")]
         lines.append(line)
@@ -91,9 +92,10 @@ def _joint_card(page: Page, result: Mapping[str, Any]) -> None:
     head, lines = joint_lines(result)
     heads = "".join(f"<th>{escaped(title)}</th>" for title in head)
     rows = "".join(f"<tr>{''.join(f'<td>{escaped(cell)}</td>' for cell in line)}</tr>" for line in lines)
+    torque = "torque in % of its standard deviation, " if result["torque"] else ""
     page.add(
-        '<section class="card"><h2>Every joint <span class="muted">rms; torque in % of its standard'
-        " deviation, motion ahead of measured states</span></h2>"
+        f'<section class="card"><h2>Every joint <span class="muted">rms; {torque}motion ahead of measured'
+        " states</span></h2>"
         f'<div class="scroll"><table class="tight"><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody>'
         "</table></div></section>"
     )

@@ -21,8 +21,11 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.api import identify
+from truing.dynamics.commanded import CommandedTrack
 from truing.dynamics.export import Exported, export, import_mujoco
-from truing.dynamics.rollout.page import main_horizon
+from truing.dynamics.motion import Track
+from truing.dynamics.recorded import Recorded
+from truing.dynamics.rollout.page import FAR, TURN, main_horizon
 from truing.dynamics.runner import Runnable, runnable
 from truing.dynamics.simulate import HORIZONS, Judgement, Response, Spans, judge
 
@@ -79,7 +82,7 @@ def rollout(
             judgement = judge(
                 {**models, "exported": runnable(models["named"], callbacks=False)},
                 held,
-                _possible(horizons, held, spans),
+                possible(horizons, held, spans),
                 within=spans,
                 most=windows,
             )
@@ -156,14 +159,14 @@ def judge_written(
     alone = runnable(ours, callbacks=False) if written is None else written
     try:
         models = {"named": runnable(ours), "exported": alone}
-        horizons = _possible(HORIZONS, motion, spans)
+        horizons = possible(HORIZONS, motion, spans)
         return Rollout(judge(models, motion, horizons, within=spans, most=WINDOWS))
     except (ValueError, RuntimeError) as error:
         return Rollout(None, str(error))
 
 
-def _possible(
-    horizons: Sequence[float], held: Sequence[_core.Recording], spans: Sequence[Spans] | None
+def possible(
+    horizons: Sequence[float], held: Sequence[Recorded], spans: Sequence[Spans] | None = None
 ) -> list[float]:
     """The horizons that the longest stretch has room for, or the shortest."""
     whole = [[(float(r.time[0]), float(r.time[-1]))] for r in held]
@@ -255,9 +258,8 @@ def _worse(judged: Judgement, model: str, ours: str, unit: str) -> list[str]:
 def shown(value: float, unit: str) -> str:
     """An error in degrees or millimetres; of one that has left, that it has."""
     if unit == "rad":
-        degrees = math.degrees(value)
-        return f"{degrees:.2f}°" if degrees < 360.0 else "more than a turn"
-    return f"{1e3 * value:.2f} mm" if value < 100.0 else "more than 100 m"
+        return f"{math.degrees(value):.2f}°" if value < TURN else "more than a turn"
+    return f"{1e3 * value:.2f} mm" if value < FAR else f"more than {FAR:g} m"
 
 
 def paths_of(judged: Judgement) -> list[Mapping[str, Any]]:
@@ -284,6 +286,7 @@ def paths_of(judged: Judgement) -> list[Mapping[str, Any]]:
             "unit": "°" if windows.units[j] == "rad" else "mm",
             "time": track.time[rows],
             "measured": scale[j] * track.q[rows, j],
+            **_commanded(track, rows, j, scale[j]),
             "ahead": np.concatenate([[*(windows.starts[k] + windows.times), np.nan] for k in chosen]),
             "simulated": {
                 model: np.concatenate([[*(scale[j] * path[k, :, j]), np.nan] for k in chosen])
@@ -292,6 +295,13 @@ def paths_of(judged: Judgement) -> list[Mapping[str, Any]]:
         }
         for j, joint in enumerate(windows.joints)
     ]
+
+
+def _commanded(track: Track, rows: NDArray[np.bool_], joint: int, scale: float) -> dict[str, Floats]:
+    """What a joint was commanded, where that was a position."""
+    if not (isinstance(track, CommandedTrack) and track.kind == "position"):
+        return {}
+    return {"commanded": scale * track.held(track.time[rows])[:, joint]}
 
 
 def response_paths(

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compare two simulator models on the same recordings: which is nearer to the robot, and at which joints.
 
-Both run in MuJoCo from measured states, driven by the measured torques. Writes result.json, report.html.
-Exits with 1 where MODEL_B is worse than MODEL_A by more than --margin.
+Where some recordings are marked as test, only these count. Both models run in MuJoCo from measured states,
+driven by the measured torques; where the recordings have commands alone, by these, through the models' own
+actuators. Writes result.json, report.html. Exits with 1 where MODEL_B is worse than MODEL_A by more than
+--margin.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
 from truing.cli.options import File, Fraction, Seed, keyword
-from truing.cli.recordings import ReadMotion, RecordingFiles, require_torques
+from truing.cli.recordings import ReadMotion, RecordingFiles
 from truing.cli.tables import say, table
 
 if TYPE_CHECKING:
@@ -52,14 +54,17 @@ class Command(ReadMotion, run.Command[Loaded, "Comparison"]):
     def load(self, progress: run.Progress) -> Loaded:
         a, b = self.read_robot(self.model_a), self.read_robot(self.model_b)
         recordings = self.read_recordings(a, self.recordings)
-        require_torques(recordings)
-        return Loaded(a, b, recordings)
+        held = [recording for recording in recordings if recording.test]
+        return Loaded(a, b, held or recordings)
 
     def solve(self, loaded: Loaded, progress: run.Progress) -> Comparison:
+        from truing.dynamics.commanded import command_kind, commanded_mjcf
         from truing.dynamics.comparison import compare
         from truing.dynamics.runner import simulator_of
 
-        a, b = simulator_of(self.model_a, loaded.a), simulator_of(self.model_b, loaded.b)
+        files = ((self.model_a, loaded.a), (self.model_b, loaded.b))
+        kind = command_kind(loaded.recordings)
+        a, b = (simulator_of(*f) if kind is None else commanded_mjcf(*f, kind) for f in files)
         return compare(a, b, loaded.recordings, margin=self.margin, seed=self.seed)
 
     def write(
@@ -85,6 +90,7 @@ class Command(ReadMotion, run.Command[Loaded, "Comparison"]):
         say(result["sentence"])
         main = main_horizon(result["rollout"]["horizon_s"])
         head, lines = joint_lines(result, [main])
-        table("rms errors of A and B: torque in % of its standard deviation, motion", head, lines)
+        of = "torque in % of its standard deviation, " if result["torque"] else ""
+        table(f"rms errors of A and B: {of}motion", head, lines)
         ratios = [(r["of"], f"{r['B_over_A']:.3g}", interval(r)) for r in result["ratios"]]
         table("error of B over that of A, mean over the joints", ("", "ratio", "90 % interval"), ratios)
