@@ -11,18 +11,16 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 from truing import _core
 from truing.controllers.distances import between, dropped_effects, dropped_links, dropped_ratios, poses_of
 from truing.controllers.nearest import Nearest
 from truing.controllers.written import Written
-from truing.errors import InputError
-from truing.files import MotorCalibration, load_lerobot_calibration, matched_motors, radians_per_count
+from truing.files import load_lerobot_calibration, matched_motors, moved_zero, radians_per_count
 
 _REASON = "LeRobot has zeros"
-_LARGEST = math.radians(45)
 
 
 def written(found: Nearest, calibrated: _core.Robot, calibration: Path) -> Written:
@@ -34,7 +32,7 @@ def written(found: Nearest, calibrated: _core.Robot, calibration: Path) -> Writt
     for index in found.robot.driven_joints():
         joint = again.joints[index]
         name = matched[joint.name]
-        changed[name] = _moved(name, motors[name], joint.offset)
+        changed[name] = moved_zero(name, motors[name], joint.offset)
         taken = (motors[name].middle - changed[name].middle) * radians_per_count()
         lines.append(
             (
@@ -67,18 +65,3 @@ def written(found: Nearest, calibrated: _core.Robot, calibration: Path) -> Writt
         remaining=remaining,
         before=found.before,
     )
-
-
-def _moved(name: str, motor: MotorCalibration, offset: float) -> MotorCalibration:
-    """With the zero moved so that what is read becomes reading + offset [rad]; one end of the range gives
-    way.
-    """
-    twice = round(2 * offset / radians_per_count())
-    if abs(offset) > _LARGEST or abs(twice) >= motor.range_max - motor.range_min:
-        raise InputError(
-            f"{name}: its zero is {math.degrees(offset):.1f} deg off, more than a range can give way: hold"
-            " the arm in its middle pose and calibrate it with LeRobot again"
-        )
-    if twice > 0:
-        return replace(motor, range_max=motor.range_max - twice)
-    return replace(motor, range_min=motor.range_min - twice)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from truing import _core
@@ -21,9 +21,11 @@ from truing.errors import InputError
 from truing.files.common import PathLike, decoded, listed, read_bytes, shown
 from truing.files.controller_parts import ControllerModel
 
+_LARGEST = math.radians(45)  # of a zero that a range can give way to
 COUNTS = 4096
 """Of one turn: STS3215 and XL330, XL430 servos."""
 
+_LARGEST_COUNT = 1_000_000  # far beyond what any servo counts
 _FIELDS = ("id", "drive_mode", "homing_offset", "range_min", "range_max")
 _OLD = ("motor_names", "calib_mode")
 
@@ -83,7 +85,7 @@ def _motor(path: Path, name: str, entry: object) -> MotorCalibration:
     values = {}
     for key in _FIELDS:
         value = entry.get(key)
-        if not isinstance(value, int) or isinstance(value, bool) or abs(value) > 1_000_000:
+        if not isinstance(value, int) or isinstance(value, bool) or abs(value) > _LARGEST_COUNT:
             raise InputError(f"{path}: {key} of {shown(name)} is {shown(value)}, expected a whole number")
         values[key] = value
     motor = MotorCalibration(**values)
@@ -98,6 +100,21 @@ def _motor(path: Path, name: str, entry: object) -> MotorCalibration:
             " than STS3215, XL330 and XL430?"
         )
     return motor
+
+
+def moved_zero(name: str, motor: MotorCalibration, offset: float) -> MotorCalibration:
+    """A motor with the zero moved so that what is read becomes reading + offset [rad]; one end of the range
+    gives way. Raises InputError: more than 45 degrees, or than the range has.
+    """
+    twice = round(2 * offset / radians_per_count())
+    if abs(offset) > _LARGEST or abs(twice) >= motor.range_max - motor.range_min:
+        raise InputError(
+            f"{name}: its zero is {math.degrees(offset):.1f} deg off, more than a range can give way: hold"
+            " the arm in its middle pose and calibrate it with LeRobot again"
+        )
+    if twice > 0:
+        return replace(motor, range_max=motor.range_max - twice)
+    return replace(motor, range_min=motor.range_min - twice)
 
 
 def matched_motors(
