@@ -6,7 +6,7 @@ The rule: a string literal of cpp/src or python/truing is not, and does not begi
 of the catalogue ("backlash", "backlash:J2", "transmission_error@"). Not searched: cpp/src/model/effects
 itself; exam/, whose effects are its own and share nothing with the catalogue; dynamics/export/parts.py,
 which sorts the effects on torques, some of them of the same names, by what simulators have for their laws;
-comments, docstrings and
+dynamics/servo and dynamics/servo.cpp, whose names are values of the actuator chain; comments, docstrings and
 sentences, where a name is an example. Words that mean something else, and requests of the demonstration,
 are listed.
 """
@@ -51,10 +51,13 @@ def python_literals(path: Path) -> Iterator[str]:
 
 
 def sources() -> dict[str, Path]:
-    cpp = (p for p in (ROOT / "cpp" / "src").rglob("*.[ch]pp") if "effects" not in p.parts)
+    servo = ROOT / "cpp" / "src" / "dynamics" / "servo.cpp"
+    cpp = (p for p in (ROOT / "cpp" / "src").rglob("*.[ch]pp") if "effects" not in p.parts and p != servo)
     sorts_torques = ROOT / "python" / "truing" / "dynamics" / "export" / "parts.py"
     python = (
-        p for p in (ROOT / "python" / "truing").rglob("*.py") if "exam" not in p.parts and p != sorts_torques
+        p
+        for p in (ROOT / "python" / "truing").rglob("*.py")
+        if not {"exam", "servo"} & set(p.parts) and p != sorts_torques
     )
     return {path.relative_to(ROOT).as_posix(): path for path in (*cpp, *python)}
 

@@ -130,6 +130,7 @@ FLOORS = {
         "scenes",
         "spike_in",
         "families",
+        "servo",
         "sets",
         "answers",
         "score",
