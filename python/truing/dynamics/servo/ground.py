@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The groundwork: gain, damping, dry friction, rotor and zero of every joint, from whatever the file says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing.dynamics.servo.data import ServoData, Window
+from truing.dynamics.servo.fit import Fitted, Fitter, Rows, rows_of
+from truing.dynamics.servo.free import Sizes, usual_values
+from truing.dynamics.servo.simulator import FIELDS, Point, Simulator
+
+Floats = NDArray[np.float64]
+
+_MOVING = 0.02  # of the fastest: slower rows are at rest
+_ROUNDS = 8
+_SCANNED = 12  # windows that the first scan looks at, at most
+_GAINS = np.exp(np.arange(-5.0, 2.1, 1.0))  # times the file's
+_WIDE = np.exp(np.arange(-4.0, 2.1, 1.5))  # the same of friction and rotors
+_FINE = np.exp(np.array([-0.7, -0.35, 0.35, 0.7]))
+
+
+def sizes_of(simulator: Simulator, point: Point, windows: Sequence[Window]) -> Sizes:
+    """What is usual at each joint, of a simulation of it and of the recordings."""
+    data = simulator.data
+    speeds = [s.speed for s in data.streams]
+    speed = np.array([_moving_rms(np.concatenate([v[:, j] for v in speeds])) for j in range(data.joints)])
+    _, torque = simulator.run([point], windows, torques=True)
+    error = np.concatenate([s.command - s.position for s in data.streams])
+    if data.torque_command:
+        error = np.concatenate([s.position - s.position.mean(axis=0) for s in data.streams])
+    gain = point.chain[:, FIELDS.index("command_gain")]
+    used = np.sqrt(np.mean(torque[0] ** 2, axis=0))
+    angle = np.maximum(np.sqrt(np.mean(error**2, axis=0)), 1e-4)
+    return Sizes(
+        np.maximum(used, 1e-3 * angle * gain + 1e-9),
+        np.maximum(speed, 1e-4),
+        angle,
+        np.maximum(_inertia(simulator, point), 1e-9),
+    )
+
+
+def _moving_rms(speed: Floats) -> float:
+    moving = np.abs(speed) > _MOVING * np.abs(speed).max()
+    return float(np.sqrt(np.mean(speed[moving] ** 2))) if moving.any() else 0.0
+
+
+def _inertia(simulator: Simulator, point: Point) -> Floats:
+    """Of everything that each joint moves, at the file's zero."""
+    m = simulator.model
+    bodies = np.asarray(m.dof_M0, dtype=float)[simulator.dofs] - np.asarray(m.dof_armature)[simulator.dofs]
+    return np.asarray(np.maximum(bodies, 0.0) + point.chain[:, FIELDS.index("armature")])
+
+
+def first_guess(simulator: Simulator, rows: Rows, point: Point, torque_command: bool) -> Point:
+    """Joint by joint the best of wide steps in gain, damping, friction and rotor: a file may be off by
+    hundreds, where no derivative leads back. All joints are changed at once: they hardly see each other."""
+    every = max(1, len(rows.windows) // _SCANNED)
+    few = rows_of(simulator.data, rows.windows[::every])
+    fitter = Fitter(simulator, few)
+    steps = [("command_gain", _GAINS), ("viscous", _WIDE), ("coulomb", _WIDE), ("armature", _WIDE)]
+    if torque_command:
+        steps = steps[1:]
+    for name, factors in [*steps, *[(name, _FINE) for name, _ in steps]]:
+        values = np.array([point.chain[:, FIELDS.index(name)] * f for f in [1.0, *factors]])
+        points = []
+        for row in values:
+            changed = point.chain.copy()
+            changed[:, FIELDS.index(name)] = row
+            points.append(Point(changed, point.weight))
+        squares = np.array([np.mean(fitter.errors(q) ** 2, axis=0) for q in fitter.motions(points)])
+        best = np.argmin(squares, axis=0)
+        chain = point.chain.copy()
+        chain[:, FIELDS.index(name)] = values[best, np.arange(len(best))]
+        point = Point(chain, point.weight)
+    return point
+
+
+def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted, Sizes]:
+    """The usual parameters fitted to all rows of the fitter."""
+    simulator = fitter.simulator
+    fitter.progress("groundwork")
+    without_limits = nominal.chain.copy()
+    point = first_guess(simulator, fitter.rows, Point(without_limits, nominal.weight), data.torque_command)
+    sizes = sizes_of(simulator, point, fitter.rows.windows)
+    free = usual_values(simulator.arm.nominal, sizes, data.torque_command)
+    start = np.array([f.at(point) for f in free])
+    return fitter.fit(point, free, start, None, _ROUNDS, "groundwork"), sizes
