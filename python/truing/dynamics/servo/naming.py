@@ -1,0 +1,517 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which effects stand beside the groundwork: ranked by linear gain, the best three refitted without
+linearisation, one after the other, as long as folds that were not fitted are predicted better."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.dynamics.servo.candidates import Candidate, candidate_columns, candidates_of
+from truing.dynamics.servo.fit import Fitted, Fitter, Noise, noise_of
+from truing.dynamics.servo.free import Free, Sizes
+from truing.dynamics.servo.simulator import Function, Point
+
+Floats = NDArray[np.float64]
+
+THRESHOLD = 4.0  # nats beyond the cost
+LEAST_GAIN = 0.01  # of a joint's squared error on folds that were not fitted
+SURE_GAIN = 2.0  # standard errors over the folds
+SURE_NATS = 10.0  # of a refit: instead of these, where folds are too unlike for standard errors
+OTHER_LAWS = 0.2  # part of a joint's error that other laws than the catalogue's may well be
+NAMED = 0.2  # what is less sure is fitted, and not named
+UNKNOWN = 0.5  # so sure at least must be that there is what nobody knows
+_CLASS_NATS, _CLASS_R2, _SAME_R2, _TEMPERED, _FAR_NATS = 6.0, 0.95, 0.5, 0.5, 25.0
+_ONE_RECORDING = 0.9  # the most that folds of one recording are worth
+_REFITTED = 3  # of the candidates, without linearisation
+_RESOLUTION = 0.3  # of the usual step between distinct readings: no error is smaller
+_MOST_ROWS = 15000  # of which sums are made; more are thinned
+_LEAST_UNKNOWN = 0.05  # as LEAST_GAIN, of free functions
+INPUTS = ("speed", "load", "angle", "command_error", "time", "directed_load", "directed_angle")
+_PLACES = 6  # of a free function
+
+
+@dataclass
+class Rank:
+    """A candidate's place beside what is fitted."""
+
+    candidate: int
+    score: float
+    share: float
+    values: Floats
+    folds: Floats  # squares by fold, with it
+    explains_best: float
+
+
+@dataclass(frozen=True)
+class Weight:
+    """What is left without an effect, everything else refitted at its joint."""
+
+    before: Floats  # squares of each fold by the fit to the others, without it
+    after: Floats  # and with it
+    loss: float  # nats
+    point: Point  # the chain without it
+
+
+@dataclass
+class Account:
+    """What was found, fitted to all training rows."""
+
+    fitted: Fitted
+    found: list[Candidate]
+    sizes: Sizes
+    nominal: Point
+    not_testable: list[tuple[str, tuple[str, ...], str]] = field(default_factory=list)
+    refits: dict[str, list[tuple[Candidate, float]]] = field(default_factory=dict)
+    """By label and joint of what was taken: rivals that were refitted, and how far behind they stayed."""
+    weights: list[Weight] = field(default_factory=list)
+
+
+@dataclass
+class Sums:
+    """Normal equations by fold, of the columns that are fitted and of the candidates."""
+
+    folds: list[tuple[Floats, Floats, float, float]]
+    always: int  # columns of what is fitted stand first
+    noise: Noise
+
+
+class Namer:
+    """The search."""
+
+    def __init__(self, fitter: Fitter, leave_out: Sequence[str], most: int) -> None:
+        self.fitter, self.leave_out, self.most = fitter, tuple(leave_out), most
+        self.data, self.arm = fitter.simulator.data, fitter.simulator.arm
+        self.joints = len(self.arm.nominal.joints)
+        self.resolution = _resolution(fitter)
+
+    # ---- ranking
+
+    def all_candidates(
+        self, point: Point, sizes: Sizes
+    ) -> tuple[list[Candidate], list[tuple[str, tuple[str, ...], str]], Floats]:
+        motions, torques = self.fitter.simulator.run([point], self.fitter.rows.windows, torques=True)
+        self.fitter.runs += 1
+        found, idle = candidates_of(self.arm, self.data, point, sizes, torques[0], self.leave_out)
+        return found, idle, motions[0]
+
+    def sums(
+        self,
+        fitted: Fitted,
+        more: Sequence[Floats],
+        errors: Floats | None = None,
+        noise: Noise | None = None,
+    ) -> Sums:
+        """Noise is what all columns together leave; rows count for as many as their noise goes on for."""
+        rows = self.fitter.rows
+        every = max(1, math.ceil(len(rows.fold) / _MOST_ROWS))
+        errors = fitted.errors if errors is None else errors
+        table = np.concatenate([fitted.columns, np.array(more).reshape(-1, *errors.shape)])
+        noise = noise or self._noise(table, errors, len(fitted.columns))
+        x = (table[:, ::every] * noise.weight).reshape(len(table), -1)
+        y = (errors[::every] * noise.weight).ravel()
+        fold = np.repeat(rows.fold[::every], self.joints)
+        folds = []
+        count = float(np.sum(1.0 / noise.effect))
+        for number in np.unique(fold):
+            at = fold == number
+            part, right = x[:, at] * math.sqrt(every), y[at] * math.sqrt(every)
+            here = float(np.sum(rows.fold == number)) * count
+            folds.append((part @ part.T, part @ right, float(right @ right), here))
+        return Sums(folds, len(fitted.columns), noise)
+
+    def _noise(self, table: Floats, errors: Floats, always: int) -> Noise:
+        """What a ridge fit of everything leaves, joint by joint."""
+        rms = np.maximum(np.sqrt(np.mean(errors**2, axis=0)), self.resolution)
+        x = (table / rms).reshape(len(table), -1)
+        y = (errors / rms).ravel()
+        scale = np.sqrt(np.maximum(np.sum(x * x, axis=1), 1e-30))
+        x = x / scale[:, None]
+        ridge = np.full(len(table), 1e-3)
+        ridge[:always] = 1e-6
+        left = errors - (np.linalg.solve(x @ x.T + np.diag(ridge), x @ y) @ x).reshape(errors.shape) * rms
+        return noise_of(left, self.fitter.rows, self.resolution)
+
+    def ranked(
+        self, sums: Sums, groups: Sequence[Sequence[int]], costs: Sequence[float], prior: Floats
+    ) -> tuple[Floats, list[Rank]]:
+        gains = _core.rank_columns(
+            sums.folds, list(range(sums.always)), [list(g) for g in groups], list(costs), prior
+        )
+        out = [
+            Rank(k, g.score, g.share, np.asarray(g.values), np.asarray(g.folds), g.explains_best)
+            for k, g in enumerate(gains[1:])
+        ]
+        return np.asarray(gains[0].folds), out
+
+    def predicts(self, before: Floats, after: Floats, least: float, nats: float = 0.0) -> bool:
+        """Folds that were not fitted: by enough in all, and by two standard errors, gains as roots, or by
+        many nats. A fold that had hardly any errors counts for less, or its own would decide."""
+        if before.size < 2 or not before.sum() > 0.0:
+            return False
+        gain = (before - after) / (before + np.median(before))
+        roots = np.copysign(np.sqrt(np.abs(gain)), gain)
+        error = roots.std(ddof=1) / math.sqrt(before.size)
+        whole = float((before - after).sum() / before.sum())
+        return whole > least / self.joints and bool(nats > SURE_NATS or roots.mean() > SURE_GAIN * error)
+
+    def folds_of(self, fitted: Fitted, noise: Noise) -> Floats:
+        """Squares of each fold, by the fit to the others, linear at the fit."""
+        sums = self.sums(fitted, [], None, noise)
+        return np.asarray(
+            _core.rank_columns(sums.folds, list(range(sums.always)), [], [], _priors(fitted))[0].folds
+        )
+
+    # ---- the search
+
+    def run(self, fitted: Fitted, sizes: Sizes, nominal: Point) -> Account:
+        account = Account(fitted, [], sizes, nominal)
+        refused: set[tuple[str, int]] = set()
+        while len(account.found) < self.most:
+            self.fitter.progress(f"candidates beside {len(account.found)} that were named")
+            if not self._round(account, refused):
+                break
+        while account.found and self._drop_idle(account):
+            pass
+        return account
+
+    def _drop_idle(self, account: Account) -> bool:
+        """Takes away what folds that were not fitted are predicted as well without; the others are weighed
+        by what is left without them (`Account.weights`)."""
+        fitted, weights = account.fitted, []
+        noise = self._noise(fitted.columns, fitted.errors, len(fitted.columns))
+        squares = self.folds_of(fitted, noise)
+        for at, one in enumerate(account.found):
+            less = self.without(account, at, noise)
+            before = self.folds_of(less, noise)
+            loss = self.fitter.cost(less.errors, less.point, less.free, less.start, noise) - self.fitter.cost(
+                fitted.errors, fitted.point, fitted.free, fitted.start, noise
+            )
+            if loss < THRESHOLD or not self.predicts(before, squares, LEAST_GAIN, loss):
+                self.fitter.progress(f"{one.effect} {' '.join(one.joints)} is idle")
+                account.found.pop(at)
+                account.fitted = self.polished(less, noise)
+                return True
+            weights.append(Weight(before, squares, loss, less.point))
+        account.weights = weights
+        return False
+
+    def _round(self, account: Account, refused: set[tuple[str, int]]) -> bool:
+        fitted = account.fitted
+        candidates, account.not_testable, base = self.all_candidates(fitted.point, account.sizes)
+        there = {c.place for c in account.found}
+        candidates = [c for c in candidates if c.place not in there and not self._fitted(fitted, c)]
+        columns = candidate_columns(self.fitter, fitted.point, base, candidates)
+        sums = self.sums(fitted, columns)
+        before, ranks = self.ranked(sums, *_groups(sums, fitted, candidates))
+        ranks.sort(key=lambda r: -r.score)
+        best: list[tuple[float, Candidate, Fitted]] = []
+        seen: set[tuple[str, tuple[str, ...]]] = set()
+        for rank in ranks:
+            one = candidates[rank.candidate]
+            if rank.score < THRESHOLD or len(best) >= _REFITTED:
+                break
+            if one.place in seen or (one.label, one.joint) in refused:
+                continue
+            if not _plausible(one, rank, fitted.point):
+                continue
+            seen.add(one.place)
+            gain, refit = self._refit(fitted, one, rank, sums.noise)
+            after = self.folds_of(refit, sums.noise)
+            if gain > THRESHOLD and self.predicts(before, after, LEAST_GAIN, gain):
+                best.append((gain, one, refit))
+            else:
+                refused.add((one.label, one.joint))
+            if len(seen) >= 2 * _REFITTED:
+                break
+        if not best:
+            return False
+        best.sort(key=lambda b: -b[0])
+        gain, one, refit = best[0]
+        self.fitter.progress(f"{one.effect} {' '.join(one.joints)} is taken")
+        account.found.append(one)
+        account.refits[f"{one.label} {one.joint}"] = [(other, gain - theirs) for theirs, other, _ in best[1:]]
+        account.fitted = self.polished(refit, sums.noise)
+        refused.clear()
+        return True
+
+    def _fitted(self, fitted: Fitted, one: Candidate) -> bool:
+        names = {(f.field, f.joint, f.body) for f in fitted.free}
+        return any((f.field, f.joint, f.body) in names for f in one.free)
+
+    def _refit(self, fitted: Fitted, one: Candidate, rank: Rank, noise: Noise) -> tuple[float, Fitted]:
+        """The candidate and what is fitted at its joint, without linearisation: nats that it wins."""
+        before = self.fitter.cost(fitted.errors, fitted.point, fitted.free, fitted.start, noise)
+        point = one.on(fitted.point)
+        if one.begin is None:
+            new = one.free[0]
+            change = float(np.clip(rank.values[0], -new.prior, new.prior))
+            point = new.put(point, new.at(point) + change)
+        mine = [k for k, f in enumerate(fitted.free) if one.joint < 0 or f.joint == one.joint or f.joint < 0]
+        if one.joint < 0:
+            mine = [k for k in mine if fitted.free[k].field in ("command_gain", "coulomb", "zero")]
+        free = [*(fitted.free[k] for k in mine), *one.free]
+        start = np.array([*(fitted.start[k] for k in mine), *(_begin(f, one, point) for f in one.free)])
+        some = self.fitter.fit(point, free, start, noise, 3, f"{one.effect} {' '.join(one.joints)}")
+        others = [k for k in range(len(fitted.free)) if k not in mine]
+        rest = [fitted.free[k] for k in others]
+        starts = fitted.start[others]
+        after = self.fitter.cost(some.errors, some.point, [*rest, *free], np.array([*starts, *start]), noise)
+        columns = fitted.columns.copy()
+        columns[mine] = some.columns[: len(mine)]
+        some.columns = np.concatenate([columns, some.columns[len(mine) :]])
+        some.free = [*fitted.free, *one.free]
+        some.start = np.array([*fitted.start, *start[len(mine) :]])
+        return before - after, some
+
+    def polished(self, refit: Fitted, noise: Noise, rounds: int = 2) -> Fitted:
+        return self.fitter.fit(refit.point, refit.free, refit.start, noise, rounds, "all that is named")
+
+    def without(self, account: Account, at: int, noise: Noise) -> Fitted:
+        """Everything but one of what was found, refitted at its joint."""
+        fitted, one = account.fitted, account.found[at]
+        drop = {(f.field, f.joint, f.body) for f in one.free}
+        keep = [k for k, f in enumerate(fitted.free) if (f.field, f.joint, f.body) not in drop]
+        mine = [k for k in keep if one.joint < 0 or fitted.free[k].joint in (one.joint, -1)]
+        point = one.off(fitted.point)
+        some = self.fitter.fit(
+            point, [fitted.free[k] for k in mine], fitted.start[mine], noise, 2, f"without {one.effect}"
+        )
+        columns = fitted.columns.copy()
+        columns[mine] = some.columns
+        return replace(
+            fitted,
+            point=some.point,
+            free=[fitted.free[k] for k in keep],
+            start=fitted.start[keep],
+            errors=some.errors,
+            columns=columns[keep],
+        )
+
+
+def _priors(fitted: Fitted) -> Floats:
+    return np.array([f.prior for f in fitted.free])
+
+
+def _begin(free: Free, one: Candidate, point: Point) -> float:
+    """Mean of a value's prior: neutral, or where the form was looked at."""
+    return free.at(point) if one.begin is not None else free.at(one.off(point))
+
+
+def _groups(
+    sums: Sums, fitted: Fitted, candidates: Sequence[Candidate]
+) -> tuple[list[list[int]], list[float], Floats]:
+    """Columns, costs and priors of the candidates: having looked at all joints and forms of an effect costs
+    the log of their number."""
+    kinds: dict[str, int] = {}
+    for one in candidates:
+        kinds[one.effect] = kinds.get(one.effect, 0) + 1
+    first = sums.always
+    prior = np.array(
+        [
+            *(f.prior for f in fitted.free),
+            *(1.0 if c.begin is not None else c.free[0].prior for c in candidates),
+        ]
+    )
+    return (
+        [[first + k] for k in range(len(candidates))],
+        [math.log(kinds[c.effect]) for c in candidates],
+        prior,
+    )
+
+
+def _plausible(one: Candidate, rank: Rank, point: Point) -> bool:
+    """A value that machines have, as the linear account has it; a form that is wanted the other way round
+    stands for something else."""
+    value = float(rank.values[0])
+    if one.begin is not None:
+        return 0.1 < value < 5.0
+    free = one.free[0]
+    at = free.at(one.off(point)) + value
+    slack = 0.02 * free.prior
+    return free.low - slack <= at <= free.high + slack and abs(value) > 1e-3 * free.prior
+
+
+def _resolution(fitter: Fitter) -> Floats:
+    """Of each joint's reading: the usual step between distinct values, a part of it. shape=(joints,)"""
+    out = []
+    for column in fitter.rows.measured.T:
+        distinct = np.unique(np.round(column, 9))
+        out.append(_RESOLUTION * float(np.quantile(np.diff(distinct), 0.05)) if distinct.size > 1 else 1e-6)
+    return np.asarray(np.maximum(np.array(out), 1e-7))
+
+
+# ---- how sure -------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Sureness:
+    """Of one effect that was found."""
+
+    probability: float
+    confounded: tuple[tuple[Candidate, float], ...]  # and their probabilities
+
+
+def sureness(namer: Namer, account: Account, single: bool) -> list[Sureness]:
+    """Posterior of each effect's class against what could stand in its place, linear at the fit."""
+    fitted = account.fitted
+    if not account.found:
+        return []
+    candidates, _, base = namer.all_candidates(fitted.point, account.sizes)
+    there = {c.place for c in account.found}
+    others = [c for c in candidates if c.place not in there and not namer._fitted(fitted, c)]
+    columns = candidate_columns(namer.fitter, fitted.point, base, others)
+    out = []
+    for at, one in enumerate(account.found):
+        mine = [k for k, f in enumerate(fitted.free) if f in one.free]
+        shown = fitted.columns[mine]
+        change = np.array([fitted.free[k].at(fitted.point) for k in mine]) - np.array(
+            [f.at(one.off(fitted.point)) for f in one.free]
+        )
+        if one.begin is not None or not np.isfinite(change).all():  # of a limit: all that it does
+            off = namer.fitter.motions([one.off(fitted.point)])[0]
+            shown, change = (base - off)[None], np.ones(1)
+        part = np.tensordot(change, shown, 1)
+        keep = [k for k in range(len(fitted.free)) if k not in mine]
+        less = replace(fitted, free=[fitted.free[k] for k in keep], columns=fitted.columns[keep])
+        sums = namer.sums(less, [part, *columns], fitted.errors + part)
+        groups, costs, prior = _groups(sums, less, [replace(one, begin=1.0), *others])
+        ranks = namer.ranked(sums, groups, costs, prior)[1]
+        out.append(_sure(namer, one, others, account.weights[at], ranks, single))
+    return out
+
+
+def _sure(
+    namer: Namer,
+    one: Candidate,
+    others: Sequence[Candidate],
+    weight_of: Weight,
+    ranks: Sequence[Rank],
+    single: bool,
+) -> Sureness:
+    mine = ranks[0]
+    loss = mine.score
+    in_class, outside = 1.0, math.exp(-_TEMPERED * min(loss, 700.0))
+    rivals: dict[tuple[str, tuple[str, ...]], tuple[Candidate, float]] = {}
+    for rank in sorted(ranks[1:], key=lambda r: -r.score):
+        other = others[rank.candidate - 1]
+        if other.place in rivals or other.place == one.place:
+            continue
+        behind = loss - rank.score
+        weight = math.exp(-_TEMPERED * max(behind, 0.0))
+        if rank.explains_best < _SAME_R2:
+            continue
+        if behind < _CLASS_NATS or rank.explains_best > _CLASS_R2:
+            rivals[other.place] = (other, weight)
+            in_class += weight
+        elif behind < _FAR_NATS:
+            outside += weight
+    before, after = weight_of.before, weight_of.after
+    gain = float((before - after).sum() / before.sum()) if before.sum() > 0.0 else 0.0
+    part = max(0.0, gain) * namer.joints
+    law = part**2 / (part**2 + OTHER_LAWS**2)
+    probability = in_class / (in_class + outside) * law
+    total = in_class + outside
+    return Sureness(
+        min(probability, _ONE_RECORDING) if single else probability,
+        tuple((other, weight / total) for other, weight in rivals.values()),
+    )
+
+
+# ---- unknown --------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class FoundFunction:
+    """A torque as a function of an input that nothing of the catalogue explains."""
+
+    joint: int
+    input: str
+    low: float
+    width: float
+    values: Floats  # [Nm] at the places
+    sigmas: Floats
+    probability: float
+    share: float
+
+
+def unknown(namer: Namer, account: Account, single: bool) -> list[FoundFunction]:
+    """Free functions of speed, load, angle, command error and time at every joint, beside what was found."""
+    fitted, sizes = account.fitted, account.sizes
+    motions, torques = namer.fitter.simulator.run([fitted.point], namer.fitter.rows.windows, torques=True)
+    base, found = motions[0], []
+    labels = [(name, place) for name in INPUTS for place in range(_PLACES)]
+    ranges = {
+        (name, j): _range(namer, name, j, base, torques[0]) for name in INPUTS for j in range(namer.joints)
+    }
+    size = 0.02 * sizes.torque
+    points = []
+    for name, place in labels:
+        functions: list[Function] = []
+        for j in range(namer.joints):
+            low, width = ranges[name, j]
+            values = np.zeros(_PLACES)
+            values[place] = size[j]
+            functions.append((j, name, low, width, values))
+        points.append(replace(fitted.point, functions=tuple(functions)))
+    columns, owners = [], []
+    for (name, place), motion in zip(labels, namer.fitter.motions(points), strict=True):
+        for j in range(namer.joints):
+            alone = np.zeros_like(base)
+            alone[:, j] = np.clip(motion[:, j] - base[:, j], -3.0, 3.0) / size[j]
+            columns.append(alone)
+            owners.append((name, j, place))
+    sums = namer.sums(fitted, columns)
+    groups, keys = [], []
+    for name in INPUTS:
+        for j in range(namer.joints):
+            groups.append([sums.always + k for k, o in enumerate(owners) if o[:2] == (name, j)])
+            keys.append((name, j))
+    costs = [math.log(len(keys))] * len(keys)
+    prior = np.array([*(f.prior for f in fitted.free), *(0.3 * sizes.torque[j] for _, j, _ in owners)])
+    before, ranks = namer.ranked(sums, groups, costs, prior)
+    taken: set[int] = set()
+    for rank in sorted(ranks, key=lambda r: -r.score):
+        name, j = keys[rank.candidate]
+        if rank.score < THRESHOLD or j in taken or not namer.predicts(before, rank.folds, _LEAST_UNKNOWN):
+            continue
+        gain = float((before - rank.folds).sum() / before.sum())
+        part = max(0.0, gain) * namer.joints
+        probability = part**2 / (part**2 + OTHER_LAWS**2)
+        if probability < UNKNOWN:
+            continue
+        taken.add(j)
+        low, width = ranges[name, j]
+        sigma = _sigmas(sums, groups[rank.candidate], prior)
+        shown = min(probability, _ONE_RECORDING) if single else probability
+        found.append(FoundFunction(j, name, low, width, rank.values, sigma, shown, gain))
+    return found
+
+
+def _sigmas(sums: Sums, group: Sequence[int], prior: Floats) -> Floats:
+    columns = [*range(sums.always), *group]
+    xx = np.sum([f[0] for f in sums.folds], axis=0)[np.ix_(columns, columns)]
+    covariance = np.linalg.inv(xx + np.diag(prior[columns] ** -2.0))
+    return np.asarray(np.sqrt(np.diag(covariance)[sums.always :]))
+
+
+def _range(namer: Namer, name: str, j: int, motion: Floats, torque: Floats) -> tuple[float, float]:
+    """First place of a function of an input, and the width between places."""
+    rows = namer.fitter.rows
+    streams = namer.data.streams
+    if name == "time":
+        low, high = 0.0, max(s.time[-1] - s.time[0] for s in streams)
+    elif name in ("speed", "command_error"):
+        values = np.concatenate(
+            [s.speed[:, j] if name == "speed" else s.command[:, j] - s.position[:, j] for s in streams]
+        )
+        low, high = np.quantile(values, [0.01, 0.99])
+    elif name == "directed_load":
+        low, high = 0.0, float(np.quantile(np.abs(torque[:, j]), 0.99))
+    else:
+        values = torque[:, j] if name == "load" else rows.measured[:, j]
+        low, high = np.quantile(values, [0.01, 0.99])
+    del motion
+    return float(low), max(float(high - low), 1e-6) / (_PLACES - 1)

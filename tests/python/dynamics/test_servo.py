@@ -1,0 +1,241 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Servo arms diagnosed from commands: a pendulum on a servo, simulated by the chain itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.dynamics.servo import PARAMETERS, ServoDiagnosis, servo_diagnose, servo_dict
+from truing.dynamics.servo.api import Prepared, prepare
+from truing.dynamics.servo.fit import Fitter, rows_of
+from truing.dynamics.servo.free import Sizes, free_value
+from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, point_of
+from truing.errors import InputError
+
+pytest.importorskip("mujoco")
+
+Floats = NDArray[np.float64]
+STEP = 0.01  # [s] between rows
+ENCODER = 1.5e-3  # [rad]
+PENDULUM = """<mujoco>
+  <worldbody>
+    <body name="arm">
+      <joint name="swing" axis="0 1 0" damping="0.05" frictionloss="0.03" armature="0.004"/>
+      <inertial pos="0 0 -0.15" mass="0.4" diaginertia="1e-4 1e-4 1e-4"/>
+    </body>
+  </worldbody>
+  <actuator><position joint="swing" kp="4" kv="0.02"/></actuator>
+</mujoco>
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "pendulum.xml"
+    path.write_text(PENDULUM, encoding="utf-8")
+    return path
+
+
+def commands(number: int, seconds: float = 5.0) -> Floats:
+    """Steps, and sines of several speeds. shape=(n, 1) [rad]"""
+    t = STEP * np.arange(round(seconds / STEP))
+    random = np.random.default_rng(number)
+    if number % 2:
+        levels = random.uniform(-0.9, 0.9, 12)
+        return np.asarray(levels[np.minimum((t / 0.6).astype(int), 11)][:, None])
+    rates = random.uniform(0.2, 1.6, 4)
+    phases = random.uniform(0.0, 6.28, 4)
+    return np.asarray(0.4 * np.sin(6.28 * np.outer(t, rates) + phases).sum(axis=1))[:, None] / 1.6
+
+
+def recording(name: str, command: Floats, position: Floats, test: bool = False) -> _core.Recording:
+    time = STEP * np.arange(len(command))
+    return _core.Recording(name, time=time, position=position, command=command, test=test)
+
+
+def resting(number: int) -> _core.Recording:
+    command = commands(number)
+    command[:20] = 0.0  # begins at rest, where the arm hangs
+    return recording(f"r{number}", command, np.zeros_like(command), number >= 4)
+
+
+def recordings_of(file: Path, noise: float = 0.0, **values: float) -> list[_core.Recording]:
+    """Six recordings of the pendulum with other values of its chain, as encoders read it."""
+    out = []
+    for number in range(6):
+        rest = resting(number)
+        of = prepare(file, [replace_test(rest)], window=np.inf)
+        point = point_of(of.arm.nominal)
+        for field, value in values.items():
+            point = point.with_value(0, field, value)
+        motion = of.simulator.run([point], of.windows)[0][0]
+        position = np.concatenate([np.zeros((1, 1)), motion])
+        shaken = position + noise * np.random.default_rng(100 + number).standard_normal(position.shape)
+        shown = np.round(shaken / ENCODER) * ENCODER if noise else position
+        out.append(recording(f"r{number}", np.asarray(rest.command), shown, number >= 4))
+    return out
+
+
+def replace_test(one: _core.Recording) -> _core.Recording:
+    return one.replace(test=False)
+
+
+def prepared_of(file: Path, recordings: list[_core.Recording], **options: float) -> Prepared:
+    return prepare(file, recordings, window=np.inf, **options)  # type: ignore[arg-type]
+
+
+def test_the_fields_of_the_chain_are_those_that_the_simulator_takes() -> None:
+    assert tuple(PARAMETERS) == FIELDS == tuple(_core.servo_fields())
+
+
+def test_motion_of_the_chain_itself_leaves_no_residual(file: Path) -> None:
+    values = {"delay": 0.013, "load_friction": 0.2, "drive_law": 0.8, "damping_gain": 0.03}
+    of = prepared_of(file, recordings_of(file, 0.0, **values))
+    point = point_of(of.arm.nominal)
+    for field, value in values.items():
+        point = point.with_value(0, field, value)
+    rows = rows_of(of.data, of.windows)
+    errors = rows.measured - of.simulator.run([point], of.windows)[0][0]
+    assert np.abs(errors).max() < 2e-3  # of states that are smoothed where a window begins
+    usual = rows.measured - of.simulator.run([point_of(of.arm.nominal)], of.windows)[0][0]
+    assert np.abs(usual).max() > 0.05
+
+
+def test_one_thread_and_two_give_the_same_bits(file: Path) -> None:
+    recordings = recordings_of(file)
+    one, two = (prepared_of(file, recordings, threads=threads) for threads in (1, 2))
+    points = [point_of(one.arm.nominal).with_value(0, "command_gain", k) for k in (2.0, 4.0, 8.0)]
+    for a, b in zip(*(of.simulator.run(points, of.windows)[0] for of in (one, two)), strict=True):
+        assert np.array_equal(a, b)
+
+
+def test_a_set_leaves_nothing_behind_for_the_next(file: Path) -> None:
+    of = prepared_of(file, recordings_of(file))
+    point = point_of(of.arm.nominal)
+    heavy = replace(point, payload=0.3, place=(0.0, 0.0, -0.2), weight=1.4, links=(("arm", 1.5),))
+    alone = of.simulator.run([point], of.windows)[0][0]
+    beside = Simulator(of.arm, of.data, 1).run([heavy, point, heavy, point], of.windows)[0]
+    assert np.array_equal(alone, beside[1]) and np.array_equal(alone, beside[3])
+    assert np.abs(beside[0] - alone).max() > 0.02
+
+
+def test_columns_are_the_differences_of_whole_simulations(file: Path) -> None:
+    of = prepared_of(file, recordings_of(file))
+    fitter = Fitter(of.simulator, rows_of(of.data, of.windows))
+    point = point_of(of.arm.nominal)
+    sizes = Sizes(*(np.ones(1) for _ in range(4)))
+    free = [free_value(name, 0, sizes) for name in ("command_gain", "viscous", "delay")]
+    _, table = fitter.columns(point, free)
+    for column, one in zip(table, free, strict=True):
+        step = 0.3 * one.step
+        two = [one.put(point, one.at(point) + step), point]
+        up, base = of.simulator.run(two, of.windows)[0]
+        near = (up - base) / step
+        assert np.linalg.norm(column - near) < 0.1 * np.linalg.norm(near)
+
+
+def test_no_command_no_torque(file: Path) -> None:
+    """`enabled` 0: the arm falls back to where it hangs."""
+    rest = resting(0)
+    columns = {"enabled": np.zeros(len(rest))}
+    up = np.full((len(rest), 1), 0.8)
+    of = prepared_of(file, [rest.replace(columns=columns, position=up, command=up, test=False)])
+    motion = of.simulator.run([point_of(of.arm.nominal)], of.windows)[0][0]
+    assert abs(motion[-1, 0]) < 0.1 and abs(motion[0, 0] - 0.8) < 0.01
+
+
+def diagnosed(file: Path, noise: float = 5e-4, **values: float) -> ServoDiagnosis:
+    return servo_diagnose(file, recordings_of(file, noise, **values), window=np.inf)
+
+
+def names(found: ServoDiagnosis) -> list[str]:
+    return [effect.effect for effect in found.effects if not effect.standard]
+
+
+@pytest.mark.slow
+def test_nothing_is_named_where_nothing_is_hidden(file: Path) -> None:
+    found = diagnosed(file)
+    assert found.verdict == "none" and not names(found) and not found.unknown
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effect", "field", "value"),
+    [
+        ("delay", "delay", 0.04),
+        ("load_friction", "load_friction", 0.35),
+        ("saturation", "saturation", 0.7),
+        ("drive_law", "drive_law", 0.6),
+    ],
+)
+def test_a_hidden_effect_is_named_first(file: Path, effect: str, field: str, value: float) -> None:
+    found = diagnosed(file, **{field: value})
+    assert names(found)[0] == effect
+    first = next(e for e in found.effects if not e.standard)
+    assert first.parameters[0].value == pytest.approx(value, rel=0.25)
+    assert found.rollout.errors["named"][0, -1] < 0.5 * found.rollout.errors["standard"][0, -1]
+
+
+def test_what_was_found_is_text(file: Path) -> None:
+    """A short search: three effects alone."""
+    every = {known.effect for known in PARAMETERS.values()} | {"payload", "link_inertia"}
+    kept = {"delay", "damping_gain"}
+    recordings = recordings_of(file, 5e-4, delay=0.04)
+    found = servo_diagnose(file, recordings, window=np.inf, leave_out=sorted(every - kept), max_effects=1)
+    written = servo_dict(found)
+    assert written["from"] == "commands" and names(found) == ["delay"]
+    assert "shares one scale" in written["classes"][0]["sentence"]
+    assert len(written["covariance"]["matrix"]) == len(written["covariance"]["names"])
+    assert written["rollout"]["held_out"]["named"]["swing"][-1] < 0.02
+    assert written["held_out"] == ["r4", "r5"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"joints": ["swing", "no"]}, "there is no joint no"),
+        ({"window": 0.0}, "window"),
+        ({"test_share": 1.5}, "test_share"),
+    ],
+)
+def test_options_that_cannot_be_used_are_refused(file: Path, change: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        prepare(file, [resting(0)], **change)  # type: ignore[arg-type]
+
+
+def test_recordings_that_cannot_be_used_are_refused(file: Path) -> None:
+    good = resting(0)
+    bad = np.array(good.command)
+    bad[7] = np.nan
+    with pytest.raises(InputError, match="r0: command of joint 1, row 8"):
+        prepare(file, [good.replace(command=bad)])
+    with pytest.raises(InputError, match="r0: there are no commands"):
+        prepare(file, [good.replace(command=np.zeros((len(good), 0)))])
+    with pytest.raises(InputError, match="there is no such file"):
+        prepare(file.with_name("no.xml"), [good])
+
+
+def test_a_free_body_is_refused(file: Path) -> None:
+    file.write_text(
+        PENDULUM.replace('<joint name="swing" axis="0 1 0"', '<freejoint name="swing"/><!--')
+        .replace('armature="0.004"/>', "-->")
+        .split("<actuator>")[0]
+        + "</mujoco>",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match="is free or a ball"):
+        prepare(file, [resting(0)])
+
+
+def test_a_point_is_its_chain(file: Path) -> None:
+    of = prepared_of(file, [resting(0)])
+    assert isinstance(point_of(of.arm.nominal), Point)
+    assert point_of(of.arm.nominal).value(0, "command_gain") == 4.0
+    assert point_of(of.arm.nominal).value(0, "viscous") == pytest.approx(0.07)
