@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The diagnosis of servo arms, from recordings of commands and motion to names."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.dynamics.servo.arm import ServoArm, servo_arm
+from truing.dynamics.servo.data import ServoData, Window, servo_data, windows_of
+from truing.dynamics.servo.fit import Fitted, Fitter, rows_of
+from truing.dynamics.servo.free import USUAL
+from truing.dynamics.servo.ground import groundwork
+from truing.dynamics.servo.judge import judged, traces_of
+from truing.dynamics.servo.naming import Account, Namer, sureness, unknown
+from truing.dynamics.servo.result import ServoDiagnosis
+from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, point_of
+from truing.dynamics.servo.words import Parts, diagnosis_of
+from truing.errors import InputError
+
+Floats = NDArray[np.float64]
+
+WINDOW = 5.0  # [s] about: longer ones see slow effects better, and forget the start less surely
+MAX_EFFECTS = 12
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """An arm and its recordings, ready to be simulated."""
+
+    arm: ServoArm
+    data: ServoData
+    windows: tuple[Window, ...]
+    simulator: Simulator
+
+    @property
+    def train(self) -> list[Window]:
+        return [w for w in self.windows if not w.test]
+
+
+def by_commands(recordings: Sequence[_core.Recording]) -> bool:
+    """Whether all recordings have commands, and none has torques or currents."""
+    torques = any(r.torque.shape[1] or r.current.shape[1] for r in recordings)
+    commands = all(r.command.shape[1] or r.torque_command.shape[1] for r in recordings)
+    return bool(recordings) and commands and not torques
+
+
+def prepare(
+    robot: _core.Robot | str | Path,
+    recordings: Sequence[_core.Recording],
+    *,
+    joints: Sequence[str] | None = None,
+    window: float = WINDOW,
+    test_share: float = 0.3,
+    threads: int = 0,
+) -> Prepared:
+    """Reads the arm, and cuts the recordings into windows. Raises InputError as `servo_diagnose` does."""
+    if not window > 0.0:
+        raise InputError(f"window: found {window:g} s, expected a time above zero")
+    if not 0.0 < test_share < 1.0:
+        raise InputError(f"test_share: found {test_share:g}, expected a part between 0 and 1")
+    if not recordings:
+        raise InputError("no recordings are given: expected at least one")
+    recorded = int(recordings[0].position.shape[1])
+    arm = servo_arm(robot, joints, recorded)
+    data = servo_data(recordings, len(arm.nominal.joints), test_share=test_share)
+    arm = _with_references(arm, data)
+    windows = windows_of(data, window, test_share=test_share)
+    return Prepared(arm, data, tuple(windows), Simulator(arm, data, threads))
+
+
+def _with_references(arm: ServoArm, data: ServoData) -> ServoArm:
+    drives = arm.nominal.drives
+    if data.torque_command:
+        drives = tuple(replace(d, command_gain=1.0) for d in drives)
+    nominal = replace(
+        arm.nominal,
+        drives=drives,
+        gain_reference=data.gain_reference,
+        supply_reference=data.supply_reference,
+        temperature_reference=data.temperature_reference,
+    )
+    return replace(arm, nominal=nominal)
+
+
+def servo_diagnose(
+    robot: _core.Robot | str | Path,
+    recordings: Sequence[_core.Recording],
+    *,
+    joints: Sequence[str] | None = None,
+    leave_out: Sequence[str] = (),
+    test_share: float = 0.3,
+    window: float = WINDOW,
+    max_effects: int = MAX_EFFECTS,
+    threads: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> ServoDiagnosis:
+    """Find which effects stand between a simulator's model and recorded motion, from commands alone.
+
+    Gain, damping, dry friction, rotor and zero of every joint are the groundwork. Every effect at every joint
+    competes by the change that it makes to simulated motion; what is named predicts folds that it was not
+    fitted to.
+
+    robot: MJCF or URDF file, or a robot with masses, which is exported first. recordings: see
+    `load_recordings`; with commanded positions [rad | m] or torques [Nm | N]; those marked as test are held
+    out. joints: names of the recorded joints in the file, in the order of the columns; None: all of the
+    file's. leave_out: effects that are not considered. test_share: part of the time that is held out, where
+    no recording is marked. window: [s] length of simulations that begin at measured states; recordings less
+    than 1.6 times as long are taken whole. threads: 0: all cores; the result is the same. progress: is
+    called with what is being done.
+
+    Raises InputError: MuJoCo is not installed, a file that it refuses, joints or columns that do not fit,
+    values that are not numbers, nothing to fit.
+    """
+    begun = time.perf_counter()
+    prepared = prepare(
+        robot, recordings, joints=joints, window=window, test_share=test_share, threads=threads
+    )
+    nominal = point_of(prepared.arm.nominal)
+    fitter = Fitter(prepared.simulator, rows_of(prepared.data, prepared.train), progress)
+    standard, sizes = groundwork(fitter, nominal, prepared.data)
+    namer = Namer(fitter, leave_out, max_effects)
+    account = namer.run(standard, sizes, nominal)
+    single = len({prepared.data.streams[w.stream].fold for w in prepared.train}) < 2
+    sure = sureness(namer, account, single)
+    functions = unknown(namer, account, single)
+    fitter.progress("judging by held-out motion")
+    models = {"nominal": nominal, "standard": standard.point, "named": account.fitted.point}
+    held, rows = _held_out(prepared, standard, account, nominal)
+    parts = Parts(
+        prepared.simulator,
+        prepared.data,
+        single,
+        namer,
+        nominal,
+        standard,
+        account,
+        sure,
+        functions,
+        judged(prepared.simulator, prepared.windows, models, window),
+        traces_of(prepared.simulator, prepared.windows, models),
+        held,
+        rows,
+        prepared.arm.notes,
+    )
+    return diagnosis_of(parts, time.perf_counter() - begun)
+
+
+def _held_out(
+    prepared: Prepared, standard: Fitted, account: Account, nominal: Point
+) -> tuple[list[Floats], NDArray[np.intp]]:
+    """Errors on held-out windows (on all, where none is), of every chain that is compared: see
+    `Parts.held`."""
+    windows = [w for w in prepared.windows if w.test] or prepared.train
+    rows = rows_of(prepared.data, windows)
+    fitter = Fitter(prepared.simulator, rows)
+    points = [nominal, standard.point, account.fitted.point, *(w.point for w in account.weights)]
+    for name in (n for n in USUAL if any(f.field == n for f in standard.free)):
+        back = standard.point.chain.copy()
+        back[:, FIELDS.index(name)] = nominal.chain[:, FIELDS.index(name)]
+        points.append(replace(standard.point, chain=back))
+    return [fitter.errors(motion) for motion in fitter.motions(points)], rows.window

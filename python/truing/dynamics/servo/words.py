@@ -1,0 +1,412 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""A diagnosis from commands in words and numbers: effects with their sizes, classes, what to record next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing.dynamics.servo.candidates import Candidate
+from truing.dynamics.servo.chain import PARAMETERS, ServoChain
+from truing.dynamics.servo.data import ServoData
+from truing.dynamics.servo.fit import Fitted, sums
+from truing.dynamics.servo.free import USUAL, Free
+from truing.dynamics.servo.naming import NAMED, Account, FoundFunction, Namer, Sureness
+from truing.dynamics.servo.result import (
+    FoundServoEffect,
+    ServoAlternative,
+    ServoClass,
+    ServoCovariance,
+    ServoDiagnosis,
+    ServoParameter,
+    ServoRollout,
+    ServoTrace,
+    UnknownMotion,
+)
+from truing.dynamics.servo.simulator import Point, Simulator, chain_of
+
+Floats = NDArray[np.float64]
+
+_PLAIN = {
+    "command_gain": "a gain of the position controller",
+    "integral_gain": "an integral part of the controller",
+    "damping_gain": "a derivative part of the controller",
+    "gain_law": "torque that does not grow in proportion with the firmware's gain",
+    "delay": "a delay from command to torque",
+    "rate_limit": "a limit of the command's speed",
+    "saturation": "a limit of the torque",
+    "drive_law": "a drive whose torque does not grow in proportion with the effort",
+    "supply_sag": "a supply that sags",
+    "dead_band": "a dead band of the controller",
+    "coulomb": "dry friction",
+    "viscous": "viscous friction",
+    "viscous_law": "friction that does not grow in proportion with speed",
+    "stribeck": "dry friction that falls with speed",
+    "load_friction": "friction that grows with the load",
+    "asymmetric_friction": "friction that differs by direction",
+    "presliding": "elastic friction before sliding",
+    "thermal_friction": "friction that changes with temperature",
+    "warmup": "friction that changes with time",
+    "spring": "a spring",
+    "current_offset": "a torque that is always there",
+    "gravity_scale": "weight other than the model's",
+    "armature": "a rotor's inertia",
+    "backlash": "backlash",
+    "joint_elasticity": "an elastic gear",
+    "payload": "a payload",
+    "link_inertia": "a link's mass",
+    "joint_offset": "a zero of the readings",
+}
+_SEPARATED = {
+    "gravity_scale": "record the same motion with a known weight at the tool",
+    "payload": "record the same motion with a known weight at the tool",
+    "link_inertia": "record the same motion with a known weight at the tool",
+    "load_friction": "record the same motion with a known weight at the tool",
+    "command_gain": "record the same motion with another gain of the firmware",
+    "drive_law": "record the same motion with another gain of the firmware",
+    "gain_law": "record two gains of the firmware at the same temperature",
+    "saturation": "record faster and larger steps, which reach the limit",
+    "rate_limit": "record larger steps, which reach the limit",
+    "supply_sag": "record the voltage, with several joints working hard at once",
+    "delay": "record a chirp up to higher frequencies, at a higher rate",
+    "damping_gain": "record a chirp up to higher frequencies",
+    "viscous": "record slow and fast strokes of the same length",
+    "viscous_law": "record strokes at several speeds",
+    "stribeck": "record slow reversals",
+    "presliding": "record slow reversals of small strokes",
+    "dead_band": "record slow reversals of small strokes",
+    "backlash": "record slow reversals of small strokes under both signs of the load",
+    "joint_elasticity": "record a chirp up to higher frequencies, with a weight at the tool",
+    "thermal_friction": "record the same motion cold and warm",
+    "warmup": "record the same motion for longer, from cold",
+    "spring": "record holding at both ends of the range",
+    "current_offset": "record the same motion with the arm turned over",
+}
+_USUAL_SEPARATED = "record steps, slow reversals and a chirp of each joint alone"
+_TOGETHER = 0.9  # correlation over recordings at which two inputs cannot be told apart
+_DEPARTS = 3.0  # standard errors from the file's value: a usual parameter departs from it
+_SAME = 0.05  # of a prior's standard deviation: too little to be called another value
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a diagnosis is made of."""
+
+    simulator: Simulator
+    data: ServoData
+    single: bool
+    namer: Namer
+    nominal: Point
+    standard: Fitted
+    account: Account
+    sure: Sequence[Sureness]
+    functions: Sequence[FoundFunction]
+    rollout: ServoRollout
+    traces: Sequence[ServoTrace]
+    held: Sequence[Floats]
+    """Errors on held-out windows: of nominal, standard, named, of the named without each effect, and of the
+    standard chain with each usual parameter as the file has it (`USUAL`). shape=(rows, joints)"""
+    held_rows: NDArray[np.intp]  # number of each row's window
+    notes: Sequence[str]
+
+
+def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
+    covariance = covariance_of(parts)
+    chains = {
+        "nominal": parts.simulator.arm.nominal,
+        "standard": chain_of(parts.standard.point, parts.simulator.arm.nominal),
+        "named": chain_of(parts.account.fitted.point, parts.simulator.arm.nominal),
+    }
+    small: list[str] = []
+    named = _named(parts, covariance, small)
+    effects = [*named, *_usual(parts, covariance)]
+    unknown = [_unknown(f, chains["nominal"]) for f in parts.functions]
+    classes = _classes(parts, named)
+    verdict, sentence = _verdict(parts, named, unknown)
+    warnings = list(parts.notes)
+    if small:
+        warnings.append(
+            f"fitted, and too small to be named, as something else may look so: {', '.join(small)}"
+        )
+    if parts.single:
+        warnings.append("one recording only: folds are blocks of its time, and no name is surer than 0.9")
+    held = tuple(dict.fromkeys(s.name for s in parts.data.streams if s.test))
+    return ServoDiagnosis(
+        parts.simulator.arm.name,
+        verdict,
+        sentence,
+        tuple(effects),
+        tuple(unknown),
+        tuple(classes),
+        tuple(dict.fromkeys(c.separated_by for c in classes if c.separated_by)),
+        chains,
+        covariance,
+        parts.rollout,
+        _where(parts),
+        tuple(parts.account.not_testable),
+        held or ("blocks of time",),
+        tuple(warnings),
+        parts.simulator.arm.mjcf,
+        tuple(parts.traces),
+        seconds,
+    )
+
+
+# ---- values ---------------------------------------------------------------------------------------
+def covariance_of(parts: Parts) -> ServoCovariance:
+    """(X'X + P)^-1 with rows that count for as many as their noise goes on for."""
+    fitted = parts.account.fitted
+    noise = parts.namer._noise(fitted.columns, fitted.errors, len(fitted.columns))
+    xx, _ = sums(fitted.columns, fitted.errors, noise)
+    prior = np.array([f.prior for f in fitted.free])
+    matrix = np.linalg.inv(xx + np.diag(prior**-2.0))
+    joints = parts.simulator.arm.nominal.joints
+    return ServoCovariance(
+        tuple(f.name(joints) for f in fitted.free),
+        tuple(f.unit for f in fitted.free),
+        tuple(f.scale for f in fitted.free),
+        np.array([f.value(fitted.point) for f in fitted.free]),
+        0.5 * (matrix + matrix.T),
+        prior,
+    )
+
+
+def _parameter(parts: Parts, covariance: ServoCovariance, free: Free, off: Point) -> ServoParameter:
+    joints = parts.simulator.arm.nominal.joints
+    name = free.name(joints)
+    at = covariance.names.index(name)
+    sigma = math.sqrt(max(float(covariance.matrix[at, at]), 0.0))
+    value = float(covariance.values[at])
+    return ServoParameter(
+        name,
+        value,
+        sigma * value if free.scale == "log" else sigma,
+        free.unit,
+        free.value(off),
+        free.value(parts.standard.point),
+    )
+
+
+# ---- effects --------------------------------------------------------------------------------------
+def _share(
+    parts: Parts, without: Floats, with_it: Floats, whole: Floats, joint: int
+) -> tuple[float, float, float]:
+    """Part of the squares of `whole` (each joint in units of its own) that goes, and its 90 % interval over
+    windows."""
+    scale = np.maximum(np.sqrt(np.mean(whole**2, axis=0)), 1e-9)
+    gains = np.sum(((without / scale) ** 2 - (with_it / scale) ** 2), axis=1)
+    total = float(np.sum((whole / scale) ** 2))
+    by_window = np.bincount(parts.held_rows, weights=gains)
+    value = float(gains.sum()) / total
+    spread = (
+        float(by_window.std(ddof=1)) * math.sqrt(by_window.size) / total if by_window.size > 1 else abs(value)
+    )
+    del joint
+    return value, value - 1.645 * spread, value + 1.645 * spread
+
+
+def _rms(errors: Floats, joint: int) -> float:
+    some = errors if joint < 0 else errors[:, joint]
+    return float(np.sqrt(np.mean(some**2)))
+
+
+def _named(parts: Parts, covariance: ServoCovariance, small: list[str]) -> list[FoundServoEffect]:
+    out = []
+    standard, named = parts.held[1], parts.held[2]
+    for k, (one, sure) in enumerate(zip(parts.account.found, parts.sure, strict=True)):
+        if sure.probability < NAMED:
+            small.append(_place(one))
+            continue
+        without = parts.held[3 + k]
+        share, low, high = _share(parts, without, named, standard, one.joint)
+        values = tuple(
+            _parameter(parts, covariance, f, one.off(parts.account.fitted.point)) for f in one.free
+        )
+        out.append(
+            FoundServoEffect(
+                one.effect,
+                one.joints,
+                False,
+                sure.probability,
+                values,
+                share,
+                (low, high),
+                _rms(without, one.joint),
+                _rms(named, one.joint),
+                tuple(
+                    ServoAlternative(o.effect, o.joints, p, _SEPARATED.get(o.effect, _USUAL_SEPARATED))
+                    for o, p in sure.confounded
+                ),
+                _sentence(one.effect, one.joints, values),
+            )
+        )
+    return sorted(out, key=lambda e: -e.share)
+
+
+def _place(one: Candidate) -> str:
+    return one.effect + (f" at {', '.join(one.joints)}" if one.joints else "")
+
+
+def _sentence(effect: str, joints: Sequence[str], values: Sequence[ServoParameter]) -> str:
+    plain = _PLAIN.get(effect, effect.replace("_", " "))
+    text = plain[:1].upper() + plain[1:] + (f" at {', '.join(joints)}" if joints else "")
+    sizes = ", ".join(f"{v.value:.3g} ± {v.sigma:.2g}{'' if v.unit == '1' else ' ' + v.unit}" for v in values)
+    return f"{text}: {sizes}" if sizes else text
+
+
+def _usual(parts: Parts, covariance: ServoCovariance) -> list[FoundServoEffect]:
+    """The usual parameters of every joint, by what each removes against the file; last those that do not
+    depart from it."""
+    joints = parts.simulator.arm.nominal.joints
+    out = []
+    first = 3 + len(parts.account.found)
+    nominal, standard = parts.held[0], parts.held[1]
+    for k, name in enumerate(n for n in USUAL if any(f.field == n for f in parts.standard.free)):
+        back = parts.held[first + k]
+        for j, joint in enumerate(joints):
+            free = next(f for f in parts.account.fitted.free if f.field == name and f.joint == j)
+            value = _parameter(parts, covariance, free, parts.nominal)
+            change = abs(free.at(parts.standard.point) - free.at(parts.nominal))
+            at = covariance.names.index(free.name(joints))
+            sigma = math.sqrt(float(covariance.matrix[at, at]))
+            departs = change > max(_DEPARTS * sigma, _SAME * free.prior)
+            scale = max(float(np.sum(np.maximum(nominal[:, j] ** 2, back[:, j] ** 2))), 1e-18)
+            share = float(np.sum(back[:, j] ** 2 - standard[:, j] ** 2)) / scale / len(joints)
+            out.append(
+                FoundServoEffect(
+                    PARAMETERS[name].effect,
+                    (joint,),
+                    True,
+                    1.0 - math.erfc(change / max(sigma, 1e-300) / math.sqrt(2.0)) if departs else 0.0,
+                    (value,),
+                    max(0.0, share) if departs else 0.0,
+                    (max(0.0, share), max(0.0, share)),
+                    _rms(back, j),
+                    _rms(standard, j),
+                    (),
+                    _sentence(PARAMETERS[name].effect, (joint,), (value,)),
+                )
+            )
+    return sorted(out, key=lambda e: -e.share)
+
+
+def _unknown(f: FoundFunction, chain: ServoChain) -> UnknownMotion:
+    places = f.low + f.width * np.arange(f.values.size)
+    words = {"directed_load": ("load", "direction"), "directed_angle": ("angle", "direction")}
+    return UnknownMotion(
+        chain.joints[f.joint],
+        words.get(f.input, (f.input,)),
+        f.probability,
+        f.share,
+        (f.share, f.share),
+        tuple((float(x), float(v), float(s)) for x, v, s in zip(places, f.values, f.sigmas, strict=True)),
+    )
+
+
+# ---- classes --------------------------------------------------------------------------------------
+def _classes(parts: Parts, named: Sequence[FoundServoEffect]) -> list[ServoClass]:
+    out = [_scale_class(named), *_orders(parts.data)]
+    for effect in named:
+        if not effect.confounded_with:
+            continue
+        members = [_member(effect.effect, effect.joints)]
+        members += [_member(a.effect, a.joints) for a in effect.confounded_with]
+        out.append(
+            ServoClass(
+                tuple(members),
+                f"These recordings cannot tell apart: {', '.join(members)}",
+                _SEPARATED.get(effect.effect, _USUAL_SEPARATED),
+            )
+        )
+    return out
+
+
+def _member(effect: str, joints: Sequence[str]) -> str:
+    return f"{effect}:{'+'.join(joints)}" if joints else effect
+
+
+def _scale_class(named: Sequence[FoundServoEffect]) -> ServoClass:
+    """Inherent: from commands and motion alone every torque is known but for one factor."""
+    masses = [e.effect for e in named if e.effect in ("gravity_scale", "payload", "link_inertia")]
+    return ServoClass(
+        ("command_gain", "coulomb", "viscous", "armature", *(masses or ("gravity_scale", "payload"))),
+        "Every torque shares one scale: twice all masses and inertias, with twice the gain and twice all"
+        " frictions, move alike. What is said here holds if the file's masses do",
+        "record the same motion with a known weight at the tool",
+    )
+
+
+def _orders(data: ServoData) -> list[ServoClass]:
+    """Temperature, gain, supply that rose together from recording to recording."""
+    means = {
+        name: np.array([float(np.mean(getattr(s, name))) for s in data.streams])
+        for name in ("gain", "warmth", "supply")
+        if name in data.varies
+    }
+    words = {
+        "gain": ("the firmware's gain", "gain_law"),
+        "warmth": ("temperature", "thermal_friction"),
+        "supply": ("the supply", "supply_sag"),
+    }
+    out = []
+    names = list(means)
+    for i, one in enumerate(names):
+        for other in names[i + 1 :]:
+            a, b = (np.log(np.maximum(means[n], 1e-9)) if n == "gain" else means[n] for n in (one, other))
+            if a.size < 3 or a.std() < 1e-9 or b.std() < 1e-9 or abs(np.corrcoef(a, b)[0, 1]) < _TOGETHER:
+                continue
+            out.append(
+                ServoClass(
+                    (words[one][1], words[other][1]),
+                    f"{words[one][0].capitalize()} and {words[other][0]} changed together from recording to"
+                    " recording: what goes with one goes with the other",
+                    f"record the same motion at the same {words[other][0].removeprefix('the ')}, in another"
+                    " order",
+                )
+            )
+    return out
+
+
+# ---- verdict --------------------------------------------------------------------------------------
+def _mean_degrees(errors: Floats) -> float:
+    return float(np.degrees(np.mean(np.sqrt(np.mean(errors**2, axis=0)))))
+
+
+def _verdict(
+    parts: Parts, named: Sequence[FoundServoEffect], unknown: Sequence[UnknownMotion]
+) -> tuple[str, str]:
+    nominal, standard, found = (_mean_degrees(parts.held[k]) for k in range(3))
+    slides = any(parts.simulator.arm.nominal.prismatic)
+
+    def size(value: float) -> str:
+        return f"{math.radians(value):.3g} (rad and m)" if slides else f"{value:.2f}°"
+
+    if named and found > standard:
+        return "does_not_hold", "What was found does not hold on motion that it was not fitted to."
+    start = f"Held-out motion is off by {size(nominal)} (rms, mean of the joints) with the file's model, by"
+    usual = f" {size(standard)} with gain, damping, friction and rotor fitted"
+    if named:
+        what = "; ".join(e.sentence.split(":")[0] for e in named[:3])
+        more = f"; and {len(named) - 3} smaller" if len(named) > 3 else ""
+        verdict = "effects+unknown" if unknown else "effects"
+        return verdict, f"{start}{usual}, by {size(found)} with what was named: {what}{more}."
+    if unknown:
+        return "unknown", f"{start}{usual}: what is left goes with inputs that no known effect explains."
+    return "none", f"{start}{usual}: beyond these no effect predicts motion that it was not fitted to."
+
+
+def _where(parts: Parts) -> dict[str, object]:
+    """Where the gap lies that the usual parameters leave: by joint, and by what the joint was doing."""
+    standard = parts.held[1]
+    squares = np.mean(standard**2, axis=0)
+    joints = parts.simulator.arm.nominal.joints
+    total = max(float(squares.sum()), 1e-30)
+    return {
+        "joints": [{"joint": j, "share": float(s) / total} for j, s in zip(joints, squares, strict=True)],
+        "inputs": [],
+    }
