@@ -4,11 +4,14 @@
 
 Inertias, Coulomb and viscous friction and an offset are fitted in any case; what is named comes on top, and
 is judged on recordings that nothing was fitted to: by torque, and by simulated motion (MuJoCo). Writes
-result.json, report.html, robot.yaml (with what was named), residuals.parquet.
+result.json, report.html, robot.yaml (with what was named), residuals.parquet. Of recordings with commands
+and no torque (servo arms) the actuators are diagnosed by simulated motion; then arm.xml and motion.parquet
+stand beside result.json and report.html.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +22,7 @@ from truing.cli.options import Flag, Threads, TorqueEffectNames, core
 from truing.cli.recordings import (
     TestShare,
     TorqueCommand,
+    checked,
     mistaken,
     print_errors,
     print_findings,
@@ -29,8 +33,11 @@ from truing.cli.tables import joined, say, table
 if TYPE_CHECKING:
     from truing.dynamics import CheckedRecordings, TorqueDiagnosis
     from truing.dynamics.rollout import Rollout
+    from truing.dynamics.servo import ServoDiagnosis
 
 PANEL = "Dynamics"
+SIMULATED = (".xml", ".mjcf", ".urdf")  # files that the simulator reads itself
+DOES_NOT_HOLD = "what was found does not hold on recordings that it was not fitted to"
 LISTED = 12  # causes on the terminal; the report has all
 
 
@@ -42,8 +49,15 @@ class Answer:
     rollout: Rollout
 
 
+@dataclass(frozen=True)
+class ServoAnswer:
+    """What was found from commands alone."""
+
+    found: ServoDiagnosis
+
+
 @dataclass(frozen=True, kw_only=True)
-class Command(TorqueCommand[Answer]):
+class Command(TorqueCommand[Answer | ServoAnswer]):
     doing = "diagnosing"
 
     leave_out: Annotated[
@@ -55,9 +69,21 @@ class Command(TorqueCommand[Answer]):
     ] = False
     threads: Threads = core("TorqueDiagnoseOptions", "threads")
 
-    def solve(self, loaded: CheckedRecordings, progress: run.Progress) -> Answer:
-        from truing.dynamics import diagnose
+    def load(self, progress: run.Progress) -> CheckedRecordings:
+        from truing.dynamics import CheckedRecordings
+        from truing.dynamics.servo import by_commands
 
+        robot, recordings = self.read(self.recordings)
+        if by_commands(recordings):
+            return CheckedRecordings(robot, tuple(recordings), ())
+        return checked((robot, recordings))
+
+    def solve(self, loaded: CheckedRecordings, progress: run.Progress) -> Answer | ServoAnswer:
+        from truing.dynamics import diagnose
+        from truing.dynamics.servo import by_commands
+
+        if by_commands(loaded.recordings):
+            return ServoAnswer(self._from_commands(loaded, progress))
         options: dict[str, Any] = {
             "leave_out": self.leave_out,
             "test_share": self.test_share,
@@ -67,6 +93,20 @@ class Command(TorqueCommand[Answer]):
             options["cutoff"] = self.cutoff
         found = diagnose(loaded.robot, loaded.recordings, **options)
         return Answer(found, self._judged(loaded, found, progress))
+
+    def _from_commands(self, loaded: CheckedRecordings, progress: run.Progress) -> ServoDiagnosis:
+        from truing.dynamics.servo import servo_diagnose
+        from truing.effects import name_list
+
+        return servo_diagnose(
+            self.robot if self.robot.suffix.lower() in SIMULATED else loaded.robot,
+            loaded.recordings,
+            joints=[joint.name for joint in loaded.robot.joints if not joint.passive],
+            leave_out=name_list(self.leave_out) if self.leave_out else (),
+            test_share=self.test_share,
+            threads=self.threads,
+            progress=progress.now,
+        )
 
     def _judged(self, loaded: CheckedRecordings, found: TorqueDiagnosis, progress: run.Progress) -> Rollout:
         from truing.dynamics.rollout import Rollout, rollout
@@ -80,11 +120,16 @@ class Command(TorqueCommand[Answer]):
         self,
         folder: Path,
         loaded: CheckedRecordings,
-        found: Answer,
+        found: Answer | ServoAnswer,
         warnings: list[str],
     ) -> Mapping[str, Any]:
         from truing.dynamics.result import write_diagnosis
+        from truing.dynamics.servo.written import write_servo
 
+        if isinstance(found, ServoAnswer):
+            return write_servo(
+                folder, found.found, loaded.recordings, warnings=warnings, test_share=self.test_share
+            )
         return write_diagnosis(
             folder,
             found.found,
@@ -97,12 +142,17 @@ class Command(TorqueCommand[Answer]):
         )
 
     def failure(self, result: Mapping[str, Any]) -> str:
+        if result.get("from") == "commands":
+            return DOES_NOT_HOLD if result["verdict"] == "does_not_hold" else ""
         if mistaken(result) or result["verdict"] != "does_not_hold":
             return mistaken(result)
-        return "what was found does not hold on recordings that it was not fitted to"
+        return DOES_NOT_HOLD
 
-    def table(self, result: Mapping[str, Any], found: Answer) -> None:
-        print_diagnosis(result)
+    def table(self, result: Mapping[str, Any], found: Answer | ServoAnswer) -> None:
+        if isinstance(found, ServoAnswer):
+            print_servo(result)
+        else:
+            print_diagnosis(result)
 
 
 def print_diagnosis(result: Mapping[str, Any]) -> None:
@@ -129,6 +179,46 @@ def print_diagnosis(result: Mapping[str, Any]) -> None:
     if result["not_testable"]:
         words = list(dict.fromkeys(n["effect"].replace("_", " ") for n in result["not_testable"]))
         say(f"not testable with these recordings (why: report.html): {joined(words, 12)}")
+
+
+def print_servo(result: Mapping[str, Any]) -> None:
+    """The verdict from commands, errors by joint, the causes, and what the recordings cannot tell."""
+    say(result["sentence"])
+    found = result["rollout"]
+    at, main = found["horizon_s"], found["main_horizon_s"]
+    column = at.index(main) if main in at else len(at) - 1
+    models = tuple(found["held_out"])
+    lines = [
+        (joint, *(motion_text(found["held_out"][m][joint][column], unit) for m in models))
+        for joint, unit in found["units"].items()
+    ]
+    ahead = at[column] if isinstance(at[column], str) else f"{at[column]:g} s"
+    table(f"{result['robot']}: simulated less held-out motion, rms ({ahead})", ("", *models), lines)
+    causes = [
+        (
+            f"{e['effect'].replace('_', ' ')} {', '.join(e['joints'])}",
+            f"{100 * e['share']:.1f} %",
+            f"{100 * e['probability']:.0f} %",
+            e["sentence"].rpartition(": ")[2],
+        )
+        for e in result["effects"]
+        if not e["standard"]
+    ]
+    if causes:
+        head = ("", "removes", "sure", "size")
+        table(
+            "what causes it, and what part of the squared error it removes", head, causes[:LISTED], words=True
+        )
+    for unknown in result["unknown"]:
+        say(f"unknown: something at {unknown['joint']} goes with {joined(unknown['inputs'], 3)}")
+    for one in result["classes"][:3]:
+        say(f"note: {one['sentence']}; to tell: {one['separated_by']}")
+
+
+def motion_text(value: float | None, unit: str) -> str:
+    if value is None:
+        return "-"
+    return f"{math.degrees(value):.2f}°" if unit == "rad" else f"{1e3 * value:.2f} mm"
 
 
 def print_rollout(result: Mapping[str, Any]) -> None:

@@ -219,13 +219,13 @@ def print_sizes(effects: list[Mapping[str, Any]]) -> None:
                 name.replace("_", " "),
                 ", ".join(best["joints"]) or "-",
                 size_text(best["size"], best["unit"]),
-                f"{best['torque_Nm']:.2g} Nm",
+                f"{best['torque_Nm']:.2g}",
                 size_text(best["size_apart"], best["unit"]),
                 label(best["closest"], best["closest_joints"]),
             )
         )
     if lines:
-        head = ("", "best at", "seen from", "rms torque", "told apart from", "from")
+        head = ("", "best at", "seen from", "rms torque [Nm | N]", "told apart from", "from")
         table("the smallest effects that would be seen", head, lines, words=True)
 
 
