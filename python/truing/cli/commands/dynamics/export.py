@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Write what was found as a simulator's model, and list what could not be written.
 
-Writes the model (MJCF and perhaps callbacks.py; URDF; URDF and actuators.py), not_written.yaml, result.json,
-report.html: how far the model, as it is written, is from held-out motion.
+Writes the model (MJCF and perhaps callbacks.py; URDF; URDF and actuators.py; zeros for LeRobot),
+not_written.yaml, result.json, report.html: how far the model, as it is written, is from held-out motion.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from truing.dynamics import Recording
     from truing.dynamics.export import Exported
     from truing.dynamics.rollout import Rollout
+    from truing.dynamics.servo.export import ServoExported, ServoResult
     from truing.model import Robot
 
 PANEL = "Dynamics"
@@ -41,16 +42,25 @@ class Loaded:
 
 
 @dataclass(frozen=True)
+class LoadedServo:
+    """A diagnosis from commands, and recordings with which of their rows were held out."""
+
+    result: ServoResult
+    training: list[Recording]
+    held_out: list[tuple[Recording, NDArray[np.bool_]]]
+
+
+@dataclass(frozen=True)
 class Found:
-    exported: Exported
+    exported: Exported | ServoExported
     files: dict[str, str]  # text by name
     rollout: Rollout
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command(run.Command[Loaded, Found]):
+class Command(run.Command["Loaded | LoadedServo", Found]):
     doing = "writing"
-    sometimes = ("callbacks.py", "actuators.py")
+    sometimes = ("callbacks.py", "actuators.py", "offsets.json")
 
     result: Annotated[
         Path,
@@ -60,13 +70,21 @@ class Command(run.Command[Loaded, Found]):
             metavar="RESULT",
         ),
     ]
-    to: Annotated[Literal["mjcf", "urdf", "isaaclab"], Choice("Simulator's format.")] = "mjcf"
+    to: Annotated[
+        Literal["mjcf", "urdf", "isaaclab", "lerobot"],
+        Choice("Format; lerobot (zeros) of a diagnosis from commands alone."),
+    ] = "mjcf"
     source: Annotated[
         Path | None,
         File(
-            "URDF that the robot was read from: its meshes and names are kept. Not for mjcf.",
-            metavar="ROBOT.urdf",
+            "File that the robot was read from, whose meshes and names are kept: a URDF, not for mjcf; of a"
+            " diagnosis from commands the MJCF.",
+            metavar="ROBOT",
         ),
+    ] = None
+    calibration: Annotated[
+        Path | None,
+        File("Of lerobot: the JSON that the arm was recorded with.", metavar="FILE.json"),
     ] = None
     recording: Annotated[
         Sequence[Path],
@@ -87,8 +105,14 @@ class Command(run.Command[Loaded, Found]):
         ),
     ] = ()
 
-    def load(self, progress: run.Progress) -> Loaded:
+    def load(self, progress: run.Progress) -> Loaded | LoadedServo:
+        from truing.dynamics.servo.export import is_servo_result
         from truing.files import load_recordings, load_residual_motion, load_robot
+
+        if is_servo_result(self.result):
+            return self._load_servo()
+        if self.to == "lerobot":
+            raise InputError("--to lerobot: expected the result of a diagnosis from commands alone")
 
         file = self.result / "robot.yaml" if self.result.is_dir() else self.result
         if not file.exists():
@@ -107,9 +131,57 @@ class Command(run.Command[Loaded, Found]):
             motion = [(recording, recording.time > -math.inf) for recording in given]
         return Loaded(robot, train, motion)
 
-    def solve(self, loaded: Loaded, progress: run.Progress) -> Found:
+    def _load_servo(self) -> LoadedServo:
+        from truing.dynamics.servo.export import MODEL, MOTION, load_servo_result
+        from truing.files import load_commanded_motion, load_recordings, load_robot
+
+        result = load_servo_result(self.result)
+        motion = self.result / MOTION
+        rows = load_commanded_motion(motion, result.chains["named"].prismatic) if motion.exists() else []
+        training = [recording for recording, held in rows if not held.all()]
+        if self.recording or self.held_out:
+            arm = load_robot(self.result / MODEL, any_tool=True)
+            if self.recording:
+                training = list(load_recordings(self.recording, arm))
+            if self.held_out:
+                rows = [(r, r.time > -math.inf) for r in load_recordings(self.held_out, arm)]
+        return LoadedServo(result, training, rows)
+
+    def _solve_servo(self, loaded: LoadedServo, progress: run.Progress) -> Found:
+        from truing.dynamics.rollout import Rollout
+        from truing.dynamics.servo.export import export_servo
+        from truing.dynamics.servo.export.verified import judge_servo
+
+        result = loaded.result
+        chain = result.chains["named"]
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "model"
+            exported = export_servo(
+                chain,
+                self.to,
+                out,
+                source=self.source or result.mjcf,
+                recordings=loaded.training,
+                calibration=self.calibration,
+            )
+            files = {path.name: path.read_text(encoding="utf-8") for path in out.iterdir()}
+            if self.to != "mjcf":
+                return Found(exported, files, Rollout(None, f"{self.to} is not run here"))
+            progress.now("simulating")
+            models = {"exported": out / exported.model}
+            if self.source is not None:
+                models = {"nominal": self.source, **models}
+            return Found(
+                exported, files, judge_servo(models, result.joints, loaded.held_out, (chain, result.mjcf))
+            )
+
+    def solve(self, loaded: Loaded | LoadedServo, progress: run.Progress) -> Found:
         from truing.dynamics.export import export
 
+        if isinstance(loaded, LoadedServo):
+            return self._solve_servo(loaded, progress)
+        if self.to == "lerobot":
+            raise InputError("--to lerobot: expected the result of a diagnosis from commands alone")
         with tempfile.TemporaryDirectory() as folder:
             exported = export(
                 loaded.robot,
@@ -141,12 +213,20 @@ class Command(run.Command[Loaded, Found]):
         except InputError as error:
             return Rollout(None, str(error))
 
-    def write(self, folder: Path, loaded: Loaded, found: Found, warnings: list[str]) -> Mapping[str, Any]:
-        from truing.dynamics.result import write_export
+    def write(
+        self, folder: Path, loaded: Loaded | LoadedServo, found: Found, warnings: list[str]
+    ) -> Mapping[str, Any]:
+        from truing.dynamics.result import write_export, write_servo_export
+        from truing.dynamics.servo.export import ServoExported
 
         for name, text in found.files.items():
             (folder / name).write_text(text, encoding="utf-8")
-        return write_export(folder, loaded.robot, found.exported, self.to, found.rollout, warnings=warnings)
+        exported = found.exported
+        if isinstance(loaded, LoadedServo):
+            name = loaded.result.robot
+            return write_servo_export(folder, name, exported, self.to, found.rollout, warnings=warnings)
+        assert not isinstance(exported, ServoExported)
+        return write_export(folder, loaded.robot, exported, self.to, found.rollout, warnings=warnings)
 
     def table(self, result: Mapping[str, Any], found: Found) -> None:
         lines = [
@@ -159,7 +239,10 @@ class Command(run.Command[Loaded, Found]):
         if motion["why_not"]:
             say(f"not judged by motion: {motion['why_not']}")
         else:
-            titles = ("with callbacks.py" if self.to == "mjcf" else "MJCF, callbacks.py", "as written")
+            ours = "with callbacks.py" if self.to == "mjcf" else "MJCF, callbacks.py"
+            ours = "all laws" if result.get("driven_by") == "commands" else ours
+            words = {"nominal": "as it was", "named": ours, "exported": "as written"}
+            titles = [words[model] for model in motion["held_out"]]
             print_motion(result["robot"], motion, "held_out", titles)
         if "callbacks.py" in found.files:
             say(f"torques that MuJoCo has no field for: {self.out / 'callbacks.py'}")
