@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robots that come with the package, and the parameters that the palletizer method fits."""
+"""Robots and recordings that come with the package, and the parameters that the palletizer method fits."""
 
 from __future__ import annotations
 
+import os
+import shutil
 from importlib import resources
 from pathlib import Path
 
@@ -34,3 +36,20 @@ PALLETIZER_FREE = (*PALLETIZER_MODEL, "base.*")
 def example(name: str) -> Path:
     """Path of a shipped robot file: "palletizer", "ur10" or "irb120"."""
     return Path(str(resources.files("truing") / "examples" / f"{name}.yaml"))
+
+
+def copy_servo_arm(folder: str | os.PathLike[str]) -> Path:
+    """Copies an arm of hobby servos into `folder`, which is made: arm.xml (MJCF, as a drawing has it) and
+    recordings (a LeRobot data set of five simulated episodes, in degrees). Returns the folder.
+
+    Raises FileExistsError: one of them is there.
+    """
+    out = Path(folder)
+    out.mkdir(parents=True, exist_ok=True)
+    source = Path(str(resources.files("truing") / "examples" / "servo_arm"))
+    for name in ("arm.xml", "recordings"):
+        if (out / name).exists():
+            raise FileExistsError(f"{out / name} is there already")
+    shutil.copyfile(source / "arm.xml", out / "arm.xml")
+    shutil.copytree(source / "recordings", out / "recordings")
+    return out
