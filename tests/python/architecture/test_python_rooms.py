@@ -136,6 +136,7 @@ FLOORS = {
         "score",
         "run",
     ],
+    "exam/dynamics/servo": ["arms", "courses", "firmware", "effects", "sizing", "stage", "families"],
 }
 
 # Packages that are slow to import, or belong to one job: which rooms may import them.
