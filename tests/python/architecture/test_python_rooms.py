@@ -133,6 +133,7 @@ FLOORS = {
         "servo",
         "sets",
         "answers",
+        "servo_score",
         "score",
         "run",
     ],

@@ -26,36 +26,46 @@ _INPUTS = (
 )
 
 
-def answer_of(diagnosis: Any) -> Answer:
+def answer_of(diagnosis: Any, usual: bool = False) -> Answer:
     """From what `truing.dynamics.diagnose` gives, or whatever has its attributes: effects (effect, joints,
     probability, confounded_with; parameters, share), unknown (joint, input), verdict; not_testable, shrink,
-    sentence where there are any. Raises UnreadableAnswerError.
+    sentence where there are any. usual: what everybody fits is an answer as well, since it is what was hidden
+    or looks the same; so are the members of classes. Raises UnreadableAnswerError.
     """
     try:
-        return _answer_of(diagnosis)
+        return _answer_of(diagnosis, usual)
     except UnreadableAnswerError:
         raise
     except (AttributeError, TypeError, ValueError) as error:
         raise UnreadableAnswerError(f"{type(error).__name__}: {error}") from error
 
 
-def _answer_of(diagnosis: Any) -> Answer:
-    effects = [
-        found
-        for found in diagnosis.effects
-        if str(found.effect) not in STANDARD and not getattr(found, "standard", False)
-    ]
+def _answer_of(diagnosis: Any, usual: bool) -> Answer:
+    effects = [found for found in diagnosis.effects if usual or not _is_standard(found)]
     return Answer(
         verdict=str(diagnosis.verdict),
         effects=tuple(_named(found) for found in effects),
         unknown=tuple(_unknown(one) for one in diagnosis.unknown),
-        not_testable=tuple(
-            _known(item) for item in getattr(diagnosis, "not_testable", ()) if hasattr(item, "effect")
-        ),
+        not_testable=(*_not_testable(diagnosis), *(_of_classes(diagnosis) if usual else ())),
         shrink=_shrink(getattr(diagnosis, "shrink", None)),
         sentence=str(getattr(diagnosis, "sentence", "")),
         parameters={name: value for found in effects for name, value in _parameters(found).items()},
     )
+
+
+def _is_standard(found: Any) -> bool:
+    return str(found.effect) in STANDARD or bool(getattr(found, "standard", False))
+
+
+def _not_testable(diagnosis: Any) -> list[tuple[str, tuple[str, ...]]]:
+    return [_known(item) for item in getattr(diagnosis, "not_testable", ()) if hasattr(item, "effect")]
+
+
+def _of_classes(diagnosis: Any) -> list[tuple[str, tuple[str, ...]]]:
+    """Members of classes that are told by name: "payload", "command_gain:J2"."""
+    names = [name for one in getattr(diagnosis, "classes", ()) for name in getattr(one, "effects", ())]
+    told = [str(name).partition(":") for name in names if isinstance(name, str)]
+    return [(effect, (joint,) if joint else ()) for effect, _, joint in told]
 
 
 def realised(diagnosis: Any, kept_back: Sequence[Path]) -> float | None:

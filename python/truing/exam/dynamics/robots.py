@@ -64,7 +64,7 @@ def _rod(mass: float, com: tuple[float, float, float], length: float, radius: fl
     return Link(mass, center, inertia + 0.04 * thick * skew)
 
 
-def _arm(
+def arm_of(
     name: str,
     axes: str,
     origins: list[tuple[float, float, float]],
@@ -76,6 +76,7 @@ def _arm(
     tool: tuple[float, float, float],
     payload: float,
 ) -> Arm:
+    """An arm from tables: links are (mass [kg], centre of mass [m], length [m], radius [m])."""
     return Arm(
         name,
         np.array(origins),
@@ -91,7 +92,7 @@ def _arm(
 
 
 _DEVELOPMENT = (
-    _arm(
+    arm_of(
         "shop",
         "zyyyzy",
         [(0, 0, 0.19), (0, 0.14, 0), (0, -0.12, 0.57), (0, 0, 0.52), (0, 0.11, 0), (0, 0, 0.11)],
@@ -110,7 +111,7 @@ _DEVELOPMENT = (
         (0.0, 0.09, 0.0),
         8.0,
     ),
-    _arm(
+    arm_of(
         "slim",
         "zyzyzyz",
         [(0, 0, 0.31), (0, 0, 0), (0, 0, 0.33), (0.06, 0, 0), (-0.06, 0, 0.36), (0, 0, 0), (0.08, 0, 0.1)],
@@ -130,7 +131,7 @@ _DEVELOPMENT = (
         (0.0, 0.0, 0.1),
         3.0,
     ),
-    _arm(
+    arm_of(
         "bench",
         "zyy",
         [(0, 0, 0.22), (0, 0.05, 0), (0, -0.02, 0.31)],
@@ -146,7 +147,7 @@ _DEVELOPMENT = (
         (0.0, 0.0, 0.26),
         1.0,
     ),
-    _arm(
+    arm_of(
         "swing",
         "yy",
         [(0, 0, 0.9), (0, 0.04, -0.45)],
@@ -161,7 +162,7 @@ _DEVELOPMENT = (
 )
 
 _EXAMINATION = (
-    _arm(
+    arm_of(
         "yard",
         "zyyxyx",
         [(0, 0, 0.45), (0.16, 0, 0), (0, 0, 0.68), (0.28, 0, 0.14), (0.42, 0, 0), (0.1, 0, 0)],
@@ -180,7 +181,7 @@ _EXAMINATION = (
         (0.12, 0.0, 0.0),
         20.0,
     ),
-    _arm(
+    arm_of(
         "reach",
         "zyzyzyx",
         [(0, 0, 0.36), (0, 0, 0), (0, 0.01, 0.42), (0, 0, 0), (0, -0.01, 0.40), (0, 0, 0), (0, 0, 0.13)],
@@ -200,7 +201,7 @@ _EXAMINATION = (
         (0.1, 0.0, 0.0),
         7.0,
     ),
-    _arm(
+    arm_of(
         "crane",
         "zyx",
         [(0, 0, 0.6), (0.1, 0, 0), (0.5, 0.03, 0)],
@@ -216,7 +217,7 @@ _EXAMINATION = (
         (0.2, 0.05, 0.0),
         5.0,
     ),
-    _arm(
+    arm_of(
         "fork",
         "yx",
         [(0, 0, 0.7), (0.4, 0.0, 0.0)],

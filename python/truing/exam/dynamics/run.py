@@ -35,7 +35,8 @@ def diagnose(robot: Path, recordings: Sequence[Path]) -> Any:
     """The candidate that the examination is for."""
     dynamics = importlib.import_module("truing.dynamics")
     arm = truing.load_robot(robot)
-    return dynamics.diagnose(arm, dynamics.load_recordings(list(recordings), arm))
+    model = arm if robot.suffix == ".urdf" else robot  # an MJCF says drives as well
+    return dynamics.diagnose(model, dynamics.load_recordings(list(recordings), arm))
 
 
 def run_exam(
@@ -83,7 +84,7 @@ class Dynamics(Half[Case, Files]):
         try:
             diagnosis = self.candidate(handed.robot, handed.recordings)
             seconds, processor = clock.spent()
-            said = answer_of(diagnosis)
+            said = answer_of(diagnosis, usual=bool(case.label.get("usual")))
             better = realised(diagnosis, case.write_kept_back(handed.robot.parent / "kept_back"))
         except Exception as error:  # the others still sit
             return failed(f"{type(error).__name__}: {error}", *clock.spent()), {}

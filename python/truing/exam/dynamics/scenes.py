@@ -58,15 +58,16 @@ class Recorded:
 class Case:
     """A set: what is handed over, and what is not."""
 
-    robot: str  # URDF
+    robot: str  # its file
     recordings: tuple[Recorded, ...]
     fresh: tuple[Recorded, ...]  # never handed over
     label: Label
+    robot_name: str = "robot.urdf"
 
     def write(self, folder: Path) -> tuple[Path, list[Path]]:
         """Robot and recordings as files: docs/reference/files.md."""
         folder.mkdir(parents=True, exist_ok=True)
-        robot = folder / "robot.urdf"
+        robot = folder / self.robot_name
         robot.write_text(self.robot, encoding="utf-8")
         return robot, [_write_recording(folder, one) for one in self.recordings]
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from truing.exam.answers import Named
+from truing.exam.dynamics.servo_score import SERVO_LINES, SERVO_MORE, of_servos
 from truing.exam.score import (
     Line,
     Row,
@@ -204,6 +205,13 @@ LINES = (
         given=lambda s: bool(s.answer.unknown),
     ),
 )
+FAILED = Line(
+    "failed",
+    "the diagnosis failed with an error, or did not end",
+    lambda s: True,
+    lambda s: bool(s.answer.error),
+    good=False,
+)
 MORE = (
     Line(
         "first_departures",
@@ -273,23 +281,22 @@ MORE = (
         lambda s: s.label.get("kind") == "real_payload",
         lambda s: any(right(item, s.label) for item in s.answer.effects),
     ),
-    Line(
-        "failed",
-        "the diagnosis failed with an error, or did not end",
-        lambda s: True,
-        lambda s: bool(s.answer.error),
-        good=False,
-    ),
+    FAILED,
 )
 
 
 def score(sheets: Sequence[Sheet], which: str = "", left_out: Mapping[str, str] | None = None) -> Scores:
     """Every row of the table, from all sheets. left_out: sets that could not be made, and why."""
-    rows = [share(line, sheets) for line in LINES] + _values(sheets) + [share(line, sheets) for line in MORE]
+    servos = [of_servos(s) for s in sheets]
+    torques = not all(servos) or not servos
+    first = (*(LINES if torques else ()), *(SERVO_LINES if any(servos) else ()))
+    more = (*(MORE if torques else (FAILED,)), *(SERVO_MORE if any(servos) else ()))
     return Scores(
-        rows,
+        [share(line, sheets) for line in first]
+        + _values(sheets, torques)
+        + [share(line, sheets) for line in more],
         {},
-        failures(sheets, (*LINES, *MORE)),
+        failures(sheets, (*first, *more)),
         len(sheets),
         which,
         left_out=dict(left_out or {}),
@@ -298,16 +305,16 @@ def score(sheets: Sequence[Sheet], which: str = "", left_out: Mapping[str, str] 
     )
 
 
-def _values(sheets: Sequence[Sheet]) -> list[Row]:
+def _values(sheets: Sequence[Sheet], torques: bool = True) -> list[Row]:
     told = [("calibration", "stated confidence against frequency", 0.05, sheets)]
     told += [
         (f"calibration_{name}", f"the same within {name}", 0.08, of)
         for name, of in by_family(sheets).items()
-        if name != "none"
+        if name not in ("none", "servo_none")
     ]
     cost = cost_of(sheets)
     return [
-        _payload_row(sheets),
+        *([_payload_row(sheets)] if torques else []),
         _rollout_row(sheets),
         *(calibration_row(*one) for one in told),
         Row("seconds", "seconds per set, median", n=cost.sets, value=cost.median, percent=False),
@@ -337,7 +344,7 @@ def _rollout_row(sheets: Sequence[Sheet]) -> Row:
     wrong = [
         abs(s.answer.shrink[0] - s.answer.realised)
         for s in sheets
-        if s.label["family"] != "unlisted" and s.answer.shrink and s.answer.realised is not None
+        if not s.label["family"].endswith("unlisted") and s.answer.shrink and s.answer.realised is not None
     ]
     value = 100.0 * float(np.median(wrong)) if wrong else math.nan
     return Row(

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from truing.exam.dynamics import families, recordings
 from truing.exam.dynamics.scenes import Case
+from truing.exam.dynamics.servo.families import FAMILIES as SERVO_FAMILIES
 from truing.exam.numbering import Numbering, parts_of
 
 COUNTS = {
@@ -18,6 +19,11 @@ COUNTS = {
     "wrong_law": 60,
     "unlisted": 80,
     "missing": 40,
+    "servo_none": 80,
+    "servo_single": 240,
+    "servo_confounded": 42,
+    "servo_unlisted": 60,
+    "servo_missing": 40,
 }
 """Sets of each family. A new family stands last: a set's random numbers start from its family's place."""
 QUICK = {
@@ -28,15 +34,21 @@ QUICK = {
     "wrong_law": 2,
     "unlisted": 2,
     "missing": 2,
+    "servo_none": 2,
+    "servo_single": 4,
+    "servo_confounded": 3,
+    "servo_unlisted": 2,
+    "servo_missing": 2,
 }
 NUMBERING = Numbering(COUNTS, QUICK, 100_000, 78, " in the dynamic half")
 ids = NUMBERING.ids
+_FAMILIES = families.FAMILIES | SERVO_FAMILIES
 
 
 def build(id: str) -> Case:
     """A set."""
     request = NUMBERING.request(id)
-    return families.FAMILIES[request.family](request)
+    return _FAMILIES[request.family](request)
 
 
 def skipped(which: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
