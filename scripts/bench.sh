@@ -37,4 +37,6 @@ cd build/run/bench  # not the source tree: only the installed truing is to be im
 if [[ -n ${TRUING_REALDATA:-} ]]; then
   "$root/.venv/bin/python" "$root/bench/real_dynamics.py" --rows "$root/$release/bench/bench_dynamics_rows" \
     --peers "$root/build/peers" --write "$root/docs/benchmarks/real-dynamics.md"
+  "$root/.venv/bin/python" "$root/bench/real_servo.py" --peers "$root/build/peers" \
+    --write "$root/docs/benchmarks/real-servo.md"
 fi

@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Servo arms whose torques nobody knows: simulated motion on held-out recordings, by what others use.
+
+    python bench/real_servo.py [--data FOLDER] [--peers ENVS] [--write PAGE]
+
+FOLDER as for bench/real_data.py; sets that are not there are left out. ENVS: what peers/setup_sysid.sh made.
+--write: the page whose markers take the tables.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from servo_replay import Usual, as_published, ask_sysid, firmware_scale, of_file, replay, sysid_task
+
+import truing
+from truing.dynamics import Recording, load_recordings
+
+ROOT = Path(__file__).resolve().parent.parent
+START, END = "<!-- table -->", "<!-- end -->"
+XL330_REFERENCE = 200.0  # firmware gain at which the file's gain is taken to hold: it says none
+SO101_JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
+SO101_MAIN = ("slow_precision", "random_waypoints")
+SO101_MORE = ("inertia_coupling", "lissajous_pattern", "pick_place")
+WINDOW = 5.0  # [s]
+
+Floats = NDArray[np.float64]
+
+
+def degrees(error: Floats) -> Floats:
+    """Rms over rows, joint by joint."""
+    return np.degrees(np.sqrt(np.mean(error**2, axis=0)))
+
+
+def judged(file: Path, usual: Usual, test: Sequence[Recording]) -> float:
+    """[deg] rms over all rows of all recordings, replayed by MuJoCo."""
+    errors = [
+        replay(file, ["q1"], usual, one, firmware_scale(one, XL330_REFERENCE)) - one.position for one in test
+    ]
+    return float(degrees(np.concatenate(errors))[0])
+
+
+def xl330(folder: Path, sysid: Path) -> list[str]:
+    file = folder / "robot.xml"
+    recordings = list(load_recordings(sorted(folder.glob("*.csv")), truing.load_robot(file, any_tool=True)))
+    train, test = ([r for r in recordings if r.test == held] for held in (False, True))
+    lines = ["**XL330, firmware gain 200 held out**", ""]
+    lines += ["| | rms [deg] | processor s |", "| --- | --- | --- |"]
+    command = np.concatenate([r.command - r.position for r in test])
+    lines.append(f"| the command taken as the response | {degrees(command)[0]:.2f} | |")
+    lines.append(f"| the MJCF | {judged(file, of_file(file, ['q1']), test):.2f} | |")
+    answer = ask_sysid(sysid, sysid_task(file, ["q1"], train, XL330_REFERENCE))
+    if isinstance(answer, str):
+        return [*lines, f"| mujoco.sysid, gain, damping, dry friction, rotor | {answer} | |", ""]
+    fields = ("gain", "damping", "frictionloss", "armature")
+    theirs = Usual(*(np.array(answer[name]) for name in fields), np.zeros(1))
+    lines.append(
+        f"| mujoco.sysid {answer['version']}, gain, damping, dry friction, rotor"
+        f" | {judged(file, theirs, test):.2f} | {answer['processor_seconds']:.1f} |"
+    )
+    return [*lines, ""]
+
+
+def so101(folder: Path) -> list[str]:
+    file = folder / "robot.xml"
+    robot = truing.load_robot(file, any_tool=True, tip_link="gripper")  # without the jaw
+    names = (*SO101_MAIN, *SO101_MORE)
+    by_name = {r.name: r for r in load_recordings([folder / f"{name}.csv" for name in names], robot)}
+    lines = ["**SO-101, windows of 5 s**", "", "| | J1 … J5 [deg] | mean |", "| --- | --- | --- |"]
+    groups = [(" + ".join(SO101_MAIN), SO101_MAIN), *((name, (name,)) for name in SO101_MORE)]
+    for title, group in groups:
+        own = [by_name[name] for name in group]
+        lines.append(f"| *{title}* | | |")
+        command = degrees(np.concatenate([one.command - one.position for one in own]))
+        published = [as_published(file, SO101_JOINTS, one, WINDOW) - one.position for one in own]
+        lines.append(row("the command taken as the response", command))
+        lines.append(row("the MJCF", degrees(np.concatenate(published))))
+    return [*lines, ""]
+
+
+def row(text: str, error: Floats) -> str:
+    return f"| {text} | {' '.join(f'{one:.2f}' for one in error)} | {float(np.mean(error)):.2f} |"
+
+
+def report(data: Path, sysid: Path) -> list[str]:
+    lines: list[str] = []
+    if (folder := data / "dyn_xl330").exists():
+        lines += xl330(folder, sysid)
+    if (folder := data / "dyn_so101").exists():
+        lines += so101(folder)
+    print("\n".join(lines))
+    return lines
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=Path(os.environ.get("TRUING_REALDATA", "data")))
+    parser.add_argument("--peers", type=Path, default=ROOT / "build" / "peers")
+    parser.add_argument(
+        "--write", type=Path, help=f"the page whose markers {START} and {END} take the tables"
+    )
+    arguments = parser.parse_args()
+    page = arguments.write.read_text(encoding="utf-8") if arguments.write else f"{START}{END}"
+    if START not in page or END not in page:
+        parser.error(f"{arguments.write} has no markers {START} and {END}")
+    lines = report(arguments.data, arguments.peers / "sysid" / "bin" / "python")
+    if not lines:
+        print(f"{arguments.data}: none of the recordings is there", file=sys.stderr)
+        return 1
+    if arguments.write:
+        begin, end = page.index(START) + len(START), page.index(END)
+        text = page[:begin] + "\n" + "\n".join(lines) + page[end:]
+        arguments.write.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
