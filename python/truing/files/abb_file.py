@@ -23,6 +23,7 @@ from truing.errors import InputError
 from truing.files.arms import ARMS, Arm, arms_of
 from truing.files.common import decoded, listed, read_bytes, shown
 from truing.files.controller_parts import ControllerModel, unknown_arm
+from truing.limits import UNIT_LENGTH_OFF
 from truing.rotations import rotations_from_quaternions
 
 _MAKER = "ABB"
@@ -239,7 +240,7 @@ def _base_frame(path: Path, unit: _Instance, robot: _core.Robot) -> Any:
     q = np.array([_number(path, unit, f"base_frame_orient_u{k}") for k in range(4)])
     if "base_frame_orient_u0" not in unit.values:  # ABB leaves out what has its usual value
         q[0] = 1.0 if not q[1:].any() else math.sqrt(max(0.0, 1.0 - float(q[1:] @ q[1:])))
-    if abs(float(np.linalg.norm(q)) - 1.0) > 1e-3:
+    if abs(float(np.linalg.norm(q)) - 1.0) > UNIT_LENGTH_OFF:
         raise InputError(
             f"{path}, line {unit.line}: base_frame_orient is {q.tolist()}, expected a quaternion of length 1"
         )

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing.errors import InputError
+from truing.limits import UNIT_LENGTH_OFF
 from truing.rotations import (
     quaternions_from_rotations,
     rotations_from_angles,
@@ -36,7 +37,6 @@ Brand = Literal["kuka", "fanuc", "yaskawa", "abb", "ur"]
 Kind = Literal["zyx", "xyz", "quaternion", "rotation-vector"]
 
 _LOCKED = 1e-12  # cosine of the middle angle below which first and last turn about one axis
-_OFF = 1e-3  # of a quaternion's length from 1: what makers' printed digits leave
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def frame_from_numbers(brand: Brand, numbers: Sequence[float]) -> Floats:
 def _rotation(brand: Brand, notation: Notation, values: Floats) -> Floats:
     if notation.rotation == "quaternion":
         length = float(np.linalg.norm(values))
-        if abs(length - 1) > _OFF:
+        if abs(length - 1) > UNIT_LENGTH_OFF:
             raise InputError(
                 f"a frame of {brand}: the quaternion {values.tolist()} has length {length:.6g}, expected 1"
             )

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from truing.files.common import PathLike, listed, shown
 from truing.files.table import Floats, Table
+from truing.limits import UNIT_LENGTH_OFF
 from truing.rotations import rotations_from_quaternions
 
 Ints = NDArray[np.int64]
@@ -27,6 +28,8 @@ _QUATERNION = ("qw", "qx", "qy", "qz")
 _WHOLE = ("cycle", "approach", "point", "block")
 _PLAIN = ("load_percent", "speed_percent", "t_s", "temp_C")
 _LABELS = ("test", "pose", "path")
+_MOST_PERCENT = 200  # of a rated value
+_FAR = 100.0  # [m] from the base no robot reaches
 _JOINT = re.compile(r"q([1-9][0-9]*)_(rad|deg|m|mm)", re.ASCII)
 
 
@@ -196,9 +199,11 @@ class _Reader:
         if name not in self.numbers:
             return np.full(self.table.rows, math.nan)
         values = self.table.numbers(name, gaps=True)
-        wrong = np.isfinite(values) & ((values < 0) | (values > 200))
+        wrong = np.isfinite(values) & ((values < 0) | (values > _MOST_PERCENT))
         if wrong.any():
-            self.table.refuse_cell(int(np.argmax(wrong)), name, "a percentage of the rated value, 0 to 200")
+            self.table.refuse_cell(
+                int(np.argmax(wrong)), name, f"a percentage of the rated value, 0 to {_MOST_PERCENT}"
+            )
         return values
 
     def optional(self, name: str) -> Floats | None:
@@ -215,11 +220,13 @@ class _Reader:
         if not self.oriented:
             return None
         q = np.column_stack([self.table.numbers(name) for name in _QUATERNION])
-        wrong = np.abs(np.linalg.norm(q, axis=1) - 1.0) > 1e-3
+        wrong = np.abs(np.linalg.norm(q, axis=1) - 1.0) > UNIT_LENGTH_OFF
         if wrong.any():
             row = int(np.argmax(wrong))
             found = " ".join(f"{value:.6g}" for value in q[row])
-            self.table.refuse(f"found the quaternion {found}, expected one of unit length (to 1e-3)", row=row)
+            self.table.refuse(
+                f"found the quaternion {found}, expected one of unit length (to {UNIT_LENGTH_OFF:g})", row=row
+            )
         return rotations_from_quaternions(q)
 
     def joints(self) -> Floats | None:
@@ -250,7 +257,7 @@ def _require_sense(table: Table, measured: MeasuredPoses) -> None:
         if test == "warm-up" and measured.block[row] == 0:
             table.refuse("found no block, expected the number of the block of cycles, from 1", row=row)
     extent = float(np.abs(measured.position).max())
-    if extent > 100.0:
+    if extent > _FAR:
         table.refuse(
             f"positions up to {extent:.4g} m: this looks like millimetres; call the columns x_mm y_mm z_mm"
         )

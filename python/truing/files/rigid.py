@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from truing.errors import InputError
 from truing.files.common import shown
+from truing.limits import UNIT_LENGTH_OFF
 from truing.rotations import rotations_from_quaternions
 
 Floats = NDArray[np.float64]
 Where = Callable[[int], str]  # what messages call entry k: "poses.txt, line 3"
 
 _LARGEST = 1e6  # [m] of a position
-_OFF = 1e-3  # entries of R^T R - I, and lengths of quaternions less 1: what a few digits leave
+_OFF = 1e-3  # entries of R^T R - I: what a few digits leave
 
 
 def frames_from_rows(values: Floats, where: Where) -> tuple[Floats, bool]:
@@ -76,7 +77,7 @@ def frames_from_quaternions(positions: Floats, q: Floats, where: Where) -> Float
     """Frames, shape=(n, 4, 4), of positions, shape=(n, 3) [m], and quaternions, shape=(n, 4), w x y z."""
     _check_positions(positions, where)
     length = np.linalg.norm(q, axis=1)
-    wrong = ~(np.abs(length - 1.0) < _OFF)
+    wrong = ~(np.abs(length - 1.0) < UNIT_LENGTH_OFF)
     if wrong.any():
         row = int(np.argmax(wrong))
         w, x, y, z = q[row]

@@ -22,6 +22,7 @@ from truing.files.common import PathLike, listed, shown
 from truing.files.plausibility import check_joint_units_look_right, check_targets_look_right
 from truing.files.program_poses import is_program as is_robot_program, wanted_poses
 from truing.files.table import Floats, Table
+from truing.limits import UNIT_LENGTH_OFF
 from truing.rotations import rotations_from_quaternions
 
 _LENGTHS = ("m", "mm")
@@ -237,7 +238,7 @@ class _Reader:
         q = np.column_stack([self.values(role, gaps=bool(point.any())) for role in _QUATERNION])
         norm = np.linalg.norm(q, axis=1)
         empty = np.isnan(q).all(axis=1) & point
-        good = empty | (np.abs(norm - 1.0) <= 1e-3)
+        good = empty | (np.abs(norm - 1.0) <= UNIT_LENGTH_OFF)
         if not good.all():
             self._refuse_quaternion(int(np.argmin(good)), q, norm)
         there = np.flatnonzero(~empty)
