@@ -116,7 +116,8 @@ def tags_texture(border: int = 2, squares: bool = True, turn: int = 0) -> Any:
         column, row = np.floor(x / step).astype(np.intp), np.floor(y / step).astype(np.intp)
         u, v = (x - step * column) / grid.size, 1 - (y - step * row) / grid.size
         inside = (column >= 0) & (column < grid.columns) & (row >= 0) & (row < grid.rows) & (u < 1) & (v >= 0)
-        number = row[inside] * grid.columns + column[inside]
+        counted = grid.rows - 1 - row if grid.from_top else row
+        number = counted[inside] * grid.columns + column[inside]
         dark = np.zeros(x.shape, dtype=bool)
         place = number, (v[inside] * cells).astype(np.intp), (u[inside] * cells).astype(np.intp)
         dark[inside] = printed[place] < 128

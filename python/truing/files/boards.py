@@ -32,6 +32,7 @@ from truing.files.tags import FAMILIES as TAG_FAMILIES, TagFinder, TagGrid
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
+_FROM_TOP = "top-left"
 Kind = Literal["chessboard", "charuco", "circles", "acircles", "apriltag"]
 
 _EXPECTED = (
@@ -67,7 +68,8 @@ class Board:
     circles: `columns` x `rows` dots, `size` from dot to dot. acircles: `columns` dots in a row, `rows` rows
     (an odd number), each shifted by half; `size` from row to row (half the distance of dots in a row).
     apriltag: `columns` x `rows` tags of the family `dictionary`, `size` of a tag, `spacing` from tag to tag
-    over it, numbered from `first` at the bottom left (None: of one tag, the one that is seen).
+    over it, numbered from `first` at the bottom left upward, or `from_top` from the top left downward (None:
+    of one tag, the one that is seen).
     """
 
     kind: Kind
@@ -81,6 +83,7 @@ class Board:
     )
     spacing: float = 0.0
     first: int | None = 0
+    from_top: bool = False
 
     def __str__(self) -> str:
         if self.kind == "apriltag":
@@ -93,13 +96,15 @@ class Board:
     def _name_of_tags(self) -> str:
         text = f"{self.kind}:{self.dictionary}"
         if self.columns * self.rows > 1:
-            return f"{text}:{self.columns}x{self.rows}:{_length(self.size)}:{self.spacing:.6g}"
+            counting = f":{_FROM_TOP}" if self.from_top else ""
+            return f"{text}:{self.columns}x{self.rows}:{_length(self.size)}:{self.spacing:.6g}{counting}"
         return f"{text}:{_length(self.size)}" + (f":{self.first}" if self.first is not None else "")
 
     @property
     def tags(self) -> TagGrid:
         """Of an apriltag board: its tags."""
-        return TagGrid(self.dictionary, self.columns, self.rows, self.size, self.spacing, self.first)
+        layout = (self.columns, self.rows, self.size, self.spacing, self.first, self.from_top)
+        return TagGrid(self.dictionary, *layout)
 
     @property
     def points(self) -> Floats:
@@ -159,7 +164,7 @@ class BoardViews:
 def parse_board(text: str) -> Board:
     """A board by its name: chessboard:9x6:25mm (inner corners), charuco:5x7:40mm:30mm[:DICTIONARY] (squares),
     circles:10x10:25.4mm, acircles:4x11:20mm, apriltag:36h11:6x6:88mm:0.3 (a grid as Kalibr's: family, tags,
-    side, gap over side), apriltag:36h11:88mm[:NUMBER] (one tag).
+    side, gap over side; with :top-left counted from there), apriltag:36h11:88mm[:NUMBER] (one tag).
 
     Raises InputError that says what was expected.
     """
@@ -200,7 +205,7 @@ def _parsed_board(text: str) -> Board:
 
 
 def _parsed_tags(parts: Sequence[str]) -> Board:
-    """FAMILY:COLUMNSxROWS:SIDE:SPACING, or FAMILY:SIDE[:NUMBER]."""
+    """FAMILY:COLUMNSxROWS:SIDE:SPACING[:top-left], or FAMILY:SIDE[:NUMBER]."""
     family = (
         parts[0].lower().removeprefix("dict_").removeprefix("apriltag_").removeprefix("tag") if parts else ""
     )
@@ -218,8 +223,9 @@ def _parsed_tags(parts: Sequence[str]) -> Board:
     counts = re.fullmatch(r"([0-9]{1,3})x([0-9]{1,3})", rest[0])
     if not counts or not 1 < int(counts[1]) * int(counts[2]) <= 600:
         raise _NoBoard(f"{rest[0]!r} is no pair of numbers of tags such as 6x6")
-    if len(rest) != 3:
-        raise _NoBoard("expected tags, side and spacing after the family")
+    from_top = rest[3:] == [_FROM_TOP]
+    if len(rest) != 3 + from_top:
+        raise _NoBoard(f"expected tags, side and spacing after the family, and {_FROM_TOP} or nothing")
     if not re.fullmatch(r"[0-9]*\.?[0-9]+", rest[2]) or not 0 < float(rest[2]) < 10:
         raise _NoBoard(
             f"{rest[2]!r} is no spacing: the gap between two tags over the side of one, such as 0.3"
@@ -231,6 +237,7 @@ def _parsed_tags(parts: Sequence[str]) -> Board:
         _board_length(rest[1]),
         dictionary=family,
         spacing=float(rest[2]),
+        from_top=from_top,
     )
 
 
@@ -902,11 +909,16 @@ def _tags_in_sight(cv: Any, images: Sequence[Image], board: Board) -> str:
             " they sharp, evenly lit and printed with their white margin?"
         )
     count = board.columns * board.rows
-    return (
+    expected_tags = (
         f"{' and '.join(said)} of the {len(images)} that were looked at again, expected those of"
         f" {board.dictionary} from {board.first or 0} to {(board.first or 0) + count - 1}, counted from the"
-        " bottom left row by row as Kalibr does: are family, counts and spacing right?"
+        f" {'top left downward' if board.from_top else 'bottom left upward as Kalibr does'}"
     )
+    other = replace(board, from_top=not board.from_top)
+    finder = TagFinder(cv, other.tags)
+    if sum(finder(image) is not None for image in images) >= 0.5 * len(images):
+        return f"{expected_tags}; they are counted the other way: say --board {other}"
+    return f"{expected_tags}: are family, counts and spacing right?"
 
 
 def _larger_board(cv: Any, images: Sequence[Path | str | Image], board: Board) -> Board | None:

@@ -3,8 +3,9 @@
 """AprilTags in images: grids of them, laid out as Kalibr's, and single ones.
 
 A grid is counted as Kalibr counts it (GridCalibrationTargetAprilgrid): tag 0 at the bottom left, then to the
-right, then the next row above. Its frame has the origin at the bottom left corner of tag 0, x to the right, y
-up, and so z out of the board.
+right, then the next row above; or from the top left downward, as OpenCV's GridBoard and most drawing programs
+do. However it is counted, its frame has the origin at the bottom left corner of the tag at the bottom left, x
+to the right, y up, and so z out of the board.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ _ERRORS = 5.0  # standard errors of the median
 @dataclass(frozen=True)
 class TagGrid:
     """`columns` x `rows` tags of side `size` [m], gaps of `spacing` times that between them; `first`: the
-    number of the tag at the bottom left; None: of a single tag, the one that is seen.
+    number of the tag at the bottom left, or with `from_top` at the top left; None: of a single tag, the one
+    that is seen.
     """
 
     family: str
@@ -48,6 +50,7 @@ class TagGrid:
     size: float
     spacing: float = 0.0
     first: int | None = 0
+    from_top: bool = False  # rows are counted downward
 
     @property
     def count(self) -> int:
@@ -58,7 +61,8 @@ class TagGrid:
         """Corners, shape=(4 count, 3) [m], tag by tag: top left, top right, bottom right, bottom left."""
         corners = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]) * self.size
         step = (1.0 + self.spacing) * self.size
-        places = [[c * step, r * step] for r in range(self.rows) for c in range(self.columns)]
+        heights = range(self.rows)[:: -1 if self.from_top else 1]
+        places = [[c * step, r * step] for r in heights for c in range(self.columns)]
         flat = (np.array(places)[:, None] + corners).reshape(-1, 2)
         return np.column_stack([flat, np.zeros(len(flat))])
 
@@ -197,12 +201,13 @@ class TagFinder:
         return (points[good], pixels[good]) if good.sum() >= max(6, _AGREEING * len(good)) else None
 
     def _gaps_of(self, seen: _Seen, turn: int, width: int) -> Floats:
-        """Between neighbours in a row (of a single column: above each other): gap over side, side [px], side
+        """Between neighbours in a row (of a single column: in that): gap over side, side [px], side
         over the image's width; shape=(m, 3).
         """
         tags = dict(zip(seen.numbers.tolist(), np.roll(seen.corners, turn, axis=1), strict=True))
         columns, out = self.grid.columns, []
-        edges = ((0, 1), (3, 2)) if columns > 1 else ((3, 0), (2, 1))
+        above = ((0, 3), (1, 2)) if self.grid.from_top else ((3, 0), (2, 1))
+        edges = ((0, 1), (3, 2)) if columns > 1 else above
         for number, tag in tags.items():
             if number + 1 not in tags or (columns > 1 and (number + 1) % columns == 0):
                 continue

@@ -52,6 +52,7 @@ def tags(columns: int, rows: int, size: float, family: str, spacing: float, firs
         ("apriltag:36h11:6x6:88mm:0.3", tags(6, 6, 0.088, "36h11", 0.3)),
         ("apriltag:tag25h9:4x3:5cm:.25", tags(4, 3, 0.05, "25h9", 0.25)),
         ("apriltag:APRILTAG_16h5:2x1:40mm:1", tags(2, 1, 0.04, "16h5", 1.0)),
+        ("apriltag:36h11:6x6:88mm:0.3:top-left", replace(tags(6, 6, 0.088, "36h11", 0.3), from_top=True)),
         ("apriltag:36h11:88mm:5", tags(1, 1, 0.088, "36h11", 0.0, 5)),
         ("apriltag:36h11:88mm", tags(1, 1, 0.088, "36h11", 0.0, None)),
     ],
@@ -75,6 +76,7 @@ def test_tags_are_read_by_their_name_and_say_it_again(text: str, board: Board) -
         ("apriltag:36h12:6x6:88mm:0.3", "no family of AprilTags '36h12'; there are 36h11, 25h9, 16h5"),
         ("apriltag:36h11", "missing"),
         ("apriltag:36h11:6x6:88mm", "tags, side and spacing"),
+        ("apriltag:36h11:6x6:88mm:0.3:top", "tags, side and spacing .* and top-left or nothing"),
         ("apriltag:36h11:6x6:88mm:26mm", "no spacing: the gap between two tags over the side"),
         ("apriltag:36h11:6x6:88:0.3", "no length with its unit"),
         ("apriltag:36h11:0x6:88mm:0.3", "no pair of numbers"),
@@ -92,6 +94,14 @@ def test_points_are_kalibrs() -> None:
     assert np.allclose(points[0, :, :2], [[0, 0.1], [0.1, 0.1], [0.1, 0], [0, 0]])
     assert np.allclose(points[1] - points[0], [0.15, 0, 0])
     assert np.allclose(points[2] - points[0], [0, 0.15, 0])
+
+
+def test_points_counted_from_the_top_left_have_the_same_frame() -> None:
+    """As of cv::aruco::GridBoard tag 1 is right of tag 0 and tag 2 below; the origin is where Kalibr's is."""
+    points = parse_board("apriltag:36h11:2x3:100mm:0.5:top-left").points.reshape(6, 4, 3)
+    assert np.allclose(points[4, :, :2], [[0, 0.1], [0.1, 0.1], [0.1, 0], [0, 0]])
+    assert np.allclose(points[1] - points[0], [0.15, 0, 0])
+    assert np.allclose(points[2] - points[0], [0, -0.15, 0])
 
 
 # ---- Finding -------------------------------------------------------------------------------------
@@ -120,6 +130,7 @@ def large_poses(board: Board, count: int, seed: int = 0) -> list[Floats]:
         ("apriltag:25h9:3x4:40mm:0.25", PLAIN),
         ("apriltag:16h5:3x2:40mm:0.5", PLAIN),
         ("apriltag:36h11:3x3:40mm:0.3", tags_texture(turn=2)),
+        ("apriltag:36h11:4x3:40mm:0.3:top-left", PLAIN),
     ],
 )
 def test_a_grid_is_found_to_a_fraction_of_a_pixel(text: str, paint: Any) -> None:
@@ -193,6 +204,15 @@ def test_other_tags_than_were_said_are_named(said: str, message: str) -> None:
         find_board(images, said, camera=LARGE)
 
 
+@pytest.mark.parametrize(("printed", "said"), [("", ":top-left"), (":top-left", "")])
+def test_a_grid_that_is_counted_the_other_way_is_refused_by_its_name(printed: str, said: str) -> None:
+    name = "apriltag:36h11:4x3:40mm:0.3"
+    board = parse_board(name + printed)
+    images = [render(board, T, LARGE, seed=k, paint=PLAIN) for k, T in enumerate(large_poses(board, 3))]
+    with pytest.raises(InputError, match=f"counted the other way: say --board {name}{printed}$"):
+        find_board(images, name + said, camera=LARGE)
+
+
 # ---- The gap between tags ------------------------------------------------------------------------
 
 
@@ -205,6 +225,7 @@ def test_other_tags_than_were_said_are_named(said: str, message: str) -> None:
         ("36h11:3x4:40mm:0.2", 0.3, PLAIN),
         ("25h9:4x3:40mm:0.5", 0.25, PLAIN),
         ("16h5:1x3:40mm:0.4", 0.3, PLAIN),
+        ("36h11:1x3:40mm:0.4:top-left", 0.3, PLAIN),
         ("36h11:3x3:40mm:0.3", 0.2, tags_texture(turn=2)),
     ],
 )
