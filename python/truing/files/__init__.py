@@ -25,6 +25,10 @@ from truing.files.common import (
     write_table as write_table,
 )
 from truing.files.controller_parts import ControllerModel as ControllerModel
+from truing.files.handeye_answer import (
+    HandEyeAnswer as HandEyeAnswer,
+    read_handeye_answer as read_handeye_answer,
+)
 from truing.files.handeye_file import (
     HandEyeData as HandEyeData,
     Stream as Stream,
@@ -38,6 +42,7 @@ from truing.files.lerobot_calibration import (
     MotorCalibration as MotorCalibration,
     load_lerobot_calibration as load_lerobot_calibration,
     matched_motors as matched_motors,
+    moved_zero as moved_zero,
     radians_per_count as radians_per_count,
 )
 from truing.files.measurement_file import (
@@ -52,7 +57,11 @@ from truing.files.performance_file import (
     load_measured as load_measured,
 )
 from truing.files.recording_file import load_recordings as load_recordings
-from truing.files.residual_file import load_residual_motion as load_residual_motion
+from truing.files.residual_file import (
+    commanded_columns as commanded_columns,
+    load_commanded_motion as load_commanded_motion,
+    load_residual_motion as load_residual_motion,
+)
 from truing.files.robot_file import (
     any_robot as any_robot,
     is_controller as is_controller,

@@ -29,6 +29,7 @@ from truing.files.opencv_file import is_opencv_file, read_opencv_camera
 from truing.files.other_poses import OtherPoses, Setup, Side, read_other_poses
 from truing.files.table import Floats, Table
 from truing.files.yaml_tree import Document, FreeMapping, Number, Strict, Text, choice, expected, found
+from truing.limits import UNIT_LENGTH_OFF
 from truing.rotations import rotations_from_angles, rotations_from_quaternions
 
 CAMERA_FORMAT = "truing-camera/1"
@@ -314,7 +315,7 @@ class _Reader:
 
     def _require_unit_quaternions(self, side: str, q: Floats, there: NDArray[np.intp]) -> None:
         norm = np.linalg.norm(q[there], axis=1)
-        wrong = np.abs(norm - 1.0) > 1e-3
+        wrong = np.abs(norm - 1.0) > UNIT_LENGTH_OFF
         if not wrong.any():
             return
         row = int(there[int(np.argmax(wrong))])

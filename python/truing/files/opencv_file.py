@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,37 @@ def read_opencv_poses(path: Path) -> dict[str, Floats]:
     return {side: _frames(path, parts) for side, parts in sides.items()}
 
 
+def read_opencv_camera_frame(path: Path) -> tuple[Literal["eye-in-hand", "eye-to-hand"] | None, Floats]:
+    """What cv::calibrateHandEye gave: R_cam2gripper and t_cam2gripper, R_cam2base and t_cam2base, whole
+    matrices, or the other way round; or one matrix whose name says nothing. The set-up that the name says,
+    and T_parent_camera, shape=(4, 4). Raises InputError that names the node.
+    """
+    nodes = _nodes(path)
+    sides: dict[str, _Parts] = {}
+    unnamed: list[tuple[str, list[Floats]]] = []
+    for name, arrays in nodes.items():
+        side, inverted = _pair_of(
+            name, (("eye-in-hand", _CAMERAS, _HANDS), ("eye-to-hand", _CAMERAS, _BASES))
+        )
+        if side:
+            sides.setdefault(side, _Parts(inverted=inverted)).numbered.setdefault(name, []).extend(arrays)
+        elif len(arrays) == 1 and _is_poses(arrays):
+            unnamed.append((name, arrays))
+    if len(sides) == 1:
+        setup = cast('Literal["eye-in-hand", "eye-to-hand"]', next(iter(sides)))
+        frames = _frames(path, sides[setup])
+    elif not sides and len(unnamed) == 1:
+        setup, frames = None, _whole(path, *unnamed[0])
+    else:
+        raise InputError(
+            f"{path}: found the nodes {listed(list(nodes)) or '(none)'}, expected one camera: R_cam2gripper"
+            " and t_cam2gripper (on the hand) or R_cam2base and t_cam2base (in the cell), or one 4 x 4 matrix"
+        )
+    if len(frames) != 1:
+        raise InputError(f"{path}: found {len(frames)} cameras, expected one")
+    return setup, frames[0]
+
+
 def is_opencv_file(path: Path) -> bool:
     """Does the file hold matrices as cv::FileStorage writes them? Raises InputError: it cannot be read."""
     data = read_bytes(path, _LARGEST_FILE)
@@ -133,11 +164,20 @@ def _side_of(name: str) -> tuple[str, bool]:
     words = re.sub(r"_?[0-9]+$", "", words)
     if words in ("rvecs", "tvecs", "extrinsic_parameters"):  # of cv::calibrateCamera
         return "board", False
+    return _pair_of(words, (("hand", _HANDS, _BASES), ("board", _BOARDS, _CAMERAS)))
+
+
+_Pairs = tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]
+
+
+def _pair_of(name: str, pairs: _Pairs) -> tuple[str, bool]:
+    """Which of `pairs` (a name, what is in it, in what) "cam2gripper" means, and whether turned round."""
+    words = re.sub(r"([a-z])([A-Z])", r"\1_\2", name).lower().replace("wrt", "2").replace("to", "2")
     match = re.search(r"([a-z]+)_?2_?([a-z]+)$", words)
     if not match:
         return "", False
     a, b = match[1], match[2]
-    for side, what, parent in (("hand", _HANDS, _BASES), ("board", _BOARDS, _CAMERAS)):
+    for side, what, parent in pairs:
         if a in what and b in parent:
             return side, False
         if a in parent and b in what:

@@ -276,7 +276,7 @@ def _yaml_poses(path: Path, setup: Setup | None) -> OtherPoses:
         document.refuse(
             (),
             "found the result of a calibration (where the camera is), expected what it was found from: give"
-            f" the file of samples, {_SAMPLES}",
+            f" the file of samples, {_SAMPLES}, and this one with --compare",
         )
     document.refuse((), f"found the keys {listed([str(key) for key in value])}, expected {_SAMPLES}")
 
@@ -444,5 +444,5 @@ def _opencv_poses(path: Path, setup: Setup | None) -> OtherPoses:
 def _refuse_launch(path: Path, setup: Setup | None) -> NoReturn:
     raise InputError(
         f"{path}: found a launch file, which holds the result of a calibration (where the camera is),"
-        f" expected what it was found from: give the file of samples, {_SAMPLES}"
+        f" expected what it was found from: give the file of samples, {_SAMPLES}, and this one with --compare"
     )
