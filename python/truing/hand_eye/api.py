@@ -29,6 +29,7 @@ from truing.effects import split_effects
 from truing.errors import InputError, UndecidedError
 from truing.files import HandEyeData
 from truing.keywords import made, takes
+from truing.report.notebook import shown
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -57,7 +58,10 @@ def handeye(
     Raises InputError on data or options that cannot be used, and UndecidedError (it carries the result) where
     `status` is not "done", unless `raise_if_undecided` is False.
     """
-    result = _core.handeye(_poses(poses), handeye_options(poses, **options))
+    chosen = handeye_options(poses, **options)
+    result = _core.handeye(_poses(poses), chosen)
+    if isinstance(poses, HandEyeData):
+        shown(result, "truing.hand_eye.result:handeye_page", poses, chosen)
     if raise_if_undecided and result.status != "done":
         raise UndecidedError(result)
     return result

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,7 @@ def handeye_report(result: Mapping[str, Any], scene: Scene | None) -> str:
         _scene(page, result, scene)
         page.add(_frames(result))
         page.add("</div>")
+        page.add(_compared(result))
     elif result["residuals"]:
         page.add("<div>")
         _closures(page, result, scene)
@@ -299,7 +301,7 @@ def _residual_traces(result: Mapping[str, Any], key: str, scale: float, unit: st
                         "symbol": symbol,
                         "opacity": 0.85,
                     },
-                    "text": [_hover(r) for r in chosen],
+                    "text": [escaped(_hover(r)).replace("\n", "<br>") for r in chosen],
                     "hovertemplate": f"%{{text}}<br>%{{y:.3g}} {unit}<extra>{name}</extra>",
                 }
             )
@@ -328,7 +330,7 @@ def _closure_axis(
 
 def _hover(r: Mapping[str, Any]) -> str:
     text = f"pose {r['pose']}" + (f" · {r['image']}" if r.get("image") else "")
-    return escaped(text) + (f"<br>{escaped(r['cause'])}" if r["cause"] else "")
+    return text + (f"\n{r['cause']}" if r["cause"] else "")
 
 
 def _trust(result: Mapping[str, Any]) -> str:
@@ -470,7 +472,7 @@ def _scene(page: Page, result: Mapping[str, Any], scene: Scene) -> None:
     drawing.add_triads()
     drawing.add_cameras()
     words = drawing.add_boards()
-    drawing.plot.draw(page, eye=(1.25, -1.25, 0.75), center=-0.12, size="cloud scene")
+    drawing.plot.draw(page, eye=(1.25, -1.25, 0.75), size="cloud scene")
     less = f" {counted(len(pick), 'pose')} drawn of {count}." if len(pick) < count else ""
     page.add(
         '<p class="note">Robot base and hands as triads (x red, y green, z blue),'
@@ -493,33 +495,33 @@ class _Drawing:
         places = [self._hands[:, :3, 3], self._cameras[:, :3, 3], self._boards[:, :3, 3], np.zeros((1, 3))]
         self._extent = float(np.ptp(np.concatenate(places), axis=0).max()) or 1.0
 
-    def _add_lines(self, pieces: Sequence[Floats], colour: str, name: str, width: float) -> None:
-        self.plot.add_line(polyline(pieces), name, colour, width, max(1.0, width / 2))
+    def _add_lines(
+        self, pieces: Sequence[Floats], colour: str, name: str, width: float, opacity: float = 1.0
+    ) -> None:
+        self.plot.add_line(polyline(pieces), name, colour, width, opacity=opacity)
 
     def add_triads(self) -> None:
         """Robot base and hands."""
         for axis, colour in enumerate(TRIADS):
             arms = [_arm(frame, axis, 0.035 * self._extent) for frame in self._hands]
-            self._add_lines(arms, faded(colour, 0.75), f"hand, {'xyz'[axis]}", 3)
+            self._add_lines(arms, colour, f"hand, {'xyz'[axis]}", 2.5, 0.75)
             base = [_arm(np.eye(4), axis, 0.13 * self._extent)]
-            self._add_lines(base, colour, f"robot base, {'xyz'[axis]}", 6)
+            self._add_lines(base, colour, f"robot base, {'xyz'[axis]}", 5)
         self.plot.add_points(
             self._hands[:, :3, 3],
             "hand",
-            {"size": 3, "color": [REJECTED if out else INK for out in self._rejected]},
-            {
-                "text": [_hover(r) for r in self._residuals],
-                "hovertemplate": "%{text}<extra>hand</extra>",
-            },
+            3.0,
+            [REJECTED if out else INK for out in self._rejected],
+            texts=[_hover(r) for r in self._residuals],
         )
 
     def add_cameras(self) -> None:
         if self.eye_in_hand:
             frusta = [_frustum(frame, 0.05 * self._extent) for frame in self._cameras]
-            self._add_lines(frusta, faded(INK, 0.55), "camera", 2)
+            self._add_lines(frusta, INK, "camera", 1.5, 0.55)
         else:
             frusta = [_frustum(frame, 0.1 * self._extent) for frame in self._cameras[:1]]
-            self._add_lines(frusta, faded(INK, 1.0), "camera", 4)
+            self._add_lines(frusta, INK, "camera", 3)
 
     def add_boards(self) -> str:
         """Boards as predicted and as seen; in words, what strokes between them mean."""
@@ -528,11 +530,11 @@ class _Drawing:
         some = np.isin(every, subsample(every, SCENE_BOARDS))  # boards one over the other show nothing
         predicted = self._boards[:1] if self.eye_in_hand else self._boards[some]
         outlines = [_moved(frame, self._outline) for frame in predicted]
-        self._add_lines(outlines, faded(AFTER, 0.95), "board, predicted", 4)
+        self._add_lines(outlines, AFTER, "board, predicted", 3, 0.95)
         if not shown.any():
             return ""
         outlines = [_moved(frame, self._outline) for frame in self._seen[shown & some]]
-        self._add_lines(outlines, faded(SEEN, 0.6), "board, seen", 2)
+        self._add_lines(outlines, SEEN, "board, seen", 1.5, 0.6)
         start = self._boards[shown, :3, 3]
         off = self._seen[shown, :3, 3] - start
         good = ~self._rejected[shown]
@@ -541,7 +543,7 @@ class _Drawing:
         if factor <= 1:
             return ""
         strokes = [np.stack([start[k], start[k] + factor * off[k]]) for k in np.flatnonzero(good)]
-        self._add_lines(strokes, REJECTED, f"seen less predicted, × {factor:g}", 3)
+        self._add_lines(strokes, REJECTED, f"seen less predicted, × {factor:g}", 2.5)
         return f" Red strokes: from the predicted to the seen board origin, enlarged {factor:g} times."
 
 
@@ -634,6 +636,35 @@ def _frames(result: Mapping[str, Any]) -> str:
     return (
         f'<section class="card"><h2>The frames</h2>{"".join(parts)}<p class="note">One standard error. The'
         " covariances are in result.json.</p></section>"
+    )
+
+
+def _compared(result: Mapping[str, Any]) -> str:
+    """The answers of other programs, and how far the loop closes with each."""
+    rows = []
+    for other in result.get("compared", ()):
+        closes = [other[name] for name in ("closure", "closure_of_ours")]
+        cells = "".join(
+            "<td></td>"
+            if one is None
+            else f"<td>{length_text(one['rms_m'])}, {_mrad(one['rotation_rms_rad'])}</td>"
+            for one in closes
+        )
+        sigmas = other["largest_sigmas"]
+        rows.append(
+            f"<tr><th>{escaped(Path(other['file']).name)}<br>{escaped(other['tool'])}</th>"
+            f"<td>{length_text(other['position_m'])}, {_mrad(other['rotation_rad'])}</td>"
+            f"<td>{'' if sigmas is None else figures_text(sigmas, 2) + ' σ'}</td>{cells}"
+            f"<td>{escaped(other['remark'])}</td></tr>"
+        )
+    if not rows:
+        return ""
+    return (
+        '<section class="card"><h2>Beside other programs</h2><div class="scroll"><table class="narrow">'
+        "<thead><tr><th></th><th>away from ours</th><th>largest component</th><th>closure with theirs</th>"
+        f"<th>with ours</th><th></th></tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+        f'<p class="note">Over {counted(result["compared"][0]["poses"], "pose")}, the board put where it fits'
+        " each camera best. The largest component is in our standard errors.</p></section>"
     )
 
 

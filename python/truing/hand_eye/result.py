@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.files import HandEyeData, save_camera, write_table
+from truing.files import HandEyeAnswer, HandEyeData, save_camera, write_table
 from truing.files.common import MOTIONS, frame_dict
+from truing.hand_eye.comparison import comparison
 from truing.hand_eye.page import Scene, handeye_report
 from truing.identification.result import write_robot
 from truing.report.json_text import to_json, without_nan
@@ -43,6 +44,7 @@ class Solved:
     clock: _core.ClockOffset | None = None
     kinematics: _core.HandEyeKinematics | None = None
     seed: int = 0
+    answers: tuple[HandEyeAnswer, ...] = ()
 
 
 # ---- result.json ---------------------------------------------------------------------------------
@@ -99,6 +101,8 @@ def handeye_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
     }
     if r.status == "done":
         found |= _frames(solved)
+        if solved.answers:
+            found["compared"] = _compared(solved)
     found["residuals"] = [_residual(solved, row, residual) for row, residual in enumerate(residuals)]
     found["rejected_poses"] = [
         {"pose": int(data.rows[row]), **_image(data, row), "cause": residual.cause}
@@ -152,6 +156,18 @@ def _frames(solved: Solved) -> dict[str, Any]:
         },
         "working_point": _working_point(solved),
     }
+
+
+def _compared(solved: Solved) -> list[dict[str, Any]]:
+    """Over held-out poses where there are some, else over those that were kept."""
+    r, k, data = solved.result, solved.kinematics, solved.data
+    A, B, as_given = poses_used(solved)
+    residuals = r.residuals if k is None else k.residuals
+    held_out = np.zeros(data.count, bool) if data.poses.set is None else np.asarray(data.poses.set) == 1
+    kept = np.array([not residual.rejected for residual in residuals])
+    rows = held_out if held_out.any() else kept
+    camera = (r if k is None else k).camera
+    return comparison(camera, A, B if as_given else None, rows, solved.options.setup, solved.answers)
 
 
 def _observability(r: _core.HandEyeResult) -> dict[str, Any]:
@@ -357,27 +373,33 @@ def _kinematics(k: _core.HandEyeKinematics) -> dict[str, Any]:
 # ---- What is drawn -------------------------------------------------------------------------------
 
 
-def scene_of(solved: Solved) -> Scene | None:
-    """Where everything is, for the report; None where no camera was found."""
-    data, r = solved.data, solved.result
-    if r.status != "done":
-        return None
+def poses_used(solved: Solved) -> tuple[Floats, Floats, bool]:
+    """T_base_hand and T_camera_board, shape=(n, 4, 4), as they were fitted; False: a reading made something
+    else of the board's poses, which only the core knows.
+    """
+    data, r, both = solved.data, solved.result, solved.kinematics
     A = np.asarray(r.T_base_hand if len(r.T_base_hand) == data.count else data.poses.T_base_hand)
-    both = solved.kinematics
     if both is not None and data.joints is not None:
         A = np.array([_core.forward_kinematics(both.robot, q)[-1] for q in data.joints])
     B = np.array(data.poses.T_camera_board)
     for k, turn in enumerate(r.symmetry):
         if turn:
             B[k] = B[k] @ np.asarray(data.poses.board_symmetries[turn - 1])
+    return A, B, not any(part.startswith("board") for part in solved.options.reading.split("+"))
+
+
+def scene_of(solved: Solved) -> Scene | None:
+    """Where everything is, for the report; None where no camera was found."""
+    data, r, both = solved.data, solved.result, solved.kinematics
+    if r.status != "done":
+        return None
+    A, B, as_given = poses_used(solved)
     X, Y = (
         np.asarray(frame.T) for frame in ((r.camera, r.board) if both is None else (both.camera, both.board))
     )
     ones = np.ones((data.count, 1, 1))
     eye_in_hand = solved.options.setup == "eye-in-hand"
     camera, predicted = (A @ X, ones * Y) if eye_in_hand else (ones * X, A @ Y)
-    # A reading that is about the board's poses: what it makes of them only the core knows.
-    as_given = not any(part.startswith("board") for part in solved.options.reading.split("+"))
     seen = camera @ B if as_given else np.full_like(A, np.nan)
     n = r.noise
     lever = np.linalg.norm((np.linalg.inv(A) @ predicted)[:, :3, 3], axis=1)
@@ -541,6 +563,12 @@ def write_handeye(
         _write_robot(folder, solved, found, nominal_file, base_link, tip_link)
     (folder / "report.html").write_text(handeye_report(found, scene_of(solved)), encoding="utf-8")
     return found
+
+
+def handeye_page(result: _core.HandEyeResult, data: HandEyeData, options: _core.HandEyeOptions) -> str:
+    """The report of ``truing handeye`` without its files."""
+    solved = Solved(data, options, result)
+    return handeye_report(without_nan(handeye_dict(solved)), scene_of(solved))
 
 
 def write_without_clock(

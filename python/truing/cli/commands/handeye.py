@@ -8,7 +8,7 @@ with --plan, robot.yaml with --with-kinematics.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -38,7 +38,7 @@ from truing.cli.tables import AXES, mm, mrad, say, say_first, table
 from truing.errors import InputError
 
 if TYPE_CHECKING:
-    from truing.files import HandEyeData
+    from truing.files import HandEyeAnswer, HandEyeData
     from truing.hand_eye import ClockOffset, HandEyeOptions, NextHandPose
     from truing.hand_eye.result import Solved
     from truing.model import Robot
@@ -80,6 +80,7 @@ class Loaded:
     data: HandEyeData | None  # None: the clocks of hand and camera could not be compared
     clock: ClockOffset | None
     robot: Robot | None
+    answers: tuple[HandEyeAnswer, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,6 +120,14 @@ class Command(run.Command[Loaded, "Solved | None"]):
             " offset of the clocks is found; without they belong together row by row."
         ),
     ] = None
+    compare: Annotated[
+        Sequence[Path],
+        File(
+            "Where another program says that the camera is: result of easy_handeye, MoveIt, OpenCV or truing."
+            " May be repeated.",
+            several=True,
+        ),
+    ] = ()
     working_point: Annotated[
         list[float] | None,
         Point(
@@ -193,10 +202,13 @@ class Command(run.Command[Loaded, "Solved | None"]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> Loaded:
-        from truing.files import load_robot
+        from truing.files import load_robot, read_handeye_answer
+        from truing.hand_eye.comparison import require_setup
         from truing.hand_eye.reading import load_on_one_clock
 
         self._require_sense()
+        answers = tuple(read_handeye_answer(path) for path in self.compare)
+        require_setup(answers, self.setup)
         path = self.with_kinematics
         robot = None if path is None else load_robot(path, self.base_link, self.tip_link)
         if self.board:
@@ -212,7 +224,7 @@ class Command(run.Command[Loaded, "Solved | None"]):
         )
         if robot is not None and data is not None:
             self._require_joints(robot, data)
-        return Loaded(data, clock, robot)
+        return Loaded(data, clock, robot, answers)
 
     def _require_sense(self) -> None:
         """Raises InputError about options that need others."""
@@ -287,7 +299,7 @@ class Command(run.Command[Loaded, "Solved | None"]):
             both = self._kinematics(loaded.robot, data, options)
             if self.plan:
                 following = handeye_plan(data, found, options=options, count=self.plan, seed=self.seed)
-        return Solved(data, options, found, following, loaded.clock, both, self.seed)
+        return Solved(data, options, found, following, loaded.clock, both, self.seed, loaded.answers)
 
     def _kinematics(self, robot: Robot | None, data: HandEyeData, options: HandEyeOptions) -> Any:
         from truing.hand_eye.api import handeye_with_kinematics
@@ -326,6 +338,7 @@ class Command(run.Command[Loaded, "Solved | None"]):
         if result["status"] == "done":
             print_camera(result)
             print_errors(result)
+            print_comparison(result)
             if "clock" in result:
                 say(f"clocks: t_hand = t_camera {result['clock']['offset_s']:+.4f} s")
         else:
@@ -366,6 +379,19 @@ def print_camera(result: Mapping[str, Any]) -> None:
         f"at the working point, {point['in_camera_m'][2] * 1e3:.0f} mm in front of it: +-"
         f" {mm(point['sigma_m'])}, +- {mrad(point['rotation_sigma_rad'])} per axis (1 sigma)"
     )
+
+
+def print_comparison(result: Mapping[str, Any]) -> None:
+    """Beside the answers of other programs."""
+    for other in result.get("compared", ()):
+        away = f"{mm(other['position_m'])}, {mrad(other['rotation_rad'])} from ours"
+        line = f"{other['file']} ({other['tool']}): {away}"
+        if other["largest_sigmas"] is not None:
+            line += f", at most {other['largest_sigmas']:.2g} sigma in a component"
+        if other["closure"] is not None:
+            theirs, ours = (mm(other[name]["rms_m"]) for name in ("closure", "closure_of_ours"))
+            line += f"; the loop closes to {theirs}, with ours to {ours} ({other['poses']} poses)"
+        say(line + (f". {other['remark'].capitalize()}" if other["remark"] else ""))
 
 
 def print_errors(result: Mapping[str, Any]) -> None:
