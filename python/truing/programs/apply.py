@@ -42,6 +42,16 @@ _LENGTH_DECIMALS: Mapping[Brand, int] = {"kuka": 3, "abb": 3, "fanuc": 3, "ur": 
 _ANGLE_DECIMALS: Mapping[Brand, int] = {"kuka": 4, "abb": 7, "fanuc": 3, "ur": 6, "yaskawa": 2}
 _JOINT_DECIMALS: Mapping[Brand, int] = {"kuka": 4, "abb": 4, "fanuc": 3, "ur": 6, "yaskawa": 0}
 _TOLERANCE = 1e-9  # [m], [rad] of the solver: far below what a program prints
+_MOST_TURN = math.radians(10.0)  # of a joint by a correction: zeros are not so far off
+_OF_POSES = (
+    0,
+    1,
+    2,
+    4,
+)  # joints that a pose must not turn so far; 4 and 6 may share a turn where they line up
+_SAME_JOINT = 1e-6  # [rad] nearer to where it was a joint comes from no side
+_AT_LIMIT = 1e-9  # [rad] by which rounding may put a joint beyond its limit
+_STRAIGHT = 1e-9  # of the longest side squared: three points with less area between them stand in a line
 _SAME_ARC = (0.01, math.radians(1.0))  # relative change of an arc's radius, turn of its plane
 
 
@@ -201,7 +211,7 @@ class _Robots:
             choices = []
             for angle, (lower, upper) in zip(solution.joints, self.limits, strict=True):
                 turns = [angle + 2 * math.pi * k for k in (-1, 0, 1)]
-                inside = [turn for turn in turns if lower - 1e-9 <= turn <= upper + 1e-9]
+                inside = [turn for turn in turns if lower - _AT_LIMIT <= turn <= upper + _AT_LIMIT]
                 bounded = math.isfinite(lower) and math.isfinite(upper)
                 choices.append(inside if bounded else [angle])
             found += [np.array(way) for way in itertools.product(*choices)]
@@ -264,7 +274,7 @@ class _Program:
         direction = np.zeros(JOINTS, dtype=int)
         if self.previous is not None:
             way = start.joints - self.previous
-            direction = np.where(np.abs(way) > 1e-6, np.sign(way), 0).astype(int)
+            direction = np.where(np.abs(way) > _SAME_JOINT, np.sign(way), 0).astype(int)
         self.previous, self.previous_name = start.joints, f"line {target.line}"
         base = Applied(
             path,
@@ -347,6 +357,9 @@ class _Program:
             reason = robots.real.describe(made.solution)
             raise InputError(f"{self._where(target)} is out of reach after compensation: {reason}")
         joints = np.asarray(made.solution.joints)
+        why = _turned_far(start.joints, joints, range(JOINTS) if target.kind == "joints" else _OF_POSES)
+        if why:
+            raise _Stays(why)
         # Whoever has the nominal robot's joints has its pose; there the last digits are the controller's own.
         command = robots.nominal.forward(joints, conditions) @ tool
         texts = self._texts(target, joints, command)
@@ -430,6 +443,18 @@ class _Program:
         return applied
 
 
+def _turned_far(start: Floats, joints: Floats, of: Sequence[int]) -> str:
+    """Why joints are no correction of those at the start; "" if they are."""
+    turned = np.abs(joints - start)
+    worst = max(of, key=lambda joint: float(turned[joint]))
+    if turned[worst] <= _MOST_TURN:
+        return ""
+    return (
+        f"the correction would turn joint {worst + 1} by {math.degrees(turned[worst]):.1f} deg: the target"
+        " stands at the limit of a joint, or where axes line up"
+    )
+
+
 def _changed_arc(start: Applied | None, middle: Applied, end: Applied | None) -> str:
     """Why the arc through three points would be another one; "" if it stays."""
     if start is None or end is None:
@@ -456,7 +481,7 @@ def _arc(points: Sequence[Floats]) -> tuple[float, Floats]:
     normal = np.cross(b - a, c - a)
     area = float(np.linalg.norm(normal))
     sides = [float(np.linalg.norm(v)) for v in (b - a, c - b, a - c)]
-    if area <= 1e-9 * max(sides) ** 2:
+    if area <= _STRAIGHT * max(sides) ** 2:
         return math.inf, np.array([0.0, 0.0, 1.0])
     return math.prod(sides) / (2 * area), normal / area
 

@@ -30,6 +30,7 @@ Floats = NDArray[np.float64]
 Forward = Callable[[Floats], Floats]  # joints [rad] to the flange in the base, shape=(4, 4) [m]
 
 _MEET = 1e-3  # [m] axes 4, 5, 6 of a nominal robot that miss each other by more do not meet
+_PARALLEL = 1e-12  # added to a sum of projections, so that parallel lines have a nearest point too
 _EDGE = 2e-5  # [rad] or [m] nearer to a limit between two counts either is right: printed digits
 
 
@@ -74,7 +75,7 @@ def _meeting_point(axes: list[tuple[Floats, Floats]]) -> tuple[Floats, float]:
     points = np.array([point for _, point in axes])
     right = np.einsum("kij,kj->i", across, points)
     # Of parallel lines one of many points.
-    centre: Floats = np.linalg.solve(across.sum(axis=0) + 1e-12 * np.eye(3), right)
+    centre: Floats = np.linalg.solve(across.sum(axis=0) + _PARALLEL * np.eye(3), right)
     misses = np.einsum("kij,kj->ki", across, centre - points)
     return centre, float(np.linalg.norm(misses, axis=1).max())
 

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truing.report.charts import AFTER, BEFORE, INK, REJECTED, distribution_chart, faded
+from truing.report.charts import AFTER, BEFORE, INK, REJECTED, distribution_chart
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
-from truing.report.scene import Scene3d, polyline
+from truing.report.scene import Scene3d
 from truing.report.words import angle_text, counted, escaped, length_text
 
 Floats = NDArray[np.float64]
@@ -114,31 +114,23 @@ def _map(page: Page, drawing: Drawing) -> None:
     page.add('<section class="card"><h2>Where, and which way</h2>')
     plot = Scene3d()
     for robot in drawing.robots:
-        plot.add_line(robot, "robot", faded(INK, 0.6), 6, 2)
+        plot.add_line(robot, "robot", INK, 5, opacity=0.6)
     moves = drawing.commands - drawing.places
     longest = float(np.nanmax(np.linalg.norm(moves, axis=1), initial=0.0)) if len(moves) else 0.0
     factor = _DRAWN / longest if longest > 0 else 1.0
-    arrows = [
-        np.array([p, p + factor * m])
-        for p, m in zip(drawing.places, moves, strict=True)
-        if np.isfinite(m).all()
-    ]
-    if arrows:
-        plot.add_line(polyline(arrows), "correction", AFTER, 4, 1.5)
+    if len(moves):
+        plot.add_arrows(drawing.places, factor * moves, "correction", AFTER, 2)
     if len(drawing.places) > 1:
-        plot.add_line(drawing.places, "order of the moves", faded(INK, 0.25), 2, 1)
+        plot.add_line(drawing.places, "order of the moves", INK, 1.5, opacity=0.25)
     for chosen, name, colour in (
         (drawing.changed, "changed", AFTER),
         (~drawing.changed, "as it was", REJECTED),
     ):
         rows = np.flatnonzero(chosen)
         if rows.size:
-            hover = {
-                "text": [escaped(drawing.texts[k]) for k in rows],
-                "hovertemplate": "%{text}<extra></extra>",
-            }
-            plot.add_points(drawing.places[rows], name, {"size": 3.5, "color": colour}, hover, 6.0)
-    plot.draw(page, eye=(1.7, -1.7, 0.9), center=0.0, size="cloud map")
+            texts = [drawing.texts[k] for k in rows]
+            plot.add_points(drawing.places[rows], name, 3.5, colour, texts=texts)
+    plot.draw(page, eye=(1.7, -1.7, 0.9), size="cloud map")
     page.add(
         f'<p class="legend"><i class="dot" style="background:{AFTER}"></i>changed'
         f' <i class="dot" style="background:{REJECTED}"></i>as it was</p>'

@@ -32,6 +32,8 @@ from truing.files.brand_frames import NOTATIONS, Brand, numbers_from_frame
 Floats = NDArray[np.float64]
 BRANDS: tuple[Brand, ...] = ("kuka", "abb", "fanuc", "ur", "yaskawa")
 _LONGEST_NAME = 20
+_UR_JOINT = 1.4  # [rad/s^2] acceleration of movej, PolyScope's own
+_UR_LINE = 1.2  # [m/s^2] of movel
 
 
 @dataclass(frozen=True)
@@ -319,9 +321,9 @@ def _ur(program: Program) -> dict[str, str]:
     def move(one: Move) -> list[str]:
         target = f"pose_{_krl(one.target)}"
         text = {
-            "joint": f"movej({target}, a=1.4, v={math.pi * program.percent / 100:.6g})",
-            "line": f"movel({target}, a=1.2, v={program.speed:.6g})",
-            "arc": f"movec(pose_{_krl(one.via)}, {target}, a=1.2, v={program.speed:.6g}, mode=1)",
+            "joint": f"movej({target}, a={_UR_JOINT}, v={math.pi * program.percent / 100:.6g})",
+            "line": f"movel({target}, a={_UR_LINE}, v={program.speed:.6g})",
+            "arc": f"movec(pose_{_krl(one.via)}, {target}, a={_UR_LINE}, v={program.speed:.6g}, mode=1)",
         }[one.kind]
         return [text, *([f"sleep({one.dwell:g})"] if one.dwell else [])]
 
@@ -336,7 +338,7 @@ def _ur(program: Program) -> dict[str, str]:
         f"def {program.name}():",
         f"  set_tcp({pose(program.tool)})",
         *(f"  pose_{_krl(name)} = {pose(program.targets[name])}" for name in _used(program)),
-        f"  movej([{start}], a=1.4, v=0.5)",
+        f"  movej([{start}], a={_UR_JOINT}, v=0.5)",
         *(f"  {line}" for line in _Language(move, opening, closing).lines(program.body)),
         "end",
         f"{program.name}()",

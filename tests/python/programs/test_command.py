@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import truing
-from program_corpus import CORPUS, options
+from program_corpus import CORPUS, applied, options
 from program_robots import built, nominal
 from truing import InputError
 from truing.cli.app import main
@@ -91,3 +91,22 @@ def test_a_limit_that_the_correction_would_pass_is_out_of_reach(tmp_path: Path) 
     path.write_text(text.replace("   3:L P[2]", "   3:!").replace("   4:L P[3", "   4:!"), encoding="latin-1")
     with pytest.raises(InputError, match="out of reach after compensation: J2 would have to go"):
         apply_programs([path], believed, real, options("fanuc"))
+
+
+@pytest.mark.parametrize(
+    ("joints", "joint"), [("170,10,0,0,30,0", 1), ("0,0,0,0,0,0", 4), ("0,0,0,0,0.01,0", 4)]
+)
+def test_a_joint_target_never_comes_out_in_another_configuration(
+    tmp_path: Path, joints: str, joint: int
+) -> None:
+    """At the limit of J1 the arm would turn over, where a wrist is in line J4 and J6 against each other."""
+    text = (
+        "MODULE M\nPROC a()\nMoveAbsJ [[{}],[9E9,9E9,9E9,9E9,9E9,9E9]],v5,fine,tool0;\nENDPROC\nENDMODULE\n"
+    )
+    (tmp_path / "a.mod").write_text(text.format(joints), encoding="ascii")
+    (found,) = applied(tmp_path / "a.mod").targets
+    assert found.status == "stayed"
+    assert found.why.startswith(f"the correction would turn joint {joint} by ")
+    (tmp_path / "a.mod").write_text(text.format("160,10,0,0,30,0"), encoding="ascii")
+    (found,) = applied(tmp_path / "a.mod").targets
+    assert found.status == "changed"

@@ -114,3 +114,38 @@ def test_one_bad_program_does_not_keep_others_from_being_written(tmp_path: Path)
 def test_a_mark_of_utf_8_is_no_part_of_a_program(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(b"\xef\xbb\xbf" + (CORPUS / name).read_bytes())
     assert rows(applied(tmp_path / name)) == expected(name)
+
+
+ARC = """/PROG  A
+/MN
+   1:J P[1] 100% FINE    ;
+{moves}
+/POS
+{points}/END
+"""
+POINT = """P[{k}]{{
+   GP1:
+	UF : 0, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X = {x:.3f} mm, Y = {y:.3f} mm, Z = 800.000 mm,
+	W = 180.000 deg, P = -30.000 deg, R = 0.000 deg
+}};
+"""
+
+
+def arc_moves(folder: Path, rise: float) -> list[str]:
+    """What becomes of four points of moves A on an arc that rises so far [mm] above 400 mm of way."""
+    points = [(900.0 - up, y) for y, up in ((-200.0, 0.0), (-80.0, rise), (80.0, rise), (200.0, 0.0))]
+    text = ARC.format(
+        moves="\n".join(f"   {k + 1}:A P[{k}] 100mm/sec FINE    ;" for k in range(1, 5)),
+        points="".join(POINT.format(k=k, x=x, y=y) for k, (x, y) in enumerate(points, 1)),
+    )
+    (folder / "a.ls").write_text(text, encoding="ascii")
+    return [f"{one.status} {one.why}".strip() for one in applied(folder / "a.ls").targets]
+
+
+def test_a_fanuc_arc_of_moves_a_keeps_its_radius_and_plane(tmp_path: Path) -> None:
+    assert arc_moves(tmp_path, 150.0) == ["changed"] * 4
+    first, second, third, last = arc_moves(tmp_path, 1.0)
+    assert (first, last) == ("changed", "changed")  # they are in the middle of none
+    assert second.startswith("stayed a point on an arc, whose ")
+    assert third == "stayed a point on an arc whose start or end stays as it is"

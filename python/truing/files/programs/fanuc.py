@@ -3,7 +3,7 @@
 """FANUC teach pendant programs as text: .ls.
 
 Targets are the blocks P[n]{...} below /POS; each says its user frame (UF), tool (UT) and configuration, and
-holds X Y Z W P R or J1 to J6 of group 1. Moves are the lines J, L, C and A below /MN.
+holds X Y Z W P R or J1 to J6 of group 1. Moves are the lines J, L, C and A below /MN; three A make an arc.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from truing.errors import InputError
-from truing.files.programs.model import NOWHERE, Configuration, Given, Place, Reading, Target, Via
+from truing.files.programs.model import NOWHERE, Configuration, Found, Given, Place, Reading, Target
 from truing.files.programs.text import NUMBER, Number, Source
 
 _FLAGS = re.ASCII | re.IGNORECASE
@@ -66,6 +66,7 @@ class _Fanuc:
         self.moves_at = (sections.get("MN", 0), sections.get("POS", len(self.text)))
         self.points_at = (sections.get("POS", len(self.text)), len(self.text))
         self.points: dict[int, _Point] = {}
+        self.on_arc: list[int | None] = []  # points of the moves A before, one after the other
 
     def read_points(self) -> None:
         for match in _BLOCK.finditer(self.text, *self.points_at):
@@ -141,7 +142,16 @@ class _Fanuc:
                 via = word == "C" and k == 0 and len(numbers) == 2
                 use = _Use(offset, word, options, via, previous, numbers[-1] if via else None)
                 self.points[number].uses.append(use)
+        self.on_arc = [*self.on_arc, numbers[-1]] if word == "A" else []
+        if len(self.on_arc) > 2:  # the first A goes straight to where the arc begins
+            self._passed(*self.on_arc[-2:])
         return None if relative else numbers[-1]
+
+    def _passed(self, number: int | None, ends_at: int | None) -> None:
+        """The last use of a point is in the middle of an arc of moves A."""
+        point = self.points.get(number) if number is not None else None
+        if point is not None:
+            point.uses[-1] = replace(point.uses[-1], via=True, ends_at=ends_at)
 
     def _point_number(self, kind: str, text: str) -> int | None:
         text = text.partition(":")[0].strip()
@@ -150,15 +160,14 @@ class _Fanuc:
     # ---- Targets ----
 
     def targets(self) -> None:
-        found: list[tuple[_Point, Target]] = []
+        found: list[Found] = []
         for point in self.points.values():
             target = self._target(point)
             if target is not None:
-                found.append((point, target))
-        found.sort(key=lambda one: one[1].order)
-        index = {point.number: k for k, (point, _) in enumerate(found)}
-        for point, target in found:
-            self.reading.targets.append(_with_via(point, target, index))
+                first = point.uses[0] if point.uses else None
+                ends = (first.previous, first.ends_at) if first is not None and first.via else None
+                found.append(Found(point.number, target, ends))
+        self.reading.take(found)
 
     def _target(self, point: _Point) -> Target | None:
         groups = self._groups(point)
@@ -263,15 +272,6 @@ def _relative(options: str) -> str:
     if not match or match[1].lower() == "skip":
         return ""
     return "an incremental move" if match[1].lower() == "inc" else f"moves with {match[1]}"
-
-
-def _with_via(point: _Point, target: Target, index: dict[int, int]) -> Target:
-    if not point.uses or not point.uses[0].via:
-        return target
-    use = point.uses[0]
-    start = index.get(use.previous) if use.previous is not None else None
-    end = index.get(use.ends_at) if use.ends_at is not None else None
-    return replace(target, via=Via(start, end))
 
 
 def read(sources: Sequence[Source], given: Given) -> Reading:

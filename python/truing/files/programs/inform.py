@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from truing.errors import InputError
-from truing.files.programs.model import NOWHERE, Configuration, Given, Place, Reading, Target, Via
+from truing.files.programs.model import NOWHERE, Configuration, Found, Given, Place, Reading, Target
 from truing.files.programs.text import Number, Source, numbers_of, trimmed
 
 _FLAGS = re.ASCII | re.IGNORECASE
@@ -149,20 +149,20 @@ class _Job:
     # ---- Targets ----
 
     def targets(self) -> None:
-        found: list[tuple[_Position, Target]] = []
+        found: list[Found] = []
         for position in self.positions.values():
             target = self._target(position)
             if target is not None:
-                found.append((position, target))
-        found.sort(key=lambda one: one[1].order)
-        index = {position.number: k for k, (position, _) in enumerate(found)}
-        for position, target in found:
-            if any(use.arc is not None and use.arc % 2 == 1 for use in position.uses):
-                at = self.sequence.index(position.number)
-                ends = [self.sequence[at - 1] if at else None, *self.sequence[at + 1 : at + 2]]
-                start, end = (index.get(n) if n is not None else None for n in [*ends, None][:2])
-                target = replace(target, via=Via(start, end))
-            self.reading.targets.append(target)
+                found.append(Found(position.number, target, self._ends(position)))
+        self.reading.take(found)
+
+    def _ends(self, position: _Position) -> tuple[int | None, int | None] | None:
+        """Of the middle one of an arc's three points its neighbours."""
+        if not any(use.arc is not None and use.arc % 2 == 1 for use in position.uses):
+            return None
+        at = self.sequence.index(position.number)
+        after = self.sequence[at + 1] if at + 1 < len(self.sequence) else None
+        return self.sequence[at - 1] if at else None, after
 
     def _target(self, position: _Position) -> Target | None:
         name = f"C{position.number:05d}"

@@ -11,12 +11,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from truing.errors import InputError
 from truing.files.brand_frames import frame_from_numbers
-from truing.files.programs.flow import Flow, Places, the_only
-from truing.files.programs.model import NOWHERE, Configuration, Given, Place, Reading, Target, Via
+from truing.files.programs.flow import Effects, Flow, Places, in_passes, the_only
+from truing.files.programs.model import (
+    NOWHERE,
+    Configuration,
+    Found,
+    Given,
+    Place,
+    Reading,
+    Target,
+    why_not_one,
+)
 from truing.files.programs.text import Number, Source, blanked, closing, number_at, pieces, trimmed
 
 _FRAME = ("X", "Y", "Z", "A", "B", "C")
@@ -30,20 +39,24 @@ _DECLARED = re.compile(
     _FLAGS | re.MULTILINE,
 )
 _ELEMENT = re.compile(
-    r"^[ \t]*((?:TOOL|BASE)_DATA\[[ \t]*\d+[ \t]*\])[ \t]*=[ \t]*(?=\{)", _FLAGS | re.MULTILINE
+    r"^[ \t]*((?:TOOL|BASE)_DATA\[[ \t]*\d+[ \t]*\])[ \t]*((?:\.[ \t]*\w+[ \t]*)?)=(?!=)[ \t]*",
+    _FLAGS | re.MULTILINE,
 )
 _STATEMENT = re.compile(r"[^\r\n]+")
 _MOVE = re.compile(r"(S?PTP|S?LIN|S?CIRC|SPL|ASYPTP|SPLINE)(_REL)?(?![\w$=])[ \t]*", _FLAGS)
+_PART_SET = re.compile(r"\$(TOOL|BASE)[ \t]*\.[ \t]*\w+[ \t]*=(?!=)", _FLAGS)
 _SET = re.compile(r"\$(TOOL|BASE)[ \t]*=(?!=)[ \t]*(.*?)[ \t]*$", _FLAGS)
 _BAS = re.compile(r"BAS[ \t]*\([ \t]*#(TOOL|BASE)[ \t]*,[ \t]*(.*?)[ \t]*\)[ \t]*$", _FLAGS)
 _FDAT = re.compile(r"FDAT_ACT[ \t]*=(?!=)[ \t]*", _FLAGS)
 _WITH = re.compile(r"\$(TOOL|BASE)[ \t]*=[ \t]*(STOOL2?|SBASE)?[ \t]*", _FLAGS)
 _ASSIGNED = re.compile(r"^[ \t]*([A-Za-z_]\w*)(?:\.\w+|\[[^\]\r\n]*\])*[ \t]*=(?!=)", _FLAGS | re.MULTILINE)
-_OPENS = re.compile(r"(IF|SWITCH|WHILE|FOR|LOOP|REPEAT)(?!\w)", _FLAGS)
-_BRANCHES = re.compile(r"(ELSE|CASE|DEFAULT)(?!\w)", _FLAGS)
+_OPENS = re.compile(r"(?:IF|SWITCH|(WHILE|FOR|LOOP|REPEAT))(?!\w)", _FLAGS)
+_BRANCHES = re.compile(r"(?:(ELSE|DEFAULT)|CASE)(?!\w)", _FLAGS)
 _CLOSES = re.compile(r"(ENDIF|ENDSWITCH|ENDWHILE|ENDFOR|ENDLOOP|UNTIL)(?!\w)", _FLAGS)
 _ROUTINE = re.compile(r"(?:GLOBAL[ \t]+)?DEF(FCT)?(?!\w)", _FLAGS)
 _ROUTINE_ENDS = re.compile(r"END(FCT)?[ \t]*$", _FLAGS)
+_CALL = re.compile(r"([A-Za-z_]\w*)[ \t]*(?=\()", _FLAGS)
+_LABEL = re.compile(r"[A-Za-z_]\w*[ \t]*:", _FLAGS)
 
 
 @dataclass(frozen=True)
@@ -95,6 +108,9 @@ class _Use:
     previous: object = None  # what the move starts at: a _Name, an _Aggregate, or None
     ends_at: object = None  # of a point on an arc: what the arc ends at
 
+    def ends(self) -> tuple[int, int] | None:
+        return (id(self.previous), id(self.ends_at)) if self.via else None
+
 
 def aggregate_at(text: str, start: int) -> _Aggregate | None:
     """The aggregate that begins with the brace at `start`."""
@@ -126,7 +142,8 @@ class _Krl:
         self.given = given
         self.code = [blanked(source.text, _NO_CODE) for source in reading.sources]
         self.names: dict[str, _Name] = {}
-        self.elements: dict[str, _Aggregate] = {}  # TOOL_DATA[1]
+        self.elements: dict[str, Place] = {}  # TOOL_DATA[1]
+        self.elsewhere: dict[str, None] = {}  # routines that are called and not in the files given
         self.assigned: dict[str, str] = {}  # name: where it is assigned first
         self.inline: list[tuple[_Aggregate, _Use]] = []
         self.mentions: set[tuple[int, int]] = set()  # offsets of names that moves use
@@ -149,11 +166,19 @@ class _Krl:
                     continue
                 self.names[name] = _Name(source, match[2], match[1].upper(), found)
             for match in _ELEMENT.finditer(code):
-                found = aggregate_at(code, match.end())
-                if found is not None:
-                    self.elements["".join(match[1].upper().split())] = found
+                whole = code.startswith("{", match.end()) and not match[2]
+                found = aggregate_at(code, match.end()) if whole else None
+                self._element("".join(match[1].upper().split()), found, self._at(source, match.start()))
             for match in _ASSIGNED.finditer(code):
                 self.assigned.setdefault(match[1].upper(), self._at(source, match.start(1)))
+
+    def _element(self, name: str, found: _Aggregate | None, where: str) -> None:
+        """TOOL_DATA[1] = {...}; found: None where it is no literal."""
+        place = None if found is None or not found.has(_FRAME) else self._literal(found, name)
+        place = place or Place(None, name, f"{name} is set to what is no literal in {where}")
+        before = self.elements.setdefault(name, place)
+        if before is not place and not before.is_like(place):
+            self.elements[name] = Place(None, name, f"{name} is set to something else in {where}")
 
     def _at(self, source: int, offset: int) -> str:
         found = self.reading.sources[source]
@@ -166,9 +191,8 @@ class _Krl:
         if number == 0:
             return NOWHERE
         found = self.elements.get(f"{kind}_DATA[{number}]")
-        if found is not None and found.has(_FRAME):
-            return self._literal(found, f"{kind}_DATA[{number}]")
-        return self.given.tool(str(number)) if kind == "TOOL" else self.given.frame(str(number))
+        given = self.given.tool(str(number)) if kind == "TOOL" else self.given.frame(str(number))
+        return given if found is None or (found.T is None and given.T is not None) else found
 
     def _literal(self, found: _Aggregate, name: str) -> Place:
         return Place(frame_from_numbers("kuka", [number.value for number in found.all_of(_FRAME)]), name)
@@ -221,11 +245,17 @@ class _Krl:
     def statements(self, source: int) -> None:
         code = self.code[source]
         unset = Places(self.given.tool(""), self.given.frame(""))
-        flow = Flow(unset, self._always(source, unset))
-        for match in _STATEMENT.finditer(code):
-            start, end = trimmed(code, match.start(), match.end())
-            if start < end and not _DECLARED.match(code, match.start()):
-                self._statement(source, start, end, flow)
+        always = self._always(source, unset)
+
+        def read(before: Effects, *, moves: bool = False) -> Effects:
+            flow = Flow(unset, always, before)
+            for match in _STATEMENT.finditer(code):
+                start, end = trimmed(code, match.start(), match.end())
+                if start < end and not _DECLARED.match(code, match.start()):
+                    self._statement(source, start, end, flow, moves=moves)
+            return flow.found
+
+        read(in_passes(read), moves=True)
 
     def _always(self, source: int, unset: Places) -> Places:
         """What is set all over the file: routines that others call begin with it."""
@@ -241,23 +271,36 @@ class _Krl:
                 frames.append(flow.now.frame)
         return Places(the_only(tools, unset.tool, "tool"), the_only(frames, unset.frame, "frame"))
 
-    def _statement(self, source: int, start: int, end: int, flow: Flow) -> None:
+    def _statement(self, source: int, start: int, end: int, flow: Flow, *, moves: bool) -> None:
+        """moves: take the targets; else only follow tool and base."""
         code = self.code[source]
         if _ROUTINE.match(code, start, end):
-            flow.begin_routine()
+            named = re.search(r"(\w+)[ \t]*\(", code[start:end], re.ASCII)
+            flow.begin_routine(named[1].upper() if named else "")
             self.previous = None
         elif _ROUTINE_ENDS.fullmatch(code, start, end):
             flow.end_routine()
-        elif _OPENS.match(code, start, end):
-            flow.open(self.reading.sources[source].line(start))
-        elif _BRANCHES.match(code, start, end):
-            flow.otherwise()
+        elif opens := _OPENS.match(code, start, end):
+            flow.open(self.reading.sources[source].line(start), loops=opens[1] is not None)
+        elif branches := _BRANCHES.match(code, start, end):
+            flow.otherwise(last=branches[1] is not None)
         elif _CLOSES.match(code, start, end):
             flow.close()
+        elif _LABEL.fullmatch(code, start, end):
+            flow.label()
         elif not self._set_places(source, start, end, flow):
             move = _MOVE.match(code, start, end)
-            if move and move[1].upper() != "SPLINE":
+            if move is None:
+                self._call(code, start, end, flow, moves=moves)
+            elif moves and move[1].upper() != "SPLINE":
                 self._move(source, move, start, end, flow.now)
+
+    def _call(self, code: str, start: int, end: int, flow: Flow, *, moves: bool) -> None:
+        call = _CALL.match(code, start, end)
+        if call is None or closing(code, call.end()) != end - 1 or call[1].upper() == "BAS":
+            return
+        if not flow.call(call[1].upper()) and moves:
+            self.elsewhere.setdefault(call[1].upper())
 
     def _set_places(self, source: int, start: int, end: int, flow: Flow) -> bool:
         code = self.code[source]
@@ -279,6 +322,10 @@ class _Krl:
             )
             flow.set_tool(places.tool if places else unknown)
             flow.set_frame(places.frame if places else unknown)
+        elif found := _PART_SET.match(code, start, end):
+            line = self.reading.sources[source].line(start)
+            place = Place(None, "", f"a part of ${found[1].upper()} is set in line {line}")
+            (flow.set_tool if found[1].upper() == "TOOL" else flow.set_frame)(place)
         else:
             return False
         return True
@@ -358,28 +405,18 @@ class _Krl:
     # ---- Targets ----
 
     def targets(self) -> None:
-        owners: list[tuple[object, Target]] = []
+        found: list[Found] = []
         for what, use in self.inline:
             shown = self._shown(use.source, what.start, what.end)
             target = self._target(what, use.source, shown, [use])
             if target is not None:
-                owners.append((what, target))
+                found.append(Found(id(what), target, use.ends()))
         for name in self.names.values():
             if name.type not in ("FDAT", "FRAME") or name.uses:
                 target = self._named(name)
                 if target is not None:
-                    owners.append((name, target))
-        owners.sort(key=lambda owner: owner[1].order)
-        index = {id(owner): k for k, (owner, _) in enumerate(owners)}
-        for owner, target in owners:
-            use = owner.uses[0] if isinstance(owner, _Name) else self._use_of(owner)
-            if use.via:
-                via = Via(index.get(id(use.previous)), index.get(id(use.ends_at)))
-                target = replace(target, via=via)
-            self.reading.targets.append(target)
-
-    def _use_of(self, what: object) -> _Use:
-        return next(use for found, use in self.inline if found is what)
+                    found.append(Found(id(name), target, name.uses[0].ends()))
+        self.reading.take(found)
 
     def _named(self, name: _Name) -> Target | None:
         reading = self.reading
@@ -450,14 +487,8 @@ class _Krl:
         active = [name for name in _EXTERNAL if (n := what.values.get(name)) is not None and n.value != 0]
         if active:
             return f"external axis {', '.join(active)} is not at 0 and may move robot or workpiece"
-        tools, frames = [use.places.tool for use in uses], [use.places.frame for use in uses]
-        for places, word in ((tools, "tool"), (frames, "base")):
-            unknown = next((place for place in places if place.T is None), None)
-            if unknown is not None and not unknown.undefined:
-                return unknown.why
-            if unknown is None and not all(place.is_like(places[0]) for place in places):
-                return f"moves use it with more than one {word}"
-        return ""
+        why = why_not_one([use.places.tool for use in uses], "tool")
+        return why or why_not_one([use.places.frame for use in uses], "base")
 
     def _configuration(self, what: _Aggregate) -> Configuration | None:
         status, turn = what.integer("S"), what.integer("T")
@@ -502,4 +533,9 @@ def read(sources: Sequence[Source], given: Given) -> Reading:
     for k in programs:
         krl.statements(k)
     krl.targets()
+    if krl.elsewhere:
+        reading.notes.append(
+            f"{sources[0].path.name}: {', '.join(krl.elsewhere)}, called and not in the files given, are"
+            " taken to leave tool and base as they are"
+        )
     return reading

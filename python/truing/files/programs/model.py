@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -33,6 +33,18 @@ class Place:
     def or_flange(self) -> Place:
         """For joints, which need no tool: where errors are told, if the tool is known."""
         return NOWHERE if self.T is None else self
+
+
+def why_not_one(places: Sequence[Place], word: str) -> str:
+    """Why a target that moves use with these tools, or frames, is not meant by one of them; "" if it is, or
+    an option has yet to say what it is.
+    """
+    unknown = next((place for place in places if place.T is None), None)
+    if unknown is not None:
+        return "" if unknown.undefined else unknown.why
+    return (
+        "" if all(place.is_like(places[0]) for place in places) else f"moves use it with more than one {word}"
+    )
 
 
 NOWHERE = Place(np.eye(4))  # the flange as a tool, the robot base as a frame
@@ -78,6 +90,17 @@ class Target:
     seed: tuple[float, ...] | None = None  # [rad] joints near which the solution is meant
     via: Via | None = None
     notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Found:
+    """A target as a reader comes to it. key: what it is known by. ends: of a point that an arc passes, keys
+    of what the arc starts and ends at.
+    """
+
+    key: Hashable
+    target: Target
+    ends: tuple[Hashable, Hashable] | None = None
 
 
 @dataclass(frozen=True)
@@ -133,6 +156,14 @@ class Reading:
     def own(self) -> list[Source]:
         """The files that make up the program."""
         return [source for k, source in enumerate(self.sources) if k not in self.others]
+
+    def take(self, found: Sequence[Found]) -> None:
+        """Adds targets in the order in which moves first use them, points of arcs with their ends."""
+        ordered = sorted(found, key=lambda one: one.target.order)
+        index = {one.key: k for k, one in enumerate(ordered)}
+        for one in ordered:
+            ends = None if one.ends is None else Via(*(index.get(key) for key in one.ends))
+            self.targets.append(one.target if ends is None else replace(one.target, via=ends))
 
     def stay(self, source: int, offset: int, what: str, why: str) -> None:
         self.stays.append(Stay(source, self.sources[source].line(offset), what, why))

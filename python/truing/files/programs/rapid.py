@@ -11,11 +11,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from truing.errors import InputError
 from truing.files.brand_frames import frame_from_numbers
-from truing.files.programs.model import NOWHERE, Configuration, Floats, Given, Place, Reading, Target, Via
+from truing.files.programs.model import (
+    NOWHERE,
+    Configuration,
+    Floats,
+    Found,
+    Given,
+    Place,
+    Reading,
+    Target,
+    why_not_one,
+)
 from truing.files.programs.text import Number, Source, blanked, closing, numbers_of, pieces, trimmed
 
 _FLAGS = re.ASCII | re.IGNORECASE
@@ -53,6 +63,9 @@ class _Use:
     via: bool = False
     previous: object = None
     ends_at: object = None
+
+    def ends(self) -> tuple[int, int] | None:
+        return (id(self.previous), id(self.ends_at)) if self.via else None
 
 
 @dataclass
@@ -272,20 +285,13 @@ class _Rapid:
 
     def targets(self) -> None:
         values = [*self.inline, *(value for names in self.names for value in names.values())]
-        owners: list[tuple[_Value, Target]] = []
+        found: list[Found] = []
         for value in values:
             if value.type in ("robtarget", "jointtarget"):
                 target = self._target(value)
                 if target is not None:
-                    owners.append((value, target))
-        owners.sort(key=lambda owner: owner[1].order)
-        index = {id(value): k for k, (value, _) in enumerate(owners)}
-        for value, target in owners:
-            use = value.uses[0]
-            if use.via:
-                via = Via(index.get(id(use.previous)), index.get(id(use.ends_at)))
-                target = replace(target, via=via)
-            self.reading.targets.append(target)
+                    found.append(Found(id(value), target, value.uses[0].ends()))
+        self.reading.take(found)
 
     def _target(self, value: _Value) -> Target | None:
         source = self.reading.sources[value.source]
@@ -335,16 +341,8 @@ class _Rapid:
             return ""
         if any(number.value != 0 for number in numbers.active):
             return "an external axis is not at 0 and may move robot or workpiece"
-        for places, word in (
-            ([use.tool for use in value.uses], "tool"),
-            ([use.frame for use in value.uses], "work object"),
-        ):
-            unknown = next((place for place in places if place.T is None), None)
-            if unknown is not None and not unknown.undefined:
-                return unknown.why
-            if unknown is None and not all(place.is_like(places[0]) for place in places):
-                return f"moves use it with more than one {word}"
-        return ""
+        why = why_not_one([use.tool for use in value.uses], "tool")
+        return why or why_not_one([use.frame for use in value.uses], "work object")
 
     def _numbers(self, value: _Value) -> _Numbers | None:
         code, parts = self.code[value.source], self._parts(value)

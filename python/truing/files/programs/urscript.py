@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from truing.errors import InputError
 from truing.files.brand_frames import frame_from_numbers
-from truing.files.programs.flow import Flow, Places, the_only
-from truing.files.programs.model import NOWHERE, Given, Place, Reading, Target, Via
+from truing.files.programs.flow import Effects, Flow, Places, in_passes, the_only
+from truing.files.programs.model import NOWHERE, Found, Given, Place, Reading, Target, why_not_one
 from truing.files.programs.text import Number, Source, blanked, closing, numbers_of, pieces, trimmed
 
 _FLAGS = re.ASCII
@@ -27,8 +27,9 @@ _ASSIGNED = re.compile(
 )
 _EVENT = re.compile(
     r"(?<![\w.])(?:(?P<move>movej|movel|movep|movec|servoj|servoc|servol|speedj|speedl|set_tcp)[ \t]*(?=\()"
-    r"|(?P<opens>(?:def|thread|sec)(?=[ \t]+\w+[ \t]*\())|(?P<block>(?:if|while|switch|case)\b)"
-    r"|(?P<other>(?:elif|else)\b)|(?P<end>end)\b)",
+    r"|(?:def|thread|sec)[ \t]+(?P<opens>\w+)(?=[ \t]*\()|(?P<block>(?:if|switch|case)\b)"
+    r"|(?P<loop>while\b)|(?P<other>elif\b)|(?P<last>else\b)|(?P<end>end)\b"
+    r"|(?P<call>[A-Za-z_]\w*)[ \t]*(?=\())",
     _FLAGS,
 )
 _MOVES = {"movej": 1, "movel": 1, "movep": 1, "movec": 2}
@@ -55,6 +56,9 @@ class _Use:
     via: bool = False
     previous: object = None
     ends_at: object = None
+
+    def ends(self) -> tuple[int, int] | None:
+        return (id(self.previous), id(self.ends_at)) if self.via else None
 
 
 def _literal(code: str, start: int, end: int) -> tuple[bool, tuple[Number, ...]] | None:
@@ -133,26 +137,37 @@ class _Script:
     # ---- Instructions ----
 
     def instructions(self) -> None:
-        code = self.code
         unset = Places(self.given.tool(""), NOWHERE)
-        flow = Flow(unset, Places(the_only(self._tools_set(), unset.tool, "tool"), NOWHERE))
-        kinds: list[str] = []
-        for match in _EVENT.finditer(code):
-            if match["move"]:
-                end = closing(code, match.end())
-                if end is not None:
-                    self._call(match, end, flow)
-            elif match["opens"]:
-                kinds.append("routine")
-                flow.begin_routine()
-                self.previous = None
-            elif match["block"]:
-                kinds.append("block")
-                flow.open(self.reading.sources[0].line(match.start()))
-            elif match["other"]:
-                flow.otherwise()
-            elif kinds:
-                (flow.end_routine if kinds.pop() == "routine" else flow.close)()
+        always = Places(the_only(self._tools_set(), unset.tool, "tool"), NOWHERE)
+
+        def read(before: Effects, *, moves: bool = False) -> Effects:
+            flow, kinds = Flow(unset, always, before), list[str]()
+            for match in _EVENT.finditer(self.code):
+                self._event(match, flow, kinds, moves=moves)
+            return flow.found
+
+        read(in_passes(read), moves=True)
+
+    def _event(self, match: re.Match[str], flow: Flow, kinds: list[str], *, moves: bool) -> None:
+        """kinds: of the routines and blocks around. moves: take the targets; else only follow the tool."""
+        if match["move"]:
+            end = closing(self.code, match.end())
+            if end is not None and (moves or match["move"] == "set_tcp"):
+                self._call(match, end, flow)
+        elif match["opens"]:
+            kinds.append("routine")
+            flow.begin_routine(match["opens"])
+            self.previous = None
+        elif match["block"] or match["loop"]:
+            kinds.append("block")
+            line = self.reading.sources[0].line(match.start())
+            flow.open(line, loops=match["loop"] is not None)
+        elif match["other"] or match["last"]:
+            flow.otherwise(last=match["last"] is not None)
+        elif match["call"]:
+            flow.call(match["call"])
+        elif kinds:
+            (flow.end_routine if kinds.pop() == "routine" else flow.close)()
 
     def _call(self, match: re.Match[str], end: int, flow: Flow) -> None:
         word, start = match["move"], match.end() + 1
@@ -222,18 +237,12 @@ class _Script:
     # ---- Targets ----
 
     def targets(self) -> None:
-        owners: list[tuple[_Value, Target]] = []
+        found: list[Found] = []
         for value in [*self.inline, *self.names.values()]:
             target = self._target(value)
             if target is not None:
-                owners.append((value, target))
-        owners.sort(key=lambda owner: owner[1].order)
-        index = {id(value): k for k, (value, _) in enumerate(owners)}
-        for value, target in owners:
-            use = value.uses[0]
-            if use.via:
-                target = replace(target, via=Via(index.get(id(use.previous)), index.get(id(use.ends_at))))
-            self.reading.targets.append(target)
+                found.append(Found(id(value), target, value.uses[0].ends()))
+        self.reading.take(found)
 
     def _target(self, value: _Value) -> Target | None:
         if not value.uses:
@@ -266,11 +275,7 @@ class _Script:
             return "is a tool as well as a target"
         if not value.pose:
             return ""
-        tools = [use.tool for use in value.uses]
-        unknown = next((tool for tool in tools if tool.T is None), None)
-        if unknown is not None:
-            return unknown.why
-        return "" if all(tool.is_like(tools[0]) for tool in tools) else "moves use it with more than one tool"
+        return why_not_one([use.tool for use in value.uses], "tool")
 
     def _other_mentions(self, value: _Value) -> None:
         """Where the program computes with a target that is changed."""
