@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Performance of a robot after ISO 9283: what to drive and measure, and what the measurements say."""
 
-from truing.performance.api import (
+from truing.performance.api import assess as assess
+from truing.performance.assessment import (
     Alignment as Alignment,
     Assessment as Assessment,
     NotFound as NotFound,
     Quantity as Quantity,
     WarmUp as WarmUp,
-    assess as assess,
 )
 from truing.performance.drive import (
     DriveOptions as DriveOptions,

@@ -40,6 +40,14 @@ _KNOWN_TAIL = 0.1  # beyond the end as if the place of a maximum were known: it 
 _NORMAL_TENTH = 1.2816  # above it lies a tenth of the normal distribution, as beyond that end
 _STEPS = 26  # of the bisection: the end of an interval to 1e-7 of the bracket
 _LENGTH_DRAWS = 4000
+_LARGEST_SIZE = 1e6  # of the bisection: here the interval is as good as open
+_FEWEST_BLOCKS = 8  # of a warm-up that a curve of five numbers is put through
+_RATES = (
+    3.0,
+    10.0,
+    30.0,
+)  # exponentials of a warm-up's curve: settled after the whole, a third, a tenth of it
+_RANK = 1e-6  # of the largest singular value: curves that short warm-ups cannot tell apart
 
 
 # ---- The three forms ---------------------------------------------------------------------------------------
@@ -72,7 +80,7 @@ def inverted(observed: float, truth: Callable[[float], float], drawn: Callable[[
 def _bisect(below: Callable[[float], bool]) -> float:
     """The size at which `below` ends to be true."""
     low, high = 0.0, 1.0
-    while below(high) and high < 1e6:
+    while below(high) and high < _LARGEST_SIZE:
         low, high = high, 2.0 * high
     for _ in range(_STEPS):
         middle = 0.5 * (low + high)
@@ -258,12 +266,12 @@ def warm_up_curve(time: Floats, values: Floats) -> Floats:
     exponentials through them, zero at the first block, shape=(blocks, k). Fewer than eight blocks stay as
     they are.
     """
-    if len(time) < 8:
+    if len(time) < _FEWEST_BLOCKS:
         return np.asarray(values - values[0])
     passed = (time - time[0]) / max(float(time[-1] - time[0]), 1e-9)
-    curves = [passed, *(1 - np.exp(-passed * rate) for rate in (3.0, 10.0, 30.0))]
+    curves = [passed, *(1 - np.exp(-passed * rate) for rate in _RATES)]
     basis = np.column_stack([np.ones_like(passed), *curves])
-    found = np.linalg.lstsq(basis, values, rcond=1e-6)[0]
+    found = np.linalg.lstsq(basis, values, rcond=_RANK)[0]
     return np.asarray(basis[:, 1:] @ found[1:])
 
 

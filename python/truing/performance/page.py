@@ -290,8 +290,8 @@ def _thermal_words(course: Row) -> str:
     return (
         f"{escaped(course['label'])}, {escaped(course['pose'])}: moved by up to"
         f" {length_text(max(course['travel_m']))}; with the thermal effects of the catalogue compensated,"
-        " each block predicted from others, the farthest block is"
-        f" {length_text(max(course['compensated_m']))} from the mean ({names})"
+        " each block predicted from others, by up to"
+        f" {length_text(max(course['compensated_m']))} ({names})"
     )
 
 
@@ -334,19 +334,19 @@ def performance_plan_report(
     page.add('<section class="card"><h2>The cube, its poses and paths</h2>')
     scene = Scene3d()
     half = 0.5 * cube["edge_m"]
-    scene.add_line(polyline(_edges(centre, half)), "cube", MUTED, 2, 1)
+    scene.add_line(polyline(_edges(centre, half)), "cube", MUTED, 2)
     for path, colour in zip(dict.fromkeys(filter(None, paths)), _COLOURS, strict=False):
         on_path = positions[[one == path for one in paths]]
-        scene.add_line(on_path, path, colour, 5, 2)
+        scene.add_line(on_path, path, colour, 4)
     single = [k for k, path in enumerate(paths) if not path]
     scene.add_points(
         positions[single],
         "poses",
-        {"size": 5, "color": INK},
-        {"text": [names[k] for k in single], "hovertemplate": "%{text}<extra></extra>"},
-        flat_size=7,
+        5.0,
+        INK,
+        texts=[names[k] for k in single],
     )
-    scene.draw(page, eye=(1.2, -1.6, 0.8), center=-0.1, size="cloud")
+    scene.draw(page, eye=(1.2, -1.6, 0.8), size="cloud")
     page.add("</section>")
     page.add(_poses_table(names, paths, positions))
     page.add(warnings_card(result))

@@ -29,6 +29,13 @@ _MOST_TURN = math.radians(150)  # a joint may differ by this from P1's: farther 
 _TIGHTEST = 1e-3  # the edge is found to this share of itself
 _MARGIN = 0.98  # the cube is smaller than the largest one, by this
 _LARGEST_TRIES = 40
+_EDGE_RANGE = (0.05, 1.6)  # of the reach, among which the edge is sought: less is no test, more no cube's
+_BETTER = 1.01  # times the best edge so far: less is not looked for at other places
+_REACHED = 0.98  # of the sampled positions are nearer than what is called the reach
+_HEIGHTS = (0.05, 0.95)  # of the sampled positions are lower than the heights looked at
+_LEVELS = 9  # heights between these, ends not taken
+_AHEAD = (0.3, 0.4, 0.5, 0.6, 0.7)  # of the reach: distances of the cube's centre from the base
+_FEWEST = 3  # cycles, and points of a path: of fewer no standard deviation and no shape is known
 
 
 @dataclass(frozen=True)
@@ -107,8 +114,8 @@ def plan_test(robot: Robot, options: PlanOptions | None = None) -> PerformancePl
 
 
 def _require_sense(options: PlanOptions) -> None:
-    if min(options.cycles, options.path_cycles, options.warm_up_cycles) < 3 or options.path_points < 3:
-        raise InputError("cycles and points of a path: expected 3 or more")
+    if min(options.cycles, options.path_cycles, options.warm_up_cycles, options.path_points) < _FEWEST:
+        raise InputError(f"cycles and points of a path: expected {_FEWEST} or more")
     if not options.speeds or not all(0 < speed <= 100 for speed in options.speeds):
         raise InputError(f"speeds: found {list(options.speeds)}, expected percentages above 0, to 100")
 
@@ -179,15 +186,15 @@ def _tool_rotations(reach: _Reach) -> list[Floats]:
 def _largest_cube(reach: _Reach, options: PlanOptions) -> Cube:
     best: Cube | None = None
     positions = reach.sampled()[:, :3, 3]
-    radius = float(np.quantile(np.linalg.norm(positions, axis=1), 0.98))
+    radius = float(np.quantile(np.linalg.norm(positions, axis=1), _REACHED))
     if options.centre is not None:
         centres = [np.array(options.centre)]
     else:
-        low, high = np.quantile(positions[:, 2], [0.05, 0.95])
+        low, high = np.quantile(positions[:, 2], _HEIGHTS)
         centres = [
             np.array([ahead * radius, 0.0, up])
-            for ahead in (0.3, 0.4, 0.5, 0.6, 0.7)
-            for up in np.linspace(low, high, 9)[1:-1]
+            for ahead in _AHEAD
+            for up in np.linspace(low, high, _LEVELS)[1:-1]
         ]
     for rotation in _tool_rotations(reach):
         for centre in centres:
@@ -219,7 +226,8 @@ def _edge_at(
     wanted = options.edge
     if wanted is not None:
         return wanted if best is None and fits(wanted) else 0.0
-    low, high = (0.05 * radius if best is None else 1.01 * best.edge), 1.6 * radius
+    low, high = radius * _EDGE_RANGE[0], radius * _EDGE_RANGE[1]
+    low = low if best is None else _BETTER * best.edge
     if not fits(low):
         return 0.0
     for _ in range(_LARGEST_TRIES):

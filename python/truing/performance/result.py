@@ -15,7 +15,7 @@ import numpy as np
 from truing import _core
 from truing.errors import InputError
 from truing.files.common import frame_dict, joint_columns, write_table
-from truing.performance.api import USUAL_CYCLES, Assessment, Quantity, WarmUp
+from truing.performance.assessment import USUAL_CYCLES, Assessment, Quantity, WarmUp
 from truing.performance.drive import DriveOptions, performance_programs, program_files
 from truing.performance.page import performance_plan_report, performance_report
 from truing.performance.plan import SHEET, PerformancePlan, sheet_rows

