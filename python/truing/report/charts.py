@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truing.report.arrays import packed as packed, subsample as subsample
 from truing.report.page import Page
 from truing.report.rows import Rows
 from truing.report.words import drawn_of, length_unit
@@ -149,14 +149,6 @@ def faded(colour: str, alpha: float) -> str:
     return f"rgba({red},{green},{blue},{alpha})"
 
 
-def packed(values: Floats | NDArray[np.integer[Any]]) -> dict[str, str]:
-    """plotly.js's own form of a typed array: four bytes a number."""
-    return {
-        "dtype": "f4",
-        "bdata": base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode(),
-    }
-
-
 def points_trace(
     x: Floats | NDArray[np.integer[Any]], y: Floats, colour: str, name: str, size: int, opacity: float = 0.8
 ) -> dict[str, Any]:
@@ -168,12 +160,6 @@ def points_trace(
         "name": name,
         "marker": {"color": colour, "size": size, "opacity": opacity},
     }
-
-
-def subsample(indices: NDArray[np.integer[Any]], limit: int) -> NDArray[np.integer[Any]]:
-    return (
-        indices if indices.size <= limit else indices[np.linspace(0, indices.size - 1, limit).astype(np.intp)]
-    )
 
 
 def round_down(value: float) -> float:

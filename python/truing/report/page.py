@@ -1,15 +1,20 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""An HTML report: one file, with plotly.js inside, that opens without a network.
+"""An HTML report: one file, with its script inside, that opens without a network.
 
 The first screen of a report answers what its reader came to ask. What is below is for finding out why. A
 report is made from the dictionary that is written as ``result.json`` and from tables of rows, so it never
 knows more than what is on disk.
+
+The script (``report.js``, built from ``web/``) draws what the page holds as JSON. Where it does not run,
+tables and static pictures are there already.
 """
 
 from __future__ import annotations
 
 import base64
+import functools
+import gzip
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -17,6 +22,7 @@ from importlib import resources
 from typing import Any
 
 from truing.report.json_text import without_nan
+from truing.report.picture import SIZES, USUAL_SIZE, chart_picture
 from truing.report.words import escaped
 
 
@@ -25,38 +31,59 @@ def part_of_page(room: str, file: str = "page.css") -> str:
     return "\n" + (resources.files("truing") / room / file).read_text(encoding="utf-8")
 
 
+@functools.lru_cache(maxsize=1)
+def _script() -> tuple[str, str]:
+    """The script of every page, compressed (gzip, base64), and its digest."""
+    text = (resources.files("truing") / "report" / "report.js").read_bytes()
+    return base64.b64encode(gzip.compress(text, mtime=0)).decode(), _digest(text)
+
+
+def _digest(text: bytes) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text).digest()).decode()}'"
+
+
 class Page:
-    """Collects markup and charts; charts are drawn by plotly.js once the page is there. `style`: more of it,
-    after the common one.
-    """
+    """Collects markup, charts and 3-D pictures. `style`: more of it, after the common one."""
 
     def __init__(self, title: str, style: str = "") -> None:
         self._title = title
         self._style = part_of_page("report", "page.css") + style
         self._body: list[str] = []
         self._charts: list[dict[str, Any]] = []
+        self._scenes: list[Mapping[str, Any]] = []
 
     def add(self, markup: str) -> None:
         self._body.append(markup)
 
     def chart(self, name: str, data: list[dict[str, Any]], layout: dict[str, Any], size: str) -> None:
-        self._body.append(f'<div class="chart {size}" id="{name}"></div>')
+        """A chart of plotly.js: traces of type scatter, bar or heatmap."""
+        width, height = SIZES.get(size.split()[0], USUAL_SIZE)
+        picture = chart_picture(data, layout, (width, int(layout.get("height", height))))
+        self._body.append(f'<div class="chart {size}" id="{name}">{picture}</div>')
         self._charts.append({"id": name, "data": data, "layout": layout})
 
-    def html(self) -> str:
-        # Late: it is the slowest import of all, and most commands need none.
-        from plotly.offline import get_plotlyjs
+    def scene(self, name: str, spec: Mapping[str, Any], picture: str, size: str) -> None:
+        """A 3-D picture (`report.scene.Scene3d` makes it), and the static one that stands for it."""
+        self._body.append(f'<div class="scene {size}" id="{name}"><div class="picture">{picture}</div></div>')
+        self._scenes.append(spec)
 
-        scripts = [get_plotlyjs(), part_of_page("report", "page.js")]
+    def html(self) -> str:
+        """The whole page."""
+        code, digest = _script()
+        boot = part_of_page("report", "boot.js")
+        policy = _policy((digest, _digest(boot.encode())))
+        data = "".join(
+            f'<script type="application/json" id="{name}">{_json_in_html(value)}</script>\n'
+            for name, value in (("charts", self._charts), ("scenes", self._scenes))
+        )
         return (
             '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport"'
             ' content="width=device-width, initial-scale=1">'
-            f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">'
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
             f"<title>{escaped(self._title)}</title><style>{self._style}</style></head>\n<body><main>\n"
             + "\n".join(self._body)
-            + f'\n</main>\n<script>{scripts[0]}</script>\n<script type="application/json"'
-            f' id="charts">{_json_in_html(self._charts)}</script>\n<script>{scripts[1]}</script>'
-            "\n</body></html>\n"
+            + f'\n</main>\n{data}<script type="text/plain" id="code">{code}</script>\n'
+            f"<script>{boot}</script>\n</body></html>\n"
         )
 
 
@@ -68,16 +95,13 @@ def _json_in_html(value: Any) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _policy(scripts: Sequence[str]) -> str:
+def _policy(digests: Sequence[str]) -> str:
     """What the page may do: run these very scripts, and load nothing. Names in it come from files of others.
 
-    plotly.js compiles its shaders' bindings with Function ("unsafe-eval"), sets styles, and makes its
-    pictures from data and blob addresses.
+    plotly.js sets styles; pictures that are saved from it are data and blob addresses.
     """
-    digests = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts]
-    allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
     return (
-        f"default-src 'none'; script-src {allowed} 'unsafe-eval'; style-src 'unsafe-inline';"
+        f"default-src 'none'; script-src {' '.join(digests)}; style-src 'unsafe-inline';"
         " img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
 

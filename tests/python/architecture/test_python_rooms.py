@@ -19,7 +19,18 @@ PACKAGE = Path(__file__).resolve().parents[3] / "python" / "truing"
 
 # Which rooms a room may import, besides itself. A room is a folder or a single file of the package; "truing"
 # stands for the names of the package itself.
-BASIC = {"_core", "_keywords", "errors", "effects", "keywords", "rotations", "files", "report", "limits"}
+BASIC = {
+    "_core",
+    "_keywords",
+    "errors",
+    "effects",
+    "keywords",
+    "rotations",
+    "files",
+    "report",
+    "limits",
+    "drawing",
+}
 ROOMS: dict[str, set[str]] = {
     "errors": {"_core"},
     "effects": {"_core", "errors"},
@@ -31,6 +42,7 @@ ROOMS: dict[str, set[str]] = {
     "model": {"_core"},
     "examples": set(),
     "report": set(),
+    "drawing": {"_core", "report"},
     "files": {"_core", "errors", "limits", "rotations"},
     "identification": BASIC,
     "planning": BASIC | {"identification"},
@@ -146,7 +158,6 @@ ONLY_IN = {
     "pydantic": {"files"},
     "pydantic_core": {"files"},
     "pyarrow": {"files"},
-    "plotly": {"report"},
     "typer": {"cli"},
     "rich": {"cli"},
     "mujoco": {"exam", "files", "dynamics"},
