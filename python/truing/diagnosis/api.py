@@ -11,6 +11,7 @@ from truing import _core
 from truing._core import Diagnosis, Measurements, Robot
 from truing.effects import Effect, evaluated, own_effects
 from truing.keywords import made, takes
+from truing.report.notebook import shown
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -42,4 +43,5 @@ def diagnose(
     Raises InputError on data or options that cannot be used.
     """
     chosen = made(_core.DiagnoseOptions, options)
-    return _core.diagnose(robot, data, chosen, evaluated(own_effects(effects), robot, data))
+    found = _core.diagnose(robot, data, chosen, evaluated(own_effects(effects), robot, data))
+    return shown(found, "truing.diagnosis.result:diagnosis_page", data)

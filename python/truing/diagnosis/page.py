@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truing.identification.page import workspace
 from truing.report.charts import (
     AFTER,
     BEFORE,
@@ -30,6 +31,7 @@ from truing.report.charts import (
 )
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.rows import Rows
+from truing.report.scene import RobotPicture
 from truing.report.trust import GOOD, LOOK, Check, check_items
 from truing.report.words import counted, escaped, figures_text, length_text, length_unit
 
@@ -59,18 +61,20 @@ _TONES = {
 }
 
 
-def diagnosis_report(result: Mapping[str, Any], rows: Rows) -> str:
+def diagnosis_report(result: Mapping[str, Any], rows: Rows, robot: RobotPicture | None = None) -> str:
     """The report of ``truing diagnose``.
 
     Args:
         result: What ``result.json`` holds (format ``truing-diagnosis/1``).
         rows: Errors of every row before and after; `rejected`: rows that counted for little.
+        robot: The robot and what was found, to be drawn.
     """
     page = Page(f"{result.get('robot') or 'Robot'}: diagnosis", part_of_page("diagnosis"))
     page.add(_headline(result, rows))
     page.add(_sanity(result))
     page.add(_parts(result))
     _where(page, result)
+    _robot(page, rows, robot)
     page.add(_remarks(result))
     for number, effect in enumerate(result["effects"]):
         _effect(page, effect, number)
@@ -227,7 +231,7 @@ def _cause_pieces(result: Mapping[str, Any]) -> list[tuple[float, str, str, str]
     pieces = []
     for number, (effect, share) in enumerate(zip(result["effects"], parts["effects"], strict=True)):
         line = _cause_cells(effect, " ".join(filter(None, (escaped(size_text(effect)), _or(effect)))))
-        pieces.append((share, _colour(number), _name(effect), line))
+        pieces.append((share, colour_of(number), _name(effect), line))
     for unknown, share in zip(result["unknown"], parts["unknown"], strict=True):
         looks = escaped(_angles(unknown["looks_like"])) or f"over {escaped(', '.join(unknown['inputs']))}"
         pieces.append((share, UNKNOWN, f"unknown {_at(unknown['joint'])}", _cause_cells(unknown, looks)))
@@ -344,6 +348,16 @@ def _where(page: Page, result: Mapping[str, Any]) -> None:
     page.add('<div class="column"><section class="card"><h2>Where in the workspace</h2>')
     _workspace(page, where)
     page.add(f"</section>{_not_testable(result) if calm else ''}</div></div>")
+
+
+def _robot(page: Page, rows: Rows, robot: RobotPicture | None) -> None:
+    """The robot with what is wrong, enlarged, and the errors around it."""
+    if robot is None:
+        return
+    head = "What it does to the robot" if robot.scene["causes"] else "The robot, and what is left"
+    page.add(f'<section class="card"><h2>{head}</h2>')
+    workspace(page, rows, robot)
+    page.add("</section>")
 
 
 def _goes_with(page: Page, where: Mapping[str, Any]) -> None:
@@ -505,7 +519,7 @@ def _axis(axis: Sequence[float]) -> str:
 
 # ---- What was found ------------------------------------------------------------------------------
 def _effect(page: Page, effect: Mapping[str, Any], number: int) -> None:
-    colour = _colour(number)
+    colour = colour_of(number)
     page.add(
         f'<section class="card"><h2><i class="dot" style="background:{colour}"></i>{_capital(_name(effect))}'
         f' <span class="muted">{_sure(effect["probability"])}</span></h2>'
@@ -985,7 +999,7 @@ def _candidates(result: Mapping[str, Any]) -> str:
 
 
 # ---- Words ---------------------------------------------------------------------------------------
-def _colour(number: int) -> str:
+def colour_of(number: int) -> str:
     return EFFECT_COLOURS[number % len(EFFECT_COLOURS)]
 
 

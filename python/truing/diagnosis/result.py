@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.diagnosis.page import diagnosis_report
+from truing.diagnosis.page import UNKNOWN, colour_of, diagnosis_report, plain_name
+from truing.drawing import cause, effects_of, robot_picture, without
 from truing.errors import InputError
 from truing.files import write_table
 from truing.files.common import joint_columns
@@ -28,6 +29,7 @@ from truing.identification.result import (
 )
 from truing.report.json_text import to_json, without_nan
 from truing.report.rows import Rows
+from truing.report.scene import RobotPicture
 
 DIAGNOSIS_FORMAT = "truing-diagnosis/1"
 Floats = NDArray[np.float64]
@@ -305,5 +307,62 @@ def write_diagnosis(
     )
     if found.next_poses:
         write_table(folder / "next_poses.csv", next_pose_columns(found))
-    (folder / "report.html").write_text(diagnosis_report(result, rows), encoding="utf-8")
+    page = diagnosis_report(result, rows, diagnosed_picture(found, result, data))
+    (folder / "report.html").write_text(page, encoding="utf-8")
     return result
+
+
+def diagnosis_page(found: _core.Diagnosis, data: _core.Measurements) -> str:
+    """The report of ``truing diagnose`` without its files."""
+    result: dict[str, Any] = without_nan(diagnosis_dict(found))
+    if found.joint_record == "qr":
+        data = with_second_record(found.robot, data)
+    return diagnosis_report(result, diagnosis_rows(found, data), diagnosed_picture(found, result, data))
+
+
+def diagnosed_picture(
+    found: _core.Diagnosis, result: Mapping[str, Any], data: _core.Measurements
+) -> RobotPicture:
+    """The robot without what was named, and each cause that was found, the largest first; all at last."""
+    causes = [_named(number, effect, found.robot) for number, effect in enumerate(result["effects"])]
+    causes += [_unnamed(unknown) for unknown in result["unknown"]]
+    every = {name: value for c in causes for name, value in c["added"].items()}
+    if len(causes) > 1:
+        together = {key: [v for c in causes for v in c[key]] for key in ("joints", "effects", "curves")}
+        causes.append(cause("all that was found", UNKNOWN, added=every, **together))
+    named = {p["name"] for effect in result["effects"] for p in effect["parameters"]}
+    old = [e for e in found.robot.effects if not set(e.parameters) & named]
+    return robot_picture(
+        without(found.robot, every).replace(effects=old),
+        causes=causes,
+        readings=np.asarray(data.joints),
+        payload=None if data.payload is None else np.asarray(data.payload),
+        temperature=None if data.temperature is None else np.asarray(data.temperature),
+    )
+
+
+def _named(number: int, effect: Mapping[str, Any], robot: _core.Robot) -> dict[str, Any]:
+    """An effect that was named: values that it adds to the chain, or a law."""
+    values = {p["name"]: p["value"] - p["nominal"] for p in effect["parameters"] if not p["frozen"]}
+    laws: list[dict[str, Any]] = []
+    if any(name.startswith(effect["effect"]) for name in values):  # else values of the chain itself
+        laws = [a for a in effects_of(robot) if set(a["parameters"]) & set(values)]
+        laws = laws or [{**effect, "parameters": {p["name"]: p["value"] for p in effect["parameters"]}}]
+        laws = [{key: law[key] for key in ("effect", "joints", "parameters")} for law in laws]
+    name = f"{plain_name(effect['effect'])}{_at_joints(effect['joints'])}"
+    return cause(name, colour_of(number), effect["joints"], added={} if laws else values, effects=laws)
+
+
+def _unnamed(unknown: Mapping[str, Any]) -> dict[str, Any]:
+    """What no effect explains: its curves."""
+    joints = [unknown["joint"]] if unknown["joint"] else []
+    keys = ("site", "input", "second")
+    curves = [
+        {**{key: c[key] for key in keys}, "points": [point[:2] for point in c["points"]]}
+        for c in unknown["curves"]
+    ]
+    return cause(f"unknown{_at_joints(joints)}", UNKNOWN, joints, curves=curves)
+
+
+def _at_joints(joints: Sequence[str]) -> str:
+    return f" at {', '.join(joints)}" if joints else ""

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from truing.dynamics.rollout.page import joint_menu, response_card, rollout_card
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, faded, packed
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
+from truing.report.scene import RobotPicture
 from truing.report.words import counted, escaped, figures_text
 
 Floats = NDArray[np.float64]
@@ -66,6 +67,7 @@ def diagnosis_report(
     traces: Sequence[Mapping[str, Any]],
     recordings: int,
     paths: Sequence[Mapping[str, Any]] = (),
+    arm: RobotPicture | None = None,
 ) -> str:
     """The report of ``truing dynamics diagnose``.
 
@@ -75,6 +77,7 @@ def diagnosis_report(
             measured, nominal, standard, named [Nm | N].
         recordings: How many there were.
         paths: Of every joint a held-out stretch of motion (`truing.dynamics.rollout.paths_of`).
+        arm: The same, to be played.
     """
     page = Page(f"{result.get('robot') or 'Robot'}: torques", part_of_page("dynamics"))
     page.add(_headline(result, recordings))
@@ -83,7 +86,7 @@ def diagnosis_report(
     _trace_card(page, traces, worst_first(result))
     _error_card(page, result)
     page.add("</div>")
-    rollout_card(page, result, paths)
+    rollout_card(page, result, paths, arm)
     page.add(_causes(result))
     _friction(page, result["friction"])
     _where(page, result)
@@ -121,10 +124,11 @@ def prediction_report(
     result: Mapping[str, Any],
     traces: Sequence[Mapping[str, Any]],
     paths: Sequence[Mapping[str, Any]] = (),
+    arm: RobotPicture | None = None,
 ) -> str:
     """The report of ``truing dynamics predict``. result: what ``result.json`` holds; traces: of every joint,
     time [s], measured (NaN: it was not) and named, the prediction [Nm | N]; paths: of every joint simulated
-    motion, if there is any.
+    motion, if there is any; arm: the same, to be played.
     """
     page = Page(f"{result.get('robot') or 'Robot'}: predicted torques", part_of_page("dynamics"))
     errors = result["errors"]
@@ -144,7 +148,7 @@ def prediction_report(
     order = sorted(errors, key=lambda joint: -(errors[joint]["percent"] or 0.0))
     _trace_card(page, start, order or [trace["joint"] for trace in traces])
     if result["simulated"] is not None:
-        response_card(page, result["simulated"], paths)
+        response_card(page, result["simulated"], paths, arm)
     lines = "".join(
         f"<tr><td>{escaped(joint)}</td>{table_cell(e['rms'], figures_text(e['rms']) + ' ' + e['unit'])}"
         f"<td>{_percent(e['percent'])}</td></tr>"
@@ -161,9 +165,12 @@ def prediction_report(
     return page.html()
 
 
-def export_report(result: Mapping[str, Any], paths: Sequence[Mapping[str, Any]]) -> str:
+def export_report(
+    result: Mapping[str, Any], paths: Sequence[Mapping[str, Any]], arm: RobotPicture | None = None
+) -> str:
     """The report of ``truing dynamics export``: the written model's motion beside the robot's, and what the
-    model lacks. result: what ``result.json`` holds; paths: of every joint a held-out stretch of motion."""
+    model lacks. result: what ``result.json`` holds; paths: of every joint a held-out stretch of motion; arm:
+    the same, to be played."""
     page = Page(f"{result.get('robot') or 'Robot'}: {result['model']}", part_of_page("dynamics"))
     motion, lacks = result["rollout"], result["not_written"]
     title = (
@@ -174,7 +181,7 @@ def export_report(result: Mapping[str, Any], paths: Sequence[Mapping[str, Any]])
         f" {escaped(result['to'])} · {escaped(result['model'])}</p>"
         f'<h1 class="long">{escaped(title)}</h1></header>'
     )
-    rollout_card(page, result, paths)
+    rollout_card(page, result, paths, arm)
     lines = "".join(
         f'<tr><td>{escaped(n["name"])}</td><td class="n">'
         f"{'' if n['size_Nm'] is None else figures_text(n['size_Nm']) + ' Nm'}</td>"

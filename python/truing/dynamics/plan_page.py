@@ -21,6 +21,8 @@ from truing.report.page import Page, footer, part_of_page, table_cell, warnings_
 from truing.report.words import counted, escaped, figures_text
 
 Floats = NDArray[np.float64]
+_SHOWN = 0.05  # of a unit: less is shown in a smaller one
+_DRAWN = 1500  # points of a line: a chart is no wider
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"))
 
 
@@ -58,7 +60,7 @@ def size_text(value: float | None, unit: str) -> str:
         return f"{figures_text(100 * value, 2)} %"
     if " " not in unit and "/" not in unit:
         for factor, prefix in PREFIXES:
-            if abs(value) * factor >= 0.05:
+            if abs(value) * factor >= _SHOWN:
                 return f"{figures_text(value * factor, 2)} {prefix}{unit}"
     return f"{figures_text(value, 2)} {unit}"
 
@@ -106,7 +108,7 @@ def _headline(result: Mapping[str, Any]) -> str:
 def _motion(page: Page, joints: Sequence[str], time: Floats, position: Floats, units: Sequence[str]) -> None:
     page.add('<section class="card"><h2>The motion <span class="muted">motion.csv</span></h2>')
     scale = [180.0 / math.pi if unit == "rad" else 1e3 for unit in units]
-    step = max(1, len(time) // 1500)
+    step = max(1, len(time) // _DRAWN)
     lines = [
         {
             "type": "scatter",

@@ -15,6 +15,7 @@ from truing._core import Identification, Measurements, Mistake, Prediction, Resi
 from truing.effects import Effect, evaluated, own_effects, split_effects
 from truing.errors import InputWarning, NotConvergedError
 from truing.keywords import made, takes
+from truing.report.notebook import shown
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -46,7 +47,10 @@ def identify(
     Raises InputError on data or options that cannot be used, and NotConvergedError (it carries the result),
     unless `raise_if_not_converged` is False.
     """
-    result = _core.identify(robot, data, *_core_options(robot, data, options))
+    chosen = _core_options(robot, data, options)
+    result = _core.identify(robot, data, *chosen)
+    if not chosen[1]:  # what a definition of one's own predicts, only its owner can say
+        shown(result, "truing.identification.result:identification_page", data, chosen[0].seed)
     if raise_if_not_converged and not result.solver.converged:
         raise NotConvergedError(result)
     return result

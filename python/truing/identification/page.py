@@ -18,10 +18,8 @@ from numpy.typing import NDArray
 from truing.report.charts import (
     AFTER,
     BEFORE,
-    INK,
     chart_over_rows,
     distribution_chart,
-    faded,
     log_error_axis,
     packed,
     points_trace,
@@ -31,11 +29,13 @@ from truing.report.charts import (
 )
 from truing.report.page import Page, footer, table_cell, warnings_card
 from truing.report.rows import Rows
+from truing.report.scene import RobotPicture, Scene3d
 from truing.report.trust import BAD, GOOD, LOOK, Check, grade_of, shortened, trust_card
 from truing.report.words import angle_text, counted, drawn_of, escaped, figures_text, length_text, length_unit
 
 Floats = NDArray[np.float64]
-CLOUD_POINTS = 1200  # shown in the 3-D plot
+CLOUD_POINTS = 800  # shown in the 3-D picture
+ARROW = 0.08  # of the workspace: how long the longest errors are drawn
 SMALL_POINTS = 500  # shown in each small plot
 LISTED_REJECTED = 200
 STRUCTURE = 1.5  # times the noise of repeats: more is left than noise
@@ -50,7 +50,10 @@ _SAID_BY_CHECKS = (
 
 
 def identification_report(
-    result: Mapping[str, Any], rows: Rows, correlation: tuple[Sequence[str], Floats] | None = None
+    result: Mapping[str, Any],
+    rows: Rows,
+    correlation: tuple[Sequence[str], Floats] | None = None,
+    robot: RobotPicture | None = None,
 ) -> str:
     """The report of ``truing identify``.
 
@@ -58,6 +61,7 @@ def identification_report(
         result: What ``result.json`` holds (format ``truing-identification/1``).
         rows: Errors of every row before and after.
         correlation: Names and correlation matrix, shape=(n, n), of the fitted parameters.
+        robot: The robot before, and what was found.
     """
     page = Page(f"{result.get('robot') or 'Robot'}: calibration report")
     held_out = "test" in result["errors"]
@@ -85,7 +89,7 @@ def identification_report(
 
     page.add(_found(result))
     page.add('<section class="card"><h2>Where in the workspace</h2>')
-    _workspace(page, rows)
+    workspace(page, rows, robot)
     page.add(
         '</section><section class="card"><h2>Error over each joint</h2><p class="lead">A line that rises,'
         " falls or waves with a joint says that this joint still has an error that the model does not know."
@@ -413,117 +417,46 @@ def _found(result: Mapping[str, Any]) -> str:
     )
 
 
-def _workspace(page: Page, rows: Rows) -> None:
+def workspace(page: Page, rows: Rows, robot: RobotPicture | None = None) -> None:
+    """Where the errors are: every measured place with an arrow to the predicted one, before and after, and
+    the robot.
+    """
     known = np.flatnonzero(
         np.isfinite(rows.position).all(axis=1) & np.isfinite(rows.magnitude_after) & ~rows.rejected
     )
     pick = subsample(known, CLOUD_POINTS)
-    if pick.size == 0:
+    if pick.size == 0 and robot is None:
         page.add('<p class="note">No positions to draw.</p>')
         return
-    position = rows.position[pick]
-    extent = float(np.ptp(position, axis=0).max()) or 1.0
-    traces: list[dict[str, Any]] = []
-    flat: dict[str, list[dict[str, Any]]] = {"top": [], "side": []}
+    scene = Scene3d()
     words = []
-    for name, error, size in (
-        ("after", rows.error_after[pick], rows.magnitude_after[pick]),
-        ("before", rows.error_before[pick], rows.magnitude_before[pick]),
+    position = rows.position[pick]
+    extent = (float(np.ptp(position, axis=0).max()) if pick.size else 0.0) or 1.0
+    for name, error, size, colour in (
+        ("before", rows.error_before[pick], rows.magnitude_before[pick], BEFORE),
+        ("after", rows.error_after[pick], rows.magnitude_after[pick], AFTER),
     ):
-        shown = name == "after"
+        if pick.size == 0:
+            break
         limit = float(np.quantile(size, 0.98)) or 1e-9
-        traces.append(_cloud(name, position, size, limit, shown))
-        factor = round_down(0.06 * extent / limit)
-        drawn = np.isfinite(error).all(axis=1)
-        traces.append(_strokes(name, position[drawn], factor * error[drawn], shown))
-        if drawn.any():
+        factor = round_down(ARROW * extent / limit)
+        texts = [f"row {row}: {length_text(float(off))} {name}" for row, off in zip(pick, size, strict=True)]
+        scene.add_lengths(position, size, limit, name, 3.5, texts=texts, group=name)
+        if np.isfinite(error).all(axis=1).any():
+            scene.add_arrows(position, factor * error, name, colour, 1.5, opacity=0.75, group=name)
             words.append(f"{name}: {factor:g} ×")
-        for view, (first, second) in {"top": (0, 1), "side": (0, 2)}.items():
-            flat[view].append(_flat_cloud(name, position[:, first], position[:, second], size, limit, shown))
-    page.add(
-        '<div class="toggle" role="group" aria-label="errors shown"><button data-show="after"'
-        ' class="on">after</button><button data-show="before">before</button></div>'
-    )
-    axes = {f"{axis}axis": {"title": {"text": f"{axis} [m]"}} for axis in "xyz"}
-    page.chart(
-        "workspace",
-        traces,
-        {
-            "scene": {
-                **axes,
-                "aspectmode": "data",
-                "camera": {"eye": {"x": 1.25, "y": 1.25, "z": 0.75}, "center": {"x": 0, "y": 0, "z": -0.12}},
-            },
-            "fallback": flat,
-        },
-        size="cloud",
-    )
-    strokes = (
-        f" Strokes point from the measured to the predicted place, enlarged ({', '.join(words)})."
+    if robot is not None:
+        scene.set_robot(robot)
+    scene.draw(page, eye=(1.25, 1.25, 0.6), size="cloud")
+    arrows = (
+        f" Arrows point from the measured to the predicted place, enlarged ({', '.join(words)})."
         if words
         else ""
     )
+    drawn = drawn_of(pick.size, known.size, "row") if known.size else "No positions were measured."
     page.add(
-        f'<p class="note">{drawn_of(pick.size, known.size, "row")}{strokes} Rejected rows are left out.'
-        " Colours stop at the 98 % quantile.</p>"
+        f'<p class="note">{drawn}{arrows} Rejected rows are left out. Colours stop at the 98 % quantile.</p>'
     )
-
-
-def _colours(size: Floats, limit: float) -> dict[str, Any]:
-    """Points coloured by the length of their error [m], up to `limit`."""
-    unit, scale = length_unit(limit)
-    return {
-        "size": 3.5,
-        "color": packed(size * scale),
-        "colorscale": "Viridis",
-        "reversescale": True,
-        "cmin": 0,
-        "cmax": limit * scale,
-        "colorbar": {"title": {"text": unit}, "thickness": 12, "len": 0.7},
-    }
-
-
-def _cloud(name: str, position: Floats, size: Floats, limit: float, shown: bool) -> dict[str, Any]:
-    return {
-        "type": "scatter3d",
-        "mode": "markers",
-        "visible": shown,
-        "name": name,
-        "marker": _colours(size, limit),
-        **{axis: packed(position[:, i]) for i, axis in enumerate("xyz")},
-        "hovertemplate": (
-            f"%{{marker.color:.3g}} {length_unit(limit)[0]}<br>x %{{x:.3f}} y %{{y:.3f}} z %{{z:.3f}}"
-            f" m<extra>{name}</extra>"
-        ),
-    }
-
-
-def _strokes(name: str, start: Floats, along: Floats, shown: bool) -> dict[str, Any]:
-    """Lines from `start` to `start + along`, shape=(n, 3) each."""
-    ends = np.full((3 * len(start), 3), np.nan)
-    ends[0::3], ends[1::3] = start, start + along
-    return {
-        "type": "scatter3d",
-        "mode": "lines",
-        "visible": shown,
-        "name": name,
-        "hoverinfo": "skip",
-        "line": {"color": faded(INK, 0.45), "width": 1.5},
-        **{axis: packed(ends[:, i]) for i, axis in enumerate("xyz")},
-    }
-
-
-def _flat_cloud(name: str, x: Floats, y: Floats, size: Floats, limit: float, shown: bool) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "visible": shown,
-        "x": packed(x),
-        "y": packed(y),
-        "marker": {**_colours(size, limit), "size": 6},
-        "name": name,
-        "hovertemplate": f"%{{marker.color:.3g}} {length_unit(limit)[0]}<extra>{name}</extra>",
-    }
 
 
 def _joint_charts(page: Page, rows: Rows) -> None:

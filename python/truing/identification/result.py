@@ -17,12 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.drawing import cause, differences, effects_of, robot_picture, tip_motion
 from truing.errors import InputError
 from truing.files import is_urdf, load_units, save_robot, write_table
 from truing.identification.api import predict, residuals
 from truing.identification.page import identification_report, prediction_report
+from truing.report.charts import REJECTED
 from truing.report.json_text import to_json, without_nan
 from truing.report.rows import Rows, statistics
+from truing.report.scene import RobotPicture
 
 IDENTIFICATION_FORMAT = "truing-identification/1"
 PREDICTION_FORMAT = "truing-prediction/1"
@@ -303,10 +306,7 @@ def write_identification(
             noise_from_repeats=_core.noise_from_repeats(data),
         )
     )
-    assert result.set is not None
-    rows = rows_of(
-        result.before, result.robot, data, test=np.asarray(result.set) == 1, rejected=result.rejected_rows
-    )
+    rows = _rows(result, data)
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
     held_out = found["errors"].get("test", found["errors"]["train"])
     write_robot(
@@ -321,9 +321,59 @@ def write_identification(
     write_table(folder / "covariance.csv", covariance_columns(result))
     names = [target.name for target in result.robot.targets]
     write_table(folder / "residuals.csv", residual_columns(rows, data, names))
-    page = identification_report(found, rows, (fitted_names(result), correlations(result.covariance)))
-    (folder / "report.html").write_text(page, encoding="utf-8")
+    (folder / "report.html").write_text(_page(found, rows, result, data), encoding="utf-8")
     return found
+
+
+def _rows(result: _core.Identification, data: _core.Measurements) -> Rows:
+    assert result.set is not None
+    test = np.asarray(result.set) == 1
+    return rows_of(result.before, result.robot, data, test=test, rejected=result.rejected_rows)
+
+
+def _page(found: dict[str, Any], rows: Rows, result: _core.Identification, data: _core.Measurements) -> str:
+    correlation = fitted_names(result), correlations(result.covariance)
+    return identification_report(
+        found, rows, correlation, calibrated_picture(result.before, result.robot, data)
+    )
+
+
+def identification_page(result: _core.Identification, data: _core.Measurements, seed: int) -> str:
+    """The report of ``truing identify`` without its files."""
+    repeats = _core.noise_from_repeats(data)
+    found = without_nan(identification_dict(result, seed=seed, noise_from_repeats=repeats))
+    return _page(found, _rows(result, data), result, data)
+
+
+def calibrated_picture(
+    before: _core.Robot, after: _core.Robot, data: _core.Measurements, most: int = 8
+) -> RobotPicture:
+    """The robot before, and what was found: all of it, and what each joint and each effect has of it, the
+    joint that moves the tip most first. `most`: so many of them.
+    """
+    readings = np.asarray(data.joints)
+    some = readings[:: max(1, len(readings) // 200)]
+    added = differences(before, after)
+    sizes = {joint.name: tip_motion(before, after, joint.name, some) for joint in before.joints}
+    worst = sorted((name for name in sizes if sizes[name] > 0), key=lambda name: -sizes[name])
+    old = effects_of(before)
+    effects = [effect for effect in effects_of(after) if effect not in old]
+    guilty = worst[:1] or [name for effect in effects[:1] for name in effect["joints"]]
+    causes = [cause("all that was found", REJECTED, guilty, added=added, effects=effects)]
+    for effect in effects:
+        where = f" at {', '.join(effect['joints'])}" if effect["joints"] else ""
+        name = f"{effect['effect'].replace('_', ' ')}{where}"
+        causes.append(cause(name, REJECTED, effect["joints"], effects=[effect]))
+    for name in worst:
+        own = {key: value for key, value in added.items() if key.startswith(f"{name}.")}
+        causes.append(cause(f"values of {name}", REJECTED, [name], added=own))
+    return robot_picture(
+        before,
+        causes=[] if not (added or effects) else causes[: most + 1],
+        readings=readings,
+        payload=None if data.payload is None else np.asarray(data.payload),
+        temperature=None if data.temperature is None else np.asarray(data.temperature),
+    )
 
 
 def write_robot(

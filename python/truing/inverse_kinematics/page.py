@@ -31,11 +31,12 @@ from truing.report.charts import (
     subsample,
 )
 from truing.report.page import Page, footer, part_of_page, warnings_card
-from truing.report.scene import Scene3d, polyline
+from truing.report.scene import RobotPicture, Scene3d, polyline
 from truing.report.words import angle_text, counted, escaped, figures_text, length_text
 
 Floats = NDArray[np.float64]
 
+_DRAWN = 0.12  # of the targets' extent: how long the largest corrections are drawn
 CLOUD_POINTS = 4000
 PATH_POINTS = 2000
 LISTED = 200
@@ -68,6 +69,7 @@ class Drawing:
     correction: Floats | None = None  # shape=(n, 3) [m] of compensated commands
     before: Floats | None = None  # shape=(n,) [m]
     sigma: Floats | None = None  # shape=(n, 6) [m], [rad]
+    robot: RobotPicture | None = None
 
 
 def inverse_report(result: Mapping[str, Any], drawing: Drawing) -> str:
@@ -270,15 +272,20 @@ def _map(page: Page, drawing: Drawing) -> None:
     page.add('<section class="card"><h2>Where</h2>')
     plot = Scene3d()
     for name, outline in drawing.obstacles:
-        plot.add_line(outline, name, faded(MUTED, 0.7), 3, 1.5)
-    _add_robots(plot, drawing.robots)
+        plot.add_line(outline, name, MUTED, 2, opacity=0.7)
+    _add_robots(plot, drawing)
     _add_targets(plot, drawing)
-    plot.draw(page, eye=(1.35, -1.35, 0.8), center=-0.1, size="cloud map")
+    factor = _add_corrections(plot, drawing)
+    plot.draw(page, eye=(1.35, -1.35, 0.8), size="cloud map")
     drawn = (
-        f"The robot is drawn at {counted(len(drawing.robots), 'target')}."
+        f"The robot stands at the first of {counted(len(drawing.robots), 'target')} that are drawn."
         if drawing.robots
-        else "No target is reached, so that no robot is drawn."
+        else "No target is reached; the robot stands where it may."
     )
+    if factor:
+        drawn += (
+            f" Arrows: from a target to the pose that is commanded in its place, enlarged {factor:g} times."
+        )
     legend = " ".join(
         f'<i class="dot" style="background:{colour}"></i>{label}'
         for reason, (label, colour) in REASONS.items()
@@ -290,13 +297,27 @@ def _map(page: Page, drawing: Drawing) -> None:
     )
 
 
-def _add_robots(plot: Scene3d, robots: Sequence[Floats]) -> None:
-    for number, robot in enumerate(robots):
-        opacity, width = (0.9, 7.0) if number == 0 else (0.3, 4.0)
-        plot.add_line(robot, "robot", faded(INK, opacity), width, max(1.5, width / 2.5))
-    if robots:
-        marker = {"size": 4.0, "color": INK, "opacity": 0.85}
-        plot.add_points(robots[0], "its joints", marker, {"hoverinfo": "name"}, 1.6 * 4.0)
+def _add_robots(plot: Scene3d, drawing: Drawing) -> None:
+    for number, robot in enumerate(drawing.robots):
+        if number or drawing.robot is None:
+            opacity, width = (0.9, 6.0) if number == 0 else (0.2, 3.0)
+            plot.add_line(robot, "robot", INK, width, opacity=opacity)
+    if drawing.robot is not None:
+        plot.set_robot(drawing.robot)
+
+
+def _add_corrections(plot: Scene3d, drawing: Drawing) -> float:
+    """Arrows to the compensated commands; how many times they are enlarged, 0 where there are none."""
+    if drawing.correction is None or not np.isfinite(drawing.correction).all(axis=1).any():
+        return 0.0
+    rows = subsample(np.flatnonzero(np.isfinite(drawing.correction).all(axis=1)), CLOUD_POINTS)
+    longest = float(np.quantile(np.linalg.norm(drawing.correction[rows], axis=1), 0.98))
+    extent = float(np.ptp(drawing.wanted[rows], axis=0).max()) or 1.0
+    if longest <= 0:
+        return 0.0
+    factor = max(round_down(_DRAWN * extent / longest), 1.0)
+    plot.add_arrows(drawing.wanted[rows], factor * drawing.correction[rows], "correction", BEFORE, 2.0)
+    return factor
 
 
 def _add_targets(plot: Scene3d, drawing: Drawing) -> None:
@@ -310,9 +331,10 @@ def _add_targets(plot: Scene3d, drawing: Drawing) -> None:
             plot.add_points(
                 drawing.wanted[pick],
                 label,
-                {"size": size, "color": colour, "opacity": 0.85},
-                {"text": [escaped(text) for text in texts], "hovertemplate": "%{text}<extra></extra>"},
-                1.6 * size,
+                size,
+                colour,
+                opacity=0.85,
+                texts=texts,
             )
 
 

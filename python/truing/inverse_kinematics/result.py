@@ -16,17 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.drawing import cause, differences, effects_of, robot_picture
 from truing.files import TargetData, write_table
 from truing.files.common import MOTIONS, joint_columns
 from truing.inverse_kinematics.page import Drawing, compensation_report, inverse_report
+from truing.report.arrays import subsample
+from truing.report.charts import AFTER
 from truing.report.json_text import to_json, without_nan
 from truing.report.rows import statistics
+from truing.report.scene import RobotPicture
 from truing.rotations import quaternions_from_rotations
 
 INVERSE_FORMAT = "truing-inverse/1"
 COMPENSATION_FORMAT = "truing-compensation/1"
 AXES = ("x", "y", "z")
 _ROBOTS_DRAWN = 3
+_POSES_SHOWN = 300  # among which the reader of a report chooses
 
 Floats = NDArray[np.float64]
 
@@ -180,6 +185,26 @@ def _skeletons(robot: _core.Robot, joints: Floats) -> tuple[Floats, ...]:
     )
 
 
+def _picture(
+    robot: _core.Robot, joints: Floats, nominal: _core.Robot | None = None, in_base: bool = False
+) -> RobotPicture:
+    """The robot at its targets; over the `nominal` one, where there is one, what makes it differ."""
+    rows = subsample(np.flatnonzero(np.isfinite(joints).all(axis=1)), _POSES_SHOWN)
+    poses = ([f"target {row}" for row in rows], joints[rows]) if rows.size else None
+    if in_base:
+        robot = robot.replace(T_measurement_base=np.eye(4))
+    causes = []
+    drawn = robot
+    alike = nominal is not None and nominal.convention == robot.convention
+    if nominal is not None and alike and [j.name for j in nominal.joints] == [j.name for j in robot.joints]:
+        drawn = nominal.replace(T_measurement_base=robot.T_measurement_base)
+        old = effects_of(nominal)
+        effects = [effect for effect in effects_of(robot) if effect not in old]
+        added = differences(drawn, robot)
+        causes = [cause("all that was calibrated", AFTER, added=added, effects=effects)]
+    return robot_picture(drawn, causes=causes, poses=poses, stand=None if poses is None else poses[1][0])
+
+
 def _outlines(scene: _core.Scene) -> tuple[tuple[str, Floats], ...]:
     """Edges of boxes; of spheres and capsules circles, and of capsules lines between them."""
     gap = np.full((1, 3), np.nan)
@@ -314,6 +339,7 @@ def write_inverse(folder: Path, solved: Solved, *, warnings: Iterable[str] = ())
         robots=_skeletons(solved.solver.robot, joints),
         joints=joints,
         obstacles=_outlines(solved.solver.options.scene),
+        robot=_picture(solved.solver.robot, joints),
     )
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
     write_table(folder / "joints.csv", inverse_columns(solved))
@@ -442,6 +468,7 @@ def write_compensation(
         ),
         before=np.where(met, np.asarray(made.results.position_before), np.nan),
         sigma=np.where(met[:, None], np.asarray(made.results.sigma), np.nan) if made.uncertain else None,
+        robot=_picture(solver.robot, joints, made.compensator.nominal.robot, in_base=made.in_base),
     )
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
     write_table(folder / "joints.csv", compensation_columns(made))

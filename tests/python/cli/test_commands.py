@@ -147,7 +147,6 @@ def modules_after(*arguments: str) -> set[str]:
 
 HEAVY = {
     "numpy",
-    "plotly",
     "pandas",
     "scipy",
     "pyarrow",
@@ -170,7 +169,7 @@ def test_help_of_a_command_imports_that_command_alone() -> None:
     assert {name for name in found if name.startswith("truing.cli.commands.")} == {
         "truing.cli.commands.identify"
     }
-    assert not found & {"plotly", "pyarrow"}
+    assert not found & {"pyarrow"}
 
 
 # ---- A new command

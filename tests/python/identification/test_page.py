@@ -206,8 +206,7 @@ def test_the_page_is_one_well_formed_file_that_needs_no_network() -> None:
     page = identification_report(
         some_result(rows), rows, (["J1.a", "J2.ratio"], correlations(np.array([[4.0, 1.0], [1.0, 1.0]])))
     )
-    assert len(page) < 5.3e6
-    assert page.count("plotly.js v") <= 1 or page.count("* plotly.js v") == 1
+    assert len(page) < 2e6
     assert not re.search(r"<(script|link|img|iframe)[^>]*(src|href)=", page)
     _Balance().feed(re.sub(r"(<script[^>]*>).*?</script>", r"\1</script>", page, flags=re.DOTALL))
 
@@ -228,7 +227,7 @@ def test_names_from_files_cannot_become_markup() -> None:
 def test_large_data_is_subsampled_and_says_so() -> None:
     rows = some_rows(30000)
     page = identification_report(some_result(rows), rows)
-    assert len(page) < 5.3e6
+    assert len(page) < 2e6
     assert "drawn of 29 998 rows" in visible(page)
 
 
@@ -239,7 +238,7 @@ def test_charts_carry_the_rows() -> None:
         chart["id"]: chart
         for chart in json.loads(re.search(r'id="charts">(.*?)</script>', page, flags=re.DOTALL)[1])
     }  # type: ignore[index]
-    assert {"distribution", "workspace", "joint0", "joint1", "rows"} <= set(charts)
+    assert {"distribution", "joint0", "joint1", "rows"} <= set(charts)
     after = charts["rows"]["data"][1]
     values = np.frombuffer(base64.b64decode(after["y"]["bdata"]), dtype=after["y"]["dtype"])
     assert values == pytest.approx(rows.magnitude_after[~rows.rejected] * 1e3, rel=1e-6)

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truing.report.charts import AFTER, BEFORE, INK, packed
+from truing.report.arrays import outline
+from truing.report.charts import AFTER, BEFORE, INK, MUTED, packed
 from truing.report.page import Page
+from truing.report.scene import RobotPicture, Scene3d
 from truing.report.words import escaped
 
 Floats = NDArray[np.float64]
@@ -31,13 +33,26 @@ KEYS = {
     "named": "named effects",
     "exported": "the written file alone",
 }
+_BUTTONS, _LETTERS = 8, 60  # side by side above a chart; more are a menu
+_DRIVEN = {
+    "torques": "are driven by the measured torques alone; errors grow even of a perfect model. Named: with"
+    " all laws, callbacks.py too. Exported: the written file alone.",
+    "commands": "are driven by the recorded commands. Named: the drives with all their laws. Exported: the"
+    " written file, by MuJoCo alone.",
+}
+LINE_POINTS = 800  # of a line over time: more are not seen
 HEADROOM = 0.6  # of the measured motion's range that simulations may leave it by and still be seen
 TURN = 2.0 * math.pi  # [rad] a simulation that is so far off has left
 FAR = 100.0  # [m] the same
 
 
-def rollout_card(page: Page, result: Mapping[str, Any], paths: Sequence[Mapping[str, Any]]) -> None:
-    """Motion of one joint over time, buttons choose it; and the errors in a table beside it."""
+def rollout_card(
+    page: Page,
+    result: Mapping[str, Any],
+    paths: Sequence[Mapping[str, Any]],
+    arm: RobotPicture | None = None,
+) -> None:
+    """Motion of one joint over time, buttons choose it; errors in a table beside it; the arm, played."""
     found = result["rollout"]
     if found["why_not"]:
         page.add(
@@ -55,13 +70,24 @@ def rollout_card(page: Page, result: Mapping[str, Any], paths: Sequence[Mapping[
     page.add(error_table(found, "held_out", MODELS))
     page.add(
         f'<p class="note">{found["windows"]} simulations of each model (MuJoCo) begin at measured states and'
-        " are driven by the measured torques alone; errors grow even of a perfect model. Named: with"
-        " all laws, callbacks.py too. Exported: the written file alone.</p>"
+        f" {_DRIVEN[result.get('driven_by', 'torques')]}</p>"
     )
     items = "".join(
         f'<div class="apart">{escaped(text[:1].upper() + text[1:])}.</div>' for text in found["worse"]
     )
     page.add(f"{items}</section></div>")
+    arm_card(page, arm)
+
+
+def arm_card(page: Page, arm: RobotPicture | None) -> None:
+    """The recorded arm and the simulated one over each other."""
+    if arm is None:
+        return
+    page.add('<section class="card"><h2>The recorded arm and the simulated one</h2>')
+    scene = Scene3d()
+    scene.set_robot(arm)
+    scene.draw(page, eye=(1.3, -1.3, 0.7), size="cloud", name="arm")
+    page.add("</section>")
 
 
 def worst_first(errors: Mapping[str, Sequence[float]], horizons: Sequence[float]) -> list[str]:
@@ -69,7 +95,12 @@ def worst_first(errors: Mapping[str, Sequence[float]], horizons: Sequence[float]
     return sorted(errors, key=lambda joint: -(errors[joint][len(horizons) // 2] or 0.0))
 
 
-def response_card(page: Page, found: Mapping[str, Any], paths: Sequence[Mapping[str, Any]]) -> None:
+def response_card(
+    page: Page,
+    found: Mapping[str, Any],
+    paths: Sequence[Mapping[str, Any]],
+    arm: RobotPicture | None = None,
+) -> None:
     """What ``predict --simulate`` adds: the motion of one joint, and the error of every one."""
     errors = found["errors"]
     order = sorted(errors, key=lambda joint: -(errors[joint]["rms"] or 0.0))
@@ -85,6 +116,7 @@ def response_card(page: Page, found: Mapping[str, Any], paths: Sequence[Mapping[
         '<div class="scroll"><table><thead><tr><th></th><th>rms</th><th>rms at their ends</th></tr></thead>'
         f"<tbody>{rows}</tbody></table></div></section>"
     )
+    arm_card(page, arm)
 
 
 # ---- Table -----------------------------------------------------------------------------------------
@@ -155,8 +187,9 @@ def motion_chart(
         '<section class="card"><h2>Simulated and real motion <span class="muted">'
         f"{escaped(first['recording'])}; at every dot the simulations begin</span></h2>"
     )
+    commanded = '<i class="commanded"></i>commanded' if "commanded" in first else ""
     page.add(
-        '<p class="key"><i class="measured"></i>measured'
+        f'<p class="key"><i class="measured"></i>measured{commanded}'
         + "".join(
             f'<i class="{model}{" dash" if model == "nominal" else ""}"></i>{escaped(keys[model])}'
             for model in models
@@ -171,16 +204,16 @@ def _traces(path: Mapping[str, Any], models: Mapping[str, tuple[str, str]]) -> l
     low, high = _range(path)
     measured = {"name": "measured", "line": {"color": INK, "width": 2.6}}
     lines = [(path["time"], path["measured"], measured)]
+    if "commanded" in path:
+        dashed = {"color": MUTED, "width": 1.2, "dash": "dash", "shape": "hv"}
+        lines.insert(0, (path["time"], path["commanded"], {"name": "commanded", "line": dashed}))
     for model, (name, colour) in models.items():
         line = {"color": colour, "width": 1.8, "dash": "dot" if model == "nominal" else "solid"}
         lines.append((path["ahead"], _seen(path, model, low, high), {"name": name, "line": line}))
     begun = np.flatnonzero(np.isnan(np.concatenate([[np.nan], path["ahead"][:-1]])))
     at = np.asarray(path["ahead"])[begun]
     dots = np.interp(at, path["time"], path["measured"])
-    return [
-        {"type": "scatter", "mode": "lines", "x": packed(np.asarray(x)), "y": packed(y), **more}
-        for x, y, more in lines
-    ] + [
+    return [_drawn_line(np.asarray(x), np.asarray(y), more) for x, y, more in lines] + [
         {
             "type": "scatter",
             "mode": "markers",
@@ -191,6 +224,11 @@ def _traces(path: Mapping[str, Any], models: Mapping[str, tuple[str, str]]) -> l
             "hoverinfo": "skip",
         }
     ]
+
+
+def _drawn_line(x: Floats, y: Floats, more: Mapping[str, Any]) -> dict[str, Any]:
+    pick = outline(y, LINE_POINTS)
+    return {"type": "scatter", "mode": "lines", "x": packed(x[pick]), "y": packed(y[pick]), **more}
 
 
 def _seen(path: Mapping[str, Any], model: str, low: float, high: float) -> Floats:
@@ -253,6 +291,6 @@ def joint_menu(buttons: list[dict[str, Any]]) -> list[dict[str, Any]]:
         "bordercolor": "#c8ced6",
         "font": {"size": 12},
     }
-    if len(buttons) > 8 or sum(len(b["label"]) for b in buttons) > 60:
+    if len(buttons) > _BUTTONS or sum(len(b["label"]) for b in buttons) > _LETTERS:
         menu["type"] = "dropdown"
     return [menu] if len(buttons) > 1 else []
