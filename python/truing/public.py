@@ -13,6 +13,7 @@ from truing import (
     dynamics as dynamics,
     examples as examples,
     files as files,
+    fleet as fleet,
     hand_eye as hand_eye,
     identification as identification,
     inverse_kinematics as inverse_kinematics,
@@ -50,6 +51,7 @@ from truing.files import (
     save_robot as save_robot,
     save_setup as save_setup,
 )
+from truing.fleet import Gram as Gram
 from truing.hand_eye import handeye as handeye
 from truing.identification import (
     identify as identify,

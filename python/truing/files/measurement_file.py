@@ -21,7 +21,7 @@ from truing.files.common import PathLike, Units, listed, write_table
 from truing.files.plausibility import check_units_look_right
 from truing.files.program_poses import is_program, read_program_poses
 from truing.files.table import Codes, Floats, Table
-from truing.limits import LARGEST_NUMBER
+from truing.limits import LARGEST_NUMBER, UNIT_LENGTH_OFF
 
 _LENGTHS = ("m", "mm")
 _ANGLES = ("rad", "deg")
@@ -52,6 +52,8 @@ _POSITION = ("x", "y", "z")
 _ORIENTATION = ("qw", "qx", "qy", "qz")
 _OF_JOINT = re.compile(r"(qr|qd|tau|dir|u|q)([1-9][0-9]*)(?:_(.*))?", re.ASCII)
 _SETS = ("train", "test")
+ARM = "arm"
+"""The column of a fleet's tables that names the arm a row is from."""
 _LIMIT_MARGIN = 1e-3  # [rad | m]
 _LARGEST = 1e6  # of a length or an angle, in the file's own unit: no machine is larger
 
@@ -70,8 +72,9 @@ _MEASURED = ("x", "dist", "fixed_point")  # roles of which a row needs one
 class _Plan:
     """Which column of the file is what. Refuses names that are almost right."""
 
-    def __init__(self, table: Table, robot: _core.Robot) -> None:
+    def __init__(self, table: Table, robot: _core.Robot, more_labels: Sequence[str] = ()) -> None:
         self.table = table
+        self._known_labels = (*_LABELS, *more_labels)
         self.joints = [robot.joints[index] for index in robot.driven_joints()]
         self.known: dict[str, _Source] = {}  # by role: "q1", "x", "dir2", "sigma m", "target" ...
         self.labels: list[str] = []
@@ -92,7 +95,7 @@ class _Plan:
     @property
     def numbers(self) -> list[str]:
         """Columns that must hold numbers."""
-        return [source.column for role, source in self.known.items() if role not in _LABELS]
+        return [source.column for role, source in self.known.items() if role not in self._known_labels]
 
     def has(self, roles: Sequence[str]) -> bool:
         return all(role in self.known for role in roles)
@@ -108,7 +111,7 @@ class _Plan:
                 self._place_of_joint(name, stem, number, unit)
                 return
         stem, _, unit = name.partition("_")
-        if name in _LABELS:
+        if name in self._known_labels:
             self.known[name] = _Source(name)
             self.labels.append(name)
         elif name in _BARE:
@@ -212,13 +215,59 @@ def load_measurements(
         return _of_program(Path(path), robot, joints_only)
     table = Table(Path(path))
     plan = _Plan(table, robot)
-    if not joints_only and not any(plan.has([role]) for role in _MEASURED):
-        table.refuse(
-            "nothing is measured: expected the columns x_m y_m z_m, or dist_m, or fixed_point; "
-            f"the columns are {listed(table.names)}"
-        )
+    if not joints_only:
+        _require_measured(plan)
     table.read(plan.numbers, plan.labels)
-    reader = _Reader(table, plan)
+    columns = _columns(plan, robot, set_column=set_column, joints_only=joints_only)
+    return _measurements(table, columns)
+
+
+def load_partition(
+    table: Table, robot: _core.Robot, row_group: int | None = None
+) -> dict[str, _core.Measurements]:
+    """The measurements of each arm in a table of a fleet, by the arm's name in the column `arm`; "" without
+    one. Columns and errors are those of `load_measurements`.
+
+    row_group: of a Parquet file, to read no more of it.
+    """
+    plan = _Plan(table, robot, more_labels=[ARM])
+    _require_measured(plan)
+    if row_group is None:
+        table.read(plan.numbers, plan.labels)
+    else:
+        table.read_row_group(row_group, plan.numbers, plan.labels)
+    arms, names = table.labels(ARM) if plan.has([ARM]) else (np.zeros(table.rows, dtype=np.int32), [""])
+    if (arms < 0).any():
+        table.refuse_cell(int(np.argmax(arms < 0)), ARM, "the name of the arm that the row is from")
+    columns = _columns(plan, robot, set_column=True, joints_only=False)
+    if len(names) == 1:
+        return {names[0]: _measurements(table, columns)}
+    return {
+        name: _measurements(table, {key: _rows_of(value, arms == code) for key, value in columns.items()})
+        for code, name in enumerate(names)
+    }
+
+
+def _rows_of(value: Any, rows: Any) -> Any:
+    """Some rows of a column, of a list of columns, or of columns by name; lists of names stay."""
+    if isinstance(value, dict):
+        return {name: column[rows] for name, column in value.items()}
+    if isinstance(value, np.ndarray):
+        return value[rows]
+    return [column[rows] if isinstance(column, np.ndarray) else column for column in value]
+
+
+def _require_measured(plan: _Plan) -> None:
+    if not any(plan.has([role]) for role in _MEASURED):
+        plan.table.refuse(
+            "nothing is measured: expected the columns x_m y_m z_m, or dist_m, or fixed_point; "
+            f"the columns are {listed(plan.table.names)}"
+        )
+
+
+def _columns(plan: _Plan, robot: _core.Robot, *, set_column: bool, joints_only: bool) -> dict[str, Any]:
+    """The columns of a table that was read, as `Measurements` takes them."""
+    reader = _Reader(plan.table, plan)
     joints = [reader.values(f"q{number}") for number in range(1, len(plan.joints) + 1)]
     columns: dict[str, Any] = {"joints": joints}
     columns |= reader.measured()
@@ -230,10 +279,15 @@ def load_measurements(
     columns |= reader.other_columns()
 
     units = {role: source.unit for role, source in plan.known.items()}
-    check_units_look_right(table, robot, plan.joints, units, columns)
+    check_units_look_right(plan.table, robot, plan.joints, units, columns)
     _warn_about_limits(reader, joints)
+    return columns
+
+
+def _measurements(table: Table, columns: dict[str, Any]) -> _core.Measurements:
+    given = dict(columns)
     try:
-        return _core.Measurements(columns.pop("joints"), **columns)
+        return _core.Measurements(given.pop("joints"), **given)
     except ValueError as error:
         raise InputError(f"{table.path}: {error}") from None
 
@@ -362,7 +416,7 @@ class _Reader:
         for column in columns:
             squared += column * column
             gap &= np.isnan(column)
-        good = gap | (np.abs(np.sqrt(squared) - 1.0) <= 1e-3)
+        good = gap | (np.abs(np.sqrt(squared) - 1.0) <= UNIT_LENGTH_OFF)
         if not good.all():
             row = int(np.argmin(good))
             found = " ".join(f"{column[row]:.6g}" for column in columns)
@@ -469,7 +523,7 @@ def _warn_about_limits(reader: _Reader, joints: list[Floats]) -> None:
                 column=reader.name(f"q{number}"),
             )
         except InputError as error:
-            warnings.warn(InputWarning(str(error)), stacklevel=3)
+            warnings.warn(InputWarning(str(error)), stacklevel=4)
 
 
 # ---- Writing -------------------------------------------------------------------------------------

@@ -78,6 +78,7 @@ class Table:
         self._header = 1  # line of the column names
         self._first_row = 0  # of the file, where this is a part of it
         self._header_is_comment = False
+        self._in_memory: Any = None
         require_whole_file(path)
         try:
             with path.open("rb") as file:
@@ -93,6 +94,22 @@ class Table:
             raise InputError(f"{path}: is not a Parquet file, though its name says so")
         self.names = self._parquet_names() if self._is_parquet else self._csv_names(head, first_line)
         self._check_names()
+
+    @classmethod
+    def of(cls, table: Any, called: str) -> Table:
+        """A table of Arrow or pandas that is in memory; messages say what it is called."""
+        if not isinstance(table, pa.Table):
+            try:
+                table = pa.Table.from_pandas(table, preserve_index=False, nthreads=1)
+            except (pa.ArrowException, TypeError, ValueError, AttributeError) as error:
+                raise InputError(f"{called}: cannot be read as a table: {reason(error)[:200]}") from None
+        out = cls.__new__(cls)
+        out.path, out.rows, out._columns, out._first_row = Path(called), 0, {}, 0
+        out._comments, out._header, out._header_is_comment, out._is_parquet = False, 1, False, True
+        out.names = [str(name).strip() for name in table.column_names]
+        out._check_names()
+        out._in_memory = table
+        return out
 
     def refuse(self, message: str, *, row: int | None = None, column: str | None = None) -> NoReturn:
         """Raises InputError about the file, a column, or the cell in `row` (counted from 0)."""
@@ -115,9 +132,34 @@ class Table:
 
     def read(self, numbers: Collection[str], labels: Collection[str]) -> None:
         """Loads the table. All other columns may hold numbers or nothing; text in them is refused."""
-        self._take(
-            self._read_parquet() if self._is_parquet else self._read_csv(numbers, labels), numbers, labels
-        )
+        if self._in_memory is not None:
+            table = self._in_memory
+        else:
+            table = self._read_parquet() if self._is_parquet else self._read_csv(numbers, labels)
+        self._take(table, numbers, labels)
+
+    def read_row_group(self, group: int, numbers: Collection[str], labels: Collection[str]) -> None:
+        """Loads one row group of a Parquet file; messages count rows from the first of the file."""
+        try:
+            with pa.parquet.ParquetFile(self.path, read_dictionary=self._text_columns()) as file:
+                if group >= file.metadata.num_row_groups:
+                    self.refuse(
+                        f"has {file.metadata.num_row_groups} row groups, expected {group + 1} or more"
+                    )
+                self._first_row = sum(file.metadata.row_group(k).num_rows for k in range(group))
+                # One thread: workers that share a machine are as many as it has processors.
+                table = file.read_row_group(group, use_threads=False)
+        except (pa.ArrowException, OSError) as error:
+            raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
+        self._take(table, numbers, labels)
+
+    def row_groups(self) -> int:
+        """Number of row groups of a Parquet file, without reading them."""
+        try:
+            with pa.parquet.ParquetFile(self.path) as file:
+                return int(file.metadata.num_row_groups)
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
 
     def _take(self, table: Any, numbers: Collection[str], labels: Collection[str]) -> None:
         self.rows = table.num_rows

@@ -47,6 +47,7 @@ ROOMS: dict[str, set[str]] = {
     "identification": BASIC,
     "planning": BASIC | {"identification"},
     "diagnosis": BASIC | {"identification"},
+    "fleet": BASIC | {"identification"},
     "hand_eye": BASIC | {"identification"},
     "inverse_kinematics": BASIC,
     "programs": BASIC | {"inverse_kinematics", "model"},
@@ -87,6 +88,7 @@ FLOORS = {
         "lerobot_calibration",
         "robot_file",
         "measurement_file",
+        "gram_file",
         "performance_file",
         "recording_parts",
         "recording_table",
@@ -163,6 +165,8 @@ ONLY_IN = {
     "mujoco": {"exam", "files", "dynamics"},
     "cv2": {"files"},
     "rosbags": {"files"},
+    "dask": {"fleet"},
+    "distributed": {"fleet"},
 }
 
 FILES = {path.relative_to(PACKAGE).as_posix(): path for path in PACKAGE.rglob("*.py")}
