@@ -11,6 +11,11 @@ from truing._core import (
     large_boom as large_boom,
     large_boom_modes as large_boom_modes,
 )
+from truing.testing.fleet import (
+    FleetSimulation as FleetSimulation,
+    save_fleet as save_fleet,
+    simulate_fleet as simulate_fleet,
+)
 from truing.testing.simulation import (
     Simulation as Simulation,
     TrueEffect as TrueEffect,
