@@ -3,7 +3,7 @@
 #
 # What one types. The work is done by scripts/ and CMake. Every target sets up what it needs by itself.
 
-.PHONY: help setup demo test test-all format tidy bench stubs docs-check clean distclean
+.PHONY: help setup demo test test-all format tidy bench stubs docs-check site wheel clean distclean
 .DEFAULT_GOAL := help
 
 help:
@@ -16,6 +16,8 @@ help:
 	@echo "make bench       the benchmarks"
 	@echo "make stubs       write python/truing/_core.pyi and _keywords.pyi from the built module"
 	@echo "make docs-check  check the links in *.md"
+	@echo "make site        the documentation site, into build/site"
+	@echo "make wheel       a wheel that other machines install without a compiler, into dist/ (some minutes)"
 	@echo "make clean       remove build/ and demo/ (distclean: .venv as well)"
 	@echo ""
 	@echo "JOBS=n sets the number of compilers at a time, PYTHON=... the interpreter of .venv."
@@ -51,6 +53,13 @@ stubs:
 
 docs-check:
 	@python3 tests/check_links.py
+
+site:
+	@scripts/setup.sh
+	@scripts/site.sh
+
+wheel:
+	@scripts/wheel.sh
 
 clean:
 	rm -rf build demo
