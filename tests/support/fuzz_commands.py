@@ -29,6 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fuzz_inputs import write_inputs
 from fuzzing import TOKENS
 from handeye_scenes import scene, write_scene
 from scene_files import SCENE
@@ -60,6 +61,7 @@ URDF = b"""\
 <axis xyz="0 0 1"/><limit lower="-1.9" upper="1.2" effort="1" velocity="1"/></joint></robot>
 """
 
+TOOLS = ["--tool", "0,0,100,0,0,0", "--frame", "0,0,0,0,0,0"]  # of whatever name
 STREAMS = ["--imu", "imu.csv", "--tracker", "tracker.csv", "--joints", "joints.csv"]
 COMMANDS: dict[str, tuple[tuple[str, ...], list[str]]] = {
     "identify": (("robot.yaml", "data.csv"), ["identify", "robot.yaml", "data.csv"]),
@@ -90,9 +92,70 @@ COMMANDS: dict[str, tuple[tuple[str, ...], list[str]]] = {
         ("boom.yaml", "setup.yaml", "imu.csv", "tracker.csv", "joints.csv", "plan.csv"),
         ["track", "run", "boom.yaml", "--setup", "setup.yaml", *STREAMS, "--plan", "plan.csv"],
     ),
+    "dynamics identify": (
+        ("moving.yaml", "motion1.csv", "motion2.csv"),
+        ["dynamics", "identify", "moving.yaml", "motion1.csv", "motion2.csv"],
+    ),
+    "dynamics diagnose": (
+        ("moving.yaml", "motion1.csv", "motion2.csv"),
+        ["dynamics", "diagnose", "moving.yaml", "motion1.csv", "motion2.csv"],
+    ),
+    "dynamics predict": (
+        ("moving.yaml", "motion1.csv"),
+        ["dynamics", "predict", "moving.yaml", "motion1.csv", "--simulate", "0.5s"],
+    ),
+    "dynamics plan": (("moving.yaml",), ["dynamics", "plan", "moving.yaml", "--columns", "current,payload"]),
+    "dynamics compare": (
+        ("moving.xml", "moving.yaml", "motion1.csv"),
+        ["dynamics", "compare", "moving.xml", "moving.yaml", "motion1.csv"],
+    ),
+    "dynamics export": (("moving.yaml",), ["dynamics", "export", "moving.yaml", "--to", "mjcf"]),
+    "apply kuka": (
+        ("kuka.yaml", "kuka_real.yaml", "kuka_points.src", "kuka_points.dat"),
+        ["apply", "kuka_points.src", *TOOLS, "--nominal", "kuka.yaml", "--real", "kuka_real.yaml"],
+    ),
+    "apply abb": (
+        ("abb.yaml", "abb_real.yaml", "abb_named.mod"),
+        ["apply", "abb_named.mod", "--nominal", "abb.yaml", "--real", "abb_real.yaml"],
+    ),
+    "apply fanuc": (
+        ("fanuc.yaml", "fanuc_real.yaml", "fanuc_plain.ls"),
+        ["apply", "fanuc_plain.ls", *TOOLS, "--nominal", "fanuc.yaml", "--real", "fanuc_real.yaml"],
+    ),
+    "apply ur": (
+        ("ur.yaml", "ur_real.yaml", "ur_waypoints.script"),
+        ["apply", "ur_waypoints.script", "--nominal", "ur.yaml", "--real", "ur_real.yaml"],
+    ),
+    "apply yaskawa": (
+        ("yaskawa.yaml", "yaskawa_real.yaml", "yaskawa_mixed.jbi"),
+        ["apply", "yaskawa_mixed.jbi", *TOOLS, "--nominal", "yaskawa.yaml", "--real", "yaskawa_real.yaml"],
+    ),
+    "ik program": (("ur.yaml", "ur_waypoints.script"), ["ik", "ur.yaml", "ur_waypoints.script"]),
+    **{
+        f"export {to}": (
+            ("robot.yaml", "found.yaml"),
+            ["export", "found.yaml", "--to", to, "--nominal", "robot.yaml"],
+        )
+        for to in ("frames", "urdf", "ros2_control", "tf", "zeros")
+    },
+    "export lerobot": (
+        ("follower.json", "so.urdf"),
+        ["export", "so.urdf", "--to", "lerobot", "--nominal", "so.urdf", "--calibration", "follower.json"],
+    ),
+    "load conf": (("calibration.conf",), ["load", "calibration.conf", "--arm", "ur5"]),
+    "load urp": (("program.urp",), ["load", "program.urp"]),
+    "load plain urp": (("plain.urp",), ["load", "plain.urp"]),
+    "load moc": (("MOC.cfg",), ["load", "MOC.cfg"]),
+    "load lerobot": (("follower.json", "so.urdf"), ["load", "follower.json@so.urdf"]),
+    "performance plan": (("ur.yaml",), ["performance", "plan", "ur.yaml", "--edge", "0.3m"]),
+    "performance report": (
+        ("commanded.csv", "measured.csv"),
+        ["performance", "report", "measured.csv", "--commanded", "commanded.csv"],
+    ),
 }
 # Those that take long where nothing is wrong come up less often.
-WEIGHTS = {"diagnose": 0.4, "track calibrate": 0.4, "track run": 0.4}
+SLOW = ("diagnose", "track calibrate", "track run", "dynamics diagnose", "performance plan")
+WEIGHTS = {**dict.fromkeys(SLOW, 0.4), "dynamics plan": 0.1}
 
 NUMBERS = [
     "1e160",
@@ -300,7 +363,7 @@ def _fault_of(case: Case, folder: Path, status: int) -> str:
         return f"left {sorted(left)[:3]}"
     if code == 2 and (left or out or not is_refused(said)):
         return f"exit status 2, files {sorted(left)[:3]}, stdout {out[:80]!r}, stderr {said[-300:]!r}"
-    if code == 0 and "out/result.json" not in left and "out/measurements.csv" not in left:
+    if code == 0 and not left & {"out/result.json", "out/measurements.csv", "out"}:
         return f"exit status 0 without a result: {sorted(left)[:3]}"
     return ""
 
@@ -336,6 +399,7 @@ def sound_files(folder: Path) -> dict[str, bytes]:
         good &= main(["identify", "sim/robot.yaml", "sim/measurements.csv", "--out", "found"]) == 0
         good &= main(["simulate", boom, "--stream", "--seconds", "4s", "--seed", "1", "--out", "stream"]) == 0
         shutil.copy(boom, "boom.yaml")
+        write_inputs(Path())
         os._exit(0 if good else 1)
     if os.waitpid(pid, 0)[1] != 0:
         raise SystemExit("the sound files could not be made")
@@ -353,15 +417,15 @@ def sound_files(folder: Path) -> dict[str, bytes]:
 def import_all() -> None:
     """What commands import when they run."""
     import cv2
-    import plotly.offline
     import rich.console
     import rich.progress
     import rich.table
 
     import truing
+    from truing.report.page import Page
 
-    assert cv2 and plotly and rich and truing.load_robot
-    plotly.offline.get_plotlyjs()
+    assert cv2 and rich and truing.load_robot
+    assert Page("").html()  # its script is compressed once
     package = Path(truing.__file__).parent
     for file in sorted(package.rglob("*.py")):
         parts = file.relative_to(package.parent).with_suffix("").parts
