@@ -32,7 +32,17 @@ from truing.errors import InputError
 
 COMMANDS = Path(__file__).parent / "commands"
 
-PANELS = ("Calibrate", "Diagnose", "Hand-eye", "Inverse kinematics", "Apply", "Track", "Dynamics", "Try out")
+PANELS = (
+    "Calibrate",
+    "Diagnose",
+    "Hand-eye",
+    "Inverse kinematics",
+    "Apply",
+    "Track",
+    "Dynamics",
+    "Fleets",
+    "Try out",
+)
 """Headings of `truing --help` in their order; others come last."""
 
 _WIDEST = 24  # characters of a metavar
@@ -315,11 +325,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         code = _fail("interrupted", 130)
     _empty_streams()
-    if arguments is None:  # all is done: Ctrl-C while Python puts itself away would only be a traceback
+    if arguments is None:  # the process is ours, and all is done
+        # Ctrl-C while Python puts itself away would only be a traceback.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if code == 130 and threading.active_count() > 1:
-        # The core is still computing in its thread, and cannot be asked to stop; all of ours is put away.
-        os._exit(130)
+        if code == 130 and threading.active_count() > 1:
+            # The core is still computing in its thread, and cannot be asked to stop; all of ours is put away.
+            os._exit(130)
     return code
 
 

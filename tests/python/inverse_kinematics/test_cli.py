@@ -34,6 +34,7 @@ from inverse_arms import (
     with_effects,
     wrapped,
 )
+from pages import visible
 from scene_files import NAMES, SCENE
 from tables import columns, write
 from truing.cli import main
@@ -336,8 +337,8 @@ def test_the_reports_answer_first_and_open_offline() -> None:
         and 'id="distribution"' in other
     )
     for text in (page, other):
-        body = text[text.index("<body>") : text.index("<script>")]
-        assert "http" not in body and "nan" not in body.lower().replace("finance", "") and "None" not in body
+        shown = visible(text)
+        assert "http" not in shown and "nan" not in shown.lower() and "None" not in shown
 
 
 # ---- compensate ----------------------------------------------------------------------------------
