@@ -79,6 +79,7 @@ FLOORS = {
         "opencv_file",
         "program_poses",
         "other_poses",
+        "handeye_answer",
         "handeye_file",
         "mjcf_file",
         "arms",
