@@ -174,7 +174,8 @@ def working(what: str, work: Callable[[Progress], Value], in_thread: bool = True
         except BaseException as error:  # noqa: BLE001  is raised again below, in the caller's thread
             failure.append(error)
 
-    thread = threading.Thread(target=job, name=f"truing {what}", daemon=True)
+    # No daemon: one that comes back from the core while Python puts itself away would abort the process.
+    thread = threading.Thread(target=job, name=f"truing {what}")
     thread.start()
     try:
         thread.join(_BAR_AFTER)

@@ -318,6 +318,27 @@ def test_ctrl_c_twice_leaves_nothing_behind(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_ctrl_c_leaves_the_process_of_a_caller_alone() -> None:
+    """What still computes is waited for: coming back while Python puts itself away, it would abort."""
+    program = (
+        "import os, signal, sys, threading, time\n"
+        "from truing.cli import main\n"
+        "from truing.cli.commands import effects\n"
+        "from truing.cli.run import working\n"
+        "def computes(self):\n"
+        "    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        "    return working('working', lambda progress: time.sleep(2.0))\n"
+        "effects.Command.run = computes\n"
+        "status = main(['effects'])\n"
+        "print(status, threading.active_count() > 1, flush=True)\n"
+        "sys.exit(7)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False, timeout=60)
+    assert done.returncode == 7
+    assert done.stdout.split() == [b"130", b"True"]
+    assert done.stderr == b"truing: interrupted\n"
+
+
 @pytest.mark.parametrize(("code", "status"), [("", 0), ("0", 0), ("3", 3), ("'a line'", 1)])
 def test_a_program_that_exits_inside_keeps_its_status(code: str, status: int) -> None:
     program = (

@@ -517,19 +517,9 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
     write_poses(poses_of(InverseSolver(gantry()), random_joints(gantry(), 100, seed=12)).repeat(1000, axis=0))
     truing.save_robot("gantry.yaml", gantry())
     before = sorted(tmp_path.iterdir())
-    program = (
-        "import sys; from truing.cli import main; print('ready', flush=True); sys.exit(main(sys.argv[1:]))"
-    )
-    arguments = [
-        sys.executable,
-        "-c",
-        program,
-        "ik",
-        "gantry.yaml",
-        "targets.csv",
-        "--choose",
-        "manipulability",
-    ]
+    program = "import sys; from truing.cli import main; print('ready', flush=True); sys.exit(main())"
+    command = ["ik", "gantry.yaml", "targets.csv", "--choose", "manipulability"]
+    arguments = [sys.executable, "-c", program, *command]
     with subprocess.Popen(
         arguments, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
     ) as process:
