@@ -152,24 +152,30 @@ TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::
   for (const auto* effects : {&torque_catalogue(), &own}) {
     for (const TorqueEffect& effect : *effects) {
       if (leave_out.count(effect.name) > 0) continue;
-      const std::size_t before = out.terms.size();
-      const bool same_as_masses = fits_masses && effect.traits.scales_masses && !payload_varies(range);
-      if (same_as_masses) {
+      if (fits_masses && effect.traits.scales_masses && !payload_varies(range)) {
         out.not_testable.push_back(
             {effect.name,
              {},
              "the same as all masses times a factor: needs a known payload (column payload_kg) that differs between "
              "recordings",
              Untestable::same_as_masses});
+        continue;
       }
       const std::size_t times = effect.per_joint ? robot.driven_count() : 1;
       for (std::size_t j = 0; j < times; ++j) try_at(effect, j);
-      // It is not named, but may be what a link's inertia looks like.
-      for (std::size_t c = before; c < out.terms.size(); ++c)
-        out.terms[c].only_alternative = out.terms[c].only_alternative || same_as_masses;
     }
   }
   return out;
+}
+
+void add_alternatives_of_masses(const Robot& robot, const MotionRange& range, const std::vector<TorqueEffect>& own,
+                                TorqueDesign* design) {
+  const std::size_t before = design->terms.size();
+  for (const NotTestable& one : design->not_testable) {
+    if (one.reason == Untestable::same_as_masses)
+      add_effect(find_torque_effect(one.effect, own), -1, robot, range, design);
+  }
+  for (std::size_t c = before; c < design->terms.size(); ++c) design->terms[c].only_alternative = true;
 }
 
 void add_free_functions(const Robot& robot, const MotionRange& range, TorqueDesign* design) {

@@ -55,8 +55,10 @@ std::vector<Noise> noise_of_all(const Problem& problem, const DesignColumns& col
 }
 
 TorqueDesign whole_design(const Problem& problem, const TorqueDiagnoseOptions& options) {
-  return design_of(problem.robot, problem.range, options.own_effects,
-                   {options.leave_out.begin(), options.leave_out.end()}, !problem.fitted_before);
+  TorqueDesign out = design_of(problem.robot, problem.range, options.own_effects,
+                               {options.leave_out.begin(), options.leave_out.end()}, !problem.fitted_before);
+  add_alternatives_of_masses(problem.robot, problem.range, options.own_effects, &out);
+  return out;
 }
 
 /// The columns that are always in, and the terms of a choice; `choice` becomes that of the part.

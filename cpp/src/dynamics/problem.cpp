@@ -441,10 +441,6 @@ ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& 
   return out;
 }
 
-}  // namespace
-
-namespace {
-
 /// By model and joint.
 std::vector<std::vector<TorqueError>> errors_on(const Folds& folds, const Problem& problem,
                                                 const std::vector<std::pair<std::string, TorqueModel>>& models) {

@@ -100,6 +100,18 @@ TEST_CASE("drives' constants are not searched for beside masses that are fitted"
                     [](const NotTestable& n) { return n.reason == Untestable::same_as_masses; }));
 }
 
+TEST_CASE("a link's inertia that is named may be a drive's constant, which is not searched for") {
+  Robot truth = with_friction(level_arm());
+  truth.torque_effects.push_back({"motor_constant", {"J1"}, {{"motor_constant.J1", 0.15}}});
+  const TorqueDiagnosis d = dynamics::diagnose(level_arm(), recorded(truth));
+  CHECK(found(d, "motor_constant") == nullptr);
+  const FoundTorqueEffect* inertia = found(d, "link_inertia");
+  REQUIRE(inertia != nullptr);
+  CHECK(std::any_of(inertia->confounded_with.begin(), inertia->confounded_with.end(), [](const TorqueAlternative& a) {
+    return a.effect == "motor_constant" && a.joints == std::vector<std::string>{"J1"};
+  }));
+}
+
 TEST_CASE("what cannot be used is refused in words") {
   std::vector<Recording> recordings = recorded(with_friction(level_arm()));
   TorqueDiagnoseOptions options;

@@ -92,6 +92,7 @@ def test_what_is_inherent_is_said_not_promised(planned: TorquePlan) -> None:
     without = plan(ARM, **{**QUICK, "starts": 1, "rounds": 0})
     why = {(n.effect, *n.joints): n.why for n in without.planned.not_testable}
     assert "known payload" in why[("motor_constant",)]
+    assert not any(key[0] == "motor_constant" for key in sizes(without.planned))
     assert "payload_kg" in why[("payload_place",)]
     assert "link inertias" in why[("armature", "J1")]
     assert "link inertias" in why[("payload",)]
@@ -165,6 +166,7 @@ def test_options_that_make_no_sense_are_refused() -> None:
         ({"duration": 1.0}, "duration"),
         ({"speed": 2.0}, "speed"),
         ({"separate": "stribeck:J9"}, "J9"),
+        ({"separate": "motor_constant"}, "motor_constant"),
     ):
         with pytest.raises(InputError, match=message):
             plan(ARM, **options)
