@@ -7310,6 +7310,11 @@ class TorqueDiagnosis:
         """
         The gap by joint and part of the motion.
         """
+    @property
+    def without_names(self) -> float:
+        """
+        [%] held-out error, geometric mean over the joints, that names start from.
+        """
 class TorquePlanOptions:
     """
     Which motions to plan, within which limits, and what will be recorded along them.

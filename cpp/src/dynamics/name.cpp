@@ -298,13 +298,13 @@ std::string words_of_usual(const Problem& problem, const Account& account) {
   return "standard practice (inertias, Coulomb and viscous friction, an offset)";
 }
 
-std::string verdict_sentence(const TorqueDiagnosis& d, const TorqueErrors& before, const std::string& usual) {
-  const auto percent = [](const TorqueErrors& errors) { return number(mean_percent(errors), 2) + " %"; };
+std::string verdict_sentence(const TorqueDiagnosis& d, const std::string& usual) {
+  const auto percent = [](double value) { return number(value, 2) + " %"; };
   if (d.verdict == Verdict::does_not_hold) return "What was found does not hold on recordings it never saw.";
   const std::string causes = causes_of(d.effects);
   if (!causes.empty()) {
-    return "The error of held-out torques falls from " + percent(before) + ", which " + usual + " leaves, to " +
-           percent(d.errors[2]) + " of their standard deviation: " + causes + ".";
+    return "The error of held-out torques falls from " + percent(d.without_names) + ", which " + usual +
+           " leaves, to " + percent(mean_percent(d.errors[2])) + " of their standard deviation: " + causes + ".";
   }
   return d.unknown.empty() ? "No gap beyond noise is left by " + usual + "."
                            : "What " + usual + " leaves goes with inputs that no known effect explains.";
@@ -454,13 +454,14 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
                           {"named", model},
                           {"with_unknown", with_free_functions(problem, beside, *functions.design, all.fit())}});
   const TorqueErrors before = account.inertias_given ? errors_without_names(problem, account) : out.errors[1];
+  out.without_names = mean_percent(before);
   out.verdict = verdict_of(out, before, any);
-  out.sentence = verdict_sentence(out, before, words_of_usual(problem, account));
+  out.sentence = verdict_sentence(out, words_of_usual(problem, account));
   const std::vector<std::string> worse = worse_joints(out.errors[1], out.errors[2]);
   if (!problem.fitted_before && !worse.empty())
     out.warnings.push_back(
         "on held-out recordings standard practice, with inertias that are all free, is better than "
-        "this model at " +
+        "what was found at " +
         listed(worse));
   if (out.verdict == Verdict::does_not_hold) {
     for (FoundTorqueEffect& e : out.effects)

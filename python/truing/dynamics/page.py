@@ -36,6 +36,7 @@ BAND = 2  # standard errors
 BAR = 120  # [px] of a cause that removes all of it
 AXIS = ("standard", "named")  # models that the axis of errors is for; others may be far off
 HEADROOM = 1.6  # of that axis over their largest error
+_EXACT = 1e-9  # [%] no error is smaller
 EMPTY_BIN = 0.005  # of a joint's rows: parts of the motion with fewer say nothing
 TONES = {
     "none": ("no gap beyond noise", "good"),
@@ -208,9 +209,10 @@ def _rms(values: Sequence[float]) -> float:
 
 
 def mean_percent(result: Mapping[str, Any], model: str) -> float:
-    """Rms over the joints of a model's held-out error [%]."""
+    """Geometric mean over the joints of a model's held-out error [%], as the core has it."""
     errors = result["torque"]["held_out"].get(model, {})
-    return _rms([value for value in errors.values() if value is not None])
+    logs = [math.log(max(value, _EXACT)) for value in errors.values() if value is not None]
+    return math.exp(sum(logs) / len(logs)) if logs else math.nan
 
 
 def worst_first(result: Mapping[str, Any]) -> list[str]:
@@ -274,8 +276,8 @@ def _about(result: Mapping[str, Any]) -> str:
     """What the percentages of the headline are."""
     held_out = ", ".join(escaped(name) for name in result["held_out"]) or "none"
     return (
-        '<p class="sub">Rms over the joints, in % of each joint\'s torque (its standard deviation), on'
-        " what was"
+        '<p class="sub">Geometric mean over the joints of the rms error, in % of each joint\'s torque (its'
+        " standard deviation), on what was"
         f" held out and never fitted: <b>{held_out}</b>. Torque and models low-passed at"
         f" {figures_text(result['cutoff_hz'])} Hz.</p>"
     )
@@ -291,7 +293,7 @@ def _moves(result: Mapping[str, Any]) -> str:
 
 def _headline(result: Mapping[str, Any], recordings: int) -> str:
     label, tone = TONES[result["verdict"]] if not _mistaken(result) else ("data to be corrected", "bad")
-    before, after = mean_percent(result, "standard"), mean_percent(result, "named")
+    before, after = result["without_names_percent"], mean_percent(result, "named")
     if beyond_standard(result) and result["verdict"] != "does_not_hold":
         text = (
             f'Torque error falls from <span class="before">{_percent(before)}</span> to'

@@ -70,6 +70,7 @@ def diagnosis_dict(
         "unknown": [_unknown(u) for u in found.unknown],
         "where": where_dict(found.where, found.errors),
         **_errors(found.errors),
+        "without_names_percent": found.without_names,
         "rollout": motion,
         "friction": friction_dict(found.robot, found.where),
         "classes": [{"effects": list(c.effects), "sentence": c.sentence} for c in found.classes],

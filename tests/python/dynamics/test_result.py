@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,13 @@ def test_result_has_what_the_contract_lists(result: dict[str, Any]) -> None:
     assert result["warnings"][0] == "a warning about the input"
     for key in ("unknown", "classes", "not_testable"):
         assert isinstance(result[key], list)
+
+
+def test_the_headline_has_the_numbers_of_the_sentence(folder: Path, result: dict[str, Any]) -> None:
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    headline = page[page.index("<h1") : page.index("</h1>")]
+    shown = re.findall(r">([\d.]+)\u202f%<", headline)
+    assert shown and shown == re.findall(r"([\d.]+) %", result["sentence"])[:2]
 
 
 def test_where_says_the_joint_that_was_worst(result: dict[str, Any]) -> None:

@@ -99,6 +99,7 @@ struct TorqueDiagnosis {
   Eigen::MatrixXd covariance;  ///< shape=(m, m): of the effects' parameters that are not frozen, one after the other
   std::vector<UnknownTorque> unknown;     ///< what no effect explains
   std::vector<TorqueErrors> errors;       ///< 'nominal', 'standard', 'named', 'with_unknown'
+  double without_names = 0.0;             ///< [%] held-out error, geometric mean over the joints, that names start from
   std::vector<TorqueRegime> where;        ///< the gap by joint and part of the motion
   std::vector<TorqueClass> classes;       ///< what cannot be told apart
   std::vector<NotTestable> not_testable;  ///< what the recordings could not show
