@@ -4,94 +4,130 @@
 #include "estimation/clustered.hpp"
 
 #include <algorithm>
-#include <cmath>
+
+#include "kernel/kernel.hpp"
+#include "math/linear_algebra.hpp"
 
 namespace truing::estimation {
 
 namespace {
 
 /// Clusters of about so many rows are summed at a time: their scores are all that is kept.
-constexpr std::size_t kRowsAtATime = 8192;
+constexpr std::size_t kRowsAtATime = 16384;
 /// A cluster that nearly alone decides a parameter leaves no residual: its score cannot be made good by division.
 constexpr double kMostLeverage = 0.9;
+constexpr Eigen::Index kLanes = 8;  ///< rows of a Gram kernel come in multiples of so many
 
-using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-/// Rows of `cluster[at]` for the cluster that each belongs to, side by side.
+/// Rows by the cluster that each belongs to, side by side.
 std::vector<std::int32_t> sorted_by(const std::vector<std::int32_t>& cluster, std::vector<std::int32_t> rows) {
-  std::stable_sort(rows.begin(), rows.end(), [&](std::int32_t a, std::int32_t b) {
+  const auto before = [&](std::int32_t a, std::int32_t b) {
     return cluster[static_cast<std::size_t>(a)] < cluster[static_cast<std::size_t>(b)];
-  });
+  };
+  if (!std::is_sorted(rows.begin(), rows.end(), before)) std::stable_sort(rows.begin(), rows.end(), before);
   return rows;
 }
 
-/// Scores and leverages of some clusters, numbered from `first`.
+/// R with A = R^T R, of a symmetric A whose eigenvalues are not negative but for rounding.
+Eigen::MatrixXd root_of(const Eigen::MatrixXd& A) {
+  const Eigen::VectorXd scale = math::unit_scale<Eigen::Dynamic>(A);
+  const auto eigen = math::symmetric_eigen<Eigen::Dynamic>(math::scaled_both<Eigen::Dynamic>(scale, A));
+  return eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose() *
+         scale.cwiseInverse().asDiagonal();
+}
+
+/// Scores and leverages, one a row of the data; then, folded, one a cluster.
 struct Scores {
-  Eigen::MatrixXd score;     ///< shape=(parameters, clusters)
-  Eigen::VectorXd leverage;  ///< of the mean of the cluster's rows
+  Eigen::MatrixXd score;     ///< shape=(rows and what fills the last lanes up, parameters)
+  Eigen::VectorXd leverage;  ///< of the mean of a row's values; of a cluster: summed over its rows
 };
 
+/// Of `rows` in their order; `place`: for every row of the data, scratch.
 Scores scores_of(const FittedRows& fitted, const std::vector<std::int32_t>& rows, const Eigen::VectorXd& values,
-                 const Weighing& weighing, const Eigen::MatrixXd& inverse, const std::vector<std::int32_t>& number,
-                 Eigen::Index clusters) {
-  const std::vector<Segment> segments = make_segments(fitted.data, rows);
-  const Evaluator evaluator(fitted.model, fitted.data, fitted.bases, segments, fitted.free, 1);
+                 const Weighing& weighing, const Eigen::MatrixXd& root, std::vector<std::int32_t>* place) {
+  for (std::size_t at = 0; at < rows.size(); ++at)
+    (*place)[static_cast<std::size_t>(rows[at])] = static_cast<std::int32_t>(at);
+  std::vector<std::int32_t> ascending = rows;
+  if (!std::is_sorted(ascending.begin(), ascending.end())) std::sort(ascending.begin(), ascending.end());
+  const Evaluator evaluator(fitted.model, fitted.data, fitted.bases, make_segments(fitted.data, ascending), fitted.free,
+                            fitted.threads);
+  const auto n = static_cast<Eigen::Index>(rows.size());
   const auto p = static_cast<Eigen::Index>(fitted.free.size());
-  Scores out{Eigen::MatrixXd::Zero(p, clusters), Eigen::VectorXd::Zero(clusters)};
-  Columns jacobian;
-  Eigen::VectorXd residual;
-  int tile = 0;
-  for (const Segment& segment : segments) {
-    for (std::size_t at = 0; at < segment.rows.size(); ++tile) {
-      const int components = evaluator.tile_components(tile), count = evaluator.tile_rows(tile);
-      jacobian.resize(static_cast<Eigen::Index>(components) * count, p);
-      residual.resize(jacobian.rows());
-      evaluator.tile(tile, values, weighing, residual.data(), jacobian.data());
-      for (int i = 0; i < count; ++i, ++at) {
-        const Eigen::Index c = number[static_cast<std::size_t>(segment.rows[at])];
-        const auto J = jacobian.middleRows(static_cast<Eigen::Index>(i) * components, components);
-        out.score.col(c).noalias() +=
-            J.transpose() * residual.segment(static_cast<Eigen::Index>(i) * components, components);
-        out.leverage[c] += (J * inverse).cwiseProduct(J).sum() / components;
-      }
+  const Eigen::Index padded = (n + kLanes - 1) / kLanes * kLanes;
+  Scores out{Eigen::MatrixXd(padded, p), Eigen::VectorXd(n)};
+  evaluator.scores(values, weighing, root,
+                   [&](const std::int32_t* some, int count, const double* scores, const double* leverage) {
+                     for (int i = 0; i < count; ++i) {
+                       const Eigen::Index at = (*place)[static_cast<std::size_t>(some[i])];
+                       out.leverage[at] = leverage[i];
+                       for (Eigen::Index k = 0; k < p; ++k) out.score(at, k) = scores[k * kernel::kTilePoses + i];
+                     }
+                   });
+  return out;
+}
+
+/// Sums over rows of one cluster, which stand side by side; returns the number of clusters.
+Eigen::Index fold(const std::vector<std::int32_t>& rows, const std::vector<std::int32_t>& cluster, Scores* scores) {
+  Eigen::Index last = -1;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const bool next =
+        i == 0 || cluster[static_cast<std::size_t>(rows[i])] != cluster[static_cast<std::size_t>(rows[i - 1])];
+    if (next && ++last == at) continue;  // in its place already
+    if (next) {
+      scores->score.row(last) = scores->score.row(at);
+      scores->leverage[last] = scores->leverage[at];
+    } else {
+      scores->score.row(last) += scores->score.row(at);
+      scores->leverage[last] += scores->leverage[at];
     }
   }
-  return out;
+  return last + 1;
+}
+
+/// Adds the products of the first `count` rows, divided by the root of 1 - h.
+void add_products(Eigen::Index count, Scores* scores, std::vector<double>* sums) {
+  const Eigen::Index padded = (count + kLanes - 1) / kLanes * kLanes;
+  scores->score.middleRows(count, padded - count).setZero();
+  const Eigen::ArrayXd factor = (1.0 - scores->leverage.head(count).array().min(kMostLeverage)).rsqrt();
+  scores->score.topRows(count).array().colwise() *= factor;
+  const kernel::Functions& run = kernel::functions();
+  run.gram_add(scores->score.data(), scores->score.rows(), static_cast<int>(scores->score.cols()),
+               static_cast<int>(padded), sums->data());
 }
 
 }  // namespace
 
 std::size_t clusters_in(const std::vector<std::int32_t>& rows, const std::vector<std::int32_t>& cluster) {
-  std::vector<std::int32_t> of_rows;
-  of_rows.reserve(rows.size());
-  for (const std::int32_t row : rows) of_rows.push_back(cluster[static_cast<std::size_t>(row)]);
-  std::sort(of_rows.begin(), of_rows.end());
-  return static_cast<std::size_t>(std::unique(of_rows.begin(), of_rows.end()) - of_rows.begin());
+  std::vector<bool> there(cluster.size());  // clusters are numbered from 0, no more of them than rows
+  std::size_t out = 0;
+  for (const std::int32_t row : rows) {
+    const auto number = static_cast<std::size_t>(cluster[static_cast<std::size_t>(row)]);
+    if (there[number]) continue;
+    there[number] = true;
+    ++out;
+  }
+  return out;
 }
 
 Eigen::MatrixXd clustered_scores(const FittedRows& fitted, const Eigen::VectorXd& values, const Weighing& weighing,
                                  const Eigen::MatrixXd& inverse, const std::vector<std::int32_t>& cluster) {
   const std::vector<std::int32_t> rows = sorted_by(cluster, fitted.rows);
   const auto cluster_at = [&](std::size_t at) { return cluster[static_cast<std::size_t>(rows[at])]; };
-  std::vector<std::int32_t> number(fitted.data.rows, -1);
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(inverse.rows(), inverse.cols());
+  const Eigen::MatrixXd root = inverse.isZero(0.0) ? Eigen::MatrixXd(0, inverse.cols()) : root_of(inverse);
+  std::vector<std::int32_t> place(fitted.data.rows);
+  const kernel::Functions& run = kernel::functions();
+  const auto p = static_cast<int>(fitted.free.size());
+  std::vector<double> sums(run.gram_size(p), 0.0);
   for (std::size_t first = 0, end = 0; first < rows.size(); first = end) {
-    Eigen::Index clusters = 0;
-    for (; end < rows.size(); ++end) {
-      const bool next = end == first || cluster_at(end) != cluster_at(end - 1);
-      if (next && end - first >= kRowsAtATime) break;
-      if (next) ++clusters;
-      number[static_cast<std::size_t>(rows[end])] = static_cast<std::int32_t>(clusters - 1);
-    }
-    std::vector<std::int32_t> some(rows.begin() + static_cast<std::ptrdiff_t>(first),
-                                   rows.begin() + static_cast<std::ptrdiff_t>(end));
-    std::sort(some.begin(), some.end());
-    Scores scores = scores_of(fitted, some, values, weighing, inverse, number, clusters);
-    for (Eigen::Index c = 0; c < clusters; ++c)
-      scores.score.col(c) /= std::sqrt(1.0 - std::min(kMostLeverage, scores.leverage[c]));
-    out.noalias() += scores.score * scores.score.transpose();
+    while (end < rows.size() && (end - first < kRowsAtATime || cluster_at(end) == cluster_at(end - 1))) ++end;
+    const std::vector<std::int32_t> some(rows.begin() + static_cast<std::ptrdiff_t>(first),
+                                         rows.begin() + static_cast<std::ptrdiff_t>(end));
+    Scores scores = scores_of(fitted, some, values, weighing, root, &place);
+    add_products(fold(some, cluster, &scores), &scores, &sums);
   }
-  return out;
+  Eigen::MatrixXd upper = Eigen::MatrixXd::Zero(p, p);
+  run.gram_reduce(sums.data(), p, upper.data());
+  return upper.selfadjointView<Eigen::Upper>();
 }
 
 }  // namespace truing::estimation

@@ -23,6 +23,7 @@ struct FittedRows {
   const std::vector<std::vector<double>>& bases;
   const std::vector<int>& free;
   const std::vector<std::int32_t>& rows;
+  int threads = 1;  ///< 0: all cores
 };
 
 /// Number of clusters (`cluster[row]`, for every row of the data) that these rows are of.

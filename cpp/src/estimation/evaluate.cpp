@@ -463,6 +463,41 @@ struct Evaluator::Impl {
     }
   }
 
+  struct Scores {
+    explicit Scores(std::size_t parameters)
+        : score(parameters * kTilePoses), leverage(kTilePoses), squared(kMaxComponents * kTilePoses) {}
+    Buffer score, leverage, squared;
+  };
+
+  /// J^T r of every pose of a tile.
+  void add_scores(const TileRange& range, const double* jacobian, Scores* out) const {
+    const std::vector<int>& map = programs[range.segment].column_free;
+    const std::size_t length = static_cast<std::size_t>(components_of(segments[range.segment].kind)) * kTilePoses;
+    const double* const residual = jacobian + map.size() * length;
+    std::fill(out->score.get(), out->score.get() + free.size() * kTilePoses, 0.0);
+    for (std::size_t k = 0; k < map.size(); ++k) {
+      double* const score = out->score.get() + static_cast<std::size_t>(map[k]) * kTilePoses;
+      const double* const column = jacobian + k * length;
+      for (std::size_t c = 0; c < length; c += kTilePoses) {
+        for (std::size_t i = 0; i < kTilePoses; ++i) score[i] += column[c + i] * residual[c + i];
+      }
+    }
+  }
+
+  /// trace(J root^T root J^T) / components of every pose of a tile.
+  void add_leverages(const TileRange& range, const double* jacobian, const Eigen::MatrixXd& root, Scores* out) const {
+    const std::vector<int>& map = programs[range.segment].column_free;
+    const int values = components_of(segments[range.segment].kind), length = values * kTilePoses;
+    std::fill(out->leverage.get(), out->leverage.get() + kTilePoses, 0.0);
+    std::fill(out->squared.get(), out->squared.get() + length, 0.0);
+    std::vector<double> row(map.size());
+    for (Eigen::Index m = 0; m < root.rows(); ++m) {
+      for (std::size_t k = 0; k < map.size(); ++k) row[k] = root(m, map[k]);
+      run.add_squared(jacobian, length, row.data(), static_cast<int>(map.size()), length, out->squared.get());
+    }
+    for (int i = 0; i < length; ++i) out->leverage.get()[i % kTilePoses] += out->squared.get()[i] / values;
+  }
+
   void sum_slot(int slot, const Eigen::VectorXd& values, const Weighing& weighing, Workspace* w) {
     std::vector<double>& sums = slot_sums[slot];
     std::fill(sums.begin(), sums.end(), 0.0);
@@ -605,6 +640,24 @@ void Evaluator::jacobian_tiles(const Eigen::VectorXd& values, const Weighing& we
       const int segment = impl.tiles[k].segment;
       sink(w->jacobian.get(), static_cast<int>(impl.programs[segment].columns.size()),
            components_of(impl.segments[segment].kind));
+    }
+  });
+}
+
+void Evaluator::scores(const Eigen::VectorXd& values, const Weighing& weighing, const Eigen::MatrixXd& root,
+                       const ScoreSink& sink) const {
+  const std::lock_guard<std::mutex> lock(impl_->busy);
+  Impl& impl = *impl_;
+  impl.for_slots(values, [&](int slot, Impl::Workspace* w) {
+    Impl::Scores scores(impl.free.size());
+    const auto [begin, end] = impl.tiles_of(slot);
+    for (std::size_t k = begin; k < end; ++k) {
+      const Impl::TileRange& range = impl.tiles[k];
+      impl.evaluate_tile(range, values, weighing, true, true, w);
+      impl.add_scores(range, w->jacobian.get(), &scores);
+      impl.add_leverages(range, w->jacobian.get(), root, &scores);
+      sink(impl.segments[range.segment].rows.data() + range.first, range.count, scores.score.get(),
+           scores.leverage.get());
     }
   });
 }

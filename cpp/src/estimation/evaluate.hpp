@@ -89,6 +89,14 @@ class Evaluator {
   using TileSink = std::function<void(const double* jacobian, int columns, int components)>;
   void jacobian_tiles(const Eigen::VectorXd& values, const Weighing& weighing, const TileSink& sink) const;
 
+  /// Of some rows of the data: scores J^T r, shape=(kTilePoses, free parameters), column by column, and the leverage
+  /// trace(J A J^T) / components of each, A = root^T root; both hold `count` rows.
+  using ScoreSink =
+      std::function<void(const std::int32_t* rows, int count, const double* scores, const double* leverage)>;
+  /// Calls `sink` for every tile, from several threads at once. root: shape=(any, free parameters).
+  void scores(const Eigen::VectorXd& values, const Weighing& weighing, const Eigen::MatrixXd& root,
+              const ScoreSink& sink) const;
+
   /// Residual (and, if not null, row-major Jacobian) of tile `tile`, weighted, for solvers that want rows. Returns
   /// components.
   int tile_count() const;

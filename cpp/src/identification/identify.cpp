@@ -39,8 +39,8 @@ std::string count_of(std::size_t n, const char* what) { return std::to_string(n)
 // --- which rows, which parameters ------------------------------------------------------------------------------------
 
 /// 0 train, 1 test for every row: the data's own split, or a fraction of the pose groups drawn with the seed.
-std::vector<std::int8_t> split(const Measurements& data, const IdentifyOptions& options) {
-  const std::vector<std::int32_t> group = pose_groups(data);
+std::vector<std::int8_t> split(const Measurements& data, const IdentifyOptions& options,
+                               const std::vector<std::int32_t>& group) {
   const std::size_t groups =
       group.empty() ? 0 : static_cast<std::size_t>(*std::max_element(group.begin(), group.end())) + 1;
   if (groups < 2)
@@ -60,13 +60,15 @@ std::vector<std::int8_t> split(const Measurements& data, const IdentifyOptions& 
 }
 
 struct SplitRows {
-  std::vector<std::int8_t> set;  ///< 0 train, 1 test, for every row
+  std::vector<std::int32_t> pose;  ///< number of the pose, for every row
+  std::vector<std::int8_t> set;    ///< 0 train, 1 test, for every row
   std::vector<std::int32_t> train, test;
 };
 
 SplitRows split_rows(const Measurements& data, const IdentifyOptions& options) {
   SplitRows out;
-  out.set = split(data, options);
+  out.pose = pose_groups(data);
+  out.set = split(data, options, out.pose);
   for (std::size_t row = 0; row < data.rows; ++row) {
     if (data.weight && data.weight[row] == 0.0) continue;  // counts for nothing
     (out.set[row] ? out.test : out.train).push_back(static_cast<std::int32_t>(row));
@@ -709,14 +711,14 @@ constexpr std::size_t kPosesPerParameter = 2;
 /// Covariance with every pose's residuals as one observation, H^-1 M H^-1 (Liang and Zeger 1986); priors scatter as
 /// the noise does that they are weighed against. Nothing is known where poses are too few.
 std::optional<Eigen::MatrixXd> clustered_by_pose(const Job& job, const Fit& found,
-                                                 const std::vector<std::int32_t>& rows, const Eigen::MatrixXd& inverse,
+                                                 const std::vector<std::int32_t>& rows,
+                                                 const std::vector<std::int32_t>& pose, const Eigen::MatrixXd& inverse,
                                                  double sigma2) {
-  const std::vector<std::int32_t> pose = pose_groups(job.data);
   if (clusters_in(rows, pose) < kPosesPerParameter * found.fitted.size()) return std::nullopt;
   Weighing weighing = found.weighing;
   weighing.prior = {};
-  Eigen::MatrixXd middle =
-      clustered_scores({job.model, job.data, job.bases, found.fitted, rows}, found.values, weighing, inverse, pose);
+  Eigen::MatrixXd middle = clustered_scores({job.model, job.data, job.bases, found.fitted, rows, job.options.threads},
+                                            found.values, weighing, inverse, pose);
   if (found.weighing.prior.weight.size() > 0) middle.diagonal() += sigma2 * found.weighing.prior.weight;
   return inverse * middle * inverse;
 }
@@ -724,7 +726,7 @@ std::optional<Eigen::MatrixXd> clustered_by_pose(const Job& job, const Fit& foun
 /// Covariance clustered by pose. Where poses are few, with positions and rotations each at the noise they show: H^-1
 /// (s_p^2 H_p + s_r^2 H_r) H^-1; for positions alone, s^2 H^-1. With a robust loss the weighted rows stand for the
 /// rows: good to a few per cent.
-Uncertainty uncertainty(const Job& job, const Fit& found, bool poses) {
+Uncertainty uncertainty(const Job& job, const Fit& found, const std::vector<std::int32_t>& pose, bool poses) {
   Uncertainty out;
   const std::vector<std::int32_t> rows = without(job.rows, found.rejected);
   const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, rows), found.fitted,
@@ -757,7 +759,8 @@ Uncertainty uncertainty(const Job& job, const Fit& found, bool poses) {
     out.covariance = inverse * (sigma2 * position.gram + sigma2_rotation * rotation_gram) * inverse;
     out.rotation_noise = std::sqrt(sigma2_rotation) / found.weighing.rotation_scale;
   }
-  if (auto clustered = clustered_by_pose(job, found, rows, inverse, sigma2)) out.covariance = std::move(*clustered);
+  if (auto clustered = clustered_by_pose(job, found, rows, pose, inverse, sigma2))
+    out.covariance = std::move(*clustered);
   out.noise = std::sqrt(sigma2);
   if (job.data.position_sigma || job.data.weight) {  // unit-weight residuals are not metres then
     const ErrorLengths errors = error_lengths(job, evaluator, found.values, poses);
@@ -936,9 +939,8 @@ void report_errors(const Job& job, const Content& content, const std::vector<std
   for (const std::int32_t row : test) {  // a fixed point that no training row touches has no place to compare with
     if (!job.data.has_fixed_point(row) || content.point[job.data.fixed_point[row]]) seen_test.push_back(row);
   }
-  std::vector<std::int32_t> all = job.rows;
-  all.insert(all.end(), seen_test.begin(), seen_test.end());
-  std::sort(all.begin(), all.end());
+  std::vector<std::int32_t> all;
+  std::merge(job.rows.begin(), job.rows.end(), seen_test.begin(), seen_test.end(), std::back_inserter(all));
   const Evaluator everything(job.model, job.data, job.bases, make_segments(job.data, all), found.fitted,
                              job.options.threads);
   const std::vector<std::int32_t> kept = without(job.rows, found.rejected);
@@ -1008,7 +1010,7 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   result.rank = static_cast<int>(seen.selection.fitted.size());
   result.columns = static_cast<int>(seen.free.size()) + (seen.scale_carrier >= 0 ? 1 : 0);
   for (const std::int32_t row : found.rejected) result.rejected_rows.push_back(static_cast<std::size_t>(row));
-  report_uncertainty(uncertainty(job, found, asked.content.poses), &result);
+  report_uncertainty(uncertainty(job, found, rows.pose, asked.content.poses), &result);
   report_parameters(nominal_model, model, seen, found, &result);
   report_errors(job, asked.content, rows.test, start.values, found, &result);
   result.warnings = make_warnings(result, asked.values, spread_of(job, found.rejected));

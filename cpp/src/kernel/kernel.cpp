@@ -363,6 +363,24 @@ void gram_reduce(double* acc, int columns, double* out) {
   });
 }
 
+// Squares of C row: kTilePoses lanes at a time stay in registers through the columns.
+void add_squared(const double* c, std::ptrdiff_t stride, const double* row, int columns, int length, double* out) {
+  constexpr int kPacks = kTilePoses / kLanes > 8 ? 8 : kTilePoses / kLanes;
+  for (int first = 0; first < length; first += kPacks * kLanes) {
+    Pack sum[kPacks];
+    for (int m = 0; m < kPacks; ++m) sum[m] = Pack{};
+    for (int k = 0; k < columns; ++k) {
+      const Pack weight = splat(row[k]);
+      const double* const column = c + stride * k + first;
+      for (int m = 0; m < kPacks; ++m) sum[m] += weight * load(column + m * kLanes);
+    }
+    for (int m = 0; m < kPacks; ++m) {
+      double* const at = out + first + m * kLanes;
+      store(at, load(at) + sum[m] * sum[m]);
+    }
+  }
+}
+
 // Filter: rows side by side, so that a row's sum goes through the weights in their order whatever its lane.
 constexpr int kFilterPacks = 8 / kLanes > 4 ? 8 / kLanes : 4;
 
@@ -402,6 +420,7 @@ void filter(const double* x, int step, const double* weights, int weight_count, 
 #define TRUING_TEXT_OF(x) #x
 #define TRUING_TEXT(x) TRUING_TEXT_OF(x)
 extern const Functions table;
-const Functions table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE), kLanes, evaluate, gram_size, gram_add, gram_reduce, filter};
+const Functions table{
+    TRUING_TEXT(TRUING_KERNEL_NAMESPACE), kLanes, evaluate, gram_size, gram_add, gram_reduce, add_squared, filter};
 
 }  // namespace truing::kernel::TRUING_KERNEL_NAMESPACE

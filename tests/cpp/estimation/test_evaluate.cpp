@@ -7,6 +7,7 @@
 
 #include <numeric>
 
+#include "estimation/clustered.hpp"
 #include "estimation/evaluate.hpp"
 #include "support/arms.hpp"
 
@@ -222,6 +223,57 @@ TEST_CASE("the streamed Gram equals the dense product") {
   }
 }
 
+/// sum over clusters of g g^T / (1 - h), by the dense Jacobian of rows with `components` values each.
+Eigen::MatrixXd scores_by_hand(const Eigen::MatrixXd& j, const Eigen::VectorXd& r, int components,
+                               const Eigen::MatrixXd& inverse, const std::vector<std::int32_t>& cluster) {
+  const auto clusters = *std::max_element(cluster.begin(), cluster.end()) + 1;
+  Eigen::MatrixXd score = Eigen::MatrixXd::Zero(j.cols(), clusters);
+  Eigen::VectorXd leverage = Eigen::VectorXd::Zero(clusters);
+  for (std::size_t row = 0; row < cluster.size(); ++row) {
+    const auto at = static_cast<Eigen::Index>(row) * components;
+    const auto block = j.middleRows(at, components);
+    score.col(cluster[row]) += block.transpose() * r.segment(at, components);
+    leverage[cluster[row]] += (block * inverse * block.transpose()).trace() / components;
+  }
+  const Eigen::VectorXd weight = (1.0 - leverage.array().min(0.9)).inverse();
+  return score * weight.asDiagonal() * score.transpose();
+}
+
+TEST_CASE("scores of clusters equal the dense ones, with the same bits on one and two threads") {
+  Robot truth = palletizer();
+  for (const auto& [what, components, rows] : {std::tuple{What::pose, 6, 500}, {What::position, 3, 40000}}) {
+    CAPTURE(components);
+    auto table = random_joints(truth, static_cast<std::size_t>(rows), 81);
+    measure(table.get(), truth, what, 1e-4, 82);
+    const Model model = make_model(truth, table->data);
+    const auto bases = make_bases(model, table->data);
+    const std::vector<std::int32_t> every = all_rows(table->data);
+    std::vector<int> free = all_parameters(model);
+    const Evaluator evaluator(model, table->data, bases, make_segments(table->data, every), free, 1);
+    Eigen::VectorXd r;
+    Eigen::MatrixXd j;
+    dense(evaluator, initial_values(model), Weighing{}, &r, &j);
+    const Eigen::MatrixXd inverse =
+        (j.transpose() * j + Eigen::MatrixXd::Identity(j.cols(), j.cols())).inverse();  // whatever can be seen
+    std::vector<std::int32_t> alone = every, together(every.size());
+    std::mt19937_64 random(83);
+    for (std::int32_t& c : together) c = static_cast<std::int32_t>(random() % (every.size() / 3));  // nor in order
+    for (const std::vector<std::int32_t>& cluster : {alone, together}) {
+      const auto scores = [&](int threads, const Eigen::MatrixXd& of) -> Eigen::MatrixXd {
+        return clustered_scores({model, table->data, bases, free, every, threads}, initial_values(model), Weighing{},
+                                of, cluster);
+      };
+      const Eigen::MatrixXd expected = scores_by_hand(j, r, components, inverse, cluster);
+      const Eigen::MatrixXd found = scores(1, inverse);
+      CHECK((found - expected).cwiseAbs().maxCoeff() < 1e-8 * expected.cwiseAbs().maxCoeff());
+      CHECK(found == scores(2, inverse));
+      const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(j.cols(), j.cols());
+      const Eigen::MatrixXd plain = scores_by_hand(j, r, components, none, cluster);
+      CHECK((scores(2, none) - plain).cwiseAbs().maxCoeff() < 1e-10 * plain.cwiseAbs().maxCoeff());
+    }
+  }
+}
+
 TEST_CASE("every copy of the kernel agrees with the scalar one") {
   const int columns = 13, length = 96;
   std::mt19937_64 random(71);
@@ -244,6 +296,14 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
     for (int j = 0; j < columns; ++j) {
       for (int i = 0; i <= j; ++i)
         CHECK(out[j * columns + i] == doctest::Approx(expected[j * columns + i]).scale(0).epsilon(1e-13));
+    }
+    // Squares of a row of numbers times the columns.
+    std::vector<double> squares(length, 1.0);
+    f->add_squared(c.data(), length, expected.data(), columns, length, squares.data());
+    for (int i = 0; i < length; ++i) {
+      double sum = 0.0;
+      for (int k = 0; k < columns; ++k) sum += expected[k] * c[k * length + i];
+      CHECK(squares[i] == doctest::Approx(1.0 + sum * sum).scale(0).epsilon(1e-13));
     }
     // Sine and cosine, through a chain of one rotation about z and a step along x: also where the quadrant changes, and
     // many turns away.
