@@ -108,6 +108,14 @@ def test_one_bad_program_does_not_keep_others_from_being_written(tmp_path: Path)
     assert "out of the nominal robot's reach" in refused.message
 
 
+def test_a_string_between_sign_and_digits_makes_no_number(tmp_path: Path) -> None:
+    text = (CORPUS / "ur_notool.script").read_bytes()
+    assert b"-1.4" in text
+    (tmp_path / "ur_notool.script").write_bytes(text.replace(b"-1.4", b'-"x"1.4', 1))
+    outcome = applied(tmp_path / "ur_notool.script")
+    assert [stay.why for _, stay in outcome.stays if stay.line == 1] == ["the target is computed"]
+
+
 @pytest.mark.parametrize(
     "name", ["kuka_arc.src", "abb_utf8.mod", "fanuc_plain.ls", "yaskawa_arc.jbi", "ur_notool.script"]
 )

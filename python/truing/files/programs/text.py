@@ -96,8 +96,15 @@ def number_at(text: str, start: int, end: int) -> Number | None:
 
 
 def blanked(text: str, pattern: re.Pattern[str]) -> str:
-    """The text with spaces where the pattern matches (comments, strings); line ends and offsets stay."""
-    return pattern.sub(lambda match: re.sub(r"[^\r\n]", " ", match[0]), text)
+    """The text with spaces where the pattern matches (comments, strings); line ends and offsets stay, and the
+    mark that opens a string: -"a"1.4 is no number.
+    """
+
+    def spaces(match: re.Match[str]) -> str:
+        mark = 1 if match[0].startswith('"') else 0
+        return match[0][:mark] + re.sub(r"[^\r\n]", " ", match[0][mark:])
+
+    return pattern.sub(spaces, text)
 
 
 def closing(text: str, start: int) -> int | None:
