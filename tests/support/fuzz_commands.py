@@ -377,9 +377,11 @@ def is_refused(said: str) -> bool:
 # ---- All of them ---------------------------------------------------------------------------------
 
 
-def sound_files(folder: Path) -> dict[str, bytes]:
-    """The files before they are damaged, made by the program itself."""
-    folder.mkdir(parents=True, exist_ok=True)
+def write_sound_files(folder: Path, seconds: int = 4) -> None:
+    """Whatever the arguments in COMMANDS name. seconds: of the recording of a robot that sways."""
+    from truing.cli import main
+    from truing.examples import example
+
     for name, data in (
         ("robot.yaml", ROBOT),
         ("arm.urdf", URDF),
@@ -387,29 +389,44 @@ def sound_files(folder: Path) -> dict[str, bytes]:
     ):
         (folder / name).write_bytes(data)
     write_scene(folder / "poses.csv", scene(12, seed=1))
-    pid = os.fork()  # whatever threads this starts end with it
-    if pid == 0:
-        os.chdir(folder)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        from truing.cli import main
-        from truing.examples import example
-
-        boom = str(example("large_boom"))
-        good = main(["simulate", "robot.yaml", "--poses", "40", "--seed", "1", "--out", "sim"]) == 0
-        good &= main(["identify", "sim/robot.yaml", "sim/measurements.csv", "--out", "found"]) == 0
-        good &= main(["simulate", boom, "--stream", "--seconds", "4s", "--seed", "1", "--out", "stream"]) == 0
-        shutil.copy(boom, "boom.yaml")
-        write_inputs(Path())
-        os._exit(0 if good else 1)
-    if os.waitpid(pid, 0)[1] != 0:
-        raise SystemExit("the sound files could not be made")
-    shutil.copy(folder / "sim/measurements.csv", folder / "data.csv")
-    shutil.copy(folder / "found/robot.yaml", folder / "found.yaml")
+    write_inputs(folder)
+    shutil.copy(example("large_boom"), folder / "boom.yaml")
+    sim, found, stream = (folder / name for name in ("sim", "found", "stream"))
+    for arguments in (
+        ["simulate", folder / "robot.yaml", "--poses", 40, "--seed", 1, "--out", sim],
+        ["identify", sim / "robot.yaml", sim / "measurements.csv", "--out", found],
+        [
+            "simulate",
+            folder / "boom.yaml",
+            "--stream",
+            "--seconds",
+            f"{seconds}s",
+            "--seed",
+            1,
+            "--out",
+            stream,
+        ],
+    ):
+        assert main([str(word) for word in arguments]) == 0
+    shutil.copy(sim / "measurements.csv", folder / "data.csv")
+    shutil.copy(found / "robot.yaml", folder / "found.yaml")
     for name in ("imu.csv", "tracker.csv", "joints.csv", "plan.csv", "setup.yaml"):
-        shutil.copy(folder / "stream" / name, folder / name)
+        shutil.copy(stream / name, folder / name)
     rng = np.random.default_rng(1)
     rows = [",".join(f"{v:.4f}" for v in rng.uniform([0.15, -0.2, 0.3], [0.3, 0.2, 0.6])) for _ in range(8)]
     (folder / "targets.csv").write_text("x_m,y_m,z_m\n" + "\n".join(rows) + "\n")
+
+
+def sound_files(folder: Path) -> dict[str, bytes]:
+    """The files before they are damaged, made by the program itself."""
+    folder.mkdir(parents=True, exist_ok=True)
+    pid = os.fork()  # whatever threads this starts end with it
+    if pid == 0:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        write_sound_files(folder)
+        os._exit(0)
+    if os.waitpid(pid, 0)[1] != 0:
+        raise SystemExit("the sound files could not be made")
     names = {name for inputs, _ in COMMANDS.values() for name in inputs}
     return {name: (folder / name).read_bytes() for name in sorted(names)}
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import truing
-from pages import charts_of, visible
+from pages import charts_of, faults_of, visible
 from truing.dynamics.servo.chain import ServoChain, ServoJoint
 from truing.dynamics.servo.export import is_servo_result, load_servo_result
 from truing.dynamics.servo.page import main_number, mean_error, paths_of, servo_report, telling, worst_first
@@ -207,6 +207,7 @@ def test_the_folder_holds_what_export_and_randomise_read(tmp_path: Path) -> None
     written = write_servo(tmp_path, found, recordings)
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"result.json", "report.html", "arm.xml", "motion.parquet"}
+    assert list(faults_of((tmp_path / "report.html").read_text(encoding="utf-8"))) == []
     assert is_servo_result(tmp_path) and load_servo_result(tmp_path).chains["named"] == found.chains["named"]
     motion = load_commanded_motion(tmp_path / "motion.parquet", (False, False))
     assert [(r.name, bool(held.all()), bool(held.any())) for r, held in motion] == [

@@ -8,15 +8,14 @@ import base64
 import dataclasses
 import json
 import re
-from html.parser import HTMLParser
 from typing import Any
 
 import numpy as np
 import pytest
 
+from pages import visible
 from truing.cli.commands.identify import worse_than_drawn
 from truing.identification.page import identification_report, prediction_report
-from truing.identification.result import correlations
 from truing.planning.page import plan_report
 from truing.report.json_text import to_json, without_nan
 from truing.report.rows import Rows, statistics
@@ -87,28 +86,6 @@ def some_result(rows: Rows, **changes: Any) -> dict[str, Any]:
         "solver": {"name": "lm", "iterations": 4, "converged": True, "stopped_because": "enough"},
     }
     return {**result, **changes}
-
-
-def visible(page: str) -> str:
-    """The text of a page, without plotly.js and style."""
-    page = re.sub(r"<(script|style).*?</\1>", " ", page, flags=re.DOTALL)
-    return " ".join(re.sub(r"<[^>]+>", " ", page).replace("\u202f", " ").split())
-
-
-class _Balance(HTMLParser):
-    """Counts tags that are opened and not closed."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.stack: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: Any) -> None:
-        if tag not in ("meta", "br"):
-            self.stack.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.stack and self.stack[-1] == tag, (tag, self.stack[-3:])
-        self.stack.pop()
 
 
 def test_what_is_worse_than_the_robot_as_drawn_is_never_called_usable() -> None:
@@ -199,16 +176,6 @@ def test_frozen_combinations_are_sentences() -> None:
     text = visible(identification_report(some_result(rows), rows))
     assert "Changing J1.d together with base.z (-1) changes no measurement" in text
     assert "J1 turns about z" in text
-
-
-def test_the_page_is_one_well_formed_file_that_needs_no_network() -> None:
-    rows = some_rows()
-    page = identification_report(
-        some_result(rows), rows, (["J1.a", "J2.ratio"], correlations(np.array([[4.0, 1.0], [1.0, 1.0]])))
-    )
-    assert len(page) < 2e6
-    assert not re.search(r"<(script|link|img|iframe)[^>]*(src|href)=", page)
-    _Balance().feed(re.sub(r"(<script[^>]*>).*?</script>", r"\1</script>", page, flags=re.DOTALL))
 
 
 def test_names_from_files_cannot_become_markup() -> None:
