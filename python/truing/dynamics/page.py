@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing.dynamics.rollout.page import joint_menu, response_card, rollout_card
-from truing.report.charts import AFTER, BEFORE, INK, MUTED, faded, packed
+from truing.report.charts import AFTER, BEFORE, INK, MUTED, faded, labelled_bars, packed
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.scene import RobotPicture
 from truing.report.words import counted, escaped, figures_text
@@ -427,26 +427,10 @@ def _error_card(page: Page, result: Mapping[str, Any]) -> None:
     joints = list(errors[models[0]]) if models else []
     largest = max((errors[m][j] or 0.0 for m in models if m in AXIS for j in joints), default=1.0)
     top = HEADROOM * largest
-    drawn = []
-    for model in models:
-        values = [errors[model][joint] for joint in joints]
-        drawn.append(
-            {
-                "type": "bar",
-                "x": joints,
-                "y": [None if v is None else min(v, top) for v in values],
-                "text": ["" if v is None else figures_text(v, 2) for v in values],
-                "textposition": "auto",
-                "textangle": -90,
-                "constraintext": "none",
-                "textfont": {"size": 11},
-                "cliponaxis": False,
-                "name": MODELS[model][0],
-                "marker": {"color": MODELS[model][1]},
-                "customdata": values,
-                "hovertemplate": "%{x}: %{customdata:.2f} %<extra>" + MODELS[model][0] + "</extra>",
-            }
-        )
+    drawn = [
+        labelled_bars(joints, [errors[model][joint] for joint in joints], top, *MODELS[model], unit=" %")
+        for model in models
+    ]
     layout = {
         "barmode": "group",
         "bargap": 0.2,

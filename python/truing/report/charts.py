@@ -14,13 +14,34 @@ from numpy.typing import NDArray
 from truing.report.arrays import packed as packed, subsample as subsample
 from truing.report.page import Page
 from truing.report.rows import Rows
-from truing.report.words import drawn_of, length_unit
+from truing.report.words import drawn_of, figures_text, length_unit
 
 Floats = NDArray[np.float64]
 # Colours that stay apart for colour-blind readers and in grey print: before is light and warm, after dark and
 # cool.
 BEFORE, AFTER, REJECTED, INK, MUTED, GRID = "#d98324", "#1f5fa8", "#b3261e", "#1c2530", "#5b6673", "#e6e9ed"
 ROW_POINTS = 1500  # shown over the row order
+
+
+def labelled_bars(
+    at: Sequence[str], values: Sequence[float | None], top: float, name: str, colour: str, unit: str = ""
+) -> dict[str, Any]:
+    """Bars with their numbers on them, those beyond `top` cut off there."""
+    return {
+        "type": "bar",
+        "x": list(at),
+        "y": [None if v is None else min(v, top) for v in values],
+        "text": ["" if v is None else figures_text(v, 2) for v in values],
+        "textposition": "auto",
+        "textangle": -90,
+        "constraintext": "none",
+        "textfont": {"size": 11},
+        "cliponaxis": False,
+        "name": name,
+        "marker": {"color": colour},
+        "customdata": list(values),
+        "hovertemplate": f"%{{x}}: %{{customdata:.3~r}}{unit}<extra>{name}</extra>",
+    }
 
 
 def distribution_chart(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from truing.dynamics.page import TONES, others, place, plain
 from truing.dynamics.rollout.page import error_text, joint_menu, motion_chart
-from truing.report.charts import AFTER, BEFORE, INK, faded, packed
+from truing.report.charts import AFTER, BEFORE, INK, faded, labelled_bars, packed
 from truing.report.page import Page, footer, part_of_page, warnings_card
 from truing.report.words import counted, escaped, figures_text
 
@@ -280,7 +280,9 @@ def _errors(page: Page, result: Mapping[str, Any]) -> None:
         largest = max((v for m in models if m != "nominal" for v in scaled[m] if v is not None), default=1.0)
         top = HEADROOM * largest
         tops.append(top)
-        drawn += [_bars(model, joints, scaled[model], top, number == main) for model in models]
+        drawn += [
+            labelled_bars(joints, scaled[m], top, *MODELS[m]) | {"visible": number == main} for m in models
+        ]
     buttons = [
         {
             "label": ahead(horizon),
@@ -308,28 +310,6 @@ def _errors(page: Page, result: Mapping[str, Any]) -> None:
     off = any((_shown(errors[m][j][main], units[j]) or 0.0) > tops[main] for m in models for j in joints)
     note = "Bars that reach the top are cut off: their numbers hold." if off else ""
     page.add(f'<p class="note">{note}</p></section>')
-
-
-def _bars(
-    model: str, joints: Sequence[str], values: Sequence[float | None], top: float, visible: bool
-) -> dict[str, Any]:
-    name, colour = MODELS[model]
-    return {
-        "type": "bar",
-        "x": list(joints),
-        "y": [None if v is None else min(v, top) for v in values],
-        "text": ["" if v is None else figures_text(v, 2) for v in values],
-        "textposition": "auto",
-        "textangle": -90,
-        "constraintext": "none",
-        "textfont": {"size": 11},
-        "cliponaxis": False,
-        "name": name,
-        "marker": {"color": colour},
-        "customdata": list(values),
-        "hovertemplate": "%{x}: %{customdata:.3f}<extra>" + name + "</extra>",
-        "visible": visible,
-    }
 
 
 def _shown(value: float | None, unit: str) -> float | None:
