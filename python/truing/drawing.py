@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.files.link_meshes import Looks
 from truing.report.arrays import packed
 from truing.report.scene import RobotPicture
 
@@ -136,6 +137,7 @@ def robot_picture(
     poses: tuple[Sequence[str], Floats] | None = None,
     play: Mapping[str, Any] | None = None,
     stand: Floats | None = None,
+    looks: Looks | None = None,
 ) -> RobotPicture:
     """The robot for a page's 3-D picture.
 
@@ -148,6 +150,7 @@ def robot_picture(
     play: "time" shape=(n,) [s], "name" and "first" shape=(n, driven joints), and "others", readings by name,
         of the same shape: motions that are played over each other.
     stand: shape=(driven joints,) the readings of the picture's beginning.
+    looks: meshes of its links (`truing.files.looks_of`); where a link has none it is drawn as a capsule.
     """
     driven = [robot.joints[index] for index in robot.driven_joints()]
     seen = [np.atleast_2d(r) for r in (readings, None if poses is None else poses[1]) if r is not None]
@@ -176,9 +179,18 @@ def robot_picture(
         "causes": list(causes),
         "poses": None if poses is None else {"names": list(poses[0]), "readings": packed(poses[1].ravel())},
         "play": None if play is None else _played(play),
+        **_looks_numbers(looks or Looks([])),
     }
     marked = {places[name]: c["colour"] for c in causes[:1] for name in c["joints"] if name in places}
     return RobotPicture(scene, line, marked)
+
+
+def _looks_numbers(looks: Looks) -> dict[str, Any]:
+    meshes = [
+        {"joint": mesh.joint, "points": packed(mesh.points.ravel()), "faces": packed(mesh.faces.ravel())}
+        for mesh in looks.meshes
+    ]
+    return {"meshes": meshes, "note": looks.note}
 
 
 def _drivers(effects: Iterable[str]) -> set[str]:

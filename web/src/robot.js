@@ -76,9 +76,9 @@ class RobotInScene {
     this.inputs = {payload: spec.payload?.value ?? 0, temperature: spec.temperature?.value ?? 20,
       direction: spec.value.map(() => 1)};
     this.chosen = 0;
-    const radius = 0.022 * spec.reach;
-    this.arm = new Arm(view, this.model, {radius, colour: MODEL, opacity: this.causes.length ? 0.45 : 1});
-    if (this.causes.length) this.found = new Arm(view, this.model, {radius: 0.98 * radius, colour: FOUND, opacity: 1});
+    const radius = 0.022 * spec.reach, {meshes} = spec;
+    this.arm = new Arm(view, this.model, {radius, meshes, colour: MODEL, opacity: this.causes.length ? 0.45 : 1});
+    if (this.causes.length) this.found = new Arm(view, this.model, {radius: 0.98 * radius, meshes, colour: FOUND, opacity: 1});
     this.note = element('p', 'note');
     this.controls();
     panel.append(this.note);
@@ -171,10 +171,10 @@ class RobotPlayed {
     const {time, first, name, others} = spec.play, rows = values => rowsOf(unpacked(values), spec.value.length);
     Object.assign(this, {view, spec, name, factor: 1, time: unpacked(time), first: rows(first), chosen: 0,
       others: others.map(other => ({name: other.name, rows: rows(other.readings)}))});
-    const radius = 0.022 * spec.reach;
+    const radius = 0.022 * spec.reach, {meshes} = spec;
     this.arms = [
-      new Arm(view, spec.model, {radius: 0.9 * radius, colour: RECORDED, opacity: 1}),
-      new Arm(view, spec.model, {radius, colour: SIMULATED, opacity: 0.55}),
+      new Arm(view, spec.model, {radius: 0.9 * radius, meshes, colour: RECORDED, opacity: 1}),
+      new Arm(view, spec.model, {radius, meshes, colour: SIMULATED, opacity: 0.55}),
     ];
     const last = this.time.length - 1;
     if (others.length > 1) choice(panel, 'against', others.map(o => o.name), k => { this.chosen = k; this.show(); });

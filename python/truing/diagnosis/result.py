@@ -16,7 +16,7 @@ from truing import _core
 from truing.diagnosis.page import UNKNOWN, colour_of, diagnosis_report, plain_name
 from truing.drawing import cause, effects_of, robot_picture, without
 from truing.errors import InputError
-from truing.files import write_table
+from truing.files import Looks, looks_of, write_table
 from truing.files.common import joint_columns
 from truing.identification.result import (
     block,
@@ -307,7 +307,8 @@ def write_diagnosis(
     )
     if found.next_poses:
         write_table(folder / "next_poses.csv", next_pose_columns(found))
-    page = diagnosis_report(result, rows, diagnosed_picture(found, result, data))
+    looks = looks_of(nominal_file, found.robot, base_link)
+    page = diagnosis_report(result, rows, diagnosed_picture(found, result, data, looks))
     (folder / "report.html").write_text(page, encoding="utf-8")
     return result
 
@@ -321,7 +322,10 @@ def diagnosis_page(found: _core.Diagnosis, data: _core.Measurements) -> str:
 
 
 def diagnosed_picture(
-    found: _core.Diagnosis, result: Mapping[str, Any], data: _core.Measurements
+    found: _core.Diagnosis,
+    result: Mapping[str, Any],
+    data: _core.Measurements,
+    looks: Looks | None = None,
 ) -> RobotPicture:
     """The robot without what was named, and each cause that was found, the largest first; all at last."""
     causes = [_named(number, effect, found.robot) for number, effect in enumerate(result["effects"])]
@@ -338,6 +342,7 @@ def diagnosed_picture(
         readings=np.asarray(data.joints),
         payload=None if data.payload is None else np.asarray(data.payload),
         temperature=None if data.temperature is None else np.asarray(data.temperature),
+        looks=looks,
     )
 
 

@@ -33,7 +33,7 @@ from truing.dynamics.sanity.findings import RecordingFinding
 from truing.dynamics.servo.export import ServoExported
 from truing.dynamics.servo.export.verified import servo_rollout_dict
 from truing.dynamics.simulate import Response
-from truing.files import load_units, save_robot, write_table
+from truing.files import load_units, looks_of, save_robot, write_table
 from truing.identification.result import parameter_dict
 from truing.report.json_text import to_json, without_nan
 
@@ -428,12 +428,14 @@ def write_diagnosis(
     sanity: Iterable[RecordingFinding] = (),
     warnings: Iterable[str] = (),
     nominal_file: Path | None = None,
+    base_link: str = "",
     test_share: float = 0.3,
 ) -> dict[str, Any]:
     """Writes everything that ``truing dynamics diagnose`` found, and returns what result.json holds.
 
     `rollout`: of `truing.dynamics.rollout`. `sanity`: findings of `check_recordings`. `nominal_file`: the
-    robot's file, in whose units robot.yaml is written. `test_share`: as it was diagnosed with.
+    robot's file, in whose units robot.yaml is written, and from whose `base_link` it was read. `test_share`:
+    as it was diagnosed with.
     """
     result: dict[str, Any] = without_nan(diagnosis_dict(found, rollout, sanity=sanity, warnings=warnings))
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
@@ -442,7 +444,7 @@ def write_diagnosis(
     _write_residuals(folder, found, recordings, test_share)
     traces = _traces(found)
     paths = paths_of(rollout.judgement) if rollout.judgement is not None else []
-    arm = arm_picture(found.robot, paths, MODEL_NAMES)
+    arm = arm_picture(found.robot, paths, MODEL_NAMES, looks_of(nominal_file, found.robot, base_link))
     report = diagnosis_report(result, traces, len(recordings), paths, arm)
     (folder / "report.html").write_text(report, encoding="utf-8")
     return result

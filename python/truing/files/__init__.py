@@ -45,6 +45,7 @@ from truing.files.lerobot_calibration import (
     moved_zero as moved_zero,
     radians_per_count as radians_per_count,
 )
+from truing.files.link_meshes import Looks as Looks, looks_of as looks_of
 from truing.files.measurement_file import (
     load_measurements as load_measurements,
     save_measurements as save_measurements,

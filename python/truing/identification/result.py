@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.drawing import cause, differences, effects_of, robot_picture, tip_motion
 from truing.errors import InputError
-from truing.files import is_urdf, load_units, save_robot, write_table
+from truing.files import Looks, is_urdf, load_units, looks_of, save_robot, write_table
 from truing.identification.api import predict, residuals
 from truing.identification.page import identification_report, prediction_report
 from truing.report.charts import REJECTED
@@ -321,7 +321,8 @@ def write_identification(
     write_table(folder / "covariance.csv", covariance_columns(result))
     names = [target.name for target in result.robot.targets]
     write_table(folder / "residuals.csv", residual_columns(rows, data, names))
-    (folder / "report.html").write_text(_page(found, rows, result, data), encoding="utf-8")
+    looks = looks_of(nominal_file, result.before, base_link)
+    (folder / "report.html").write_text(_page(found, rows, result, data, looks), encoding="utf-8")
     return found
 
 
@@ -331,11 +332,16 @@ def _rows(result: _core.Identification, data: _core.Measurements) -> Rows:
     return rows_of(result.before, result.robot, data, test=test, rejected=result.rejected_rows)
 
 
-def _page(found: dict[str, Any], rows: Rows, result: _core.Identification, data: _core.Measurements) -> str:
+def _page(
+    found: dict[str, Any],
+    rows: Rows,
+    result: _core.Identification,
+    data: _core.Measurements,
+    looks: Looks | None = None,
+) -> str:
     correlation = fitted_names(result), correlations(result.covariance)
-    return identification_report(
-        found, rows, correlation, calibrated_picture(result.before, result.robot, data)
-    )
+    picture = calibrated_picture(result.before, result.robot, data, looks=looks)
+    return identification_report(found, rows, correlation, picture)
 
 
 def identification_page(result: _core.Identification, data: _core.Measurements, seed: int) -> str:
@@ -346,7 +352,11 @@ def identification_page(result: _core.Identification, data: _core.Measurements, 
 
 
 def calibrated_picture(
-    before: _core.Robot, after: _core.Robot, data: _core.Measurements, most: int = 8
+    before: _core.Robot,
+    after: _core.Robot,
+    data: _core.Measurements,
+    most: int = 8,
+    looks: Looks | None = None,
 ) -> RobotPicture:
     """The robot before, and what was found: all of it, and what each joint and each effect has of it, the
     joint that moves the tip most first. `most`: so many of them.
@@ -373,6 +383,7 @@ def calibrated_picture(
         readings=readings,
         payload=None if data.payload is None else np.asarray(data.payload),
         temperature=None if data.temperature is None else np.asarray(data.temperature),
+        looks=looks,
     )
 
 

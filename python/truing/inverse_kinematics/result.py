@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.drawing import cause, differences, effects_of, robot_picture
-from truing.files import TargetData, write_table
+from truing.files import Looks, TargetData, write_table
 from truing.files.common import MOTIONS, joint_columns
 from truing.inverse_kinematics.page import Drawing, compensation_report, inverse_report
 from truing.report.arrays import subsample
@@ -186,7 +186,11 @@ def _skeletons(robot: _core.Robot, joints: Floats) -> tuple[Floats, ...]:
 
 
 def _picture(
-    robot: _core.Robot, joints: Floats, nominal: _core.Robot | None = None, in_base: bool = False
+    robot: _core.Robot,
+    joints: Floats,
+    looks: Looks | None,
+    nominal: _core.Robot | None = None,
+    in_base: bool = False,
 ) -> RobotPicture:
     """The robot at its targets; over the `nominal` one, where there is one, what makes it differ."""
     rows = subsample(np.flatnonzero(np.isfinite(joints).all(axis=1)), _POSES_SHOWN)
@@ -202,7 +206,8 @@ def _picture(
         effects = [effect for effect in effects_of(robot) if effect not in old]
         added = differences(drawn, robot)
         causes = [cause("all that was calibrated", AFTER, added=added, effects=effects)]
-    return robot_picture(drawn, causes=causes, poses=poses, stand=None if poses is None else poses[1][0])
+    stand = None if poses is None else poses[1][0]
+    return robot_picture(drawn, causes=causes, poses=poses, stand=stand, looks=looks)
 
 
 def _outlines(scene: _core.Scene) -> tuple[tuple[str, Floats], ...]:
@@ -327,8 +332,12 @@ def inverse_columns(solved: Solved) -> dict[str, Any]:
     return columns
 
 
-def write_inverse(folder: Path, solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
-    """Writes everything that ``truing ik`` found into `folder`, and returns what result.json holds."""
+def write_inverse(
+    folder: Path, solved: Solved, *, looks: Looks | None = None, warnings: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Writes everything that ``truing ik`` found into `folder`, and returns what result.json holds. looks: of
+    the robot's links.
+    """
     found: dict[str, Any] = without_nan(inverse_dict(solved, warnings=warnings))
     first = first_of_each(solved)
     joints = _commanded_joints(solved.solver, first)
@@ -339,7 +348,7 @@ def write_inverse(folder: Path, solved: Solved, *, warnings: Iterable[str] = ())
         robots=_skeletons(solved.solver.robot, joints),
         joints=joints,
         obstacles=_outlines(solved.solver.options.scene),
-        robot=_picture(solved.solver.robot, joints),
+        robot=_picture(solved.solver.robot, joints, looks),
     )
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
     write_table(folder / "joints.csv", inverse_columns(solved))
@@ -438,9 +447,11 @@ def pose_columns(made: CompensatedProgram) -> dict[str, Any]:
 
 
 def write_compensation(
-    folder: Path, made: CompensatedProgram, *, warnings: Iterable[str] = ()
+    folder: Path, made: CompensatedProgram, *, looks: Looks | None = None, warnings: Iterable[str] = ()
 ) -> dict[str, Any]:
-    """Writes everything that ``truing compensate`` found into `folder`. Returns what result.json holds."""
+    """Writes everything that ``truing compensate`` found into `folder`. Returns what result.json holds.
+    looks: of the robot's links.
+    """
     wanted = wanted_frames(made)
     found: dict[str, Any] = without_nan(compensation_dict(made, wanted, warnings=warnings))
     solver, solutions = made.compensator.calibrated, list(made.results.solutions)
@@ -468,7 +479,7 @@ def write_compensation(
         ),
         before=np.where(met, np.asarray(made.results.position_before), np.nan),
         sigma=np.where(met[:, None], np.asarray(made.results.sigma), np.nan) if made.uncertain else None,
-        robot=_picture(solver.robot, joints, made.compensator.nominal.robot, in_base=made.in_base),
+        robot=_picture(solver.robot, joints, looks, made.compensator.nominal.robot, made.in_base),
     )
     (folder / "result.json").write_text(to_json(found), encoding="utf-8")
     write_table(folder / "joints.csv", compensation_columns(made))

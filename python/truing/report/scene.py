@@ -174,6 +174,8 @@ class Scene3d:
             "robot": self._robot,
         }
         page.scene(name, spec, self._picture(np.array(eye), every), size)
+        if self._robot is not None and self._robot.get("note"):
+            page.add(f'<p class="note">{escaped(self._robot["note"])}</p>')
 
     def _picture(self, eye: Floats, every: Floats) -> str:
         """Everything seen along `eye`, without perspective."""

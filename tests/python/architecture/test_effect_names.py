@@ -33,6 +33,7 @@ COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 OTHER_MEANING = {
     ("python/truing/tracking/result.py", "drift"),  # of two clocks [s/s]
     ("python/truing/tracking/page.py", "drift"),
+    ("python/truing/files/link_meshes.py", "scale"),  # of a mesh, as a URDF has it
     ("python/truing/cli/commands/demo.py", "backlash:J3"),  # a request, as a user makes it
     ("python/truing/cli/commands/demo.py", "backlash.J3"),  # and what was hidden for it
 }

@@ -167,12 +167,14 @@ class Command(run.Command[Loaded, "Compensations"]):
     def write(
         self, folder: Path, loaded: Loaded, found: Compensations, warnings: list[str]
     ) -> Mapping[str, Any]:
+        from truing.files import looks_of
         from truing.inverse_kinematics.result import CompensatedProgram, write_compensation
 
         program = CompensatedProgram(
             loaded.data, loaded.compensator, found, self.in_base, self.uncertainty is not None
         )
-        return write_compensation(folder, program, warnings=warnings)
+        looks = looks_of(self.nominal, loaded.compensator.nominal.robot, self.base_link)
+        return write_compensation(folder, program, looks=looks, warnings=warnings)
 
     def table(self, result: Mapping[str, Any], found: Compensations) -> None:
         print_reasons(

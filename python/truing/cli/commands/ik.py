@@ -153,9 +153,11 @@ class Command(run.Command[Loaded, "Solved"]):
         return Solved(data, solver, list(found.solutions), np.arange(data.count), path=found, steps=steps)
 
     def write(self, folder: Path, loaded: Loaded, found: Solved, warnings: list[str]) -> Mapping[str, Any]:
+        from truing.files import looks_of
         from truing.inverse_kinematics.result import write_inverse
 
-        return write_inverse(folder, found, warnings=warnings)
+        looks = looks_of(self.robot, found.solver.robot, self.base_link)
+        return write_inverse(folder, found, looks=looks, warnings=warnings)
 
     def table(self, result: Mapping[str, Any], found: Solved) -> None:
         print_reasons(

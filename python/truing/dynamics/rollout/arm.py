@@ -12,6 +12,7 @@ import numpy as np
 
 from truing import _core
 from truing.drawing import robot_picture
+from truing.files import Looks
 from truing.report.arrays import subsample
 from truing.report.scene import RobotPicture
 
@@ -19,7 +20,10 @@ FRAMES = 600  # of a film: more are not seen
 
 
 def arm_picture(
-    robot: _core.Robot, paths: Sequence[Mapping[str, Any]], names: Mapping[str, str]
+    robot: _core.Robot,
+    paths: Sequence[Mapping[str, Any]],
+    names: Mapping[str, str],
+    looks: Looks | None = None,
 ) -> RobotPicture | None:
     """The film of `paths` (`truing.dynamics.rollout.paths_of`): measured motion and that of every model,
     `names` in words, what was named first. None where a joint of the robot is missing in the paths.
@@ -54,4 +58,4 @@ def arm_picture(
         "first": measured,
         "others": {names[model]: simulated[model][rows] for model in models},
     }
-    return robot_picture(robot, play=play, stand=measured[0])
+    return robot_picture(robot, play=play, stand=measured[0], looks=looks)

@@ -138,6 +138,7 @@ class Command(TorqueCommand[Answer | ServoAnswer]):
             sanity=loaded.findings,
             warnings=warnings,
             nominal_file=self.robot,
+            base_link=self.base_link,
             test_share=self.test_share,
         )
 
