@@ -81,35 +81,102 @@ struct JointState {
   double command = 0.0;   ///< as the rate limit lets it follow
   double bristle = 0.0;   ///< presliding travel [rad]
   double rotor = 0.0, rotor_speed = 0.0;
-  double torque = 0.0;   ///< of the drive, in the step before
-  double damping = 0.0;  ///< of the drive: less torque for more speed, taken implicitly
+  double torque = 0.0;                   ///< of the drive, in the step before
+  double damping = 0.0;                  ///< of the drive: less torque for more speed, taken implicitly
+  double gain = 1.0, gain_factor = 1.0;  ///< of the firmware, last seen, and what it multiplies by
+};
+
+/// What moves the bodies by one step: the simulator, or every joint along its path.
+class Bodies {
+ public:
+  virtual ~Bodies() = default;
+  /// Before the chain acts on row + part: what it reads (speeds, angles, bias) stands in the workspace.
+  virtual void look(Index /*row*/, double /*part*/) {}
+  virtual void step() = 0;
+};
+
+class Simulator final : public Bodies {
+ public:
+  Simulator(const ServoCalls& calls, const ServoWorkspace& w) : calls_(calls), w_(w) {}
+  void step() override { calls_.step(w_.model, w_.data); }
+
+ private:
+  const ServoCalls& calls_;
+  const ServoWorkspace& w_;
+};
+
+/// Joints that do not know of each other, implicit in friction and damping.
+class Apart final : public Bodies {
+ public:
+  Apart(const ServoArm& arm, const ServoRecording& r, const ServoPath& path, const ServoSet& set,
+        const ServoWorkspace& w)
+      : arm_(arm),
+        r_(r),
+        path_(path),
+        weight_(set.weight_scale),
+        w_(w),
+        inertia_(path.inertia.cols()),
+        against_(inertia_.size()),
+        first_(std::max(0, set.only)),
+        end_(set.only < 0 ? inertia_.size() : set.only + 1) {}
+
+  void look(Index row, double part) override {
+    const Index next = std::min(row + 1, path_.inertia.rows() - 1);
+    const auto between = [&](const Eigen::MatrixXd& table, Index j) {
+      return table(row, j) + part * (table(next, j) - table(row, j));
+    };
+    for (Index j = first_; j < end_; ++j) {
+      const double cosine = between(path_.cosine, j), sine = between(path_.sine, j);
+      const double x = path_.turns[j] * (w_.qpos[j] - between(r_.position, j));
+      w_.bias[j] = weight_ * (cosine * std::cos(x) + sine * std::sin(x));
+      against_[j] = w_.bias[j] + between(path_.bias, j) - cosine;
+      inertia_[j] = between(path_.inertia, j) + w_.armature[j];
+    }
+  }
+
+  /// (I + h d) v' + h F sgn v' = I v + h (applied - bias), by implicit Coulomb friction (Moreau 1988).
+  void step() override {
+    const double h = arm_.step;
+    for (Index j = first_; j < end_; ++j) {
+      const double heavy = inertia_[j] + h * w_.damping[j];
+      const double free = (inertia_[j] * w_.qvel[j] + h * (w_.applied[j] - against_[j])) / heavy;
+      w_.qvel[j] = std::copysign(std::max(0.0, std::abs(free) - h * w_.frictionloss[j] / heavy), free);
+      w_.qpos[j] += h * w_.qvel[j];
+    }
+  }
+
+ private:
+  const ServoArm& arm_;
+  const ServoRecording& r_;
+  const ServoPath& path_;
+  double weight_;
+  const ServoWorkspace& w_;
+  Eigen::VectorXd inertia_, against_;
+  Index first_, end_;
 };
 
 /// One set over one window on one workspace.
 class Run {
  public:
-  Run(const ServoCalls& calls, const ServoWorkspace& w, const ServoArm& arm, const std::vector<ServoBodies>& bodies,
-      const ServoRecording& recording, const ServoSet& set)
-      : calls_(calls), w_(w), arm_(arm), r_(recording), set_(set), n_(static_cast<Index>(arm.dof.size())) {
+  Run(Bodies* moved, const ServoWorkspace& w, const ServoArm& arm, const ServoRecording& recording, const ServoSet& set)
+      : moved_(moved),
+        w_(w),
+        arm_(arm),
+        r_(recording),
+        set_(set),
+        n_(static_cast<Index>(arm.dof.size())),
+        first_(std::max(0, set.only)),
+        end_(set.only < 0 ? n_ : set.only + 1) {
     for (Index j = 0; j < n_; ++j) drives_.emplace_back(set.chain, j);
     joints_.resize(static_cast<std::size_t>(n_));
-    for (int k = 0; k < 3; ++k) w_.gravity[k] = set.weight_scale * arm.gravity[k];
-    if (set.bodies >= 0) place_bodies(bodies[static_cast<std::size_t>(set.bodies)]);
     for (Index j = 0; j < n_; ++j) {
       const Drive& d = drives_[static_cast<std::size_t>(j)];
       w_.armature[arm_.dof[static_cast<std::size_t>(j)]] = d[F::armature] * (has_rotor(d) ? kLinkArmature : 1.0);
     }
-    calls_.constants(w_.model, w_.data);
-    calls_.reset(w_.model, w_.data);
-  }
-
-  /// Puts back what other sets expect.
-  void restore(const ServoBodies& nominal) const {
-    if (set_.bodies >= 0) place_bodies(nominal);
   }
 
   void begin(Index row) {
-    for (Index j = 0; j < n_; ++j) {
+    for (Index j = first_; j < end_; ++j) {
       const Drive& d = drives_[static_cast<std::size_t>(j)];
       JointState& s = joints_[static_cast<std::size_t>(j)];
       q(j) = r_.position(row, j) - d[F::zero];
@@ -122,12 +189,13 @@ class Run {
     time_ = static_cast<double>(row) * r_.step;
   }
 
-  /// One step of the simulator.
-  void step(Index row) {
+  /// One step of the simulator, `part` of the way from a row to the next.
+  void step(Index row, double part) {
     sum_torques_ = 0.0;
     for (const JointState& s : joints_) sum_torques_ += std::abs(s.torque);
-    for (Index j = 0; j < n_; ++j) drive(j, row);
-    calls_.step(w_.model, w_.data);
+    moved_->look(row, part);
+    for (Index j = first_; j < end_; ++j) drive(j, row);
+    moved_->step();
     time_ += arm_.step;
   }
 
@@ -143,13 +211,6 @@ class Run {
   double& v(Index j) const { return w_.qvel[arm_.dof[static_cast<std::size_t>(j)]]; }
   double measured(const Drive& d, const JointState& s, Index j) const {
     return has_rotor(d) && d[F::motor_encoder] > 0.5 ? s.rotor : q(j);
-  }
-
-  void place_bodies(const ServoBodies& b) const {
-    std::copy(b.mass.begin(), b.mass.end(), w_.mass);
-    std::copy(b.ipos.begin(), b.ipos.end(), w_.ipos);
-    std::copy(b.iquat.begin(), b.iquat.end(), w_.iquat);
-    std::copy(b.inertia.begin(), b.inertia.end(), w_.inertia);
   }
 
   /// What the rows before a window leave in the joint: integral, rate-limited command, bent bristle.
@@ -170,7 +231,15 @@ class Run {
   }
 
   /// Torque of the drive for an angle and a speed; the state of its controller is that of this step.
-  double drive_torque(const Drive& d, const JointState& s, Index j, Index row, const Held& command, double angle,
+  static double firmware(double gain, double exponent, JointState* s) {
+    if (gain != s->gain) {  // seldom: a power at each step would take longer than all else
+      s->gain = gain;
+      s->gain_factor = std::pow(gain, exponent);
+    }
+    return s->gain_factor;
+  }
+
+  double drive_torque(const Drive& d, JointState& s, Index j, Index row, const Held& command, double angle,
                       double speed) const {
     if (at(r_.enabled, row, j) < 0.5) return 0.0;
     double tau = 0.0;
@@ -179,7 +248,8 @@ class Run {
     } else {
       const double error = without_band(s.command - d[F::zero] - angle, d[F::dead_band]);
       const double effort = d[F::command_gain] * error + d[F::integral_gain] * s.integral;
-      tau = std::pow(at(r_.gain, row, j), d[F::gain_law]) * effort + d[F::damping_gain] * (command.slope - speed);
+      tau = firmware(at(r_.gain, row, j), d[F::gain_law], &s) * effort;
+      tau += d[F::damping_gain] * (command.slope - speed);
     }
     tau = drive_law(d, tau);
     tau *= 1.0 + d[F::supply_gain] * (at(r_.supply, row, j) - 1.0);
@@ -190,8 +260,9 @@ class Run {
   double friction_level(const Drive& d, const JointState& s, Index j, Index row, double speed) const {
     const double by_speed =
         d[F::stribeck] == 0.0 ? 0.0 : d[F::stribeck] * std::exp(-std::pow(speed / d[F::stribeck_speed], 2));
-    const double level = d[F::coulomb] + d[F::load_friction] * std::abs(s.torque) + by_speed +
-                         d[F::asymmetric_friction] * std::tanh(speed / kTurning);
+    const double by_side =
+        d[F::asymmetric_friction] == 0.0 ? 0.0 : d[F::asymmetric_friction] * std::tanh(speed / kTurning);
+    const double level = d[F::coulomb] + d[F::load_friction] * std::abs(s.torque) + by_speed + by_side;
     return std::max(0.0, level * (1.0 + d[F::thermal_friction] * at(r_.warmth, row, j) + d[F::warmup] * time_));
   }
 
@@ -236,6 +307,7 @@ class Run {
     s.integral += at(r_.enabled, row, j) * (s.command - d[F::zero] - measured(d, s, j)) * arm_.step;
     const double speed = v(j);
     double applied = 0.0, damping = d[F::viscous];
+    const bool at_rotor = has_rotor(d) && d[F::presliding] == 0.0;
     if (has_rotor(d)) {
       applied = turn_rotor(d, j, row, command, &s, &damping);
     } else {
@@ -250,7 +322,7 @@ class Run {
     damping += std::max(0.0, d[F::viscous_law] * std::abs(speed));
     applied -= std::min(0.0, d[F::viscous_law]) * speed * std::abs(speed);
     const double level = friction_level(d, s, j, row, speed);
-    w_.frictionloss[dof] = level;
+    w_.frictionloss[dof] = at_rotor ? 0.0 : level;
     if (d[F::presliding] > 0.0) {
       applied -= bristle_force(d, level, speed, &s, &damping);
       w_.frictionloss[dof] = 0.0;
@@ -259,7 +331,7 @@ class Run {
     w_.damping[dof] = damping;
   }
 
-  double speed_slope(const Drive& d, const JointState& s, Index j, Index row, const Held& command, double speed) const {
+  double speed_slope(const Drive& d, JointState& s, Index j, Index row, const Held& command, double speed) const {
     if (d[F::damping_gain] == 0.0) return 0.0;
     const double more = kSlope / d[F::damping_gain];
     return std::max(0.0, (s.torque - drive_torque(d, s, j, row, command, q(j), speed + more)) / more);
@@ -292,23 +364,26 @@ class Run {
       const double speed = d[F::motor_encoder] > 0.5 ? s->rotor_speed : link_speed;
       s->torque = drive_torque(d, *s, j, row, command, at_encoder, speed);
       const double force = s->torque - passed - d[F::viscous] * s->rotor_speed;
-      s->rotor_speed += h * force / (inertia + h * (d[F::viscous] + (touches ? rub + h * stiffness : 0.0)));
+      const double heavy = inertia + h * (d[F::viscous] + (touches ? rub + h * stiffness : 0.0));
+      const double free = s->rotor_speed + h * force / heavy;
+      const double level = d[F::presliding] > 0.0 ? 0.0 : friction_level(d, *s, j, row, s->rotor_speed);
+      s->rotor_speed = std::copysign(std::max(0.0, std::abs(free) - h * level / heavy), free);
       s->rotor += h * s->rotor_speed;
       angle += h * link_speed;
       sum += passed / kRotorSteps;
       touching += (touches ? 1.0 : 0.0) / kRotorSteps;
     }
     const double slope = touching * (rub + arm_.step * stiffness);
-    *damping = slope;  // the rotor has the viscous part
+    *damping = slope;  // the rotor has friction
     return sum + slope * link_speed;
   }
 
-  const ServoCalls& calls_;
+  Bodies* moved_;
   const ServoWorkspace& w_;
   const ServoArm& arm_;
   const ServoRecording& r_;
   const ServoSet& set_;
-  Index n_;
+  Index n_, first_, end_;
   std::vector<Drive> drives_;
   std::vector<JointState> joints_;
   double time_ = 0.0, sum_torques_ = 0.0;
@@ -321,14 +396,44 @@ ServoBodies bodies_of(const ServoWorkspace& w, int bodies) {
   return {take(w.mass, 1), take(w.ipos, 3), take(w.iquat, 4), take(w.inertia, 3)};
 }
 
-void check(const ServoArm& arm, const std::vector<ServoWorkspace>& workspaces,
-           const std::vector<ServoRecording>& recordings, const std::vector<ServoWindow>& windows,
+void place_bodies(const ServoWorkspace& w, const ServoBodies& b) {
+  std::copy(b.mass.begin(), b.mass.end(), w.mass);
+  std::copy(b.ipos.begin(), b.ipos.end(), w.ipos);
+  std::copy(b.iquat.begin(), b.iquat.end(), w.iquat);
+  std::copy(b.inertia.begin(), b.inertia.end(), w.inertia);
+}
+
+/// Arrays of a simulator that there is not. shape=(joints, 7)
+ServoWorkspace workspace_on(Eigen::MatrixXd* space) {
+  ServoWorkspace w;
+  double** const arrays[] = {&w.qpos, &w.qvel, &w.applied, &w.bias, &w.frictionloss, &w.damping, &w.armature};
+  for (Index k = 0; k < space->cols(); ++k) *arrays[k] = space->col(k).data();
+  return w;
+}
+
+void require(bool good, const char* what) {
+  if (!good) throw std::invalid_argument(what);
+}
+
+void check_paths(const std::vector<std::vector<ServoPath>>& paths, const std::vector<ServoRecording>& recordings,
+                 const std::vector<ServoSet>& sets) {
+  for (const std::vector<ServoPath>& kind : paths) {
+    require(kind.size() == recordings.size(), "simulate_servos_apart: a path of every recording expected");
+    for (std::size_t k = 0; k < kind.size(); ++k) {
+      const Eigen::MatrixXd& like = recordings[k].position;
+      for (const Eigen::MatrixXd* table : {&kind[k].inertia, &kind[k].bias, &kind[k].cosine, &kind[k].sine})
+        require(table->rows() == like.rows() && table->cols() == like.cols() && kind[k].turns.size() == like.cols(),
+                "simulate_servos_apart: a path's tables have another shape than its recording");
+    }
+  }
+  for (const ServoSet& s : sets)
+    require(s.only < s.chain.rows() && std::max(0, s.bodies) < static_cast<int>(paths.size()),
+            "simulate_servos_apart: masses without paths, or no such joint");
+}
+
+void check(const ServoArm& arm, const std::vector<ServoRecording>& recordings, const std::vector<ServoWindow>& windows,
            const std::vector<ServoSet>& sets) {
   const auto joints = static_cast<Index>(arm.dof.size());
-  const auto require = [](bool good, const char* what) {
-    if (!good) throw std::invalid_argument(what);
-  };
-  require(!workspaces.empty(), "simulate_servos: no workspace");
   require(arm.step > 0.0 && arm.qpos.size() == arm.dof.size(),
           "simulate_servos: an arm with a step and joints expected");
   for (const ServoRecording& r : recordings) {
@@ -362,7 +467,7 @@ void simulate(Run* run, const ServoWindow& window, const ServoArm& arm, double s
   run->begin(window.first);
   bool left = false;
   for (Index k = 0; k < window.rows; ++k) {
-    for (int i = 0; i < substeps && !left; ++i) run->step(window.first + k);
+    for (int i = 0; i < substeps && !left; ++i) run->step(window.first + k, static_cast<double>(i) / substeps);
     for (Index j = 0; j < joints; ++j) {
       const double q = run->recorded(j);
       left = left || !(std::abs(q) < kFar);
@@ -414,7 +519,8 @@ std::vector<std::string> servo_inputs() {
 ServoMotion simulate_servos(const ServoCalls& calls, const std::vector<ServoWorkspace>& workspaces, const ServoArm& arm,
                             const std::vector<ServoBodies>& bodies, const std::vector<ServoRecording>& recordings,
                             const std::vector<ServoWindow>& windows, const std::vector<ServoSet>& sets, bool torques) {
-  check(arm, workspaces, recordings, windows, sets);
+  require(!workspaces.empty(), "simulate_servos: no workspace");
+  check(arm, recordings, windows, sets);
   const auto joints = static_cast<Index>(arm.dof.size());
   std::vector<Index> rows(1, 0);
   for (const ServoWindow& w : windows) rows.push_back(rows.back() + w.rows);
@@ -430,13 +536,53 @@ ServoMotion simulate_servos(const ServoCalls& calls, const std::vector<ServoWork
     for (std::size_t k = next++; k < count; k = next++) {
       const std::size_t set = k % sets.size(), window = k / sets.size();
       const ServoRecording& r = recordings[static_cast<std::size_t>(windows[window].recording)];
-      Run run(calls, w, arm, bodies, r, sets[set]);
+      for (int i = 0; i < 3; ++i) w.gravity[i] = sets[set].weight_scale * arm.gravity[i];
+      if (sets[set].bodies >= 0) place_bodies(w, bodies[static_cast<std::size_t>(sets[set].bodies)]);
+      Simulator moved(calls, w);
+      Run run(&moved, w, arm, r, sets[set]);
+      calls.constants(w.model, w.data);
+      calls.reset(w.model, w.data);
       simulate(&run, windows[window], arm, r.step, rows[window], &out.position[set],
                torques ? &out.torque[set] : nullptr);
-      run.restore(nominal);
+      if (sets[set].bodies >= 0) place_bodies(w, nominal);
     }
   };
   for_each_on_threads(workspaces.size(), static_cast<int>(workspaces.size()), {}, work, 1);
+  return out;
+}
+
+ServoMotion simulate_servos_apart(const ServoArm& arm, const std::vector<std::vector<ServoPath>>& paths,
+                                  const std::vector<ServoRecording>& recordings,
+                                  const std::vector<ServoWindow>& windows, const std::vector<ServoSet>& sets,
+                                  int threads, bool torques) {
+  check(arm, recordings, windows, sets);
+  check_paths(paths, recordings, sets);
+  ServoArm apart = arm;  // joints one after the other
+  for (std::size_t j = 0; j < arm.dof.size(); ++j) apart.dof[j] = apart.qpos[j] = static_cast<int>(j);
+  const auto joints = static_cast<Index>(arm.dof.size());
+  std::vector<Index> rows(1, 0);
+  for (const ServoWindow& w : windows) rows.push_back(rows.back() + w.rows);
+  ServoMotion out;
+  out.position.assign(sets.size(), Eigen::MatrixXd::Zero(rows.back(), joints));
+  if (torques) out.torque = out.position;
+  std::vector<Eigen::MatrixXd> space(static_cast<std::size_t>(threads), Eigen::MatrixXd::Zero(joints, 7));
+  const auto work = [&](std::size_t k, std::size_t thread) {
+    const std::size_t set = k % sets.size(), window = k / sets.size();
+    const auto recording = static_cast<std::size_t>(windows[window].recording);
+    space[thread].setZero();
+    const ServoWorkspace w = workspace_on(&space[thread]);
+    Apart moved(apart, recordings[recording], paths[static_cast<std::size_t>(std::max(0, sets[set].bodies))][recording],
+                sets[set], w);
+    Run run(&moved, w, apart, recordings[recording], sets[set]);
+    simulate(&run, windows[window], apart, recordings[recording].step, rows[window], &out.position[set],
+             torques ? &out.torque[set] : nullptr);
+  };
+  std::atomic<std::size_t> next{0};
+  const std::size_t count = sets.size() * windows.size();
+  const auto deal = [&](std::size_t thread) {
+    for (std::size_t k = next++; k < count; k = next++) work(k, thread);
+  };
+  for_each_on_threads(space.size(), threads, {}, deal, 1);
   return out;
 }
 

@@ -78,6 +78,18 @@ std::pair<std::vector<Eigen::MatrixXd>, std::vector<Eigen::MatrixXd>> simulate(
   return {std::move(motion.position), std::move(motion.torque)};
 }
 
+std::pair<std::vector<Eigen::MatrixXd>, std::vector<Eigen::MatrixXd>> simulate_apart(
+    const ServoArm& arm, const std::vector<std::vector<ServoPath>>& paths,
+    const std::vector<ServoRecording>& recordings, const std::vector<ServoWindow>& windows,
+    const std::vector<ServoSet>& sets, int threads, bool torques) {
+  ServoMotion motion;
+  {
+    const py::gil_scoped_release unlocked;
+    motion = simulate_servos_apart(arm, paths, recordings, windows, sets, threads, torques);
+  }
+  return {std::move(motion.position), std::move(motion.torque)};
+}
+
 using Sums = std::tuple<Eigen::MatrixXd, Eigen::VectorXd, double, double>;
 
 std::vector<ColumnGain> ranked(const std::vector<Sums>& given, const std::vector<int>& always,
@@ -124,13 +136,21 @@ void bind_servo(py::module_& m) {
            }),
            py::arg("recording"), py::arg("first"), py::arg("rows"));
   py::class_<ServoSet>(m, "ServoSet", "Values of the chain of every joint, shape=(joints, fields).")
-      .def(py::init([](Eigen::MatrixXd chain, double weight_scale, int bodies, const std::vector<Function>& functions) {
-             ServoSet out{std::move(chain), weight_scale, bodies, {}};
+      .def(py::init([](Eigen::MatrixXd chain, double weight_scale, int bodies, const std::vector<Function>& functions,
+                       int only) {
+             ServoSet out{std::move(chain), weight_scale, bodies, only, {}};
              for (const Function& one : functions) out.functions.push_back(function_of(one));
              return out;
            }),
            py::arg("chain"), py::arg("weight_scale") = 1.0, py::arg("bodies") = -1,
-           py::arg("functions") = std::vector<Function>{});
+           py::arg("functions") = std::vector<Function>{}, py::arg("only") = -1);
+  py::class_<ServoPath>(m, "ServoPath", "What each joint feels along a recorded motion of the others.")
+      .def(py::init([](Eigen::MatrixXd inertia, Eigen::MatrixXd bias, Eigen::MatrixXd cosine, Eigen::MatrixXd sine,
+                       Eigen::VectorXd turns) {
+             return ServoPath{std::move(inertia), std::move(bias), std::move(cosine), std::move(sine),
+                              std::move(turns)};
+           }),
+           py::arg("inertia"), py::arg("bias"), py::arg("cosine"), py::arg("sine"), py::arg("turns"));
   m.def("servo_fields", &servo_fields, "Names of the columns of ServoSet's chain.");
   m.def("servo_inputs", &servo_inputs, "Names of what a torque added at a joint may be a function of.");
   m.def("simulate_servos", &simulate, py::arg("calls"), py::arg("workspaces"), py::arg("arm"), py::arg("bodies"),
@@ -139,6 +159,12 @@ void bind_servo(py::module_& m) {
 
 calls, workspaces: addresses of the simulator's functions, and of each thread's model, data and arrays, which must live
 as long as the call takes. Raises InputError: shapes that do not fit, addresses that are missing.)");
+  m.def("simulate_servos_apart", &simulate_apart, py::arg("arm"), py::arg("paths"), py::arg("recordings"),
+        py::arg("windows"), py::arg("sets"), py::arg("threads") = 1, py::arg("torques") = false,
+        R"(As simulate_servos, joint by joint along the measured motion of the others, without a simulator.
+
+paths: of every kind of masses, those of every recording; a set's `bodies` is the number of its kind. Raises InputError:
+shapes that do not fit, masses without paths.)");
   py::class_<ColumnGain>(m, "ColumnGain", "What adding a candidate's columns would win.")
       .def_readonly("score", &ColumnGain::score, "Log Bayes factor less the candidate's cost [nats].")
       .def_readonly("scale", &ColumnGain::scale, "Of the prior, the most likely one.")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.servo import PARAMETERS, ServoDiagnosis, servo_diagnose, servo_dict
+from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.api import Prepared, prepare
 from truing.dynamics.servo.fit import Fitter, rows_of
 from truing.dynamics.servo.free import Sizes, free_value
@@ -124,6 +125,94 @@ def test_a_set_leaves_nothing_behind_for_the_next(file: Path) -> None:
     beside = Simulator(of.arm, of.data, 1).run([heavy, point, heavy, point], of.windows)[0]
     assert np.array_equal(alone, beside[1]) and np.array_equal(alone, beside[3])
     assert np.abs(beside[0] - alone).max() > 0.02
+
+
+TWO = """<mujoco>
+  <worldbody>
+    <body name="upper" pos="0 0 1">
+      <joint name="shoulder" axis="0 1 0" damping="0.1" frictionloss="0.02" armature="0.06"/>
+      <inertial pos="0.02 0 -0.1" mass="0.4" diaginertia="4e-4 4e-4 1e-4"/>
+      <body name="fore" pos="0 0 -0.2">
+        <joint name="elbow" axis="0 1 0" damping="0.05" frictionloss="0.02" armature="0.03"/>
+        <inertial pos="0 0.01 -0.08" mass="0.2" diaginertia="1e-4 1e-4 1e-4"/>
+        <body name="slider">
+          <joint name="rail" type="slide" axis="0.6 0 0.8" damping="5" frictionloss="0.1" armature="1"/>
+          <inertial pos="0 0 -0.05" mass="0.1" diaginertia="1e-5 1e-5 1e-5"/>
+          <site name="tool" pos="0 0 -0.1"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><position joint="shoulder" kp="6"/><position joint="elbow" kp="4"/>
+    <position joint="rail" kp="300"/></actuator>
+</mujoco>
+"""
+
+
+def moved_by_itself(tmp_path: Path) -> tuple[Path, list[_core.Recording]]:
+    """Three joints under commands, as the simulator moves the whole arm."""
+    file = tmp_path / "two.xml"
+    file.write_text(TWO, encoding="utf-8")
+    command = np.column_stack([commands(0), commands(2), 0.05 * commands(4)])
+    rest = recording("r", command * np.minimum(1.0, np.arange(len(command)) / 40.0)[:, None], 0.0 * command)
+    motion = rest
+    for _ in range(2):  # begins where it is from the second time on
+        of = prepare(file, [motion], window=np.inf)
+        moved = of.simulator.run([point_of(of.arm.nominal)], of.windows)[0][0]
+        motion = rest.replace(position=np.concatenate([motion.position[:1], moved]))
+    return file, [motion]
+
+
+def test_joints_apart_move_as_the_whole_arm_does(tmp_path: Path) -> None:
+    file, recordings = moved_by_itself(tmp_path)
+    of = prepare(file, recordings, window=np.inf)
+    apart, point = Apart(of.simulator), point_of(of.arm.nominal)
+    whole = of.simulator.run([point], of.windows)[0][0]
+    one = apart.run([point], of.windows)[0][0]
+    assert (np.std(whole - one, axis=0) < 0.02 * np.std(whole, axis=0)).all()
+
+
+def test_masses_do_to_a_joint_apart_what_they_do_to_the_arm(file: Path) -> None:
+    """Of one joint, which is apart by itself."""
+    of = prepared_of(file, recordings_of(file))
+    apart, point = Apart(of.simulator), point_of(of.arm.nominal)
+    whole = of.simulator.run([point], of.windows)[0][0]
+    one = apart.run([point], of.windows)[0][0]
+    assert np.abs(whole - one).max() < 2e-3
+    for other in (
+        replace(point, weight=1.3),
+        replace(point, payload=0.1),
+        replace(point, links=(("arm", 1.4),)),
+    ):
+        change = of.simulator.run([other], of.windows)[0][0] - whole
+        alone = apart.run([other], of.windows)[0][0] - one
+        assert np.linalg.norm(alone - change) < 0.05 * np.linalg.norm(change)
+
+
+def test_one_joint_alone_is_the_same_joint(tmp_path: Path) -> None:
+    file, recordings = moved_by_itself(tmp_path)
+    of = prepare(file, recordings, window=np.inf)
+    point = point_of(of.arm.nominal).with_value(1, "load_friction", 0.2)
+    apart = Apart(of.simulator)
+    every, alone = apart.run([point], of.windows)[0][0], apart.run([point], of.windows, only=1)[0][0]
+    assert np.array_equal(every[:, 1], alone[:, 1]) and not alone[:, 0].any()
+
+
+def test_an_anchor_makes_errors_those_of_the_whole_arm(tmp_path: Path) -> None:
+    file, recordings = moved_by_itself(tmp_path)
+    of = prepare(file, recordings, window=np.inf)
+    rows = rows_of(of.data, of.windows)
+    fitter = Fitter(Apart(of.simulator), rows)
+    point = point_of(of.arm.nominal).with_value(0, "command_gain", 5.0)
+    fitter.anchor(point)
+    whole = rows.measured - of.simulator.run([point], of.windows)[0][0]
+    assert np.abs(fitter.errors(fitter.motions([point])[0]) - whole).max() < 1e-9
+
+
+def test_a_payload_hangs_at_the_tool(tmp_path: Path) -> None:
+    file, recordings = moved_by_itself(tmp_path)
+    chain = prepare(file, recordings, window=np.inf).arm.nominal
+    assert (chain.payload_body, chain.payload_place) == ("slider", (0.0, 0.0, -0.1))
 
 
 def test_columns_are_the_differences_of_whole_simulations(file: Path) -> None:

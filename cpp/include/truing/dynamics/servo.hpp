@@ -116,6 +116,7 @@ struct ServoSet {
   Eigen::MatrixXd chain;  ///< shape=(joints, kServoFields)
   double weight_scale = 1.0;
   int bodies = -1;  ///< number of its ServoBodies; -1: the model's
+  int only = -1;    ///< of joints apart: the one that is moved, the others' numbers are zero; -1: all
   std::vector<ServoFunction> functions;
 };
 
@@ -125,12 +126,29 @@ struct ServoMotion {
   std::vector<Eigen::MatrixXd> torque;    ///< the same [Nm | N], if asked for
 };
 
+/// What each joint of an arm feels along a recorded motion while the others move as was measured: shape=(n, joints),
+/// rows as the recording's. With x the joint's angle less the recorded one, `turns` 1 for a hinge and 0 for a slide,
+///   inertia qdd + bias + weight_scale (cosine cos(turns x) + sine sin(turns x)) - cosine = torque.
+struct ServoPath {
+  Eigen::MatrixXd inertia;       ///< of what the joint moves, without its rotor [kg m^2 | kg]
+  Eigen::MatrixXd bias;          ///< all else along the recorded motion, weight included [Nm | N]
+  Eigen::MatrixXd cosine, sine;  ///< weight, as the joint alone leaves the recorded motion [Nm | N]
+  Eigen::VectorXd turns;
+};
+
 /// Simulates every set over every window, one workspace a thread. What leaves (not finite, or 1e3 rad from where it
 /// began) stays there. The same numbers whatever the number of workspaces. Throws std::invalid_argument: tables of
 /// other shapes, windows beyond their recordings.
 ServoMotion simulate_servos(const ServoCalls& calls, const std::vector<ServoWorkspace>& workspaces, const ServoArm& arm,
                             const std::vector<ServoBodies>& bodies, const std::vector<ServoRecording>& recordings,
                             const std::vector<ServoWindow>& windows, const std::vector<ServoSet>& sets, bool torques);
+
+/// The same joint by joint, each along the measured motion of the others: no simulator is called. `paths`: of every
+/// kind of masses, those of every recording; a set's `bodies` is the number of its kind.
+ServoMotion simulate_servos_apart(const ServoArm& arm, const std::vector<std::vector<ServoPath>>& paths,
+                                  const std::vector<ServoRecording>& recordings,
+                                  const std::vector<ServoWindow>& windows, const std::vector<ServoSet>& sets,
+                                  int threads, bool torques);
 
 /// Normal equations of one fold: rows that are fitted or left out together.
 struct ColumnSums {

@@ -186,7 +186,16 @@ class _Reader:
             prismatic=tuple(bool(m.jnt_type[j] == _SLIDE) for j in self.joints),
             drives=tuple(self._drive(j) for j in self.joints),
             payload_body=bodies[-1],
+            payload_place=self._payload_place(bodies[-1]),
         )
+
+    def _payload_place(self, body: str) -> tuple[float, float, float]:
+        """The body's last site, a tool's as a rule, or its centre: at the joint's axis a mass is idle."""
+        m = self.m
+        b = next(b for b in range(1, m.nbody) if self._body(b) == body)
+        sites = [k for k in range(m.nsite) if m.site_bodyid[k] == b]
+        place = m.site_pos[sites[-1]] if sites else m.body_ipos[b]
+        return float(place[0]), float(place[1]), float(place[2])
 
     def _drive(self, j: int) -> ServoJoint:
         m = self.m

@@ -5,15 +5,17 @@ perturbations, Levenberg's damping, priors and bounds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.data import ServoData, Window
 from truing.dynamics.servo.free import Free, moved
-from truing.dynamics.servo.simulator import Point, Simulator
+from truing.dynamics.servo.simulator import FIELDS, Point, Simulator
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -21,6 +23,8 @@ Progress = Callable[[str], None]
 _DAMPINGS = (0.0, 0.03, 0.3, 3.0)  # Levenberg's, of the diagonal: all are tried at once, the best is taken
 _LONGER = (2.0, 4.0)  # times the step of the second: along curved valleys
 _LAST = 2e-3  # relative fall of the cost at which a fit ends
+_ANCHORS = 3
+_AGREES = 0.02  # of the rms error: what the anchor may still change
 _LEFT = 3.0  # [rad] an error that is cut: what has left pulls no more than this
 _LAGS = 400  # rows: longest correlation that is summed
 
@@ -96,19 +100,70 @@ class Fitted:
 
 
 class Fitter:
-    """Fits of chains to the rows of some windows."""
+    """Fits of chains to the rows of some windows. simulator: `Apart`: what the whole arm does otherwise is
+    added as it is at the last `anchor` (space mapping, Bandler 1994)."""
 
-    def __init__(self, simulator: Simulator, rows: Rows, progress: Progress | None = None) -> None:
+    def __init__(self, simulator: Simulator | Apart, rows: Rows, progress: Progress | None = None) -> None:
         self.simulator, self.rows = simulator, rows
         self.progress = progress or (lambda text: None)
         self.runs = 0  # simulated chains
+        self._only: tuple[int, Floats] | None = None
+        self.other: Floats = np.zeros_like(rows.measured)  # of the whole arm, less that of joints apart
 
     def motions(self, points: Sequence[Point]) -> list[Floats]:
         self.runs += len(points)
-        return self.simulator.run(points, self.rows.windows)[0]
+        if self._only is None or not isinstance(self.simulator, Apart):
+            return self.simulator.run(points, self.rows.windows)[0]
+        joint, motion = self._only
+        found = self.simulator.run(points, self.rows.windows, only=joint)[0]
+        out = [motion.copy() for _ in found]
+        for one, moved_joint in zip(out, found, strict=True):
+            one[:, joint] = moved_joint[:, joint]
+        return out
+
+    @contextlib.contextmanager
+    def only(self, joint: int, fitted: Fitted) -> Iterator[None]:
+        """Meanwhile this joint alone is simulated, if joints are apart: the others stay as they were fitted.
+        A supply that sags by all joints' torques needs them all."""
+        sags = np.any(fitted.point.chain[:, FIELDS.index("supply_sag")] != 0.0)
+        if joint >= 0 and not sags and self.rows.measured.shape[1] > 1:
+            self._only = joint, self.rows.measured - self.other - fitted.errors
+        try:
+            yield
+        finally:
+            self._only = None
 
     def errors(self, motion: Floats) -> Floats:
-        return np.clip(self.rows.measured - motion, -_LEFT, _LEFT)
+        return np.clip(self.rows.measured - self.other - motion, -_LEFT, _LEFT)
+
+    def anchor(self, point: Point) -> None:
+        """From here on errors at this point are the whole arm's."""
+        if isinstance(self.simulator, Apart):
+            whole = self.simulator.whole.run([point], self.rows.windows)[0][0]
+            self.other = np.clip(whole - self.motions([point])[0], -_LEFT, _LEFT)
+
+    def settled(
+        self,
+        point: Point,
+        free: Sequence[Free],
+        start: Floats,
+        noise: Noise | None,
+        rounds: int,
+        doing: str = "",
+    ) -> Fitted:
+        """`fit` by joints apart, anchored anew where it ends, as long as the whole arm's errors fall."""
+        self.anchor(point)
+        best = self.fit(point, free, start, noise, rounds, doing)
+        for _ in range(_ANCHORS):
+            before = self.other
+            self.anchor(best.point)
+            errors, columns = self.columns(best.point, free)
+            here = self.cost(errors, best.point, free, start, best.noise)
+            best = Fitted(best.point, list(free), start, errors, columns, best.noise, here)
+            if np.sqrt(np.mean((self.other - before) ** 2)) < _AGREES * np.sqrt(np.mean(errors**2)):
+                break
+            best = self.fit(best.point, free, start, noise, 2, doing)
+        return best
 
     def columns(self, point: Point, free: Sequence[Free], exact: bool = False) -> tuple[Floats, Floats]:
         """Errors of the point, and the change of the position with each value on its scale.

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.data import ServoData, Window
 from truing.dynamics.servo.fit import Fitted, Fitter, Rows, rows_of
 from truing.dynamics.servo.free import Sizes, usual_values
@@ -24,7 +25,7 @@ _WIDE = np.exp(np.arange(-4.0, 2.1, 1.5))  # the same of friction and rotors
 _FINE = np.exp(np.array([-0.7, -0.35, 0.35, 0.7]))
 
 
-def sizes_of(simulator: Simulator, point: Point, windows: Sequence[Window]) -> Sizes:
+def sizes_of(simulator: Simulator | Apart, point: Point, windows: Sequence[Window]) -> Sizes:
     """What is usual at each joint, of a simulation of it and of the recordings."""
     data = simulator.data
     speeds = [s.speed for s in data.streams]
@@ -49,14 +50,14 @@ def _moving_rms(speed: Floats) -> float:
     return float(np.sqrt(np.mean(speed[moving] ** 2))) if moving.any() else 0.0
 
 
-def _inertia(simulator: Simulator, point: Point) -> Floats:
+def _inertia(simulator: Simulator | Apart, point: Point) -> Floats:
     """Of everything that each joint moves, at the file's zero."""
     m = simulator.model
     bodies = np.asarray(m.dof_M0, dtype=float)[simulator.dofs] - np.asarray(m.dof_armature)[simulator.dofs]
     return np.asarray(np.maximum(bodies, 0.0) + point.chain[:, FIELDS.index("armature")])
 
 
-def first_guess(simulator: Simulator, rows: Rows, point: Point, torque_command: bool) -> Point:
+def first_guess(simulator: Simulator | Apart, rows: Rows, point: Point, torque_command: bool) -> Point:
     """Joint by joint the best of wide steps in gain, damping, friction and rotor: a file may be off by
     hundreds, where no derivative leads back. All joints are changed at once: they hardly see each other."""
     every = max(1, len(rows.windows) // _SCANNED)
@@ -89,4 +90,4 @@ def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted,
     sizes = sizes_of(simulator, point, fitter.rows.windows)
     free = usual_values(simulator.arm.nominal, sizes, data.torque_command)
     start = np.array([f.at(point) for f in free])
-    return fitter.fit(point, free, start, None, _ROUNDS, "groundwork"), sizes
+    return fitter.settled(point, free, start, None, _ROUNDS, "groundwork"), sizes

@@ -92,7 +92,7 @@ class Simulator:
         self._spaces = [_addresses(m, d) for m, d in zip(self._models, self._datas, strict=True)]
         self._calls = _functions(mujoco)
         joints = [self.model.joint(name) for name in arm.nominal.joints]
-        self._arm = _core.ServoArm(
+        self.core_arm = _core.ServoArm(
             [int(joint.qposadr[0]) for joint in joints],
             [int(joint.dofadr[0]) for joint in joints],
             data.step,
@@ -100,7 +100,7 @@ class Simulator:
             np.array(self.model.opt.gravity),
             data.torque_command,
         )
-        self._recordings = [
+        self.core_recordings = [
             _core.ServoRecording(s.step, s.command, s.smooth, s.speed, s.gain, s.supply, s.enabled, s.warmth)
             for s in data.streams
         ]
@@ -126,7 +126,14 @@ class Simulator:
                 some = [_core.ServoWindow(w.stream, w.first, w.rows) for w in batch]
                 parts.append(
                     _core.simulate_servos(
-                        self._calls, self._spaces, self._arm, bodies, self._recordings, some, sets, torques
+                        self._calls,
+                        self._spaces,
+                        self.core_arm,
+                        bodies,
+                        self.core_recordings,
+                        some,
+                        sets,
+                        torques,
                     )
                 )
                 if heard is not None:
@@ -180,6 +187,15 @@ class Simulator:
             b = self.last_body
             self._add_point_mass(b, point.payload, np.array(point.place), mass, ipos, iquat, inertia)
         return mass, ipos.ravel(), iquat.ravel(), inertia.ravel()
+
+    def with_masses(self, point: Point) -> Any:
+        """A model of its own with the masses of a point."""
+        m = copy.copy(self.model)
+        mass, ipos, iquat, inertia = self.masses(point)
+        m.body_mass[:], m.body_ipos[:] = mass, ipos.reshape(-1, 3)
+        m.body_iquat[:], m.body_inertia[:] = iquat.reshape(-1, 4), inertia.reshape(-1, 3)
+        self.mujoco.mj_setConst(m, self.mujoco.MjData(m))
+        return m
 
     def _add_point_mass(
         self,

@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joints simulated apart, each along the measured motion of the others: the same chain, 15 times faster and
+more than the simulator moves the whole arm. The search looks here; the simulator judges what it finds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.dynamics.servo.data import Stream, Window
+from truing.dynamics.servo.simulator import Point, Simulator
+from truing.dynamics.smoothing import cubics, rows_within
+
+Floats = NDArray[np.float64]
+Tables = tuple[Floats, Floats, Floats, Floats]
+"""Inertia, bias, weight by cosine and sine of a joint's own turn: `ServoPath`. shape=(n, joints)"""
+
+_SMOOTHING = 0.03  # [s] on both sides, of accelerations: they are needed of the other joints alone
+_SLIDE = 2  # mjtJoint
+
+
+class Apart:
+    """An arm's joints along recordings; has what of a `Simulator` fits and searches use."""
+
+    def __init__(self, simulator: Simulator) -> None:
+        self.whole = simulator
+        self.data, self.arm, self.model = simulator.data, simulator.arm, simulator.model
+        self.dofs = simulator.dofs
+        names = simulator.arm.nominal.joints
+        self._joints = np.array([simulator.model.joint(name).id for name in names])
+        self._turns = np.asarray(self.model.jnt_type)[self._joints] != _SLIDE
+        self._moved = _descendants(self.model, np.asarray(self.model.jnt_bodyid)[self._joints])
+        self._paths: dict[tuple[object, ...], list[_core.ServoPath]] = {}
+        self._known: dict[str, list[Tables]] = {}
+
+    def run(
+        self, points: Sequence[Point], windows: Sequence[Window], torques: bool = False, only: int = -1
+    ) -> tuple[list[Floats], list[Floats]]:
+        """As `Simulator.run`. only: the joint that is moved, where the others do not matter; -1: all."""
+        kinds: dict[tuple[object, ...], int] = {}
+        for p in points:
+            kinds.setdefault(_masses(p), len(kinds))
+        paths = [self._path(p) for p in {_masses(p): p for p in points}.values()]
+        sets = [_core.ServoSet(p.chain, p.weight, kinds[_masses(p)], list(p.functions), only) for p in points]
+        some = [_core.ServoWindow(w.stream, w.first, w.rows) for w in windows]
+        whole = self.whole
+        return _core.simulate_servos_apart(
+            whole.core_arm, paths, whole.core_recordings, some, sets, whole.threads, torques
+        )
+
+    # ---- what the joints feel
+
+    def _path(self, point: Point) -> list[_core.ServoPath]:
+        """Of every recording. Torques are linear in masses: others than the model's add what one does."""
+        key = _masses(point)
+        if key not in self._paths:
+            tables = self._tables("", Point(point.chain))
+            for body, scale in point.links:
+                tables = _more(
+                    tables,
+                    self._tables(f"link {body}", Point(point.chain, links=((body, 2.0),))),
+                    scale - 1.0,
+                )
+            if point.payload:
+                one = Point(point.chain, payload=1.0, place=point.place)
+                tables = _more(tables, self._tables("payload", one), point.payload)
+            turns = self._turns.astype(float)
+            self._paths[key] = [_core.ServoPath(*t, turns) for t in tables]
+            if len(self._paths) > 40:  # of fits of masses, which come by once
+                self._paths.pop(next(iter(self._paths)))
+        return self._paths[key]
+
+    def _tables(self, name: str, point: Point) -> list[Tables]:
+        """Of the model's masses (""), or what one further unit of a mass adds to these."""
+        if name not in self._known:
+            found = [self._along(stream, point) for stream in self.data.streams]
+            if name:
+                found = _more(found, self._tables("", Point(point.chain)), -1.0)
+            self._known[name] = found
+        return self._known[name]
+
+    def _along(self, stream: Stream, point: Point) -> Tables:
+        """Newton and Euler along a recording (Luh et al. 1980), without the joint's own acceleration."""
+        m, mujoco = self.whole.with_masses(point), self.whole.mujoco
+        d = mujoco.MjData(m)
+        n, rows = self._joints.size, stream.time.size
+        acceleration = cubics(stream.speed, rows_within(_SMOOTHING, stream.step), stream.step)[1]
+        places = np.asarray(m.jnt_qposadr)[self._joints]
+        torque, one = np.empty((rows, n)), np.empty(m.nv)
+        axes, anchors = np.empty((rows, n, 3)), np.empty((rows, n, 3))
+        centres, turns = np.empty((rows, m.nbody, 3)), np.empty((rows, m.nbody, 9))
+        for k in range(rows):
+            d.qpos[places], d.qvel[self.dofs] = stream.smooth[k], stream.speed[k]
+            d.qacc[self.dofs] = acceleration[k]
+            mujoco.mj_kinematics(m, d)
+            mujoco.mj_comPos(m, d)
+            mujoco.mj_comVel(m, d)
+            mujoco.mj_rne(m, d, 1, one)
+            torque[k] = one[self.dofs]
+            axes[k], anchors[k] = d.xaxis[self._joints], d.xanchor[self._joints]
+            centres[k], turns[k] = d.xipos, d.ximat
+        turned = turns.reshape(rows, m.nbody, 3, 3)
+        inertia, cosine, sine = np.empty((rows, n)), np.zeros((rows, n)), np.zeros((rows, n))
+        gravity = np.asarray(m.opt.gravity)
+        mass, floats = np.asarray(m.body_mass), 1.0 - np.asarray(m.body_gravcomp)
+        for j in range(n):
+            axis, moved = axes[:, j], self._moved[j]
+            if not self._turns[j]:
+                inertia[:, j] = mass[moved].sum()
+                cosine[:, j] = -axis @ gravity * np.sum((mass * floats)[moved])
+                torque[:, j] += axis @ gravity * np.sum((mass * (1.0 - floats))[moved])
+                continue
+            arm = centres[:, moved] - anchors[:, None, j]
+            swept = np.cross(axis[:, None], arm)
+            own = np.einsum("ki,kbij->kbj", axis, turned[:, moved])
+            about = np.sum(own**2 * np.asarray(m.body_inertia)[moved], axis=2)
+            inertia[:, j] = np.sum(about + mass[moved] * np.sum(swept**2, axis=2), axis=1)
+            heavy = np.einsum("kbi,b->ki", swept, (mass * floats)[moved])
+            cosine[:, j] = -heavy @ gravity
+            torque[:, j] += np.einsum("kbi,b,i->k", swept, (mass * (1.0 - floats))[moved], gravity)
+            sine[:, j] = -np.cross(axis, heavy) @ gravity
+        return inertia, torque - inertia * acceleration, cosine, sine
+
+
+def _masses(point: Point) -> tuple[object, ...]:
+    links = tuple((body, scale) for body, scale in point.links if scale != 1.0)
+    return (point.payload, point.place if point.payload else None, links)
+
+
+def _more(tables: Sequence[Tables], others: Sequence[Tables], times: float) -> list[Tables]:
+    out = []
+    for (a, b, c, d), (e, f, g, h) in zip(tables, others, strict=True):
+        out.append((a + times * e, b + times * f, c + times * g, d + times * h))
+    return out
+
+
+def _descendants(model: object, bodies: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """All bodies that each of some bodies carries, itself among them."""
+    parents = np.asarray(model.body_parentid)  # type: ignore[attr-defined]
+    out = []
+    for body in bodies:
+        carried = np.zeros(parents.size, dtype=bool)
+        carried[body] = True
+        for b in range(int(body) + 1, parents.size):
+            carried[b] = carried[parents[b]]
+        out.append(np.flatnonzero(carried))
+    return out
