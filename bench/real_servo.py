@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from servo_replay import Usual, as_published, ask_sysid, firmware_scale, of_file
 
 import truing
 from truing.dynamics import Recording, load_recordings
+from truing.dynamics.servo import servo_diagnose
 
 ROOT = Path(__file__).resolve().parent.parent
 START, END = "<!-- table -->", "<!-- end -->"
@@ -56,6 +58,7 @@ def xl330(folder: Path, sysid: Path) -> list[str]:
     command = np.concatenate([r.command - r.position for r in test])
     lines.append(f"| the command taken as the response | {degrees(command)[0]:.2f} | |")
     lines.append(f"| the MJCF | {judged(file, of_file(file, ['q1']), test):.2f} | |")
+    lines += by_truing(file, recordings, test)
     answer = ask_sysid(sysid, sysid_task(file, ["q1"], train, XL330_REFERENCE))
     if isinstance(answer, str):
         return [*lines, f"| mujoco.sysid, gain, damping, dry friction, rotor | {answer} | |", ""]
@@ -66,6 +69,23 @@ def xl330(folder: Path, sysid: Path) -> list[str]:
         f" | {judged(file, theirs, test):.2f} | {answer['processor_seconds']:.1f} |"
     )
     return [*lines, ""]
+
+
+def by_truing(file: Path, recordings: Sequence[Recording], test: Sequence[Recording]) -> list[str]:
+    """Its usual parameters, replayed as the peer's; and what it names, in its own simulation."""
+    begun = time.process_time()
+    found = servo_diagnose(file, list(recordings))
+    seconds = time.process_time() - begun
+    drive, chain = found.chains["standard"].drives[0], found.chains["standard"]
+    law = (XL330_REFERENCE / chain.gain_reference) ** drive.gain_law
+    values = (drive.command_gain * law, drive.viscous, drive.coulomb, drive.armature, drive.zero)
+    usual = Usual(*(np.array([value]) for value in values))
+    named = [f"{e.effect} ({e.probability:.2f})" for e in found.effects if not e.standard]
+    error = float(np.degrees(found.rollout.errors["named"][0, -1]))
+    return [
+        f"| truing, gain, damping, dry friction, rotor, zero | {judged(file, usual, test):.2f} | |",
+        f"| truing, and what it names: {', '.join(named) or 'nothing'} | {error:.2f} | {seconds:.1f} |",
+    ]
 
 
 def so101(folder: Path) -> list[str]:

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.arm import ServoArm, servo_arm
 from truing.dynamics.servo.data import ServoData, Window, servo_data, windows_of
 from truing.dynamics.servo.fit import Fitted, Fitter, rows_of
 from truing.dynamics.servo.free import USUAL
 from truing.dynamics.servo.ground import groundwork
 from truing.dynamics.servo.judge import judged, traces_of
-from truing.dynamics.servo.naming import Account, Namer, sureness, unknown
+from truing.dynamics.servo.naming import Account, Namer, late, sureness, unknown
 from truing.dynamics.servo.result import ServoDiagnosis
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, point_of
 from truing.dynamics.servo.words import Parts, diagnosis_of
@@ -124,7 +125,8 @@ def servo_diagnose(
         robot, recordings, joints=joints, window=window, test_share=test_share, threads=threads
     )
     nominal = point_of(prepared.arm.nominal)
-    fitter = Fitter(prepared.simulator, rows_of(prepared.data, prepared.train), progress)
+    apart = Apart(prepared.simulator)
+    fitter = Fitter(apart, rows_of(prepared.data, prepared.train), progress)
     standard, sizes = groundwork(fitter, nominal, prepared.data)
     namer = Namer(fitter, leave_out, max_effects)
     account = namer.run(standard, sizes, nominal)
@@ -149,6 +151,7 @@ def servo_diagnose(
         held,
         rows,
         prepared.arm.notes,
+        late(namer, account),
     )
     return diagnosis_of(parts, time.perf_counter() - begun)
 

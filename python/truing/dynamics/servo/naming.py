@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.servo.candidates import Candidate, candidate_columns, candidates_of
+from truing.dynamics.servo.chain import PARAMETERS
 from truing.dynamics.servo.fit import Fitted, Fitter, Noise, noise_of
-from truing.dynamics.servo.free import Free, Sizes
+from truing.dynamics.servo.free import USUAL, Free, Sizes, moved
 from truing.dynamics.servo.simulator import Function, Point
 
 Floats = NDArray[np.float64]
@@ -28,8 +29,16 @@ OTHER_LAWS = 0.2  # part of a joint's error that other laws than the catalogue's
 NAMED = 0.2  # what is less sure is fitted, and not named
 UNKNOWN = 0.5  # so sure at least must be that there is what nobody knows
 _CLASS_NATS, _CLASS_R2, _SAME_R2, _TEMPERED, _FAR_NATS = 6.0, 0.95, 0.5, 0.5, 25.0
+_LATE_R2 = 0.95  # of a delay, that damping and the others do as well: these are one class
 _ONE_RECORDING = 0.9  # the most that folds of one recording are worth
-_REFITTED = 3  # of the candidates, without linearisation
+_REFITTED = 6  # of the candidates, without linearisation
+_FIRST_ROUNDS, _MORE_ROUNDS = 2, 4  # of a refit: from each start, from the best of these
+_WIDE = (0.5, 2.0)  # of a prior: sizes that a candidate is looked at
+_FRICTIONS = (1.0, 0.4, 0.05)  # times the dry friction that stands beside it
+_OF_INPUTS = ("gain_law", "thermal_friction", "supply_gain", "warmup")
+_LEAST_GROUPS = 3
+_BETTER = 3.0  # nats: of a name that takes another's place
+_FARTHEST = 0.6  # of a prior: that derivatives are followed
 _RESOLUTION = 0.3  # of the usual step between distinct readings: no error is smaller
 _MOST_ROWS = 15000  # of which sums are made; more are thinned
 _LEAST_UNKNOWN = 0.05  # as LEAST_GAIN, of free functions
@@ -90,6 +99,7 @@ class Namer:
         self.data, self.arm = fitter.simulator.data, fitter.simulator.arm
         self.joints = len(self.arm.nominal.joints)
         self.resolution = _resolution(fitter)
+        self.groups = _groups_of_inputs(self)
 
     # ---- ranking
 
@@ -107,6 +117,7 @@ class Namer:
         more: Sequence[Floats],
         errors: Floats | None = None,
         noise: Noise | None = None,
+        folds_of_rows: NDArray[np.intp] | None = None,
     ) -> Sums:
         """Noise is what all columns together leave; rows count for as many as their noise goes on for."""
         rows = self.fitter.rows
@@ -116,13 +127,14 @@ class Namer:
         noise = noise or self._noise(table, errors, len(fitted.columns))
         x = (table[:, ::every] * noise.weight).reshape(len(table), -1)
         y = (errors[::every] * noise.weight).ravel()
-        fold = np.repeat(rows.fold[::every], self.joints)
+        which = rows.fold if folds_of_rows is None else folds_of_rows
+        fold = np.repeat(which[::every], self.joints)
         folds = []
         count = float(np.sum(1.0 / noise.effect))
         for number in np.unique(fold):
             at = fold == number
             part, right = x[:, at] * math.sqrt(every), y[at] * math.sqrt(every)
-            here = float(np.sum(rows.fold == number)) * count
+            here = float(np.sum(which == number)) * count
             folds.append((part @ part.T, part @ right, float(right @ right), here))
         return Sums(folds, len(fitted.columns), noise)
 
@@ -161,12 +173,20 @@ class Namer:
         whole = float((before - after).sum() / before.sum())
         return whole > least / self.joints and bool(nats > SURE_NATS or roots.mean() > SURE_GAIN * error)
 
-    def folds_of(self, fitted: Fitted, noise: Noise) -> Floats:
+    def folds_of(self, fitted: Fitted, noise: Noise, folds_of_rows: NDArray[np.intp] | None = None) -> Floats:
         """Squares of each fold, by the fit to the others, linear at the fit."""
-        sums = self.sums(fitted, [], None, noise)
+        sums = self.sums(fitted, [], None, noise, folds_of_rows)
         return np.asarray(
             _core.rank_columns(sums.folds, list(range(sums.always)), [], [], _priors(fitted))[0].folds
         )
+
+    def carries(self, one: Candidate, before: Fitted, after: Fitted, noise: Noise) -> bool:
+        """Whether what goes with an input that changes from recording to recording predicts values of it that
+        were not fitted: recordings of one value (of several inputs that rose together) are one fold."""
+        if self.groups is None or one.free[0].field not in _OF_INPUTS:
+            return True
+        folds = [self.folds_of(fitted, noise, self.groups) for fitted in (before, after)]
+        return bool(folds[0].sum() - folds[1].sum() > LEAST_GAIN / self.joints * folds[0].sum())
 
     # ---- the search
 
@@ -177,9 +197,33 @@ class Namer:
             self.fitter.progress(f"candidates beside {len(account.found)} that were named")
             if not self._round(account, refused):
                 break
+            self._question(account)
         while account.found and self._drop_idle(account):
             pass
         return account
+
+    def _question(self, account: Account) -> None:
+        """Looks again at every earlier name of the joint where one was taken: another may stand there now."""
+        joint = account.found[-1].joint
+        noise = self._noise(account.fitted.columns, account.fitted.errors, len(account.fitted.columns))
+        for at in [k for k, c in enumerate(account.found[:-1]) if c.joint == joint and joint >= 0]:
+            one, fitted = account.found[at], account.fitted
+            less = self.without(account, at, noise)
+            rest = Account(
+                less, [c for k, c in enumerate(account.found) if k != at], account.sizes, account.nominal
+            )
+            best, seen = self.best_beside(rest, set(), joint)
+            if not best or best[0][1].place == one.place:
+                continue
+            gain, other, refit = best[0]
+            new = self.fitter.cost(refit.errors, refit.point, refit.free, refit.start, seen)
+            old = self.fitter.cost(fitted.errors, fitted.point, fitted.free, fitted.start, seen)
+            if old - new > _BETTER:
+                self.fitter.progress(f"{other.effect} in the place of {one.effect} {' '.join(one.joints)}")
+                account.found[at] = other
+                account.found.append(account.found.pop(at))
+                account.fitted = self.polished(refit, seen)
+                return
 
     def _drop_idle(self, account: Account) -> bool:
         """Takes away what folds that were not fitted are predicted as well without; the others are weighed
@@ -203,62 +247,110 @@ class Namer:
         return False
 
     def _round(self, account: Account, refused: set[tuple[str, int]]) -> bool:
+        best, noise = self.best_beside(account, refused)
+        if not best:
+            return False
+        gain, one, refit = best[0]
+        self.fitter.progress(f"{one.effect} {' '.join(one.joints)} is taken")
+        account.found.append(one)
+        account.refits[f"{one.label} {one.joint}"] = [(other, gain - theirs) for theirs, other, _ in best[1:]]
+        account.fitted = self.polished(refit, noise)
+        refused.clear()
+        return True
+
+    def best_beside(
+        self, account: Account, refused: set[tuple[str, int]], joint: int | None = None
+    ) -> tuple[list[tuple[float, Candidate, Fitted]], Noise]:
+        """What may stand beside what was found, refitted, the best first. joint: only there."""
         fitted = account.fitted
         candidates, account.not_testable, base = self.all_candidates(fitted.point, account.sizes)
         there = {c.place for c in account.found}
         candidates = [c for c in candidates if c.place not in there and not self._fitted(fitted, c)]
         columns = candidate_columns(self.fitter, fitted.point, base, candidates)
         sums = self.sums(fitted, columns)
-        before, ranks = self.ranked(sums, *_groups(sums, fitted, candidates))
-        ranks.sort(key=lambda r: -r.score)
+        ranks = self.ranked(sums, *_groups(sums, fitted, candidates))[1]
+        starts = self.starts(fitted, candidates, sums.noise)
+        order = sorted(ranks, key=lambda r: -max(r.score, starts[r.candidate][0]))
         best: list[tuple[float, Candidate, Fitted]] = []
         seen: set[tuple[str, tuple[str, ...]]] = set()
-        for rank in ranks:
-            one = candidates[rank.candidate]
-            if rank.score < THRESHOLD or len(best) >= _REFITTED:
+        for rank in order:
+            one, (promised, start) = candidates[rank.candidate], starts[rank.candidate]
+            if max(rank.score, promised) < THRESHOLD or len(seen) >= _REFITTED:
                 break
             if one.place in seen or (one.label, one.joint) in refused:
                 continue
-            if not _plausible(one, rank, fitted.point):
+            if joint is not None and one.joint != joint:
+                continue
+            points = [start] if start is not None else []
+            if _plausible(one, rank, fitted.point):
+                points.append(_linear_start(one, rank, fitted.point))
+            if not points:
                 continue
             seen.add(one.place)
-            gain, refit = self._refit(fitted, one, rank, sums.noise)
+            joint_alone = -1 if one.free[0].field == "supply_sag" else one.joint
+            with self.fitter.only(joint_alone, fitted):
+                gain, refit = self._refit(fitted, one, points, sums.noise)
             after = self.folds_of(refit, sums.noise)
-            if gain > THRESHOLD and self.predicts(before, after, LEAST_GAIN, gain):
+            before = self.folds_of(fitted, sums.noise)
+            fine = gain > THRESHOLD and self.predicts(before, after, LEAST_GAIN, gain)
+            if fine and self.carries(one, fitted, refit, sums.noise):
                 best.append((gain, one, refit))
             else:
                 refused.add((one.label, one.joint))
-            if len(seen) >= 2 * _REFITTED:
-                break
-        if not best:
-            return False
         best.sort(key=lambda b: -b[0])
-        gain, one, refit = best[0]
-        self.fitter.progress(f"{one.effect} {' '.join(one.joints)} is taken")
-        account.found.append(one)
-        account.refits[f"{one.label} {one.joint}"] = [(other, gain - theirs) for theirs, other, _ in best[1:]]
-        account.fitted = self.polished(refit, sums.noise)
-        refused.clear()
-        return True
+        return best, sums.noise
+
+    def starts(
+        self, fitted: Fitted, candidates: Sequence[Candidate], noise: Noise
+    ) -> list[tuple[float, Point | None]]:
+        """Of each candidate of a joint the best of wide steps in its size and in the friction beside it, with
+        what is fitted at the joint following as far as its derivatives reach: nats, and where it is."""
+        out: list[tuple[float, Point | None]] = [(-math.inf, None)] * len(candidates)
+        labels: dict[str, list[int]] = {}
+        for k, one in enumerate(candidates):
+            if one.joint >= 0:
+                labels.setdefault(one.label, []).append(k)
+        tried, points = [], []
+        for members in labels.values():
+            for number in range(len(_sizes(candidates[members[0]]))):
+                for friction in _FRICTIONS:
+                    changed = fitted.point
+                    for k in members:
+                        changed = _wide(candidates[k], changed, number, friction)
+                    points.append(changed)
+                    tried.append(members)
+        follows = {j: _Follow(fitted, j, noise) for j in {c.joint for c in candidates if c.joint >= 0}}
+        for members, point, motion in zip(tried, points, self.fitter.motions(points), strict=True):
+            errors = self.fitter.errors(motion)
+            for k in members:
+                follow = follows[candidates[k].joint]
+                gain, step = follow.gain(errors, point)
+                if gain > out[k][0]:
+                    out[k] = (gain, follow.moved(fitted.point, point, step))
+        return out
 
     def _fitted(self, fitted: Fitted, one: Candidate) -> bool:
         names = {(f.field, f.joint, f.body) for f in fitted.free}
         return any((f.field, f.joint, f.body) in names for f in one.free)
 
-    def _refit(self, fitted: Fitted, one: Candidate, rank: Rank, noise: Noise) -> tuple[float, Fitted]:
-        """The candidate and what is fitted at its joint, without linearisation: nats that it wins."""
+    def _refit(
+        self, fitted: Fitted, one: Candidate, points: Sequence[Point], noise: Noise
+    ) -> tuple[float, Fitted]:
+        """The candidate and what is fitted at its joint, without linearisation: nats that it wins. points:
+        where to begin."""
         before = self.fitter.cost(fitted.errors, fitted.point, fitted.free, fitted.start, noise)
-        point = one.on(fitted.point)
-        if one.begin is None:
-            new = one.free[0]
-            change = float(np.clip(rank.values[0], -new.prior, new.prior))
-            point = new.put(point, new.at(point) + change)
         mine = [k for k, f in enumerate(fitted.free) if one.joint < 0 or f.joint == one.joint or f.joint < 0]
         if one.joint < 0:
             mine = [k for k in mine if fitted.free[k].field in ("command_gain", "coulomb", "zero")]
         free = [*(fitted.free[k] for k in mine), *one.free]
-        start = np.array([*(fitted.start[k] for k in mine), *(_begin(f, one, point) for f in one.free)])
-        some = self.fitter.fit(point, free, start, noise, 3, f"{one.effect} {' '.join(one.joints)}")
+        doing = f"{one.effect} {' '.join(one.joints)}"
+        tries = []
+        for point in points:
+            start = np.array([*(fitted.start[k] for k in mine), *(_begin(f, one, point) for f in one.free)])
+            tries.append(self.fitter.fit(point, free, start, noise, _FIRST_ROUNDS, doing))
+        some = min(tries, key=lambda t: t.cost)
+        start = some.start
+        some = self.fitter.fit(some.point, free, start, noise, _MORE_ROUNDS, doing)
         others = [k for k in range(len(fitted.free)) if k not in mine]
         rest = [fitted.free[k] for k in others]
         starts = fitted.start[others]
@@ -271,7 +363,7 @@ class Namer:
         return before - after, some
 
     def polished(self, refit: Fitted, noise: Noise, rounds: int = 2) -> Fitted:
-        return self.fitter.fit(refit.point, refit.free, refit.start, noise, rounds, "all that is named")
+        return self.fitter.settled(refit.point, refit.free, refit.start, noise, rounds, "all that is named")
 
     def without(self, account: Account, at: int, noise: Noise) -> Fitted:
         """Everything but one of what was found, refitted at its joint."""
@@ -280,9 +372,10 @@ class Namer:
         keep = [k for k, f in enumerate(fitted.free) if (f.field, f.joint, f.body) not in drop]
         mine = [k for k in keep if one.joint < 0 or fitted.free[k].joint in (one.joint, -1)]
         point = one.off(fitted.point)
-        some = self.fitter.fit(
-            point, [fitted.free[k] for k in mine], fitted.start[mine], noise, 2, f"without {one.effect}"
-        )
+        with self.fitter.only(one.joint, fitted):
+            some = self.fitter.fit(
+                point, [fitted.free[k] for k in mine], fitted.start[mine], noise, 2, f"without {one.effect}"
+            )
         columns = fitted.columns.copy()
         columns[mine] = some.columns
         return replace(
@@ -293,6 +386,72 @@ class Namer:
             errors=some.errors,
             columns=columns[keep],
         )
+
+
+class _Follow:
+    """What is fitted at a joint, following a change by its derivatives: (X'X + P) d = X'e - P (x - start)."""
+
+    def __init__(self, fitted: Fitted, joint: int, noise: Noise) -> None:
+        self.joint, self.weight = joint, float(noise.weight[joint])
+        mine = [k for k, f in enumerate(fitted.free) if f.joint == joint]
+        self.free = [fitted.free[k] for k in mine]
+        self.start = fitted.start[mine]
+        self.x = fitted.columns[mine, :, joint] * self.weight
+        self.precision = np.array([f.prior**-2 for f in self.free])
+        self.inverse = np.linalg.inv(self.x @ self.x.T + np.diag(self.precision + 1e-9))
+        self.before = self._cost(fitted.errors[:, joint] * self.weight, fitted.point, np.zeros(len(mine)))
+
+    def _cost(self, errors: Floats, point: Point, step: Floats) -> float:
+        at = np.array([f.at(point) for f in self.free]) + step - self.start
+        return 0.5 * float(errors @ errors + np.sum(self.precision * at**2))
+
+    def gain(self, errors: Floats, point: Point) -> tuple[float, Floats]:
+        """Nats, and the steps."""
+        e = errors[:, self.joint] * self.weight
+        at = np.array([f.at(point) for f in self.free])
+        step = self.inverse @ (self.x @ e - self.precision * (at - self.start))
+        most = np.array([_FARTHEST * f.prior for f in self.free])
+        step = np.clip(step, -most, most)
+        return self.before - self._cost(e - step @ self.x, point, step), step
+
+    def moved(self, base: Point, changed: Point, step: Floats) -> Point:
+        """The base with this joint as in `changed`, and the steps."""
+        chain = base.chain.copy()
+        chain[self.joint] = changed.chain[self.joint]
+        return moved(replace(base, chain=chain), self.free, step)
+
+
+def _sizes(one: Candidate) -> list[float]:
+    """In units of the prior, or of where the form begins."""
+    if one.begin is not None:
+        return [1.0]
+    free = one.free[0]
+    return [
+        s for s in (*_WIDE, *(-w for w in _WIDE)) if free.low <= s * free.prior + _neutral(one) <= free.high
+    ]
+
+
+def _neutral(one: Candidate) -> float:
+    return PARAMETERS[one.free[0].field].neutral
+
+
+def _wide(one: Candidate, point: Point, number: int, friction: float) -> Point:
+    """The point with the candidate at a size, and other dry friction."""
+    sizes = _sizes(one)
+    point = one.on(point)
+    if one.begin is None:
+        free = one.free[0]
+        point = free.put(point, _neutral(one) + sizes[min(number, len(sizes) - 1)] * free.prior)
+    return point.with_value(one.joint, "coulomb", friction * point.value(one.joint, "coulomb"))
+
+
+def _linear_start(one: Candidate, rank: Rank, point: Point) -> Point:
+    point = one.on(point)
+    if one.begin is None:
+        new = one.free[0]
+        change = float(np.clip(rank.values[0], -new.prior, new.prior))
+        point = new.put(point, new.at(point) + change)
+    return point
 
 
 def _priors(fitted: Fitted) -> Floats:
@@ -336,6 +495,17 @@ def _plausible(one: Candidate, rank: Rank, point: Point) -> bool:
     at = free.at(one.off(point)) + value
     slack = 0.02 * free.prior
     return free.low - slack <= at <= free.high + slack and abs(value) > 1e-3 * free.prior
+
+
+def _groups_of_inputs(namer: Namer) -> NDArray[np.intp] | None:
+    """Number of each row's group of recordings of one firmware gain; None: there are not three."""
+    if "gain" not in namer.data.varies:
+        return None
+    gains = np.array([float(np.median(s.gain)) for s in namer.data.streams])
+    kinds = np.unique(np.round(np.log(np.maximum(gains, 1e-9)), 2), return_inverse=True)[1]
+    windows = namer.fitter.rows.windows
+    rows = np.array([kinds[w.stream] for w in windows], dtype=np.intp)[namer.fitter.rows.window]
+    return rows if np.unique(rows).size >= _LEAST_GROUPS else None
 
 
 def _resolution(fitter: Fitter) -> Floats:
@@ -420,6 +590,25 @@ def _sure(
         min(probability, _ONE_RECORDING) if single else probability,
         tuple((other, weight / total) for other, weight in rivals.values()),
     )
+
+
+# ---- what the usual parameters do as well ----------------------------------------------------------
+def late(namer: Namer, account: Account) -> list[int]:
+    """Joints at which the usual parameters (damping, above all) do what a delay does."""
+    fitted = account.fitted
+    candidates, _, base = namer.all_candidates(fitted.point, account.sizes)
+    some = [c for c in candidates if c.effect == "delay"]
+    out = []
+    for one, column in zip(some, candidate_columns(namer.fitter, fitted.point, base, some), strict=True):
+        j = one.joint
+        mine = [k for k, f in enumerate(fitted.free) if f.joint == j and f.field in USUAL]
+        x, y = fitted.columns[mine, :, j], column[:, j]
+        scale = np.sqrt(np.maximum(np.sum(x * x, axis=1), 1e-30))
+        x = x / scale[:, None]
+        fit = np.linalg.solve(x @ x.T + 1e-6 * np.eye(len(x)), x @ y) @ x
+        if float(np.sum((y - fit) ** 2)) < (1.0 - _LATE_R2) * float(np.sum(y * y)):
+            out.append(j)
+    return out
 
 
 # ---- unknown --------------------------------------------------------------------------------------

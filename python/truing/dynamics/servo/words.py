@@ -113,6 +113,7 @@ class Parts:
     standard chain with each usual parameter as the file has it (`USUAL`). shape=(rows, joints)"""
     held_rows: NDArray[np.intp]  # number of each row's window
     notes: Sequence[str]
+    late: Sequence[int]  # joints at which damping and a delay do the same
 
 
 def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
@@ -123,7 +124,8 @@ def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
         "named": chain_of(parts.account.fitted.point, parts.simulator.arm.nominal),
     }
     small: list[str] = []
-    named = _named(parts, covariance, small)
+    unheld: list[str] = []
+    named = _named(parts, covariance, small, unheld)
     effects = [*named, *_usual(parts, covariance)]
     unknown = [_unknown(f, chains["nominal"]) for f in parts.functions]
     classes = _classes(parts, named)
@@ -132,6 +134,10 @@ def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
     if small:
         warnings.append(
             f"fitted, and too small to be named, as something else may look so: {', '.join(small)}"
+        )
+    if unheld:
+        warnings.append(
+            f"fitted, and not named, as held-out motion is predicted no better with it: {', '.join(unheld)}"
         )
     if parts.single:
         warnings.append("one recording only: folds are blocks of its time, and no name is surer than 0.9")
@@ -196,11 +202,11 @@ def _parameter(parts: Parts, covariance: ServoCovariance, free: Free, off: Point
 def _share(
     parts: Parts, without: Floats, with_it: Floats, whole: Floats, joint: int
 ) -> tuple[float, float, float]:
-    """Part of the squares of `whole` (each joint in units of its own) that goes, and its 90 % interval over
-    windows."""
+    """Part of the squares of `whole` (or `without`, where this is more; each joint in units of its own) that
+    goes, and its 90 % interval over windows."""
     scale = np.maximum(np.sqrt(np.mean(whole**2, axis=0)), 1e-9)
     gains = np.sum(((without / scale) ** 2 - (with_it / scale) ** 2), axis=1)
-    total = float(np.sum((whole / scale) ** 2))
+    total = max(float(np.sum((whole / scale) ** 2)), float(np.sum((without / scale) ** 2)))
     by_window = np.bincount(parts.held_rows, weights=gains)
     value = float(gains.sum()) / total
     spread = (
@@ -215,7 +221,9 @@ def _rms(errors: Floats, joint: int) -> float:
     return float(np.sqrt(np.mean(some**2)))
 
 
-def _named(parts: Parts, covariance: ServoCovariance, small: list[str]) -> list[FoundServoEffect]:
+def _named(
+    parts: Parts, covariance: ServoCovariance, small: list[str], unheld: list[str]
+) -> list[FoundServoEffect]:
     out = []
     standard, named = parts.held[1], parts.held[2]
     for k, (one, sure) in enumerate(zip(parts.account.found, parts.sure, strict=True)):
@@ -224,6 +232,9 @@ def _named(parts: Parts, covariance: ServoCovariance, small: list[str]) -> list[
             continue
         without = parts.held[3 + k]
         share, low, high = _share(parts, without, named, standard, one.joint)
+        if share <= 0.0:
+            unheld.append(_place(one))
+            continue
         values = tuple(
             _parameter(parts, covariance, f, one.off(parts.account.fitted.point)) for f in one.free
         )
@@ -311,6 +322,10 @@ def _unknown(f: FoundFunction, chain: ServoChain) -> UnknownMotion:
 # ---- classes --------------------------------------------------------------------------------------
 def _classes(parts: Parts, named: Sequence[FoundServoEffect]) -> list[ServoClass]:
     out = [_scale_class(named), *_orders(parts.data)]
+    for joint in (parts.simulator.arm.nominal.joints[j] for j in parts.late):
+        alike = tuple(_member(effect, (joint,)) for effect in ("delay", "viscous", "damping_gain"))
+        text = f"In motion as slow as this a delay, damping and a derivative part at {joint} do the same"
+        out.append(ServoClass(alike, text, _SEPARATED["delay"]))
     for effect in named:
         if not effect.confounded_with:
             continue
