@@ -8,6 +8,7 @@
 
 #include "dynamics/effects/families.hpp"
 #include "dynamics/payload.hpp"
+#include "dynamics/turn.hpp"
 #include "math/statistics.hpp"
 
 namespace truing::dynamics {
@@ -57,18 +58,21 @@ struct FreeInput {
   bool needs_torque;
   std::function<VectorXd(const Motion&)> value;
   bool times_direction = false;
+  bool narrow = false;  ///< what it drives may be narrow: a detent, a resonance, some seconds
 };
 
 constexpr int kKnots = 8;
+constexpr int kNarrowKnots = 3 * (kKnots - 1) + 1;  ///< the wide ones among them
 
 /// Straight lines between evenly spaced knots: hat number k.
-double hat(double x, int k, double low, double high) {
-  const double width = (high - low) / (kKnots - 1);
+double hat(double x, int k, int knots, double low, double high) {
+  const double width = (high - low) / (knots - 1);
   const double at = std::clamp(x, low, high);
   return std::max(0.0, 1.0 - std::abs((at - low) / width - k));
 }
 
-void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, double prior, TorqueDesign* design) {
+void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, int knots, double prior,
+              TorqueDesign* design) {
   if (!(input.high > input.low)) return;
   TorqueGroup group;
   group.joints = {robot.joints[robot.driven_joints()[joint]].name};
@@ -77,20 +81,50 @@ void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, dou
   group.low = input.low;
   group.high = input.high;
   if (input.times_direction) group.inputs.push_back("direction");
-  for (int k = 0; k < kKnots; ++k) {
+  for (int k = 0; k < knots; ++k) {
     TorqueTerm term;
     term.parameter = "free." + group.joints.front() + "." + input.name + (input.times_direction ? ".direction" : "") +
-                     "." + std::to_string(k);
+                     "." + std::to_string(k) + "." + std::to_string(knots);
     term.unit = "Nm";
     term.joints = {joint};
     term.needs_torque = input.needs_torque;
     term.needs_rigid = false;
     term.prior = prior;
-    term.basis = [input, k, joint](const Motion& m) -> MatrixXd {
+    term.basis = [input, k, knots, joint](const Motion& m) -> MatrixXd {
       MatrixXd out = input.value(m);
-      for (double& x : out.reshaped()) x = hat(x, k, input.low, input.high);
+      for (double& x : out.reshaped()) x = hat(x, k, knots, input.low, input.high);
       if (input.times_direction) out.array() *= m.direction.col(static_cast<Index>(joint)).array();
       return out;
+    };
+    group.columns.push_back(static_cast<int>(design->terms.size()));
+    design->terms.push_back(std::move(term));
+  }
+  design->groups.push_back(std::move(group));
+}
+
+constexpr int kPlays = 6;  ///< stop operators, up to 1.5 standard deviations of the torque
+
+/// Hysteresis of the load as a sum of stop operators (Prandtl 1928; Ishlinskii 1944): a frame, or a gear, that gives
+/// way and stays. Its curve is the weight of every width.
+void add_memory(std::size_t joint, const Robot& robot, double torque, double prior, TorqueDesign* design) {
+  TorqueGroup group;
+  group.joints = {robot.joints[robot.driven_joints()[joint]].name};
+  group.joint = static_cast<int>(joint);
+  group.inputs = {"load", "its past"};
+  const double width = 1.5 * torque / kPlays;
+  group.low = width;
+  group.high = kPlays * width;
+  if (!(width > 0.0)) return;
+  for (int k = 1; k <= kPlays; ++k) {
+    TorqueTerm term;
+    term.parameter = "free." + group.joints.front() + ".load.past." + std::to_string(k);
+    term.unit = "Nm";
+    term.joints = {joint};
+    term.needs_torque = true;
+    term.needs_rigid = false;
+    term.prior = prior;
+    term.basis = [joint, x0 = k * width](const Motion& m) -> MatrixXd {
+      return stop_operator(m.torque.col(static_cast<Index>(joint)), x0);
     };
     group.columns.push_back(static_cast<int>(design->terms.size()));
     design->terms.push_back(std::move(term));
@@ -109,14 +143,15 @@ std::vector<FreeInput> inputs_at(std::size_t joint, const Robot& robot, const Mo
     const std::string name = k == j ? "angle" : "angle " + driven_name(robot, static_cast<std::size_t>(k));
     for (const bool times_direction : {false, true})
       out.push_back({name, range.lower[k], range.upper[k], false,
-                     [k](const Motion& m) -> VectorXd { return m.q.col(k); }, times_direction});
+                     [k](const Motion& m) -> VectorXd { return m.q.col(k); }, times_direction, k == j});
   }
-  out.push_back(
-      {"speed", -range.speed[j], range.speed[j], false, [j](const Motion& m) -> VectorXd { return m.qd.col(j); }});
+  out.push_back({"speed", -range.speed[j], range.speed[j], false,
+                 [j](const Motion& m) -> VectorXd { return m.qd.col(j); }, false, true});
   out.push_back({"load", -torque, torque, true, load});
   out.push_back({"load", -torque, torque, true, load, true});
   if (range.duration >= kShortest)
-    out.push_back({"time", 0.0, range.duration, false, [](const Motion& m) -> VectorXd { return m.time; }});
+    out.push_back(
+        {"time", 0.0, range.duration, false, [](const Motion& m) -> VectorXd { return m.time; }, false, true});
   for (const auto& [name, bounds] : range.columns) {
     if (name == "enabled" || is_of_payload(name) || !(bounds.second > bounds.first)) continue;
     out.push_back({name, bounds.first, bounds.second, false,
@@ -181,7 +216,11 @@ void add_alternatives_of_masses(const Robot& robot, const MotionRange& range, co
 void add_free_functions(const Robot& robot, const MotionRange& range, TorqueDesign* design) {
   for (std::size_t j = 0; j < robot.driven_count(); ++j) {
     const double prior = 0.3 * std::max(range.torque[static_cast<Index>(j)], 1e-3);
-    for (const FreeInput& input : inputs_at(j, robot, range)) add_free(input, j, robot, prior, design);
+    for (const FreeInput& input : inputs_at(j, robot, range)) {
+      add_free(input, j, robot, kKnots, prior, design);
+      if (input.narrow) add_free(input, j, robot, kNarrowKnots, prior, design);
+    }
+    add_memory(j, robot, range.torque[static_cast<Index>(j)], prior, design);
   }
 }
 

@@ -159,10 +159,11 @@ std::optional<Account> of_given_inertias(const Problem& problem, const TorqueGra
 constexpr double kLeastGainOfFunctions = 0.05;  ///< a free function bends to anything: it must remove more than a law
 constexpr int kMostFunctions = 6;               ///< more of them are no answer that anybody reads
 
-/// Beside what was named, free functions of what may drive an unknown effect.
+/// Beside what was named, free functions of what may drive an unknown effect. What was fitted and is too small to be
+/// named makes room: it may be what little a law can do for something that nobody knows.
 Account with_functions(const Problem& problem, const Account& of_effects, const TorqueModel& model,
                        const SearchLimits& limits, std::vector<Noise>* noise) {
-  Choice choice = of_effects.choice;
+  Choice choice = likely_of(of_effects);
   const std::vector<int>& always = of_effects.search->evidence().nuisance();
   auto design = std::make_shared<TorqueDesign>(part_of(*of_effects.design, always, &choice));
   std::vector<int> nuisance;

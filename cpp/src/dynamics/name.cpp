@@ -426,6 +426,18 @@ TorqueErrors errors_without_names(const Problem& problem, const Account& account
 
 }  // namespace
 
+Choice likely_of(const Account& account) {
+  const Naming naming(account);
+  Choice out;
+  for (std::size_t k = 0; k < account.choice.groups.size(); ++k) {
+    std::vector<TorqueAlternative> ignored;
+    if (naming.sure(k, &ignored) < kNamed) continue;
+    out.groups.push_back(account.choice.groups[k]);
+    out.scales.push_back(account.choice.scales[k]);
+  }
+  return out;
+}
+
 TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const Account& account,
                       const std::vector<Noise>& noise, const Account& functions,
                       const std::vector<Noise>& noise_of_functions) {

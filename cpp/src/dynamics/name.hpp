@@ -10,6 +10,9 @@
 
 namespace truing::dynamics {
 
+/// Of an account's choice, what is likely enough to be named.
+Choice likely_of(const Account& account);
+
 /// `functions`: the account with free functions beside what was named. Noise is that of either.
 TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const Account& account,
                       const std::vector<Noise>& noise, const Account& functions,

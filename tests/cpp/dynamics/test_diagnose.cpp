@@ -2,12 +2,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
 
 #include <Eigen/Eigenvalues>
 
 #include <doctest/doctest.h>
 
 #include "dynamics/judge.hpp"
+#include "dynamics/turn.hpp"
 #include "support/sanitized.hpp"
 #include "support/swung_arm.hpp"
 #include "truing/dynamics.hpp"
@@ -27,6 +31,26 @@ std::vector<Recording> recorded(const Robot& truth, const std::vector<TorqueEffe
     out.back().test = k > 2;
   }
   return out;
+}
+
+/// Recordings of an arm at whose first joint a law of no catalogue acts as well.
+std::vector<Recording> recorded_with(const std::string& name, std::function<Eigen::MatrixXd(const Motion&)> basis) {
+  const TorqueEffect own{name, name, [=](const Robot&, std::size_t joint, const MotionRange&) {
+                           TorqueTerm term;
+                           term.parameter = name + ".J1";
+                           term.unit = "Nm";
+                           term.joints = {joint};
+                           term.needs_torque = true;
+                           term.basis = basis;
+                           return std::vector<TorqueForm>{{term}};
+                         }};
+  Robot truth = with_friction(level_arm());
+  truth.torque_effects.push_back({name, {"J1"}, {{name + ".J1", 1.0}}});
+  return recorded(truth, {own});
+}
+
+double deviation(const Eigen::VectorXd& x) {
+  return std::sqrt((x.array() - x.mean()).square().sum() / static_cast<double>(x.size()));
 }
 
 const FoundTorqueEffect* found(const TorqueDiagnosis& d, const std::string& effect) {
@@ -110,6 +134,28 @@ TEST_CASE("a link's inertia that is named may be a drive's constant, which is no
   CHECK(std::any_of(inertia->confounded_with.begin(), inertia->confounded_with.end(), [](const TorqueAlternative& a) {
     return a.effect == "motor_constant" && a.joints == std::vector<std::string>{"J1"};
   }));
+}
+
+TEST_CASE("a detent that is narrower than a wide function is unknown over the joint's angle") {
+  const TorqueDiagnosis d =
+      dynamics::diagnose(level_arm(), recorded_with("detent", [](const Motion& m) -> Eigen::MatrixXd {
+                           const Eigen::ArrayXd x = (m.q.col(0).array() - 0.2) / 0.07;
+                           return x * (-0.5 * x.square()).exp();
+                         }));
+  REQUIRE(!d.unknown.empty());
+  CHECK(d.unknown.front().joint == "J1");
+  CHECK(d.unknown.front().inputs == std::vector<std::string>{"angle"});
+}
+
+TEST_CASE("what gives way under load and stays is unknown over the load and its past") {
+  const TorqueDiagnosis d =
+      dynamics::diagnose(level_arm(), recorded_with("play", [](const Motion& m) -> Eigen::MatrixXd {
+                           const double width = 0.6 * deviation(m.torque.col(0));
+                           return dynamics::stop_operator(m.torque.col(0), width);
+                         }));
+  REQUIRE(!d.unknown.empty());
+  CHECK(d.unknown.front().joint == "J1");
+  CHECK(d.unknown.front().inputs == std::vector<std::string>{"load", "its past"});
 }
 
 TEST_CASE("what cannot be used is refused in words") {
