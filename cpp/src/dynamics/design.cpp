@@ -203,12 +203,38 @@ TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::
   return out;
 }
 
+namespace {
+
+/// The constants of all drives off by one factor: what all masses together look like.
+TorqueGroup common_constant(const std::string& effect, const Robot& robot, TorqueDesign* design) {
+  TorqueGroup group;
+  group.effect = effect;
+  group.family = TorqueFamily::drive;
+  TorqueTerm term;
+  term.parameter = effect + ".all";
+  term.unit = "-";
+  term.prior = 0.2;
+  term.needs_torque = true;
+  term.needs_rigid = false;
+  for (std::size_t j = 0; j < robot.driven_count(); ++j) {
+    group.joints.push_back(driven_name(robot, j));
+    term.joints.push_back(j);
+  }
+  term.basis = [](const Motion& m) -> MatrixXd { return m.torque; };
+  group.columns = {static_cast<int>(design->terms.size())};
+  design->terms.push_back(std::move(term));
+  return group;
+}
+
+}  // namespace
+
 void add_alternatives_of_masses(const Robot& robot, const MotionRange& range, const std::vector<TorqueEffect>& own,
                                 TorqueDesign* design) {
   const std::size_t before = design->terms.size();
   for (const NotTestable& one : design->not_testable) {
-    if (one.reason == Untestable::same_as_masses)
-      add_effect(find_torque_effect(one.effect, own), -1, robot, range, design);
+    if (one.reason != Untestable::same_as_masses) continue;
+    add_effect(find_torque_effect(one.effect, own), -1, robot, range, design);
+    if (robot.driven_count() > 1) design->groups.push_back(common_constant(one.effect, robot, design));
   }
   for (std::size_t c = before; c < design->terms.size(); ++c) design->terms[c].only_alternative = true;
 }

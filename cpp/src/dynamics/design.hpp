@@ -42,7 +42,8 @@ struct TorqueDesign {
 /// are fitted beside them.
 TorqueDesign design_of(const Robot& robot, const MotionRange& range, const std::vector<TorqueEffect>& own,
                        const std::set<std::string>& leave_out, bool fits_masses);
-/// Effects that are the same as masses: they are not named, but may be what a link's inertia looks like.
+/// Effects that are the same as masses, joint by joint and of all drives by one factor: they are not named, but may be
+/// what links' inertias look like.
 void add_alternatives_of_masses(const Robot& robot, const MotionRange& range, const std::vector<TorqueEffect>& own,
                                 TorqueDesign* design);
 /// One effect more, in all its forms, at a joint (-1: at every joint). Throws std::invalid_argument where it does not

@@ -100,8 +100,36 @@ class Naming {
         outside += weight;
       }
     }
+    if (mine.family == TorqueFamily::inertia) add_one_scale(&in_class, confounded);
     for (TorqueAlternative& alternative : *confounded) alternative.probability *= 1.0 / (in_class + outside);
     return in_class / (in_class + outside);
+  }
+
+  /// Links, rotors and loads that are named beside each other may together be one factor of all drives' constants,
+  /// which none of them looks like while the others stay.
+  void add_one_scale(double* in_class, std::vector<TorqueAlternative>* confounded) const {
+    Choice rest;
+    for (std::size_t k = 0; k < choice_.groups.size(); ++k) {
+      if (group_of(design_, choice_.groups[k]).family == TorqueFamily::inertia) continue;
+      rest.groups.push_back(choice_.groups[k]);
+      rest.scales.push_back(choice_.scales[k]);
+    }
+    const Evidence::State less = search_.state(rest);
+    for (std::size_t g = 0; g < design_.groups.size(); ++g) {
+      const TorqueGroup& other = design_.groups[g];
+      const bool one_scale = other.joints.size() > 1 && is_alternative(other) && other.family == TorqueFamily::drive;
+      const bool known = std::any_of(confounded->begin(), confounded->end(), [&](const TorqueAlternative& one) {
+        return one.effect == other.effect && one.joints == other.joints;
+      });
+      if (!one_scale || known) continue;
+      const int number = static_cast<int>(g);
+      const double behind =
+          state_.score - less.score - search_.evidence().gain(less, other.columns, search_.cost(number)).score;
+      if (behind >= kClassNats) continue;
+      const double weight = std::exp(-kTempered * std::max(behind, 0.0));
+      confounded->push_back({other.effect, other.joints, weight});
+      *in_class += weight;
+    }
   }
 
   /// That it, or one of its class, is there.
@@ -128,6 +156,10 @@ class Naming {
   }
 
  private:
+  bool is_alternative(const TorqueGroup& group) const {
+    return design_.terms[static_cast<std::size_t>(group.columns.front())].only_alternative;
+  }
+
   bool is_in(int g) const { return std::find(choice_.groups.begin(), choice_.groups.end(), g) != choice_.groups.end(); }
 
   VectorXd folds_and_held_out(const Choice& choice) const {

@@ -136,6 +136,21 @@ TEST_CASE("a link's inertia that is named may be a drive's constant, which is no
   }));
 }
 
+TEST_CASE("what may be one factor of all drives is said so, and no link alone is sure") {
+  std::vector<Recording> all = recorded(with_friction(level_arm()));
+  for (Recording& one : all) one.torque *= 1.2;
+  const TorqueDiagnosis d = dynamics::diagnose(level_arm(), all);
+  int named = 0;
+  for (const FoundTorqueEffect& e : d.effects) {
+    if (e.effect != "link_inertia" && e.effect != "payload") continue;
+    ++named;
+    CHECK(std::any_of(e.confounded_with.begin(), e.confounded_with.end(), [](const TorqueAlternative& a) {
+      return a.effect == "motor_constant" && a.joints == std::vector<std::string>{"J1", "J2"};
+    }));
+  }
+  CHECK(named > 0);
+}
+
 TEST_CASE("a detent that is narrower than a wide function is unknown over the joint's angle") {
   const TorqueDiagnosis d =
       dynamics::diagnose(level_arm(), recorded_with("detent", [](const Motion& m) -> Eigen::MatrixXd {
