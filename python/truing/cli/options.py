@@ -483,6 +483,14 @@ DataFile = Annotated[
     Path,
     File("Measurements: CSV or Parquet, one row per measured pose.", argument=True, metavar="DATA"),
 ]
+ProgramFile = Annotated[
+    Path | None,
+    File(
+        "Robot program (.src, .mod, .ls, .script, .jbi), or table of `truing apply --poses-out`, that gives"
+        " the joints of DATA, which then has none: one row per move to a literal target, in their order.",
+        metavar="PROGRAM",
+    ),
+]
 OutFolder = Annotated[
     Path, File("Folder to write to: all files, or none.", flag="--out", metavar="FOLDER", panel=OUTPUT)
 ]

@@ -27,7 +27,7 @@ from truing.files.boards import Board, BoardViews, find_board, parse_board, plau
 from truing.files.common import PathLike, atomic_write, listed
 from truing.files.opencv_file import is_opencv_file, read_opencv_camera
 from truing.files.other_poses import OtherPoses, Setup, Side, read_other_poses
-from truing.files.table import Floats, Table
+from truing.files.table import Beside, Floats, Table
 from truing.files.yaml_tree import Document, FreeMapping, Number, Strict, Text, choice, expected, found
 from truing.limits import UNIT_LENGTH_OFF
 from truing.rotations import rotations_from_angles, rotations_from_quaternions
@@ -440,6 +440,7 @@ def load_handeye(
     angles: str | None = None,
     setup: Setup | None = None,
     progress: Callable[[int, int], None] | None = None,
+    beside: Beside | None = None,
 ) -> HandEyeData:
     """Read robot poses, and what the camera saw of the board at each, from CSV or Parquet, or from a file of
     easy_handeye, easy_handeye2, MoveIt or OpenCV that holds both.
@@ -458,13 +459,15 @@ def load_handeye(
     setup: of samples of easy_handeye, which writes the robot's poses the other way round where the camera
     stands in the cell; None: as the samples say, else eye-in-hand.
     progress: called with images done, and images in all.
+    beside: columns of a table that another file gives, hand_x_m … of a program
+    (`truing.programs.commanded_hand`).
 
     Raises InputError that names the line, the column, what was found and what was expected.
     """
-    other = read_other_poses(Path(path), setup)
+    other = None if beside else read_other_poses(Path(path), setup)
     if other is not None:
         return _of_other_program(other, board)
-    table = Table(Path(path))
+    table = Table(Path(path), beside=beside)
     plan = _Plan(table, ("hand", "board"))
     angles = check_angles(angles)
     parsed = parse_board(board) if isinstance(board, str) else board

@@ -20,7 +20,7 @@ from truing.errors import InputError, InputWarning
 from truing.files.common import PathLike, Units, listed, write_table
 from truing.files.plausibility import check_units_look_right
 from truing.files.program_poses import is_program, read_program_poses
-from truing.files.table import Codes, Floats, Table
+from truing.files.table import Beside, Codes, Floats, Table
 from truing.limits import LARGEST_NUMBER, UNIT_LENGTH_OFF
 
 _LENGTHS = ("m", "mm")
@@ -197,7 +197,12 @@ class _Plan:
 
 
 def load_measurements(
-    path: PathLike, robot: _core.Robot, *, set_column: bool = True, joints_only: bool = False
+    path: PathLike,
+    robot: _core.Robot,
+    *,
+    set_column: bool = True,
+    joints_only: bool = False,
+    beside: Beside | None = None,
 ) -> _core.Measurements:
     """Read measurements of `robot` from CSV or Parquet.
 
@@ -207,13 +212,15 @@ def load_measurements(
     numbers becomes a covariate of its own name; qr1_..., u1_..., qd1_..., tau1_... do so in SI units and
     under their SI name (qr1_deg as qr1_rad).
 
-    set_column: False passes over the column `set`. joints_only: rows need no measurement (for predictions).
+    set_column: False passes over the column `set`. joints_only: rows need no measurement (for predictions),
+    and a robot program of joints is read as well. beside: columns that another file gives, such as the joints
+    of a program (`truing.programs.commanded_joints`).
     Raises InputError that names the line, the column, what was found and what was expected. Warns
-    (InputWarning) about joints beyond their limits. joints_only: a robot program of joints is read as well.
+    (InputWarning) about joints beyond their limits.
     """
     if is_program(Path(path)):
         return _of_program(Path(path), robot, joints_only)
-    table = Table(Path(path))
+    table = Table(Path(path), beside=beside)
     plan = _Plan(table, robot)
     if not joints_only:
         _require_measured(plan)
@@ -296,9 +303,9 @@ def _of_program(path: Path, robot: _core.Robot, joints_only: bool) -> _core.Meas
     """A robot program has joints, and nothing that was measured."""
     if not joints_only:
         raise InputError(
-            f"{path}: is a robot program, in which nothing is measured: expected a table with the joints"
-            " of its moves"
-            " (`truing apply --poses-out` writes them) and beside them what was measured there, x_m y_m z_m"
+            f"{path}: is a robot program, in which nothing is measured: expected a table of what was measured"
+            " at its targets, x_m y_m z_m; the joints of the rows come from the program with `truing"
+            f" identify ROBOT measured.csv --program {path.name}`"
         )
     program = read_program_poses(path)
     if not program.only_joints:

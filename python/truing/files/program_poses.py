@@ -115,27 +115,37 @@ def _known(place: Place) -> Floats:
     return place.T
 
 
-def read_program_poses(path: Path) -> ProgramPoses:
-    """Raises InputError where the program cannot be read, or has no literal target."""
-    readings, refused = read_programs([_with_moves(path)], Given())
+def read_program_poses(path: Path, *, every_move: bool = False) -> ProgramPoses:
+    """every_move: a target as often as moves go to it, in the order in which the moves stand in the file.
+    Raises InputError where the program cannot be read, has no literal target, or, with `every_move`, goes to
+    what is none.
+    """
+    readings, refused = read_programs([with_moves(path)], Given())
     if refused:
         raise InputError(refused[0].message)
     reading = readings[0]
     if reading.stays:
         first = reading.stays[0]
+        what = f"line {first.line}, {first.what}: {first.why}"
+        if every_move:
+            raise InputError(
+                f"{path}: {what}: it is not known which row belongs to it; expected a program of literal"
+                " targets, or a table of poses"
+            )
         more = f", and {len(reading.stays) - 1} more" if len(reading.stays) > 1 else ""
         warnings.warn(
-            f"{path}: left out is what is no literal target: line {first.line}, {first.what}:"
-            f" {first.why}{more}",
-            InputWarning,
-            stacklevel=3,
+            f"{path}: left out is what is no literal target: {what}{more}", InputWarning, stacklevel=3
         )
-    if not reading.targets:
+    targets = list(reading.targets)
+    if every_move:
+        order = sorted((move, k) for k, target in enumerate(targets) for move in target.moves)
+        targets = [targets[k] for _, k in order]
+    if not targets:
         raise InputError(f"{path}: has no literal target whose meaning is known")
-    return ProgramPoses(path, reading.brand, tuple(reading.targets))
+    return ProgramPoses(path, reading.brand, tuple(targets))
 
 
-def _with_moves(path: Path) -> Path:
+def with_moves(path: Path) -> Path:
     """Of a .dat the .src beside it, which says what its targets are for."""
     if path.suffix.lower() != ".dat":
         return path
@@ -144,9 +154,9 @@ def _with_moves(path: Path) -> Path:
 
 
 def hand_poses(path: Path) -> Floats:
-    """T_base_flange, shape=(n, 4, 4) [m]; of the tool, with a warning, where the program does not say
-    which."""
-    frames, as_tools = read_program_poses(path).flanges()
+    """T_base_flange at every move, shape=(n, 4, 4) [m]; of the tool, with a warning, where the program does
+    not say which."""
+    frames, as_tools = read_program_poses(path, every_move=True).flanges()
     if as_tools:
         warnings.warn(
             f"{path}: its tool is not known: the poses are those of the tool, and the camera is found"

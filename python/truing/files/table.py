@@ -15,6 +15,7 @@ import math
 import mmap
 import re
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
@@ -47,6 +48,23 @@ _NUMBER = re.compile(
 )
 
 
+@dataclass(frozen=True)
+class Beside:
+    """Columns of numbers that another file gives, one entry per row of a table and in its order."""
+
+    file: Path
+    columns: dict[str, Floats]
+
+    def require(self, rows: int, path: Path) -> None:
+        """Raises InputError where the table `path` has other rows."""
+        count = len(next(iter(self.columns.values())))
+        if count != rows:
+            raise InputError(
+                f"{path}: has {rows} {'row' if rows == 1 else 'rows'}, but {self.file} gives {count}:"
+                " expected one row for each, in the same order"
+            )
+
+
 def _lots_of_groups(metadata: Any, rows: int) -> Iterator[list[int]]:
     """Row groups of a Parquet file one after the other, together where they are small: Arrow keeps what it
     reads of all that it is given until the last batch.
@@ -67,12 +85,13 @@ class Table:
     """A table on disk. `names` is known at once; `read` loads it; then columns are taken out one by one.
 
     comments: lines of a CSV file that begin with # are passed over; the last of those above the first row may
-    be the column names, as numpy.savetxt writes them.
+    be the column names, as numpy.savetxt writes them. beside: columns that it has from another file.
     """
 
-    def __init__(self, path: Path, *, comments: bool = False) -> None:
+    def __init__(self, path: Path, *, comments: bool = False, beside: Beside | None = None) -> None:
         self.path = path
         self.rows = 0
+        self._beside = beside
         self._columns: dict[str, Any] = {}
         self._comments = comments
         self._header = 1  # line of the column names
@@ -92,7 +111,8 @@ class Table:
         self._is_parquet = head.startswith(_PARQUET_MAGIC)
         if not self._is_parquet and path.suffix.lower() in PARQUET_SUFFIXES:
             raise InputError(f"{path}: is not a Parquet file, though its name says so")
-        self.names = self._parquet_names() if self._is_parquet else self._csv_names(head, first_line)
+        self._own = self._parquet_names() if self._is_parquet else self._csv_names(head, first_line)
+        self.names: list[str] = [*self._own, *(beside.columns if beside else ())]
         self._check_names()
 
     @classmethod
@@ -106,7 +126,8 @@ class Table:
         out = cls.__new__(cls)
         out.path, out.rows, out._columns, out._first_row = Path(called), 0, {}, 0
         out._comments, out._header, out._header_is_comment, out._is_parquet = False, 1, False, True
-        out.names = [str(name).strip() for name in table.column_names]
+        out._beside = None
+        out._own = out.names = [str(name).strip() for name in table.column_names]
         out._check_names()
         out._in_memory = table
         return out
@@ -126,9 +147,16 @@ class Table:
 
     def refuse_cell(self, row: int, column: str, expected: str) -> NoReturn:
         """Raises InputError: what the file holds there, and what was expected."""
-        cell = str(self._columns[column][row].as_py()) if self._is_parquet else self._csv_cell(row, column)[1]
+        cell = self._text_of(row, column)
         found = "an empty cell" if cell in ("", "None") else shown(cell)
         self.refuse(f"found {found}, expected {expected}", row=row, column=column)
+
+    def _text_of(self, row: int, column: str) -> str:
+        if self._beside is not None and column in self._beside.columns:
+            return f"{self._beside.columns[column][row]:.6g}"
+        if self._is_parquet:
+            return str(self._columns[column][row].as_py())
+        return self._csv_cell(row, column)[1]
 
     def read(self, numbers: Collection[str], labels: Collection[str]) -> None:
         """Loads the table. All other columns may hold numbers or nothing; text in them is refused."""
@@ -165,8 +193,10 @@ class Table:
         self.rows = table.num_rows
         if self.rows == 0:
             self.refuse("has column names but no rows")
-        self._columns = dict(zip(self.names, table.columns, strict=True))
-        for name in self.names:
+        if self._beside is not None:
+            self._beside.require(self.rows, self.path)
+        self._columns = dict(zip(self._own, table.columns, strict=True))
+        for name in self._own:
             kind = self._columns[name].type
             if pa.types.is_dictionary(kind):
                 kind = kind.value_type
@@ -212,6 +242,8 @@ class Table:
         Empty cells become NaN if `gaps`, else they are refused; NaN and infinity in the file are refused.
         With `any_value` (a column without a meaning of its own) NaN and infinity are taken.
         """
+        if self._beside is not None and name in self._beside.columns:
+            return self._beside.columns[name].copy()
         column = self._columns[name]
         if column.type != pa.float64():
             column = column.cast(pa.float64(), safe=False)
@@ -283,6 +315,12 @@ class Table:
 
     def _check_names(self) -> None:
         where = self.path if self._is_parquet else f"{self.path}, line {self._header}"
+        if self._beside is not None:
+            for name in self._own:
+                if name in self._beside.columns:
+                    raise InputError(
+                        f"{where}: has the column {name!r}, which {self._beside.file} gives as well"
+                    )
         if len(self.names) == 1:
             for separator, called in ((";", "semicolons"), ("\t", "tabs")):
                 if separator in self.names[0]:
@@ -362,6 +400,7 @@ class Table:
             raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
 
     def _read_csv(self, numbers: Collection[str], labels: Collection[str]) -> Any:
+        numbers = [name for name in numbers if name in self._own]
         types = dict.fromkeys(numbers, pa.float64()) | dict.fromkeys(
             labels, pa.dictionary(pa.int32(), pa.string())
         )
@@ -369,7 +408,7 @@ class Table:
             self.refuse(f"has more than {_LARGEST_CSV // 10**9} GB: take every n-th row")
         # The header is skipped, not parsed again: Arrow would leave spaces around the names.
         source, above = self._without_comments()
-        read = pa.csv.ReadOptions(column_names=self.names, skip_rows=above)
+        read = pa.csv.ReadOptions(column_names=self._own, skip_rows=above)
         convert = pa.csv.ConvertOptions(
             column_types=types, null_values=_EMPTY, true_values=[], false_values=[]
         )
@@ -409,14 +448,14 @@ class Table:
         """Raises InputError for the first line with a wrong number of cells, or without a number where one
         belongs.
         """
-        places = [(self.names.index(name), name) for name in numbers]
+        places = [(self._own.index(name), name) for name in numbers]
         last = 1
         try:
             for line, cells in self._csv_lines():
                 last = line
-                if len(cells) != len(self.names):
+                if len(cells) != len(self._own):
                     raise InputError(
-                        f"{self.path}, line {line}: found {len(cells)} cells, expected {len(self.names)} "
+                        f"{self.path}, line {line}: found {len(cells)} cells, expected {len(self._own)} "
                         "as there are column names"
                     )
                 for place, name in places:
@@ -431,7 +470,7 @@ class Table:
 
     def _csv_cell(self, row: int, column: str | None) -> tuple[int, str]:
         """Line number of a row, and the text in one of its cells."""
-        place = None if column is None else self.names.index(column)
+        place = None if column is None else self._own.index(column)
         try:
             for index, (line, cells) in enumerate(self._csv_lines()):
                 if index == row:
@@ -443,7 +482,7 @@ class Table:
     def _refuse_text(self, name: str, kind: str, *, known: bool) -> NoReturn:
         if self._is_parquet:
             self.refuse(f"holds {kind} values, expected numbers", column=name)
-        place = self.names.index(name)
+        place = self._own.index(name)
         for line, cells in self._csv_lines():
             if place < len(cells) and cells[place] not in _EMPTY and not _NUMBER.fullmatch(cells[place]):
                 what = (

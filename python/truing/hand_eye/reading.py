@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from truing._core import ClockOffset, HandEyePoses
 from truing.errors import InputError
 from truing.files import HandEyeData, load_handeye, load_stream, pair_rows
+from truing.files.table import Beside
 from truing.hand_eye.api import handeye_clock
 
 Floats = NDArray[np.float64]
@@ -30,14 +31,16 @@ def load_on_one_clock(
     camera: Path | None = None,
     angles: str = "",
     board_poses: Path | None = None,
+    beside: Beside | None = None,
     setup: Setup = "eye-in-hand",
     progress: Any = None,
 ) -> tuple[HandEyeData | None, ClockOffset | None]:
     """What the files hold, hand poses at the camera's times (None: the offset of the clocks is not found),
     and the offset where there is one.
 
-    board: what is in the images. board_poses: file of board poses with times of their own. progress: called
-    with how many images of how many are searched. Raises InputError.
+    board: what is in the images. board_poses: file of board poses with times of their own. beside: the hand
+    poses of a table `poses` that has none. progress: called with how many images of how many are searched.
+    Raises InputError.
     """
     if board_poses is None:
         data = load_handeye(
@@ -47,6 +50,7 @@ def load_on_one_clock(
             angles=angles or None,
             setup=setup,
             progress=progress,
+            beside=beside,
         )
         if data.board_time is None or data.time is None:
             return data, None

@@ -9,3 +9,7 @@ from truing.programs.apply import (
     RefusedFile as RefusedFile,
     apply_programs as apply_programs,
 )
+from truing.programs.rows import (
+    commanded_hand as commanded_hand,
+    commanded_joints as commanded_joints,
+)

@@ -61,16 +61,23 @@ def test_compensate_takes_a_program_of_joints(tmp_path: Path) -> None:
     )
 
 
-def test_hand_eye_takes_poses_of_the_flange() -> None:
+def test_hand_eye_takes_poses_of_the_flange(tmp_path: Path) -> None:
     with pytest.warns(InputWarning, match="its tool is not known"):
         poses = read_other_poses(CORPUS / "yaskawa_arc.jbi")
     assert poses is not None and poses.hand is not None
     assert np.allclose(poses.hand[0, :3, 3], [0.8, -0.1, 0.65])
-    with pytest.warns(InputWarning, match="left out is what is no literal target: line 14"):
-        script = read_other_poses(CORPUS / "ur_waypoints.script")
-    assert script is not None and script.hand is not None
-    down = script.hand[0] @ np.array([0, 0, 0.1, 1])  # set_tcp is 100 mm along the flange's z
+    point = "p[0.65,-0.4,0.45,0,3.14159265358979,0]"
+    script = tmp_path / "two.script"
+    script.write_text(f"set_tcp(p[0,0,0.1,0,0,0])\nmovel({point})\nmovel({point})\n")
+    poses = read_other_poses(script)
+    assert poses is not None and poses.hand is not None and len(poses.hand) == 2
+    down = poses.hand[0] @ np.array([0, 0, 0.1, 1])  # set_tcp is 100 mm along the flange's z
     assert np.allclose(down[:3], [0.65, -0.4, 0.45])
+
+
+def test_a_move_whose_hand_pose_is_not_known_shifts_no_rows() -> None:
+    with pytest.raises(InputError, match="line 14.*not known which row belongs to it"):
+        read_other_poses(CORPUS / "ur_waypoints.script")
 
 
 def test_joints_are_no_hand_poses() -> None:

@@ -20,6 +20,7 @@ from truing.cli.options import (
     DataFile,
     EffectNames,
     Fraction,
+    ProgramFile,
     RobotFile,
     Seed,
     Threads,
@@ -43,6 +44,7 @@ class Command(run.Command["tuple[Robot, Measurements]", "Diagnosis"]):
 
     robot: RobotFile
     data: DataFile
+    program: ProgramFile = None
     leave_out: Annotated[
         str, EffectNames("Effects that are not considered: 'drift,scale'. `truing effects` lists them.")
     ] = ""
@@ -65,7 +67,9 @@ class Command(run.Command["tuple[Robot, Measurements]", "Diagnosis"]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> tuple[Robot, Measurements]:
-        robot, data = robot_and_measurements(self.robot, self.data, self.base_link, self.tip_link)
+        robot, data = robot_and_measurements(
+            self.robot, self.data, self.base_link, self.tip_link, program=self.program
+        )
         if self.record == "qr":
             from truing.diagnosis.result import with_second_record
 

@@ -39,6 +39,7 @@ from truing.errors import InputError
 
 if TYPE_CHECKING:
     from truing.files import HandEyeAnswer, HandEyeData
+    from truing.files.table import Beside
     from truing.hand_eye import ClockOffset, HandEyeOptions, NextHandPose
     from truing.hand_eye.result import Solved
     from truing.model import Robot
@@ -118,6 +119,14 @@ class Command(run.Command[Loaded, "Solved | None"]):
         File(
             "Board poses in a file of their own; POSES then has hand poses. With times (t_s) in both the"
             " offset of the clocks is found; without they belong together row by row."
+        ),
+    ] = None
+    program: Annotated[
+        Path | None,
+        File(
+            "Robot program of poses (.src, .mod, .ls, .script, .jbi) that gives the hand poses of a table"
+            " POSES without columns hand_x_m …: one row per move to a literal target, in their order.",
+            metavar="PROGRAM",
         ),
     ] = None
     compare: Annotated[
@@ -219,6 +228,7 @@ class Command(run.Command[Loaded, "Solved | None"]):
             camera=self.camera,
             angles=self.angles,
             board_poses=self.board_poses,
+            beside=self._hand(),
             setup=self.setup,
             progress=progress.of if self.board else None,
         )
@@ -226,8 +236,19 @@ class Command(run.Command[Loaded, "Solved | None"]):
             self._require_joints(robot, data)
         return Loaded(data, clock, robot, answers)
 
+    def _hand(self) -> Beside | None:
+        if self.program is None:
+            return None
+        from truing.programs import commanded_hand
+
+        return commanded_hand(self.program)
+
     def _require_sense(self) -> None:
         """Raises InputError about options that need others."""
+        if self.program is not None and self.board_poses is not None:
+            raise InputError(
+                "--program: gives the hand poses of a table POSES; with --board-poses it is POSES"
+            )
         if self.board_poses is not None and (self.board or self.camera is not None):
             raise InputError(
                 "--board-poses: board poses are given, so --board and --camera have no images to be for"

@@ -23,6 +23,7 @@ from truing.cli.options import (
     Free,
     Length,
     Names,
+    ProgramFile,
     RobotFile,
     Seed,
     Threads,
@@ -48,6 +49,7 @@ class Command(run.Command["tuple[Robot, Measurements]", "Found"]):
 
     robot: RobotFile
     data: DataFile
+    program: ProgramFile = None
     free: Free = ""
     hold: Annotated[str, Names("Names and globs that stay at nominal: 'base.*,J6.*'.")] = ""
     effects: Effects = ""
@@ -78,7 +80,9 @@ class Command(run.Command["tuple[Robot, Measurements]", "Found"]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> tuple[Robot, Measurements]:
-        return robot_and_measurements(self.robot, self.data, self.base_link, self.tip_link)
+        return robot_and_measurements(
+            self.robot, self.data, self.base_link, self.tip_link, program=self.program
+        )
 
     def solve(self, loaded: tuple[Robot, Measurements], progress: run.Progress) -> Found:
         import truing

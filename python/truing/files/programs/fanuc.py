@@ -203,6 +203,7 @@ class _Fanuc:
             kind=kind,  # type: ignore[arg-type]
             numbers=tuple(values[n] for n in names),
             order=(0, first.offset if first else len(self.text) + point.start),
+            moves=tuple((0, use.offset) for use in point.uses),
             tool=tool if kind == "pose" else tool.or_flange(),
             frame=frame if kind == "pose" else NOWHERE,
             configuration=self._configuration(piece) if kind == "pose" else None,

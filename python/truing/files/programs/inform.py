@@ -181,6 +181,7 @@ class _Job:
             kind="pose" if pose else "joints",
             numbers=position.numbers,
             order=(0, first.offset if first else len(self.text) + position.start),
+            moves=tuple((0, use.offset) for use in position.uses),
             tool=self._tool(heading) if pose else self._tool(heading).or_flange(),
             frame=self._frame(heading) if pose else NOWHERE,
             configuration=heading.configuration if pose else None,

@@ -469,6 +469,7 @@ class _Krl:
             kind=kind,  # type: ignore[arg-type]
             numbers=what.all_of(names),
             order=(first.source, first.offset),
+            moves=tuple((use.source, use.offset) for use in uses),
             tool=first.places.tool if kind == "pose" else first.places.tool.or_flange(),
             frame=first.places.frame if kind == "pose" else NOWHERE,
             configuration=self._configuration(what) if kind == "pose" else None,

@@ -84,6 +84,7 @@ class Target:
     kind: Literal["pose", "joints"]
     numbers: tuple[Number, ...]
     order: tuple[int, int]  # file and offset of the move that first uses it
+    moves: tuple[tuple[int, int], ...]  # likewise of every move to it
     tool: Place = NOWHERE
     frame: Place = NOWHERE
     configuration: Configuration | None = None

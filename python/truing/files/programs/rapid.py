@@ -317,6 +317,7 @@ class _Rapid:
             kind="pose" if pose else "joints",
             numbers=numbers.target,
             order=(first.source, first.offset),
+            moves=tuple((use.source, use.offset) for use in value.uses),
             tool=first.tool if pose else first.tool.or_flange(),
             frame=first.frame if pose else NOWHERE,
             configuration=_configuration(numbers.configuration) if pose else None,

@@ -264,6 +264,7 @@ class _Script:
             kind="pose" if value.pose else "joints",
             numbers=value.numbers,
             order=(0, first.offset),
+            moves=tuple((0, use.offset) for use in value.uses),
             tool=first.tool if value.pose else first.tool.or_flange(),
             seed=first.seed,
         )
