@@ -106,6 +106,13 @@ void say_what_angles_cannot_show(const std::vector<Sampling>& samplings, const R
                       joint + " stood at " + std::to_string(sampling.angles) +
                           " angles only: any order makes the same motion as any other",
                       Untestable::other});
+    } else if (sampling.travel > kMostTravel) {
+      out->push_back({family().name,
+                      {joint},
+                      joint + " moved over " + number(sampling.travel / kTwoPi, 3) +
+                          " turns: orders are looked for over " + number(kMostTravel / kTwoPi, 2) +
+                          " at most; are its angles in the right unit?",
+                      Untestable::other});
     } else if (sampling.repeats > 0.0) {
       on_grids[std::round(10.0 * sampling.repeats) / 10.0].push_back(sampling.joint);
     } else if (sampling.lowest > kLowestOrder) {

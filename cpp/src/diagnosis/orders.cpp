@@ -208,6 +208,10 @@ double repeat_of(const std::vector<double>& angles, double travel) {
   return 0.0;
 }
 
+bool is_scanned(const Sampling& sampling) {
+  return sampling.angles > kFewAngles && sampling.lowest <= kHighestOrder && sampling.travel <= kMostTravel;
+}
+
 double log_sum(double a, double b) {
   const double larger = std::max(a, b);
   return larger + std::log1p(std::exp(std::min(a, b) - larger));
@@ -230,7 +234,7 @@ std::vector<Sampling> samplings(const Design& design, const std::vector<InputCol
     one.angles = angles.size();
     one.travel = angles.back() - angles.front();
     one.lowest = std::max(kLowestOrder, kWaves * kTwoPi / one.travel);
-    one.repeats = repeat_of(angles, one.travel);
+    one.repeats = one.travel > kMostTravel ? 0.0 : repeat_of(angles, one.travel);
     out.push_back(one);
   }
   return out;
@@ -240,7 +244,9 @@ OrderScan::OrderScan(const Design& design, const Evidence& evidence, const Evide
                      const std::vector<InputColumn>& inputs, const std::vector<Sampling>& samplings,
                      double design_effect, std::size_t most_values) {
   double travel = 0.0;
-  for (const Sampling& sampling : samplings) travel = std::max(travel, sampling.travel);
+  for (const Sampling& sampling : samplings) {
+    if (is_scanned(sampling)) travel = std::max(travel, sampling.travel);
+  }
   // Between two orders of the scan no more than a fifth of a wave's square is lost; and halves of integers are in it.
   double step = 0.5;
   while (step * travel > 4.0) step *= 0.5;
@@ -251,7 +257,7 @@ OrderScan::OrderScan(const Design& design, const Evidence& evidence, const Evide
   const Evidence::State seen = seen_on(left, evidence, state, times);
   const double freedom = evidence.degrees_of_freedom();
   for (const Sampling& sampling : samplings) {
-    if (sampling.angles <= kFewAngles || sampling.lowest > kHighestOrder) continue;
+    if (!is_scanned(sampling)) continue;
     const auto view = std::make_shared<const JointView>(design, left, *motion_of_joint(inputs, sampling.joint),
                                                         sampling.joint, times);
     const std::vector<Wave> waves = view->waves(orders_[0], step, orders_.size());

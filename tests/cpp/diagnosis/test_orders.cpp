@@ -211,6 +211,22 @@ TEST_CASE("a joint that stood at few angles, or hardly turned, is said not to sh
   CHECK(why["J4"].find("J4 turns too little for two whole waves of orders below 2") == 0);
 }
 
+TEST_CASE("a joint that moved over hundreds of turns is not looked at, in no time" * doctest::skip(kSanitized)) {
+  auto table = waving(40, 742, {});
+  std::vector<double> far(40);  // degrees called radians, or a wrong power of ten
+  for (std::size_t row = 0; row < 40; ++row) far[row] = 1000.0 * table->data.joints[2][row];
+  table->data.joints[2] = table->add(far);
+  arms::measure(table.get(), arm_of_gears(), arms::What::position, kWhiteNoise, 743);
+  const Diagnosis d = truing::diagnose(arm_of_gears(), table->data);
+  INFO(said(d));
+  const auto why = std::find_if(d.not_testable.begin(), d.not_testable.end(), [](const NotTestable& n) {
+    return n.effect == "transmission_error" && n.joints == std::vector<std::string>{"J3"};
+  });
+  REQUIRE(why != d.not_testable.end());
+  CHECK(why->why.find("J3 moved over ") == 0);
+  CHECK(why->why.find("are its angles in the right unit?") != std::string::npos);
+}
+
 TEST_CASE("curves with corners at every joint are no orders" * doctest::skip(kSanitized)) {
   // Steps at random angles, another one at every joint: their spectrum is broad, and no order stands out of it.
   const Robot robot = arm_of_gears();
