@@ -11,7 +11,8 @@ cases. Three forms are used:
 - *test inversion* (Carpenter 1999): of lengths and of maxima, which are biased upwards and end at zero. The
   interval holds every size at which what was observed is no rare outcome, above or below.
 - the *profile* of a maximum over many points (RT, dRP) is first drawn towards its mean by as much as chance
-  alone would spread it (empirical Bayes): else the largest of ten would be taken for larger than it is.
+  alone would spread it (empirical Bayes): else the largest of ten would be taken for larger than it is. RT's
+  upper end leaves it as found: else one point that is much worse than its neighbours would be averaged away.
 
 Coverage, measured: tests/python/performance/test_coverage.py and docs/guide/performance.md.
 """
@@ -37,6 +38,7 @@ Interval = tuple[float, float]
 DRAWS = 1000
 TAIL = 0.025
 _KNOWN_TAIL = 0.1  # beyond the end as if the place of a maximum were known: it is not, so that less is beyond
+_UNEVEN_TAIL = 0.015  # beyond the end of a profile that chance made more uneven than it is
 _NORMAL_TENTH = 1.2816  # above it lies a tenth of the normal distribution, as beyond that end
 _STEPS = 26  # of the bisection: the end of an interval to 1e-7 of the bracket
 _LENGTH_DRAWS = 4000
@@ -189,12 +191,18 @@ def path_repeatability_interval(attained: Floats, rng: np.random.Generator) -> I
     for k in range(DRAWS):  # all points of a cycle are drawn together: neighbours go together
         drawn = (rng.standard_normal((n, n)) @ centred / np.sqrt(n - 1)).reshape(attained.shape)
         ratios[k] = pose_repeatability(np.moveaxis(drawn, 0, 1)) / true
-    # The lower end for a profile that chance made uneven; the upper end as if it were known which point is
-    # the worst, which a point that is much worse than its neighbours is.
-    profile = np.exp(_shrunk(np.log(found / found.mean()), np.log(ratios)))
-    high = np.quantile(np.log((profile * ratios).max(axis=1) / profile.max()), 1 - TAIL)
-    low = np.quantile(np.log(ratios[:, np.argmax(found)]), _KNOWN_TAIL)
+    # The more even a profile, the more its largest value grows by chance. The lower end is of the profile
+    # without what chance made uneven; the upper end of the profile as found, in which a point that is much
+    # worse than its neighbours stays so. Chance has made that too uneven in part, so that more is beyond.
+    even = np.exp(_shrunk(np.log(found / found.mean()), np.log(ratios)))
+    high = np.quantile(_growth(even, ratios), 1 - TAIL)
+    low = np.quantile(_growth(found, ratios), _UNEVEN_TAIL)
     return float(found.max() * np.exp(-high)), float(found.max() * np.exp(-low))
+
+
+def _growth(profile: Floats, ratios: Floats) -> Floats:
+    """Logarithm of what chance makes of a profile's largest value, shape=(draws,)."""
+    return np.asarray(np.log((profile * ratios).max(axis=1) / profile.max()))
 
 
 def accuracy_drift_interval(offsets: Floats, time: Floats, rng: np.random.Generator) -> Interval:
