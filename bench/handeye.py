@@ -5,7 +5,7 @@
     python bench/handeye.py [--quick] [--only accuracy,images,...] [--write docs/benchmarks/handeye.md]
 
 Needs OpenCV 4 (`pip install "opencv-python-headless<5"`: 5.0 has no calibrateHandEye in Python). `--write`
-puts the tables between the markers of the page.
+puts the tables between the markers of the page; those not asked for stay as they are.
 Trial k has seed k, in every cell; the oracle of bench/handeye_oracle.py says what can be had when the noises
 are known.
 """
@@ -481,7 +481,7 @@ def coverage(quick: bool) -> Iterator[str]:
         "| --- |" + " --- |" * 9,
     )
     for what, name, method, scene_of in cells:
-        count = max(10, seeds // 5) if "oracle: " in name and "image" in what else seeds  # half a second each
+        count = max(10, seeds // 5) if "oracle: " in name else seeds  # up to half a second each
         inside, squared = [], []
         for seed in range(count):
             scene = scene_of(seed)
@@ -660,34 +660,36 @@ def main() -> None:
             f'OpenCV {cv2.__version__} has no calibrateHandEye: pip install "opencv-python-headless<5"'
         )
     cv2.setNumThreads(1)
-    before = os.getloadavg()[0] if hasattr(os, "getloadavg") else math.nan
-    lines = []
+    quick = " --quick" if arguments.quick else ""
     for name in wanted:
+        before = load()
         title, table = TABLES[name]
-        lines += ["", f"## {title}", *table(arguments.quick)]
-        print(
-            "\n".join(lines[-60:]) if not arguments.write else f"{title}: done",
-            file=sys.stdout if not arguments.write else sys.stderr,
-            flush=True,
+        lines = list(table(arguments.quick))
+        about = (
+            f"From `python bench/handeye.py{quick} --only {name}` on {datetime.now(timezone.utc):%Y-%m-%d}:"
+            f" {machine()}. Load average {before:.1f} before and {load():.1f} after, this program's own work"
+            " included; above the number of cores, believe no time but in ratio."
         )
-        if not arguments.write:
-            lines = []
-    if arguments.write:
-        command = (
-            "python bench/handeye.py"
-            + (" --quick" if arguments.quick else "")
-            + (f" --only {arguments.only}" if wanted != list(TABLES) else "")
-        )
-        after = os.getloadavg()[0] if hasattr(os, "getloadavg") else math.nan
-        about = [
-            f"From `{command}` on {datetime.now(timezone.utc):%Y-%m-%d}: {machine()}. Load average"
-            f" {before:.1f} before and {after:.1f} after, this program's own work included; above the number"
-            " of cores, believe no time but in ratio."
-        ]
-        start, end = page.index("<!-- table -->") + len("<!-- table -->"), page.index("<!-- end -->")
-        arguments.write.write_text(
-            page[:start] + "\n" + "\n".join([*about, *lines]) + "\n" + page[end:], encoding="utf-8"
-        )
+        section = "\n".join([f"## {title}", "", about, *lines])
+        if arguments.write:  # at once: what is made is kept if a later table fails
+            page = with_section(arguments.write.read_text(encoding="utf-8"), title, section)
+            arguments.write.write_text(page, encoding="utf-8")
+            note(f"{title}: done")
+        else:
+            print("\n" + section, flush=True)
+
+
+def load() -> float:
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else math.nan
+
+
+def with_section(page: str, title: str, section: str) -> str:
+    """The page with this section between its markers anew, and the others as they were."""
+    start, end = page.index("<!-- table -->") + len("<!-- table -->"), page.index("<!-- end -->")
+    old = {part.split("\n", 1)[0]: f"## {part.rstrip()}" for part in page[start:end].split("\n## ")[1:]}
+    old[title] = section.rstrip()
+    titles = [title for title, _ in TABLES.values() if title in old]
+    return page[:start] + "\n" + "\n\n".join(old[one] for one in titles) + "\n" + page[end:]
 
 
 if __name__ == "__main__":

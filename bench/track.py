@@ -6,7 +6,7 @@
     docs/benchmarks/track.md
 
 Reads the output of one run or of several from standard input; `--write` puts the tables between the markers
-of the page, without it they are printed.
+of the page, without it they are printed. Tables of the page that are not in the input stay as they are.
 Every line must be one that `bench_track` writes; anything else ends it with exit 2 and nothing written.
 """
 
@@ -36,8 +36,8 @@ def machine() -> str:
     return f"{processor}, {os.cpu_count()} cores, {platform.system()}"
 
 
-def tables(text: str) -> tuple[list[str], int, int]:
-    """Lines of the page, and how many targets were reached and missed."""
+def tables(text: str, about: str) -> tuple[list[str], int, int]:
+    """Lines of the page, and how many targets were reached and missed. about: when and where it was made."""
     lines: list[str] = []
     commands: list[str] = []
     reached = missed = 0
@@ -49,7 +49,7 @@ def tables(text: str) -> tuple[list[str], int, int]:
                 "",
                 f"## {line[0].upper()}{line[1:]}",
                 "",
-                f"`{commands[-1]}`" if commands else "",
+                f"`{commands[-1]}`, {about}" if commands else about,
                 "",
                 "| | measured | to reach | |",
                 "| --- | --- | --- | --- |",
@@ -86,20 +86,29 @@ def main() -> None:
     page = arguments.write.read_text(encoding="utf-8") if arguments.write else ""
     if arguments.write and not (START in page and END in page):
         parser.error(f"{arguments.write} has no markers {START} and {END}")
+    about = f"{datetime.now(timezone.utc):%Y-%m-%d}: {machine()}."
     try:
-        lines, reached, missed = tables(sys.stdin.read())
+        lines, reached, missed = tables(sys.stdin.read(), about)
     except ValueError as error:
         parser.error(str(error))
-    about = (
-        f"Made on {datetime.now(timezone.utc):%Y-%m-%d}: {machine()}. {reached} targets reached, {missed}"
-        " missed."
-    )
-    text = "\n".join([about, *lines])
+    text = "\n".join(lines).strip()
     if arguments.write:
         start, end = page.index(START) + len(START), page.index(END)
+        text = merged(page[start:end], text)
         arguments.write.write_text(page[:start] + "\n" + text + "\n" + page[end:], encoding="utf-8")
     else:
         print(text)
+    print(f"{reached} targets reached, {missed} missed", file=sys.stderr)
+
+
+def merged(old: str, new: str) -> str:
+    """The old tables, those of `new` put in their places: one is known by its title and its command."""
+
+    def by_name(text: str) -> dict[tuple[str, str], str]:
+        parts = [part.strip() for part in re.split(r"^## ", text, flags=re.MULTILINE)[1:]]
+        return {(part.split("\n")[0], part.split("`")[1]): f"## {part}" for part in parts}
+
+    return "\n\n".join({**by_name(old), **by_name(new)}.values())
 
 
 if __name__ == "__main__":
