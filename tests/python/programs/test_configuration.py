@@ -40,6 +40,14 @@ def posture(brand: Brand, degrees: list[float]):  # type: ignore[no-untyped-def]
         # Yaskawa: flip (0) while R is within 90 degrees.
         ("yaskawa", [0, 10, 0, 30, -60, 0], (0, 0, 0, 0, 0, 0)),
         ("yaskawa", [0, 10, 0, 150, 60, -190], (1, 0, 0, 0, 1, 0)),
+        # Behind axis 1: the lower arm lies back, the forearm stands up on its end. The wrist is before the
+        # lower arm as ever (ABB), but the elbow is under the line from shoulder to wrist (FANUC, Yaskawa).
+        ("abb", [10, -90, 0, 5, 30, 7], (0, 0, 0, 4)),
+        ("abb", [-10, -90, 0, 5, -30, 7], (-1, 0, 0, 5)),
+        ("fanuc", [0, -90, 0, 0, 60, 0], (1, 0, 0, 0, 0, 0)),
+        ("yaskawa", [0, -90, 0, 30, 60, 0], (0, 1, 1, 0, 0, 0)),
+        # The forearm folded over further: the elbow is above that line.
+        ("fanuc", [0, -45, 150, 0, 60, 0], (1, 1, 0, 0, 0, 0)),
     ],
 )
 def test_configuration_data_are_those_of_the_joints(
