@@ -230,6 +230,13 @@ def test_columns_are_the_differences_of_whole_simulations(file: Path) -> None:
         assert np.linalg.norm(column - near) < 0.1 * np.linalg.norm(near)
 
 
+def test_a_value_that_nothing_depends_on_does_not_overflow(file: Path) -> None:
+    of = prepared_of(file, recordings_of(file))
+    free = free_value("saturation", 0, Sizes(*(np.ones(1) for _ in range(4))))
+    point = free.put(point_of(of.arm.nominal), 1e6)
+    assert np.isfinite(point.value(0, "saturation")) and point.value(0, "saturation") > 1e100
+
+
 def test_no_command_no_torque(file: Path) -> None:
     """`enabled` 0: the arm falls back to where it hangs."""
     rest = resting(0)

@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 _DAMPINGS = (0.0, 0.03, 0.3, 3.0)  # Levenberg's, of the diagonal: all are tried at once, the best is taken
+_FARTHEST_LOG = 4.0  # of a logarithm in one step: a flat column would leave for any number
 _LONGER = (2.0, 4.0)  # times the step of the second: along curved valleys
 _LAST = 2e-3  # relative fall of the cost at which a fit ends
 _ANCHORS = 3
@@ -125,13 +126,14 @@ class Fitter:
     def only(self, joint: int, fitted: Fitted) -> Iterator[None]:
         """Meanwhile this joint alone is simulated, if joints are apart: the others stay as they were fitted.
         A supply that sags by all joints' torques needs them all."""
+        outer, self._only = self._only, None
         sags = np.any(fitted.point.chain[:, FIELDS.index("supply_sag")] != 0.0)
         if joint >= 0 and not sags and self.rows.measured.shape[1] > 1:
             self._only = joint, self.rows.measured - self.other - fitted.errors
         try:
             yield
         finally:
-            self._only = None
+            self._only = outer
 
     def errors(self, motion: Floats) -> Floats:
         return np.clip(self.rows.measured - self.other - motion, -_LEFT, _LEFT)
@@ -252,9 +254,10 @@ class Fitter:
         at = np.array([f.at(point) for f in free])
         right = xy - precision * (at - start)
         out = []
+        most = np.array([_FARTHEST_LOG if f.scale == "log" else np.inf for f in free])
         for mu in _DAMPINGS:
             d = xx + np.diag(precision + mu * np.diag(xx) + 1e-12)
-            out.append(bounded_step(d, right, free, at))
+            out.append(np.clip(bounded_step(d, right, free, at), -most, most))
         return [*out, *(longer * out[1] for longer in _LONGER)]
 
 

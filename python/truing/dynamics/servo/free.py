@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 USUAL = tuple(name for name, known in PARAMETERS.items() if known.usual)
 WEIGHT, PAYLOAD, LINK = "weight_scale", "payload_mass", "link_scale"
 _STEP = 0.03  # of the prior's standard deviation: a difference quotient's step
+_MOST_LOG = 300.0  # what a logarithm may be
 _LEAST_LOG = 1e-9  # below it a logarithm ends
 
 
@@ -87,7 +88,7 @@ class Free:
     def put(self, point: Point, at: float) -> Point:
         """The point with this value on its scale, within the bounds."""
         at = min(max(at, self.low), self.high)
-        value = math.exp(at) if self.scale == "log" else at
+        value = math.exp(min(at, _MOST_LOG)) if self.scale == "log" else at
         if self.field == WEIGHT:
             return replace(point, weight=value)
         if self.field == PAYLOAD:
