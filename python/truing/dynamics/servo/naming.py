@@ -31,7 +31,7 @@ UNKNOWN = 0.5  # so sure at least must be that there is what nobody knows
 _CLASS_NATS, _CLASS_R2, _SAME_R2, _TEMPERED, _FAR_NATS = 6.0, 0.95, 0.5, 0.5, 25.0
 _LATE_R2 = 0.95  # of a delay, that damping and the others do as well: these are one class
 _ONE_RECORDING = 0.9  # the most that folds of one recording are worth
-_REFITTED = 6  # of the candidates, without linearisation
+_REFITTED, _REFITTED_EACH = 6, 4  # of the candidates, without linearisation; of each joint, if there are more
 _FIRST_ROUNDS, _MORE_ROUNDS = 2, 4  # of a refit: from each start, from the best of these
 _WIDE = (0.5, 2.0)  # of a prior: sizes that a candidate is looked at
 _FRICTIONS = (1.0, 0.4, 0.05)  # times the dry friction that stands beside it
@@ -195,18 +195,20 @@ class Namer:
         refused: set[tuple[str, int]] = set()
         while len(account.found) < self.most:
             self.fitter.progress(f"candidates beside {len(account.found)} that were named")
+            before = len(account.found)
             if not self._round(account, refused):
                 break
-            self._question(account)
+            for joint in range(self.joints):
+                if joint in {c.joint for c in account.found[before:]}:
+                    self._question(account, joint)
         while account.found and self._drop_idle(account):
             pass
         return account
 
-    def _question(self, account: Account) -> None:
+    def _question(self, account: Account, joint: int) -> None:
         """Looks again at every earlier name of the joint where one was taken: another may stand there now."""
-        joint = account.found[-1].joint
         noise = self._noise(account.fitted.columns, account.fitted.errors, len(account.fitted.columns))
-        for at in [k for k, c in enumerate(account.found[:-1]) if c.joint == joint and joint >= 0]:
+        for at in [k for k, c in enumerate(account.found) if c.joint == joint][:-1]:
             one, fitted = account.found[at], account.fitted
             less = self.without(account, at, noise)
             rest = Account(
@@ -250,11 +252,19 @@ class Namer:
         best, noise = self.best_beside(account, refused)
         if not best:
             return False
-        gain, one, refit = best[0]
-        self.fitter.progress(f"{one.effect} {' '.join(one.joints)} is taken")
-        account.found.append(one)
-        account.refits[f"{one.label} {one.joint}"] = [(other, gain - theirs) for theirs, other, _ in best[1:]]
-        account.fitted = self.polished(refit, noise)
+        taken: dict[int, int] = {}  # the best of each joint; what moves all joints alone
+        for k, (_, one, _) in enumerate(best):
+            taken.setdefault(one.joint, k)
+        taken = {-1: 0} if best[0][1].joint < 0 else {j: k for j, k in taken.items() if j >= 0}
+        for k in taken.values():
+            gain, one, _ = best[k]
+            self.fitter.progress(f"{one.effect} {' '.join(one.joints)} is taken")
+            account.found.append(one)
+            account.refits[f"{one.label} {one.joint}"] = [
+                (other, gain - theirs) for theirs, other, _ in best[k + 1 :] if other.joint == one.joint
+            ]
+        refits = [best[k][1:] for k in taken.values()]
+        account.fitted = self.polished(_together(account.fitted, refits), noise)
         refused.clear()
         return True
 
@@ -266,27 +276,41 @@ class Namer:
         candidates, account.not_testable, base = self.all_candidates(fitted.point, account.sizes)
         there = {c.place for c in account.found}
         candidates = [c for c in candidates if c.place not in there and not self._fitted(fitted, c)]
+        if joint is not None:
+            candidates = [c for c in candidates if c.joint == joint]
+        with self.fitter.only(-1 if joint is None else joint, fitted):
+            return self._best_of(account, refused, candidates, base)
+
+    def _best_of(
+        self,
+        account: Account,
+        refused: set[tuple[str, int]],
+        candidates: Sequence[Candidate],
+        base: Floats,
+    ) -> tuple[list[tuple[float, Candidate, Fitted]], Noise]:
+        fitted = account.fitted
         columns = candidate_columns(self.fitter, fitted.point, base, candidates)
         sums = self.sums(fitted, columns)
         ranks = self.ranked(sums, *_groups(sums, fitted, candidates))[1]
         starts = self.starts(fitted, candidates, sums.noise)
         order = sorted(ranks, key=lambda r: -max(r.score, starts[r.candidate][0]))
         best: list[tuple[float, Candidate, Fitted]] = []
-        seen: set[tuple[str, tuple[str, ...]]] = set()
+        seen: dict[tuple[str, tuple[str, ...]], int] = {}  # places, and their joints
+        most = _REFITTED if self.joints == 1 else _REFITTED_EACH
         for rank in order:
             one, (promised, start) = candidates[rank.candidate], starts[rank.candidate]
-            if max(rank.score, promised) < THRESHOLD or len(seen) >= _REFITTED:
+            if max(rank.score, promised) < THRESHOLD:
                 break
-            if one.place in seen or (one.label, one.joint) in refused:
+            if list(seen.values()).count(one.joint) >= most:
                 continue
-            if joint is not None and one.joint != joint:
+            if one.place in seen or (one.label, one.joint) in refused:
                 continue
             points = [start] if start is not None else []
             if _plausible(one, rank, fitted.point):
                 points.append(_linear_start(one, rank, fitted.point))
             if not points:
                 continue
-            seen.add(one.place)
+            seen[one.place] = one.joint
             joint_alone = -1 if one.free[0].field == "supply_sag" else one.joint
             with self.fitter.only(joint_alone, fitted):
                 gain, refit = self._refit(fitted, one, points, sums.noise)
@@ -386,6 +410,18 @@ class Namer:
             errors=some.errors,
             columns=columns[keep],
         )
+
+
+def _together(fitted: Fitted, refits: Sequence[tuple[Candidate, Fitted]]) -> Fitted:
+    """Refits of unlike joints in one. What they saw is that of the last."""
+    point, free, start = refits[0][1].point, list(fitted.free), list(fitted.start)
+    chain = point.chain.copy()
+    for one, refit in refits:
+        if one.joint >= 0:
+            chain[one.joint] = refit.point.chain[one.joint]
+        free += one.free
+        start += list(refit.start[len(fitted.free) :])
+    return replace(refits[-1][1], point=replace(point, chain=chain), free=free, start=np.array(start))
 
 
 class _Follow:
