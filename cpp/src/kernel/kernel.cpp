@@ -363,9 +363,10 @@ void gram_reduce(double* acc, int columns, double* out) {
   });
 }
 
-// Squares of C row: kTilePoses lanes at a time stay in registers through the columns.
+// Squares of C row: so many lanes at a time stay in registers through the columns.
 void add_squared(const double* c, std::ptrdiff_t stride, const double* row, int columns, int length, double* out) {
-  constexpr int kPacks = kTilePoses / kLanes > 8 ? 8 : kTilePoses / kLanes;
+  constexpr int kPacks = 6;
+  static_assert(kTilePoses % (kPacks * kLanes) == 0, "no pack reads beyond a tile's rows");
   for (int first = 0; first < length; first += kPacks * kLanes) {
     Pack sum[kPacks];
     for (int m = 0; m < kPacks; ++m) sum[m] = Pack{};

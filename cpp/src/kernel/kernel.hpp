@@ -106,7 +106,7 @@ struct Functions {
   void (*gram_add)(const double* c, std::ptrdiff_t stride, int columns, int length, double* acc);
   /// Sums the lanes: upper triangle of `out` (columns x columns, column-major) += acc; acc is cleared.
   void (*gram_reduce)(double* acc, int columns, double* out);
-  /// out[i] += (sum over k of row[k] c[k * stride + i])^2 for i below `length` (a multiple of 48).
+  /// out[i] += (sum over k of row[k] c[k * stride + i])^2 for i below `length` (a multiple of kTilePoses).
   void (*add_squared)(const double* c, std::ptrdiff_t stride, const double* row, int columns, int length, double* out);
   /// out[i] = sum over k of weights[k] x[i * step + k], of `count` rows (a multiple of 8). `x` holds (count - 1) * step
   /// + weight_count numbers; `scratch`: filter_scratch(...) numbers. An output's bits do not depend on the others.

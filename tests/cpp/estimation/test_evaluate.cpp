@@ -5,6 +5,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "estimation/clustered.hpp"
@@ -306,6 +307,10 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
       for (int k = 0; k < columns; ++k) sum += expected[k] * c[k * length + i];
       CHECK(squares[i] == doctest::Approx(1.0 + sum * sum).scale(0).epsilon(1e-13));
     }
+    // Of one tile's rows alone: none beyond them is touched.
+    squares.assign(length, 1.0);
+    f->add_squared(c.data(), length, expected.data(), columns, truing::kernel::kTilePoses, squares.data());
+    CHECK(std::all_of(squares.begin() + truing::kernel::kTilePoses, squares.end(), [](double v) { return v == 1.0; }));
     // Sine and cosine, through a chain of one rotation about z and a step along x: also where the quadrant changes, and
     // many turns away.
     using namespace truing::kernel;
