@@ -72,7 +72,9 @@ def looks_of(path: PathLike | None, robot: _core.Robot, base_link: str = "") -> 
             return None
         tree = ElementTree.fromstring(text)
         named = [one for one in _named_meshes(tree, robot, base_link) if one.files]
-    except (InputError, ElementTree.ParseError, _Damaged, OSError, RecursionError):
+    except _Damaged as error:
+        return Looks([], f"Drawn without meshes: an origin or a scale in {shown(Path(path).name)}: {error}.")
+    except (InputError, ElementTree.ParseError, OSError, RecursionError):
         return None
     if not named:
         return None

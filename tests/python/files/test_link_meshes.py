@@ -116,6 +116,17 @@ def test_a_damaged_mesh_is_left_out_and_named(kind: str, tmp_path: Path) -> None
     assert found.note.startswith("Drawn without their meshes: ") and name[-20:] in found.note
 
 
+def test_a_scale_that_is_none_is_said(tmp_path: Path) -> None:
+    urdf = write_meshed_arm(tmp_path / "arm")
+    robot = truing.load_robot(urdf)
+    urdf.write_text(urdf.read_text().replace('scale="0.001 0.001 0.001"', 'scale="1 1"'))
+    found = looks_of(urdf, robot)
+    assert found is not None and not found.meshes
+    assert found.note == (
+        "Drawn without meshes: an origin or a scale in 'arm.urdf': found '1 1', expected three numbers."
+    )
+
+
 @pytest.mark.parametrize(
     "name",
     ["{0}/secret.stl", "file://{0}/secret.stl", "../../secret.stl", "package://arm_description/../secret.stl",
