@@ -185,7 +185,7 @@ def _with_point_mass(mujoco: Any, model: Any, joint: str, mass: float, place: Fl
 
 
 @contextlib.contextmanager
-def _quiet(mujoco: Any) -> Iterator[None]:
+def quiet(mujoco: Any) -> Iterator[None]:
     """A simulation that leaves is told by its result, not by MuJoCo in a file of the working folder."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: None)
@@ -312,7 +312,7 @@ class Runner:
         usual = float(self.model.opt.timestep)
         self.model.opt.timestep = usual if step is None else step
         try:
-            with _quiet(self.mujoco):
+            with quiet(self.mujoco):
                 parts = [
                     self._run(starts[k : k + _AT_ONCE], track[k : k + _AT_ONCE], times)
                     for k in range(0, starts.size, _AT_ONCE)

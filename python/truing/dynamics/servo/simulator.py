@@ -5,7 +5,6 @@ addresses. C++ computes the chain and calls `mj_step`; no Python runs meanwhile.
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import ctypes
 import os
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.export import import_mujoco
+from truing.dynamics.runner import quiet
 from truing.dynamics.servo.arm import ServoArm
 from truing.dynamics.servo.chain import ServoChain, ServoJoint
 from truing.dynamics.servo.data import ServoData, Window
@@ -120,7 +120,7 @@ class Simulator:
             for p, place in zip(points, places, strict=True)
         ]
         parts: list[tuple[list[Floats], list[Floats]]] = []
-        with _quiet(self.mujoco):
+        with quiet(self.mujoco):
             batches = list(self._batches(windows, len(points)))
             for k, batch in enumerate(batches):
                 some = [_core.ServoWindow(w.stream, w.first, w.rows) for w in batch]
@@ -260,14 +260,3 @@ def _addresses(model: Any, data: Any) -> dict[str, int]:
         "data": int(data._address),
         **{name: int(array.ctypes.data) for name, array in arrays.items()},
     }
-
-
-@contextlib.contextmanager
-def _quiet(mujoco: Any) -> Iterator[None]:
-    """A simulation that leaves is told by its result, not by MuJoCo in a file of the working folder."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
