@@ -7093,12 +7093,13 @@ class UnknownTorque:
     @property
     def curve(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Shape=(n, 3): input, torque, standard error [Nm | N]
+        Shape=(n, 3): input, torque, standard error [Nm | N]; empty where its past counts.
         """
     @property
     def inputs(self) -> tuple[str, ...]:
         """
-        'angle', 'angle J2' (another joint's), 'speed', 'load', 'time', 'direction' or a column.
+        'angle', 'angle J2' (another joint's), 'speed', 'load', 'time', 'direction' or a column; 'its past'
+        after 'load' where the load is remembered.
         """
     @property
     def joint(self) -> str:

@@ -12,6 +12,7 @@
 #include "diagnosis/design.hpp"
 #include "diagnosis/free_search.hpp"
 #include "estimation/evidence.hpp"
+#include "math/constants.hpp"
 #include "rooms.hpp"
 
 namespace truing::diagnosis {
@@ -40,8 +41,8 @@ struct Sampling {
 constexpr std::size_t kFewAngles = 4;  ///< of so many, any function is a wave of any order
 constexpr double kAsWell = 3.0;        ///< nats: an order that loses less fits about as well
 /// [rad] of a joint's travel, over which orders are looked for: their number grows with it, and the time with its
-/// square. It is 32 turns.
-constexpr double kMostTravel = 201.1;
+/// square.
+constexpr double kMostTravel = 32.0 * kTwoPi;
 
 /// Of every driven revolute joint that moves, on the design's training rows.
 std::vector<Sampling> samplings(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot);

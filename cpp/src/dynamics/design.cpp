@@ -112,8 +112,6 @@ void add_memory(std::size_t joint, const Robot& robot, double torque, double pri
   group.joint = static_cast<int>(joint);
   group.inputs = {"load", "its past"};
   const double width = 1.5 * torque / kPlays;
-  group.low = width;
-  group.high = kPlays * width;
   if (!(width > 0.0)) return;
   for (int k = 1; k <= kPlays; ++k) {
     TorqueTerm term;

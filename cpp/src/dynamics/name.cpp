@@ -288,7 +288,7 @@ std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& 
     unknown.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     const std::vector<Parameter> knots = parameters_of(design, group.columns, naming.fit());
     const double width = (group.high - group.low) / std::max(1.0, static_cast<double>(knots.size()) - 1.0);
-    for (std::size_t i = 0; i < knots.size(); ++i)
+    for (std::size_t i = 0; width > 0.0 && i < knots.size(); ++i)
       unknown.curve.push_back({group.low + width * static_cast<double>(i), knots[i].value, knots[i].sigma});
     out.push_back(std::move(unknown));
   }

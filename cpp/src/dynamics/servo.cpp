@@ -230,7 +230,7 @@ class Run {
     if (limited) s->command = command;
   }
 
-  /// Torque of the drive for an angle and a speed; the state of its controller is that of this step.
+  /// What the firmware's gain multiplies the effort by.
   static double firmware(double gain, double exponent, JointState* s) {
     if (gain != s->gain) {  // seldom: a power at each step would take longer than all else
       s->gain = gain;
@@ -239,6 +239,7 @@ class Run {
     return s->gain_factor;
   }
 
+  /// Torque of the drive for an angle and a speed; the state of its controller is that of this step.
   double drive_torque(const Drive& d, JointState& s, Index j, Index row, const Held& command, double angle,
                       double speed) const {
     if (at(r_.enabled, row, j) < 0.5) return 0.0;

@@ -171,6 +171,7 @@ TEST_CASE("what gives way under load and stays is unknown over the load and its 
   REQUIRE(!d.unknown.empty());
   CHECK(d.unknown.front().joint == "J1");
   CHECK(d.unknown.front().inputs == std::vector<std::string>{"load", "its past"});
+  CHECK(d.unknown.front().curve.empty());  // what is remembered has no one torque for a load
 }
 
 TEST_CASE("what cannot be used is refused in words") {

@@ -53,12 +53,14 @@ struct FoundTorqueEffect {
 /// A part of the torques that goes with an input, and that no effect of the catalogue explains.
 struct UnknownTorque {
   std::string joint;  ///< its name
-  std::vector<std::string>
-      inputs;  ///< 'angle', 'angle J2' (another joint's), 'speed', 'load', 'time', 'direction' or a column
-  double probability = 0.0;                  ///< posterior that there is such a thing
-  Share share;                               ///< as that of an effect
-  double rms = 0.0;                          ///< [Nm | N] of its torque
-  std::vector<std::array<double, 3>> curve;  ///< shape=(n, 3): input, torque, standard error [Nm | N]
+  /// 'angle', 'angle J2' (another joint's), 'speed', 'load', 'time', 'direction' or a column; 'its past' after 'load'
+  /// where the load is remembered.
+  std::vector<std::string> inputs;
+  double probability = 0.0;  ///< posterior that there is such a thing
+  Share share;               ///< as that of an effect
+  double rms = 0.0;          ///< [Nm | N] of its torque
+  std::vector<std::array<double, 3>>
+      curve;  ///< shape=(n, 3): input, torque, standard error [Nm | N]; empty where its past counts
 };
 
 /// How much of the gap lies in one part of the motion.
