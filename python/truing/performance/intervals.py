@@ -38,6 +38,7 @@ Interval = tuple[float, float]
 DRAWS = 1000
 TAIL = 0.025
 _KNOWN_TAIL = 0.1  # beyond the end as if the place of a maximum were known: it is not, so that less is beyond
+_KNOWN_RATIO_TAIL = 0.15  # the same where errors are factors: their distribution leans to the far side
 _UNEVEN_TAIL = 0.015  # beyond the end of a profile that chance made more uneven than it is
 _NORMAL_TENTH = 1.2816  # above it lies a tenth of the normal distribution, as beyond that end
 _STEPS = 26  # of the bisection: the end of an interval to 1e-7 of the bracket
@@ -253,8 +254,7 @@ def repeatability_drift_interval(positions: Floats, time: Floats, rng: np.random
         lambda size: level * float(drift(np.exp(size * shape))),
         lambda size: level * drift(np.exp(size * shape) * ratios),
     )
-    smooth = level * np.exp(shape)
-    return low, max(high, _end_at_largest(smooth, smooth * ratios))
+    return low, max(high, _end_of_ratios(level * np.exp(shape), ratios))
 
 
 def _end_at_largest(curve: Floats, drawn: Floats) -> float:
@@ -264,6 +264,15 @@ def _end_at_largest(curve: Floats, drawn: Floats) -> float:
     place = int(np.argmax(np.abs(curve - curve[0])))
     deviation = float((drawn[:, place] - drawn[:, 0]).std())
     return float(abs(curve[place] - curve[0])) + _NORMAL_TENTH * deviation
+
+
+def _end_of_ratios(curve: Floats, ratios: Floats) -> float:
+    """The same of a curve whose errors are factors: what was found too small by a factor was drawn with a small
+    scatter too, so that the truth is the value over the factor (a pivot), not the value times it.
+    """
+    place = int(np.argmax(np.abs(curve - curve[0])))
+    changes = np.abs(curve[place] / ratios[:, place] - curve[0] / ratios[:, 0])
+    return float(np.quantile(changes, 1 - _KNOWN_RATIO_TAIL))
 
 
 # ---- Parts -------------------------------------------------------------------------------------------------

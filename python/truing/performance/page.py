@@ -285,7 +285,7 @@ def _line(x: Sequence[float], metres: Sequence[float], name: str, colour: str, d
 
 def _thermal_words(course: Row) -> str:
     if course["compensated_m"] is None:
-        return f"thermal effects were not fitted: {escaped(course['not_compensated_because'])}"
+        return f"Thermal effects were not fitted: {escaped(course['not_compensated_because'])}"
     names = ", ".join(escaped(name) for name in course["thermal_effects"])
     return (
         f"{escaped(course['label'])}, {escaped(course['pose'])}: moved by up to"
