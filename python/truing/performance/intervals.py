@@ -267,8 +267,8 @@ def _end_at_largest(curve: Floats, drawn: Floats) -> float:
 
 
 def _end_of_ratios(curve: Floats, ratios: Floats) -> float:
-    """The same of a curve whose errors are factors: what was found too small by a factor was drawn with a small
-    scatter too, so that the truth is the value over the factor (a pivot), not the value times it.
+    """The same of a curve whose errors are factors: what was found too small by a factor was drawn with a
+    small scatter too, so that the truth is the value over the factor (a pivot), not the value times it.
     """
     place = int(np.argmax(np.abs(curve - curve[0])))
     changes = np.abs(curve[place] / ratios[:, place] - curve[0] / ratios[:, 0])
