@@ -59,7 +59,8 @@ class Command(run.Command[Loaded, "Solved"]):
     targets: Annotated[
         Path,
         File(
-            "CSV or Parquet, one row per target: x_m y_m z_m qw qx qy qz, and optional columns.",
+            "CSV or Parquet, one row per target: x_m y_m z_m qw qx qy qz, and optional columns;"
+            " or a robot program (.src .mod .ls .script .jbi).",
             argument=True,
             metavar="TARGETS",
         ),
