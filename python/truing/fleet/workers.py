@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import multiprocessing
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
@@ -91,19 +93,37 @@ def workers_of(client: Any = None, workers: int | None = None) -> Iterator[Worke
     distributed = _distributed()
     import dask
 
+    if _is_starting():  # a worker that runs its parent's script: the parent says what is wrong
+        sys.exit(1)
     quiet = {"distributed.worker.daemon": True, "distributed.admin.system-monitor.gil.enabled": False}
     with (
         dask.config.set(quiet),
-        distributed.LocalCluster(
-            n_workers=workers or os.cpu_count() or 1,
+        _cluster_of(distributed, workers or os.cpu_count() or 1) as cluster,
+        distributed.Client(cluster) as own,
+    ):
+        yield Workers(own)
+
+
+def _is_starting() -> bool:
+    """This process is being started by multiprocessing, and runs the script that its parent runs."""
+    return bool(getattr(multiprocessing.current_process(), "_inheriting", False))
+
+
+def _cluster_of(distributed: Any, workers: int) -> Any:
+    """A cluster on this machine. Raises InputError where its processes end as soon as they begin."""
+    try:
+        return distributed.LocalCluster(
+            n_workers=workers,
             threads_per_worker=1,
             memory_limit=_MEMORY,
             dashboard_address=":0",
             silence_logs=logging.CRITICAL,
-        ) as cluster,
-        distributed.Client(cluster) as own,
-    ):
-        yield Workers(own)
+        )
+    except RuntimeError as error:
+        raise InputError(
+            f"the worker processes did not start ({str(error).rstrip('.')}). Each of them imports the script that starts them:"
+            ' in a script, put what calls truing.fleet under `if __name__ == "__main__":`, or give workers=0'
+        ) from None
 
 
 @contextlib.contextmanager

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -104,6 +106,21 @@ def test_the_command_works_on_the_scheduler_at_an_address(
     assert code == 0
     assert "3 arms, 480 rows, 24 partitions" in capsys.readouterr().out
     assert (out / "robot_a003.yaml").exists()
+
+
+def test_a_script_without_a_guard_is_told_to_have_one(folder: Path, tmp_path: Path) -> None:
+    """Every worker runs the script again: one error says what to write, and none is of Dask."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import truing\nfrom truing.examples import example\n"
+        f"truing.fleet.identify(truing.load_robot(example('ur10')), {str(folder)!r}, workers=1)\n"
+    )
+    ran = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=300)
+    assert ran.returncode == 1
+    assert ran.stderr.count("Traceback") == 1, ran.stderr
+    last = ran.stderr.strip().splitlines()[-1]
+    assert last.startswith("truing.errors.InputError: the worker processes did not start"), last
+    assert 'if __name__ == "__main__":' in last
 
 
 class _Killer(threading.Thread):
