@@ -293,6 +293,20 @@ def test_what_was_found_is_text(file: Path) -> None:
     assert written["held_out"] == ["r4", "r5"]
 
 
+def test_what_held_out_motion_vetoes_leaves_the_chain(file: Path) -> None:
+    """Recordings that are fitted have a delay, those that are held out have not."""
+    every = {known.effect for known in PARAMETERS.values()} | {"payload", "link_inertia"}
+    late, prompt = recordings_of(file, 5e-4, delay=0.04), recordings_of(file, 5e-4)
+    found = servo_diagnose(
+        file, [*late[:4], *prompt[4:]], window=np.inf, leave_out=sorted(every - {"delay"}), max_effects=1
+    )
+    assert not names(found) and found.chains["named"].drives[0].delay == 0.0
+    assert any("no better with it: delay at swing" in warning for warning in found.warnings)
+    assert found.rollout.errors["named"][0, -1] == pytest.approx(
+        found.rollout.errors["standard"][0, -1], rel=0.05
+    )
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

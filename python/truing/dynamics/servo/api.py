@@ -23,7 +23,7 @@ from truing.dynamics.servo.judge import judged, traces_of
 from truing.dynamics.servo.naming import Account, Namer, late, sureness, unknown
 from truing.dynamics.servo.result import ServoDiagnosis
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, point_of
-from truing.dynamics.servo.words import Parts, diagnosis_of
+from truing.dynamics.servo.words import Parts, diagnosis_of, held_share
 from truing.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -130,12 +130,16 @@ def servo_diagnose(
     standard, sizes = groundwork(fitter, nominal, prepared.data)
     namer = Namer(fitter, leave_out, max_effects)
     account = namer.run(standard, sizes, nominal)
+    fitter.progress("judging by held-out motion")
+    held, rows = _held_out(prepared, standard, account, nominal)
+    while (at := _veto(account, held, rows)) is not None:
+        account.vetoed.append(account.found[at])
+        namer.drop(account, at)
+        held, rows = _held_out(prepared, standard, account, nominal)
     single = len({prepared.data.streams[w.stream].fold for w in prepared.train}) < 2
     sure = sureness(namer, account, single)
     functions = unknown(namer, account, single)
-    fitter.progress("judging by held-out motion")
     models = {"nominal": nominal, "standard": standard.point, "named": account.fitted.point}
-    held, rows = _held_out(prepared, standard, account, nominal)
     parts = Parts(
         prepared.simulator,
         prepared.data,
@@ -154,6 +158,14 @@ def servo_diagnose(
         late(namer, account),
     )
     return diagnosis_of(parts, time.perf_counter() - begun)
+
+
+def _veto(account: Account, held: Sequence[Floats], rows: NDArray[np.intp]) -> int | None:
+    """Number of the effect that helps held-out motion least, if that is predicted no better with it."""
+    standard, named = held[1], held[2]
+    without = held[3 : 3 + len(account.found)]
+    shares = [held_share(one, named, standard, rows)[0] for one in without]
+    return int(np.argmin(shares)) if shares and min(shares) <= 0.0 else None
 
 
 def _held_out(

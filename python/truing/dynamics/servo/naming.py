@@ -80,6 +80,7 @@ class Account:
     refits: dict[str, list[tuple[Candidate, float]]] = field(default_factory=dict)
     """By label and joint of what was taken: rivals that were refitted, and how far behind they stayed."""
     weights: list[Weight] = field(default_factory=list)
+    vetoed: list[Candidate] = field(default_factory=list)  # held-out motion is predicted no better with them
 
 
 @dataclass
@@ -201,9 +202,24 @@ class Namer:
             for joint in range(self.joints):
                 if joint in {c.joint for c in account.found[before:]}:
                     self._question(account, joint)
+        self._weigh(account)
+        return account
+
+    def _weigh(self, account: Account) -> None:
+        """Drops what is idle, until nothing is."""
+        account.weights = []
         while account.found and self._drop_idle(account):
             pass
-        return account
+
+    def drop(self, account: Account, at: int) -> None:
+        """Takes one of what was found out of the chain; the rest is fitted, and weighed, without it."""
+        fitted, one = account.fitted, account.found[at]
+        self.fitter.progress(f"{one.effect} {' '.join(one.joints)} does not hold")
+        noise = self._noise(fitted.columns, fitted.errors, len(fitted.columns))
+        less = self.without(account, at, noise)
+        account.found.pop(at)
+        account.fitted = self.polished(less, noise)
+        self._weigh(account)
 
     def _question(self, account: Account, joint: int) -> None:
         """Looks again at every earlier name of the joint where one was taken: another may stand there now."""

@@ -124,8 +124,7 @@ def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
         "named": chain_of(parts.account.fitted.point, parts.simulator.arm.nominal),
     }
     small: list[str] = []
-    unheld: list[str] = []
-    named = _named(parts, covariance, small, unheld)
+    named = _named(parts, covariance, small)
     effects = [*named, *_usual(parts, covariance)]
     unknown = [_unknown(f, chains["nominal"]) for f in parts.functions]
     classes = _classes(parts, named)
@@ -135,10 +134,9 @@ def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
         warnings.append(
             f"fitted, and too small to be named, as something else may look so: {', '.join(small)}"
         )
-    if unheld:
-        warnings.append(
-            f"fitted, and not named, as held-out motion is predicted no better with it: {', '.join(unheld)}"
-        )
+    if parts.account.vetoed:
+        places = ", ".join(_place(one) for one in parts.account.vetoed)
+        warnings.append(f"not named, as held-out motion is predicted no better with it: {places}")
     if parts.single:
         warnings.append("one recording only: folds are blocks of its time, and no name is surer than 0.9")
     held = tuple(dict.fromkeys(s.name for s in parts.data.streams if s.test))
@@ -199,20 +197,19 @@ def _parameter(parts: Parts, covariance: ServoCovariance, free: Free, off: Point
 
 
 # ---- effects --------------------------------------------------------------------------------------
-def _share(
-    parts: Parts, without: Floats, with_it: Floats, whole: Floats, joint: int
+def held_share(
+    without: Floats, with_it: Floats, whole: Floats, window: NDArray[np.intp]
 ) -> tuple[float, float, float]:
     """Part of the squares of `whole` (or `without`, where this is more; each joint in units of its own) that
     goes, and its 90 % interval over windows."""
     scale = np.maximum(np.sqrt(np.mean(whole**2, axis=0)), 1e-9)
     gains = np.sum(((without / scale) ** 2 - (with_it / scale) ** 2), axis=1)
     total = max(float(np.sum((whole / scale) ** 2)), float(np.sum((without / scale) ** 2)))
-    by_window = np.bincount(parts.held_rows, weights=gains)
+    by_window = np.bincount(window, weights=gains)
     value = float(gains.sum()) / total
     spread = (
         float(by_window.std(ddof=1)) * math.sqrt(by_window.size) / total if by_window.size > 1 else abs(value)
     )
-    del joint
     return value, value - 1.645 * spread, value + 1.645 * spread
 
 
@@ -221,9 +218,7 @@ def _rms(errors: Floats, joint: int) -> float:
     return float(np.sqrt(np.mean(some**2)))
 
 
-def _named(
-    parts: Parts, covariance: ServoCovariance, small: list[str], unheld: list[str]
-) -> list[FoundServoEffect]:
+def _named(parts: Parts, covariance: ServoCovariance, small: list[str]) -> list[FoundServoEffect]:
     out = []
     standard, named = parts.held[1], parts.held[2]
     for k, (one, sure) in enumerate(zip(parts.account.found, parts.sure, strict=True)):
@@ -231,10 +226,7 @@ def _named(
             small.append(_place(one))
             continue
         without = parts.held[3 + k]
-        share, low, high = _share(parts, without, named, standard, one.joint)
-        if share <= 0.0:
-            unheld.append(_place(one))
-            continue
+        share, low, high = held_share(without, named, standard, parts.held_rows)
         values = tuple(
             _parameter(parts, covariance, f, one.off(parts.account.fitted.point)) for f in one.free
         )
