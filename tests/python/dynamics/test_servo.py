@@ -237,6 +237,18 @@ def test_a_value_that_nothing_depends_on_does_not_overflow(file: Path) -> None:
     assert np.isfinite(point.value(0, "saturation")) and point.value(0, "saturation") > 1e100
 
 
+def test_dry_friction_holds_a_joint_of_little_inertia(file: Path) -> None:
+    """A hundredth of the pendulum's inertia: held level by friction alone, it moves no more."""
+    light = PENDULUM.replace('pos="0 0 -0.15"', 'pos="0 0 -0.005"').replace(' armature="0.004"', "")
+    file.write_text(light, encoding="utf-8")
+    rest = resting(0)
+    level = np.full((len(rest), 1), 1.57)
+    columns = {"enabled": np.zeros(len(rest))}
+    of = prepared_of(file, [rest.replace(columns=columns, position=level, command=level)])
+    motion = of.simulator.run([point_of(of.arm.nominal)], of.windows)[0][0]
+    assert abs(motion[-1, 0] - 1.57) < 0.01
+
+
 def test_no_command_no_torque(file: Path) -> None:
     """`enabled` 0: the arm falls back to where it hangs."""
     rest = resting(0)

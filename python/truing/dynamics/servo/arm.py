@@ -20,6 +20,7 @@ from truing.dynamics.servo.chain import ServoChain, ServoJoint
 from truing.errors import InputError
 
 FRICTION_TIME = 0.004  # [s] solreffriction: with MuJoCo's 0.02 dry friction is viscous below 0.03 rad/s
+FRICTION_HOLDS = (0.9999, 0.9999, 0.001)  # solimpfriction: with its 0.9 light joints creep by some deg/s
 _LEAST_ARMATURE = 1e-6  # [kg m^2] of a file that says none
 _LEAST_FRICTION = 1e-4  # [Nm] and of its friction [Nm, Nm s/rad], which are fitted as logarithms
 _GUESSED_GAIN = 10.0  # [Nm/rad] where no actuator says one
@@ -174,7 +175,8 @@ class _Reader:
             f' stiffness="{float(np.ravel(m.jnt_stiffness[j])[0])!r}"'
             f' damping="{float(np.ravel(m.dof_damping[dof])[0])!r}"'
             f' frictionloss="{max(float(m.dof_frictionloss[dof]), _LEAST_FRICTION)!r}"'
-            f' armature="{float(m.dof_armature[dof])!r}" solreffriction="{FRICTION_TIME} 1"/>'
+            f' armature="{float(m.dof_armature[dof])!r}" solreffriction="{FRICTION_TIME} 1"'
+            f' solimpfriction="{_numbers(FRICTION_HOLDS)}"/>'
         )
 
     # ---- the chain

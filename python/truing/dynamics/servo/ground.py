@@ -20,7 +20,8 @@ Floats = NDArray[np.float64]
 _MOVING = 0.02  # of the fastest: slower rows are at rest
 _ROUNDS = 8
 _SCANNED = 12  # windows that the first scan looks at, at most
-_GAINS = np.exp(np.arange(-5.0, 2.1, 1.0))  # times the file's
+_TORQUES = ("command_gain", "viscous", "coulomb", "armature")
+_GAINS = np.exp(np.arange(-5.0, 2.1, 1.0))  # times the file's, and what all torques share
 _WIDE = np.exp(np.arange(-4.0, 2.1, 1.5))  # the same of friction and rotors
 _FINE = np.exp(np.array([-0.7, -0.35, 0.35, 0.7]))
 
@@ -58,26 +59,25 @@ def _inertia(simulator: Simulator | Apart, point: Point) -> Floats:
 
 
 def first_guess(simulator: Simulator | Apart, rows: Rows, point: Point, torque_command: bool) -> Point:
-    """Joint by joint the best of wide steps in gain, damping, friction and rotor: a file may be off by
-    hundreds, where no derivative leads back. All joints are changed at once: they hardly see each other."""
+    """Joint by joint the best of wide steps in gain, damping, friction and rotor, and in all torques at once,
+    of which only weight and masses say how large they are: a file may be off by hundreds, where no derivative
+    leads back. All joints are changed at once: they hardly see each other."""
     every = max(1, len(rows.windows) // _SCANNED)
     few = rows_of(simulator.data, rows.windows[::every])
     fitter = Fitter(simulator, few)
-    steps = [("command_gain", _GAINS), ("viscous", _WIDE), ("coulomb", _WIDE), ("armature", _WIDE)]
-    if torque_command:
-        steps = steps[1:]
-    for name, factors in [*steps, *[(name, _FINE) for name, _ in steps]]:
-        values = np.array([point.chain[:, FIELDS.index(name)] * f for f in [1.0, *factors]])
-        points = []
-        for row in values:
-            changed = point.chain.copy()
-            changed[:, FIELDS.index(name)] = row
-            points.append(Point(changed, point.weight))
-        squares = np.array([np.mean(fitter.errors(q) ** 2, axis=0) for q in fitter.motions(points)])
+    names = [name for name in _TORQUES if not (torque_command and name == "command_gain")]
+    wide = [([name], _GAINS if name == "command_gain" else _WIDE) for name in names]
+    fine = [([name], _FINE) for name in names]
+    for together, factors in [*wide, (names, _GAINS), *fine]:
+        columns = [FIELDS.index(name) for name in together]
+        chains = []
+        for factor in (1.0, *factors):
+            chains.append(point.chain.copy())
+            chains[-1][:, columns] *= factor
+        motions = fitter.motions([Point(chain, point.weight) for chain in chains])
+        squares = np.array([np.mean(fitter.errors(motion) ** 2, axis=0) for motion in motions])
         best = np.argmin(squares, axis=0)
-        chain = point.chain.copy()
-        chain[:, FIELDS.index(name)] = values[best, np.arange(len(best))]
-        point = Point(chain, point.weight)
+        point = Point(np.array(chains)[best, np.arange(len(best))], point.weight)
     return point
 
 

@@ -8,8 +8,8 @@ Elements of MuJoCo 4, written by MjSpec (six digits):
 - delay: `delay` with `interp` linear: of commands held from step to step that is their mean over a step, as
   the chain takes it.
 - saturation: forcerange. Zero of the recordings: `ref` of the joint, so that qpos is what the robot reads.
-- dry friction with solreffriction; presliding and Stribeck friction: a passive `dcmotor` with LuGre, as in
-  truing.dynamics.export.mjcf. A constant torque: its cogging with no poles.
+- dry friction with solreffriction and solimpfriction, or it creeps; presliding and Stribeck friction: a
+  passive `dcmotor` with LuGre, as in truing.dynamics.export.mjcf. A constant torque: its cogging with no poles.
 - play and elasticity between rotor and link: a further hinge behind the joint, with limits or a spring.
 - weight: gravcomp of the bodies. Weight at single joints: those gravcomp that are nearest to it.
 """
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from truing.dynamics.export import import_mujoco
 from truing.dynamics.export.parts import NotWritten
-from truing.dynamics.servo.arm import FRICTION_TIME
+from truing.dynamics.servo.arm import FRICTION_HOLDS, FRICTION_TIME
 from truing.dynamics.servo.chain import ServoChain
 from truing.dynamics.servo.export.held import Held, HeldJoint, Use
 from truing.errors import InputError
@@ -220,6 +220,7 @@ def _write_joint(mujoco: Any, spec: Any, name: str, values: HeldJoint) -> None:
     joint.damping = _as_field(joint.damping, values.damping)
     joint.frictionloss = 0.0 if bristles else values.friction
     joint.solref_friction = [FRICTION_TIME, 1.0]
+    joint.solimp_friction[: len(FRICTION_HOLDS)] = FRICTION_HOLDS
     joint.armature = values.armature
     before, at = float(np.ravel(joint.stiffness)[0]), float(joint.springref)
     joint.stiffness = _as_field(joint.stiffness, (before + values.spring,))
