@@ -25,6 +25,19 @@ int law_number(const EffectTraits& traits, std::size_t joint) {
   return traits.law == Law::none ? -1 : static_cast<int>(joint) * kLaws + static_cast<int>(traits.law);
 }
 
+/// Weight, temperature and other joints' motions bend and turn a joint that stands still as well.
+bool acts_at_rest(const EffectTraits& traits) {
+  switch (traits.driver) {
+    case Driver::gravity_torque:
+    case Driver::motor_torque:
+    case Driver::temperature:
+    case Driver::other_angles:
+      return true;
+    default:
+      return traits.stands_for == StandsFor::joint_offset;
+  }
+}
+
 /// Builds the list of candidates and, column by column, what they need.
 class Builder {
  public:
@@ -35,8 +48,10 @@ class Builder {
       if (motion && motion->constant) {
         const Joint& joint = task.at.joints[k];
         if (!joint.passive())
-          out_.not_testable.push_back(
-              {"every effect but its zero", {joint.name}, joint.name + " does not move", Untestable::joint_at_rest});
+          out_.not_testable.push_back({"every effect of its own motion",
+                                       {joint.name},
+                                       joint.name + " does not move",
+                                       Untestable::joint_at_rest});
       }
     }
   }
@@ -120,7 +135,7 @@ class Builder {
     NotTestable first;
     bool any = effect.terms_of_robot && try_terms(effect, own, {}, &first);
     for (std::size_t k = 0; k < task_.at.joints.size(); ++k) {
-      if (!moves_[k] && effect.traits.stands_for != StandsFor::joint_offset) continue;
+      if (!moves_[k] && !acts_at_rest(effect.traits)) continue;
       NotTestable obstacle;
       any |= try_terms(effect, own, {k}, &obstacle);
       if (first.why.empty()) first = obstacle;
@@ -306,11 +321,11 @@ class Builder {
   /// Corrections of the laws of effects at joints, to be asked for once the effect itself is in.
   void law_tests() {
     for (std::size_t joint = 0; joint < task_.at.joints.size(); ++joint) {
-      if (!moves_[joint]) continue;
       for (const LawTest test : {LawTest::of_driver, LawTest::times_direction, LawTest::times_the_lengths}) {
         for (const std::vector<Effect>* effects : {&catalogue(), &task_.options.own_effects}) {
           for (const Effect& effect : *effects) {
-            if (effect.traits.law_test == test && is_searched(effect)) add_law_test(effect, joint);
+            const bool acts = moves_[joint] || acts_at_rest(effect.traits);
+            if (acts && effect.traits.law_test == test && is_searched(effect)) add_law_test(effect, joint);
           }
         }
       }

@@ -91,6 +91,36 @@ TEST_CASE("of an effect's forms at a joint one line is shown, and the whole robo
   CHECK(count("thermal", {"J3"}) == 1);
 }
 
+TEST_CASE("a spring at a joint that stands still is named, with the bending that looks the same") {
+  const Robot robot = arms::ur10();
+  Robot truth = robot;
+  truth.effects = {{"joint_compliance", {"J3"}, {{"joint_compliance.J3", 2e-6}}}};
+  truth.T_measurement_base.translation() = Eigen::Vector3d(0.5, -0.2, 0.8);
+  const auto table = arms::random_joints(truth, 150, 21);
+  for (const std::size_t still : {2U, 3U, 4U}) table->data.joints[still] = table->add(std::vector<double>(150, 0.4));
+  arms::measure(table.get(), truth, arms::What::position, 3e-5, 22);
+  DiagnoseOptions options;
+  options.threads = 1;
+  const Diagnosis d = truing::diagnose(robot, table->data, options);
+  INFO(d.sentence);
+  REQUIRE(d.effects.size() == 1);
+  const truing::FoundEffect& named = d.effects[0];
+  const auto is_said = [&](const std::string& effect, const std::string& joint) {
+    const std::vector<std::string> at = {joint};
+    return (named.effect == effect && named.joints == at) ||
+           std::any_of(named.confounded_with.begin(), named.confounded_with.end(),
+                       [&](const truing::Alternative& a) { return a.effect == effect && a.joints == at; });
+  };
+  CHECK(is_said("joint_compliance", "J3"));
+  CHECK(is_said("link_compliance", "J2"));
+  // What follows the joint's own motion cannot be judged, and is no candidate.
+  for (const char* effect : {"gear_ratio", "harmonic", "axis_wobble"}) {
+    CHECK(std::none_of(d.candidates.begin(), d.candidates.end(), [&](const Candidate& c) {
+      return c.effect == effect && c.joints == std::vector<std::string>{"J3"};
+    }));
+  }
+}
+
 TEST_CASE("an own effect is found at its joint and drawn over the input that drives it") {
   const Robot robot = arms::ur10();
   Robot truth = robot;
