@@ -34,7 +34,7 @@ constexpr double kHardlyLess = 0.98;       ///< of the gap: what is left of it w
 constexpr double kManyOutliers = 0.05;     ///< of the rows, from which on they are no exceptions
 constexpr double kSmallGain = 0.02;        ///< of the error, that is not worth a line if it may be none
 constexpr double kNamed = 0.5;             ///< a name is given to what is more likely right than wrong
-constexpr double kLawInQuestion = 0.7;     ///< at most so likely is a law that a function of its input does as well as
+constexpr double kLawInQuestion = 0.85;    ///< at most so likely is a law that a function of its input does as well as
 
 void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
   std::string error;

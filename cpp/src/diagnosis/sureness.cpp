@@ -257,7 +257,7 @@ double selection_frequency(const Work& work, const Resampled& resampled, const S
 /// examination (docs/method/exam.md).
 double calibrated(double posterior, double selection_frequency, double removal_loss) {
   const double score = 0.45 * posterior + 0.35 * selection_frequency + 0.2 * std::min(removal_loss, 40.0) / 40.0;
-  constexpr double kMap[6][2] = {{0.0, 0.05}, {0.5, 0.3}, {0.7, 0.66}, {0.9, 0.88}, {0.975, 0.9}, {0.998, 0.98}};
+  constexpr double kMap[6][2] = {{0.0, 0.05}, {0.5, 0.3}, {0.7, 0.66}, {0.9, 0.88}, {0.975, 0.9}, {0.998, 0.96}};
   for (int k = 1; k < 6; ++k) {
     if (score <= kMap[k][0])
       return kMap[k - 1][1] + (score - kMap[k - 1][0]) / (kMap[k][0] - kMap[k - 1][0]) * (kMap[k][1] - kMap[k - 1][1]);
