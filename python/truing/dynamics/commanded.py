@@ -21,6 +21,7 @@ from truing.dynamics.motion import Track, even_track
 from truing.dynamics.runner import Runnable, Runner, mjcf_as_it_is
 from truing.errors import InputError
 from truing.files import is_mjcf
+from truing.files.mjcf_file import quiet
 
 Floats = NDArray[np.float64]
 CommandKind = Literal["position", "torque"]
@@ -115,7 +116,8 @@ def commanded_mjcf(path: Path, robot: _core.Robot, kind: CommandKind) -> Command
             " every joint (`truing dynamics export --to mjcf` writes one)"
         )
     mujoco = import_mujoco()
-    model = mujoco.MjModel.from_xml_path(str(path))
+    with quiet(mujoco):
+        model = mujoco.MjModel.from_xml_path(str(path))
     off = mujoco.mjtDisableBit
     for bit in (off.mjDSBL_CONTACT, off.mjDSBL_AUTORESET):
         model.opt.disableflags |= int(bit)

@@ -8,11 +8,10 @@ Torques of the drives enter as forces at the joints, in place of the model's own
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import importlib.util
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,6 +26,7 @@ from truing.dynamics.export.parts import drive_torque
 from truing.dynamics.motion import Track, table_at
 from truing.errors import InputError
 from truing.files import is_mjcf
+from truing.files.mjcf_file import quiet
 
 Floats = NDArray[np.float64]
 
@@ -86,7 +86,8 @@ def runnable_mjcf(path: Path, robot: _core.Robot) -> Runnable:
     Contacts and limits do not act.
     """
     mujoco = import_mujoco()
-    model = _without_bounds(mujoco.MjModel.from_xml_path(str(path)))
+    with quiet(mujoco):
+        model = _without_bounds(mujoco.MjModel.from_xml_path(str(path)))
     off = _drives_off(mujoco, model, [joint.name for joint in robot.joints])
     notes = (f"recorded torques stand in the place of its drives {', '.join(off)}",) if off else ()
     return mjcf_as_it_is(model, robot, notes)
@@ -182,17 +183,6 @@ def _with_point_mass(mujoco: Any, model: Any, joint: str, mass: float, place: Fl
     loaded.body_sameframe[body] = loaded.body_simple[body] = 0
     mujoco.mj_setConst(loaded, mujoco.MjData(loaded))
     return loaded
-
-
-@contextlib.contextmanager
-def quiet(mujoco: Any) -> Iterator[None]:
-    """A simulation that leaves is told by its result, not by MuJoCo in a file of the working folder."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 class Runner:

@@ -8,9 +8,10 @@ origin; motion counts from `ref`. Bodies that do not move against a link are mer
 
 from __future__ import annotations
 
+import contextlib
 import re
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -53,7 +54,8 @@ def robot_from_mjcf(path: Path, base: str = "", tip: str = "") -> _core.Robot:
     installed, not an MJCF that it takes, no such body, several ends, free or ball joints, closed loops.
     """
     mj = _mujoco(path)
-    model = _compiled(mj, path)
+    with quiet(mj):
+        model = _compiled(mj, path)
     chain = _Chain(mj, model, path, base, tip)
     robot = chain.robot(path.stem)
     chain.warn()
@@ -69,6 +71,17 @@ def _mujoco(path: Path) -> Any:
             ' pip install "truing[dynamics]"'
         ) from None
     return mujoco
+
+
+@contextlib.contextmanager
+def quiet(mujoco: Any) -> Iterator[None]:
+    """What MuJoCo warns of is told by what comes of it, not in a file of the working folder."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def _compiled(mj: Any, path: Path) -> Any:

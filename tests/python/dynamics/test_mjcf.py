@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import re
 import sys
 import warnings
 from pathlib import Path
@@ -328,6 +330,19 @@ def test_what_cannot_be_read_is_said(tmp_path: Path, old: str, new: str, message
     with pytest.raises(InputError, match=message) as error:
         truing.load_robot(path, tip_link="left")
     assert str(error.value).startswith(f"{path}: ") and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("old", ["mass=", "ref="])
+@pytest.mark.filterwarnings("ignore::truing.InputWarning")
+def test_numbers_that_are_none_leave_no_file_of_mujoco(
+    tmp_path: Path, old: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert old in JAW
+    Path("robot.xml").write_text(re.sub(old + "(['\"])[^'\"]*", old + r"\1nan", JAW.replace("EXTRA", "")))
+    with contextlib.suppress(InputError):
+        truing.load_robot("robot.xml", tip_link="left")
+    assert [path.name for path in Path.cwd().iterdir()] == ["robot.xml"]
 
 
 @pytest.mark.parametrize(

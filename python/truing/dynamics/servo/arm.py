@@ -18,6 +18,7 @@ from truing import _core
 from truing.dynamics.export import export, import_mujoco
 from truing.dynamics.servo.chain import ServoChain, ServoJoint
 from truing.errors import InputError
+from truing.files.mjcf_file import quiet
 
 FRICTION_TIME = 0.004  # [s] solreffriction: with MuJoCo's 0.02 dry friction is viscous below 0.03 rad/s
 FRICTION_HOLDS = (0.9999, 0.9999, 0.001)  # solimpfriction: with its 0.9 light joints creep by some deg/s
@@ -57,7 +58,8 @@ def servo_arm(
     if not path.is_file():
         raise InputError(f"{path}: there is no such file: expected an MJCF or a URDF")
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
+        with quiet(mujoco):
+            model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise InputError(f"{path}: MuJoCo cannot load it: {error}") from None
     return _Reader(path, model, joints, recorded).arm()

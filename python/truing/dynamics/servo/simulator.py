@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.export import import_mujoco
-from truing.dynamics.runner import quiet
 from truing.dynamics.servo.arm import ServoArm
 from truing.dynamics.servo.chain import ServoChain, ServoJoint
 from truing.dynamics.servo.data import ServoData, Window
 from truing.errors import InputError
+from truing.files.mjcf_file import quiet
 
 Floats = NDArray[np.float64]
 FIELDS: tuple[str, ...] = tuple(_core.servo_fields())

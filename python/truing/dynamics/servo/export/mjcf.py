@@ -29,6 +29,7 @@ from truing.dynamics.servo.arm import FRICTION_HOLDS, FRICTION_TIME
 from truing.dynamics.servo.chain import ServoChain
 from truing.dynamics.servo.export.held import Held, HeldJoint, Use
 from truing.errors import InputError
+from truing.files.mjcf_file import quiet
 
 Floats = NDArray[np.float64]
 
@@ -76,11 +77,13 @@ def _spec(mujoco: Any, source: Path | str) -> Any:
     name = str(source) if isinstance(source, Path) else "the result's model"
     try:
         if isinstance(source, Path):
-            spec = mujoco.MjSpec.from_file(str(source))
+            with quiet(mujoco):
+                spec = mujoco.MjSpec.from_file(str(source))
             for folder in ("meshdir", "texturedir"):  # the file moves, what it names does not
                 if spec.meshes or spec.textures:
                     setattr(spec, folder, str((source.parent / getattr(spec, folder)).resolve()))
-            spec.copy().compile()
+            with quiet(mujoco):
+                spec.copy().compile()
         else:
             spec = mujoco.MjSpec.from_string(source)
     except ValueError as error:
