@@ -39,7 +39,6 @@ import handeye_oracle as oracle
 
 Floats = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parent.parent
-NORMAL_95 = 1.959964
 
 
 @dataclass(frozen=True)
@@ -49,6 +48,8 @@ class Found:
     # of T_parent_camera: translation in the parent [m], then rotation about the camera's own axes [rad], as
     # handeye_oracle.error_of
     covariance: Floats | None = None
+    # shape=(6,) of Student's t, for intervals; turns about the camera's own axes: the fewest of the three
+    degrees_of_freedom: Floats | None = None
     said: str = ""  # warnings, what was rejected, what could not be seen
 
 
@@ -91,7 +92,10 @@ def found_of(result: HandEyeResult) -> Found:
         if result.rejected
         else ""
     )
-    return Found(result.camera.T, result.board.T, turn @ result.camera.covariance @ turn.T, listed + said)
+    freedom = np.array(result.camera_degrees_of_freedom)
+    freedom[3:] = freedom[3:].min()
+    covariance = turn @ result.camera.covariance @ turn.T
+    return Found(result.camera.T, result.board.T, covariance, freedom, listed + said)
 
 
 def ours_closed_form(scene: HandEyeScene) -> Found:
@@ -459,6 +463,13 @@ def images(quick: bool) -> Iterator[str]:
     )
 
 
+def student_95(degrees_of_freedom: Floats) -> Floats:
+    """Half the width of the 95 % interval in standard errors; infinitely many: the normal distribution's."""
+    from scipy.stats import t
+
+    return np.asarray(t.ppf(0.975, np.minimum(degrees_of_freedom, 1e9)))
+
+
 def coverage(quick: bool) -> Iterator[str]:
     """How often the truth lies within the 95 % intervals that a method states."""
     seeds = 50 if quick else 500
@@ -493,7 +504,8 @@ def coverage(quick: bool) -> Iterator[str]:
                 inside.append(np.zeros(6, dtype=bool))
                 continue
             error = oracle.error_of(scene.T_parent_camera, found.T_parent_camera)
-            inside.append(np.abs(error) < NORMAL_95 * np.sqrt(np.diag(found.covariance)))
+            freedom = np.full(6, np.inf) if found.degrees_of_freedom is None else found.degrees_of_freedom
+            inside.append(np.abs(error) < student_95(freedom) * np.sqrt(np.diag(found.covariance)))
             squared.append(error @ np.linalg.solve(found.covariance, error) / 6)
         if inside and squared:
             yield (
@@ -507,8 +519,10 @@ def coverage(quick: bool) -> Iterator[str]:
     yield from (
         "",
         (
-            "Of the camera's place in its parent and of its rotation about its own axes. 95 % and 1 are"
-            f" right; with {seeds} seeds 95 % may read {95 - 196 * math.sqrt(0.0475 / seeds):.1f} to"
+            "Of the camera's place in its parent and of its rotation about its own axes; intervals by"
+            " Student's t with the degrees of freedom that the result states. 95 % and 1 (n / (n - 2) of n"
+            f" degrees) are right; with {seeds} seeds 95 % may read"
+            f" {95 - 196 * math.sqrt(0.0475 / seeds):.1f} to"
             f" {min(100.0, 95 + 196 * math.sqrt(0.0475 / seeds)):.1f} %."
         ),
     )

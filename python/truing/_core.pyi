@@ -3625,6 +3625,11 @@ class HandEyeResult:
         T_parent_board, in the base (eye in hand) or in the hand.
         """
     @property
+    def board_degrees_of_freedom(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
+        """
+        Shape=(6,): the same of `board`.
+        """
+    @property
     def board_scale(self) -> float:
         """
         Factor on the board's lengths that would fit best; 1: as given.
@@ -3639,6 +3644,13 @@ class HandEyeResult:
         """
         T_parent_camera, in the hand (eye in hand) or in the base; only with status `done` or `not
         converged`.
+        """
+    @property
+    def camera_degrees_of_freedom(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
+        """
+        Shape=(6,): an interval of `camera` is its standard error times the quantile of Student's t of so
+        many degrees of freedom, in the order of its covariance; infinite: the noise was given, and the
+        quantile is the normal one.
         """
     @property
     def camera_model(self) -> Camera | None:

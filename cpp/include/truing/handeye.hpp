@@ -187,6 +187,13 @@ struct HandEyeResult {
   /// T_parent_camera, in the hand (eye in hand) or in the base; only with status `done` or `not converged`.
   UncertainFrame camera;
   UncertainFrame board;  ///< T_parent_board, in the base (eye in hand) or in the hand
+  /// shape=(6,): an interval of `camera` is its standard error times the quantile of Student's t of so many degrees of
+  /// freedom, in the order of its covariance; infinite: the noise was given, and the quantile is the normal one.
+  Eigen::Matrix<double, 6, 1> camera_degrees_of_freedom =
+      Eigen::Matrix<double, 6, 1>::Constant(std::numeric_limits<double>::infinity());
+  /// shape=(6,): the same of `board`
+  Eigen::Matrix<double, 6, 1> board_degrees_of_freedom =
+      Eigen::Matrix<double, 6, 1>::Constant(std::numeric_limits<double>::infinity());
   Eigen::Vector3d working_point = Eigen::Vector3d::Zero();  ///< shape=(3,) [m] in the camera frame
   /// shape=(3, 3) [m^2] of that point in the frame that carries the camera.
   Eigen::Matrix3d working_point_covariance = Eigen::Matrix3d::Zero();

@@ -14,6 +14,7 @@
 #include "hand_eye/left_out.hpp"
 #include "hand_eye/readings.hpp"
 #include "hand_eye/refine.hpp"
+#include "hand_eye/small_sample.hpp"
 #include "hand_eye/words.hpp"
 #include "math/constants.hpp"
 #include "math/frame.hpp"
@@ -179,6 +180,7 @@ struct Work {
   Rows fitted, held_out;
   LoopEstimate fit;
   bool lens_stays = false;  // asked to be refined, but poses are not good enough for that
+  bool plain = false;       // weights are plain, as what is left is no noise
   bool by_pixels = false;   // the fit is that of pixels, not of boards found from them
 };
 
@@ -251,6 +253,7 @@ void question_noise(const HandEyeOptions& options, Work* work, HandEyeResult* re
   other.noise.variance = {plain_position * plain_position / 3.0 * left, plain.variance[1],
                           plain_rotation * plain_rotation / 3.0 * left, 0.0};
   work->fit = refine_loop(work->problem, work->fitted, other.X, other.Y, other.noise, options.max_iterations);
+  work->plain = true;
   warn(result, {HandEyeConcernKind::not_like_noise, plain_position, position});
 }
 
@@ -333,13 +336,21 @@ double left_out_pixels(const Work& work, const LeftOut& left_out) {
   return std::sqrt(squares / static_cast<double>(work.fitted.size()));
 }
 
+/// The noise that the fit went by.
+LoopNoise weights_of(const Work& work) {
+  LoopNoise weights = work.fit.noise;
+  if (work.by_pixels)  // what boards scatter beyond their pixels takes no part in that fit
+    weights.variance[2] = 0.0, weights.estimate[2] = false;
+  if (work.plain) weights.estimate = {true, false, true, false};  // two scatters, of position and rotation
+  return weights;
+}
+
 void describe_poses(const HandEyeOptions& options, const Agreement& agreement, const Work& work,
                     HandEyeResult* result) {
   const std::size_t n = work.problem.A.size();
   result->residuals.resize(n);
   const double position_noise = std::max(agreement.position, 1e-6), rotation_noise = std::max(agreement.rotation, 1e-6);
-  LoopNoise weights = work.fit.noise;
-  if (work.by_pixels) weights.variance[2] = 0.0;  // what boards scatter beyond their pixels takes no part in that fit
+  const LoopNoise weights = weights_of(work);
   std::optional<LensData> lens;
   if (result->camera_model) lens.emplace(LensData{*work.poses.camera, work.poses.images});
   const LeftOut left_out(work.problem, work.fitted, work.fit, weights, lens);
@@ -558,8 +569,11 @@ void use_images(const HandEyeOptions& options, Work* work, HandEyeResult* result
 /// What was found, how well it is known and what is odd about it.
 void describe(const HandEyeOptions& options, const Agreement& agreement, double size, const Work& work,
               HandEyeResult* result) {
-  result->camera = {work.fit.X, work.fit.covariance.topLeftCorner<6, 6>()};
-  result->board = {work.fit.Y, work.fit.covariance.bottomRightCorner<6, 6>()};
+  const SmallSample sample = small_sample(work.problem, work.fitted, work.fit, weights_of(work));
+  result->camera = {work.fit.X, sample.covariance.topLeftCorner<6, 6>()};
+  result->board = {work.fit.Y, sample.covariance.bottomRightCorner<6, 6>()};
+  result->camera_degrees_of_freedom = sample.degrees_of_freedom.head<6>();
+  result->board_degrees_of_freedom = sample.degrees_of_freedom.tail<6>();
   result->working_point_covariance = at_working_point(result->camera, result->working_point);
   describe_noise(options, work.problem, work.fit.noise, result);
   describe_poses(options, agreement, work, result);

@@ -14,20 +14,16 @@
 namespace truing::hand_eye {
 namespace {
 
-constexpr double kStep = 1e-9;          // the estimate stands when a step is this small beside its standard errors …
-constexpr double kVarianceStep = 1e-2;  // … and variances change by no more than this fraction
-constexpr double kLargestChange = 2.0;  // of a variance's logarithm in one step
-constexpr double kPriorSpread =
-    3.0;  // [log of variance] of the weak prior that keeps what data cannot split near an even split
+constexpr double kStep = 1e-9;            // the estimate stands when a step is this small beside its standard errors …
+constexpr double kVarianceStep = 1e-2;    // … and variances change by no more than this fraction
+constexpr double kLargestChange = 2.0;    // of a variance's logarithm in one step
 constexpr double kLeastVariance = 1e-18;  // [m^2, rad^2, px^2] a nanometre, a nanoradian: data without noise stop there
 constexpr double kSingular = 1e-13;       // smallest eigenvalue of the unit-diagonal information
 
-using Shapes = std::array<Matrix6d, kVariances>;
 using Vector12d = Eigen::Matrix<double, 12, 1>;
 
-/// V = sum of variance times shape.
-Shapes shapes(const LoopProblem& problem, std::size_t i, const Eigen::Vector3d& w) {
-  Shapes out{Matrix6d::Zero(), Matrix6d::Identity(), Matrix6d::Zero(), Matrix6d::Zero()};
+NoiseShapes shapes_at(const LoopProblem& problem, std::size_t i, const Eigen::Vector3d& w) {
+  NoiseShapes out{Matrix6d::Zero(), Matrix6d::Identity(), Matrix6d::Zero(), Matrix6d::Zero()};
   out[0].topLeftCorner<3, 3>().setIdentity();
   const Eigen::Matrix3d wx = cross_matrix(w);
   out[1].topLeftCorner<3, 3>() = -wx * wx;
@@ -61,7 +57,7 @@ void linearise(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3
                                                   : Eigen::Vector3d(turned * (Y.translation() - A.translation()));
 }
 
-Matrix6d weighted_sum(const Shapes& shape, const LoopNoise& noise) {
+Matrix6d weighted_sum(const NoiseShapes& shape, const LoopNoise& noise) {
   return noise.variance[0] * shape[0] + noise.variance[1] * shape[1] + noise.variance[2] * shape[2] +
          noise.variance[3] * shape[3];
 }
@@ -87,7 +83,7 @@ LoopSums sum_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Iso
   Eigen::Vector3d w;
   for (const std::size_t i : rows) {
     linearise(problem, i, X, Y, &e, &J, &w);
-    const Shapes shape = shapes(problem, i, w);
+    const NoiseShapes shape = shapes_at(problem, i, w);
     const Matrix6d W = solve_definite<6, 6>(weighted_sum(shape, noise), Matrix6d::Identity());
     const Eigen::Matrix<double, 6, 12> WJ = W * J;
     const Vector6d We = W * e;
@@ -230,12 +226,21 @@ LoopEstimate refine_loop(const LoopProblem& problem, const Rows& rows, const Eig
   return out;
 }
 
+NoiseShapes noise_shapes(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X,
+                         const Eigen::Isometry3d& Y) {
+  Vector6d e;
+  Eigen::Matrix<double, 6, 12> J;
+  Eigen::Vector3d w;
+  linearise(problem, i, X, Y, &e, &J, &w);
+  return shapes_at(problem, i, w);
+}
+
 LoopRow loop_row(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X, const Eigen::Isometry3d& Y,
                  const LoopNoise& noise) {
   LoopRow row;
   Eigen::Vector3d w;
   linearise(problem, i, X, Y, &row.e, &row.J, &w);
-  row.V = weighted_sum(shapes(problem, i, w), noise);
+  row.V = weighted_sum(shapes_at(problem, i, w), noise);
   return row;
 }
 

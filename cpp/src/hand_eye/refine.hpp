@@ -65,6 +65,14 @@ struct LoopEstimate {
 LoopEstimate refine_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Isometry3d& X,
                          const Eigen::Isometry3d& Y, LoopNoise noise, int max_iterations);
 
+/// Spread [log of variance] of the weak prior that keeps what data cannot split near an even split.
+constexpr double kPriorSpread = 3.0;
+
+/// V of a pose is the sum of variance times shape.
+using NoiseShapes = std::array<Matrix6d, kVariances>;
+NoiseShapes noise_shapes(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X,
+                         const Eigen::Isometry3d& Y);
+
 /// The closure of a pose, its derivatives by X and Y as in LoopEstimate::covariance, and its covariance.
 struct LoopRow {
   Vector6d e;

@@ -50,12 +50,19 @@ class Solved:
 # ---- result.json ---------------------------------------------------------------------------------
 
 
-def _uncertain(frame: _core.UncertainFrame, parent: str) -> dict[str, Any]:
-    return {
+def _uncertain(
+    frame: _core.UncertainFrame, parent: str, degrees_of_freedom: Floats | None = None
+) -> dict[str, Any]:
+    """degrees_of_freedom: shape=(6,) of Student's t; infinite: null. None: not known, not told."""
+    found = {
         "in": parent,
         **frame_dict(frame.T),
         "sigma": dict(zip(MOTIONS, map(float, frame.sigma), strict=True)),
     }
+    if degrees_of_freedom is not None:
+        numbers = [float(value) if math.isfinite(value) else None for value in degrees_of_freedom]
+        found["degrees_of_freedom"] = dict(zip(MOTIONS, numbers, strict=True))
+    return found
 
 
 def _errors(e: _core.HandEyeErrors | None) -> dict[str, Any] | None:
@@ -146,9 +153,12 @@ def _frames(solved: Solved) -> dict[str, Any]:
         solved.result if solved.kinematics is None else solved.kinematics
     )
     camera_in, board_in = ("hand", "base") if solved.options.setup == "eye-in-hand" else ("base", "hand")
+    alone = solved.kinematics is None
     return {
-        "camera": _uncertain(both.camera, camera_in),
-        "board": _uncertain(both.board, board_in),
+        "camera": _uncertain(
+            both.camera, camera_in, solved.result.camera_degrees_of_freedom if alone else None
+        ),
+        "board": _uncertain(both.board, board_in, solved.result.board_degrees_of_freedom if alone else None),
         "covariance": {
             "of": list(MOTIONS),
             "camera": both.camera.covariance,

@@ -132,6 +132,17 @@ def test_standard_errors_agree_with_the_covariance_and_cover_the_truth() -> None
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.8
 
 
+def test_intervals_are_students_where_the_noise_was_found() -> None:
+    _, found = run(scene(10, seed=61))
+    _, many = run(scene(40, seed=61))
+    _, told = run(scene(10, seed=61), "--hand-sigma", "0.1mm,0.05deg", "--camera-sigma", "0.5mm,0.1deg")
+    for of in ("camera", "board"):
+        few, more = found[of]["degrees_of_freedom"], many[of]["degrees_of_freedom"]
+        assert few.keys() == found[of]["sigma"].keys()
+        assert all(5 < few[name] < 60 < more[name] for name in few)
+        assert told[of]["degrees_of_freedom"] == dict.fromkeys(few)
+
+
 def test_residuals_tell_the_same_as_result_json() -> None:
     _, result = run(scene(20))
     table = columns("found/residuals.csv")
