@@ -15,8 +15,10 @@ from truing import _core
 from truing.dynamics.servo import PARAMETERS, ServoDiagnosis, servo_diagnose, servo_dict
 from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.api import Prepared, prepare
+from truing.dynamics.servo.data import servo_data
 from truing.dynamics.servo.fit import Fitter, rows_of
 from truing.dynamics.servo.free import Sizes, free_value
+from truing.dynamics.servo.ground import groundwork
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, point_of
 from truing.errors import InputError
 
@@ -249,6 +251,37 @@ def test_dry_friction_holds_a_joint_of_little_inertia(file: Path) -> None:
     assert abs(motion[-1, 0] - 1.57) < 0.01
 
 
+def wrists(gain: float) -> str:
+    """Three light joints that turn about the vertical: masses of some grams say how large torques are."""
+    text = ""
+    for k in range(3):
+        text += f"""<body name="b{k}"><joint name="j{k}" axis="0 0 1" damping="{0.04 * gain}"
+            frictionloss="{0.02 * gain}" armature="1e-5"/>
+            <inertial pos="0.01 0 0" mass="0.02" diaginertia="1e-6 1e-6 1e-6"/>"""
+    drives = "".join(f'<position joint="j{k}" kp="{gain}"/>' for k in range(3))
+    return f"<mujoco><worldbody>{text}{'</body>' * 3}</worldbody><actuator>{drives}</actuator></mujoco>"
+
+
+def test_drives_of_one_kind_have_one_scale_where_motion_does_not_say(tmp_path: Path) -> None:
+    """Seeds of the noise: 7."""
+    file = tmp_path / "wrists.xml"
+    file.write_text(wrists(5.0), encoding="utf-8")
+    command = np.column_stack([commands(0), commands(2), commands(4)])
+    command *= np.minimum(1.0, np.arange(len(command)) / 40.0)[:, None]
+    rest = recording("r", command, 0.0 * command)
+    of = prepare(file, [rest], window=np.inf)
+    moved = of.simulator.run([point_of(of.arm.nominal)], of.windows)[0][0]
+    shaken = np.concatenate([np.zeros((1, 3)), moved])
+    shaken += 5e-4 * np.random.default_rng(7).standard_normal(shaken.shape)
+    file.write_text(wrists(300.0), encoding="utf-8")
+    of = prepare(file, [rest.replace(position=shaken)], window=np.inf)
+    fitter = Fitter(Apart(of.simulator), rows_of(of.data, of.windows))
+    point = groundwork(fitter, point_of(of.arm.nominal), of.data)[0].point
+    gains = np.array([point.value(j, "command_gain") for j in range(3)])
+    assert np.ptp(np.log(gains)) < 0.3
+    assert point.place == of.arm.nominal.payload_place
+
+
 def test_no_command_no_torque(file: Path) -> None:
     """`enabled` 0: the arm falls back to where it hangs."""
     rest = resting(0)
@@ -317,6 +350,14 @@ def test_what_held_out_motion_vetoes_leaves_the_chain(file: Path) -> None:
     assert found.rollout.errors["named"][0, -1] == pytest.approx(
         found.rollout.errors["standard"][0, -1], rel=0.05
     )
+
+
+def test_commands_are_those_of_their_rows_where_times_are_rounded() -> None:
+    """Thirty rows a second, in single precision: even rows end a rounding before those of the recording."""
+    command = commands(0)
+    time = np.float32(np.arange(len(command)) / 30.0).astype(float)
+    stream = servo_data([_core.Recording("r", time=time, position=command, command=command)], 1).streams[0]
+    assert np.array_equal(stream.command, command[: len(stream.command)])
 
 
 @pytest.mark.parametrize(

@@ -222,7 +222,8 @@ def _streams(
         smooth, speed = cubics(
             table_at(t, position[rows], fine), max(int(round(smoothing / usual)), 2), usual
         )
-        held = rows[np.clip(np.searchsorted(t, grid + 1e-6 * usual, "right") - 1, 0, rows.size - 1)]
+        # Of the nearest row: times that shake by a rounding would else take commands a whole row late.
+        held = rows[np.clip(np.searchsorted(t, grid + 0.5 * usual, "right") - 1, 0, rows.size - 1)]
         inputs = {
             name: np.full((1, 1), 0.0 if name == "warmth" else 1.0) if table is None else table[held]
             for name, table in tables.items()

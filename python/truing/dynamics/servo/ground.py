@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.data import ServoData, Window
-from truing.dynamics.servo.fit import Fitted, Fitter, Rows, rows_of
+from truing.dynamics.servo.fit import Fitted, Fitter, Rows, noise_of, rows_of
 from truing.dynamics.servo.free import Sizes, usual_values
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator
 
@@ -19,6 +20,10 @@ Floats = NDArray[np.float64]
 
 _MOVING = 0.02  # of the fastest: slower rows are at rest
 _ROUNDS = 8
+_KIND = 3  # joints of one gain in the file, at least: servos of one kind
+_ALIKE = 0.2  # of the logarithm of their gains
+_SAME_SQUARES = 0.3  # more of a joint's squared error, before it is fitted again: its scale is not seen
+_LEAST_ERROR = 1e-6  # [rad | m]
 _SCANNED = 12  # windows that the first scan looks at, at most
 _TORQUES = ("command_gain", "viscous", "coulomb", "armature")
 _GAINS = np.exp(np.arange(-5.0, 2.1, 1.0))  # times the file's, and what all torques share
@@ -74,10 +79,10 @@ def first_guess(simulator: Simulator | Apart, rows: Rows, point: Point, torque_c
         for factor in (1.0, *factors):
             chains.append(point.chain.copy())
             chains[-1][:, columns] *= factor
-        motions = fitter.motions([Point(chain, point.weight) for chain in chains])
+        motions = fitter.motions([replace(point, chain=chain) for chain in chains])
         squares = np.array([np.mean(fitter.errors(motion) ** 2, axis=0) for motion in motions])
         best = np.argmin(squares, axis=0)
-        point = Point(np.array(chains)[best, np.arange(len(best))], point.weight)
+        point = replace(point, chain=np.array(chains)[best, np.arange(len(best))])
     return point
 
 
@@ -85,9 +90,35 @@ def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted,
     """The usual parameters fitted to all rows of the fitter."""
     simulator = fitter.simulator
     fitter.progress("groundwork")
-    without_limits = nominal.chain.copy()
-    point = first_guess(simulator, fitter.rows, Point(without_limits, nominal.weight), data.torque_command)
+    point = first_guess(simulator, fitter.rows, nominal, data.torque_command)
     sizes = sizes_of(simulator, point, fitter.rows.windows)
     free = usual_values(simulator.arm.nominal, sizes, data.torque_command)
     start = np.array([f.at(point) for f in free])
-    return fitter.settled(point, free, start, None, _ROUNDS, "groundwork"), sizes
+    fitted = fitter.settled(point, free, start, None, _ROUNDS, "groundwork")
+    return _alike(fitter, fitted, nominal), sizes
+
+
+def _alike(fitter: Fitter, fitted: Fitted, nominal: Point) -> Fitted:
+    """Drives to which the file gives one gain are servos of one kind: joints whose motion says nothing of the
+    scale of their torques, as light ones, have that of the others (the median of the gains)."""
+    gain, torques = FIELDS.index("command_gain"), np.array([FIELDS.index(name) for name in _TORQUES])
+    if not any(f.field == "command_gain" for f in fitted.free):
+        return fitted
+    chain, scaled = fitted.point.chain, fitted.point.chain.copy()
+    for of_file in np.unique(nominal.chain[:, gain]):
+        kind = np.flatnonzero(nominal.chain[:, gain] == of_file)
+        if kind.size >= _KIND:
+            scaled[np.ix_(kind, torques)] *= (np.median(chain[kind, gain]) / chain[kind, gain])[:, None]
+    motion = fitter.motions([replace(fitted.point, chain=scaled)])[0]
+    before, after = (np.mean(errors**2, axis=0) for errors in (fitted.errors, fitter.errors(motion)))
+    unseen = (after < (1.0 + _SAME_SQUARES) * before) & np.any(scaled != chain, axis=1)
+    if not unseen.any():
+        return fitted
+    point = replace(fitted.point, chain=np.where(unseen[:, None], scaled, chain))
+    free, start = list(fitted.free), fitted.start.copy()
+    for k, one in enumerate(free):
+        if one.field in _TORQUES and unseen[one.joint]:
+            start[k] = one.at(point)
+            free[k] = replace(one, prior=_ALIKE) if one.field == "command_gain" else one
+    noise = noise_of(fitted.errors, fitter.rows, _LEAST_ERROR * np.ones(len(chain)))
+    return fitter.settled(point, free, start, noise, _ROUNDS // 2, "scale of the torques")

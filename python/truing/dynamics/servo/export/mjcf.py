@@ -9,7 +9,7 @@ Elements of MuJoCo 4, written by MjSpec (six digits):
   the chain takes it.
 - saturation: forcerange. Zero of the recordings: `ref` of the joint, so that qpos is what the robot reads.
 - dry friction with solreffriction and solimpfriction, or it creeps; presliding and Stribeck friction: a
-  passive `dcmotor` with LuGre, as in truing.dynamics.export.mjcf. A constant torque: its cogging with no poles.
+  passive `dcmotor` with LuGre, as in truing.dynamics.export.mjcf. A constant torque: cogging with no poles.
 - play and elasticity between rotor and link: a further hinge behind the joint, with limits or a spring.
 - weight: gravcomp of the bodies. Weight at single joints: those gravcomp that are nearest to it.
 """
