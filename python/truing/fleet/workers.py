@@ -121,8 +121,9 @@ def _cluster_of(distributed: Any, workers: int) -> Any:
         )
     except RuntimeError as error:
         raise InputError(
-            f"the worker processes did not start ({str(error).rstrip('.')}). Each of them imports the script that starts them:"
-            ' in a script, put what calls truing.fleet under `if __name__ == "__main__":`, or give workers=0'
+            f"the worker processes did not start ({str(error).rstrip('.')}). Each of them imports the script"
+            " that starts them: in a script, put what calls truing.fleet under"
+            ' `if __name__ == "__main__":`, or give workers=0'
         ) from None
 
 
