@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'ColumnGain', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'FreeParameter', 'Frozen', 'GroupChoice', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'RowSums', 'SanityFinding', 'Scene', 'SeenColumns', 'ServoArm', 'ServoBodies', 'ServoPath', 'ServoRecording', 'ServoSet', 'ServoWindow', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueClass', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'choose_groups', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'free_parameters', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'rank_columns', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_at', 'robot_from_urdf', 'rotation_from_rpy', 'rpy_from_rotation', 'seen_columns', 'servo_fields', 'servo_inputs', 'simulate_servos', 'simulate_servos_apart', 'simulate_streams', 'sum_rows', 'torque_effects', 'torque_regressor', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'ColumnGain', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'FreeParameter', 'Frozen', 'GroupChoice', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'RowSums', 'SanityFinding', 'Scene', 'SeenColumns', 'ServoArm', 'ServoBodies', 'ServoPath', 'ServoRecording', 'ServoSet', 'ServoWindow', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueBlock', 'TorqueClass', 'TorqueColumns', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueSumOptions', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'choose_groups', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'free_parameters', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'rank_columns', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_at', 'robot_from_urdf', 'robot_with_torques', 'rotation_from_rpy', 'rpy_from_rotation', 'seen_columns', 'servo_fields', 'servo_inputs', 'simulate_servos', 'simulate_servos_apart', 'simulate_streams', 'sum_rows', 'sum_torques', 'torque_columns', 'torque_effects', 'torque_regressor', 'torques_of_bodies', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -7328,6 +7328,120 @@ class TorqueDiagnosis:
         """
         [%] held-out error, geometric mean over the joints, that names start from.
         """
+class TorqueSumOptions:
+    """
+    How torques are summed.
+    
+    cutoff = 8.0: [Hz] of the low-pass without phase that both sides of the equation of motion go through.
+    shortest = 2.0: [s] a recording is cut into blocks of equal time that are no shorter.
+    most_blocks = 100: And no more than these.
+    threads = 1: 0: as many as the machine has.
+    """
+    def __init__(self, *, cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0, shortest: typing.SupportsFloat | typing.SupportsIndex = 2.0, most_blocks: typing.SupportsInt | typing.SupportsIndex = 100, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def copy(self) -> TorqueSumOptions:
+        """
+        An independent copy.
+        """
+    def replace(self, **kwargs: typing.Any) -> TorqueSumOptions:
+        """
+        A copy with the given attributes changed (the constructor's keywords; an unknown one raises TypeError).
+        """
+    @property
+    def cutoff(self) -> float:
+        """
+        [Hz] of the low-pass without phase that both sides of the equation of motion go through.
+        """
+    @cutoff.setter
+    def cutoff(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def most_blocks(self) -> int:
+        """
+        And no more than these.
+        """
+    @most_blocks.setter
+    def most_blocks(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def shortest(self) -> float:
+        """
+        [s] a recording is cut into blocks of equal time that are no shorter.
+        """
+    @shortest.setter
+    def shortest(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def threads(self) -> int:
+        """
+        0: as many as the machine has.
+        """
+    @threads.setter
+    def threads(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class TorqueColumns:
+    """
+    What a joint's torque may be a sum of.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """
+        Names of the joints that have a reading.
+        """
+    @property
+    def names(self) -> tuple[str, ...]:
+        """
+        Of the parameters: link_inertia.J2.m, armature.J2, coulomb.J2 ….
+        """
+    @property
+    def of_joint(self) -> tuple[list[int], ...]:
+        """
+        By joint: numbers of the parameters that its torque knows, ascending.
+        """
+    @property
+    def prior(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Size that each may well have; of inertias alone it says something.
+        """
+    @property
+    def units(self) -> tuple[str, ...]:
+        """
+        Of these.
+        """
+class TorqueBlock:
+    """
+    Normal equations of one joint's torque over the rows of a block in which the joint moves. What is
+    explained is the measured torque less the nominal model's [Nm | N]; behind the columns of the
+    parameters the nominal torque itself is one more.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def gram(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Shape=(p + 1, p + 1): X^T X.
+        """
+    @property
+    def right(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shape=(p + 1,): X^T y.
+        """
+    @property
+    def rows(self) -> float:
+        """
+        How many; 0: the joint was at rest, or not measured.
+        """
+    @property
+    def squares(self) -> float:
+        """
+        y^T y.
+        """
 class TorquePlanOptions:
     """
     Which motions to plan, within which limits, and what will be recorded along them.
@@ -8128,6 +8242,12 @@ def robot_from_urdf(urdf_text: str, base_link: str = '', tip_link: str = '') -> 
     Raises InputError: not a URDF, unknown base or tip (lists the links there are), tip not below base, planar or
     floating joint.
     """
+def robot_with_torques(robot: Robot, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> Robot:
+    """
+    The robot with these values of all parameters of `torque_columns`, shape=(p,), added to what it has.
+    
+    Raises InputError on another shape.
+    """
 def rotation_from_rpy(rpy: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
     """
     Rotation of roll, pitch and yaw as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll).
@@ -8175,6 +8295,20 @@ def sum_rows(robot: Robot, data: Measurements, names: collections.abc.Sequence[s
     counts: shape=(n,), False for rows of which only the errors are told. rotation_length: [m] a rotation error of 1 rad
     counts as this length, where rows give no sigma. The same bits for any number of threads. Raises InputError.
     """
+def sum_torques(robot: Robot, recording: Recording, options: TorqueSumOptions | None = None) -> list[TorqueBlock]:
+    """
+    Normal equations of a recording's torques: block after block of time, and in each joint after joint.
+    
+    Of a recording that is read in pieces no more than a stretch is in memory. A known payload is part of the nominal
+    torque. The same bits for any number of threads. Raises InputError on a recording or options that cannot be used.
+    """
+def torque_columns(robot: Robot) -> TorqueColumns:
+    """
+    The parameters that torques are summed for: inertial ones of the links, and of every joint armature, Coulomb and
+    viscous friction and an offset.
+    
+    Raises InputError: a robot that cannot be used, no link has a mass.
+    """
 def torque_effects() -> list[dict[str, str]]:
     """
     What every effect on torques is, in words, by the catalogue's order.
@@ -8186,6 +8320,13 @@ def torque_regressor(robot: Robot, q: numpy.typing.ArrayLike, qd: numpy.typing.A
     
     q, qd, qdd: shape=(n, driven joints), readings, their speeds and accelerations [rad | m, s]. Rotors are no part of it.
     Raises InputError: a robot that cannot be used, another shape, values that are not finite.
+    """
+def torques_of_bodies(robot: Robot, gram: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], right: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    Values of all parameters with inertias that bodies can have, nearest to the solution of gram values = right.
+    
+    gram: shape=(p, p), right: shape=(p,), of the parameters of `torque_columns`; the sum of squares is in units of the
+    noise. Raises InputError on other shapes.
     """
 def urdf_with_calibration(urdf_text: str, calibrated: Robot, base_link: str = '', tip_link: str = '') -> str:
     """

@@ -10,3 +10,4 @@
 #include "truing/dynamics/recording.hpp"
 #include "truing/dynamics/regressor.hpp"
 #include "truing/dynamics/rigid.hpp"
+#include "truing/dynamics/sums.hpp"

@@ -14,6 +14,7 @@
 #include "truing/dynamics/regressor.hpp"
 #include "truing/dynamics/rigid.hpp"
 #include "truing/dynamics/servo.hpp"
+#include "truing/dynamics/sums.hpp"
 #include "truing/fleet.hpp"
 #include "truing/handeye.hpp"
 #include "truing/identify.hpp"

@@ -6,6 +6,7 @@
 #include "parts.hpp"
 #include "repr.hpp"
 #include "tables/dynamics/diagnose.hpp"
+#include "tables/dynamics/sums.hpp"
 
 namespace truing::python {
 
@@ -74,6 +75,51 @@ void bind_found(py::module_& m) {
   });
 }
 
+void bind_torque_sums(py::module_& m) {
+  define_options<TorqueSumOptions>(m, "TorqueSumOptions");
+  auto columns = define_result<TorqueColumns>(m, "TorqueColumns");
+  columns.def("__repr__",
+              [](const TorqueColumns& c) { return formatted("TorqueColumns(%zu parameters)", c.names.size()); });
+  auto block = define_result<TorqueBlock>(m, "TorqueBlock");
+  block.def("__repr__", [](const TorqueBlock& b) { return formatted("TorqueBlock(%.0f rows)", b.rows); });
+  m.def(
+      "torque_columns", [](const Robot& robot) { return dynamics::torque_columns(robot); }, py::arg("robot"),
+      R"(The parameters that torques are summed for: inertial ones of the links, and of every joint armature, Coulomb and
+viscous friction and an offset.
+
+Raises InputError: a robot that cannot be used, no link has a mass.)");
+  m.def(
+      "sum_torques",
+      [](const Robot& given_robot, const Recording& recording, const std::optional<TorqueSumOptions>& given) {
+        const TorqueSumOptions options = given.value_or(TorqueSumOptions{});
+        const Robot robot = given_robot;
+        const py::gil_scoped_release unlocked;
+        return dynamics::sum_torques(robot, recording, options);
+      },
+      py::arg("robot"), py::arg("recording"), py::arg("options") = py::none(),
+      R"(Normal equations of a recording's torques: block after block of time, and in each joint after joint.
+
+Of a recording that is read in pieces no more than a stretch is in memory. A known payload is part of the nominal
+torque. The same bits for any number of threads. Raises InputError on a recording or options that cannot be used.)");
+  m.def(
+      "torques_of_bodies",
+      [](const Robot& robot, const Eigen::MatrixXd& gram, const Eigen::VectorXd& right) {
+        return dynamics::torques_of_bodies(robot, gram, right);
+      },
+      py::arg("robot"), py::arg("gram"), py::arg("right"),
+      R"(Values of all parameters with inertias that bodies can have, nearest to the solution of gram values = right.
+
+gram: shape=(p, p), right: shape=(p,), of the parameters of `torque_columns`; the sum of squares is in units of the
+noise. Raises InputError on other shapes.)");
+  m.def(
+      "robot_with_torques",
+      [](const Robot& robot, const Eigen::VectorXd& values) { return dynamics::robot_with_torques(robot, values); },
+      py::arg("robot"), py::arg("values"),
+      R"(The robot with these values of all parameters of `torque_columns`, shape=(p,), added to what it has.
+
+Raises InputError on another shape.)");
+}
+
 }  // namespace
 
 /// Name, summary and what the documents say of every effect on torques.
@@ -98,6 +144,7 @@ void bind_torque(py::module_& m) {
   define_options<TorqueDiagnoseOptions>(m, "TorqueDiagnoseOptions");
   bind_fit(m);
   bind_found(m);
+  bind_torque_sums(m);
   m.def(
       "dynamics_identify",
       [](const Robot& given_robot, const std::vector<Recording>& recordings,
