@@ -77,7 +77,8 @@ using Velocities = std::vector<Eigen::Vector3d>;
 /// From `begin`: slopes of the rotation vectors within `window` before and after; NaN where rows are not on both sides.
 Velocities angular_velocity(const Record& r, double begin, double step, std::size_t count, double window) {
   Velocities out(count, Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
-  const double reach = window * (1.0 + 1e-9);
+  // Rows that lie on the window's ends by a rounded stamp are within it.
+  const double reach = window + 0.5 * median_step(r.time);
   for (std::size_t k = 0; k < count; ++k) {
     const double t = begin + step * static_cast<double>(k);
     const auto first = std::lower_bound(r.time.begin(), r.time.end(), t - reach) - r.time.begin();

@@ -1054,6 +1054,31 @@ TEST_CASE("the offset between two clocks is found within three standard errors, 
                        doctest::Contains("goes back in time at row 5"), std::invalid_argument);
 }
 
+TEST_CASE("the offset is found in every stretch of stamps that are rounded: seed 71") {
+  // A tracker of 60 Hz, so quiet that slopes over two of its steps will do: their ends are where a row is, or is not.
+  const auto hand_at = [](double t) {
+    return make({0.6 + 0.1 * std::sin(0.9 * t), 0.1 * std::cos(1.3 * t), 0.3},
+                {0.6 * std::sin(1.1 * t), 0.5 * std::sin(0.7 * t + 1.0), 0.7 * std::sin(0.43 * t)});
+  };
+  const Scene s = make_scene(HandEyeSetup::eye_to_hand, 3, {}, 1);
+  Random random(71);
+  std::vector<double> hand_time;
+  Frames hand;
+  for (int i = 0; i < 6000; ++i) hand_time.push_back(0.01 * i), hand.push_back(hand_at(hand_time.back()));
+  for (int stretch = 0; stretch < 5; ++stretch) {
+    CAPTURE(stretch);
+    std::vector<double> time;
+    Frames board;
+    for (int i = 0; i < 600; ++i) {
+      time.push_back(std::round(1e6 * (2.0 + 10.0 * stretch + i / 60.0)) / 1e6 - 6.8665);
+      board.push_back(disturbed(predicted_board(s.X, hand_at(time.back() + 6.9), s.Y), 5e-5, 5e-5, &random));
+    }
+    const ClockOffset c = handeye_clock(hand_time, hand, time, board, s.setup, 8.0);
+    REQUIRE_MESSAGE(c.found, c.message);
+    CHECK(std::abs(c.offset - 6.9) < 1e-3);
+  }
+}
+
 namespace {
 
 /// Two records of 20 and 17 s that turn about three axes with frequencies of `seed`; `same`: of one motion.

@@ -59,6 +59,7 @@ def test_three_clocks_are_found() -> None:
         -0.13, abs=0.05
     ) or found.where.setup.controller_clock_offset == pytest.approx(0.13, abs=0.05)
     assert found.inertial.clock_offset_sigma < 5e-3
+    assert abs(found.where.clock_drift) == pytest.approx(1e-3, rel=0.1)
 
 
 def test_frames_and_gravity_are_found() -> None:
