@@ -23,12 +23,13 @@ from servo_replay import Usual, as_published, ask_sysid, firmware_scale, of_file
 
 import truing
 from truing.dynamics import Recording, load_recordings
-from truing.dynamics.servo import servo_diagnose
+from truing.dynamics.servo import ServoDiagnosis, servo_diagnose
 
 ROOT = Path(__file__).resolve().parent.parent
 START, END = "<!-- table -->", "<!-- end -->"
 XL330_REFERENCE = 200.0  # firmware gain at which the file's gain is taken to hold: it says none
 SO101_JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
+SO101_TRAIN = ("multisine", "step_response")
 SO101_MAIN = ("slow_precision", "random_waypoints")
 SO101_MORE = ("inertia_coupling", "lissajous_pattern", "pick_place")
 WINDOW = 5.0  # [s]
@@ -80,19 +81,35 @@ def by_truing(file: Path, recordings: Sequence[Recording], test: Sequence[Record
     law = (XL330_REFERENCE / chain.gain_reference) ** drive.gain_law
     values = (drive.command_gain * law, drive.viscous, drive.coulomb, drive.armature, drive.zero)
     usual = Usual(*(np.array([value]) for value in values))
-    named = [f"{e.effect} ({e.probability:.2f})" for e in found.effects if not e.standard]
     error = float(np.degrees(found.rollout.errors["named"][0, -1]))
     return [
         f"| truing, gain, damping, dry friction, rotor, zero | {judged(file, usual, test):.2f} | |",
-        f"| truing, and what it names: {', '.join(named) or 'nothing'} | {error:.2f} | {seconds:.1f} |",
+        f"| truing, and what it names: {names_of(found)} | {error:.2f} | {seconds:.1f} |",
     ]
+
+
+def names_of(found: ServoDiagnosis) -> str:
+    more = len(found.chains["named"].joints) > 1
+    named = [
+        f"{e.effect}{' ' + ', '.join(e.joints) if more else ''} ({e.probability:.2f})"
+        for e in found.effects
+        if not e.standard
+    ]
+    return ", ".join(named) or "nothing"
 
 
 def so101(folder: Path) -> list[str]:
     file = folder / "robot.xml"
     robot = truing.load_robot(file, any_tool=True, tip_link="gripper")  # without the jaw
-    names = (*SO101_MAIN, *SO101_MORE)
-    by_name = {r.name: r for r in load_recordings([folder / f"{name}.csv" for name in names], robot)}
+    names = (*SO101_TRAIN, *SO101_MAIN, *SO101_MORE)
+    recordings = [
+        one.replace(test=one.name not in SO101_TRAIN)
+        for one in load_recordings([folder / f"{name}.csv" for name in names], robot)
+    ]
+    begun = time.process_time()
+    found = servo_diagnose(file, recordings, joints=SO101_JOINTS, window=WINDOW)
+    seconds = time.process_time() - begun
+    by_name = {r.name: r for r in recordings}
     lines = ["**SO-101, windows of 5 s**", "", "| | J1 … J5 [deg] | mean |", "| --- | --- | --- |"]
     groups = [(" + ".join(SO101_MAIN), SO101_MAIN), *((name, (name,)) for name in SO101_MORE)]
     for title, group in groups:
@@ -102,7 +119,22 @@ def so101(folder: Path) -> list[str]:
         published = [as_published(file, SO101_JOINTS, one, WINDOW) - one.position for one in own]
         lines.append(row("the command taken as the response", command))
         lines.append(row("the MJCF", degrees(np.concatenate(published))))
+        lines.append(
+            row("truing, gain, damping, dry friction, rotor, zero", held_out(found, "standard", own))
+        )
+        lines.append(row("truing, and what it names", held_out(found, "named", own)))
+    lines += [
+        "",
+        f"truing names: {names_of(found)}; {seconds:.0f} s of the processor for the whole diagnosis.",
+    ]
     return [*lines, ""]
+
+
+def held_out(found: ServoDiagnosis, model: str, recordings: Sequence[Recording]) -> Floats:
+    """[deg] rms of a chain over the rows of all of the recordings, joint by joint."""
+    rows = [len(one) for one in recordings]
+    squares = [found.rollout.recordings[model][one.name] ** 2 for one in recordings]
+    return np.asarray(np.degrees(np.sqrt(np.average(squares, axis=0, weights=rows))))
 
 
 def row(text: str, error: Floats) -> str:
