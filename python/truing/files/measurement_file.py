@@ -242,7 +242,7 @@ def load_partition(
     if row_group is None:
         table.read(plan.numbers, plan.labels)
     else:
-        table.read_row_group(row_group, plan.numbers, plan.labels)
+        table.read_row_groups([row_group], plan.numbers, plan.labels)
     arms, names = table.labels(ARM) if plan.has([ARM]) else (np.zeros(table.rows, dtype=np.int32), [""])
     if (arms < 0).any():
         table.refuse_cell(int(np.argmax(arms < 0)), ARM, "the name of the arm that the row is from")

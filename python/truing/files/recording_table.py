@@ -324,11 +324,25 @@ def read_table(
     layout = _Layout(table, robot, joints)
     if table.is_parquet and table.count_rows() * len(table.names) > MOST_IN_MEMORY:
         return [read_in_pieces(table, layout, name)]
-    table.read(layout.numbers, ["set"] if layout.set else [])
+    table.read(layout.numbers, _labels(layout))
+    return _recordings_in(table, layout, name, robot)
+
+
+def read_row_groups(
+    path: Path, name: str, robot: _core.Robot, groups: Sequence[int]
+) -> list[_core.Recording]:
+    """The same of row groups of a Parquet file that are next to one another, as if there were no others."""
+    table = Table(path)
+    layout = _Layout(table, robot, None)
+    table.read_row_groups(groups, layout.numbers, _labels(layout))
+    return _recordings_in(table, layout, name, robot)
+
+
+def _recordings_in(table: Table, layout: _Layout, name: str, robot: _core.Robot) -> list[_core.Recording]:
     reader = _Reader(table, layout)
     time = reader.times()
     tables = {"time": time, **reader.tables()}
-    return make_recordings(str(path), name, robot, tables, reader.columns(), reader.test())
+    return make_recordings(str(table.path), name, robot, tables, reader.columns(), reader.test())
 
 
 # ---- Recordings longer than memory

@@ -14,7 +14,7 @@ import csv
 import math
 import mmap
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
@@ -166,20 +166,32 @@ class Table:
             table = self._read_parquet() if self._is_parquet else self._read_csv(numbers, labels)
         self._take(table, numbers, labels)
 
-    def read_row_group(self, group: int, numbers: Collection[str], labels: Collection[str]) -> None:
-        """Loads one row group of a Parquet file; messages count rows from the first of the file."""
+    def read_row_groups(
+        self, groups: Sequence[int], numbers: Collection[str], labels: Collection[str]
+    ) -> None:
+        """Loads row groups of a Parquet file that are next to one another; messages count rows from the first
+        of the file.
+        """
         try:
             with pa.parquet.ParquetFile(self.path, read_dictionary=self._text_columns()) as file:
-                if group >= file.metadata.num_row_groups:
+                if groups[-1] >= file.metadata.num_row_groups:
                     self.refuse(
-                        f"has {file.metadata.num_row_groups} row groups, expected {group + 1} or more"
+                        f"has {file.metadata.num_row_groups} row groups, expected {groups[-1] + 1} or more"
                     )
-                self._first_row = sum(file.metadata.row_group(k).num_rows for k in range(group))
+                self._first_row = sum(file.metadata.row_group(k).num_rows for k in range(groups[0]))
                 # One thread: workers that share a machine are as many as it has processors.
-                table = file.read_row_group(group, use_threads=False)
+                table = file.read_row_groups(list(groups), use_threads=False)
         except (pa.ArrowException, OSError) as error:
             raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
         self._take(table, numbers, labels)
+
+    def lots_of_groups(self, rows: int) -> list[tuple[int, ...]]:
+        """Numbers of a Parquet file's row groups, together where they are small, without reading them."""
+        try:
+            with pa.parquet.ParquetFile(self.path) as file:
+                return [tuple(lot) for lot in _lots_of_groups(file.metadata, rows)]
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
 
     def row_groups(self) -> int:
         """Number of row groups of a Parquet file, without reading them."""

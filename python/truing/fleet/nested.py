@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,21 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 RANK_TOLERANCE = 1e-6  # as `identify` has it: what others explain of a unit column up to this is not seen
+
+
+class Equations(Protocol):
+    """What of a Gram is used here: normal equations at a point, of rows r + J step."""
+
+    @property
+    def xx(self) -> Floats: ...
+    @property
+    def xr(self) -> Floats: ...
+    @property
+    def rr(self) -> float: ...
+    @property
+    def values(self) -> int: ...
+    @property
+    def scores(self) -> Floats: ...
 
 
 @dataclass(frozen=True)
@@ -70,7 +85,7 @@ class _Block:
     shared: Floats
 
 
-def _block(gram: Gram, place: Place) -> _Block:
+def _block(gram: Equations, place: Place) -> _Block:
     o, s = place.own, place.shared
     return _Block(gram.xx[np.ix_(o, o)], gram.xx[np.ix_(o, s)], gram.xx[np.ix_(s, s)], gram.xr[o], gram.xr[s])
 
@@ -170,7 +185,7 @@ class Reduced:
     values: float  # measured numbers less own unknowns
 
 
-def reduced(grams: Mapping[str, Gram], layout: Layout, mu: float = 0.0) -> Reduced:
+def reduced(grams: Mapping[str, Equations], layout: Layout, mu: float = 0.0) -> Reduced:
     """Schur complement of every arm's block, summed in the order of the arms. mu: damping on unit columns."""
     n = len(layout.shared)
     S, g, rr, values = np.zeros((n, n)), np.zeros(n), 0.0, 0.0
@@ -185,7 +200,7 @@ def reduced(grams: Mapping[str, Gram], layout: Layout, mu: float = 0.0) -> Reduc
     return Reduced(S, g, rr, values)
 
 
-def damped_step(grams: Mapping[str, Gram], layout: Layout, mu: float) -> Step:
+def damped_step(grams: Mapping[str, Equations], layout: Layout, mu: float) -> Step:
     """(H + mu D) step = -Jᵀ W r, D the diagonal of H (Marquardt 1963: damping on unit columns), block by
     block.
     """
@@ -204,7 +219,7 @@ def damped_step(grams: Mapping[str, Gram], layout: Layout, mu: float) -> Step:
     return Step(shared, own, float(fall))
 
 
-def _shared_gradient(grams: Mapping[str, Gram], layout: Layout) -> Floats:
+def _shared_gradient(grams: Mapping[str, Equations], layout: Layout) -> Floats:
     out = np.zeros(len(layout.shared))
     for name, place in layout.arms.items():
         out[place.into] += grams[name].xr[place.shared]
@@ -219,7 +234,7 @@ class Covariance:
     own: Mapping[str, Floats]
 
 
-def covariance(grams: Mapping[str, Gram], layout: Layout) -> Covariance:
+def covariance(grams: Mapping[str, Equations], layout: Layout) -> Covariance:
     """Clustered by pose, H⁻¹ M H⁻¹ with M the sum of the poses' scores (Liang and Zeger 1986), in the blocks
     of the arrow: no matrix is larger than one arm's. The Grams must have scores.
     """

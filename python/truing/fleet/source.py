@@ -19,6 +19,7 @@ from truing import _core
 from truing.errors import InputError, InputWarning
 from truing.files.common import PARQUET_SUFFIXES
 from truing.files.measurement_file import load_partition
+from truing.files.recording_table import PIECE_ROWS, read_row_groups, read_table
 from truing.files.table import Table
 
 ONE_ARM = "arm"
@@ -53,6 +54,22 @@ class Partition:
 
 
 @dataclass(frozen=True)
+class RecordingPartition(Partition):
+    """A file of recordings of motion, or some row groups of one."""
+
+    row_groups: tuple[int, ...] = ()  # none: the whole file
+
+    def recordings(self, robot: _core.Robot) -> list[_core.Recording]:
+        """What is in it. Raises InputError that names the partition."""
+        path = Path(self.path)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", InputWarning)
+            if self.row_groups:
+                return read_row_groups(path, path.stem, robot, self.row_groups)
+            return read_table(path, path.stem, robot, None)
+
+
+@dataclass(frozen=True)
 class Source:
     """The partitions of a fleet's rows in their order, and the tables of those that are in memory."""
 
@@ -80,6 +97,34 @@ def partitions_of(source: Any, *, one_arm: bool = False) -> Source:
             found += _row_groups(path, name)
         else:
             found.append(Partition(str(path), str(path), None, name))
+    return Source(tuple(found))
+
+
+def recordings_of(source: Any, *, one_arm: bool = False) -> Source:
+    """The partitions of recordings of motion: a CSV file, or row groups of a Parquet file that are next to
+    one another, of 65 536 rows or more together.
+
+    A recording is of the arm of its folder (`arm=NAME/`), or of its file's name. one_arm: all are of one.
+
+    Raises InputError where there is nothing, or nothing that can be read.
+    """
+    if hasattr(source, "to_delayed"):
+        raise InputError(
+            "recordings of motion are given as files or folders, not as a dask.dataframe: the order of their"
+            " rows is part of them"
+        )
+    found: list[Partition] = []
+    for path, arm in _files_of(source):
+        name = ONE_ARM if one_arm else arm or path.stem
+        lots: list[tuple[int, ...]] = [()]
+        if path.suffix.lower() in PARQUET_SUFFIXES:
+            try:
+                lots = Table(path).lots_of_groups(PIECE_ROWS)
+            except InputError:
+                pass  # reading it says why
+        for lot in lots if len(lots) > 1 else [()]:
+            called = f"{path}, row groups {lot[0]} to {lot[-1]}" if lot else str(path)
+            found.append(RecordingPartition(called, str(path), None, name, lot))
     return Source(tuple(found))
 
 
