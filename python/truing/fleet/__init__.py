@@ -19,4 +19,11 @@ from truing.fleet.found import (
 )
 from truing.fleet.gram import ErrorCounts as ErrorCounts, Gram as Gram
 from truing.fleet.source import Partition as Partition, partitions_of as partitions_of
+from truing.fleet.torques import (
+    ArmTorques as ArmTorques,
+    FleetDynamics as FleetDynamics,
+    StandsOut as StandsOut,
+    TorqueErrorOf as TorqueErrorOf,
+    dynamics as dynamics,
+)
 from truing.fleet.workers import client_at as client_at

@@ -13,8 +13,11 @@ from truing._core import (
 )
 from truing.testing.fleet import (
     FleetSimulation as FleetSimulation,
+    TorqueFleet as TorqueFleet,
     save_fleet as save_fleet,
+    save_torque_fleet as save_torque_fleet,
     simulate_fleet as simulate_fleet,
+    simulate_torque_fleet as simulate_torque_fleet,
 )
 from truing.testing.simulation import (
     Simulation as Simulation,

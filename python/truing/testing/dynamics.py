@@ -101,20 +101,18 @@ def simulate_motion(
     out = []
     for number in range(recordings):
         random = np.random.default_rng([seed, number])
-        time = np.arange(0.0, seconds, STEP)
-        bare = Recording("motion", time=time, position=fourier_motion(time, len(names), random))
-        torque = np.asarray(_core.dynamics_predict(truth, bare, CUT_OFF).torque)
-        noise = coloured_noise(torque.shape, random) * NOISE * torque.std(axis=0)
-        out.append(
-            Recording(
-                f"motion{number + 1}",
-                time=time,
-                position=bare.position,
-                torque=torque + noise,
-                test=number >= recordings - held_out,
-            )
-        )
+        test = number >= recordings - held_out
+        out.append(moved(truth, f"motion{number + 1}", seconds=seconds, test=test, random=random))
     return SimulatedMotion(nominal, truth, out)
+
+
+def moved(truth: Robot, name: str, *, seconds: float, test: bool, random: np.random.Generator) -> Recording:
+    """A recording of a robot along a random Fourier trajectory, with correlated noise of its torques."""
+    time = np.arange(0.0, seconds, STEP)
+    bare = Recording("motion", time=time, position=fourier_motion(time, len(truth.driven_joints()), random))
+    torque = np.asarray(_core.dynamics_predict(truth, bare, CUT_OFF).torque)
+    noise = coloured_noise(torque.shape, random) * NOISE * torque.std(axis=0)
+    return Recording(name, time=time, position=bare.position, torque=torque + noise, test=test)
 
 
 def fourier_motion(time: Floats, joints: int, random: np.random.Generator) -> Floats:
