@@ -44,14 +44,25 @@ SourceFiles = Annotated[
 ]
 
 
+RecordingFiles = Annotated[
+    list[Path],
+    File(
+        "Recordings of motion and torque of the arms: CSV or Parquet files, or a folder of them. A file's arm"
+        " is named by its folder arm=NAME, or is the file's own name.",
+        argument=True,
+        metavar="SOURCE",
+        several=True,
+    ),
+]
+
+
 @dataclass(frozen=True, kw_only=True)
-class FleetCommand(run.Command["Robot", Found]):
-    """A command that reads a fleet."""
+class FleetWork(run.Command["Robot", Found]):
+    """A command whose work is done by workers."""
 
     own_processes = True
 
     robot: RobotFile
-    source: SourceFiles
     scheduler: Annotated[
         str,
         Kind(
@@ -73,14 +84,6 @@ class FleetCommand(run.Command["Robot", Found]):
     skip_corrupt: Annotated[
         bool, Flag("Pass over files and row groups that cannot be read; the result names them.")
     ] = False
-    loss: Annotated[
-        Literal["reject", "none"],
-        Choice("What to do about outliers: leave them out, arm by arm, or nothing."),
-    ] = "reject"
-    test_share: Annotated[
-        float, Fraction("Fraction of the poses held out, when the data has no `set` column.")
-    ] = 0.2
-    seed: Seed = 0
     base_link: BaseLink = ""
     tip_link: TipLink = ""
 
@@ -92,18 +95,6 @@ class FleetCommand(run.Command["Robot", Found]):
                 "--scheduler and --workers: found both, expected one: a scheduler has workers of its own"
             )
         return load_robot(self.robot, self.base_link, self.tip_link)
-
-    def options(self, progress: run.Progress) -> dict[str, Any]:
-        """Keywords that the verbs of a fleet have in common."""
-        return {
-            "one_arm": self.one_arm,
-            "skip_corrupt": self.skip_corrupt,
-            "loss": self.loss,
-            "test_share": self.test_share,
-            "seed": self.seed,
-            "workers": self.workers,
-            "tell": progress.now,
-        }
 
     @contextlib.contextmanager
     def client(self) -> Iterator[Any]:
@@ -119,6 +110,33 @@ class FleetCommand(run.Command["Robot", Found]):
     def failure(self, result: Mapping[str, Any]) -> str:
         solver = result["solver"]
         return "" if solver["converged"] else f"did not converge: {solver['stopped_because']}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FleetCommand(FleetWork[Found]):
+    """A command that reads a fleet's measurements."""
+
+    source: SourceFiles
+    loss: Annotated[
+        Literal["reject", "none"],
+        Choice("What to do about outliers: leave them out, arm by arm, or nothing."),
+    ] = "reject"
+    test_share: Annotated[
+        float, Fraction("Fraction of the poses held out, when the data has no `set` column.")
+    ] = 0.2
+    seed: Seed = 0
+
+    def options(self, progress: run.Progress) -> dict[str, Any]:
+        """Keywords that the verbs of a fleet have in common."""
+        return {
+            "one_arm": self.one_arm,
+            "skip_corrupt": self.skip_corrupt,
+            "loss": self.loss,
+            "test_share": self.test_share,
+            "seed": self.seed,
+            "workers": self.workers,
+            "tell": progress.now,
+        }
 
 
 def say_errors(result: Mapping[str, Any]) -> None:
