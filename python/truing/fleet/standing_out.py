@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 
 LEAST = 5  # values, of which one can stand out: fewer others say nothing of how they scatter
 _MOST = 0.25  # of the values, that may stand out: what more of them do is how they scatter
+_LEAST_ERROR = 1e-12  # none is smaller: nothing is divided by zero
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ def standing_out(values: Floats, errors: Floats, least_probability: float) -> li
     that is too far from what was left then (Rosner 1983): so two that stand out do not hide each other. In
     how many ways so many can be taken away is part of the probability.
     """
+    errors = np.maximum(errors, _LEAST_ERROR)
     left = [int(k) for k in np.flatnonzero(np.isfinite(values) & np.isfinite(errors))]
     known, removed = len(left), list[Outlier]()
     for count in range(1, int(_MOST * known) + 1 if known >= LEAST else 0):
@@ -62,7 +64,8 @@ def centre_of(values: Floats, errors: Floats) -> tuple[float, float, float]:
     """Mean of values that scatter beyond their errors, its standard error, and that scatter (DerSimonian and
     Laird 1986).
     """
-    weights = 1.0 / np.maximum(errors, 1e-300) ** 2
+    errors = np.maximum(errors, _LEAST_ERROR)
+    weights = 1.0 / errors**2
     mean = float(weights @ values / weights.sum())
     excess = float(weights @ (values - mean) ** 2) - (len(values) - 1)
     scale = float(weights.sum() - weights @ weights / weights.sum())

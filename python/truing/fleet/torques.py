@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 
 _CHANCE = 0.01  # that an arm of a fleet without a fault is named
 _GAIN_ON_UNSEEN = 0.01  # of a joint's squared held-out error, that an arm's own value must take away
+_GAINS = (-0.5, 1.0)  # that a motor may have, as the catalogue has it
 _MUCH_MORE = 1.5  # times the median arm's error, from which on an arm has something that nothing explains
 
 
@@ -173,6 +174,7 @@ def _found(ended: TorqueFitted, settings: TorqueSettings, passes: int) -> FleetD
     warnings = list(fitted.notes)
     if not any(error.rows for error in errors):
         warnings.append("nothing is held out: recordings are too short, or all times are at rest")
+    warnings += _gains_of_no_motor(fitted)
     if len(arms) < LEAST:
         warnings.append(f"{len(arms)} arms: {LEAST} or more say how arms scatter, and which stand out")
     sigma = np.sqrt(np.maximum(np.diag(fitted.covariance.shared), 0.0))
@@ -238,6 +240,20 @@ def _arm(fitted: TorqueFitted, name: str) -> ArmTorques:
             )
         ),
     )
+
+
+def _gains_of_no_motor(fitted: TorqueFitted) -> list[str]:
+    """What to say where masses and gains share a scale that no motor has: of which arm it comes."""
+    gains = np.array([_gains(fitted, name) for name in fitted.arms])
+    if gains.min() >= _GAINS[0] and gains.max() <= _GAINS[1]:
+        return []
+    apart = np.abs(gains - np.median(gains, axis=0)).max(axis=1)
+    arm = list(fitted.arms)[int(np.argmax(apart))]
+    return [
+        f"motor gains from {gains.min():+.2g} to {gains.max():+.2g}, which motors do not have: an arm with a"
+        f" payload that is not stated, or in other units, leads the masses of all away; look at {arm}, state"
+        " its payload_kg, or leave it out"
+    ]
 
 
 def _own_sigma(fitted: TorqueFitted, name: str) -> Floats:

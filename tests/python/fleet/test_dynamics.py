@@ -141,6 +141,20 @@ def test_a_joint_that_rests_keeps_the_types_values(tmp_path: Path) -> None:
     assert found.arms["a002"].parameter("coulomb.J5").sigma > 0.0
 
 
+def test_an_arm_that_leads_all_masses_away_is_said(tmp_path: Path) -> None:
+    """Torques of one arm in another unit: no motor has such a gain."""
+    fleet = simulate_torque_fleet(arms=6, faults=0, seed=8108)
+    save_torque_fleet(tmp_path, fleet)
+    path = tmp_path / "arm=a004" / "run1.parquet"
+    table = pq.read_table(path)
+    for k, name in enumerate(table.column_names):
+        if name.startswith("tau"):
+            table = table.set_column(k, name, pa.array(8.0 * table[name].to_numpy()))
+    pq.write_table(table, path)
+    found = truing.fleet.dynamics(fleet.nominal, tmp_path, workers=0)
+    assert [w for w in found.warnings if w.startswith("motor gains from") and "look at a004" in w]
+
+
 # ---- Partitions
 
 
