@@ -4,7 +4,8 @@
 
 Effects and elements of MuJoCo 4:
 
-- dry friction: frictionloss with solreffriction; without it a joint creeps below some hundredths of a rad/s.
+- dry friction: frictionloss with solreffriction, without which a joint creeps below some hundredths of a
+  rad/s, and solimpfriction, without which light joints creep under load.
 - friction by speed: damping, a polynomial of speed with its sign.
 - presliding and Stribeck: a passive `dcmotor` with LuGre friction: dz/dt = v - s0 |v| / g(v) z, force s0 z,
   where
@@ -37,6 +38,7 @@ from truing.dynamics.export.parts import (
 from truing.rotations import quaternions_from_rotations
 
 STEP = 0.001  # [s] of the model
+FRICTION_HOLDS = (0.9999, 0.9999, 0.001)  # solimpfriction: with MuJoCo's 0.9 light joints creep
 SOLREF_FRICTION = 0.004  # [s] within which dry friction stops a joint; at least two steps
 _EQUALITY = 0.004  # [s] the same of joints that follow others
 _STRIBECK_X0 = 1e-3  # [rad | m] over which a Stribeck friction without presliding builds up
@@ -246,6 +248,7 @@ def _joint(parent: Element, link: Link, fields: JointFields | None, spring: floa
     if spring:
         joint.set("stiffness", plain(spring / r**2))
     joint.set("solreffriction", plain([SOLREF_FRICTION, 1.0]))
+    joint.set("solimpfriction", plain(FRICTION_HOLDS))
     if fields.frictionloss:
         joint.set("frictionloss", plain(fields.frictionloss / abs(r)))
 
