@@ -49,6 +49,7 @@ REPORTS: dict[str, list[list[str]]] = {
     "dynamics randomise": [["dynamics", "randomise", "dynamics-demo", "--out", "randomise"]],
     "exam": [["exam", "--sets", "none/0", "--workers", "1", "--out", "exam"]],
     "fleet diagnose": [["fleet", "diagnose", *FLEET, "fleet-diagnose"]],
+    "fleet dynamics": [["fleet", "dynamics", "moving.yaml", "moved", *FLEET[2:], "fleet-dynamics"]],
     "fleet identify": [["fleet", "identify", *FLEET, "fleet-identify"]],
 }
 WITHOUT = ["effects", "export", "load", "simulate"]
@@ -76,6 +77,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         assert main([*arguments, "--out", str(place / name)]) == 0
         (place / "arms").mkdir(exist_ok=True)
         shutil.copy(place / name / "measurements.csv", place / "arms" / f"{name}.csv")
+    (place / "moved").mkdir()
+    for name in ("motion1.csv", "motion2.csv"):
+        shutil.copy(place / name, place / "moved" / name)
     return place
 
 
