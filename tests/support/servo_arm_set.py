@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes the data set of python/truing/examples/servo_arm.
 
-The arm of arm.xml in truth has softer gains, other friction, a delay, zeros that are off, and a load in its
-gripper; it is driven along five motions.
+The arm of arm.xml in truth has softer gains, other friction, a delay, and zeros that are off; it is driven along
+five motions.
 
     python tests/support/servo_arm_set.py FOLDER
 """
@@ -33,8 +33,6 @@ FRICTION = (0.07, 0.09, 0.08)  # [Nm]
 ARMATURE = (0.02, 0.024, 0.02)  # [kg m^2]
 ZERO = (0.004, -0.02, 0.03)  # [rad] what the robot reads less the model's angle
 DELAY = 0.024  # [s]
-LOAD = 0.14  # [kg] in the gripper, which the model does not know
-PLACE = (0.18, 0.0, 0.0)
 HOME = np.array([0.0, -0.5, 0.6])
 HELD_OUT = 2  # of the episodes, the last
 
@@ -50,9 +48,6 @@ def truth() -> mujoco.MjModel:
         actuator.set_to_position(kp=GAINS[k], kv=0.0)
         actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_FALSE
         actuator.delay, actuator.nsample = DELAY, round(DELAY / STEP) + 1
-    load = spec.body("gripper").add_body(name="load", pos=PLACE)
-    load.explicitinertial, load.mass, load.inertia = True, LOAD, [1e-6] * 3
-    load.ipos, load.iquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
     return spec.compile()
 
 
