@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes the data set of python/truing/examples/servo_arm.
 
-The arm of arm.xml in truth has softer gains, other friction, a delay, and zeros that are off; it is driven along
-five motions.
+The arm of arm.xml in truth has softer gains, other friction, a delay, and zeros that are off; it is driven
+along five motions.
 
     python tests/support/servo_arm_set.py FOLDER
 """
