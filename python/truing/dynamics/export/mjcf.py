@@ -39,7 +39,7 @@ from truing.rotations import quaternions_from_rotations
 
 STEP = 0.001  # [s] of the model
 FRICTION_HOLDS = (0.9999, 0.9999, 0.001)  # solimpfriction: with MuJoCo's 0.9 light joints creep
-SOLREF_FRICTION = 0.004  # [s] within which dry friction stops a joint; at least two steps
+FRICTION_TIME = 0.004  # [s] solreffriction: with MuJoCo's 0.02 dry friction is viscous below 0.03 rad/s
 _EQUALITY = 0.004  # [s] the same of joints that follow others
 _STRIBECK_X0 = 1e-3  # [rad | m] over which a Stribeck friction without presliding builds up
 
@@ -247,7 +247,7 @@ def _joint(parent: Element, link: Link, fields: JointFields | None, spring: floa
         joint.set("damping", plain(fields.damping / np.array([r**2, abs(r) ** 3, r**4])))
     if spring:
         joint.set("stiffness", plain(spring / r**2))
-    joint.set("solreffriction", plain([SOLREF_FRICTION, 1.0]))
+    joint.set("solreffriction", plain([FRICTION_TIME, 1.0]))
     joint.set("solimpfriction", plain(FRICTION_HOLDS))
     if fields.frictionloss:
         joint.set("frictionloss", plain(fields.frictionloss / abs(r)))

@@ -16,12 +16,11 @@ import numpy as np
 
 from truing import _core
 from truing.dynamics.export import export, import_mujoco
+from truing.dynamics.export.mjcf import FRICTION_HOLDS, FRICTION_TIME
 from truing.dynamics.servo.chain import ServoChain, ServoJoint
 from truing.errors import InputError
 from truing.files.mjcf_file import quiet
 
-FRICTION_TIME = 0.004  # [s] solreffriction: with MuJoCo's 0.02 dry friction is viscous below 0.03 rad/s
-FRICTION_HOLDS = (0.9999, 0.9999, 0.001)  # solimpfriction: with its 0.9 light joints creep by some deg/s
 _LEAST_ARMATURE = 1e-6  # [kg m^2] of a file that says none
 _LEAST_FRICTION = 1e-4  # [Nm] and of its friction [Nm, Nm s/rad], which are fitted as logarithms
 _GUESSED_GAIN = 10.0  # [Nm/rad] where no actuator says one

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing.dynamics.export import import_mujoco
+from truing.dynamics.export.mjcf import FRICTION_HOLDS, FRICTION_TIME
 from truing.dynamics.export.parts import NotWritten
-from truing.dynamics.servo.arm import FRICTION_HOLDS, FRICTION_TIME
 from truing.dynamics.servo.chain import ServoChain
 from truing.dynamics.servo.export.held import Held, HeldJoint, Use
 from truing.errors import InputError
