@@ -103,7 +103,9 @@ Of a recording that is read in pieces no more than a stretch is in memory. A kno
 torque. The same bits for any number of threads. Raises InputError on a recording or options that cannot be used.)");
   m.def(
       "torques_of_bodies",
-      [](const Robot& robot, const Eigen::MatrixXd& gram, const Eigen::VectorXd& right) {
+      [](const Robot& given_robot, const Eigen::MatrixXd& gram, const Eigen::VectorXd& right) {
+        const Robot robot = given_robot;
+        const py::gil_scoped_release unlocked;
         return dynamics::torques_of_bodies(robot, gram, right);
       },
       py::arg("robot"), py::arg("gram"), py::arg("right"),
@@ -178,7 +180,7 @@ Raises InputError on recordings or options that cannot be used.)");
         const py::gil_scoped_release unlocked;
         return dynamics::predict(robot, recording, cutoff);
       },
-      py::arg("robot"), py::arg("recording"), py::arg("cutoff") = 8.0,
+      py::arg("robot"), py::arg("recording"), py::arg("cutoff") = kUsualCutoff,
       R"(Torques of every row of a recording: links, rotors, and the effects that the robot carries.
 
 Raises InputError on a recording that cannot be used.)");

@@ -144,11 +144,12 @@ def markdown_table() -> str:
     return "\n".join(lines)
 
 
-def predict(robot: Robot, recording: Recording, *, cutoff: float = 8.0) -> TorquePrediction:
+def predict(robot: Robot, recording: Recording, *, cutoff: float | None = None) -> TorquePrediction:
     """Torques of every row of a recording: links, rotors, and the effects that the robot carries.
 
-    cutoff: [Hz] of the low-pass without phase that the angles go through for their derivatives.
+    cutoff: [Hz] of the low-pass without phase that the angles go through for their derivatives; None: as in
+    TorqueOptions.
 
     Raises InputError on a recording that cannot be used.
     """
-    return _core.dynamics_predict(robot, recording, cutoff)
+    return _core.dynamics_predict(robot, recording, **({} if cutoff is None else {"cutoff": cutoff}))

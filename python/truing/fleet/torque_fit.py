@@ -52,9 +52,9 @@ _LIKELY_GAIN = 0.2  # by which a motor's constant may well be off
 class TorqueSettings:
     """What is asked for."""
 
-    cutoff: float = 8.0
-    test_share: float = 0.2
-    skip_corrupt: bool = False
+    cutoff: float  # [Hz]
+    test_share: float
+    skip_corrupt: bool
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,7 @@ def dynamics(
     client: Any = None,
     *,
     one_arm: bool = False,
-    cutoff: float = 8.0,
+    cutoff: float | None = None,
     test_share: float = 0.2,
     skip_corrupt: bool = False,
     workers: int | None = None,
@@ -133,17 +133,19 @@ def dynamics(
     All arms share the links' inertial parameters, armature, Coulomb and viscous friction and an offset. Each
     has, at every joint, friction and an offset that depart from these, and a gain of its motor.
 
-    robot: nominal, of all arms, with masses and inertias. source: files, or a folder of Parquet or CSV files,
-    with the columns of recordings of motion and torque. A file is of the arm that its folder `arm=NAME/`
-    names, or of its own name; one_arm: all are of one. client: of Dask; None: a cluster on this machine, for
-    this call, of so many `workers` (None: one a processor; 0: this process alone). cutoff: [Hz] of the
-    low-pass without phase that both sides of the equation of motion go through. test_share: fraction of the
-    time that is held out, where no recording is marked as test. skip_corrupt: partitions that cannot be read
-    are passed over and named in `skipped`. tell: is told what begins.
+    robot: nominal, of all arms, with masses and inertias. source: files, or a folder of Parquet or CSV
+    files, with the columns of recordings of motion and torque. A file is of the arm that its folder
+    `arm=NAME/` names, or of its own name; one_arm: all are of one. client: of Dask; None: a cluster on this
+    machine, for this call, of so many `workers` (None: one a processor; 0: this process alone). cutoff:
+    [Hz] of the low-pass without phase that both sides of the equation of motion go through; None: as in
+    TorqueSumOptions. test_share: fraction of the time that is held out, where no recording is marked as
+    test. skip_corrupt: partitions that cannot be read are passed over and named in `skipped`. tell: is told
+    what begins.
 
     The same bits on one worker or many. Raises InputError on data or options that cannot be used; it names
     the partition.
     """
+    cutoff = _core.TorqueSumOptions().cutoff if cutoff is None else cutoff
     if not (math.isfinite(cutoff) and cutoff > 0.0):
         raise InputError(f"cutoff: found {cutoff}, expected more than 0 Hz")
     if not 0.0 < test_share < 1.0:
@@ -171,7 +173,9 @@ def _found(ended: TorqueFitted, settings: TorqueSettings, passes: int) -> FleetD
     )
     stands_out = _standing_out(fitted)
     unexplained = _unexplained(fitted)
-    warnings = list(fitted.notes)
+    warnings = list(fitted.notes[:_TOLD])
+    if len(fitted.notes) > _TOLD:
+        warnings.append(f"and {len(fitted.notes) - _TOLD} more warnings of recordings")
     if not any(error.rows for error in errors):
         warnings.append("nothing is held out: recordings are too short, or all times are at rest")
     warnings += _gains_of_no_motor(fitted)

@@ -17,7 +17,8 @@ namespace truing {
 struct TorqueDiagnoseOptions {
   std::vector<TorqueEffect> own_effects;  ///< take part beside the catalogue
   std::vector<std::string> leave_out;     ///< effects that are not to be considered, by name
-  double cutoff = 8.0;      ///< [Hz] of the low-pass without phase that both sides of the equation of motion go through
+  double cutoff =
+      kUsualCutoff;         ///< [Hz] of the low-pass without phase that both sides of the equation of motion go through
   double test_share = 0.3;  ///< fraction of the time held out when there is one recording, or none is marked as test
   int max_effects = 40;     ///< maximum number of effects named
   double least_gain = 0.01;  ///< [-] fraction of a joint's squared error on unseen recordings that a name must remove

@@ -25,7 +25,8 @@ struct TorqueOptions {
   std::vector<EffectRequest> effects;
   std::vector<TorqueEffect> own_effects;  ///< known beside the catalogue
   bool fit_inertials = true;              ///< the links' inertial parameters are fitted beside the effects
-  double cutoff = 8.0;      ///< [Hz] of the low-pass without phase that both sides of the equation of motion go through
+  double cutoff =
+      kUsualCutoff;         ///< [Hz] of the low-pass without phase that both sides of the equation of motion go through
   double test_share = 0.3;  ///< fraction of the time held out when there is one recording, or none is marked as test
   int threads = 0;          ///< 0: as many as the machine has
 
@@ -76,7 +77,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
 
 /// Torques of every row of a recording: links, rotors, and the effects that the robot carries. Angles are low-passed at
 /// `cutoff` [Hz] for their derivatives. Throws std::invalid_argument on a recording that cannot be used.
-TorquePrediction predict(const Robot& robot, const Recording& recording, double cutoff = 8.0,
+TorquePrediction predict(const Robot& robot, const Recording& recording, double cutoff = kUsualCutoff,
                          const std::vector<TorqueEffect>& own_effects = {});
 
 }  // namespace dynamics

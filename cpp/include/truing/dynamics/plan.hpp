@@ -38,7 +38,7 @@ struct TorquePlanOptions {
   double noise = 0.02;
   std::vector<double> torque_noise;  ///< [Nm | N] of every joint, instead of `noise`
   double noise_time = 0.2;           ///< [s] correlation time of the noise
-  double cutoff = 8.0;               ///< [Hz] of the low-pass that a diagnosis will use
+  double cutoff = kUsualCutoff;      ///< [Hz] of the low-pass that a diagnosis will use
   double alike = 0.98;               ///< an effect of which another explains a larger fraction is not told from it
   int starts = 12;                   ///< random motions, the best of which is refined
   int rounds = 24;                   ///< of refinement, four proposals each

@@ -15,6 +15,9 @@ namespace truing {
 
 struct Recording;
 
+/// [Hz] of the low-pass that motion and torques go through, where none is given.
+inline constexpr double kUsualCutoff = 8.0;
+
 /// Rows of a recording in order of time, some of them each time that it is called: false when there are no more.
 using NextRows = std::function<bool(Recording* rows)>;
 

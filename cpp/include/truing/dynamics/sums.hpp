@@ -17,7 +17,8 @@ namespace truing {
 
 /// How torques are summed.
 struct TorqueSumOptions {
-  double cutoff = 8.0;    ///< [Hz] of the low-pass without phase that both sides of the equation of motion go through
+  double cutoff =
+      kUsualCutoff;       ///< [Hz] of the low-pass without phase that both sides of the equation of motion go through
   double shortest = 2.0;  ///< [s] a recording is cut into blocks of equal time that are no shorter
   int most_blocks = 100;  ///< and no more than these
   int threads = 1;        ///< 0: as many as the machine has

@@ -41,7 +41,7 @@ class Command(FleetWork["FleetDynamics"]):
                 self.source,
                 client,
                 one_arm=self.one_arm,
-                cutoff=self.cutoff or 8.0,
+                cutoff=self.cutoff,
                 test_share=self.test_share,
                 skip_corrupt=self.skip_corrupt,
                 workers=self.workers,
@@ -62,7 +62,7 @@ class Command(FleetWork["FleetDynamics"]):
                 (
                     s.arm,
                     s.parameter,
-                    f"{s.value:+.3g} ± {s.sigma:.2g} {s.unit}",
+                    f"{s.value:+.3g} ± {s.sigma:.2g} {s.unit}".removesuffix(" -"),
                     f"{s.others:+.2g} ± {s.scatter:.2g}",
                 )
                 for s in found.stands_out
