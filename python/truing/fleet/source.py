@@ -59,14 +59,17 @@ class RecordingPartition(Partition):
 
     row_groups: tuple[int, ...] = ()  # none: the whole file
 
-    def recordings(self, robot: _core.Robot) -> list[_core.Recording]:
-        """What is in it. Raises InputError that names the partition."""
+    def recordings(self, robot: _core.Robot) -> tuple[list[_core.Recording], tuple[str, ...]]:
+        """What is in it, and what reading it warns of. Raises InputError that names the partition."""
         path = Path(self.path)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", InputWarning)
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", InputWarning)
             if self.row_groups:
-                return read_row_groups(path, path.stem, robot, self.row_groups)
-            return read_table(path, path.stem, robot, None)
+                found = read_row_groups(path, path.stem, robot, self.row_groups)
+            else:
+                found = read_table(path, path.stem, robot, None)
+        notes = (str(one.message) for one in told if issubclass(one.category, InputWarning))
+        return found, tuple(dict.fromkeys(notes))
 
 
 @dataclass(frozen=True)

@@ -48,12 +48,15 @@ def _number(value: float | None, unit: str = "", sign: bool = False) -> str:
     if value is None:
         return '<td class="held" data-v="-1">–</td>'
     text = ("+" if sign and value > 0 else "") + figures_text(value)
-    return table_cell(value, f"{text} {escaped(unit)}".strip())
+    return table_cell(value, f"{text} {escaped(unit)}".strip() if unit != "-" else text)
 
 
 def _stands_out(found: Sequence[Mapping[str, Any]]) -> str:
     if not found:
-        return _table("Arms that stand out", "Nothing was found.", (), ())
+        return (
+            '<section class="card"><h2>Arms that stand out</h2><p class="lead">None: no arm departs from the'
+            " others by more than chance (1 % for the fleet).</p></section>"
+        )
     rows = [
         [
             f"<th>{escaped(one['arm'])}</th>",
@@ -76,7 +79,7 @@ def _stands_out(found: Sequence[Mapping[str, Any]]) -> str:
             "others, mean",
             "others, scatter",
         ),
-        *("torque, rms, Nm or N", "of the squared held-out error"),
+        *("torque, rms, Nm or N", "closes, of squares"),
     )
     lead = "A parameter is named where the others scatter too little for it to be chance (1 % for the fleet)."
     return _table("Arms that stand out", lead, names, rows)

@@ -121,16 +121,15 @@ class TorqueTask:
 def sum_recordings(partition: RecordingPartition, task: TorqueTask, frame: Any = None) -> TorqueTotals:
     """The sums of a partition's recordings, which are of one arm."""
     try:
-        found = partition.recordings(task.robot)
+        found, told = partition.recordings(task.robot)
         if not found:
-            return TorqueTotals({})
+            return TorqueTotals({}, told)
         sums = [_sums_of(recording, task, partition.arm) for recording in found]
     except InputError as error:
         text = str(error)
         return TorqueTotals({}, (), (text if partition.path in text else f"{partition.called}: {text}",))
-    return TorqueTotals(
-        {partition.arm: functools.reduce(lambda a, b: a + b, sums)}, _notes(found, task.robot)
-    )
+    total = functools.reduce(lambda a, b: a + b, sums)
+    return TorqueTotals({partition.arm: total}, (*told, *_notes(found, task.robot)))
 
 
 def _sums_of(recording: _core.Recording, task: TorqueTask, arm: str) -> ArmSums:

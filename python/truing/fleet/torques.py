@@ -28,6 +28,7 @@ Floats = NDArray[np.float64]
 _CHANCE = 0.01  # that an arm of a fleet without a fault is named
 _GAIN_ON_UNSEEN = 0.01  # of a joint's squared held-out error, that an arm's own value must take away
 _GAINS = (-0.5, 1.0)  # that a motor may have, as the catalogue has it
+_TOLD = 20  # warnings of recordings; the others are counted
 _MUCH_MORE = 1.5  # times the median arm's error, from which on an arm has something that nothing explains
 
 

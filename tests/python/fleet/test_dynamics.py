@@ -158,6 +158,17 @@ def test_an_arm_that_leads_all_masses_away_is_said(tmp_path: Path) -> None:
 # ---- Partitions
 
 
+def test_what_reading_warns_of_reaches_the_result(tmp_path: Path) -> None:
+    fleet = simulate_torque_fleet(faults=0, seed=8107)
+    save_torque_fleet(tmp_path, fleet)
+    file = sorted(tmp_path.rglob("*.parquet"))[0]
+    table = pq.read_table(file)
+    gaps = pa.array([1.0] + [float("nan")] * (table.num_rows - 1))
+    pq.write_table(table.append_column("gaps", gaps), file)
+    found = truing.fleet.dynamics(fleet.nominal, tmp_path, workers=0)
+    assert [note for note in found.warnings if str(file) in note and "'gaps'" in note]
+
+
 def test_row_groups_are_partitions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not the same numbers: at the ends of a partition the filter leaves rows out."""
     fleet = simulate_torque_fleet(arms=5, faults=0, seconds=40.0, seed=8107)
