@@ -201,7 +201,10 @@ def held_share(
     without: Floats, with_it: Floats, whole: Floats, window: NDArray[np.intp]
 ) -> tuple[float, float, float]:
     """Part of the squares of `whole` (or `without`, where this is more; each joint in units of its own) that
-    goes, and its 90 % interval over windows."""
+    goes, and its 90 % interval over windows.
+
+    without, with_it, whole: shape=(n, joints), errors of held-out rows. window: shape=(n,), of each row.
+    """
     scale = np.maximum(np.sqrt(np.mean(whole**2, axis=0)), 1e-9)
     gains = np.sum(((without / scale) ** 2 - (with_it / scale) ** 2), axis=1)
     total = max(float(np.sum((whole / scale) ** 2)), float(np.sum((without / scale) ** 2)))
