@@ -190,10 +190,9 @@ def require_torques(recordings: Sequence[Recording]) -> None:
     for recording in recordings:
         if recording.torque.shape[1] or recording.current.shape[1]:
             continue
-        commands = recording.command.shape[1] or recording.torque_command.shape[1]
         raise InputError(
-            f"{recording.name}: there is neither a torque (tau1_Nm …) nor a current (i1_A …)"
-            + ("; from commands alone (u1_rad …) there is `truing dynamics diagnose`" if commands else "")
+            f"{recording.name}: there is neither a torque (tau1_Nm …) nor a current (i1_A …): record one of"
+            " them, or take `truing dynamics diagnose`, which asks for no more than commands (u1_rad …)"
         )
 
 
