@@ -350,6 +350,18 @@ def _stretch(trace: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v[rows] if isinstance(v, np.ndarray) else v for k, v in trace.items()}
 
 
+def _drawable(trace: Mapping[str, Any]) -> dict[str, Any]:
+    """A trace of about POINTS rows, with a row of NaN in each pause of more than five of its steps.
+
+    What was held out may be blocks of time, and no line is drawn from one to the next.
+    """
+    every = max(1, len(trace["time"]) // POINTS)
+    thinned = {k: v[::every] if isinstance(v, np.ndarray) else v for k, v in trace.items()}
+    steps = np.diff(thinned["time"])
+    pauses = np.flatnonzero(steps > 5.0 * np.median(steps)) + 1 if len(steps) else []
+    return {k: np.insert(v, pauses, np.nan) if isinstance(v, np.ndarray) else v for k, v in thinned.items()}
+
+
 def _trace_card(page: Page, traces: Sequence[Mapping[str, Any]], order: Sequence[str]) -> None:
     """Torque of one joint over time; buttons choose the joint, the first is shown."""
     by_joint = {trace["joint"]: trace for trace in traces if len(trace["time"])}
@@ -359,8 +371,7 @@ def _trace_card(page: Page, traces: Sequence[Mapping[str, Any]], order: Sequence
         return
     drawn, owners = [], []
     for joint in shown:
-        trace = by_joint[joint]
-        step = max(1, len(trace["time"]) // POINTS)
+        trace = _drawable(by_joint[joint])
         for key, name, colour, dash, width in (
             ("nominal", "nominal", NOMINAL, "dot", 1.6),
             ("standard", "standard", BEFORE, "solid", 1.8),
@@ -373,8 +384,8 @@ def _trace_card(page: Page, traces: Sequence[Mapping[str, Any]], order: Sequence
                 {
                     "type": "scatter",
                     "mode": "lines",
-                    "x": packed(np.asarray(trace["time"])[::step]),
-                    "y": packed(np.asarray(trace[key])[::step]),
+                    "x": packed(trace["time"]),
+                    "y": packed(trace[key]),
                     "name": name,
                     "line": {"color": colour, "width": width, "dash": dash},
                     "visible": joint == shown[0],

@@ -18,11 +18,13 @@ import truing
 from pages import charts_of, visible
 from truing.dynamics import Recording, TorqueDiagnosis, diagnose, identify, predict
 from truing.dynamics.result import (
+    diagnosis_page,
     prediction_columns,
     write_diagnosis,
     write_fit,
     write_prediction,
 )
+from truing.report.arrays import unpacked
 from truing.testing.dynamics import HIDDEN, SimulatedMotion, demo_arm, simulate_motion
 
 
@@ -143,6 +145,16 @@ def test_the_report_says_it_in_its_first_lines(folder: Path, result: dict[str, A
     assert charts["trace"]["layout"]["updatemenus"][0]["buttons"][0]["label"] == "J5"  # the worst is first
     loads = [len([t for t in charts[f"friction{k}"]["data"]]) for k in range(6)]
     assert loads[1] == 2 and loads[0] == 1  # only J2 has friction that grows with the load
+
+
+def test_no_line_is_drawn_from_one_held_out_block_to_the_next(simulated: SimulatedMotion) -> None:
+    found = diagnose(simulated.nominal, simulated.recordings[:1])  # one recording: blocks of its time
+    pauses = np.diff(np.array(found.traces[0].time))
+    apart = np.count_nonzero(pauses > 1.0)
+    assert apart >= 1
+    line = charts_of(diagnosis_page(found, 1))["trace"]["data"][0]
+    for axis in ("x", "y"):
+        assert np.isnan(unpacked(line[axis])).sum() == apart
 
 
 def test_a_fit_writes_its_parameters_with_errors(simulated: SimulatedMotion, tmp_path: Path) -> None:
