@@ -357,8 +357,8 @@ def _drawable(trace: Mapping[str, Any]) -> dict[str, Any]:
     """
     every = max(1, len(trace["time"]) // POINTS)
     thinned = {k: v[::every] if isinstance(v, np.ndarray) else v for k, v in trace.items()}
-    steps = np.diff(thinned["time"])
-    pauses = np.flatnonzero(steps > 5.0 * np.median(steps)) + 1 if len(steps) else []
+    steps = np.diff(thinned["time"], prepend=thinned["time"][0])
+    pauses = np.flatnonzero(steps > 5.0 * np.median(steps))
     return {k: np.insert(v, pauses, np.nan) if isinstance(v, np.ndarray) else v for k, v in thinned.items()}
 
 
