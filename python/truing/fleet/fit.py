@@ -74,6 +74,7 @@ class Plan:
     arms: Mapping[str, ArmPlan]
     shared: Mapping[str, int]  # unknowns of all arms, with their priority
     faults: tuple[str, ...]  # partitions that cannot be read
+    notes: tuple[str, ...]  # what reading the others warns of
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def plan_of(workers: Workers, source: Source, nominal: _core.Robot, settings: Se
     found = sample_all(workers, source, nominal)
     refuse_faults(found.faults, settings.skip_corrupt, len(source.partitions))
     arms = {name: _arm_plan(nominal, name, found, settings) for name in sorted(found.rows)}
-    return Plan(nominal, source, arms, shared_of(arms), found.faults)
+    return Plan(nominal, source, arms, shared_of(arms), found.faults, found.notes)
 
 
 def shared_of(arms: Mapping[str, ArmPlan]) -> dict[str, int]:

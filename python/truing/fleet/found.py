@@ -16,6 +16,7 @@ from truing import _core
 from truing.fleet.fit import Fitted, Settings
 from truing.fleet.gram import ErrorCounts, Gram
 from truing.fleet.nested import Covariance, covariance
+from truing.fleet.source import first_notes
 
 Floats = NDArray[np.float64]
 
@@ -99,6 +100,7 @@ class FleetIdentification:
     rows: int
     partitions: int
     skipped: tuple[str, ...]  # partitions that could not be read, and why
+    warnings: tuple[str, ...]  # of what was read: the first twenty, and the number of the others
     iterations: int
     passes: int
     converged: bool
@@ -138,6 +140,7 @@ def found_in(fitted: Fitted, settings: Settings, passes: int) -> FleetIdentifica
         rows=sum(arm.rows for arm in plan.arms.values()),
         partitions=len(plan.source.partitions),
         skipped=fitted.faults,
+        warnings=first_notes(plan.notes, "rows"),
         iterations=fitted.iterations,
         passes=passes,
         converged=fitted.converged,

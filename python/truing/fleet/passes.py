@@ -67,11 +67,14 @@ class Sums:
 
 @dataclass(frozen=True)
 class Sample:
-    """Of some partitions: rows of each arm, how many and a sample, and partitions that cannot be read."""
+    """Of some partitions: rows of each arm, how many and a sample; partitions that cannot be read, and what
+    reading the others warns of.
+    """
 
     rows: Mapping[str, int]
     data: Mapping[str, tuple[_core.Measurements, ...]]
     faults: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 # ---- What a worker does ------------------------------------------------------------------------------------
@@ -80,7 +83,7 @@ class Sample:
 def sum_partition(partition: Partition, task: Task, frame: Any = None) -> Sums:
     """A Gram for each arm in a partition."""
     try:
-        found = partition.read(task.nominal, frame)
+        found, _ = partition.read(task.nominal, frame)  # the first pass has told the warnings
     except InputError as error:
         return Sums({}, (str(error),))
     try:
@@ -136,7 +139,7 @@ def rows_held_out(data: _core.Measurements, share: float, seed: int) -> Bools:
 def sample_partition(partition: Partition, nominal: _core.Robot, frame: Any = None) -> Sample:
     """How many rows each arm has in a partition, and an even sample of them."""
     try:
-        found = partition.read(nominal, frame)
+        found, told = partition.read(nominal, frame)
         for data in found.values():
             _core.validate_measurements(data, nominal)
     except InputError as error:
@@ -145,6 +148,7 @@ def sample_partition(partition: Partition, nominal: _core.Robot, frame: Any = No
     return Sample(
         {name: found[name].rows for name in names},
         {name: (some_rows(found[name], _SAMPLE_OF_PARTITION),) for name in names},
+        notes=told,
     )
 
 
@@ -197,7 +201,8 @@ def add_samples(parts: Sequence[Sample]) -> Sample:
             rows[name] = rows.get(name, 0) + count
             data[name] = (*data.get(name, ()), *part.data[name])
     kept = {name: (together(some, SAMPLE_ROWS),) for name, some in data.items()}
-    return Sample(rows, kept, tuple(fault for part in parts for fault in part.faults))
+    notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
+    return Sample(rows, kept, tuple(fault for part in parts for fault in part.faults), notes)
 
 
 def together(parts: Sequence[_core.Measurements], most: int) -> _core.Measurements:

@@ -114,7 +114,7 @@ def identification_dict(found: FleetIdentification, warnings: Iterable[str] = ()
 
 
 def _warnings(found: FleetIdentification) -> list[str]:
-    out = [f"passed over: {fault}" for fault in found.skipped]
+    out = [*found.warnings, *(f"passed over: {fault}" for fault in found.skipped)]
     lost = sum(arm.left_out for arm in found.arms.values())
     return out + ([f"{lost} rows left out as gross outliers"] if lost else [])
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 import os
 import re
 import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,8 +27,28 @@ from truing.files.table import Table
 ONE_ARM = "arm"
 """What the only arm is called, where nothing names it."""
 
+_TOLD = 20  # warnings of what was read; the others are counted
 _SUFFIXES = (".csv", *PARQUET_SUFFIXES)
 _ARM_FOLDER = re.compile(r"arm=(.+)")
+
+
+@contextmanager
+def heard() -> Iterator[list[warnings.WarningMessage]]:
+    """Warnings of what runs in it, in place of their being shown: a worker has nobody to show them to."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", InputWarning)
+        yield told
+
+
+def notes_of(told: Sequence[warnings.WarningMessage]) -> tuple[str, ...]:
+    """What was said of the input, each once."""
+    return tuple(dict.fromkeys(str(one.message) for one in told if issubclass(one.category, InputWarning)))
+
+
+def first_notes(notes: Sequence[str], of: str) -> tuple[str, ...]:
+    """The first twenty warnings, and the number of the others. of: what they are of, in words."""
+    more = len(notes) - _TOLD
+    return (*notes[:_TOLD], *((f"and {more} more warnings of {of}",) if more > 0 else ()))
 
 
 @dataclass(frozen=True)
@@ -38,8 +60,11 @@ class Partition:
     row_group: int | None = None  # of a Parquet file; None: the whole file
     arm: str = ONE_ARM  # the arm of rows that name none
 
-    def read(self, robot: _core.Robot, frame: Any = None) -> dict[str, _core.Measurements]:
-        """Measurements of every arm in it, by name. frame: the table that was handed over.
+    def read(
+        self, robot: _core.Robot, frame: Any = None
+    ) -> tuple[dict[str, _core.Measurements], tuple[str, ...]]:
+        """Measurements of every arm in it, by name, and what reading it warns of. frame: the table that was
+        handed over.
 
         Raises InputError that names the partition.
         """
@@ -47,10 +72,9 @@ class Partition:
             table = Table(Path(self.path))
         else:
             table = Table.of(frame, self.called)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", InputWarning)
+        with heard() as told:
             found = load_partition(table, robot, self.row_group)
-        return {name or self.arm: data for name, data in found.items()}
+        return {name or self.arm: data for name, data in found.items()}, notes_of(told)
 
 
 @dataclass(frozen=True)
@@ -62,14 +86,12 @@ class RecordingPartition(Partition):
     def recordings(self, robot: _core.Robot) -> tuple[list[_core.Recording], tuple[str, ...]]:
         """What is in it, and what reading it warns of. Raises InputError that names the partition."""
         path = Path(self.path)
-        with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always", InputWarning)
+        with heard() as told:
             if self.row_groups:
                 found = read_row_groups(path, path.stem, robot, self.row_groups)
             else:
                 found = read_table(path, path.stem, robot, None)
-        notes = (str(one.message) for one in told if issubclass(one.category, InputWarning))
-        return found, tuple(dict.fromkeys(notes))
+        return found, notes_of(told)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.errors import InputError
 from truing.fleet.found import FleetParameter
-from truing.fleet.source import recordings_of
+from truing.fleet.source import first_notes, recordings_of
 from truing.fleet.standing_out import LEAST, centre_of, left_of, standing_out
 from truing.fleet.torque_fit import GAIN, TorqueFitted, TorqueSettings, combination, fit_torques
 from truing.fleet.torque_sums import Joints, JointSum
@@ -28,7 +28,6 @@ Floats = NDArray[np.float64]
 _CHANCE = 0.01  # that an arm of a fleet without a fault is named
 _GAIN_ON_UNSEEN = 0.01  # of a joint's squared held-out error, that an arm's own value must take away
 _GAINS = (-0.5, 1.0)  # that a motor may have, as the catalogue has it
-_TOLD = 20  # warnings of recordings; the others are counted
 _MUCH_MORE = 1.5  # times the median arm's error, from which on an arm has something that nothing explains
 
 
@@ -174,9 +173,7 @@ def _found(ended: TorqueFitted, settings: TorqueSettings, passes: int) -> FleetD
     )
     stands_out = _standing_out(fitted)
     unexplained = _unexplained(fitted)
-    warnings = list(fitted.notes[:_TOLD])
-    if len(fitted.notes) > _TOLD:
-        warnings.append(f"and {len(fitted.notes) - _TOLD} more warnings of recordings")
+    warnings = list(first_notes(fitted.notes, "recordings"))
     if not any(error.rows for error in errors):
         warnings.append("nothing is held out: recordings are too short, or all times are at rest")
     warnings += _gains_of_no_motor(fitted)

@@ -18,6 +18,8 @@ import truing
 from truing.cli import main
 from truing.examples import example
 from truing.fleet import FleetIdentification
+from truing.fleet.result import write_fleet
+from truing.fleet.source import first_notes
 from truing.testing.fleet import FleetSimulation, save_fleet, simulate_fleet
 
 ARMS, POSES = 8, 80
@@ -103,6 +105,27 @@ def test_one_arm_is_what_identify_finds(robot: truing.Robot, tmp_path: Path) -> 
             assert p.value == pytest.approx(theirs.parameter(p.name).value, abs=0.02 * p.sigma), p.name
             assert p.sigma == pytest.approx(theirs.parameter(p.name).sigma, rel=0.2), p.name
     assert ours.after.fitted.rms == pytest.approx(theirs.train.after.rms, rel=1e-5)
+
+
+def test_what_reading_warns_of_reaches_the_result(
+    robot: truing.Robot, folder: Path, found: FleetIdentification, tmp_path: Path
+) -> None:
+    tight = robot.copy()  # its elbow may hardly turn: every file has rows beyond
+    tight.joints[2].lower, tight.joints[2].upper = -0.5, 0.5
+    assert not found.warnings
+    warned = truing.fleet.identify(tight, folder, workers=0)
+    names = [file.name for file in sorted(folder.rglob("*.parquet"))]
+    assert names and len(warned.warnings) == len(names)
+    for name, note in zip(names, warned.warnings, strict=True):
+        assert name in note and "beyond its limits" in note
+    write_fleet(tmp_path, warned, nominal_file=example("ur10"))
+    assert json.loads((tmp_path / "result.json").read_text())["warnings"][0] == warned.warnings[0]
+
+
+def test_of_many_warnings_the_first_are_told_and_the_others_counted() -> None:
+    notes = [f"note {k}" for k in range(23)]
+    assert first_notes(notes, "rows") == (*notes[:20], "and 3 more warnings of rows")
+    assert first_notes(notes[:20], "rows") == tuple(notes[:20])
 
 
 def test_gross_outliers_are_left_out_arm_by_arm(robot: truing.Robot, tmp_path: Path) -> None:
