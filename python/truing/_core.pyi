@@ -6770,12 +6770,13 @@ class TorqueOptions:
     
     effects = []: Effects to fit. None: what is usual, the links' inertial parameters, armature, Coulomb and viscous
         friction, an offset.
+    leave_out_forms = []: Forms of laws that are not fitted, by effect and part: 'viscous_law.root'.
     fit_inertials = True: The links' inertial parameters are fitted beside the effects.
     cutoff = 8.0: [Hz] of the low-pass without phase that both sides of the equation of motion go through.
     test_share = 0.3: Fraction of the time held out when there is one recording, or none is marked as test.
     threads = 0: 0: as many as the machine has.
     """
-    def __init__(self, *, effects: collections.abc.Sequence[EffectRequest] = [], fit_inertials: bool = True, cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, effects: collections.abc.Sequence[EffectRequest] = [], leave_out_forms: collections.abc.Sequence[str] = [], fit_inertials: bool = True, cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -6813,6 +6814,14 @@ class TorqueOptions:
         """
     @fit_inertials.setter
     def fit_inertials(self, arg1: bool) -> None:
+        ...
+    @property
+    def leave_out_forms(self) -> tuple[str, ...]:
+        """
+        Forms of laws that are not fitted, by effect and part: 'viscous_law.root'.
+        """
+    @leave_out_forms.setter
+    def leave_out_forms(self, arg1: collections.abc.Sequence[str]) -> None:
         ...
     @property
     def test_share(self) -> float:

@@ -252,6 +252,8 @@ class TorqueKeywords(TypedDict, total=False):
     effects: Effects
     """Effects to fit. None: what is usual, the links' inertial parameters, armature, Coulomb and viscous
     friction, an offset."""
+    leave_out_forms: str | Sequence[str]
+    """Forms of laws that are not fitted, by effect and part: 'viscous_law.root'."""
     fit_inertials: bool
     """The links' inertial parameters are fitted beside the effects."""
     cutoff: float

@@ -32,6 +32,26 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// Without the forms that have such a parameter; their columns stay unused.
+void leave_out_forms(const std::vector<std::string>& forms, TorqueDesign* design) {
+  const auto has = [&](const TorqueGroup& group, const std::string& form) {
+    const std::size_t dot = form.find('.');
+    if (dot == std::string::npos || group.effect != form.substr(0, dot)) return false;
+    const std::string part = form.substr(dot);
+    return std::any_of(group.columns.begin(), group.columns.end(), [&](int c) {
+      const std::string& name = design->terms[static_cast<std::size_t>(c)].parameter;
+      return name.size() >= part.size() && name.compare(name.size() - part.size(), part.size(), part) == 0;
+    });
+  };
+  std::vector<TorqueGroup>& groups = design->groups;
+  groups.erase(std::remove_if(groups.begin(), groups.end(),
+                              [&](const TorqueGroup& group) {
+                                return std::any_of(forms.begin(), forms.end(),
+                                                   [&](const std::string& form) { return has(group, form); });
+                              }),
+               groups.end());
+}
+
 /// Groups of the effects asked for; of a law with inner constants all forms.
 TorqueDesign requested_design(const Problem& problem, const TorqueOptions& options) {
   TorqueDesign design;
@@ -47,6 +67,7 @@ TorqueDesign requested_design(const Problem& problem, const TorqueOptions& optio
     for (const std::string& joint : request.joints)
       add_effect(effect, static_cast<int>(driven_number(problem.robot, joint)), problem.robot, problem.range, &design);
   }
+  leave_out_forms(options.leave_out_forms, &design);
   return design;
 }
 

@@ -190,9 +190,10 @@ def export_report(
         for n in lacks
     )
     if lines:
+        said = "".join(f'<p class="note">{escaped(text)}.</p>' for text in result.get("notes", ()))
         page.add(
-            '<section class="card"><h2>What the model lacks</h2><div class="scroll"><table class="causes">'
-            f"<tbody>{lines}</tbody></table></div></section>"
+            f'<section class="card"><h2>What the model lacks</h2>{said}<div class="scroll">'
+            f'<table class="causes"><tbody>{lines}</tbody></table></div></section>'
         )
     page.add(warnings_card(result))
     page.add(footer(result))

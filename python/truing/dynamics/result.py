@@ -21,8 +21,7 @@ from truing import _core
 from truing.dynamics.api import PAYLOAD_COLUMNS
 from truing.dynamics.comparison import Comparison, comparison_dict
 from truing.dynamics.comparison.page import comparison_report
-from truing.dynamics.export import Exported
-from truing.dynamics.export.parts import NotWritten
+from truing.dynamics.export import Exported, refit_words
 from truing.dynamics.friction import friction_dict
 from truing.dynamics.page import diagnosis_report, export_report, fit_report, prediction_report
 from truing.dynamics.recorded import driven_joints, measured_torque, torque_unit
@@ -383,21 +382,24 @@ def _response_dict(robot: _core.Robot, recording: _core.Recording, response: Res
 def export_dict(
     robot: _core.Robot,
     to: str,
-    model: str,
-    not_written: Sequence[NotWritten],
+    exported: Exported,
     rollout: Rollout = NOT_JUDGED,
     *,
     warnings: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """What ``result.json`` of ``truing dynamics export`` holds. model: name of the simulator's file; rollout:
-    the model as it is written beside the robot."""
+    """What ``result.json`` of ``truing dynamics export`` holds. rollout: the model as it is written beside
+    the robot."""
     found: dict[str, Any] = without_nan(
         {
             **_head("export"),
             "robot": robot.name,
             "to": to,
-            "model": model,
-            "not_written": [{"name": n.name, "size_Nm": n.size, "reason": n.reason} for n in not_written],
+            "model": exported.model.name,
+            "not_written": [
+                {"name": n.name, "size_Nm": n.size, "reason": n.reason} for n in exported.not_written
+            ],
+            "refitted": list(exported.refitted),
+            "notes": [text for text in (refit_words(exported.refitted), exported.not_refitted) if text],
             "rollout": rollout_dict(rollout, "URDF" if to == "urdf" else "MJCF"),
             "warnings": list(warnings),
         }
@@ -534,7 +536,7 @@ def write_export(
     warnings: Iterable[str] = (),
 ) -> dict[str, Any]:
     """Writes ``result.json`` and the report of ``truing dynamics export``; returns what result.json holds."""
-    result = export_dict(robot, to, exported.model.name, exported.not_written, rollout, warnings=warnings)
+    result = export_dict(robot, to, exported, rollout, warnings=warnings)
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     paths = paths_of(rollout.judgement) if rollout.judgement is not None else []
     arm = arm_picture(robot, paths, MODEL_NAMES)

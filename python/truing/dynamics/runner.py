@@ -60,9 +60,10 @@ class Runnable:
 
 def runnable(exported: Exported, callbacks: bool = True) -> Runnable:
     """What `export(to="mjcf")` wrote, loaded again. callbacks: with callbacks.py, if there is one."""
-    model = _without_bounds(import_mujoco().MjModel.from_xml_path(str(exported.model)))
-    chain = exported.chain
     beside = _module(exported.callbacks) if callbacks and exported.callbacks is not None else None
+    file = exported.model if beside is None else exported.callbacks_model or exported.model
+    model = _without_bounds(import_mujoco().MjModel.from_xml_path(str(file)))
+    chain = exported.chain
     if beside is not None:
         beside.prepare(model)
     return Runnable(

@@ -48,6 +48,7 @@ def test_what_was_named_moves_like_the_robot(judged: Rollout) -> None:
     named, alone, standard = (motion.worst_joint(m, 0.5) for m in ("named", "exported", "standard"))
     assert named < 0.25 * standard
     assert named < alone < standard
+    assert judged.refitted == ("load_friction.J2",)
     assert motion.worst_joint("nominal", 0.5) > standard
 
 

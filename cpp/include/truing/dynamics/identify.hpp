@@ -24,7 +24,9 @@ struct TorqueOptions {
   /// offset.
   std::vector<EffectRequest> effects;
   std::vector<TorqueEffect> own_effects;  ///< known beside the catalogue
-  bool fit_inertials = true;              ///< the links' inertial parameters are fitted beside the effects
+  /// Forms of laws that are not fitted, by effect and part: 'viscous_law.root'.
+  std::vector<std::string> leave_out_forms;
+  bool fit_inertials = true;  ///< the links' inertial parameters are fitted beside the effects
   double cutoff =
       kUsualCutoff;         ///< [Hz] of the low-pass without phase that both sides of the equation of motion go through
   double test_share = 0.3;  ///< fraction of the time held out when there is one recording, or none is marked as test

@@ -10,7 +10,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.chains import coupling_of
-from truing.dynamics.export import beside, isaaclab, mjcf, urdf
+from truing.dynamics.export import beside, isaaclab, mjcf, refit, urdf
 from truing.dynamics.export.chain import Chain, chain_of, file_name
 from truing.dynamics.export.parts import (
     NotWritten as NotWritten,
@@ -35,7 +35,9 @@ from truing.files.output import atomic_output_dir
 Simulator = Literal["mjcf", "urdf", "isaaclab"]
 
 CALLBACKS = "callbacks.py"
+CALLBACKS_MODEL = "callbacks.xml"  # what callbacks.py belongs to where the model alone was fitted anew
 NOT_WRITTEN = "not_written.yaml"
+_FORMATS = {"mjcf": "MJCF", "urdf": "URDF", "isaaclab": "Isaac Lab"}
 _NEAR_M = 1e-8  # [m] between the robot's and the written model's tools
 _NEAR_NM = 1e-7  # of the largest gravity torque
 
@@ -50,16 +52,29 @@ class Exported:
     not_written: tuple[NotWritten, ...]  # largest first
     robot: _core.Robot = field(repr=False)
     chain: Chain = field(repr=False)  # the robot as it was written
+    callbacks_model: Path | None = None  # the file that `callbacks` belongs to, if it is not `model`
+    refitted: tuple[str, ...] = ()  # parameters without which `model` was fitted anew
+    not_refitted: str = ""  # why not, where that would have been better
 
     def summary(self) -> str:
         """What was written, and what was not, in lines."""
         lines = [f"{self.model}"]
         if self.callbacks is not None:
             lines.append(f"{self.callbacks}: torques that the simulator has no field for")
+        if self.callbacks_model is not None:
+            lines.append(f"{self.callbacks_model}: the model that these belong to")
+        lines += [text for text in (refit_words(self.refitted), self.not_refitted) if text]
         for item in self.not_written:
             size = "" if math.isnan(item.size) else f" ({item.size:.2g} Nm)"
             lines.append(f"not written: {item.name}{size}: {item.reason}")
         return "\n".join(lines)
+
+
+def refit_words(parameters: Sequence[str]) -> str:
+    """A sentence; "" for none."""
+    if not parameters:
+        return ""
+    return f"Coulomb friction, damping and bodies were fitted anew without {', '.join(parameters)}"
 
 
 def export(
@@ -68,14 +83,18 @@ def export(
     out: str | os.PathLike[str],
     source: str | os.PathLike[str] | None = None,
     recordings: Sequence[Recorded] = (),
+    cutoff: float | None = None,
 ) -> Exported:
     """Writes a robot with its bodies and `torque_effects` for a simulator, into the folder `out`.
 
     to: "mjcf" (MuJoCo 4, robot.xml and perhaps callbacks.py), "urdf" (robot.urdf) or "isaaclab" (robot.urdf
     and actuators.py). source: the URDF file that the robot was read from: its meshes and names are kept
-    (not for mjcf). not_written.yaml lists what the model lacks, each with its size in Nm. recordings:
-    motion on which sizes are stated, and on which Coulomb friction and damping are made to stand for laws
-    that the format has not; without any, a motion through the robot's range, with the torques of gravity.
+    (not for mjcf). not_written.yaml lists what the model lacks, each with its size in Nm. recordings: what
+    the robot was fitted to, and nothing that was held out. Where the format does not hold some effects,
+    Coulomb friction, damping and bodies are fitted anew to them without these; callbacks.py then belongs to
+    callbacks.xml, which has the robot as it is. Sizes are stated on them. Without any, friction and damping
+    stand for what is lacking, on a motion through the robot's range with the torques of gravity. cutoff:
+    [Hz] that the robot was fitted with.
 
     The MJCF is loaded again and compared with the robot: tool pose, and torques against gravity. Raises
     InputError: robot without masses, unknown simulator, source that is not this robot's, an effect without
@@ -87,35 +106,116 @@ def export(
         raise InputError(
             "source is not used for mjcf, whose chain is written anew: leave it out, or export to urdf"
         )
+    text = None if source is None else _source_text(Path(source))
+    whole = _written(robot, to, text, recordings)
+    alone, parameters, why_not = _refitted(whole, to, text, recordings, cutoff)
+    files = dict(alone.files)
+    if whole.callbacks:
+        files[CALLBACKS] = whole.callbacks
+    if whole.callbacks and alone is not whole:
+        files[CALLBACKS_MODEL] = whole.files[whole.main]
+    left = sorted(alone.left, key=lambda item: -item.size if math.isfinite(item.size) else -math.inf)
+    where = "the recordings" if recordings else "a motion through the robot's range at the torques of gravity"
+    files[NOT_WRITTEN] = listed(robot.name, to, left, where, parameters, why_not)
+    inputs = [] if source is None else [Path(source)]
+    with atomic_output_dir(out, inputs=inputs, obsolete=[CALLBACKS, CALLBACKS_MODEL]) as folder:
+        for file, content in files.items():
+            (folder / file).write_text(content, encoding="utf-8")
+    folder = Path(out)
+    beside_it, its_model = (folder / n if n in files else None for n in (CALLBACKS, CALLBACKS_MODEL))
+    return Exported(
+        folder,
+        folder / alone.main,
+        beside_it,
+        tuple(left),
+        robot,
+        whole.chain,
+        its_model,
+        tuple(parameters),
+        why_not,
+    )
+
+
+@dataclass(frozen=True)
+class _Written:
+    """A robot in a format's words."""
+
+    robot: _core.Robot
+    chain: Chain
+    main: str  # name of the file for the simulator
+    files: dict[str, str]  # text by name
+    callbacks: str  # text of callbacks.py; "" if it needs none
+    left: list[NotWritten]
+
+
+def _written(
+    robot: _core.Robot, to: Simulator, source: str | None, recordings: Sequence[Recorded], alone: bool = False
+) -> _Written:
+    """alone: the MJCF says that callbacks.py does not belong to it."""
     chain = chain_of(robot)
     usual = reference_motion(robot, chain)
     reference = recorded_motion(robot, recordings) if recordings else usual
     parts = parts_of(robot, chain, reference)
     name = file_name(robot.name)
-    files: dict[str, str] = {}
     if to == "mjcf":
         model = mjcf.model_of(chain, parts, reference)
-        files[f"{name}.xml"] = mjcf.write(robot, chain, parts, model)
-        left = model.not_written
-        if model.beside:
-            files[CALLBACKS] = _callbacks_text(chain, model)
-        _check(robot, chain, usual, files[f"{name}.xml"])
-    else:
-        text = None if source is None else _source_text(Path(source))
-        files[f"{name}.urdf"], left = urdf.write(robot, chain, parts, reference, text)
-        if to == "isaaclab":
-            files["actuators.py"], left = isaaclab.write(robot, chain, parts, reference)
-    left = sorted(left, key=lambda item: -item.size if math.isfinite(item.size) else -math.inf)
-    where = "the recordings" if recordings else "a motion through the robot's range at the torques of gravity"
-    files[NOT_WRITTEN] = listed(robot.name, to, left, where)
-    inputs = [] if source is None else [Path(source)]
-    with atomic_output_dir(out, inputs=inputs, obsolete=[CALLBACKS]) as folder:
-        for file, text in files.items():
-            (folder / file).write_text(text, encoding="utf-8")
-    folder = Path(out)
-    main = {"mjcf": f"{name}.xml", "urdf": f"{name}.urdf", "isaaclab": "actuators.py"}[to]
-    beside_it = folder / CALLBACKS if CALLBACKS in files else None
-    return Exported(folder, folder / main, beside_it, tuple(left), robot, chain)
+        text = mjcf.write(robot, chain, parts, model, CALLBACKS_MODEL if alone else "")
+        _check(robot, chain, usual, text)
+        callbacks = _callbacks_text(chain, model) if model.beside else ""
+        return _Written(robot, chain, f"{name}.xml", {f"{name}.xml": text}, callbacks, model.not_written)
+    text, left = urdf.write(robot, chain, parts, reference, source)
+    files = {f"{name}.urdf": text}
+    if to == "urdf":
+        return _Written(robot, chain, f"{name}.urdf", files, "", left)
+    files["actuators.py"], left = isaaclab.write(robot, chain, parts, reference)
+    return _Written(robot, chain, "actuators.py", files, "", left)
+
+
+def _refitted(
+    whole: _Written, to: Simulator, source: str | None, recordings: Sequence[Recorded], cutoff: float | None
+) -> tuple[_Written, list[str], str]:
+    """What is written where no callback adds anything: the robot itself, or the one that was fitted without
+    what the format does not hold. Then the parameters that this is; or why it was not done."""
+    parameters = refit.lacking(whole.robot, whole.left)
+    if not parameters:
+        return whole, [], ""
+    wanted = f"not fitted anew without {', '.join(parameters)}"
+    if not recordings:
+        return whole, [], f"{wanted}: that needs the recordings that the robot was fitted to"
+    try:
+        anew = _anew(whole, parameters, to, source, recordings, cutoff)
+    except InputError as error:
+        return whole, [], f"{wanted}: {error}"
+    without = set(parameters)
+    names = {
+        item.name
+        for item in whole.left
+        if any(p == item.name or p.startswith(f"{item.name}.") for p in without)
+    }
+    reason = f"in {CALLBACKS}" if to == "mjcf" else f"no place in {_FORMATS[to]}"
+    left = [
+        replace(item, reason=f"{reason}; fitted anew without it") for item in whole.left if item.name in names
+    ]
+    left += [item for item in anew.left if item.name not in names]
+    return replace(anew, left=left), parameters, ""
+
+
+def _anew(
+    whole: _Written,
+    parameters: Sequence[str],
+    to: Simulator,
+    source: str | None,
+    recordings: Sequence[Recorded],
+    cutoff: float | None,
+) -> _Written:
+    """Fitted anew without these parameters, with laws of friction that stand in their place where the format
+    can hold those."""
+    for instead in (True, False):
+        robot = refit.fit_without(whole.robot, parameters, to, recordings, cutoff, instead)
+        anew = _written(robot, to, source, recordings, alone=bool(whole.callbacks))
+        if not refit.lacking(robot, anew.left):
+            break
+    return anew
 
 
 def _source_text(path: Path) -> str:
@@ -143,11 +243,21 @@ def _callbacks_text(chain: Chain, model: mjcf.Model) -> str:
     return text
 
 
-def listed(robot: str, to: str, left: Sequence[NotWritten], where: str) -> str:
+def listed(
+    robot: str,
+    to: str,
+    left: Sequence[NotWritten],
+    where: str,
+    refitted: Sequence[str] = (),
+    not_refitted: str = "",
+) -> str:
     """YAML of what was not written (JSON strings are YAML strings)."""
     lines = [
         f"robot: {json.dumps(robot)}",
         f"simulator: {to}",
+        "# refitted: without these parameters Coulomb friction, damping and bodies were fitted anew",
+        f"refitted: {json.dumps(list(refitted))}",
+        *([f"not_refitted: {json.dumps(not_refitted)}"] if not_refitted else []),
         f"# size: root mean square over {where}; thermal effects 10 degrees and 600 s from where they count",
         "not_written:" + ("" if left else " []"),
     ]

@@ -3,7 +3,7 @@
 """Torques that a simulator has no field for. `truing.dynamics.export` writes this file beside the model.
 
     import mujoco, callbacks
-    model = mujoco.MjModel.from_xml_path("robot.xml")
+    model = mujoco.MjModel.from_xml_path("callbacks.xml")  # robot.xml where there is none
     callbacks.install(model)
 
 `install` sets MuJoCo's passive callback for this model; other models are left alone. What resists motion is
@@ -33,6 +33,8 @@ EFFECTS: list[Effect] = []
 FIELDS: dict[str, list[float]] = {}
 """`frictionloss` [Nm | N] and `damping` [Nm s/rad | N s/m] at the readings, to which the effects are
 added."""
+
+NO_CALLBACKS = "callbacks_belong_to"  # text in a model that was fitted without these effects
 
 REFERENCE_C = 20.0  # temperature from which thermal effects count
 _QUIET = 0.01  # [rad/s | m/s] below this the sign of another joint's speed fades
@@ -113,7 +115,17 @@ def _tables(
 
 def prepare(model: Any) -> Floats:
     """Sets the model's fields to those that belong to the callbacks: without them, Coulomb friction and
-    damping stand for what they add. Returns which degree of freedom each joint is, shape=(joints,)."""
+    damping stand for what they add. Returns which degree of freedom each joint is, shape=(joints,).
+
+    Raises ValueError: the model was fitted without these effects.
+    """
+    import mujoco
+
+    text = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, NO_CALLBACKS)
+    if text >= 0:
+        begin, size = model.text_adr[text], model.text_size[text]
+        file = bytes(model.text_data[begin : begin + size - 1]).decode()
+        raise ValueError(f"this model was fitted without callbacks: they belong to {file}")
     ratios = np.asarray(RATIOS)
     dofs = np.array([model.joint(name).dofadr[0] for name in JOINTS])
     model.dof_frictionloss[dofs] = np.asarray(FIELDS["frictionloss"]) / np.abs(ratios)

@@ -23,7 +23,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from truing import _core
-from truing.dynamics.export.beside import Effect
+from truing.dynamics.export.beside import NO_CALLBACKS, Effect
 from truing.dynamics.export.chain import Body, Chain, Floats, Link, body_in, plain
 from truing.dynamics.export.parts import (
     JointParts,
@@ -196,8 +196,8 @@ def _shared(name: str, a: int, b: int, c: float, own: float, other: float) -> Te
     return Tendon(name, {a: t, b: math.copysign(1.0 / t, c)})
 
 
-def write(robot: _core.Robot, chain: Chain, parts: Parts, model: Model) -> str:
-    """The text of the MJCF."""
+def write(robot: _core.Robot, chain: Chain, parts: Parts, model: Model, callbacks_model: str = "") -> str:
+    """The text of the MJCF. callbacks_model: the file that callbacks.py belongs to, if it is not this one."""
     root = Element("mujoco", model=robot.name or "robot")
     _child(root, "compiler", angle="radian", autolimits="true")
     gravity = plain(np.array(robot.gravity))
@@ -218,6 +218,8 @@ def write(robot: _core.Robot, chain: Chain, parts: Parts, model: Model) -> str:
         _child(parent, "site", _pose(before), name="flange")
     _followers(root, chain, model)
     _actuators(root, robot, chain, parts, model)
+    if callbacks_model:
+        _child(_child(root, "custom"), "text", name=NO_CALLBACKS, data=callbacks_model)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 

@@ -4,7 +4,7 @@
 driven by the measured torques. Where are they 0.1, 0.5 and 2 s later?
 
 `named` has the laws as they were found (the MJCF and callbacks.py); `exported` is the MJCF as it is written,
-alone.
+alone: what MuJoCo has no field for is not in it, and the rest was fitted anew without that.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from truing import _core
 from truing.dynamics.api import identify
 from truing.dynamics.commanded import CommandedTrack
 from truing.dynamics.export import Exported, export, import_mujoco
+from truing.dynamics.export.refit import training
 from truing.dynamics.motion import Track
 from truing.dynamics.recorded import Recorded
 from truing.dynamics.rollout.page import FAR, TURN, main_horizon
@@ -47,6 +48,8 @@ class Rollout:
     """Models 'nominal', 'standard', 'named', 'exported'."""
     why_not: str = ""
     """Why nothing was simulated; "" if it was."""
+    refitted: tuple[str, ...] = ()
+    """Parameters without which friction and bodies of 'exported' were fitted anew."""
 
 
 def rollout(
@@ -70,13 +73,14 @@ def rollout(
     spans: list[Spans] | None = None
     if list(found.held_out) == [BLOCKS_OF_TIME]:
         held, spans = list(recordings), held_out_blocks(recordings, test_share)
-    train = [r for r in recordings if r not in held] or held
     try:
+        rows = held_out_rows(recordings, found.held_out, test_share)
+        train = training(list(zip(recordings, rows, strict=True)))
         import_mujoco()
         standard = nominal if is_fitted(nominal) else _standard(nominal, recordings, found.cutoff, test_share)
         with tempfile.TemporaryDirectory() as folder:
             models = {
-                name: export(robot, "mjcf", Path(folder) / name, recordings=train)
+                name: export(robot, "mjcf", Path(folder) / name, recordings=train, cutoff=found.cutoff)
                 for name, robot in (("nominal", nominal), ("standard", standard), ("named", found.robot))
             }
             judgement = judge(
@@ -88,7 +92,7 @@ def rollout(
             )
     except (ValueError, RuntimeError) as error:  # InputError, and what MuJoCo says to a model
         return Rollout(None, str(error))
-    return Rollout(judgement)
+    return Rollout(judgement, refitted=models["named"].refitted)
 
 
 def is_fitted(robot: _core.Robot) -> bool:
@@ -160,7 +164,8 @@ def judge_written(
     try:
         models = {"named": runnable(ours), "exported": alone}
         horizons = possible(HORIZONS, motion, spans)
-        return Rollout(judge(models, motion, horizons, within=spans, most=WINDOWS))
+        judged = judge(models, motion, horizons, within=spans, most=WINDOWS)
+        return Rollout(judged, refitted=ours.refitted if written is None else ())
     except (ValueError, RuntimeError) as error:
         return Rollout(None, str(error))
 
@@ -181,7 +186,8 @@ def rollout_dict(found: Rollout, written: str = "MJCF") -> dict[str, Any]:
     judged = found.judgement
     if judged is None:
         return {"horizon_s": [], "held_out": {}, "why_not": found.why_not}
-    return {**judgement_dict(judged, "held_out"), "why_not": "", **words_of(judged, written)}
+    out = {**judgement_dict(judged, "held_out"), "why_not": "", "refitted": list(found.refitted)}
+    return {**out, **words_of(judged, written, bool(found.refitted))}
 
 
 def judgement_dict(judged: Judgement, key: str) -> dict[str, Any]:
@@ -206,7 +212,7 @@ def judgement_dict(judged: Judgement, key: str) -> dict[str, Any]:
     }
 
 
-def words_of(judged: Judgement, written: str = "MJCF") -> dict[str, Any]:
+def words_of(judged: Judgement, written: str = "MJCF", refitted: bool = False) -> dict[str, Any]:
     """sentence: how far every model is off. worse: where what was found moves worse than what was there.
     verdict: of these, what the verdict must say."""
     horizon = judged.windows.horizons[main_horizon(judged.windows.horizons)]
@@ -215,7 +221,7 @@ def words_of(judged: Judgement, written: str = "MJCF") -> dict[str, Any]:
         "nominal": "the nominal model",
         "standard": "standard practice",
         "named": "what was named",
-        "exported": f"the {written} alone",
+        "exported": f"the {written} alone" + (", fitted anew without what it lacks," if refitted else ""),
     }
     names = {model: name for model, name in names.items() if model in judged.simulated}
     off = {model: shown(judged.worst_joint(model, horizon), unit) for model in names}
@@ -224,7 +230,7 @@ def words_of(judged: Judgement, written: str = "MJCF") -> dict[str, Any]:
         "sentence": f"Simulated {horizon:g} s ahead the robot is off by "
         + ", ".join(f"{off[model]} with {name}" for model, name in names.items())
         + f" (worst joint, median of {judged.windows.starts.size} windows)",
-        "worse": [*named, *_worse(judged, "exported", names["exported"], unit)],
+        "worse": [*named, *_worse(judged, "exported", f"the {written} alone", unit)],
         "verdict": [text[:1].upper() + text[1:] for text in named if text.startswith("in motion")],
     }
 

@@ -8,10 +8,11 @@ not_written.yaml, result.json, report.html: how far the model, as it is written,
 
 from __future__ import annotations
 
+import json
 import math
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -39,6 +40,7 @@ class Loaded:
     robot: Robot
     recordings: list[Recording]
     held_out: list[tuple[Recording, NDArray[np.bool_]]]  # and which of their rows
+    cutoff: float | None  # [Hz] that the robot was fitted with
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class Found:
 @dataclass(frozen=True, kw_only=True)
 class Command(run.Command["Loaded | LoadedServo", Found]):
     doing = "writing"
-    sometimes = ("callbacks.py", "actuators.py", "offsets.json")
+    sometimes = ("callbacks.py", "callbacks.xml", "actuators.py", "offsets.json")
 
     result: Annotated[
         Path,
@@ -89,8 +91,9 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
     recording: Annotated[
         Sequence[Path],
         File(
-            "Motion on which sizes of what is not written are stated. May be repeated. Default: what RESULT"
-            " was fitted to; of a robot.yaml a motion through the robot's range.",
+            "What the robot was fitted to: on it sizes of what is not written are stated, and friction and bodies"
+            " are fitted anew without that. May be repeated. Default: what RESULT was fitted to; of a robot.yaml"
+            " a motion through the robot's range.",
             metavar="REC",
             several=True,
         ),
@@ -106,6 +109,7 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
     ] = ()
 
     def load(self, progress: run.Progress) -> Loaded | LoadedServo:
+        from truing.dynamics.export.refit import training
         from truing.dynamics.servo.export import is_servo_result
         from truing.files import load_recordings, load_residual_motion, load_robot
 
@@ -123,13 +127,13 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
         robot = load_robot(file)
         residuals = self.result / "residuals.parquet"
         motion = load_residual_motion(residuals, robot) if residuals.exists() else []
-        train = [recording for recording, held in motion if not held.all()]
+        train = training(motion)
         if self.recording:
             train = list(load_recordings(self.recording, robot))
         if self.held_out:
             given = load_recordings(self.held_out, robot)
             motion = [(recording, recording.time > -math.inf) for recording in given]
-        return Loaded(robot, train, motion)
+        return Loaded(robot, train, motion, _cutoff(self.result / "result.json"))
 
     def _load_servo(self) -> LoadedServo:
         from truing.dynamics.servo.export import MODEL, MOTION, load_servo_result
@@ -189,6 +193,7 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
                 Path(folder) / "model",
                 source=self.source,
                 recordings=loaded.recordings,
+                cutoff=loaded.cutoff,
             )
             files = {path.name: path.read_text(encoding="utf-8") for path in exported.folder.iterdir()}
             return Found(exported, files, self._judged(loaded, exported, Path(folder), progress))
@@ -207,9 +212,12 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
         if not any(held.any() for _, held in loaded.held_out):  # do not write two models for nothing
             return judge_written(exported, None, [])
         try:
-            ours = export(loaded.robot, "mjcf", folder / "ours", recordings=loaded.recordings)
+            ours = export(
+                loaded.robot, "mjcf", folder / "ours", recordings=loaded.recordings, cutoff=loaded.cutoff
+            )
             written = load_robot(exported.model, any_tool=True)
-            return judge_written(ours, runnable(export(written, "mjcf", folder / "urdf")), loaded.held_out)
+            judged = judge_written(ours, runnable(export(written, "mjcf", folder / "urdf")), loaded.held_out)
+            return replace(judged, refitted=exported.refitted)
         except InputError as error:
             return Rollout(None, str(error))
 
@@ -235,6 +243,8 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
         ]
         if lines:
             table("what the model lacks", ("", "size", "why"), lines, words=True)
+        for text in result.get("notes", ()):
+            say(text)
         motion = result["rollout"]
         if motion["why_not"]:
             say(f"not judged by motion: {motion['why_not']}")
@@ -245,5 +255,18 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
             titles = [words[model] for model in motion["held_out"]]
             print_motion(result["robot"], motion, "held_out", titles)
         if "callbacks.py" in found.files:
-            say(f"torques that MuJoCo has no field for: {self.out / 'callbacks.py'}")
+            model = f", for {self.out / 'callbacks.xml'}" if "callbacks.xml" in found.files else ""
+            say(f"torques that MuJoCo has no field for: {self.out / 'callbacks.py'}{model}")
         say(f"model: {self.out / result['model']}")
+
+
+def _cutoff(file: Path) -> float | None:
+    """[Hz] that a diagnosis or fit says in its result.json; None where it says none."""
+    if not file.exists():
+        return None
+    try:
+        said = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{file}: cannot be read: {error}") from None
+    cutoff = said.get("cutoff_hz") if isinstance(said, dict) else None
+    return float(cutoff) if isinstance(cutoff, int | float) and cutoff > 0.0 else None

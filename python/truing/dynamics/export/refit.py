@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot fitted anew with what a format can hold.
+
+Without a law of friction that the format has no place for, the best Coulomb and viscous friction and the best
+bodies are others than those that were fitted beside it. What acts from elsewhere (couplings, springs, ripple)
+stays in the fit: friction that is fitted without it bends towards it and moves worse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.dynamics.api import identify
+from truing.dynamics.export.parts import NotWritten
+from truing.dynamics.recorded import Recorded
+from truing.errors import InputError
+
+_ANEW = ("coulomb", "viscous", "current_offset", "viscous_law", "stribeck", "presliding", "armature")
+"""Effects that are fitted anew where the robot carries them; the others stay as they are."""
+_FRICTION = {"load_friction", "viscous_law", "stribeck", "position_friction", "thermal_friction", "warmup"}
+_TAKEN_UP = _FRICTION | {"presliding", "armature"}
+"""Effects that Coulomb friction, damping and bodies can make up for."""
+_NO_FORMS = ("viscous_law.root", "viscous_law.saturating")  # no format holds these
+_NONE_HELD_OUT = 1e-6  # test_share at which no recording and no block of time is held out
+_SHORTEST = 1.0  # [s] of a stretch that is fitted to
+
+
+def lacking(robot: _core.Robot, left: Iterable[NotWritten]) -> list[str]:
+    """Parameters that a format does not hold, and that friction and bodies can make up for. left: what it has no
+    place for."""
+    names = {item.name for item in left if item.name.split(".")[0] in _TAKEN_UP}
+    return [
+        parameter
+        for effect in robot.torque_effects
+        for parameter in effect.parameters
+        if any(parameter == name or parameter.startswith(f"{name}.") for name in names)
+    ]
+
+
+def training(
+    recordings: Sequence[tuple[_core.Recording, NDArray[np.bool_]]],
+) -> list[_core.Recording]:
+    """What was not held out of recordings, given with their rows that were: stretches of theirs.
+
+    Raises InputError: a part of a recording that is longer than memory was held out.
+    """
+    out: list[_core.Recording] = []
+    for recording, held in recordings:
+        if held.all():
+            continue
+        if not held.any():
+            out.append(recording.replace(test=False))
+            continue
+        if recording.pieces is not None:
+            raise InputError(f"{recording.name}: is longer than memory, and parts of it were held out")
+        rows = np.flatnonzero(~held)
+        for part in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
+            if recording.time[part[-1]] - recording.time[part[0]] >= _SHORTEST:
+                out.append(_rows(recording, part, len(out)))
+    return out
+
+
+def _rows(recording: _core.Recording, rows: NDArray[np.intp], number: int) -> _core.Recording:
+    n = len(recording)
+    tables = ("time", "position", "speed", "torque", "current")
+    whole = {name: np.asarray(getattr(recording, name)) for name in tables}
+    columns = {name: np.asarray(column)[rows] for name, column in recording.columns.items()}
+    parts = {name: table[rows] for name, table in whole.items() if table.shape[0] == n and table.size}
+    return _core.Recording(f"{recording.name} {number}", **parts, columns=columns)
+
+
+def fit_without(
+    robot: _core.Robot,
+    parameters: Collection[str],
+    to: str,
+    recordings: Sequence[Recorded],
+    cutoff: float | None,
+    instead: bool = True,
+) -> _core.Robot:
+    """The robot without these parameters: friction, bodies and rotor inertias fitted anew to all of the
+    recordings. cutoff: [Hz], as the robot was fitted with; None: the usual one. instead: with laws of friction
+    that the format `to` holds, at joints that lose one.
+
+    Raises InputError on recordings that nothing can be fitted to.
+    """
+    given = [recording for recording in recordings if isinstance(recording, _core.Recording)]
+    if len(given) < len(recordings):
+        raise InputError("recordings: expected those of truing.dynamics.load_recordings")
+    rest = [
+        effect.replace(parameters={k: v for k, v in effect.parameters.items() if k not in parameters})
+        for effect in robot.torque_effects
+    ]
+    rest = [effect for effect in rest if effect.parameters]
+    where = {name: {j for e in rest if e.effect == name for j in e.joints} for name in _ANEW}
+    lost = {
+        joint
+        for effect in robot.torque_effects
+        if effect.effect in _FRICTION and set(effect.parameters) & set(parameters)
+        for joint in effect.joints
+    }
+    if instead and to == "mjcf":
+        where["viscous_law"] |= lost
+        # MuJoCo has it as a part of what builds up over an angle after a reversal.
+        where["stribeck"] |= lost & where["presliding"]
+    options = {} if cutoff is None else {"cutoff": cutoff}
+    return identify(
+        # Without its range it counts as one that was not fitted before: how friction turns is chosen anew.
+        robot.replace(torque_effects=[e for e in rest if e.effect not in _ANEW], fitted_range={}),
+        [recording.replace(test=False) for recording in given],
+        effects=[f"{name}:{'+'.join(sorted(joints))}" for name, joints in where.items() if joints],
+        leave_out_forms=_NO_FORMS,
+        test_share=_NONE_HELD_OUT,
+        **options,
+    ).robot
