@@ -492,11 +492,11 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   std::vector<std::string> said_already;
   const Robot beside = robot_of(problem, functions, all, &said_already);
   const TorqueModel model = model_of(out.robot, problem);
-  out.errors =
-      errors_of(problem, {{"nominal", problem.nominal},
-                          {"standard", groundwork.model},
-                          {"named", model},
-                          {"with_unknown", with_free_functions(problem, beside, *functions.design, all.fit())}});
+  // Functions of the load were fitted over the torque of what was named.
+  const TorqueModel with_unknown = with_free_functions(problem, beside, *functions.design, all.fit()).seeing(model);
+  out.errors = errors_of(
+      problem,
+      {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model}, {"with_unknown", with_unknown}});
   const TorqueErrors before = account.inertias_given ? errors_without_names(problem, account) : out.errors[1];
   out.without_names = mean_percent(before);
   out.verdict = verdict_of(out, before, any);

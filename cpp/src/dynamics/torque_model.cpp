@@ -65,16 +65,30 @@ TorqueModel TorqueModel::turning(const std::vector<FrictionTurn>& turns) const {
 }
 
 bool TorqueModel::needs_rigid() const {
-  return std::any_of(terms_.begin(), terms_.end(), [](const ValuedTerm& v) { return v.term.needs_rigid; });
+  return std::any_of(terms_.begin(), terms_.end(), [](const ValuedTerm& v) { return v.term.needs_rigid; }) ||
+         (seen_ && seen_->needs_rigid());
 }
 
-MatrixXd TorqueModel::torque(Motion* motion) const {
+TorqueModel TorqueModel::seeing(const TorqueModel& other) const {
+  TorqueModel out = *this;
+  out.seen_ = std::make_shared<const TorqueModel>(other);
+  return out;
+}
+
+MatrixXd TorqueModel::torque_of_others(Motion* motion) const {
   motion->direction = directions_of(*motion, turns_);
   MatrixXd out = chain_.torques(motion->q, motion->qd, motion->qdd, links_);
   out += motion->qdd * rotors_;  // it is symmetric
   add_payload(*motion, &out);
   add_terms(terms_, false, *motion, &out);
-  motion->torque = out;
+  return out;
+}
+
+MatrixXd TorqueModel::torque(Motion* motion) const {
+  MatrixXd seen;
+  if (seen_) seen = seen_->torque_of_others(motion);
+  MatrixXd out = torque_of_others(motion);
+  motion->torque = seen_ ? seen : out;
   add_terms(terms_, true, *motion, &out);
   return out;
 }

@@ -4,6 +4,7 @@
 
 // What a robot, with its rotors and the effects that it carries, needs of torque along a motion.
 
+#include <memory>
 #include <vector>
 
 #include "dynamics/regressor.hpp"
@@ -37,6 +38,9 @@ class TorqueModel {
   /// The same with friction that turns so.
   TorqueModel turning(const std::vector<FrictionTurn>& turns) const;
 
+  /// The same, whose terms that ask for the torque see that of `other`.
+  TorqueModel seeing(const TorqueModel& other) const;
+
   /// Torques of every row [Nm | N], shape=(rows, joints). Sets Motion::direction to what this robot's friction knows of
   /// it, and Motion::torque to what the terms that ask for it see: the torques of all others.
   Eigen::MatrixXd torque(Motion* motion) const;
@@ -47,6 +51,8 @@ class TorqueModel {
   const Robot& robot() const { return robot_; }
 
  private:
+  /// Of all but the terms that ask for the torque.
+  Eigen::MatrixXd torque_of_others(Motion* motion) const;
   void add(std::vector<ValuedTerm> more);
 
   Robot robot_;
@@ -55,6 +61,7 @@ class TorqueModel {
   Eigen::MatrixXd rotors_;         ///< mass matrix of the rotors
   std::vector<ValuedTerm> terms_;  ///< the others
   std::vector<FrictionTurn> turns_;
+  std::shared_ptr<const TorqueModel> seen_;  ///< null: itself
 };
 
 }  // namespace truing::dynamics

@@ -5,6 +5,7 @@
 
 #include <doctest/doctest.h>
 
+#include "dynamics/torque_model.hpp"
 #include "truing/dynamics/effect.hpp"
 
 using namespace truing;
@@ -48,4 +49,22 @@ TEST_CASE("effects that a robot carries have their terms whatever the motion") {
   CHECK(terms("stribeck", {{"", 1.0}, {".vs", 0.05}}).size() == 1);
   CHECK(terms("presliding", {{"", 1.0}, {".x0", 1e-3}}).size() == 1);
   CHECK(terms("ripple", {{".sin1", 0.1}, {".cos1", 0.2}}).size() == 2);
+}
+
+TEST_CASE("what a model needs the torque for sees that of another where it was told so") {
+  const Robot robot = one_joint();
+  const std::vector<TorqueTerm> of_load = terms("load_friction", {{"", 0.5}}), sliding = terms("viscous", {{"", 1.0}});
+  const dynamics::TorqueModel bare(robot, {}), strong(robot, {{sliding.front(), 100.0}});
+  const dynamics::TorqueModel model(robot, {{of_load.front(), 0.5}});
+  Motion motion;
+  motion.robot = &robot;
+  motion.q = motion.qdd = Eigen::MatrixXd::Zero(4, 1);
+  motion.qd = Eigen::MatrixXd::Ones(4, 1);
+  motion.time = Eigen::VectorXd::LinSpaced(4, 0.0, 0.3);
+  const Eigen::MatrixXd others = bare.torque(&motion);
+  CHECK((model.torque(&motion) - others - 0.5 * others.cwiseAbs()).cwiseAbs().maxCoeff() < 1e-12);
+  const Eigen::MatrixXd seen = strong.torque(&motion);
+  const Eigen::MatrixXd found = model.seeing(strong).torque(&motion);
+  CHECK((found - others - 0.5 * seen.cwiseAbs()).cwiseAbs().maxCoeff() < 1e-9);
+  CHECK((seen - others).cwiseAbs().minCoeff() > 99.0);
 }
