@@ -5,7 +5,7 @@
 robot = truing.load_robot("robot.urdf", any_tool=True)
 recordings = truing.dynamics.load_recordings("recordings/*.csv", robot)
 checked = truing.dynamics.check_recordings(robot, recordings)
-print(truing.dynamics.diagnose(checked.robot, checked.recordings).summary())
+print(truing.dynamics.diagnose(checked.robot, checked.recordings, cutoff=checked.cutoff).summary())
 """
 
 from truing._core import (

@@ -30,7 +30,7 @@ from truing.dynamics.sanity.grids import grids_of
 from truing.dynamics.sanity.readings import rows_of
 from truing.errors import InputError
 from truing.files import write_table
-from truing.testing.dynamics import HIDDEN, demo_arm, simulate_motion
+from truing.testing.dynamics import HIDDEN, USUAL, demo_arm, simulate_motion
 
 Floats = NDArray[np.float64]
 REAL = Path(os.environ.get("TRUING_REALDATA", ""))
@@ -99,16 +99,60 @@ def test_of_real_recordings_only_what_is_known_of_them_is_said(folder: str) -> N
         robot.joints[index].torque_per_ampere = gain
     found = check_recordings(robot, load_recordings(str(REAL / folder / "*.csv"), robot)).findings
     expected = {
-        "dyn_ur10": ["one_recording"],
+        "dyn_ur10": ["torques_low_passed", "one_recording"],
         "dyn_tx40": ["at_rest", "one_recording"],
         "dyn_ur10e": ["at_rest"],
     }
     assert [one.finding for one in found] == expected[folder]
+    if folder == "dyn_ur10":
+        assert found[0].value == pytest.approx(1.9, abs=0.1)
     rest = found[0]
     if folder == "dyn_ur10e":  # one joint at a time, point to point
         assert {"single_j2", "single_j3", "single_j5", "ptp10"} <= set(
             rest.recordings
         ) and rest.value == 100.0
+
+
+# ---- Low-passed torques ----------------------------------------------------------------------------
+def low_passed(table: Any, step: float, frequency: float) -> Any:
+    """Without what is above, by the Fourier transform of the table beside its mirror image."""
+    whole = np.vstack([table, np.asarray(table)[::-1]])
+    spectrum = np.fft.rfft(whole, axis=0)
+    spectrum[np.fft.rfftfreq(len(whole), step) > frequency] = 0.0
+    return np.fft.irfft(spectrum, len(whole), axis=0)[: len(table)]
+
+
+@pytest.mark.parametrize("frequency", [1.7, 2.4, 3.5])
+def test_torques_that_were_low_passed_are_compared_below_that(frequency: float) -> None:
+    simulated = simulate_motion(seed=7, seconds=24.0, recordings=3, held_out=1)
+    filtered = [one.replace(torque=low_passed(one.torque, 0.01, frequency)) for one in simulated.recordings]
+    checked = check_recordings(simulated.nominal, filtered)
+    found = only(checked)
+    assert found.finding == "torques_low_passed" and found.applied and not found.mistake
+    assert found.value == pytest.approx(frequency, rel=0.1)
+    assert checked.cutoff <= found.value < checked.cutoff + 0.1 + 1e-9
+    errors = [
+        diagnose(simulated.nominal, checked.recordings, cutoff=cutoff).errors[2].held_out
+        for cutoff in (checked.cutoff, 8.0)
+    ]
+    below, beyond = (np.array([joint.percent for joint in some]) for some in errors)
+    assert np.mean(np.log(below)) < np.mean(np.log(beyond)) - 0.2
+
+
+def test_one_recording_with_the_whole_band_is_compared_in_it() -> None:
+    simulated = simulate_motion(seed=7, seconds=24.0, recordings=3)
+    filtered = [one.replace(torque=low_passed(one.torque, 0.01, 2.4)) for one in simulated.recordings[:2]]
+    checked = check_recordings(simulated.nominal, [*filtered, simulated.recordings[2]])
+    assert "torques_low_passed" not in kinds(checked) and checked.cutoff == 8.0
+
+
+def test_friction_that_builds_up_slowly_is_no_low_pass() -> None:
+    names = [f"J{k}" for k in range(1, 7)]
+    slow = {f"presliding.{name}{part}": value for name in names for part, value in (("", 9.0), (".x0", 0.03))}
+    less = {f"coulomb.{name}": -USUAL[k][0] for k, name in enumerate(names)}
+    hidden = {"presliding": (names, slow), "coulomb": (names, less)}
+    simulated = simulate_motion(seed=8, seconds=24.0, recordings=3, hidden=hidden)
+    assert "torques_low_passed" not in kinds(check_recordings(simulated.nominal, simulated.recordings))
 
 
 # ---- Signs -----------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.recorded import driven_joints
-from truing.dynamics.sanity import columns, lag
+from truing.dynamics.sanity import band, columns, lag
 from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
@@ -34,11 +34,12 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     units and scales of columns, clipped and coarse values, gaps, rest.
 
         checked = truing.dynamics.check_recordings(robot, recordings)
-        found = truing.dynamics.diagnose(checked.robot, checked.recordings)
+        found = truing.dynamics.diagnose(checked.robot, checked.recordings, cutoff=checked.cutoff)
 
     Returns the findings, and robot and recordings with what is certain corrected (`applied`): units and
     signs of speeds and angles that derivatives or limits prove, signs of torques that both friction and
-    weight contradict, and torques that are late by 40 ms or more. A `mistake` is not corrected: until it is,
+    weight contradict, and torques that are late by 40 ms or more. `cutoff` is that of the low-pass that both sides of
+    the equation of motion are to go through: the usual one, or where the recorded torques end. A `mistake` is not corrected: until it is,
     effects that are named are doubtful.
 
     Raises InputError on a robot or recordings that cannot be used.
@@ -70,8 +71,12 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     if not any(one.mistake and one.finding == "position_unit" for one in found):
         found += columns.rest(robot, grids)
     found += [*columns.values(robot, recordings), *columns.alone(recordings)]
+    frequency = None if any(one.mistake for one in found) else band.edge(robot, recordings)
+    if frequency is not None:
+        found.append(band.finding(frequency))
     found.sort(key=lambda one: (not one.mistake, one.finding in ("at_rest", "gaps", "one_recording")))
-    return CheckedRecordings(robot, tuple(recordings), tuple(found))
+    cutoff = _core.TorqueOptions().cutoff if frequency is None else band.cutoff_below(frequency)
+    return CheckedRecordings(robot, tuple(recordings), tuple(found), cutoff)
 
 
 def _scaled(recording: _core.Recording, by_speed: Floats | None, by_angle: Floats | None) -> _core.Recording:

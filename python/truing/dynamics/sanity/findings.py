@@ -33,6 +33,7 @@ class CheckedRecordings:
     robot: _core.Robot
     recordings: tuple[_core.Recording, ...]
     findings: tuple[RecordingFinding, ...]
+    cutoff: float = 8.0  # [Hz] of the low-pass for what is fitted to them
 
 
 def listed(names: Sequence[str], most: int = _FEW) -> str:

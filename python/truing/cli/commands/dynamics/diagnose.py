@@ -88,9 +88,8 @@ class Command(TorqueCommand[Answer | ServoAnswer]):
             "leave_out": self.leave_out,
             "test_share": self.test_share,
             "threads": self.threads,
+            "cutoff": loaded.cutoff if self.cutoff is None else self.cutoff,
         }
-        if self.cutoff is not None:
-            options["cutoff"] = self.cutoff
         found = diagnose(loaded.robot, loaded.recordings, **options)
         return Answer(found, self._judged(loaded, found, progress))
 

@@ -47,9 +47,8 @@ class Command(TorqueCommand["TorqueFit"]):
             "fit_inertials": not self.keep_inertias,
             "test_share": self.test_share,
             "threads": self.threads,
+            "cutoff": loaded.cutoff if self.cutoff is None else self.cutoff,
         }
-        if self.cutoff is not None:
-            options["cutoff"] = self.cutoff
         return identify(loaded.robot, loaded.recordings, **options)
 
     def write(
