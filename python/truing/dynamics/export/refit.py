@@ -10,6 +10,7 @@ stays in the fit: friction that is fitted without it bends towards it and moves 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +71,9 @@ def _rows(recording: _core.Recording, rows: NDArray[np.intp], number: int) -> _c
     tables = ("time", "position", "speed", "torque", "current")
     whole = {name: np.asarray(getattr(recording, name)) for name in tables}
     columns = {name: np.asarray(column)[rows] for name, column in recording.columns.items()}
-    parts = {name: table[rows] for name, table in whole.items() if table.shape[0] == n and table.size}
+    parts: dict[str, Any] = {
+        name: table[rows] for name, table in whole.items() if table.shape[0] == n and table.size
+    }
     return _core.Recording(f"{recording.name} {number}", **parts, columns=columns)
 
 
@@ -107,7 +110,7 @@ def fit_without(
         where["viscous_law"] |= lost
         # MuJoCo has it as a part of what builds up over an angle after a reversal.
         where["stribeck"] |= lost & where["presliding"]
-    options = {} if cutoff is None else {"cutoff": cutoff}
+    options: dict[str, Any] = {} if cutoff is None else {"cutoff": cutoff}
     return identify(
         # Without its range it counts as one that was not fitted before: how friction turns is chosen anew.
         robot.replace(torque_effects=[e for e in rest if e.effect not in _ANEW], fitted_range={}),

@@ -104,7 +104,7 @@ def _spectra(
         columns = np.column_stack([np.tanh(qd[:, j] / QUIET), qd[:, j], np.ones(len(q)), rigid[:, j]])
         values = np.linalg.lstsq(columns, torque[:, j], rcond=None)[0]
         joints.append((_power(torque[:, j], window), _power(columns @ values, window)))
-    return np.fft.rfftfreq(window, step), joints
+    return np.asarray(np.fft.rfftfreq(window, step), dtype=np.float64), joints
 
 
 def _smoothed(table: Floats, half: int) -> Floats:
