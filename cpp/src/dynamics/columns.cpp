@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/regressor.hpp"
 #include "kernel/kernel.hpp"
 
 namespace truing::dynamics {
@@ -23,38 +24,38 @@ std::vector<std::vector<int>> columns_by_joint(const TorqueDesign& design, std::
   return out;
 }
 
-/// Columns of the rigid chain at every row of a motion, of the links that a joint feels; made in place of those of the
-/// thread's last motion.
-class LinkColumns {
- public:
-  LinkColumns(const RigidChain& chain, const Motion& motion) : links_(static_cast<std::size_t>(chain.links())) {
-    thread_local std::vector<double> room;
-    const Index rows = RigidChain::padded(motion.rows());
-    blocks_.assign(static_cast<std::size_t>(chain.driven()) * links_, nullptr);
-    stride_ = rows;
-    std::size_t felt = 0;
-    for (Index k = 0; k < chain.driven(); ++k) felt += chain.felt_links(k).size();
-    room.resize(felt * static_cast<std::size_t>(kLinkParameters * rows));
-    double* next = room.data();
-    for (Index k = 0; k < chain.driven(); ++k) {
-      for (const Index link : chain.felt_links(k)) {
-        blocks_[static_cast<std::size_t>(k) * links_ + static_cast<std::size_t>(link)] = next;
-        next += kLinkParameters * rows;
-      }
+/// Columns of the rigid chain at every row of a motion, filtered: by joint, those of the links that it feels.
+std::vector<MatrixXd> filtered_links(const RigidChain& chain, const Tile& tile) {
+  thread_local std::vector<double> room;
+  const Motion& motion = tile.motion;
+  const Index rows = RigidChain::padded(motion.rows());
+  std::vector<double*> blocks(static_cast<std::size_t>(chain.driven() * chain.links()), nullptr);
+  std::vector<MatrixXd> out;
+  std::size_t felt = 0;
+  for (Index k = 0; k < chain.driven(); ++k) felt += chain.felt_links(k).size();
+  room.resize(felt * static_cast<std::size_t>(kLinkParameters * rows));
+  double* next = room.data();
+  for (Index k = 0; k < chain.driven(); ++k) {
+    for (const Index link : chain.felt_links(k)) {
+      blocks[static_cast<std::size_t>(k * chain.links() + link)] = next;
+      next += kLinkParameters * rows;
     }
-    if (motion.rows() > 0) chain.regressors(motion.q, motion.qd, motion.qdd, 0, motion.rows(), blocks_.data(), stride_);
+    out.emplace_back(tile.count, kLinkParameters * static_cast<Index>(chain.felt_links(k).size()));
   }
-
-  const double* column(std::size_t joint, int parameter) const {
-    return blocks_[joint * links_ + static_cast<std::size_t>(parameter / kLinkParameters)] +
-           stride_ * (parameter % kLinkParameters);
+  if (motion.rows() > 0) chain.regressors(motion.q, motion.qd, motion.qdd, 0, motion.rows(), blocks.data(), rows);
+  const double* column = room.data();
+  for (MatrixXd& table : out) {
+    for (Index c = 0; c < table.cols(); ++c, column += rows) tile.own_rows(column, table.col(c).data());
   }
+  return out;
+}
 
- private:
-  std::size_t links_;
-  Index stride_ = 0;
-  std::vector<double*> blocks_;
-};
+/// Where a joint's filtered columns have that of an inertial parameter.
+Index place_of(const RigidChain& chain, std::size_t joint, int parameter) {
+  const std::vector<Index>& felt = chain.felt_links(static_cast<Index>(joint));
+  const auto at = std::lower_bound(felt.begin(), felt.end(), parameter / kLinkParameters) - felt.begin();
+  return kLinkParameters * static_cast<Index>(at) + parameter % kLinkParameters;
+}
 
 /// Normal equations of rows of a table, the measured value its last column.
 class TableSum {
@@ -135,24 +136,36 @@ DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design)
   for (const std::vector<int>& columns : by_joint_) numbers += static_cast<double>(columns.size() + 1);
   const Index rows = tiles.kept_rows();
   if (rows >= 0 && sizeof(double) * numbers * static_cast<double>(rows) < kMostKept) kept_.resize(tiles.kept_tiles());
-  for (const TorqueTerm& term : design.terms)
+  for (const TorqueTerm& term : design.terms) {
     needs_rigid_ = needs_rigid_ || (term.link_parameter < 0 && term.needs_rigid);
+    needs_torque_ = needs_torque_ || term.needs_torque;
+  }
+}
+
+const std::vector<MatrixXd>& DesignColumns::links_of(Tile* tile, std::vector<MatrixXd>* made) const {
+  std::vector<MatrixXd>& place = kept_.empty() ? *made : tile->memory.links;
+  if (place.empty()) place = filtered_links(chain_, *tile);
+  return place;
 }
 
 void DesignColumns::fill(Tile* tile, bool that_need_torque, Tables* tables) const {
   if (needs_rigid_) fill_rigid(&tile->motion);
   const bool any_link = !that_need_torque && std::any_of(design_.terms.begin(), design_.terms.end(),
                                                          [](const TorqueTerm& t) { return t.link_parameter >= 0; });
-  const LinkColumns links(chain_, any_link ? tile->motion : Motion{});
+  std::vector<MatrixXd> made;
+  const std::vector<MatrixXd>& links = any_link ? links_of(tile, &made) : made;
   std::vector<Index> next(by_joint_.size(), 0);
   for (const TorqueTerm& term : design_.terms) {
     const bool of_link = term.link_parameter >= 0, wanted = term.needs_torque == that_need_torque;
     const MatrixXd values = of_link || !wanted ? MatrixXd() : term.basis(tile->motion);
     for (std::size_t k = 0; k < term.joints.size(); ++k) {
       const std::size_t j = term.joints[k];
-      double* const out = (*tables)[j].col(next[j]++).data();
+      auto out = (*tables)[j].col(next[j]++);
       if (!wanted) continue;
-      tile->own_rows(of_link ? links.column(j, term.link_parameter) : values.col(static_cast<Index>(k)).data(), out);
+      if (of_link)
+        out = links[j].col(place_of(chain_, j, term.link_parameter));
+      else
+        tile->own_rows(values.col(static_cast<Index>(k)).data(), out.data());
     }
   }
   tile->motion.rigid.clear();  // large, and soon made again
@@ -177,8 +190,11 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
     out->push_back({columns.of_joint(j), std::vector<Gram>(static_cast<std::size_t>(folds.count))});
   std::vector<TileGrams> lot(Tiles::kTogether);
   const auto work = [&](Tile& tile, std::size_t k) {
-    const MatrixXd predicted = own_torque(subtracted, &tile);
-    set_torque(seen, &tile);
+    const MatrixXd predicted = kept_torque(subtracted, &tile);
+    if (columns.any_needs_torque())
+      set_torque(seen, &tile);
+    else
+      set_direction(seen.turns(), &tile);
     columns.use(&tile, true,
                 [&](DesignColumns::Tables& tables) { lot[k] = grams_of(&tables, tile, predicted, folds); });
   };
@@ -194,26 +210,58 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
   return out;
 }
 
-std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const std::vector<int>& which,
-                            const VectorXd& values, const Folds& folds) {
-  VectorXd by_column = VectorXd::Zero(static_cast<Index>(columns.design().terms.size()));
-  for (std::size_t k = 0; k < which.size(); ++k) by_column[which[k]] = values[static_cast<Index>(k)];
+namespace {
+
+/// What the model and the columns times values leave, in the tile's own rows: shape=(count, joints).
+MatrixXd errors_of(const DesignColumns& columns, const TorqueModel& model, const VectorXd& values, Tile* tile) {
+  set_direction(model.turns(), tile);
+  MatrixXd errors = tile->measured - kept_torque(model, tile);
+  columns.use(tile, false, [&](const DesignColumns::Tables& tables) {
+    for (std::size_t j = 0; j < tables.size(); ++j) {
+      const std::vector<int>& of = columns.of_joint(j);
+      for (std::size_t c = 0; c < of.size(); ++c) {
+        if (values[of[c]] != 0.0)
+          errors.col(static_cast<Index>(j)) -= values[of[c]] * tables[j].col(static_cast<Index>(c));
+      }
+    }
+  });
+  return errors;
+}
+
+}  // namespace
+
+std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const VectorXd& values,
+                            const Folds& folds) {
   return noise_of(
-      columns.tiles(),
-      [&](Tile& tile) -> MatrixXd {
-        MatrixXd errors = tile.measured - own_torque(model, &tile);
-        columns.use(&tile, false, [&](const DesignColumns::Tables& tables) {
-          for (std::size_t j = 0; j < tables.size(); ++j) {
-            const std::vector<int>& of = columns.of_joint(j);
-            for (std::size_t c = 0; c < of.size(); ++c) {
-              const double value = by_column[of[c]];
-              if (value != 0.0) errors.col(static_cast<Index>(j)) -= value * tables[j].col(static_cast<Index>(c));
-            }
-          }
-        });
-        return errors;
-      },
-      folds);
+      columns.tiles(), [&](Tile& tile) -> MatrixXd { return errors_of(columns, model, values, &tile); }, folds);
+}
+
+std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const VectorXd& values,
+                           const Folds& folds) {
+  const auto joints = static_cast<Index>(columns.tiles().robot().driven_count());
+  VectorXd squares = VectorXd::Zero(joints), rows = squares;
+  std::vector<std::pair<VectorXd, VectorXd>> lot(Tiles::kTogether);
+  const auto work = [&](Tile& tile, std::size_t k) {
+    const MatrixXd errors = errors_of(columns, subtracted, values, &tile);
+    const VectorXd time = tile.own_time();
+    lot[k] = {VectorXd::Zero(joints), VectorXd::Zero(joints)};
+    for (Index i = 0; i < tile.count; ++i) {
+      if (folds.fold(tile.recording, time[i]) < 0) continue;
+      for (Index j = 0; j < joints; ++j) {
+        if (std::isnan(errors(i, j))) continue;
+        lot[k].first[j] += errors(i, j) * errors(i, j);
+        lot[k].second[j] += 1.0;
+      }
+    }
+  };
+  const auto add = [&](std::size_t k) {
+    squares += lot[k].first;
+    rows += lot[k].second;
+  };
+  columns.tiles().for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; }, work, add);
+  std::vector<double> out;
+  for (Index j = 0; j < joints; ++j) out.push_back(rows[j] < 2.0 ? 0.0 : std::sqrt(squares[j] / rows[j]));
+  return out;
 }
 
 }  // namespace truing::dynamics

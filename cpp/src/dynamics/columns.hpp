@@ -23,6 +23,8 @@ class DesignColumns {
 
   const Tiles& tiles() const { return tiles_; }
   const TorqueDesign& design() const { return design_; }
+  /// Some of the columns ask for the torque of a model.
+  bool any_needs_torque() const { return needs_torque_; }
   /// Numbers of the design's columns that a joint's torque has, ascending.
   const std::vector<int>& of_joint(std::size_t joint) const { return by_joint_[joint]; }
 
@@ -31,22 +33,29 @@ class DesignColumns {
 
  private:
   void fill(Tile* tile, bool that_need_torque, Tables* tables) const;
+  /// The filtered columns of the links, kept with the tile where tables are.
+  const std::vector<Eigen::MatrixXd>& links_of(Tile* tile, std::vector<Eigen::MatrixXd>* made) const;
 
   const Tiles& tiles_;
   const TorqueDesign& design_;
   RigidChain chain_;
   std::vector<std::vector<int>> by_joint_;
-  bool needs_rigid_ = false;
+  bool needs_rigid_ = false, needs_torque_ = false;
   mutable std::vector<Tables> kept_;  ///< by tile; empty: not yet made
 };
+
+/// What a fit of all columns leaves of the torque that `subtracted` leaves, in rows that these folds have, those at
+/// rest included: rms by joint [Nm | N]. None of the columns that have a value may need a torque.
+std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const Eigen::VectorXd& values,
+                           const Folds& folds);
 
 /// Measured torque less that of `subtracted` against the design's columns; rows at rest are left out. Terms that need a
 /// torque see that of `seen`.
 TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
                       const Folds& folds);
 
-/// What the model and these columns times values leave; none of them may need a torque.
-std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const std::vector<int>& which,
-                            const Eigen::VectorXd& values, const Folds& folds);
+/// What the model and the columns times values leave; no column that has a value may need a torque.
+std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const Eigen::VectorXd& values,
+                            const Folds& folds);
 
 }  // namespace truing::dynamics

@@ -65,10 +65,9 @@ constexpr int kKnots = 8;
 constexpr int kNarrowKnots = 3 * (kKnots - 1) + 1;  ///< the wide ones among them
 
 /// Straight lines between evenly spaced knots: hat number k.
-double hat(double x, int k, int knots, double low, double high) {
+Eigen::ArrayXd hat(const VectorXd& x, int k, int knots, double low, double high) {
   const double width = (high - low) / (knots - 1);
-  const double at = std::clamp(x, low, high);
-  return std::max(0.0, 1.0 - std::abs((at - low) / width - k));
+  return (1.0 - ((x.array().max(low).min(high) - low) / width - k).abs()).max(0.0);
 }
 
 void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, int knots, double prior,
@@ -91,10 +90,9 @@ void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, int
     term.needs_rigid = false;
     term.prior = prior;
     term.basis = [input, k, knots, joint](const Motion& m) -> MatrixXd {
-      MatrixXd out = input.value(m);
-      for (double& x : out.reshaped()) x = hat(x, k, knots, input.low, input.high);
-      if (input.times_direction) out.array() *= m.direction.col(static_cast<Index>(joint)).array();
-      return out;
+      Eigen::ArrayXd out = hat(input.value(m), k, knots, input.low, input.high);
+      if (input.times_direction) out *= m.direction.col(static_cast<Index>(joint)).array();
+      return out.matrix();
     };
     group.columns.push_back(static_cast<int>(design->terms.size()));
     design->terms.push_back(std::move(term));
@@ -263,12 +261,32 @@ namespace {
 
 MatrixXd torque_along(const TorqueModel& model, Tile* tile) {
   if (model.needs_rigid()) fill_rigid(&tile->motion);
-  MatrixXd out = model.torque(&tile->motion);
+  set_direction(model.turns(), tile);
+  MatrixXd out = model.torque_by_direction(&tile->motion);
   tile->motion.rigid.clear();  // large, and soon made again
   return out;
 }
 
 }  // namespace
+
+void set_direction(const std::vector<FrictionTurn>& turns, Tile* tile) {
+  Motion& motion = tile->motion;
+  motion.direction.resize(motion.q.rows(), motion.q.cols());
+  for (Index j = 0; j < motion.q.cols(); ++j) {
+    const FrictionTurn& turn = turns[static_cast<std::size_t>(j)];
+    const auto [at, fresh] = tile->memory.directions.try_emplace({j, turn.speed, turn.travel});
+    if (fresh) at->second = direction_of(motion, j, turn);
+    motion.direction.col(j) = at->second;
+  }
+}
+
+const MatrixXd& kept_torque(const TorqueModel& model, Tile* tile) {
+  if (tile->memory.model != model.number()) {
+    tile->memory.torque = own_torque(model, tile);
+    tile->memory.model = model.number();
+  }
+  return tile->memory.torque;
+}
 
 MatrixXd own_torque(const TorqueModel& model, Tile* tile) { return tile->own_rows(torque_along(model, tile)); }
 
@@ -427,18 +445,24 @@ Gram FoldGram::of(const std::vector<int>& columns) const {
   return out;
 }
 
+Gram sum_of_folds(const JointGrams& grams, const Noise& noise) {
+  Gram out;
+  for (std::size_t f = 0; f < grams.folds.size(); ++f) {
+    const Gram& gram = grams.folds[f];
+    if (gram.xx.size() == 0) continue;
+    const double rows = rows_counted(noise, f), n = out.n;
+    out.add(gram, rows / (noise.sigma * noise.sigma));
+    out.n = n + rows * gram.n;
+  }
+  return out;
+}
+
 Gram sum_of_folds(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns) {
   const auto p = static_cast<Index>(columns);
   Gram out{MatrixXd::Zero(p, p), VectorXd::Zero(p), 0.0, 0.0};
   for (std::size_t j = 0; j < grams.size(); ++j) {
-    Gram sum;
-    for (std::size_t f = 0; f < grams[j].folds.size(); ++f) {
-      const Gram& gram = grams[j].folds[f];
-      if (gram.xx.size() == 0) continue;
-      const double rows = rows_counted(noise[j], f);
-      sum.add(gram, rows / (noise[j].sigma * noise[j].sigma));
-      out.n += rows * gram.n;
-    }
+    const Gram sum = sum_of_folds(grams[j], noise[j]);
+    out.n += sum.n;
     if (sum.xx.size() == 0) continue;
     const std::vector<int>& at = grams[j].columns;
     for (std::size_t a = 0; a < at.size(); ++a) {

@@ -87,9 +87,13 @@ std::vector<Noise> noise_of(const Tiles& tiles, const std::function<Eigen::Matri
 
 void fill_rigid(Motion* motion);
 
-/// Torque of the model in the tile's own rows, shape=(count, joints). Sets Motion::torque.
+/// Sets Motion::direction to what friction that turns so knows of it.
+void set_direction(const std::vector<FrictionTurn>& turns, Tile* tile);
+/// Torque of the model in the tile's own rows, shape=(count, joints). Sets Motion::direction and Motion::torque.
 Eigen::MatrixXd own_torque(const TorqueModel& model, Tile* tile);
-/// Only that.
+/// The same without setting anything; kept for the next time that the tile is asked for the same model.
+const Eigen::MatrixXd& kept_torque(const TorqueModel& model, Tile* tile);
+/// Only Motion::direction and Motion::torque.
 void set_torque(const TorqueModel& model, Tile* tile);
 
 /// One fold, all joints together: each in units of its noise and with rows that count as one. As one matrix it would be
@@ -106,6 +110,8 @@ class FoldGram {
   double yy_ = 0.0, n_ = 0.0;
 };
 
+/// All folds of a joint together, in units of its noise, with rows that count as one.
+Gram sum_of_folds(const JointGrams& grams, const Noise& noise);
 /// All folds and joints together, in the same units.
 Gram sum_of_folds(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns);
 

@@ -37,19 +37,19 @@ using Eigen::VectorXd;
 std::vector<Noise> noise_of_all(const Problem& problem, const DesignColumns& columns, const TorqueGrams& grams,
                                 const std::vector<Noise>& first) {
   const TorqueDesign& design = columns.design();
-  std::vector<int> which;
+  std::vector<bool> wanted(design.terms.size(), false);
   for (const TorqueGroup& group : design.groups) {
     // Not what needs the torque: with that of another model it would be another column.
     const bool fixed = std::none_of(group.columns.begin(), group.columns.end(),
                                     [&](int c) { return design.terms[static_cast<std::size_t>(c)].needs_torque; });
-    if (fixed) which.insert(which.end(), group.columns.begin(), group.columns.end());
+    for (const int column : group.columns) wanted[static_cast<std::size_t>(column)] = fixed;
   }
   std::vector<Noise> noise = first;
   for (int round = 0; round < 2; ++round) {
     // Every row counts here: the priors are there for what the rows cannot see, and for nothing else.
     for (Noise& one : noise) one.design_effect = 1.0;
-    const Fit all = fit_of(sums_of(grams, noise, design, std::vector<bool>(design.terms.size(), true)), which);
-    noise = noise_of(columns, problem.nominal, all.columns, all.values, problem.train);
+    const VectorXd values = values_of(grams, noise, design, wanted, problem.tiles.threads());
+    noise = noise_of(columns, problem.nominal, values, problem.train);
   }
   return noise;
 }
@@ -84,16 +84,23 @@ TorqueDesign part_of(const TorqueDesign& whole, const std::vector<int>& nuisance
   return out;
 }
 
-/// Everything chosen, fitted with the turns that are set. `seen`: the model whose torque some terms need.
-TorqueModel fitted_with_turns(const Problem& problem, const TorqueDesign& whole, Choice choice, const TorqueModel& seen,
-                              const std::vector<Noise>& noise) {
+/// Errors by joint of everything chosen, fitted with the turns that are set. `seen`: the model whose torque some terms
+/// need.
+std::vector<double> errors_with_turns(const Problem& problem, const TorqueDesign& whole, Choice choice,
+                                      const TorqueModel& seen, const std::vector<Noise>& noise) {
   const TorqueDesign design = part_of(whole, standard_columns(whole), &choice);
   const TorqueGrams grams = sum_grams(DesignColumns(problem.tiles, design), problem.nominal,
                                       seen.turning(problem.range.turns), problem.train);
   const Sums sums = sums_of(grams, noise, design, inertial_columns(design));
   std::vector<int> columns(design.terms.size());
   std::iota(columns.begin(), columns.end(), 0);
-  return problem.nominal.with(valued(design, fit_of(sums, columns)));
+  return rms_of(problem, problem.nominal.with(valued(design, fit_of(sums, columns))));
+}
+
+bool same(const std::vector<FrictionTurn>& a, const std::vector<FrictionTurn>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const FrictionTurn& one, const FrictionTurn& other) {
+    return one.speed == other.speed && one.travel == other.travel;
+  });
 }
 
 /// The choice fitted, as a model beside the nominal one.
@@ -217,10 +224,13 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   // What noise is, and the torque that some terms need, are those of the model found in the round before.
   for (int round = 0; round < 2; ++round) {
     if (round > 0 && !problem.fitted_before) {
-      choose_turns(&problem, [&] { return fitted_with_turns(problem, *design, choice, model, noise); });
-      *design = whole_design(problem, options);  // of the same groups
-      columns = std::make_unique<DesignColumns>(problem.tiles, *design);
-      model = model.turning(problem.range.turns);
+      const std::vector<FrictionTurn> before = problem.range.turns;
+      choose_turns(&problem, [&] { return errors_with_turns(problem, *design, choice, model, noise); });
+      if (!same(problem.range.turns, before)) {
+        *design = whole_design(problem, options);  // of the same groups
+        columns = std::make_unique<DesignColumns>(problem.tiles, *design);
+        model = model.turning(problem.range.turns);
+      }
     }
     if (round > 0) grams = sum_grams(*columns, problem.nominal, model, problem.train);
     const Sums sums = sums_of(grams, noise, *design, priors);

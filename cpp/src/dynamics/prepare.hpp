@@ -4,8 +4,11 @@
 
 // Recordings as the fit sees them: evenly sampled, filtered without phase, cut at gaps, in tiles.
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "rooms.hpp"
@@ -16,6 +19,16 @@ namespace truing::dynamics {
 
 /// A joint whose speed [rad/s | m/s] stays below this is at rest.
 constexpr double kSpeedAtRest = 0.01;
+
+/// What was made of a tile and may be asked for again: it depends on nothing but what it is kept under.
+struct TileMemory {
+  /// By joint, speed and travel of a turn: directions at every row of the motion.
+  std::map<std::tuple<Eigen::Index, double, double>, Eigen::VectorXd> directions;
+  /// Filtered columns of the inertial parameters, in the tile's own rows: by joint, those of the links that it feels.
+  std::vector<Eigen::MatrixXd> links;
+  std::uint64_t model = 0;  ///< TorqueModel::number() of `torque`
+  Eigen::MatrixXd torque;   ///< in the tile's own rows
+};
 
 /// A stretch of a recording. Basis functions see every row of `motion`; the fit sees every `stride`-th row of what they
 /// give, filtered as the measured torques were.
@@ -30,6 +43,7 @@ struct Tile {
   Eigen::Index count = 0;    ///< of filtered rows that are this tile's own
   Eigen::MatrixXd measured;  ///< shape=(count, joints) [Nm | N] filtered; NaN: not measured
   Eigen::MatrixXd moving;    ///< shape=(count, joints): 1 where the joint moves, 0 where it has been at rest a while
+  TileMemory memory;
 
   /// The tile's own rows of basis values given at every row of the motion.
   Eigen::MatrixXd own_rows(const Eigen::MatrixXd& values) const;
@@ -72,6 +86,7 @@ class Tiles {
   std::size_t kept_tiles() const { return tiles_.size(); }
   const Robot& robot() const { return robot_; }
   const PrepareOptions& options() const { return options_; }
+  int threads() const { return threads_; }
 
  private:
   const std::vector<Recording>& recordings_;

@@ -10,6 +10,7 @@
 #include "dynamics/effects/families.hpp"
 #include "dynamics/payload.hpp"
 #include "dynamics/physical.hpp"
+#include "math/batch.hpp"
 #include "math/linear_algebra.hpp"
 #include "math/text.hpp"
 
@@ -214,6 +215,99 @@ Fit fit_of(const Sums& sums, const std::vector<int>& columns, const VectorXd& ri
 
 namespace {
 
+/// Normal equations of one joint less its own columns.
+struct Eliminated {
+  std::vector<int> own, shared;  ///< columns of the design
+  Eigen::LLT<MatrixXd> factor;   ///< L L^T of its own
+  MatrixXd half;                 ///< L^-1 of their products with the shared ones
+  VectorXd right;                ///< L^-1 of their right-hand side
+  MatrixXd left_xx;              ///< what is left of the shared ones' matrix …
+  VectorXd left_xy;              ///< … and of their right-hand side
+};
+
+/// A little on the diagonal holds what the rows cannot see at all.
+double firm(double diagonal) { return diagonal * (1.0 + 1e-9) + 1e-30; }
+
+Eliminated eliminated(const JointGrams& grams, const Noise& noise, const TorqueDesign& design,
+                      const std::vector<bool>& wanted) {
+  Eliminated out;
+  std::vector<Index> own, shared;
+  for (std::size_t k = 0; k < grams.columns.size(); ++k) {
+    const int column = grams.columns[k];
+    if (!wanted[static_cast<std::size_t>(column)]) continue;
+    const bool alone = design.terms[static_cast<std::size_t>(column)].joints.size() == 1;
+    (alone ? out.own : out.shared).push_back(column);
+    (alone ? own : shared).push_back(static_cast<Index>(k));
+  }
+  const Gram sum = sum_of_folds(grams, noise);
+  if (sum.xx.size() == 0) {
+    out.own.clear();
+    out.shared.clear();
+    return out;
+  }
+  MatrixXd d = sum.xx(own, own);
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    const auto at = static_cast<Index>(k);
+    d(at, at) = firm(d(at, at) + std::pow(design.terms[static_cast<std::size_t>(out.own[k])].prior, -2.0));
+  }
+  out.factor = estimation::factorised(std::move(d));
+  out.half = sum.xx(own, shared);
+  out.factor.matrixL().solveInPlace(out.half);
+  out.right = sum.xy(own);
+  out.factor.matrixL().solveInPlace(out.right);
+  out.left_xx = sum.xx(shared, shared);
+  out.left_xx.noalias() -= out.half.transpose() * out.half;
+  out.left_xy = sum.xy(shared) - out.half.transpose() * out.right;
+  return out;
+}
+
+}  // namespace
+
+VectorXd values_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
+                   const std::vector<bool>& wanted, int threads) {
+  std::vector<Eliminated> joints(grams->size());
+  math::for_each_on_threads(
+      joints.size(), threads, {}, [&](std::size_t j) { joints[j] = eliminated((*grams)[j], noise[j], design, wanted); },
+      1);
+  std::vector<int> shared;
+  for (const Eliminated& joint : joints) shared.insert(shared.end(), joint.shared.begin(), joint.shared.end());
+  std::sort(shared.begin(), shared.end());
+  shared.erase(std::unique(shared.begin(), shared.end()), shared.end());
+  const auto place = [&](int column) {
+    return std::lower_bound(shared.begin(), shared.end(), column) - shared.begin();
+  };
+  const auto p = static_cast<Index>(shared.size());
+  MatrixXd d = MatrixXd::Zero(p, p);
+  VectorXd right = VectorXd::Zero(p), solution;
+  for (const Eliminated& joint : joints) {
+    std::vector<Index> at;
+    for (const int column : joint.shared) at.push_back(place(column));
+    d(at, at) += joint.left_xx;
+    right(at) += joint.left_xy;
+  }
+  for (Index k = 0; k < p; ++k)
+    d(k, k) = firm(d(k, k) +
+                   std::pow(design.terms[static_cast<std::size_t>(shared[static_cast<std::size_t>(k)])].prior, -2.0));
+  if (p > 0) {
+    const VectorXd scale = unit_scale<Eigen::Dynamic>(d);
+    solution = scale.cwiseProduct(
+        solve_symmetric<Eigen::Dynamic, 1>(scaled_both<Eigen::Dynamic>(scale, d), scale.cwiseProduct(right)));
+  }
+  VectorXd out = VectorXd::Zero(static_cast<Index>(design.terms.size()));
+  for (Index k = 0; k < p; ++k) out[shared[static_cast<std::size_t>(k)]] = solution[k];
+  for (const Eliminated& joint : joints) {
+    if (joint.own.empty()) continue;
+    VectorXd own = joint.right;
+    for (std::size_t k = 0; k < joint.shared.size(); ++k)
+      own -= out[joint.shared[k]] * joint.half.col(static_cast<Index>(k));
+    joint.factor.matrixU().solveInPlace(own);
+    for (std::size_t k = 0; k < joint.own.size(); ++k) out[joint.own[k]] = own[static_cast<Index>(k)];
+  }
+  return out;
+}
+
+namespace {
+
 /// Of a fit: which of its columns are inertial, at which of 10 * links parameters, and the others.
 struct InertialPart {
   std::vector<Index> inertial, parameter, other;
@@ -285,33 +379,56 @@ std::vector<ValuedTerm> valued(const TorqueDesign& design, const Fit& fit) {
 
 namespace {
 
-Groundwork fitted_groundwork(const Problem& problem) {
+/// By column of the design: the fit's values, others nought.
+VectorXd by_column(const TorqueDesign& design, const Fit& fit) {
+  VectorXd out = VectorXd::Zero(static_cast<Index>(design.terms.size()));
+  out(fit.columns) = fit.values;
+  return out;
+}
+
+TorqueDesign standard_design(const Problem& problem) {
   TorqueDesign design;
   for (const TorqueEffect& effect : torque_catalogue()) {
     if (effect.traits.standard) add_effect(effect, -1, problem.robot, problem.range, &design);
   }
-  if (problem.fitted_before) {
-    const std::vector<Noise> noise = noise_of(problem.tiles, problem.nominal, problem.train);
-    return {std::move(design), {}, {}, problem.nominal, noise};
-  }
+  return design;
+}
+
+/// `table`: of `design`.
+Groundwork fitted_groundwork(const Problem& problem, const TorqueDesign& design, const DesignColumns& table) {
   const std::vector<bool> with_prior = inertial_columns(design);
   const std::vector<int> columns = standard_columns(design);
-  const TorqueGrams grams =
-      sum_grams(DesignColumns(problem.tiles, design), problem.nominal, problem.nominal, problem.train);
+  const TorqueGrams grams = sum_grams(table, problem.nominal, problem.nominal, problem.train);
   // Each joint by the noise that the fit leaves, which depends on it.
   std::vector<Noise> noise(problem.robot.driven_count());
   for (std::size_t j = 0; j < noise.size(); ++j)
     noise[j].sigma = std::max(0.1 * problem.range.torque[static_cast<Index>(j)], 1e-6);
   Sums sums;
   Fit fit;
-  TorqueModel model = problem.nominal;
   for (int round = 0; round < 2; ++round) {
     sums = sums_of(grams, noise, design, with_prior);
     fit = fit_of(sums, columns);
-    model = problem.nominal.with(valued(design, fit));
-    noise = noise_of(problem.tiles, model, problem.train);
+    noise = noise_of(table, problem.nominal, by_column(design, fit), problem.train);
   }
-  return {std::move(design), std::move(sums), std::move(fit), std::move(model), std::move(noise)};
+  TorqueModel model = problem.nominal.with(valued(design, fit));
+  return {design, std::move(sums), std::move(fit), std::move(model), std::move(noise)};
+}
+
+Groundwork fitted_groundwork(const Problem& problem) {
+  TorqueDesign design = standard_design(problem);
+  if (problem.fitted_before) {
+    const std::vector<Noise> noise = noise_of(problem.tiles, problem.nominal, problem.train);
+    return {std::move(design), {}, {}, problem.nominal, noise};
+  }
+  return fitted_groundwork(problem, design, DesignColumns(problem.tiles, design));
+}
+
+/// Errors by joint that the groundwork leaves with the turns that are set.
+std::vector<double> errors_of_groundwork(const Problem& problem) {
+  const TorqueDesign design = standard_design(problem);
+  const DesignColumns table(problem.tiles, design);
+  const Groundwork groundwork = fitted_groundwork(problem, design, table);
+  return rms_of(table, problem.nominal, by_column(design, groundwork.fit), problem.train);
 }
 
 }  // namespace
@@ -477,7 +594,14 @@ std::vector<TorqueErrors> errors_of(const Problem& problem,
 
 // --- the turn of friction ------------------------------------------------------------------------
 
-void choose_turns(Problem* problem, const std::function<TorqueModel()>& model_with) {
+std::vector<double> rms_of(const Problem& problem, const TorqueModel& model) {
+  const std::vector<std::vector<TorqueError>> errors = errors_on(problem.train, problem, {{"", model}});
+  std::vector<double> out;
+  for (const TorqueError& error : errors.front()) out.push_back(error.rms);
+  return out;
+}
+
+void choose_turns(Problem* problem, const std::function<std::vector<double>()>& errors_with) {
   constexpr FrictionTurn kTurns[] = {{0.01, 0.0}, {1e-3, 0.0}, {3e-4, 0.0}, {0.01, 1e-6}, {0.01, 1e-5}, {0.01, 1e-4}};
   const auto set = [&](const std::vector<FrictionTurn>& turns) {
     problem->range.turns = turns;
@@ -488,10 +612,10 @@ void choose_turns(Problem* problem, const std::function<TorqueModel()>& model_wi
   std::vector<FrictionTurn> chosen(joints);
   for (const FrictionTurn& turn : kTurns) {
     set(std::vector<FrictionTurn>(joints, turn));
-    const std::vector<TorqueError> errors = errors_on(problem->train, *problem, {{"", model_with()}}).front();
+    const std::vector<double> errors = errors_with();
     for (std::size_t j = 0; j < joints; ++j) {
-      if (errors[j].rms >= least[j]) continue;
-      least[j] = errors[j].rms;
+      if (errors[j] >= least[j]) continue;
+      least[j] = errors[j];
       chosen[j] = turn;
     }
   }
@@ -499,7 +623,7 @@ void choose_turns(Problem* problem, const std::function<TorqueModel()>& model_wi
 }
 
 Groundwork groundwork_of(Problem* problem) {
-  if (!problem->fitted_before) choose_turns(problem, [&] { return fitted_groundwork(*problem).model; });
+  if (!problem->fitted_before) choose_turns(problem, [&] { return errors_of_groundwork(*problem); });
   return fitted_groundwork(*problem);
 }
 

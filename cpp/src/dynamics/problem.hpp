@@ -61,6 +61,12 @@ Sums sums_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const To
 
 Fit fit_of(const Sums& sums, const std::vector<int>& columns, const Eigen::VectorXd& ridge = {});
 
+/// Values alone of a fit of many columns with the priors of their terms, by column of the design; those that are not
+/// `wanted` are nought. What belongs to one joint is eliminated there (Schur complement), and what several joints share
+/// is left: so there may be thousands.
+Eigen::VectorXd values_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
+                          const std::vector<bool>& wanted, int threads);
+
 /// The fit with inertial parameters that bodies can have, and the other values that go with them. `nominal`: the robot
 /// that the inertial columns add to. Links whose nominal no body could have are said in `warnings`.
 Fit with_bodies(const Robot& nominal, const TorqueDesign& design, const Sums& sums, const Fit& fit,
@@ -90,8 +96,10 @@ Groundwork groundwork_of(Problem* problem);
 /// Sets MotionRange::turns, and those of the nominal model, to what leaves the smallest errors at every joint on the
 /// training rows, those at rest included: how friction is left at rest is part of how it turns. Friction that a model
 /// turns more slowly than the joint does, or forgets at rest, would look like presliding and like Stribeck's curve.
-/// `model_with`: the model fitted with the turns that are set.
-void choose_turns(Problem* problem, const std::function<TorqueModel()>& model_with);
+/// `errors_with`: rms errors by joint on these rows of what is fitted with the turns that are set [Nm | N].
+void choose_turns(Problem* problem, const std::function<std::vector<double>()>& errors_with);
+/// Of a model, by joint, on the training rows, those at rest included.
+std::vector<double> rms_of(const Problem& problem, const TorqueModel& model);
 
 /// The robot with what a fit found: link inertias added to its links, effects to its torque effects.
 Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<int>& groups, const Fit& fit,

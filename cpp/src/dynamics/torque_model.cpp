@@ -3,6 +3,8 @@
 #include "dynamics/torque_model.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <utility>
 
 #include "dynamics/effects/families.hpp"
 #include "dynamics/payload.hpp"
@@ -34,12 +36,22 @@ void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, cons
   }
 }
 
+namespace {
+
+std::uint64_t next_number() {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
+}
+
+}  // namespace
+
 TorqueModel::TorqueModel(const Robot& robot, std::vector<ValuedTerm> own)
     : robot_(robot),
       chain_(robot),
       links_(link_parameters(robot)),
       rotors_(rotor_matrix(robot)),
-      turns_(turns_of(robot)) {
+      turns_(turns_of(robot)),
+      number_(next_number()) {
   add(std::move(own));
 }
 
@@ -55,12 +67,14 @@ void TorqueModel::add(std::vector<ValuedTerm> more) {
 TorqueModel TorqueModel::with(const std::vector<ValuedTerm>& more) const {
   TorqueModel out = *this;
   out.add(more);
+  out.number_ = next_number();
   return out;
 }
 
 TorqueModel TorqueModel::turning(const std::vector<FrictionTurn>& turns) const {
   TorqueModel out = *this;
   out.turns_ = turns;
+  if (!terms_.empty()) out.number_ = next_number();  // links and rotors know no friction
   return out;
 }
 
@@ -72,11 +86,11 @@ bool TorqueModel::needs_rigid() const {
 TorqueModel TorqueModel::seeing(const TorqueModel& other) const {
   TorqueModel out = *this;
   out.seen_ = std::make_shared<const TorqueModel>(other);
+  out.number_ = next_number();
   return out;
 }
 
 MatrixXd TorqueModel::torque_of_others(Motion* motion) const {
-  motion->direction = directions_of(*motion, turns_);
   MatrixXd out = chain_.torques(motion->q, motion->qd, motion->qdd, links_);
   out += motion->qdd * rotors_;  // it is symmetric
   add_payload(*motion, &out);
@@ -85,8 +99,17 @@ MatrixXd TorqueModel::torque_of_others(Motion* motion) const {
 }
 
 MatrixXd TorqueModel::torque(Motion* motion) const {
+  motion->direction = directions_of(*motion, turns_);
+  return torque_by_direction(motion);
+}
+
+MatrixXd TorqueModel::torque_by_direction(Motion* motion) const {
   MatrixXd seen;
-  if (seen_) seen = seen_->torque_of_others(motion);
+  if (seen_) {
+    const MatrixXd mine = std::exchange(motion->direction, directions_of(*motion, seen_->turns_));
+    seen = seen_->torque_of_others(motion);
+    motion->direction = mine;
+  }
   MatrixXd out = torque_of_others(motion);
   motion->torque = seen_ ? seen : out;
   add_terms(terms_, true, *motion, &out);

@@ -4,6 +4,7 @@
 
 // What a robot, with its rotors and the effects that it carries, needs of torque along a motion.
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -44,6 +45,12 @@ class TorqueModel {
   /// Torques of every row [Nm | N], shape=(rows, joints). Sets Motion::direction to what this robot's friction knows of
   /// it, and Motion::torque to what the terms that ask for it see: the torques of all others.
   Eigen::MatrixXd torque(Motion* motion) const;
+  /// The same where Motion::direction is set already.
+  Eigen::MatrixXd torque_by_direction(Motion* motion) const;
+
+  const std::vector<FrictionTurn>& turns() const { return turns_; }
+  /// Models of one number have the same torques.
+  std::uint64_t number() const { return number_; }
 
   /// A term may look at Motion::rigid.
   bool needs_rigid() const;
@@ -51,7 +58,7 @@ class TorqueModel {
   const Robot& robot() const { return robot_; }
 
  private:
-  /// Of all but the terms that ask for the torque.
+  /// Of all but the terms that ask for the torque, by Motion::direction.
   Eigen::MatrixXd torque_of_others(Motion* motion) const;
   void add(std::vector<ValuedTerm> more);
 
@@ -62,6 +69,7 @@ class TorqueModel {
   std::vector<ValuedTerm> terms_;  ///< the others
   std::vector<FrictionTurn> turns_;
   std::shared_ptr<const TorqueModel> seen_;  ///< null: itself
+  std::uint64_t number_;
 };
 
 }  // namespace truing::dynamics

@@ -12,21 +12,35 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// log(2 cosh(x)).
+double log_cosh(double x) {
+  constexpr double kStraight = 20.0;  // from here on the second part is less than half of the first one's last bit
+  const double size = std::abs(x);
+  return size > kStraight ? size : size + std::log1p(std::exp(-2.0 * size));
+}
+
+/// A speed, and the integral of tanh(v / width) up to it, over the width.
+struct Reached {
+  double speed, integral;
+};
+
 /// Mean of tanh(v / width) while v goes evenly from a to b.
-double mean_tanh(double a, double b, double width) {
-  if (std::abs(b - a) < 1e-3 * width) return std::tanh(0.5 * (a + b) / width);
-  const auto log_cosh = [](double x) { return std::abs(x) + std::log1p(std::exp(-2.0 * std::abs(x))); };
-  return width / (b - a) * (log_cosh(b / width) - log_cosh(a / width));
+double mean_tanh(const Reached& a, const Reached& b, double width) {
+  if (std::abs(b.speed - a.speed) < 1e-3 * width) return std::tanh(0.5 * (a.speed + b.speed) / width);
+  return width / (b.speed - a.speed) * (b.integral - a.integral);
 }
 
 }  // namespace
 
 VectorXd direction_by_speed(const Eigen::Ref<const VectorXd>& qd, double width) {
   VectorXd out(qd.size());
+  if (qd.size() == 0) return out;
+  const auto reached = [width](double v) { return Reached{v, log_cosh(v / width)}; };
+  Reached before = reached(qd[0]);  // half-way from the row before
   for (Index i = 0; i < qd.size(); ++i) {
-    const double before = 0.5 * (qd[i] + qd[std::max<Index>(i - 1, 0)]);
-    const double after = 0.5 * (qd[i] + qd[std::min(i + 1, qd.size() - 1)]);
-    out[i] = 0.5 * (mean_tanh(before, qd[i], width) + mean_tanh(qd[i], after, width));
+    const Reached at = reached(qd[i]), after = reached(0.5 * (qd[i] + qd[std::min(i + 1, qd.size() - 1)]));
+    out[i] = 0.5 * (mean_tanh(before, at, width) + mean_tanh(at, after, width));
+    before = after;
   }
   return out;
 }
@@ -54,13 +68,14 @@ VectorXd stop_operator(const Eigen::Ref<const VectorXd>& q, double x0) {
   return out;
 }
 
+VectorXd direction_of(const Motion& motion, Index joint, const FrictionTurn& turn) {
+  return turn.travel > 0.0 ? stop_operator(motion.q.col(joint), turn.travel)
+                           : direction_by_speed(motion.qd.col(joint), turn.speed);
+}
+
 MatrixXd directions_of(const Motion& motion, const std::vector<FrictionTurn>& turns) {
   MatrixXd out(motion.q.rows(), motion.q.cols());
-  for (Index j = 0; j < out.cols(); ++j) {
-    const FrictionTurn& turn = turns[static_cast<std::size_t>(j)];
-    out.col(j) = turn.travel > 0.0 ? stop_operator(motion.q.col(j), turn.travel)
-                                   : direction_by_speed(motion.qd.col(j), turn.speed);
-  }
+  for (Index j = 0; j < out.cols(); ++j) out.col(j) = direction_of(motion, j, turns[static_cast<std::size_t>(j)]);
   return out;
 }
 

@@ -18,6 +18,9 @@ Eigen::VectorXd stop_operator(const Eigen::Ref<const Eigen::VectorXd>& q, double
 /// tanh(speed / width), each row the mean over the time that belongs to it, speeds on straight lines between the rows.
 Eigen::VectorXd direction_by_speed(const Eigen::Ref<const Eigen::VectorXd>& qd, double width);
 
+/// The same of one joint, by the speed or by the travel.
+Eigen::VectorXd direction_of(const Motion& motion, Eigen::Index joint, const FrictionTurn& turn);
+
 /// Motion::direction where friction turns so at every joint.
 Eigen::MatrixXd directions_of(const Motion& motion, const std::vector<FrictionTurn>& turns);
 
