@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
+#include <utility>
 
 #include "dynamics/regressor.hpp"
 #include "kernel/kernel.hpp"
@@ -67,10 +70,15 @@ class TableSum {
     const auto count = static_cast<Index>(rows.size());
     for (Index done = 0; done < count; done += kTogether) {
       const Index some = std::min(kTogether, count - done), all = RigidChain::padded(some);
+      const Index first = rows[static_cast<std::size_t>(done)];
+      const bool in_a_row = rows[static_cast<std::size_t>(done + some - 1)] == first + some - 1;
       for (Index c = 0; c < table.cols(); ++c) {
         const double* const from = table.col(c).data();
         double* const to = rows_.col(c).data();
-        for (Index i = 0; i < some; ++i) to[i] = from[rows[static_cast<std::size_t>(done + i)]];
+        if (in_a_row)
+          std::copy_n(from + first, some, to);
+        else
+          for (Index i = 0; i < some; ++i) to[i] = from[rows[static_cast<std::size_t>(done + i)]];
       }
       rows_.middleRows(some, all - some).setZero();
       kernel::functions().gram_add(rows_.data(), kTogether, static_cast<int>(table.cols()), static_cast<int>(all),
@@ -136,6 +144,7 @@ DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design)
   for (const std::vector<int>& columns : by_joint_) numbers += static_cast<double>(columns.size() + 1);
   const Index rows = tiles.kept_rows();
   if (rows >= 0 && sizeof(double) * numbers * static_cast<double>(rows) < kMostKept) kept_.resize(tiles.kept_tiles());
+  stale_.resize(kept_.size(), 0);
   for (const TorqueTerm& term : design.terms) {
     needs_rigid_ = needs_rigid_ || (term.link_parameter < 0 && term.needs_rigid);
     needs_torque_ = needs_torque_ || term.needs_torque;
@@ -148,22 +157,28 @@ const std::vector<MatrixXd>& DesignColumns::links_of(Tile* tile, std::vector<Mat
   return place;
 }
 
-void DesignColumns::fill(Tile* tile, bool that_need_torque, Tables* tables) const {
+void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&)>& wanted, Tables* tables) const {
   if (needs_rigid_) fill_rigid(&tile->motion);
-  const bool any_link = !that_need_torque && std::any_of(design_.terms.begin(), design_.terms.end(),
-                                                         [](const TorqueTerm& t) { return t.link_parameter >= 0; });
   std::vector<MatrixXd> made;
-  const std::vector<MatrixXd>& links = any_link ? links_of(tile, &made) : made;
   std::vector<Index> next(by_joint_.size(), 0);
+  std::map<std::string, std::pair<std::size_t, Index>> made_already;  // by TorqueTerm::column: joint and place
   for (const TorqueTerm& term : design_.terms) {
-    const bool of_link = term.link_parameter >= 0, wanted = term.needs_torque == that_need_torque;
-    const MatrixXd values = of_link || !wanted ? MatrixXd() : term.basis(tile->motion);
+    const bool of_link = term.link_parameter >= 0, now = wanted(term);
+    const auto same = term.column.empty() ? made_already.end() : made_already.find(term.column);
+    const bool copied = same != made_already.end();
+    const MatrixXd values = of_link || copied || !now ? MatrixXd() : term.basis(tile->motion);
     for (std::size_t k = 0; k < term.joints.size(); ++k) {
       const std::size_t j = term.joints[k];
-      auto out = (*tables)[j].col(next[j]++);
-      if (!wanted) continue;
+      const Index place = next[j]++;
+      auto out = (*tables)[j].col(place);
+      if (!now) continue;
+      if (copied) {
+        out = (*tables)[same->second.first].col(same->second.second);
+        continue;
+      }
+      if (k == 0 && !term.column.empty()) made_already.try_emplace(term.column, j, place);
       if (of_link)
-        out = links[j].col(place_of(chain_, j, term.link_parameter));
+        out = links_of(tile, &made)[j].col(place_of(chain_, j, term.link_parameter));
       else
         tile->own_rows(values.col(static_cast<Index>(k)).data(), out.data());
     }
@@ -177,11 +192,17 @@ void DesignColumns::use(Tile* tile, bool with_torque, const std::function<void(T
   if (tables.empty()) {
     for (const std::vector<int>& columns : by_joint_)
       tables.emplace_back(tile->count, static_cast<Index>(columns.size()) + 1);
-    fill(tile, false, &tables);
+    fill(tile, [](const TorqueTerm& term) { return !term.needs_torque; }, &tables);
+  } else if (stale_[tile->number] != 0) {
+    const auto turns = [](const TorqueTerm& t) { return t.needs_direction && !t.needs_torque && t.link_parameter < 0; };
+    fill(tile, turns, &tables);
   }
-  if (with_torque) fill(tile, true, &tables);
+  if (!kept_.empty()) stale_[tile->number] = 0;
+  if (with_torque && needs_torque_) fill(tile, [](const TorqueTerm& term) { return term.needs_torque; }, &tables);
   use(tables);
 }
+
+void DesignColumns::turned() { std::fill(stale_.begin(), stale_.end(), 1); }
 
 TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
                       const Folds& folds) {

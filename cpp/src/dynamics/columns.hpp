@@ -30,9 +30,11 @@ class DesignColumns {
 
   /// Calls use(tables) of a tile. Columns that need a torque are there if `with_torque`, by Motion::torque.
   void use(Tile* tile, bool with_torque, const std::function<void(Tables&)>& use) const;
+  /// Friction turns otherwise now: columns that look at the direction are made anew.
+  void turned();
 
  private:
-  void fill(Tile* tile, bool that_need_torque, Tables* tables) const;
+  void fill(Tile* tile, const std::function<bool(const TorqueTerm&)>& wanted, Tables* tables) const;
   /// The filtered columns of the links, kept with the tile where tables are.
   const std::vector<Eigen::MatrixXd>& links_of(Tile* tile, std::vector<Eigen::MatrixXd>* made) const;
 
@@ -42,6 +44,7 @@ class DesignColumns {
   std::vector<std::vector<int>> by_joint_;
   bool needs_rigid_ = false, needs_torque_ = false;
   mutable std::vector<Tables> kept_;  ///< by tile; empty: not yet made
+  mutable std::vector<char> stale_;   ///< by tile: turned() since
 };
 
 /// What a fit of all columns leaves of the torque that `subtracted` leaves, in rows that these folds have, those at

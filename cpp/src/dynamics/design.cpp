@@ -59,6 +59,7 @@ struct FreeInput {
   std::function<VectorXd(const Motion&)> value;
   bool times_direction = false;
   bool narrow = false;  ///< what it drives may be narrow: a detent, a resonance, some seconds
+  std::string same{};   ///< the same at all joints that have an input of this name
 };
 
 constexpr int kKnots = 8;
@@ -88,6 +89,8 @@ void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, int
     term.joints = {joint};
     term.needs_torque = input.needs_torque;
     term.needs_rigid = false;
+    term.needs_direction = input.times_direction;
+    if (!input.same.empty()) term.column = input.same + "." + std::to_string(k) + "." + std::to_string(knots);
     term.prior = prior;
     term.basis = [input, k, knots, joint](const Motion& m) -> MatrixXd {
       Eigen::ArrayXd out = hat(input.value(m), k, knots, input.low, input.high);
@@ -139,7 +142,8 @@ std::vector<FreeInput> inputs_at(std::size_t joint, const Robot& robot, const Mo
     const std::string name = k == j ? "angle" : "angle " + driven_name(robot, static_cast<std::size_t>(k));
     for (const bool times_direction : {false, true})
       out.push_back({name, range.lower[k], range.upper[k], false,
-                     [k](const Motion& m) -> VectorXd { return m.q.col(k); }, times_direction, k == j});
+                     [k](const Motion& m) -> VectorXd { return m.q.col(k); }, times_direction, k == j,
+                     times_direction ? "" : "angle " + std::to_string(k)});
   }
   out.push_back({"speed", -range.speed[j], range.speed[j], false,
                  [j](const Motion& m) -> VectorXd { return m.qd.col(j); }, false, true});
@@ -147,11 +151,12 @@ std::vector<FreeInput> inputs_at(std::size_t joint, const Robot& robot, const Mo
   out.push_back({"load", -torque, torque, true, load, true});
   if (range.duration >= kShortest)
     out.push_back(
-        {"time", 0.0, range.duration, false, [](const Motion& m) -> VectorXd { return m.time; }, false, true});
+        {"time", 0.0, range.duration, false, [](const Motion& m) -> VectorXd { return m.time; }, false, true, "time"});
   for (const auto& [name, bounds] : range.columns) {
     if (name == "enabled" || is_of_payload(name) || !(bounds.second > bounds.first)) continue;
     out.push_back({name, bounds.first, bounds.second, false,
-                   [name = name](const Motion& m) -> VectorXd { return m.columns.at(name); }});
+                   [name = name](const Motion& m) -> VectorXd { return m.columns.at(name); }, false, false,
+                   "column " + name});
   }
   return out;
 }

@@ -84,18 +84,41 @@ TorqueDesign part_of(const TorqueDesign& whole, const std::vector<int>& nuisance
   return out;
 }
 
-/// Errors by joint of everything chosen, fitted with the turns that are set. `seen`: the model whose torque some terms
-/// need.
-std::vector<double> errors_with_turns(const Problem& problem, const TorqueDesign& whole, Choice choice,
-                                      const TorqueModel& seen, const std::vector<Noise>& noise) {
-  const TorqueDesign design = part_of(whole, standard_columns(whole), &choice);
-  const TorqueGrams grams = sum_grams(DesignColumns(problem.tiles, design), problem.nominal,
-                                      seen.turning(problem.range.turns), problem.train);
-  const Sums sums = sums_of(grams, noise, design, inertial_columns(design));
-  std::vector<int> columns(design.terms.size());
-  std::iota(columns.begin(), columns.end(), 0);
-  return rms_of(problem, problem.nominal.with(valued(design, fit_of(sums, columns))));
-}
+/// Everything chosen, fitted again with other turns.
+class Refit {
+ public:
+  /// `seen`: the model whose torque some terms need.
+  Refit(const Problem& problem, const TorqueDesign& whole, const Choice& choice, const TorqueModel& seen,
+        const std::vector<Noise>& noise)
+      : problem_(problem),
+        seen_(seen),
+        noise_(noise),
+        design_(part(whole, choice)),
+        table_(problem.tiles, design_),
+        columns_(design_.terms.size()) {
+    std::iota(columns_.begin(), columns_.end(), 0);
+  }
+
+  /// Errors by joint with the turns that are set.
+  std::vector<double> errors() {
+    table_.turned();
+    const TorqueGrams grams = sum_grams(table_, problem_.nominal, seen_.turning(problem_.range.turns), problem_.train);
+    const Fit fit = fit_of(sums_of(grams, noise_, design_, inertial_columns(design_)), columns_);
+    return rms_of(problem_, problem_.nominal.with(valued(design_, fit)));
+  }
+
+ private:
+  static TorqueDesign part(const TorqueDesign& whole, Choice choice) {
+    return part_of(whole, standard_columns(whole), &choice);
+  }
+
+  const Problem& problem_;
+  const TorqueModel& seen_;
+  const std::vector<Noise>& noise_;
+  TorqueDesign design_;
+  DesignColumns table_;
+  std::vector<int> columns_;
+};
 
 bool same(const std::vector<FrictionTurn>& a, const std::vector<FrictionTurn>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const FrictionTurn& one, const FrictionTurn& other) {
@@ -225,10 +248,11 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   for (int round = 0; round < 2; ++round) {
     if (round > 0 && !problem.fitted_before) {
       const std::vector<FrictionTurn> before = problem.range.turns;
-      choose_turns(&problem, [&] { return errors_with_turns(problem, *design, choice, model, noise); });
+      Refit refit(problem, *design, choice, model, noise);
+      choose_turns(&problem, [&] { return refit.errors(); });
       if (!same(problem.range.turns, before)) {
         *design = whole_design(problem, options);  // of the same groups
-        columns = std::make_unique<DesignColumns>(problem.tiles, *design);
+        columns->turned();
         model = model.turning(problem.range.turns);
       }
     }

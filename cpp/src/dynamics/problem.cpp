@@ -414,23 +414,6 @@ Groundwork fitted_groundwork(const Problem& problem, const TorqueDesign& design,
   return {design, std::move(sums), std::move(fit), std::move(model), std::move(noise)};
 }
 
-Groundwork fitted_groundwork(const Problem& problem) {
-  TorqueDesign design = standard_design(problem);
-  if (problem.fitted_before) {
-    const std::vector<Noise> noise = noise_of(problem.tiles, problem.nominal, problem.train);
-    return {std::move(design), {}, {}, problem.nominal, noise};
-  }
-  return fitted_groundwork(problem, design, DesignColumns(problem.tiles, design));
-}
-
-/// Errors by joint that the groundwork leaves with the turns that are set.
-std::vector<double> errors_of_groundwork(const Problem& problem) {
-  const TorqueDesign design = standard_design(problem);
-  const DesignColumns table(problem.tiles, design);
-  const Groundwork groundwork = fitted_groundwork(problem, design, table);
-  return rms_of(table, problem.nominal, by_column(design, groundwork.fit), problem.train);
-}
-
 }  // namespace
 
 std::vector<Parameter> parameters_of(const TorqueDesign& design, const std::vector<int>& columns, const Fit& fit) {
@@ -623,8 +606,21 @@ void choose_turns(Problem* problem, const std::function<std::vector<double>()>& 
 }
 
 Groundwork groundwork_of(Problem* problem) {
-  if (!problem->fitted_before) choose_turns(problem, [&] { return errors_of_groundwork(*problem); });
-  return fitted_groundwork(*problem);
+  if (problem->fitted_before) {
+    const std::vector<Noise> noise = noise_of(problem->tiles, problem->nominal, problem->train);
+    return {standard_design(*problem), {}, {}, problem->nominal, noise};
+  }
+  TorqueDesign design = standard_design(*problem);
+  DesignColumns table(problem->tiles, design);
+  choose_turns(problem, [&] {
+    design = standard_design(*problem);  // of the same columns
+    table.turned();
+    const Groundwork groundwork = fitted_groundwork(*problem, design, table);
+    return rms_of(table, problem->nominal, by_column(design, groundwork.fit), problem->train);
+  });
+  design = standard_design(*problem);
+  table.turned();
+  return fitted_groundwork(*problem, design, table);
 }
 
 }  // namespace truing::dynamics

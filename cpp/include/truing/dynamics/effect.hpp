@@ -50,7 +50,11 @@ struct TorqueTerm {
   bool needs_torque = false;  ///< the basis depends on Motion::torque
   /// The recordings show too little of it to name it, but it may stand for what they show.
   bool only_alternative = false;
-  bool needs_rigid = true;  ///< the basis may look at Motion::rigid
+  bool needs_rigid = true;      ///< the basis may look at Motion::rigid
+  bool needs_direction = true;  ///< the basis may look at Motion::direction
+  /// Terms of one joint each that have the same name here have the same basis: it is evaluated once. Empty: no other
+  /// has it.
+  std::string column{};
   /// The basis is this column of Motion::rigid at `joints`: number of an inertial parameter, 10 * link + part; -1: it
   /// is none of them. Then it is not called.
   int link_parameter = -1;

@@ -129,6 +129,11 @@ TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, d
   return term;
 }
 
+TorqueTerm undirected(TorqueTerm term) {
+  term.needs_direction = false;
+  return term;
+}
+
 TorqueTerm within(TorqueTerm term, double least, double most) {
   term.least = least;
   term.most = most;

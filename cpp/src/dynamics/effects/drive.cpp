@@ -16,9 +16,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 std::vector<TorqueForm> current_offset(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  return {{term_at(joint, parameter_name("current_offset", robot, joint), torque_unit(robot, joint),
-                   0.3 * std::max(range.torque[static_cast<Index>(joint)], 1e-3),
-                   [](const Motion& m) -> ArrayXd { return ArrayXd::Ones(m.rows()); })}};
+  return {{undirected(term_at(joint, parameter_name("current_offset", robot, joint), torque_unit(robot, joint),
+                              0.3 * std::max(range.torque[static_cast<Index>(joint)], 1e-3),
+                              [](const Motion& m) -> ArrayXd { return ArrayXd::Ones(m.rows()); }))}};
 }
 
 std::vector<TorqueForm> motor_constant(const Robot& robot, std::size_t joint, const MotionRange&) {

@@ -45,6 +45,8 @@ TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, d
                    bool needs_torque = false);
 
 /// The same term of a parameter that machines have between these bounds.
+/// The term again, of a basis that does not look at Motion::direction.
+TorqueTerm undirected(TorqueTerm term);
 TorqueTerm within(TorqueTerm term, double least, double most = std::numeric_limits<double>::infinity());
 
 /// "coulomb.J2"

@@ -45,9 +45,9 @@ TorqueForm coulomb_with(const Robot& robot, std::size_t joint, const std::map<st
 }
 
 std::vector<TorqueForm> viscous(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  return {{term_at(joint, parameter_name("viscous", robot, joint),
-                   torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(range, joint),
-                   [joint](const Motion& m) { return speed(m, joint); })}};
+  return {{undirected(term_at(joint, parameter_name("viscous", robot, joint),
+                              torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(range, joint),
+                              [joint](const Motion& m) { return speed(m, joint); }))}};
 }
 
 // --- laws of the speed beside Coulomb's and the linear one
@@ -58,7 +58,7 @@ TorqueForm saturating_with(const Robot& robot, std::size_t joint, double v0, dou
   TorqueTerm term = term_at(joint, parameter_name(kLaw, robot, joint, "saturating"), torque_unit(robot, joint), prior,
                             [joint, v0](const Motion& m) -> ArrayXd { return (speed(m, joint) / v0).tanh(); });
   term.constants[parameter_name(kLaw, robot, joint, "v0")] = v0;
-  return {term};
+  return {undirected(std::move(term))};
 }
 
 std::vector<TorqueForm> viscous_law(const Robot& robot, std::size_t joint, const MotionRange& range) {
@@ -66,12 +66,13 @@ std::vector<TorqueForm> viscous_law(const Robot& robot, std::size_t joint, const
   const double fastest = std::max(range.speed[static_cast<Index>(joint)], kSpeedAtRest);
   const std::string unit = torque_unit(robot, joint), angle = angle_unit(robot, joint);
   std::vector<TorqueForm> out;
-  out.push_back({term_at(joint, parameter_name(kLaw, robot, joint, "quadratic"), unit + " s^2/" + angle + "^2",
-                         torque / (fastest * fastest),
-                         [joint](const Motion& m) -> ArrayXd { return speed(m, joint) * speed(m, joint).abs(); })});
-  out.push_back({term_at(joint, parameter_name(kLaw, robot, joint, "cubic"), unit + " s^3/" + angle + "^3",
-                         torque / std::pow(fastest, 3.0),
-                         [joint](const Motion& m) -> ArrayXd { return speed(m, joint).cube(); })});
+  out.push_back(
+      {undirected(term_at(joint, parameter_name(kLaw, robot, joint, "quadratic"), unit + " s^2/" + angle + "^2",
+                          torque / (fastest * fastest),
+                          [joint](const Motion& m) -> ArrayXd { return speed(m, joint) * speed(m, joint).abs(); }))});
+  out.push_back({undirected(term_at(joint, parameter_name(kLaw, robot, joint, "cubic"), unit + " s^3/" + angle + "^3",
+                                    torque / std::pow(fastest, 3.0),
+                                    [joint](const Motion& m) -> ArrayXd { return speed(m, joint).cube(); }))});
   out.push_back({term_at(
       joint, parameter_name(kLaw, robot, joint, "root"), unit + " (s/" + angle + ")^0.5", torque / std::sqrt(fastest),
       [joint](const Motion& m) -> ArrayXd { return direction(m, joint) * speed(m, joint).abs().sqrt(); })});
@@ -116,7 +117,7 @@ TorqueForm presliding_at(const Robot& robot, std::size_t joint, double x0, doubl
       joint, parameter_name("presliding", robot, joint), torque_unit(robot, joint), prior,
       [joint, x0](const Motion& m) -> ArrayXd { return stop_operator(m.q.col(static_cast<Index>(joint)), x0); });
   term.constants[parameter_name("presliding", robot, joint, "x0")] = x0;
-  return {within(std::move(term), 0.0)};
+  return {within(undirected(std::move(term)), 0.0)};
 }
 
 std::vector<TorqueForm> presliding(const Robot& robot, std::size_t joint, const MotionRange& range) {
@@ -136,9 +137,9 @@ TorqueForm presliding_with(const Robot& robot, std::size_t joint, const std::map
 // --- friction that is not a function of the speed alone
 
 std::vector<TorqueForm> asymmetric(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  return {{term_at(joint, parameter_name("asymmetric_friction", robot, joint),
-                   torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(range, joint),
-                   [joint](const Motion& m) -> ArrayXd { return speed(m, joint).abs(); })}};
+  return {{undirected(term_at(joint, parameter_name("asymmetric_friction", robot, joint),
+                              torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(range, joint),
+                              [joint](const Motion& m) -> ArrayXd { return speed(m, joint).abs(); }))}};
 }
 
 // Gears lose a part of what they carry (Hamon, Gautier and Garrec 2011).

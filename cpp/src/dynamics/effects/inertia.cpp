@@ -112,9 +112,10 @@ std::vector<TorqueForm> payload_place(const Robot& robot, std::size_t, const Mot
 std::vector<TorqueForm> armature(const Robot& robot, std::size_t joint, const MotionRange& range) {
   const auto at = static_cast<Index>(joint);
   const double prior = std::max(range.torque[at], 1e-3) / std::max(range.acceleration[at], 0.1);
-  return {{within(term_at(joint, parameter_name("armature", robot, joint), is_revolute(robot, joint) ? "kg m^2" : "kg",
-                          prior, [at](const Motion& m) -> ArrayXd { return m.qdd.col(at); }),
-                  0.0)}};
+  return {{within(
+      undirected(term_at(joint, parameter_name("armature", robot, joint), is_revolute(robot, joint) ? "kg m^2" : "kg",
+                         prior, [at](const Motion& m) -> ArrayXd { return m.qdd.col(at); })),
+      0.0)}};
 }
 
 }  // namespace

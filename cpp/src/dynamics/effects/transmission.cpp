@@ -30,11 +30,11 @@ std::vector<TorqueForm> coupling(const Robot& robot, std::size_t joint, const Mo
     const std::string unit = torque_unit(robot, joint);
     out.push_back(
         {term_at(joint, name + "coulomb", unit, torque, [other](const Motion& m) { return m.direction.col(other); }),
-         term_at(joint, name + "viscous", unit + " s/" + angle_unit(robot, k),
-                 torque / std::max(range.speed[other], 0.01),
-                 [other](const Motion& m) -> ArrayXd { return m.qd.col(other); }),
-         term_at(joint, name + "inertia", "kg m^2", torque / std::max(range.acceleration[other], 0.1),
-                 [other](const Motion& m) -> ArrayXd { return m.qdd.col(other); })});
+         undirected(term_at(joint, name + "viscous", unit + " s/" + angle_unit(robot, k),
+                            torque / std::max(range.speed[other], 0.01),
+                            [other](const Motion& m) -> ArrayXd { return m.qd.col(other); })),
+         undirected(term_at(joint, name + "inertia", "kg m^2", torque / std::max(range.acceleration[other], 0.1),
+                            [other](const Motion& m) -> ArrayXd { return m.qdd.col(other); }))});
   }
   if (out.empty()) throw Unsuited("there is no other joint");
   return out;
@@ -56,7 +56,10 @@ std::vector<TorqueForm> ripple(const Robot& robot, std::size_t joint, const Moti
                            [at, k](const Motion& m) -> ArrayXd { return (k * m.q.col(at).array()).sin(); }),
                    term_at(joint, name + ".cos" + std::to_string(k), "Nm", prior,
                            [at, k](const Motion& m) -> ArrayXd { return (k * m.q.col(at).array()).cos(); })});
-    for (TorqueTerm& term : out.back()) term.only_alternative = !seen;
+    for (TorqueTerm& term : out.back()) {
+      term.only_alternative = !seen;
+      term.needs_direction = false;
+    }
   }
   return out;
 }
@@ -64,9 +67,9 @@ std::vector<TorqueForm> ripple(const Robot& robot, std::size_t joint, const Moti
 std::vector<TorqueForm> spring(const Robot& robot, std::size_t joint, const MotionRange& range) {
   const auto at = static_cast<Index>(joint);
   const double travel = std::max(range.upper[at] - range.lower[at], 1e-3);
-  return {{term_at(joint, parameter_name("spring", robot, joint),
-                   torque_unit(robot, joint) + "/" + angle_unit(robot, joint), torque_prior(range, joint) / travel,
-                   [at](const Motion& m) -> ArrayXd { return m.q.col(at); })}};
+  return {{undirected(
+      term_at(joint, parameter_name("spring", robot, joint), torque_unit(robot, joint) + "/" + angle_unit(robot, joint),
+              torque_prior(range, joint) / travel, [at](const Motion& m) -> ArrayXd { return m.q.col(at); }))}};
 }
 
 // --- the link is not where the motor is
@@ -141,7 +144,7 @@ std::vector<TorqueForm> tool_force(const Robot& robot, std::size_t, const Motion
     term.parameter = std::string("tool_force.") + "xyz"[axis];
     term.unit = "N";
     term.prior = prior;
-    term.needs_rigid = false;
+    term.needs_rigid = term.needs_direction = false;
     for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
     term.basis = [axis](const Motion& m) { return held_against(m, axis); };
     form.push_back(std::move(term));
