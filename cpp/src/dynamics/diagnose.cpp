@@ -181,6 +181,7 @@ std::optional<Account> of_given_inertias(const Problem& problem, const TorqueGra
   more.most = static_cast<int>(free.choice.groups.size() + problem.robot.driven_count());
   out.choice = out.search->run(free.choice, more, false);
   out.inertias_given = true;
+  out.choice = without_what_hides(out);
   if (!as_good(out.search->squares_of_folds(out.choice), free.search->squares_of_folds(free.choice))) return {};
   if (!bodies_can_do_it(problem, out)) return {};
   return out;
@@ -269,6 +270,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
       account_of(design, sums_of(grams, noise, *design, priors),
                  sums_of(held_out, noise, *design, std::vector<bool>(design->terms.size(), false)), nuisance);
   free.choice = choice;
+  free.choice = without_what_hides(free);
   const auto answer = [&](const Account& account, const TorqueModel& of_account) {
     std::vector<Noise> noise_of_functions = noise;
     const Account functions = with_functions(problem, account, of_account, limits, &noise_of_functions);

@@ -456,7 +456,48 @@ TorqueErrors errors_without_names(const Problem& problem, const Account& account
   return errors_of(problem, {{"usual", problem.nominal.with(valued(*account.design, fit))}}).front();
 }
 
+/// How sure each of a choice is.
+std::vector<double> sureness(const Account& account) {
+  const Naming naming(account);
+  std::vector<double> out;
+  for (std::size_t k = 0; k < account.choice.groups.size(); ++k) {
+    std::vector<TorqueAlternative> ignored;
+    out.push_back(naming.sure(k, &ignored));
+  }
+  return out;
+}
+
+/// Whether without number `at` another one is likely that is not so beside it.
+bool hides_another(const Account& account, const std::vector<double>& sure, std::size_t at) {
+  Account less = account;
+  less.choice = Search::without(account.choice, at);
+  const std::vector<double> then = sureness(less);
+  for (std::size_t k = 0; k < then.size(); ++k) {
+    if (sure[k < at ? k : k + 1] < kNamed && then[k] >= kNamed) return true;
+  }
+  return false;
+}
+
 }  // namespace
+
+Choice without_what_hides(Account account) {
+  for (bool changed = true; changed;) {
+    changed = false;
+    const std::vector<double> sure = sureness(account);
+    std::vector<std::size_t> unlikely;
+    for (std::size_t k = 0; k < sure.size(); ++k) {
+      if (sure[k] < kNamed) unlikely.push_back(k);
+    }
+    std::sort(unlikely.begin(), unlikely.end(), [&](std::size_t a, std::size_t b) { return sure[a] < sure[b]; });
+    for (const std::size_t at : unlikely) {
+      if (unlikely.size() < 2 || !hides_another(account, sure, at)) continue;
+      account.choice = Search::without(account.choice, at);
+      changed = true;
+      break;
+    }
+  }
+  return account.choice;
+}
 
 Choice likely_of(const Account& account) {
   const Naming naming(account);

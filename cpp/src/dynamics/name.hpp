@@ -10,6 +10,10 @@
 
 namespace truing::dynamics {
 
+/// The choice less what only hides another one: of two that do the same neither is missed, and neither would be named.
+/// The less likely one goes, if then the other is likely.
+Choice without_what_hides(Account account);
+
 /// Of an account's choice, what is likely enough to be named.
 Choice likely_of(const Account& account);
 

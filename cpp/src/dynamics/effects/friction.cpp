@@ -58,7 +58,7 @@ TorqueForm saturating_with(const Robot& robot, std::size_t joint, double v0, dou
   TorqueTerm term = term_at(joint, parameter_name(kLaw, robot, joint, "saturating"), torque_unit(robot, joint), prior,
                             [joint, v0](const Motion& m) -> ArrayXd { return (speed(m, joint) / v0).tanh(); });
   term.constants[parameter_name(kLaw, robot, joint, "v0")] = v0;
-  return {undirected(std::move(term))};
+  return {within(undirected(std::move(term)), 0.0)};  // friction that falls is Stribeck's
 }
 
 std::vector<TorqueForm> viscous_law(const Robot& robot, std::size_t joint, const MotionRange& range) {
@@ -73,9 +73,11 @@ std::vector<TorqueForm> viscous_law(const Robot& robot, std::size_t joint, const
   out.push_back({undirected(term_at(joint, parameter_name(kLaw, robot, joint, "cubic"), unit + " s^3/" + angle + "^3",
                                     torque / std::pow(fastest, 3.0),
                                     [joint](const Motion& m) -> ArrayXd { return speed(m, joint).cube(); }))});
-  out.push_back({term_at(
-      joint, parameter_name(kLaw, robot, joint, "root"), unit + " (s/" + angle + ")^0.5", torque / std::sqrt(fastest),
-      [joint](const Motion& m) -> ArrayXd { return direction(m, joint) * speed(m, joint).abs().sqrt(); })});
+  out.push_back({within(
+      term_at(joint, parameter_name(kLaw, robot, joint, "root"), unit + " (s/" + angle + ")^0.5",
+              torque / std::sqrt(fastest),
+              [joint](const Motion& m) -> ArrayXd { return direction(m, joint) * speed(m, joint).abs().sqrt(); }),
+      0.0)});
   for (const double part : {0.05, 0.15, 0.4}) out.push_back(saturating_with(robot, joint, part * fastest, torque));
   return out;
 }
@@ -97,7 +99,7 @@ TorqueForm stribeck_at(const Robot& robot, std::size_t joint, double vs, double 
 
 std::vector<TorqueForm> stribeck(const Robot& robot, std::size_t joint, const MotionRange& range) {
   std::vector<TorqueForm> out;
-  for (const double vs : {0.02, 0.05, 0.12, 0.3}) {
+  for (const double vs : {0.02, 0.05, 0.12, 0.3, 0.7}) {
     if (vs < 0.5 * range.speed[static_cast<Index>(joint)])
       out.push_back(stribeck_at(robot, joint, vs, torque_prior(range, joint)));
   }
