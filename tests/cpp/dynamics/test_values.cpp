@@ -1,0 +1,78 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include <numeric>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "dynamics/columns.hpp"
+#include "dynamics/problem.hpp"
+#include "support/swung_arm.hpp"
+
+using namespace truing;
+using namespace truing::dynamics;
+using swung::level_arm;
+using swung::measured;
+using swung::swing;
+using swung::with_friction;
+
+namespace {
+
+std::vector<Recording> recorded() {
+  std::vector<Recording> out;
+  for (int k = 0; k < 5; ++k) {
+    out.push_back(measured(with_friction(level_arm()), swing(k, 8.0), static_cast<std::uint64_t>(k), {}));
+    out.back().test = k > 2;
+  }
+  return out;
+}
+
+TorqueDesign whole(const Problem& problem) { return design_of(problem.robot, problem.range, {}, {}, true); }
+
+}  // namespace
+
+TEST_CASE("values with each joint's own columns eliminated are those of one fit of all columns") {
+  const std::vector<Recording> recordings = recorded();
+  Problem problem(level_arm(), recordings, {});
+  const TorqueDesign design = whole(problem);
+  const TorqueGrams grams =
+      sum_grams(DesignColumns(problem.tiles, design), problem.nominal, problem.nominal, problem.train);
+  std::vector<Noise> noise(problem.robot.driven_count());
+  for (Noise& one : noise) one.sigma = 0.1;
+
+  const auto p = design.terms.size();
+  std::vector<int> every(p);
+  std::iota(every.begin(), every.end(), 0);
+  const Fit fit = fit_of(sums_of(grams, noise, design, std::vector<bool>(p, true)), every);
+  const Eigen::VectorXd values = values_of(grams, noise, design, std::vector<bool>(p, true), 2);
+  // Columns may be nearly alike: what they do together is what is known.
+  const Gram all = sum_of_folds(*grams, noise, p);
+  const Eigen::VectorXd apart = values - fit.values;
+  CHECK(apart.dot(all.xx * apart) < 1e-8 * fit.values.dot(all.xx * fit.values));
+
+  std::vector<bool> some(p, true);
+  some[3] = false;
+  CHECK(values_of(grams, noise, design, some, 1)[3] == 0.0);
+  CHECK(values_of(grams, noise, design, some, 1) == values_of(grams, noise, design, some, 2));
+}
+
+TEST_CASE("columns kept while friction turns otherwise are those made anew") {
+  const std::vector<Recording> recordings = recorded();
+  Problem problem(level_arm(), recordings, {});
+  const TorqueDesign design = whole(problem);
+  const DesignColumns kept(problem.tiles, design);
+  const auto sums = [&](const DesignColumns& columns, const FrictionTurn& turn) {
+    const std::vector<FrictionTurn> turns(problem.robot.driven_count(), turn);
+    return sum_grams(columns, problem.nominal, problem.nominal.turning(turns), problem.train);
+  };
+  const FrictionTurn slow{0.01, 0.0}, by_travel{0.01, 1e-4};
+  sums(kept, slow);
+  DesignColumns turned = kept;
+  turned.turned();
+  const TorqueGrams again = sums(turned, by_travel), anew = sums(DesignColumns(problem.tiles, design), by_travel);
+  const TorqueGrams before = sums(kept, slow);
+  for (std::size_t j = 0; j < anew->size(); ++j) {
+    CHECK((*again)[j].folds[0].xx == (*anew)[j].folds[0].xx);
+    CHECK((*before)[j].folds[0].xx != (*anew)[j].folds[0].xx);
+  }
+}
