@@ -44,6 +44,7 @@ PYBIND11_MODULE(_core, m) {
   truing::python::bind_simulation(m);
   truing::python::bind_calibrate(m);
   truing::python::bind_rigid(m);
+  truing::python::bind_own_torque_effects(m);
   truing::python::bind_torque(m);
   truing::python::bind_torque_plan(m);
   truing::python::bind_servo(m);

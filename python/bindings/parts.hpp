@@ -13,6 +13,7 @@ void bind_measurement(py::module_& m);
 void bind_effect_traits(py::module_& m);
 void bind_effect(py::module_& m);
 void bind_motion_recording(py::module_& m);
+void bind_own_torque_effects(py::module_& m);
 void bind_torque(py::module_& m);
 void bind_torque_plan(py::module_& m);
 void bind_urdf(py::module_& m);

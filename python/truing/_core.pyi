@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'ColumnGain', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'FreeParameter', 'Frozen', 'GroupChoice', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'RowSums', 'SanityFinding', 'Scene', 'SeenColumns', 'ServoArm', 'ServoBodies', 'ServoPath', 'ServoRecording', 'ServoSet', 'ServoWindow', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueBlock', 'TorqueClass', 'TorqueColumns', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueSumOptions', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'choose_groups', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'free_parameters', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'rank_columns', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_at', 'robot_from_urdf', 'robot_with_torques', 'rotation_from_rpy', 'rpy_from_rotation', 'seen_columns', 'servo_fields', 'servo_inputs', 'simulate_servos', 'simulate_servos_apart', 'simulate_streams', 'sum_rows', 'sum_torques', 'torque_columns', 'torque_effects', 'torque_regressor', 'torques_of_bodies', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'ColumnGain', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'FreeParameter', 'Frozen', 'GroupChoice', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'Motion', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'RowSums', 'SanityFinding', 'Scene', 'SeenColumns', 'ServoArm', 'ServoBodies', 'ServoPath', 'ServoRecording', 'ServoSet', 'ServoWindow', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueBlock', 'TorqueClass', 'TorqueColumns', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueSumOptions', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'choose_groups', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'free_parameters', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'rank_columns', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_at', 'robot_from_urdf', 'robot_with_torques', 'rotation_from_rpy', 'rpy_from_rotation', 'seen_columns', 'servo_fields', 'servo_inputs', 'simulate_servos', 'simulate_servos_apart', 'simulate_streams', 'sum_rows', 'sum_torques', 'torque_columns', 'torque_effects', 'torque_regressor', 'torques_of_bodies', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -6764,6 +6764,51 @@ class InertialResult:
         """
         What to know or do.
         """
+class Motion:
+    """
+    A stretch of a recording, as the basis of an effect on torques sees it. Arrays are copies.
+    """
+    def __len__(self) -> int:
+        ...
+    def column(self, name: str) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"] | None:
+        """
+        shape=(rows,) A further column of the recording; None: it has none of this name.
+        """
+    @property
+    def direction(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(rows, joints) -1 … 1: of the motion, as dry friction knows it
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(rows, joints) [rad | m]
+        """
+    @property
+    def qd(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(rows, joints) [rad/s | m/s]
+        """
+    @property
+    def qdd(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(rows, joints) [rad/s^2 | m/s^2]
+        """
+    @property
+    def step(self) -> float:
+        """
+        [s] between rows
+        """
+    @property
+    def time(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        shape=(rows,) [s] from the start of the recording
+        """
+    @property
+    def torque(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        shape=(rows, joints) [Nm | N] that the model predicts in all, friction included
+        """
 class TorqueOptions:
     """
     How torques are fitted.
@@ -8017,13 +8062,13 @@ def distinguish(robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, n
     
     Raises InputError: unknown effects, joints or columns.
     """
-def dynamics_diagnose(robot: Robot, recordings: collections.abc.Sequence[Recording], options: TorqueDiagnoseOptions | None = None) -> TorqueDiagnosis:
+def dynamics_diagnose(robot: Robot, recordings: collections.abc.Sequence[Recording], options: TorqueDiagnoseOptions | None = None, own_effects: collections.abc.Sequence[typing.Any] = []) -> TorqueDiagnosis:
     """
     Which effects stand between a robot's model and the torques that it was recorded with.
     
     Raises InputError on recordings or options that cannot be used.
     """
-def dynamics_identify(robot: Robot, recordings: collections.abc.Sequence[Recording], options: TorqueOptions | None = None) -> TorqueFit:
+def dynamics_identify(robot: Robot, recordings: collections.abc.Sequence[Recording], options: TorqueOptions | None = None, own_effects: collections.abc.Sequence[typing.Any] = []) -> TorqueFit:
     """
     Finds inertial parameters and the effects asked for from recordings with torques or currents.
     
@@ -8036,7 +8081,7 @@ def dynamics_plan(robot: Robot, options: TorquePlanOptions | None = None, record
     recordings: looked at as well, for what they can show. Raises InputError: options, names or recordings that cannot be
     used, a robot without masses, a joint without room to move.
     """
-def dynamics_predict(robot: Robot, recording: Recording, cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0) -> TorquePrediction:
+def dynamics_predict(robot: Robot, recording: Recording, cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0, own_effects: collections.abc.Sequence[typing.Any] = []) -> TorquePrediction:
     """
     Torques of every row of a recording: links, rotors, and the effects that the robot carries.
     

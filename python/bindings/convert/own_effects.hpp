@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "convert/pybind.hpp"
+#include "truing/dynamics/effect.hpp"
 #include "truing/model/effect.hpp"
 
 namespace truing::python {
@@ -27,5 +28,7 @@ struct OwnEffect {
 std::vector<Effect> effects_from(const std::vector<OwnEffect>& own);
 /// Effects whose basis Python evaluates whenever rows are asked for: `truing.Effect` objects. Takes the GIL to do so.
 std::vector<Effect> effects_evaluated_when_asked(const std::vector<py::object>& own);
+/// The same of effects on torques: `truing.dynamics.TorqueEffect` objects.
+std::vector<TorqueEffect> torque_effects_evaluated_when_asked(const std::vector<py::object>& own);
 
 }  // namespace truing::python

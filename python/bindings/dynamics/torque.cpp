@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "convert/columns.hpp"
 #include "convert/options.hpp"
+#include "convert/own_effects.hpp"
 #include "convert/text.hpp"
 #include "parts.hpp"
 #include "repr.hpp"
@@ -149,38 +150,44 @@ void bind_torque(py::module_& m) {
   bind_torque_sums(m);
   m.def(
       "dynamics_identify",
-      [](const Robot& given_robot, const std::vector<Recording>& recordings,
-         const std::optional<TorqueOptions>& given) {
-        const TorqueOptions options = given.value_or(TorqueOptions{});
+      [](const Robot& given_robot, const std::vector<Recording>& recordings, const std::optional<TorqueOptions>& given,
+         const std::vector<py::object>& own) {
+        TorqueOptions options = given.value_or(TorqueOptions{});
+        options.own_effects = torque_effects_evaluated_when_asked(own);
         const Robot robot = given_robot;
         const py::gil_scoped_release unlocked;
         return dynamics::identify(robot, recordings, options);
       },
       py::arg("robot"), py::arg("recordings"), py::arg("options") = py::none(),
+      py::arg("own_effects") = std::vector<py::object>{},
       R"(Finds inertial parameters and the effects asked for from recordings with torques or currents.
 
 Raises InputError on recordings or options that cannot be used.)");
   m.def(
       "dynamics_diagnose",
       [](const Robot& given_robot, const std::vector<Recording>& recordings,
-         const std::optional<TorqueDiagnoseOptions>& given) {
-        const TorqueDiagnoseOptions options = given.value_or(TorqueDiagnoseOptions{});
+         const std::optional<TorqueDiagnoseOptions>& given, const std::vector<py::object>& own) {
+        TorqueDiagnoseOptions options = given.value_or(TorqueDiagnoseOptions{});
+        options.own_effects = torque_effects_evaluated_when_asked(own);
         const Robot robot = given_robot;
         const py::gil_scoped_release unlocked;
         return dynamics::diagnose(robot, recordings, options);
       },
       py::arg("robot"), py::arg("recordings"), py::arg("options") = py::none(),
+      py::arg("own_effects") = std::vector<py::object>{},
       R"(Which effects stand between a robot's model and the torques that it was recorded with.
 
 Raises InputError on recordings or options that cannot be used.)");
   m.def(
       "dynamics_predict",
-      [](const Robot& given_robot, const Recording& recording, double cutoff) {
+      [](const Robot& given_robot, const Recording& recording, double cutoff, const std::vector<py::object>& own) {
         const Robot robot = given_robot;
+        const std::vector<TorqueEffect> effects = torque_effects_evaluated_when_asked(own);
         const py::gil_scoped_release unlocked;
-        return dynamics::predict(robot, recording, cutoff);
+        return dynamics::predict(robot, recording, cutoff, effects);
       },
       py::arg("robot"), py::arg("recording"), py::arg("cutoff") = kUsualCutoff,
+      py::arg("own_effects") = std::vector<py::object>{},
       R"(Torques of every row of a recording: links, rotors, and the effects that the robot carries.
 
 Raises InputError on a recording that cannot be used.)");

@@ -39,6 +39,7 @@ from truing.dynamics.api import (
 )
 from truing.dynamics.comparison import compare as compare
 from truing.dynamics.diagnosing import diagnose as diagnose
+from truing.dynamics.own_effects import MotionInputs as MotionInputs, TorqueEffect as TorqueEffect
 from truing.dynamics.rollout import rollout as rollout
 from truing.dynamics.sanity import (
     CheckedRecordings as CheckedRecordings,

@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from truing import _core
 from truing._core import Recording, Robot, TorqueDiagnosis, TorqueFit, TorquePlan, TorquePrediction
-from truing.effects import Effect, Effects, parse_effects
+from truing.dynamics.own_effects import TorqueEffect, own_torque_effects
+from truing.effects import Effect, EffectLike, parse_effects
 from truing.errors import InputError
 from truing.keywords import made, takes
 from truing.report.notebook import shown
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
     from truing._keywords import TorqueDiagnoseKeywords, TorqueKeywords, TorquePlanKeywords
 
+
+TorqueEffects: TypeAlias = EffectLike | TorqueEffect | Iterable[EffectLike | TorqueEffect]
 
 PAYLOAD_COLUMNS = ("payload_kg", "payload_x_m", "payload_y_m", "payload_z_m")
 
@@ -33,16 +36,27 @@ def identify(robot: Robot, recordings: Sequence[Recording], **options: Unpack[To
 
     robot: with masses, centres of mass and inertias of its links. recordings: see `load_recordings`; those
     marked as test are held out.
-    options: fields of `TorqueOptions`. `effects` may be one text, as above; without it armature, Coulomb and
-    viscous friction and an offset are fitted at every joint.
+    options: fields of `TorqueOptions`. `effects` may be one text, as above, and hold own effects
+    (`TorqueEffect`); without it armature, Coulomb and viscous friction and an offset are fitted at every
+    joint.
 
     Raises InputError on recordings or options that cannot be used.
     """
-    fit = made(_core.TorqueOptions, {**options, "effects": requests(options.get("effects", ()))})
-    return _core.dynamics_identify(robot, list(recordings), fit)
+    effects: TorqueEffects = options.get("effects", ())
+    items = [effects] if isinstance(effects, str | _core.EffectRequest | Effect | TorqueEffect) else effects
+    asked: list[_core.EffectRequest] = []
+    own: list[TorqueEffect] = []
+    for item in items:
+        if isinstance(item, TorqueEffect):
+            own.append(item)
+            asked.append(item.request(robot))
+        else:
+            asked += requests(item)
+    fit = made(_core.TorqueOptions, {**options, "effects": asked})
+    return _core.dynamics_identify(robot, list(recordings), fit, own)
 
 
-def requests(effects: Effects) -> list[_core.EffectRequest]:
+def requests(effects: EffectLike | Iterable[EffectLike]) -> list[_core.EffectRequest]:
     """Effects asked for, also as one text: "coulomb,load_friction:J2+J3". Raises InputError."""
     if isinstance(effects, str):
         return parse_effects(effects) if effects.strip() else []
@@ -58,7 +72,11 @@ def requests(effects: Effects) -> list[_core.EffectRequest]:
 
 @takes(_core.TorqueDiagnoseOptions)
 def diagnose(
-    robot: Robot, recordings: Sequence[Recording], **options: Unpack[TorqueDiagnoseKeywords]
+    robot: Robot,
+    recordings: Sequence[Recording],
+    *,
+    effects: TorqueEffect | Iterable[TorqueEffect] = (),
+    **options: Unpack[TorqueDiagnoseKeywords],
 ) -> TorqueDiagnosis:
     """Find which effects stand between a robot's model and the torques that it was recorded with.
 
@@ -71,11 +89,13 @@ def diagnose(
 
     robot: with masses, centres of mass and inertias of its links. recordings: see `load_recordings`; those
     marked as test are held out.
+    effects: definitions of own effects that take part beside the catalogue's.
     options: fields of `TorqueDiagnoseOptions`. `leave_out` may be one text, "coupling,ripple".
 
     Raises InputError on recordings or options that cannot be used.
     """
-    found = _core.dynamics_diagnose(robot, list(recordings), made(_core.TorqueDiagnoseOptions, options))
+    chosen = made(_core.TorqueDiagnoseOptions, options)
+    found = _core.dynamics_diagnose(robot, list(recordings), chosen, own_torque_effects(effects, robot))
     return shown(found, "truing.dynamics.result:diagnosis_page", len(recordings))
 
 
@@ -144,12 +164,22 @@ def markdown_table() -> str:
     return "\n".join(lines)
 
 
-def predict(robot: Robot, recording: Recording, *, cutoff: float | None = None) -> TorquePrediction:
+def predict(
+    robot: Robot,
+    recording: Recording,
+    *,
+    cutoff: float | None = None,
+    effects: TorqueEffect | Iterable[TorqueEffect] = (),
+) -> TorquePrediction:
     """Torques of every row of a recording: links, rotors, and the effects that the robot carries.
 
     cutoff: [Hz] of the low-pass without phase that the angles go through for their derivatives; None: as in
     TorqueOptions.
+    effects: definitions of the own effects that the robot carries.
 
     Raises InputError on a recording that cannot be used.
     """
-    return _core.dynamics_predict(robot, recording, **({} if cutoff is None else {"cutoff": cutoff}))
+    own = own_torque_effects(effects, robot)
+    return _core.dynamics_predict(
+        robot, recording, own_effects=own, **({} if cutoff is None else {"cutoff": cutoff})
+    )

@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from truing import _core
 from truing.dynamics import api
+from truing.dynamics.own_effects import TorqueEffect
 from truing.dynamics.servo.api import by_commands, servo_diagnose
 from truing.dynamics.servo.result import ServoDiagnosis
 from truing.errors import InputError
@@ -35,7 +36,11 @@ _SERVO_KEYWORDS = (
 
 @overload
 def diagnose(
-    robot: Robot, recordings: Sequence[Recording], **options: Unpack[TorqueDiagnoseKeywords]
+    robot: Robot,
+    recordings: Sequence[Recording],
+    *,
+    effects: TorqueEffect | Iterable[TorqueEffect] = (),
+    **options: Unpack[TorqueDiagnoseKeywords],
 ) -> TorqueDiagnosis: ...
 
 
@@ -47,7 +52,11 @@ def diagnose(
 
 @takes(_core.TorqueDiagnoseOptions)
 def diagnose(
-    robot: Robot | str | Path, recordings: Sequence[Recording], **options: Any
+    robot: Robot | str | Path,
+    recordings: Sequence[Recording],
+    *,
+    effects: TorqueEffect | Iterable[TorqueEffect] = (),
+    **options: Any,
 ) -> TorqueDiagnosis | ServoDiagnosis:
     """Find which effects stand between a robot's model and what was recorded of it.
 
@@ -64,13 +73,15 @@ def diagnose(
 
     robot: with masses, centres of mass and inertias of its links. recordings: see `load_recordings`; those
     marked as test are held out.
+    effects: definitions of own effects (`TorqueEffect`) that take part beside the catalogue's; not of servo
+    arms.
     options: fields of `TorqueDiagnoseOptions`. `leave_out` may be one text, "coupling,ripple".
 
     Raises InputError on recordings or options that cannot be used.
     """
     recordings = list(recordings)
     if by_commands(recordings):
-        strange = sorted(set(options) - set(_SERVO_KEYWORDS))
+        strange = sorted(set(options) - set(_SERVO_KEYWORDS)) + (["effects"] if effects else [])
         if strange:
             raise InputError(
                 f"{strange[0]} is not an option of a diagnosis from commands: expected"
@@ -78,4 +89,4 @@ def diagnose(
             )
         return servo_diagnose(robot, recordings, **options)
     given = load_robot(robot, any_tool=True) if isinstance(robot, str | Path) else robot
-    return api.diagnose(given, recordings, **options)
+    return api.diagnose(given, recordings, effects=effects, **options)
