@@ -107,10 +107,9 @@ constexpr int kPlays = 6;  ///< stop operators, up to 1.5 standard deviations of
 
 /// Hysteresis of the load as a sum of stop operators (Prandtl 1928; Ishlinskii 1944): a frame, or a gear, that gives
 /// way and stays. Its curve is the weight of every width.
-/// The load is the whole torque, or that of the links alone: a frame behind the gear does not feel its friction, which
-/// is most of the torque at a wrist.
-void add_memory(std::size_t joint, bool of_links, const Robot& robot, double torque, double prior,
-                TorqueDesign* design) {
+/// The load is that of the links: a frame behind the gear does not feel its friction, which is most of the torque at a
+/// wrist, and whose turn would look like a memory.
+void add_memory(std::size_t joint, const Robot& robot, double torque, double prior, TorqueDesign* design) {
   TorqueGroup group;
   group.joints = {robot.joints[robot.driven_joints()[joint]].name};
   group.joint = static_cast<int>(joint);
@@ -119,14 +118,13 @@ void add_memory(std::size_t joint, bool of_links, const Robot& robot, double tor
   if (!(width > 0.0)) return;
   for (int k = 1; k <= kPlays; ++k) {
     TorqueTerm term;
-    term.parameter = "free." + group.joints.front() + (of_links ? ".links" : ".load") + ".past." + std::to_string(k);
+    term.parameter = "free." + group.joints.front() + ".load.past." + std::to_string(k);
     term.unit = "Nm";
     term.joints = {joint};
-    term.needs_torque = !of_links;
     term.needs_rigid = term.needs_direction = false;
     term.prior = prior;
-    term.basis = [joint, of_links, x0 = k * width](const Motion& m) -> MatrixXd {
-      return stop_operator((of_links ? m.links : m.torque).col(static_cast<Index>(joint)), x0);
+    term.basis = [joint, x0 = k * width](const Motion& m) -> MatrixXd {
+      return stop_operator(m.links.col(static_cast<Index>(joint)), x0);
     };
     group.columns.push_back(static_cast<int>(design->terms.size()));
     design->terms.push_back(std::move(term));
@@ -250,8 +248,7 @@ void add_free_functions(const Robot& robot, const MotionRange& range, TorqueDesi
       add_free(input, j, robot, kKnots, prior, design);
       if (input.narrow) add_free(input, j, robot, kNarrowKnots, prior, design);
     }
-    for (const bool of_links : {false, true})
-      add_memory(j, of_links, robot, range.torque[static_cast<Index>(j)], prior, design);
+    add_memory(j, robot, range.torque[static_cast<Index>(j)], prior, design);
   }
 }
 
