@@ -66,6 +66,7 @@ class Builder {
       if (is_searched(effect) && !left_out(effect.name)) add_effect(effect, task_.options.own_effects);
     }
     drifts();
+    warmth_over_time();
     law_tests();
     return std::move(out_);
   }
@@ -318,6 +319,62 @@ class Builder {
     add(std::move(e), {});
   }
 
+  /// Where no temperature was recorded, what follows it is a function of time: all lengths that grow together, which
+  /// nothing else does, by name; a joint's zero, which other things move as well, as a function that is unknown.
+  void warmth_over_time() {
+    const int time = time_index();
+    if (task_.data.temperature || time < 0) return;
+    for (const Effect& effect : catalogue()) {
+      if (effect.traits.driver != Driver::temperature || !is_searched(effect) || left_out(effect.name)) continue;
+      if (effect.traits.law_test == LawTest::times_the_lengths) add_growths(effect.name, time);
+      if (effect.traits.law_test == LawTest::of_driver) add_moving_zeros(effect.name, time);
+    }
+  }
+
+  void add_growths(const std::string& effect, int time) {
+    std::vector<std::string> every;
+    for (const Joint& joint : task_.at.joints) every.push_back(joint.name);
+    add_growth(effect, {}, every, time);
+    for (const std::string& joint : every) add_growth(effect, {joint}, {joint}, time);
+  }
+
+  /// A candidate that is one function of time, with a few knots and with more of them.
+  void add_over_time(const Explanation& what, const std::string& prefix) {
+    for (const int most : {kDriftKnots[0], kDriftKnots[1]}) {
+      Explanation e = what;
+      e.knots = {knots_of(task_.inputs[static_cast<std::size_t>(e.inputs[0])], task_.rows, most)};
+      const std::size_t count = e.knots[0].size();
+      const bool no_finer = most > kDriftKnots[0] && static_cast<int>(count) < most;
+      if (count < 4 || no_finer || static_cast<int>(count) > most_parameters()) return;
+      for (std::size_t k = 0; k < count; ++k)
+        e.parameters.push_back(prefix + "_" + std::to_string(count) + "." + std::to_string(k + 1));
+      add(std::move(e), {});
+    }
+  }
+
+  /// The lengths of some links times one function of time, which is zero at first: what was wrong then is geometry.
+  void add_growth(const std::string& effect, const std::vector<std::string>& joints,
+                  const std::vector<std::string>& links, int time) {
+    const bool any_length = std::any_of(
+        links.begin(), links.end(), [&](const std::string& link) { return !lengths_of_link(task_.at, link).empty(); });
+    if (!any_length) return;
+    Explanation e = wandering(effect, "", time, {});
+    e.joints = joints;
+    e.law_test = LawTest::times_the_lengths;
+    e.note = "no temperature was recorded: lengths grow together, a free function of " + time_in_words(e);
+    add_over_time(e, effect + (joints.empty() ? "" : "." + joints[0]) + ".of_" + e.driver);
+  }
+
+  void add_moving_zeros(const std::string& effect, int time) {
+    for (const Joint& joint : task_.at.joints) {
+      if (joint.passive()) continue;
+      Explanation e = wandering(effect, joint.name, time, {});
+      e.kind = Explanation::Kind::free;
+      e.joints = {joint.name};
+      add_over_time(e, "free." + joint.name + "." + e.driver);
+    }
+  }
+
   /// Corrections of the laws of effects at joints, to be asked for once the effect itself is in.
   void law_tests() {
     for (std::size_t joint = 0; joint < task_.at.joints.size(); ++joint) {
@@ -388,6 +445,28 @@ Candidates make_candidates(const DesignTask& task) {
 
 bool is_left_out(const DiagnoseOptions& options, const std::string& effect) {
   return std::find(options.leave_out.begin(), options.leave_out.end(), effect) != options.leave_out.end();
+}
+
+std::vector<std::pair<std::string, double>> lengths_of_link(const Robot& robot, const std::string& joint) {
+  const Joint& link = robot.joints[robot.joint_index(joint)];
+  const Eigen::Vector3d origin = link.T_parent_joint.translation();
+  const std::pair<const char*, double> lengths[5] = {
+      {"a", link.a}, {"d", link.d}, {"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
+  std::vector<std::pair<std::string, double>> out;
+  for (const auto& [value, length] : lengths) {
+    if ((value[0] >= 'x') == (robot.convention == Convention::urdf) && length != 0.0)
+      out.push_back({joint + "." + value, length});
+  }
+  return out;
+}
+
+std::vector<std::pair<std::string, double>> lengths_that_grow(const Robot& robot, const Explanation& e) {
+  std::vector<std::pair<std::string, double>> out;
+  for (const Joint& joint : robot.joints) {
+    if (!e.joints.empty() && std::find(e.joints.begin(), e.joints.end(), joint.name) == e.joints.end()) continue;
+    for (auto& length : lengths_of_link(robot, joint.name)) out.push_back(std::move(length));
+  }
+  return out;
 }
 
 std::vector<std::string> frame_coordinates(const std::string& site) {

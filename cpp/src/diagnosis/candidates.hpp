@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/inputs.hpp"
@@ -18,6 +19,8 @@ namespace truing::diagnosis {
 
 /// Coordinates of a frame, in the order of its columns.
 constexpr const char* kFrame[6] = {"x", "y", "z", "rx", "ry", "rz"};
+/// In place of an effect's name: a function of what was recorded, and of no known cause.
+constexpr const char* kNoEffect = "free";
 
 /// One candidate, as the user reads it and as `identify` is asked for it.
 struct Explanation {
@@ -38,6 +41,11 @@ struct Explanation {
   std::vector<std::vector<double>> knots;
   LawTest law_test = LawTest::of_driver;  ///< kind law: which function its columns are
 };
+
+/// A candidate that is a free function of time from the start, be it named or not.
+inline bool is_over_time(const Explanation& e) {
+  return e.kind == Explanation::Kind::drift || (e.kind == Explanation::Kind::free && e.effect != kNoEffect);
+}
 
 struct Candidates {
   std::vector<Explanation> named;  ///< parallel to `groups`
@@ -64,6 +72,12 @@ Candidates make_candidates(const DesignTask& task);
 
 /// True when the effect is not to be considered, by name.
 bool is_left_out(const DiagnoseOptions& options, const std::string& effect);
+
+/// Lengths of a link that its convention has, and the sites that they are values of [m].
+std::vector<std::pair<std::string, double>> lengths_of_link(const Robot& robot, const std::string& joint);
+
+/// Of LawTest::times_the_lengths: the lengths of its joints' links, of every link where it names none.
+std::vector<std::pair<std::string, double>> lengths_that_grow(const Robot& robot, const Explanation& e);
 
 /// Coordinates of a frame that wanders: "base.xyz" -> base.x, base.y, base.z; "base" and "base.xyzrxryrz" -> all six; a
 /// joint -> none.

@@ -115,7 +115,7 @@ Shortlist shortlist(const Work& work, const std::vector<int>& also) {
     const Explanation& e = work.design.candidates.named[g];
     const bool wanted = std::find(also.begin(), also.end(), static_cast<int>(g)) != also.end();
     const bool plain =
-        e.kind == Kind::catalogue || e.kind == Kind::all_geometry || (e.kind == Kind::drift && e.knots[0].size() <= 6);
+        e.kind == Kind::catalogue || e.kind == Kind::all_geometry || (is_over_time(e) && e.knots[0].size() <= 6);
     if (groups[g].shadow || groups[g].columns.empty() || (!wanted && !plain)) continue;
     ColumnGroup group = groups[g];
     group.corrects_law_at = -1;
@@ -161,7 +161,7 @@ static int add_fine_function(Work* work, const Robot& robot, std::size_t joint, 
   }
   Explanation e;
   e.kind = Kind::free;
-  e.effect = "free";
+  e.effect = kNoEffect;
   e.site = robot.joints[joint].name;
   e.joints = {e.site};
   e.inputs = which;
@@ -390,11 +390,14 @@ static void find_gap(const Work& work, Gears* gears, Decision* out) {
   out->search.threshold = std::max(out->search.threshold, at);
 }
 
-/// What has no name, of a choice.
+/// A candidate from the start; else a function that was found on what those leave.
+static bool is_candidate(const Explanation& e) { return is_named(e) || is_over_time(e); }
+
+/// What was found on what the candidates leave, of a choice.
 static Choice without_names(const Work& work, const Choice& choice) {
   std::vector<int> names;
   for (const int g : choice.groups) {
-    if (is_named(work.design.candidates.named[static_cast<std::size_t>(g)])) names.push_back(g);
+    if (is_candidate(work.design.candidates.named[static_cast<std::size_t>(g)])) names.push_back(g);
   }
   return without_these(choice, names);
 }
@@ -547,7 +550,7 @@ static Decision explain(Work* work, const Robot& robot) {
   prefer_links_that_predict(*work, &out);
   if (out.p_gap > options.false_alarm) {
     const bool only_named = std::all_of(out.state.choice.groups.begin(), out.state.choice.groups.end(), [&](int g) {
-      return is_named(work->design.candidates.named[static_cast<std::size_t>(g)]);
+      return is_candidate(work->design.candidates.named[static_cast<std::size_t>(g)]);
     });
     if (only_named && !out.state.choice.groups.empty()) out.state = evidence_now(*work).evaluate({});
   }

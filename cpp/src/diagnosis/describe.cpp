@@ -223,7 +223,8 @@ static std::vector<Parameter> parameters_of(const Work& work, const Evidence::St
     if (e.kind == Kind::drift) continue;  // a curve, not numbers
     out.push_back(parameter);
   }
-  if (out.empty() && e.kind == Kind::catalogue) return parameters_of_search(work, state, e);
+  const bool grows = e.kind == Kind::drift && e.law_test == LawTest::times_the_lengths;
+  if (grows || (out.empty() && e.kind == Kind::catalogue)) return parameters_of_search(work, state, e);
   return out;
 }
 
@@ -262,6 +263,23 @@ static double share_alone(const Work& work, const Evidence& evidence, const Choi
   return std::max(0.0, 1.0 - held_out_squares(work.grams.test, alone.columns, alone.solution) / gap);
 }
 
+/// Why an effect was not tested for want of a column; nullptr: no column was missing.
+static const NotTestable* lacking(const Work& work, const std::string& effect) {
+  for (const NotTestable& n : work.design.candidates.not_testable) {
+    if (n.effect == effect && n.reason == Untestable::column_missing) return &n;
+  }
+  return nullptr;
+}
+
+/// Its law needs a column that is missing, and time stood in for that.
+static bool is_tried_over_time(const Work& work, const std::string& effect) {
+  const auto& named = work.design.candidates.named;
+  return std::any_of(named.begin(), named.end(),
+                     [&](const Explanation& e) { return is_over_time(e) && e.effect == effect; });
+}
+
+static std::string recorded_it_would_tell(const NotTestable& lacking) { return "record what it needs: " + lacking.why; }
+
 /// What could stand in its place by these data.
 static std::vector<Alternative> class_of(const Work& work, const Explanation& e, const Sureness& sure,
                                          double probability) {
@@ -273,8 +291,13 @@ static std::vector<Alternative> class_of(const Work& work, const Explanation& e,
   for (const Rival& rival : sure.rivals) {
     const Explanation& other = work.design.candidates.named[static_cast<std::size_t>(rival.group)];
     if (!rival.in_class || !listed_already.insert({other.effect, other.joints}).second) continue;
-    out.push_back({other.effect, other.joints, probability * std::exp(-0.5 * std::max(0.0, rival.loss)) / (1.0 + rest),
-                   separated_by(work, e, other)});
+    const NotTestable *needs = is_over_time(other) ? lacking(work, other.effect) : nullptr,
+                      *need_of_this = is_over_time(e) ? lacking(work, e.effect) : nullptr;
+    const std::string by = needs          ? recorded_it_would_tell(*needs)
+                           : need_of_this ? recorded_it_would_tell(*need_of_this)
+                                          : separated_by(work, e, other);
+    out.push_back(
+        {other.effect, other.joints, probability * std::exp(-0.5 * std::max(0.0, rival.loss)) / (1.0 + rest), by});
     if (out.size() >= kMost) break;
   }
   return out;
@@ -283,15 +306,11 @@ static std::vector<Alternative> class_of(const Work& work, const Explanation& e,
 /// What was not recorded may do the same.
 static std::vector<Alternative> untested_mimics(const Work& work, const Explanation& e) {
   std::vector<Alternative> out;
-  const std::vector<NotTestable>& untested = work.design.candidates.not_testable;
   for (const std::string& name : effect_traits(work, e).mimicked_by) {
-    const auto lacking = std::find_if(untested.begin(), untested.end(), [&](const NotTestable& n) {
-      return n.effect == name && n.reason == Untestable::column_missing;
-    });
-    if (lacking == untested.end()) continue;
+    const NotTestable* why = lacking(work, name);
+    if (!why || is_tried_over_time(work, name)) continue;
     const bool whole_robot = !find_effect(name, work.given.options.own_effects).per_joint;
-    out.push_back(
-        {name, whole_robot ? std::vector<std::string>{} : e.joints, 0.0, "record what it needs: " + lacking->why});
+    out.push_back({name, whole_robot ? std::vector<std::string>{} : e.joints, 0.0, recorded_it_would_tell(*why)});
   }
   return out;
 }
@@ -392,6 +411,18 @@ static std::vector<Curve> curves_of_function(const Work& work, const Decision& d
   return out;
 }
 
+/// "; or its zero moves with temperature, which was not recorded": of a joint that moves as time goes on.
+static std::string unrecorded_cause(const Work& work, const Explanation& e) {
+  if (e.inputs.size() != 1 || e.site == "base") return "";
+  const std::string& input = work.inputs[static_cast<std::size_t>(e.inputs[0])].name;
+  if (input != "order" && input != input_name(Driver::time, 0)) return "";
+  for (const Effect& effect : catalogue()) {
+    const bool of_joint = effect.traits.driver == Driver::temperature && effect.traits.moves == Moves::joint;
+    if (of_joint && lacking(work, effect.name)) return "; or " + plain(effect.name) + ": no temperature was recorded";
+  }
+  return "";
+}
+
 UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at) {
   const int g = decision.state.choice.groups[at];
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
@@ -417,6 +448,7 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
     for (Curve& curve : curves_of_function(work, decision, g, site)) out.curves.push_back(std::move(curve));
   }
   if (!out.curves.empty() && e.inputs.size() == 1 && e.site != "base") out.looks_like = shape_of(out.curves[0]);
+  out.looks_like += unrecorded_cause(work, e);
   if (e.inputs.size() == 2) out.looks_like = "depends on both " + out.inputs[0] + " and " + out.inputs[1];
   if (e.site == "base") out.looks_like = "the base moves as a function of " + out.inputs[0];
   return out;
@@ -459,6 +491,7 @@ std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidenc
   std::vector<Candidate> out;
   for (std::size_t g = 0; g < first.size(); ++g) {
     if (groups[g].corrects_law_at >= 0 || named[g].kind == Kind::law) continue;
+    if (is_over_time(named[g]) && effect_traits(work, named[g]).driver != Driver::time) continue;  // its own is missing
     Candidate c;
     c.effect = named[g].effect;
     c.joints = named[g].joints;

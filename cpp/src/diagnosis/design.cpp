@@ -31,20 +31,6 @@ double root_mean_square(const std::vector<double>& values, const std::vector<std
   return std::sqrt(sum / std::max<double>(1.0, static_cast<double>(rows.size())));
 }
 
-/// Lengths of a link that its convention has, and the sites that they are values of.
-std::vector<std::pair<std::string, double>> lengths_of_link(const Robot& robot, const std::string& joint) {
-  const Joint& link = robot.joints[robot.joint_index(joint)];
-  const Eigen::Vector3d origin = link.T_parent_joint.translation();
-  const std::pair<const char*, double> lengths[5] = {
-      {"a", link.a}, {"d", link.d}, {"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
-  std::vector<std::pair<std::string, double>> out;
-  for (const auto& [value, length] : lengths) {
-    if ((value[0] >= 'x') == (robot.convention == Convention::urdf) && length != 0.0)
-      out.push_back({joint + "." + value, length});
-  }
-  return out;
-}
-
 /// Approach directions of the joint that an input belongs to; absent: they were not recorded.
 Column direction_beside(const Robot& robot, const Measurements& data, const InputColumn& input) {
   const std::vector<std::size_t> driven = robot.driven_joints();
@@ -104,8 +90,11 @@ class Designer {
 
  private:
   static bool is_form(const Explanation& e) { return !e.constants.empty(); }
-  bool is_product(const Explanation& e) const { return e.kind == Kind::drift || e.kind == Kind::law || is_form(e); }
-  bool is_without_frame(const Explanation& e) const { return e.kind == Kind::drift && !content_.frame; }
+  static bool grows(const Explanation& e) { return e.law_test == LawTest::times_the_lengths; }
+  static bool is_product(const Explanation& e) {
+    return e.kind == Kind::drift || e.kind == Kind::law || e.kind == Kind::free || is_form(e);
+  }
+  bool is_without_frame(const Explanation& e) const { return e.kind == Kind::drift && !grows(e) && !content_.frame; }
 
   /// Core columns: what is always unknown, joint motions, and every parameter of a candidate.
   void choose_core() {
@@ -125,6 +114,7 @@ class Designer {
       out_.joint_column.push_back({want(model_.parameter_index(parameter_of(StandsFor::joint_offset, joint.name)))});
     for (std::size_t g = 0; g < out_.candidates.named.size(); ++g) {
       const Explanation& e = out_.candidates.named[g];
+      for (std::size_t k = 0; k < lengths_of(e).size(); ++k) want(model_.parameter_index(lengths_of(e)[k].first));
       if ((e.kind != Kind::catalogue && e.kind != Kind::all_geometry) || is_form(e)) continue;
       for (const std::string& name : e.parameters)
         out_.candidates.groups[g].columns.push_back(want(model_.parameter_index(name)));
@@ -276,7 +266,7 @@ class Designer {
       for (Eigen::Index k = 0; k < count; ++k) {
         if (columns.size() != 0) group.columns.push_back(static_cast<int>(next + k));
         out_.column_names.push_back(e.parameters[static_cast<std::size_t>(k)]);
-        out_.column_units.push_back("rad");  // a form at a joint, as well
+        out_.column_units.push_back(grows(e) ? "-" : "rad");  // a form at a joint, as well
       }
       if (columns.size() == 0)
         out_.x.middleCols(next, count).setZero();
@@ -288,13 +278,13 @@ class Designer {
 
   /// Columns of one drift or correction; none: of a target that no row measures.
   Design::Rows products(const Explanation& e) const {
+    if (grows(e)) return times_the_lengths(e);
     if (e.kind == Kind::drift) {
       std::vector<int> sites;
       for (const std::string& site : frame_coordinates(e.site)) sites.push_back(out_.column(site));
       if (std::find(sites.begin(), sites.end(), -1) != sites.end()) return {};
       return free_columns(out_, sites, task_.inputs, e.inputs, e.knots);
     }
-    if (e.law_test == LawTest::times_the_lengths) return times_the_lengths(e);
     Design::Rows columns =
         free_columns(out_, out_.joint_column[task_.at.joint_index(e.site)], task_.inputs, e.inputs, e.knots);
     if (e.law_test == LawTest::times_direction) multiply_by_direction(e, &columns);
@@ -340,10 +330,14 @@ class Designer {
     return out;
   }
 
+  std::vector<std::pair<std::string, double>> lengths_of(const Explanation& e) const {
+    return grows(e) ? lengths_that_grow(task_.at, e) : std::vector<std::pair<std::string, double>>{};
+  }
+
   Design::Rows times_the_lengths(const Explanation& e) const {
     Design::Rows columns = Design::Rows::Zero(out_.x.rows(), static_cast<Eigen::Index>(e.parameters.size()));
     bool first = true;
-    for (const auto& [site, length] : lengths_of_link(task_.at, e.site)) {
+    for (const auto& [site, length] : lengths_of(e)) {
       const int column = out_.column(site);
       if (column < 0) continue;
       const Design::Rows one = length * free_columns(out_, {column}, task_.inputs, e.inputs, e.knots);
@@ -353,6 +347,7 @@ class Designer {
         columns += one;
       first = false;
     }
+    if (e.kind == Kind::drift) columns.col(0).setZero();  // since the first pose
     return columns;
   }
 
@@ -402,8 +397,7 @@ class Designer {
 
 /// Sites that a free function acts at, and what each is multiplied by.
 std::vector<std::pair<std::string, double>> places_of(const Explanation& candidate, const Robot& robot) {
-  if (candidate.kind == Kind::law && candidate.law_test == LawTest::times_the_lengths)
-    return lengths_of_link(robot, candidate.site);
+  if (candidate.law_test == LawTest::times_the_lengths) return lengths_that_grow(robot, candidate);
   std::vector<std::pair<std::string, double>> places;
   for (const std::string& site : frame_coordinates(candidate.site)) places.push_back({site, 1.0});
   if (places.empty()) places.push_back({candidate.site, 1.0});
@@ -501,7 +495,7 @@ Effect free_effect(const Explanation& candidate, const Eigen::VectorXd& coeffici
     std::vector<Term> terms;
     for (const auto& [site, times] : places_of(candidate, of)) {
       // One function for all lengths of a link.
-      const bool shared = of_law && candidate.law_test == LawTest::times_the_lengths;
+      const bool shared = candidate.law_test == LawTest::times_the_lengths;
       Term term;
       term.parameter = parameter;
       term.unit = "-";

@@ -134,7 +134,7 @@ class TrialMaker {
   void add(const std::string& site, const std::vector<int>& columns, const std::vector<int>& which) {
     Trial trial;
     trial.what.kind = Explanation::Kind::free;
-    trial.what.effect = "free";
+    trial.what.effect = kNoEffect;
     trial.what.site = site;
     if (site != "base") trial.what.joints = {site};
     trial.what.inputs = which;

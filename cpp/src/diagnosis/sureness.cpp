@@ -67,9 +67,10 @@ class Contest {
     const Explanation& e = named_[static_cast<std::size_t>(group)];
     const ColumnGroup& columns = groups_[static_cast<std::size_t>(group)];
     const std::vector<int>& in = less_.choice.groups;
-    return group != group_ && columns.corrects_law_at < 0 && !columns.columns.empty() && e.kind != Kind::free &&
-           e.kind != Kind::drift && !same_name(e, name()) && !contains(e, name()) &&
-           std::find(in.begin(), in.end(), group) == in.end();
+    // What is a free function of time contains all that changes slowly: it is compared with its like alone.
+    const bool comparable = is_over_time(e) ? is_over_time(name()) : e.kind != Kind::free;
+    return group != group_ && columns.corrects_law_at < 0 && !columns.columns.empty() && comparable &&
+           !same_name(e, name()) && !contains(e, name()) && std::find(in.begin(), in.end(), group) == in.end();
   }
 
   Rival rival(const Evidence::Gain& gain) const {
@@ -80,7 +81,7 @@ class Contest {
     if (gain.squares > 0.5 * gained_ || (any_geometry && like_geometry_)) out.r2 = explained(gain);
     // What can make the same motion is named with it, even where the last per cents speak for one of them: no law is
     // that exact.
-    const bool comparable = any_geometry ? like_geometry_ : gain.rank <= 8;
+    const bool comparable = any_geometry ? like_geometry_ : gain.rank <= 8 || is_over_time(name());
     out.in_class = out.loss < kClassNats || (out.r2 > kClassR2 && comparable);
     return out;
   }

@@ -99,7 +99,7 @@ static std::vector<int> flexible_columns(const Design& design) {
   for (std::size_t g = 0; g < design.candidates.groups.size(); ++g) {
     const Explanation& e = design.candidates.named[g];
     const bool coarse_drift = e.kind == Kind::drift && frame_coordinates(e.site).size() == 6 && e.knots[0].size() <= 12;
-    if (e.kind == Kind::drift && !coarse_drift) continue;
+    if (is_over_time(e) && !coarse_drift) continue;
     for (const int k : design.candidates.groups[g].columns) {
       if (!in[static_cast<std::size_t>(k)]) out.push_back(k);
       in[static_cast<std::size_t>(k)] = true;

@@ -277,6 +277,125 @@ TEST_CASE("diagnose says of a cable pack and of an end stop which joint they hol
   }));
 }
 
+/// A joint that moves over time, in a shape that no candidate has: warm-up, and cooling after two thirds.
+double warmed_up(double t) {
+  const double until = 0.66, warm = 1.0 - std::exp(-std::min(t, until) / 0.2);
+  return t < until ? warm : warm * std::exp(-(t - until) / 0.15);
+}
+
+TEST_CASE("without a temperature column warm links grow by name, and the frame does not drift") {
+  const std::size_t rows = 240;
+  const auto share = [rows](const Inputs& in) { return static_cast<double>(in.row) / rows; };
+  // Every length by the same fraction: 0.3 permille at most, some 15 K of aluminium.
+  Effect grown{"grown", "", {}, false};
+  grown.terms = [share](const Robot& robot, std::size_t, const truing::Measurements&) {
+    std::vector<Term> terms;
+    for (const Joint& joint : robot.joints) {
+      for (const auto& [value, length] : {std::make_pair("a", joint.a), std::make_pair("d", joint.d)}) {
+        if (std::abs(length) < 1e-3) continue;
+        Term term;
+        term.parameter = "grown.size";
+        term.unit = "-";
+        term.site = joint.name + "." + value;
+        term.basis = [share, metres = length](const Inputs& in) { return 3e-4 * metres * warmed_up(share(in)); };
+        terms.push_back(term);
+      }
+    }
+    return terms;
+  };
+  for (const bool timed : {true, false}) {
+    auto table = measured(arm(), {grown}, rows, 1100);
+    std::vector<double> time(rows);
+    for (std::size_t row = 0; row < rows; ++row) time[row] = 20.0 * static_cast<double>(row);
+    if (timed) table->data.time = table->add(time);
+    const Diagnosis d = diagnose(arm(), table->data);
+    CAPTURE(timed);
+    INFO(names(d));
+    CHECK(is_named(d, "thermal", {}));
+    CHECK(!is_named(d, "drift", {}));
+    CHECK(d.unknown.empty());
+    CHECK(d.after.rms < 1.15 * std::sqrt(3.0) * kNoise);
+    REQUIRE(!d.effects.empty());
+    const auto largest = std::max_element(
+        d.effects[0].parameters.begin(), d.effects[0].parameters.end(),
+        [](const truing::Parameter& a, const truing::Parameter& b) { return std::abs(a.value) < std::abs(b.value); });
+    REQUIRE(largest != d.effects[0].parameters.end());
+    CHECK(largest->value == doctest::Approx(3e-4 * warmed_up(0.6)).epsilon(0.1));
+  }
+}
+
+TEST_CASE("without a temperature column a zero that moves over time is unknown, and warmth may be its cause") {
+  const std::size_t rows = 240;
+  const auto zero_of = [rows](const std::string& joint) {
+    return hidden(joint, [rows](const Inputs& in) { return 4e-4 * warmed_up(static_cast<double>(in.row) / rows); });
+  };
+  std::vector<double> time(rows);
+  for (std::size_t row = 0; row < rows; ++row) time[row] = 20.0 * static_cast<double>(row);
+  auto table = measured(arm(), {zero_of("J3")}, rows, 1110);
+  table->data.time = table->add(time);
+  const Diagnosis d = diagnose(arm(), table->data);
+  INFO(names(d));
+  CHECK(d.effects.empty());
+  REQUIRE(d.unknown.size() == 1);
+  CHECK(d.unknown[0].joint == "J3");
+  CHECK(d.unknown[0].inputs == std::vector<std::string>{"time"});
+  CHECK(d.unknown[0].looks_like.find("thermal zero") != std::string::npos);
+  // The first joint's zero is the frame's turn about its axis: which of them moved, only a temperature could tell.
+  auto first = measured(arm(), {zero_of("J1")}, rows, 1120);
+  first->data.time = first->add(time);
+  const Diagnosis of_first = diagnose(arm(), first->data);
+  INFO(names(of_first));
+  CHECK(of_first.effects.size() + of_first.unknown.size() == 1);
+}
+
+TEST_CASE("a frame that drifts while no temperature is recorded is said to drift, the robot does not grow") {
+  const std::size_t rows = 240;
+  Effect wandering{"wandering", "", {}, false};
+  wandering.terms = [rows](const Robot&, std::size_t, const truing::Measurements&) {
+    std::vector<Term> terms;
+    for (const char* site : {"base.x", "base.y", "base.rz"}) {
+      Term term;
+      term.parameter = "wandering.size";
+      term.unit = "-";
+      term.site = site;
+      term.basis = [rows](const Inputs& in) { return 3e-4 * warmed_up(static_cast<double>(in.row) / rows); };
+      terms.push_back(term);
+    }
+    return terms;
+  };
+  const auto table = measured(arm(), {wandering}, rows, 1130);
+  const Diagnosis d = diagnose(arm(), table->data);
+  INFO(names(d));
+  CHECK(is_named(d, "drift", {}));
+  CHECK(d.effects.size() == 1);
+  CHECK(d.unknown.empty());
+}
+
+/// A gas spring between the pedestal and the upper arm: its force along the line between its ends, exactly.
+double torque_of_balancer(double q) {
+  const double below = 0.35, on_arm = 0.25, turned = q + 1.9;
+  const double length = std::sqrt(below * below + on_arm * on_arm + 2.0 * below * on_arm * std::cos(turned));
+  const double force = 900.0 + 2500.0 * (0.55 - length);
+  return force * below * on_arm * std::sin(turned) / length;
+}
+
+TEST_CASE(
+    "diagnose says of a gravity balancer which joint it turns, by that joint's angle, beside the joint's spring") {
+  const auto balanced =
+      hidden("J2", [](const Inputs& in) { return 6e-6 * (in.gravity_torque[1] + torque_of_balancer(in.joints[1])); });
+  const auto heavy = [](std::size_t row) { return row % 2 ? 5.0 : 0.0; };
+  const auto table = measured(arm(), {balanced}, 240, 1140, {false, {}, heavy});
+  const Diagnosis d = diagnose(arm(), table->data);
+  INFO(names(d));
+  CHECK((is_named(d, "joint_compliance", {"J2"}) || is_named(d, "stiffness_zones", {"J2"})));
+  const bool unknown = std::any_of(d.unknown.begin(), d.unknown.end(), [](const truing::UnknownEffect& u) {
+    return u.joint == "J2" && u.inputs == std::vector<std::string>{"q2"};
+  });
+  CHECK((is_named(d, "harmonic", {"J2"}) || unknown));
+  for (const truing::FoundEffect& e : d.effects) CHECK(e.joints == std::vector<std::string>{"J2"});
+  for (const truing::UnknownEffect& u : d.unknown) CHECK(u.joint == "J2");
+}
+
 TEST_CASE("diagnose finds none of the laws of machines in noise" * doctest::skip(kSanitized)) {
   const auto warm = [](std::size_t row) { return 26.0 - 4.0 * std::cos(0.03 * static_cast<double>(row)); };
   const auto heavy = [](std::size_t row) { return row % 2 ? 3.0 : 0.0; };
