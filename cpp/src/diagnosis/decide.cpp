@@ -22,6 +22,7 @@ constexpr double kManyValues = 10.0;  ///< for each parameter of the links: no l
 constexpr double kMuchBetter = 1.05;  ///< sums of squares that are worth another choice
 constexpr double kChance = 0.05;      ///< of random signs, that a free function may have at most
 constexpr double kFreeShare = 0.04;   ///< of what is left, that a free function must explain
+constexpr double kWholly = 0.95;      ///< of a function, that a plain shape makes: then it is that shape
 
 const EffectTraits& effect_traits(const Work& work, const Explanation& e) {
   return model::traits_of(e.effect, work.given.options.own_effects);
@@ -118,7 +119,6 @@ Shortlist shortlist(const Work& work, const std::vector<int>& also) {
         e.kind == Kind::catalogue || e.kind == Kind::all_geometry || (is_over_time(e) && e.knots[0].size() <= 6);
     if (groups[g].shadow || groups[g].columns.empty() || (!wanted && !plain)) continue;
     ColumnGroup group = groups[g];
-    group.corrects_law_at = -1;
     for (int& column : group.columns) column = take(column);
     out.groups.push_back(std::move(group));
     out.which.push_back(static_cast<int>(g));
@@ -130,8 +130,8 @@ Shortlist shortlist(const Work& work, const std::vector<int>& also) {
 }
 
 /// Of the motion that a law and its correction make together, the part that the plain law must make to keep its name.
-/// What a joint does with its own angle can be anything: there the bar is higher.
-static double least_share_of_law(const EffectTraits& traits) { return follows_own_angle(traits) ? 0.92 : 0.65; }
+/// What a joint does with its own angle can be anything: there the bar is higher, and no plainer shape may do better.
+static double least_share_of_law(const EffectTraits& traits) { return follows_own_angle(traits) ? 0.75 : 0.65; }
 
 static std::vector<int> columns_of(const Work& work, const std::vector<int>& groups) {
   std::vector<int> out;
@@ -252,12 +252,27 @@ static Question question_of(const Work& work, const Robot& robot, const Choice& 
   return q;
 }
 
+/// How plain the function is where it stands alone at its joint: what of it a step, a corner or a bump would make.
+static double share_of_shape(const Work& work, const Evidence& evidence, const Evidence::State& rest,
+                             const Question& q) {
+  if (q.what.inputs.size() != 1 || q.what.law_test != LawTest::of_driver) return 0.0;
+  const Evidence::Gain gain = evidence.gain(rest, columns_of(work, {q.function}), 0.0);
+  Decision alone;
+  Choice choice = rest.choice;
+  choice.groups.push_back(q.function);
+  choice.scales.push_back(gain.scale);
+  alone.state = evidence.evaluate(choice);
+  return share_of_plain_shape(work, alone, q.function, q.joint);
+}
+
 /// The law that makes most of what the function and the laws at its joint make together; no group: none makes enough.
 static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence, const Choice& choice,
                                       const Question& q) {
   const auto& groups = work.design.candidates.groups;
   const auto& named = work.design.candidates.named;
   const Evidence::State rest = evidence.evaluate(without_these(choice, q.here));
+  const double of_shape = share_of_shape(work, evidence, rest, q);
+  const bool of_angle = q.what.inputs[0] == input_named(work, input_name(Driver::angle, q.joint));
   const double together = rest.rss - evidence.evaluate(choice).rss;
   Evidence::Gain best;
   for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -268,7 +283,10 @@ static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence
       continue;
     const Evidence::Gain gain = evidence.gain(rest, groups[g].columns, groups[g].cost);
     const double share = gain.squares / std::max(together, 1e-300);
-    if (share > least_share_of_law(effect_traits(work, e)) && gain.score > best.score) {
+    const EffectTraits& traits = effect_traits(work, e);
+    const bool plainer =
+        (of_angle ? follows_configuration(traits) : follows_own_angle(traits)) && of_shape > std::max(share, kWholly);
+    if (!plainer && share > least_share_of_law(traits) && gain.score > best.score) {
       best = gain;
       best.group = static_cast<int>(g);
     }
@@ -320,21 +338,42 @@ static bool replace_laws(Work* work, const Robot& robot, const Question& q, Deci
   return false;
 }
 
+/// The law stands, and the function is what it leaves: as large as that, and gone with the law. One such function of
+/// the same inputs will do.
+static void keep_as_correction(Work* work, const Evidence& evidence, int function, const Evidence::Gain& law,
+                               Decision* decision) {
+  std::vector<int> gone = {function};
+  for (const auto& [other, corrected] : decision->corrects) {
+    const Explanation& e = work->design.candidates.named[static_cast<std::size_t>(other)];
+    if (corrected == law.group && e.inputs == work->design.candidates.named[static_cast<std::size_t>(function)].inputs)
+      gone.push_back(other);
+  }
+  Choice choice = without_these(decision->state.choice, gone);
+  if (std::find(choice.groups.begin(), choice.groups.end(), law.group) == choice.groups.end()) {
+    choice.groups.push_back(law.group);
+    choice.scales.push_back(law.scale);
+  }
+  auto& groups = work->design.candidates.groups;
+  const Evidence::Gain left = evidence.gain(evidence.evaluate(choice), columns_of(*work, {function}), 0.0);
+  choice.groups.push_back(function);
+  choice.scales.push_back(left.scale);
+  decision->state = evidence.evaluate(choice);
+  decision->corrects[function] = law.group;
+  const int number = groups[static_cast<std::size_t>(law.group)].law_at;
+  if (number < 0) return;
+  ColumnGroup& correction = groups[static_cast<std::size_t>(function)];
+  correction.corrects_law_at = correction.law_at = number;
+}
+
 /// One function against the laws at its joint. True: the choice has changed.
 static bool question_law(Work* work, const Robot& robot, const Evidence& evidence, int function, Decision* decision) {
   const Choice& choice = decision->state.choice;
   const Question q = question_of(*work, robot, choice, function);
   const Evidence::Gain best = law_that_stands(*work, evidence, choice, q);
   if (best.group >= 0) {  // the law stands; the function corrects it
-    const bool is_in = std::find(choice.groups.begin(), choice.groups.end(), best.group) != choice.groups.end();
-    if (!is_in) {
-      Choice with = choice;
-      with.groups.push_back(best.group);
-      with.scales.push_back(best.scale);
-      decision->state = evidence.evaluate(with);
-    }
-    decision->corrects[function] = best.group;
-    return !is_in;
+    const std::size_t before = choice.groups.size();
+    keep_as_correction(work, evidence, function, best, decision);
+    return decision->state.choice.groups.size() != before;
   }
   const bool nothing_else_is_named = q.here.size() == 1 && q.what.kind == Kind::free;
   if (nothing_else_is_named || q.what.law_test == LawTest::times_the_lengths) return false;

@@ -351,9 +351,15 @@ double left_by(const Curve& curve, const std::vector<std::vector<double>>& colum
 }  // namespace
 
 std::string shape_of(const Curve& curve) {
+  constexpr double kMost = 0.75;  ///< of what a free curve explains, that a shape must explain
   if (curve.points.size() < 2 || curve.samples.size() < 8) return "";
-  const std::string unit = curve.input_unit.empty() ? "" : " " + curve.input_unit;
   if (curve.points.size() <= 3) return "different levels of " + curve.input;
+  const PlainShape best = plain_shape(curve);
+  return best.share < kMost ? "no simple shape in " + curve.input : best.text;
+}
+
+PlainShape plain_shape(const Curve& curve) {
+  const std::string unit = curve.input_unit.empty() ? "" : " " + curve.input_unit;
   const std::size_t n = curve.samples.size();
   const auto column = [&](const auto& f) {
     std::vector<double> out;
@@ -413,8 +419,7 @@ std::string shape_of(const Curve& curve) {
   const auto best = std::min_element(shapes.begin(), shapes.end(), [unit2](const Shape& a, const Shape& b) {
     return a.left / unit2 + 2.0 * a.parameters < b.left / unit2 + 2.0 * b.parameters;
   });
-  if (whole - best->left < 0.75 * (whole - noise)) return "no simple shape in " + curve.input;
-  return best->text;
+  return {best->text, (whole - best->left) / std::max(whole - noise, 1e-300)};
 }
 
 }  // namespace truing::diagnosis

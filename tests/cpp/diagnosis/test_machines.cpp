@@ -396,6 +396,41 @@ TEST_CASE(
   for (const truing::UnknownEffect& u : d.unknown) CHECK(u.joint == "J2");
 }
 
+TEST_CASE("a law that makes most of the motion keeps its name, and what it leaves is unknown at its joint") {
+  const auto is_unknown = [](const Diagnosis& d, const std::string& joint, const std::string& input) {
+    return std::any_of(d.unknown.begin(), d.unknown.end(), [&](const truing::UnknownEffect& u) {
+      return u.joint == joint && u.inputs == std::vector<std::string>{input};
+    });
+  };
+  const auto eccentric = hidden("J4", [](const Inputs& in) {  // three lobes beside: 15 % of the square
+    return 5e-4 * (std::cos(in.joints[3] + 0.4) + 0.42 * std::cos(3.0 * in.joints[3] + 1.0));
+  });
+  const auto turned = measured(arm(), {eccentric}, 300, 1200);
+  const Diagnosis d = diagnose(arm(), turned->data);
+  INFO(names(d));
+  REQUIRE(d.effects.size() == 1);
+  CHECK(is_named(d, "harmonic", {"J4"}));
+  CHECK(d.effects[0].probability <= 0.85);
+  CHECK(is_unknown(d, "J4", "q4"));
+  // A joint whose sensor is ahead of its gear: half of it follows at once, half late.
+  const std::size_t rows = 300;
+  std::vector<double> now(rows), late(rows), time(rows);
+  for (std::size_t row = 0; row < rows; ++row) {
+    time[row] = 20.0 * static_cast<double>(row);
+    now[row] = 15.0 * warmed_up(static_cast<double>(row) / rows);
+    late[row] = row == 0 ? now[0] : late[row - 1] + 0.013 * (now[row] - late[row - 1]);
+  }
+  const auto zero = hidden("J3", [&](const Inputs& in) { return 2e-5 * (now[in.row] + late[in.row]); });
+  auto warm = measured(arm(), {zero}, rows, 1210, {false, [&](std::size_t row) { return 20.0 + now[row]; }});
+  warm->data.time = warm->add(time);
+  const Diagnosis lagging = diagnose(arm(), warm->data);
+  INFO(names(lagging));
+  REQUIRE(lagging.effects.size() == 1);
+  CHECK(is_named(lagging, "thermal_zero", {"J3"}));
+  CHECK(lagging.effects[0].probability <= 0.85);
+  for (const truing::UnknownEffect& u : lagging.unknown) CHECK(u.joint == "J3");
+}
+
 TEST_CASE("diagnose finds none of the laws of machines in noise" * doctest::skip(kSanitized)) {
   const auto warm = [](std::size_t row) { return 26.0 - 4.0 * std::cos(0.03 * static_cast<double>(row)); };
   const auto heavy = [](std::size_t row) { return row % 2 ? 3.0 : 0.0; };
