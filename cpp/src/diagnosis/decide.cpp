@@ -559,6 +559,14 @@ bool links_predict(const Work& work, const Choice& choice, std::size_t at) {
                          kMuchBetter);
 }
 
+static std::vector<FunctionBeside> functions_beside(const FreeScan& scan) {
+  std::vector<FunctionBeside> out;
+  for (const FreeGain& found : scan.best) {
+    if (found.what.inputs.size() == 1) out.push_back({found.what.site, found.what.inputs[0], found.gain.evidence});
+  }
+  return out;
+}
+
 /// Of the candidates that there are.
 static Decision explain(Work* work, const Robot& robot) {
   const DiagnoseOptions& options = work->given.options;
@@ -579,6 +587,7 @@ static Decision explain(Work* work, const Robot& robot) {
     const FreeScan scan =
         scan_free(work->design, evidence, out.state, work->inputs, robot, work->noise.design_effect, scan_options);
     out.p_left = scan.p;
+    out.beside = functions_beside(scan);
     const OrderAt order = gears.best(evidence, out.state);
     const bool order_is_better = scan.best.empty() || order.in_noise > scan.best.front().gain.score;
     if (order_is_better && gears.take(order, &out)) continue;

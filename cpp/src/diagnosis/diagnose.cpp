@@ -169,7 +169,9 @@ std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evide
       if (!is_named(work.design.candidates.named[static_cast<std::size_t>(g)])) continue;
       const Sureness sure = how_sure(work, evidence, decision->state, at);
       double probability = calibrated(sure.raw, selection_frequency(work, resampled, sure, g), sure.removal_loss);
-      if (sure.law_in_question) probability = std::min(probability, kLawInQuestion);
+      const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(g)];
+      if (sure.law_in_question || is_function_beside(work, *decision, name))
+        probability = std::min(probability, kLawInQuestion);
       // Resampled folds of few poses hardly find all links again, though each fold is predicted better with them.
       const bool holds = links_predict(work, decision->state.choice, at);
       out[g] = {sure, holds ? std::max(probability, kNamed) : probability};

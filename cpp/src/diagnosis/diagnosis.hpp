@@ -64,6 +64,13 @@ struct TooLarge {
   ColumnGroup candidate{};  ///< as it was
 };
 
+/// What a free function of one input would still win, at a joint.
+struct FunctionBeside {
+  std::string joint;
+  int input = -1;
+  double evidence = 0.0;  ///< log Bayes factor
+};
+
 /// Everything that was decided.
 struct Decision {
   Evidence::State state;  ///< named, laws and free functions
@@ -72,7 +79,8 @@ struct Decision {
   double p_left = 1.0;
   std::vector<Evidence::Gain> first;  ///< every group alone
   std::map<int, int> corrects;  ///< a law's correction, or a free function that is one: the group whose law it corrects
-  std::vector<TooLarge> too_large{};  ///< set aside: the rest was decided without them
+  std::vector<TooLarge> too_large{};     ///< set aside: the rest was decided without them
+  std::vector<FunctionBeside> beside{};  ///< the likeliest of those that were not taken
 };
 
 struct Refit {
@@ -224,6 +232,8 @@ void describe_what_is_too_large(const Work& work, const Evidence& evidence, cons
 bool same_name(const Explanation& a, const Explanation& b);
 bool contains(const Explanation& large, const Explanation& small);
 Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at);
+/// A function of what the name's law depends on moves the same joint beside it: the law is not quite right.
+bool is_function_beside(const Work& work, const Decision& decision, const Explanation& name);
 Resampled resample(const Work& work, const Decision& decision);
 /// How often the selection on resampled folds finds the group's class again.
 double selection_frequency(const Work& work, const Resampled& resampled, const Sureness& sure, int group);

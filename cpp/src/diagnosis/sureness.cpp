@@ -155,6 +155,23 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
   return out;
 }
 
+bool is_function_beside(const Work& work, const Decision& decision, const Explanation& name) {
+  constexpr double kNats = 2.0;
+  if (name.kind != Kind::catalogue || name.joints.size() != 1 || name.period > 0.0) return false;
+  const EffectTraits& traits = effect_traits(work, name);
+  const std::string own_angle = input_name(Driver::angle, work.given.frames.robot.joint_index(name.joints[0]));
+  return std::any_of(decision.beside.begin(), decision.beside.end(), [&](const FunctionBeside& f) {
+    const InputColumn& input = work.inputs[static_cast<std::size_t>(f.input)];
+    const bool is_angle =
+        input.joint >= 0 && input.name == input_name(Driver::angle, static_cast<std::size_t>(input.joint));
+    // A zero that is wrong may be a part of any function of the angles.
+    const bool of_these = traits.driver == Driver::other_angles ? is_angle && input.name != own_angle
+                          : traits.driver == Driver::constant   ? is_angle
+                                                                : input.name == name.driver;
+    return f.joint == name.joints[0] && of_these && f.evidence > kNats;
+  });
+}
+
 /// A bootstrap draw of the folds.
 static Gram drawn(const std::vector<Gram>& folds, Random* random) {
   std::vector<double> times(folds.size(), 0.0);
