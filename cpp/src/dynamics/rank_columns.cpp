@@ -1,12 +1,14 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Candidates beside columns that are always in: evidence, and squares of folds that were not fitted.
+// Candidates beside columns that are always in: their sums, evidence, and squares of folds that were not fitted.
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "estimation/evidence.hpp"
+#include "math/batch.hpp"
 #include "rooms.hpp"
 #include "truing/dynamics/servo.hpp"
 
@@ -48,7 +50,77 @@ Eigen::VectorXd squares_of_folds(const Gram& all, const std::vector<Gram>& folds
   return out;
 }
 
+/// Sums of one joint and fold over the columns that are seen there.
+struct JointFold {
+  std::vector<int> columns;
+  Gram gram;
+};
+
+/// One joint's and one fold's rows, written column by column into blocks that the kernel sums.
+JointFold sum_joint(const std::vector<ColumnValues>& columns, const ColumnRows& of, int joint,
+                    const std::vector<Index>& rows) {
+  const Index joints = of.weight.size();
+  JointFold out;
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    if (columns[k].joint < 0 || columns[k].joint == joint) out.columns.push_back(static_cast<int>(k));
+  constexpr auto kBlock = static_cast<std::size_t>(GramSum::stride());
+  const double weight = of.weight[joint] * std::sqrt(static_cast<double>(of.every));
+  GramSum sum(static_cast<Index>(out.columns.size()));
+  for (std::size_t begin = 0; begin < rows.size(); begin += kBlock) {
+    const std::size_t count = std::min(kBlock, rows.size() - begin);
+    double* to = sum.row();
+    const auto write = [&](const double* from, Index step, Index first) {
+      for (std::size_t i = 0; i < count; ++i) to[i] = weight * from[rows[begin + i] * step + first];
+      to += GramSum::stride();
+    };
+    for (const int k : out.columns) {
+      const ColumnValues& column = columns[static_cast<std::size_t>(k)];
+      write(column.values, column.joint < 0 ? joints : 1, column.joint < 0 ? joint : 0);
+    }
+    write(of.measured, joints, joint);
+    for (std::size_t i = 0; i < count; ++i) sum.push();
+  }
+  out.gram = sum.finish();
+  return out;
+}
+
 }  // namespace
+
+std::vector<ColumnSums> sum_columns(const std::vector<ColumnValues>& columns, const ColumnRows& rows, int threads) {
+  const auto joints = static_cast<std::size_t>(rows.weight.size());
+  const auto n = static_cast<Index>(columns.size());
+  for (const ColumnValues& one : columns)
+    if (one.joint >= static_cast<int>(joints)) throw std::invalid_argument("sum_columns: a joint that there is not");
+  if (rows.every < 1 || rows.folds < 1) throw std::invalid_argument("sum_columns: no fold, or no rows are taken");
+  std::vector<std::vector<Index>> of_fold(static_cast<std::size_t>(rows.folds));
+  for (std::size_t r = 0; r < rows.fold.size(); r += static_cast<std::size_t>(rows.every)) {
+    if (rows.fold[r] < 0 || rows.fold[r] >= rows.folds)
+      throw std::invalid_argument("sum_columns: a fold that there is not");
+    of_fold[static_cast<std::size_t>(rows.fold[r])].push_back(static_cast<Index>(r));
+  }
+  std::vector<JointFold> parts(joints * of_fold.size());
+  const auto work = [&](std::size_t k) {
+    parts[k] = sum_joint(columns, rows, static_cast<int>(k % joints), of_fold[k / joints]);
+  };
+  for_each_on_threads(parts.size(), threads, {}, work, 1);
+  std::vector<ColumnSums> out(of_fold.size());
+  for (std::size_t f = 0; f < out.size(); ++f) {
+    out[f].xx = Eigen::MatrixXd::Zero(n, n);
+    out[f].xy = Eigen::VectorXd::Zero(n);
+    out[f].n = static_cast<double>(of_fold[f].size());
+    for (std::size_t j = 0; j < joints; ++j) {
+      const JointFold& part = parts[f * joints + j];
+      for (std::size_t b = 0; b < part.columns.size(); ++b) {
+        for (std::size_t a = 0; a < part.columns.size(); ++a)
+          out[f].xx(part.columns[a], part.columns[b]) +=
+              part.gram.xx(static_cast<Index>(a), static_cast<Index>(b));
+        out[f].xy[part.columns[b]] += part.gram.xy[static_cast<Index>(b)];
+      }
+      out[f].yy += part.gram.yy;
+    }
+  }
+  return out;
+}
 
 std::vector<ColumnGain> rank_columns(const std::vector<ColumnSums>& folds, const std::vector<int>& always,
                                      const std::vector<std::vector<int>>& candidates, const std::vector<double>& costs,

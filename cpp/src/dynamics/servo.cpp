@@ -39,6 +39,26 @@ double at(const Eigen::MatrixXd& table, Index row, Index joint) {
   return table(std::min(row, table.rows() - 1), table.cols() == 1 ? 0 : joint);
 }
 
+/// Whole number below, which a call of std::floor would take most of a step for.
+Index floored(double x) {
+  const auto whole = static_cast<Index>(x);
+  return static_cast<double>(whole) > x ? whole - 1 : whole;
+}
+
+/// Cosine and sine, near zero by their series, to 1e-14.
+void turn_of(double x, double* cosine, double* sine) {
+  if (std::abs(x) > 0.5) {
+    *cosine = std::cos(x);
+    *sine = std::sin(x);
+    return;
+  }
+  const double y = x * x;
+  *cosine = 1.0 - y / 2.0 *
+                      (1.0 - y / 12.0 * (1.0 - y / 30.0 * (1.0 - y / 56.0 * (1.0 - y / 90.0 * (1.0 - y / 132.0)))));
+  *sine =
+      x * (1.0 - y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (1.0 - y / 110.0 * (1.0 - y / 156.0))))));
+}
+
 /// Mean over one step of the simulator of a command that is held from row to row, and of its slope.
 struct Held {
   double value = 0.0, slope = 0.0;
@@ -46,11 +66,10 @@ struct Held {
 Held held_command(const ServoRecording& r, Index joint, double begin, double length) {
   const auto value = [&](Index row) { return r.command(std::clamp<Index>(row, 0, r.command.rows() - 1), joint); };
   const auto slope = [&](Index row) { return (value(row) - value(row - 1)) / r.step; };
-  const double from = begin / r.step, to = (begin + length) / r.step;
-  const double first = std::floor(from + 1e-9), last = std::floor(to - 1e-9);
-  const auto row = static_cast<Index>(first);
-  if (last <= first) return {value(row), slope(row)};
-  const double later = (to - last) / (to - from);  // part of the step after the change
+  const double rate = 1.0 / r.step, from = begin * rate, to = (begin + length) * rate;
+  const Index row = floored(from + 1e-9), last = floored(to - 1e-9);
+  if (last <= row) return {value(row), slope(row)};
+  const double later = (to - static_cast<double>(last)) / (to - from);  // part of the step after the change
   return {(1.0 - later) * value(row) + later * value(row + 1), (1.0 - later) * slope(row) + later * slope(row + 1)};
 }
 
@@ -63,6 +82,8 @@ double drive_law(const Drive& d, double effort) {
   const double law = size < kStraight ? size * std::pow(kStraight, exponent - 1.0) : std::pow(size, exponent);
   return std::copysign(reference * law, effort);
 }
+
+double square(double x) { return x * x; }
 
 double without_band(double error, double band) {
   return std::abs(error) <= band ? 0.0 : error - std::copysign(band, error);
@@ -128,7 +149,9 @@ class Apart final : public Bodies {
     for (Index j = first_; j < end_; ++j) {
       const double cosine = between(path_.cosine, j), sine = between(path_.sine, j);
       const double x = path_.turns[j] * (w_.qpos[j] - between(r_.position, j));
-      w_.bias[j] = weight_ * (cosine * std::cos(x) + sine * std::sin(x));
+      double c = 1.0, s = 0.0;
+      turn_of(x, &c, &s);
+      w_.bias[j] = weight_ * (cosine * c + sine * s);
       against_[j] = w_.bias[j] + between(path_.bias, j) - cosine;
       inertia_[j] = between(path_.inertia, j) + w_.armature[j];
     }
@@ -169,6 +192,7 @@ class Run {
         end_(set.only < 0 ? n_ : set.only + 1) {
     for (Index j = 0; j < n_; ++j) drives_.emplace_back(set.chain, j);
     joints_.resize(static_cast<std::size_t>(n_));
+    sags_ = (set.chain.col(static_cast<Index>(F::supply_sag)).array() != 0.0).any();
     for (Index j = 0; j < n_; ++j) {
       const Drive& d = drives_[static_cast<std::size_t>(j)];
       w_.armature[arm_.dof[static_cast<std::size_t>(j)]] = d[F::armature] * (has_rotor(d) ? kLinkArmature : 1.0);
@@ -191,8 +215,10 @@ class Run {
 
   /// One step of the simulator, `part` of the way from a row to the next.
   void step(Index row, double part) {
-    sum_torques_ = 0.0;
-    for (const JointState& s : joints_) sum_torques_ += std::abs(s.torque);
+    if (sags_) {
+      sum_torques_ = 0.0;
+      for (const JointState& s : joints_) sum_torques_ += std::abs(s.torque);
+    }
     moved_->look(row, part);
     for (Index j = first_; j < end_; ++j) drive(j, row);
     moved_->step();
@@ -260,7 +286,7 @@ class Run {
 
   double friction_level(const Drive& d, const JointState& s, Index j, Index row, double speed) const {
     const double by_speed =
-        d[F::stribeck] == 0.0 ? 0.0 : d[F::stribeck] * std::exp(-std::pow(speed / d[F::stribeck_speed], 2));
+        d[F::stribeck] == 0.0 ? 0.0 : d[F::stribeck] * std::exp(-square(speed / d[F::stribeck_speed]));
     const double by_side =
         d[F::asymmetric_friction] == 0.0 ? 0.0 : d[F::asymmetric_friction] * std::tanh(speed / kTurning);
     const double level = d[F::coulomb] + d[F::load_friction] * std::abs(s.torque) + by_speed + by_side;
@@ -388,6 +414,7 @@ class Run {
   std::vector<Drive> drives_;
   std::vector<JointState> joints_;
   double time_ = 0.0, sum_torques_ = 0.0;
+  bool sags_ = false;
 };
 
 ServoBodies bodies_of(const ServoWorkspace& w, int bodies) {

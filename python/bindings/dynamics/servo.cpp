@@ -92,6 +92,31 @@ std::pair<std::vector<Eigen::MatrixXd>, std::vector<Eigen::MatrixXd>> simulate_a
 
 using Sums = std::tuple<Eigen::MatrixXd, Eigen::VectorXd, double, double>;
 
+using Values = py::array_t<double, py::array::c_style>;
+
+std::vector<Sums> summed(const std::vector<std::pair<int, Values>>& columns, const Values& measured,
+                         const Eigen::VectorXd& weight, std::vector<int> fold, int folds, Eigen::Index every,
+                         int threads) {
+  const auto rows = static_cast<py::ssize_t>(fold.size());
+  if (measured.ndim() != 2 || measured.shape(0) != rows || measured.shape(1) != weight.size())
+    throw std::invalid_argument("sum_columns: measured has another shape than (rows, joints)");
+  std::vector<ColumnValues> seen;
+  for (const auto& [joint, values] : columns) {
+    if (values.size() != (joint < 0 ? measured.size() : rows))
+      throw std::invalid_argument("sum_columns: a column has another shape than the rows");
+    seen.push_back({values.data(), joint});
+  }
+  const ColumnRows of{measured.data(), weight, std::move(fold), folds, every};
+  std::vector<ColumnSums> sums;
+  {
+    const py::gil_scoped_release unlocked;
+    sums = sum_columns(seen, of, threads);
+  }
+  std::vector<Sums> out;
+  for (ColumnSums& one : sums) out.emplace_back(std::move(one.xx), std::move(one.xy), one.yy, one.n);
+  return out;
+}
+
 std::vector<ColumnGain> ranked(const std::vector<Sums>& given, const std::vector<int>& always,
                                const std::vector<std::vector<int>>& candidates, const std::vector<double>& costs,
                                const Eigen::VectorXd& prior) {
@@ -165,6 +190,13 @@ as long as the call takes. Raises InputError: shapes that do not fit, addresses 
 
 paths: of every kind of masses, those of every recording; a set's `bodies` is the number of its kind. Raises InputError:
 shapes that do not fit, masses without paths.)");
+  m.def("sum_columns", &summed, py::arg("columns"), py::arg("measured"), py::arg("weight"), py::arg("fold"),
+        py::arg("folds") = 1, py::arg("every") = 1, py::arg("threads") = 1,
+        R"(Of each fold X^T X, X^T y, y^T y and the number of rows, weighted; the same bits whatever the threads.
+
+columns: a joint and its values, shape=(rows,), or -1 and those of all joints, shape=(rows, joints). measured: y,
+shape=(rows, joints). weight: of each joint. fold: of each row, from 0 on. every: rows are thinned to each
+so-many-th. Raises InputError: shapes that do not fit, folds or joints that there are not.)");
   py::class_<ColumnGain>(m, "ColumnGain", "What adding a candidate's columns would win.")
       .def_readonly("score", &ColumnGain::score, "Log Bayes factor less the candidate's cost [nats].")
       .def_readonly("scale", &ColumnGain::scale, "Of the prior, the most likely one.")

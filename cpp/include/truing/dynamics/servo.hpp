@@ -158,6 +158,26 @@ struct ColumnSums {
   double n = 0.0;  ///< rows that count
 };
 
+/// A column of a table of rows by joints, as it lies in memory: of one joint, shape=(rows,), or of all (joint -1),
+/// shape=(rows, joints).
+struct ColumnValues {
+  const double* values = nullptr;
+  int joint = -1;
+};
+
+/// Rows that sums are made of.
+struct ColumnRows {
+  const double* measured = nullptr;  ///< shape=(rows, joints): what the columns are to explain
+  Eigen::VectorXd weight;            ///< of each joint's rows
+  std::vector<int> fold;             ///< of each row, from 0 on
+  int folds = 1;
+  Eigen::Index every = 1;  ///< rows are thinned to each so-many-th, which counts for as many
+};
+
+/// Normal equations by fold of weighted rows. The order of the sums is fixed: the same bits whatever the threads. Throws
+/// std::invalid_argument: folds or joints that there are not.
+std::vector<ColumnSums> sum_columns(const std::vector<ColumnValues>& columns, const ColumnRows& rows, int threads);
+
 /// What adding columns to those that are always in would win.
 struct ColumnGain {
   double score = 0.0;          ///< log Bayes factor less the candidate's cost [nats]
