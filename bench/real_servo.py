@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 
 def degrees(error: Floats) -> Floats:
     """Rms over rows, joint by joint."""
-    return np.degrees(np.sqrt(np.mean(error**2, axis=0)))
+    return np.asarray(np.degrees(np.sqrt(np.mean(error**2, axis=0))))
 
 
 def judged(file: Path, usual: Usual, test: Sequence[Recording]) -> float:
@@ -63,8 +63,10 @@ def xl330(folder: Path, sysid: Path) -> list[str]:
     answer = ask_sysid(sysid, sysid_task(file, ["q1"], train, XL330_REFERENCE))
     if isinstance(answer, str):
         return [*lines, f"| mujoco.sysid, gain, damping, dry friction, rotor | {answer} | |", ""]
-    fields = ("gain", "damping", "frictionloss", "armature")
-    theirs = Usual(*(np.array(answer[name]) for name in fields), np.zeros(1))
+    gain, damping, friction, armature = (
+        np.array(answer[name]) for name in ("gain", "damping", "frictionloss", "armature")
+    )
+    theirs = Usual(gain, damping, friction, armature, np.zeros(1))
     lines.append(
         f"| mujoco.sysid {answer['version']}, gain, damping, dry friction, rotor"
         f" | {judged(file, theirs, test):.2f} | {answer['processor_seconds']:.1f} |"

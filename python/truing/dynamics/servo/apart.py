@@ -5,13 +5,14 @@ more than the simulator moves the whole arm. The search looks here; the simulato
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.servo.data import Stream, Window
+from truing.dynamics.servo.data import ServoData, Stream, Window
 from truing.dynamics.servo.simulator import Point, Simulator
 from truing.dynamics.smoothing import cubics, rows_within
 
@@ -26,7 +27,8 @@ _SLIDE = 2  # mjtJoint
 class Apart:
     """An arm's joints along recordings; has what of a `Simulator` fits and searches use."""
 
-    def __init__(self, simulator: Simulator) -> None:
+    def __init__(self, simulator: Simulator, step: float = 0.0) -> None:
+        """step: longest of a simulation [s]; 0: the simulator's."""
         self.whole = simulator
         self.data, self.arm, self.model = simulator.data, simulator.arm, simulator.model
         self.dofs = simulator.dofs
@@ -34,22 +36,33 @@ class Apart:
         self._joints = np.array([simulator.model.joint(name).id for name in names])
         self._turns = np.asarray(self.model.jnt_type)[self._joints] != _SLIDE
         self._moved = _descendants(self.model, np.asarray(self.model.jnt_bodyid)[self._joints])
+        self.step = longer_step(self.data, step)
+        self._core_arm = simulator.core_arm_with(self.step)
         self._paths: dict[tuple[object, ...], list[_core.ServoPath]] = {}
         self._known: dict[str, list[Tables]] = {}
 
     def run(
-        self, points: Sequence[Point], windows: Sequence[Window], torques: bool = False, only: int = -1
+        self,
+        points: Sequence[Point],
+        windows: Sequence[Window],
+        torques: bool = False,
+        only: Sequence[int] | None = None,
     ) -> tuple[list[Floats], list[Floats]]:
-        """As `Simulator.run`. only: the joint that is moved, where the others do not matter; -1: all."""
+        """As `Simulator.run`. only: of each point the joint that is moved, where the others do not matter;
+        -1: all."""
+        moved = [-1] * len(points) if only is None else only
         kinds: dict[tuple[object, ...], int] = {}
         for p in points:
             kinds.setdefault(_masses(p), len(kinds))
         paths = [self._path(p) for p in {_masses(p): p for p in points}.values()]
-        sets = [_core.ServoSet(p.chain, p.weight, kinds[_masses(p)], list(p.functions), only) for p in points]
+        sets = [
+            _core.ServoSet(p.chain, p.weight, kinds[_masses(p)], list(p.functions), joint)
+            for p, joint in zip(points, moved, strict=True)
+        ]
         some = [_core.ServoWindow(w.stream, w.first, w.rows) for w in windows]
         whole = self.whole
         return _core.simulate_servos_apart(
-            whole.core_arm, paths, whole.core_recordings, some, sets, whole.threads, torques
+            self._core_arm, paths, whole.core_recordings, some, sets, whole.threads, torques
         )
 
     # ---- what the joints feel
@@ -111,8 +124,9 @@ class Apart:
             axis, moved = axes[:, j], self._moved[j]
             if not self._turns[j]:
                 inertia[:, j] = mass[moved].sum()
-                cosine[:, j] = -axis @ gravity * np.sum((mass * floats)[moved])
-                torque[:, j] += axis @ gravity * np.sum((mass * (1.0 - floats))[moved])
+                along = np.einsum("ki,i->k", axis, gravity)
+                cosine[:, j] = -along * np.sum((mass * floats)[moved])
+                torque[:, j] += along * np.sum((mass * (1.0 - floats))[moved])
                 continue
             arm = centres[:, moved] - anchors[:, None, j]
             swept = np.cross(axis[:, None], arm)
@@ -120,10 +134,19 @@ class Apart:
             about = np.sum(own**2 * np.asarray(m.body_inertia)[moved], axis=2)
             inertia[:, j] = np.sum(about + mass[moved] * np.sum(swept**2, axis=2), axis=1)
             heavy = np.einsum("kbi,b->ki", swept, (mass * floats)[moved])
-            cosine[:, j] = -heavy @ gravity
+            cosine[:, j] = -np.einsum("ki,i->k", heavy, gravity)
             torque[:, j] += np.einsum("kbi,b,i->k", swept, (mass * (1.0 - floats))[moved], gravity)
-            sine[:, j] = -np.cross(axis, heavy) @ gravity
+            sine[:, j] = -np.einsum("ki,i->k", np.cross(axis, heavy), gravity)
         return inertia, torque - inertia * acceleration, cosine, sine
+
+
+def longer_step(data: ServoData, longest: float) -> float:
+    """The longest step up to `longest` [s] that is whole steps of the simulator's, and of which the rows of
+    all recordings are whole numbers apart."""
+    rows = [round(s.step / data.step) for s in data.streams]
+    most = math.gcd(*rows)
+    fits = [k for k in range(1, most + 1) if most % k == 0 and k * data.step <= longest * (1.0 + 1e-6)]
+    return data.step * max([1, *fits])
 
 
 def _masses(point: Point) -> tuple[object, ...]:

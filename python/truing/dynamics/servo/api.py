@@ -16,11 +16,11 @@ from truing import _core
 from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.arm import ServoArm, servo_arm
 from truing.dynamics.servo.data import ServoData, Window, servo_data, windows_of
-from truing.dynamics.servo.fit import Fitted, Fitter, rows_of
+from truing.dynamics.servo.fit import Fitted, Fitter, Rows, rows_of
 from truing.dynamics.servo.free import USUAL
 from truing.dynamics.servo.ground import groundwork
 from truing.dynamics.servo.judge import judged, traces_of
-from truing.dynamics.servo.naming import Account, Namer, late, sureness, unknown
+from truing.dynamics.servo.naming import NAMED, Account, Namer, Sureness, late, sureness, unknown
 from truing.dynamics.servo.result import ServoDiagnosis
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, point_of
 from truing.dynamics.servo.words import Parts, diagnosis_of, held_share
@@ -30,6 +30,9 @@ Floats = NDArray[np.float64]
 
 WINDOW = 5.0  # [s] about: longer ones see slow effects better, and forget the start less surely
 MAX_EFFECTS = 12
+LONGEST_STEP = 0.005  # [s] of joints apart, in the search; what is reported is the whole arm's
+LEAST_HELD = 0.1  # of a joint's squared error on held-out motion: other laws may well do less (OTHER_LAWS)
+BLOCK = 1.0  # [s] of held-out motion, over which the interval of what a name removes is taken
 
 
 @dataclass(frozen=True)
@@ -125,19 +128,22 @@ def servo_diagnose(
         robot, recordings, joints=joints, window=window, test_share=test_share, threads=threads
     )
     nominal = point_of(prepared.arm.nominal)
-    apart = Apart(prepared.simulator)
+    apart = Apart(prepared.simulator, LONGEST_STEP)
     fitter = Fitter(apart, rows_of(prepared.data, prepared.train), progress)
     standard, sizes = groundwork(fitter, nominal, prepared.data)
     namer = Namer(fitter, leave_out, max_effects)
     account = namer.run(standard, sizes, nominal)
     fitter.progress("judging by held-out motion")
-    held, rows = _held_out(prepared, standard, account, nominal)
-    while (at := _veto(account, held, rows)) is not None:
-        account.vetoed.append(account.found[at])
-        namer.drop(account, at)
-        held, rows = _held_out(prepared, standard, account, nominal)
     single = len({prepared.data.streams[w.stream].fold for w in prepared.train}) < 2
-    sure = sureness(namer, account, single)
+    while True:
+        held, rows = _held_out(prepared, standard, account, nominal)
+        sure = sureness(namer, account, single)
+        vetoed = _veto(sure, held, rows, namer.resolution)
+        if vetoed is None:
+            break
+        at, why = vetoed
+        account.vetoed.append((account.found[at], why))
+        namer.drop(account, at)
     functions = unknown(namer, account, single)
     models = {"nominal": nominal, "standard": standard.point, "named": account.fitted.point}
     parts = Parts(
@@ -160,19 +166,35 @@ def servo_diagnose(
     return diagnosis_of(parts, time.perf_counter() - begun)
 
 
-def _veto(account: Account, held: Sequence[Floats], rows: NDArray[np.intp]) -> int | None:
-    """Number of the effect that helps held-out motion least, if that is predicted no better with it."""
+def _veto(
+    sure: Sequence[Sureness], held: Sequence[Floats], blocks: NDArray[np.intp], resolution: Floats
+) -> tuple[int, str] | None:
+    """Number of an effect that does not deserve a name, and why: something else may look so (the least sure
+    first), held-out motion is not predicted better with it for certain, or it moves the arm by less than
+    encoders show (that which helps least)."""
     standard, named = held[1], held[2]
-    without = held[3 : 3 + len(account.found)]
-    shares = [held_share(one, named, standard, rows)[0] for one in without]
-    return int(np.argmin(shares)) if shares and min(shares) <= 0.0 else None
+    failed: list[tuple[int, float, int, str]] = []
+    for k, (one, without) in enumerate(zip(sure, held[3:], strict=False)):
+        share, low, _ = held_share(without, named, standard, blocks)
+        moved = np.sqrt(np.mean((without - named) ** 2, axis=0))
+        if one.of_class < NAMED:
+            why = "what it wins is so little that something else may look so"
+        elif low <= 0.0 or share * named.shape[1] < LEAST_HELD:
+            why = "held-out motion is not predicted better with it for certain"
+        elif np.all(moved < resolution):
+            why = "it moves the arm by less than the encoders' steps show"
+        else:
+            continue
+        unsure = one.of_class < NAMED
+        failed.append((0, one.of_class, k, why) if unsure else (1, share, k, why))
+    return min(failed)[2:] if failed else None
 
 
 def _held_out(
     prepared: Prepared, standard: Fitted, account: Account, nominal: Point
 ) -> tuple[list[Floats], NDArray[np.intp]]:
     """Errors on held-out windows (on all, where none is), of every chain that is compared: see
-    `Parts.held`."""
+    `Parts.held`. And the number of each row's block of time."""
     windows = [w for w in prepared.windows if w.test] or prepared.train
     rows = rows_of(prepared.data, windows)
     fitter = Fitter(prepared.simulator, rows)
@@ -181,4 +203,15 @@ def _held_out(
         back = standard.point.chain.copy()
         back[:, FIELDS.index(name)] = nominal.chain[:, FIELDS.index(name)]
         points.append(replace(standard.point, chain=back))
-    return [fitter.errors(motion) for motion in fitter.motions(points)], rows.window
+    return [fitter.errors(motion) for motion in fitter.motions(points)], _blocks(prepared.data, rows)
+
+
+def _blocks(data: ServoData, rows: Rows) -> NDArray[np.intp]:
+    """Number of each row's block of about a second, counted within its window."""
+    out: list[NDArray[np.intp]] = []
+    count = 0
+    for w in rows.windows:
+        blocks = max(1, round(w.rows * data.streams[w.stream].step / BLOCK))
+        out.append(count + np.arange(w.rows) * blocks // w.rows)
+        count += blocks
+    return np.concatenate(out)

@@ -21,8 +21,8 @@ from truing.dynamics.servo.chain import ServoChain, ServoJoint
 from truing.errors import InputError
 from truing.files.mjcf_file import quiet
 
-_LEAST_ARMATURE = 1e-6  # [kg m^2] of a file that says none
-_LEAST_FRICTION = 1e-4  # [Nm] and of its friction [Nm, Nm s/rad], which are fitted as logarithms
+LEAST_ARMATURE = 1e-6  # [kg m^2] of a file that says none
+LEAST_FRICTION = 1e-4  # [Nm] and of its friction [Nm, Nm s/rad], which are fitted as logarithms
 _GUESSED_GAIN = 10.0  # [Nm/rad] where no actuator says one
 _SLIDE, _HINGE = 2, 3  # mjtJoint
 
@@ -175,7 +175,7 @@ class _Reader:
             f' springref="{float(m.qpos_spring[adr])!r}"'
             f' stiffness="{float(np.ravel(m.jnt_stiffness[j])[0])!r}"'
             f' damping="{float(np.ravel(m.dof_damping[dof])[0])!r}"'
-            f' frictionloss="{max(float(m.dof_frictionloss[dof]), _LEAST_FRICTION)!r}"'
+            f' frictionloss="{max(float(m.dof_frictionloss[dof]), LEAST_FRICTION)!r}"'
             f' armature="{float(m.dof_armature[dof])!r}" solreffriction="{FRICTION_TIME} 1"'
             f' solimpfriction="{_numbers(FRICTION_HOLDS)}"/>'
         )
@@ -218,9 +218,9 @@ class _Reader:
             self.notes.append(f"joint {m.joint(j).name} has no actuator: its gain is fitted from a guess")
         return ServoJoint(
             command_gain=max(gain, 1e-9),
-            viscous=max(viscous, _LEAST_FRICTION),
-            coulomb=max(float(m.dof_frictionloss[dof]), _LEAST_FRICTION),
-            armature=max(float(m.dof_armature[dof]), _LEAST_ARMATURE),
+            viscous=max(viscous, LEAST_FRICTION),
+            coulomb=max(float(m.dof_frictionloss[dof]), LEAST_FRICTION),
+            armature=max(float(m.dof_armature[dof]), LEAST_ARMATURE),
             saturation=limit if limit > 0.0 else math.inf,
             delay=delay,
         )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from truing.dynamics.servo.arm import ServoArm
 from truing.dynamics.servo.chain import PARAMETERS
 from truing.dynamics.servo.data import ServoData
-from truing.dynamics.servo.fit import Fitter
+from truing.dynamics.servo.fit import Column, Fitter, change_of
 from truing.dynamics.servo.free import LINK, PAYLOAD, WEIGHT, Free, Sizes, free_value
 from truing.dynamics.servo.simulator import Point
 
@@ -25,8 +25,6 @@ _FROM_NEUTRAL = (
     "delay",
     "drive_law",
     "gain_law",
-    "supply_gain",
-    "supply_sag",
     "dead_band",
     "viscous_law",
     "load_friction",
@@ -70,12 +68,17 @@ class Candidate:
 
     def off(self, point: Point) -> Point:
         """The point without the effect."""
-        one = self.free[0]
-        if one.field in (WEIGHT, LINK):
-            return one.put(point, 1.0)
-        if one.field == PAYLOAD:
-            return one.put(point, 0.0)
-        return point.with_value(self.joint, one.field, PARAMETERS[one.field].neutral)
+        if self.joint < 0:
+            return self.free[0].put(point, self.neutral)
+        return point.with_value(self.joint, self.free[0].field, self.neutral)
+
+    @property
+    def neutral(self) -> float:
+        """The value at which the effect is not there."""
+        one = self.free[0].field
+        if one in (WEIGHT, LINK, PAYLOAD):
+            return 0.0 if one == PAYLOAD else 1.0
+        return PARAMETERS[one].neutral
 
     @property
     def place(self) -> tuple[str, tuple[str, ...]]:
@@ -103,6 +106,7 @@ def candidates_of(
                 constants = {"drive_reference": float(sizes.torque[j])} if name == "drive_law" else {}
                 out.append(_candidate(name, j, joint, sizes, constants, None, name))
         out += _scanned(data, j, joint, sizes, np.abs(torque[:, j]))
+    out += _of_supply(sizes, idle)
     out += _of_masses(arm, data)
     return [c for c in out if c.effect not in leave_out], not_testable
 
@@ -170,6 +174,17 @@ def _scanned(data: ServoData, j: int, joint: str, sizes: Sizes, torque: Floats) 
     return out
 
 
+def _of_supply(sizes: Sizes, idle: Mapping[str, str]) -> list[Candidate]:
+    """One supply feeds all drives: as its volts were recorded, and as all drives' torques pull it down."""
+    out = []
+    for name, usual in (("supply_gain", 1.0), ("supply_sag", 1.0 / float(np.sum(sizes.torque)))):
+        if name not in idle:
+            known = PARAMETERS[name]
+            free = Free(name, -1, known.scale, known.spread * usual, known.low, known.high, known.unit)
+            out.append(Candidate(known.effect, -1, (), (free,), label=name))
+    return out
+
+
 def _of_masses(arm: ServoArm, data: ServoData) -> list[Candidate]:
     """Weight of all, a payload at the last body, and each body's mass."""
     out = [
@@ -200,9 +215,9 @@ def _of_masses(arm: ServoArm, data: ServoData) -> list[Candidate]:
 
 def candidate_columns(
     fitter: Fitter, point: Point, base: Floats, candidates: Sequence[Candidate]
-) -> list[Floats]:
-    """What each candidate does to the position, shape=(n, joints) each, with the values of its free value
-    counted from the neutral one; of a form that was looked at away from it: of all that it does there.
+) -> list[Column]:
+    """What each candidate does to the position, with the values of its free value counted from the neutral
+    one; of a form that was looked at away from it: of all that it does there.
 
     One form at all joints is one simulation, as in `Fitter.columns`.
     """
@@ -216,15 +231,10 @@ def candidate_columns(
             changed, steps[k] = _shown(candidates[k], changed)
         points.append(changed)
     motions = fitter.motions(points)
-    out: list[Floats] = [np.zeros(0)] * len(candidates)
+    out: list[Column] = [(-1, np.zeros(0))] * len(candidates)
     for members, motion in zip(labels.values(), motions, strict=True):
         for k in members:
-            change = np.clip(motion - base, -3.0, 3.0) / steps[k]
-            if candidates[k].joint >= 0 and len(members) > 1:
-                alone = np.zeros_like(change)
-                alone[:, candidates[k].joint] = change[:, candidates[k].joint]
-                change = alone
-            out[k] = change
+            out[k] = candidates[k].joint, change_of(motion, base, steps[k], candidates[k].joint)
     return out
 
 

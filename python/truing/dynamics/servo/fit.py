@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truing import _core
 from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.data import ServoData, Window
 from truing.dynamics.servo.free import Free, moved
@@ -19,10 +20,13 @@ from truing.dynamics.servo.simulator import FIELDS, Point, Simulator
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
+Column = tuple[int, Floats]
+"""What a value changes: a joint and its rows, shape=(n,), or -1 and all joints', shape=(n, joints)."""
+FoldSums = tuple[Floats, Floats, float, float]
 
 _DAMPINGS = (0.0, 0.03, 0.3, 3.0)  # Levenberg's, of the diagonal: all are tried at once, the best is taken
 _FARTHEST_LOG = 4.0  # of a logarithm in one step: a flat column would leave for any number
-_LONGER = (2.0, 4.0)  # times the step of the second: along curved valleys
+_LONGER = (3.0,)  # times the step of the second: along curved valleys
 _LAST = 2e-3  # relative fall of the cost at which a fit ends
 _ANCHORS = 3
 _AGREES = 0.02  # of the rms error: what the anchor may still change
@@ -95,7 +99,7 @@ class Fitted:
     free: list[Free]
     start: Floats  # prior means, on the scales
     errors: Floats  # shape=(n, joints) measured less simulated
-    columns: Floats = field(repr=False)  # shape=(values, n, joints) of the position
+    columns: list[Column] = field(repr=False)  # of the position, by each value on its scale
     noise: Noise = field(repr=False, default_factory=lambda: Noise(np.ones(1), np.ones(1)))
     cost: float = np.inf
 
@@ -108,32 +112,34 @@ class Fitter:
         self.simulator, self.rows = simulator, rows
         self.progress = progress or (lambda text: None)
         self.runs = 0  # simulated chains
-        self._only: tuple[int, Floats] | None = None
+        self._beside: tuple[Point, Floats] | None = None
         self.other: Floats = np.zeros_like(rows.measured)  # of the whole arm, less that of joints apart
 
     def motions(self, points: Sequence[Point]) -> list[Floats]:
         self.runs += len(points)
-        if self._only is None or not isinstance(self.simulator, Apart):
+        if self._beside is None or not isinstance(self.simulator, Apart):
             return self.simulator.run(points, self.rows.windows)[0]
-        joint, motion = self._only
-        found = self.simulator.run(points, self.rows.windows, only=joint)[0]
-        out = [motion.copy() for _ in found]
-        for one, moved_joint in zip(out, found, strict=True):
-            one[:, joint] = moved_joint[:, joint]
-        return out
+        base, motion = self._beside
+        moves = [_only_joint(point, base) for point in points]
+        found = self.simulator.run(points, self.rows.windows, only=moves)[0]
+        for k, joint in enumerate(moves):
+            if joint >= 0:
+                alone, found[k] = found[k][:, joint], motion.copy()
+                found[k][:, joint] = alone
+        return found
 
     @contextlib.contextmanager
-    def only(self, joint: int, fitted: Fitted) -> Iterator[None]:
-        """Meanwhile this joint alone is simulated, if joints are apart: the others stay as they were fitted.
-        A supply that sags by all joints' torques needs them all."""
-        outer, self._only = self._only, None
+    def beside(self, fitted: Fitted) -> Iterator[None]:
+        """Meanwhile of points that differ from a fit at one joint this joint alone is simulated, if joints
+        are apart: the others stay as they were fitted. A supply that sags by all torques needs them all."""
+        outer = self._beside
         sags = np.any(fitted.point.chain[:, FIELDS.index("supply_sag")] != 0.0)
-        if joint >= 0 and not sags and self.rows.measured.shape[1] > 1:
-            self._only = joint, self.rows.measured - self.other - fitted.errors
+        if not sags and self.rows.measured.shape[1] > 1:
+            self._beside = fitted.point, self.rows.measured - self.other - fitted.errors
         try:
             yield
         finally:
-            self._only = outer
+            self._beside = outer
 
     def errors(self, motion: Floats) -> Floats:
         return np.clip(self.rows.measured - self.other - motion, -_LEFT, _LEFT)
@@ -167,7 +173,7 @@ class Fitter:
             best = self.fit(best.point, free, start, noise, 2, doing)
         return best
 
-    def columns(self, point: Point, free: Sequence[Free], exact: bool = False) -> tuple[Floats, Floats]:
+    def columns(self, point: Point, free: Sequence[Free], exact: bool = False) -> tuple[Floats, list[Column]]:
         """Errors of the point, and the change of the position with each value on its scale.
 
         One value is changed at all joints in one simulation, and what a joint does then is taken for its
@@ -189,14 +195,12 @@ class Fitter:
             points.append(changed)
         motions = self.motions([point, *points])
         base = motions[0]
-        table = np.zeros((len(free), *base.shape))
+        out: list[Column] = [(-1, np.zeros(0))] * len(free)
         for members, motion in zip(groups.values(), motions[1:], strict=True):
-            change = np.clip(motion - base, -_LEFT, _LEFT)
             for k in members:
-                seen = slice(None) if len(members) == 1 else slice(free[k].joint, free[k].joint + 1)
-                if steps[k]:
-                    table[k][:, seen] = change[:, seen] / steps[k]
-        return self.errors(base), table
+                joint = -1 if exact and base.shape[1] > 1 else free[k].joint
+                out[k] = joint, change_of(motion, base, steps[k], joint)
+        return self.errors(base), out
 
     def cost(self, errors: Floats, point: Point, free: Sequence[Free], start: Floats, noise: Noise) -> float:
         """Half of the weighted squares, and of the priors'."""
@@ -212,11 +216,12 @@ class Fitter:
         noise: Noise | None,
         rounds: int,
         doing: str = "",
+        seen: tuple[Floats, list[Column]] | None = None,
     ) -> Fitted:
         """Gauss-Newton with Levenberg's damping. noise: None: every joint's rms before each round, so that
-        all joints count alike."""
+        all joints count alike. seen: errors and columns at the point, where they are known."""
         free = list(free)
-        errors, table = self.columns(point, free)
+        errors, table = seen or self.columns(point, free)
         fixed = noise
         least = 1e-6 * np.ones(errors.shape[1])
         for number in range(rounds):
@@ -226,17 +231,13 @@ class Fitter:
             )
             before = self.cost(errors, point, free, start, noise)
             tried = [
-                moved(point, free, step) for step in self._steps(point, free, start, errors, table, noise)
+                point,
+                *(moved(point, free, step) for step in self._steps(point, free, start, errors, table, noise)),
             ]
-            costs = []
-            motions = self.motions(tried)
-            for one, motion in zip(tried, motions, strict=True):
-                costs.append(self.cost(self.errors(motion), one, free, start, noise))
-            best = int(np.argmin(costs))
-            if not costs[best] < before:
+            point, after = self._best(tried, errors, free, start, noise)
+            if not after < before:
                 break
-            point = tried[best]
-            done = costs[best] > before * (1.0 - _LAST)
+            done = after > before * (1.0 - _LAST)
             if number + 1 == rounds or done:
                 errors, table = self.columns(point, free)
                 break
@@ -245,8 +246,41 @@ class Fitter:
         cost = self.cost(errors, point, free, start, noise)
         return Fitted(point, free, start, errors, table, noise, cost)
 
+    def _best(
+        self, tried: Sequence[Point], errors: Floats, free: Sequence[Free], start: Floats, noise: Noise
+    ) -> tuple[Point, float]:
+        """The best of points, the first of which has these errors, and its cost. Joints apart do not know of
+        each other: each takes what is best for it."""
+        motions = self.motions(tried[1:])
+        some = [errors, *(self.errors(motion) for motion in motions)]
+        costs = np.array(
+            [self._joint_costs(e, p, free, start, noise) for e, p in zip(some, tried, strict=True)]
+        )
+        sags = np.any(tried[0].chain[:, FIELDS.index("supply_sag")] != 0.0)
+        if not isinstance(self.simulator, Apart) or sags or any(one.joint < 0 for one in free):
+            best = int(np.argmin(costs.sum(axis=1)))
+            return tried[best], float(costs[best].sum())
+        each = np.argmin(costs, axis=0)
+        chain = np.array([tried[k].chain[j] for j, k in enumerate(each)])
+        return replace(tried[0], chain=chain), float(costs.min(axis=0).sum())
+
+    def _joint_costs(
+        self, errors: Floats, point: Point, free: Sequence[Free], start: Floats, noise: Noise
+    ) -> Floats:
+        """`cost`, joint by joint; priors of what is of the whole arm stand at the first."""
+        out = 0.5 * np.sum((errors * noise.weight) ** 2, axis=0)
+        for one, mean in zip(free, start, strict=True):
+            out[max(one.joint, 0)] += 0.5 * ((one.at(point) - mean) / one.prior) ** 2
+        return np.asarray(out)
+
     def _steps(
-        self, point: Point, free: Sequence[Free], start: Floats, errors: Floats, table: Floats, noise: Noise
+        self,
+        point: Point,
+        free: Sequence[Free],
+        start: Floats,
+        errors: Floats,
+        table: Sequence[Column],
+        noise: Noise,
     ) -> list[Floats]:
         """Steps of every damping: (X'X + P + mu D) s = X'e - P (x - start)."""
         xx, xy = sums(table, errors, noise)
@@ -259,6 +293,22 @@ class Fitter:
             d = xx + np.diag(precision + mu * np.diag(xx) + 1e-12)
             out.append(np.clip(bounded_step(d, right, free, at), -most, most))
         return [*out, *(longer * out[1] for longer in _LONGER)]
+
+
+def _only_joint(point: Point, base: Point) -> int:
+    """The joint at which alone a point differs; -1: others do, or what is of the whole arm."""
+    there = np.flatnonzero(np.any(point.chain != base.chain, axis=1))
+    whole = ("weight", "payload", "place", "links")
+    same = all(getattr(point, name) == getattr(base, name) for name in whole)
+    return int(there[0]) if same and there.size == 1 and not point.functions else -1
+
+
+def change_of(motion: Floats, base: Floats, step: float, joint: int) -> Floats:
+    """Change of a motion by a step of one, of a joint (-1: of all). Contiguous."""
+    seen = (slice(None), slice(None) if joint < 0 else joint)
+    if not step:
+        return np.zeros_like(base[seen])
+    return np.ascontiguousarray(np.clip(motion[seen] - base[seen], -_LEFT, _LEFT) / step)
 
 
 def bounded_step(d: Floats, right: Floats, free: Sequence[Free], at: Floats) -> Floats:
@@ -280,7 +330,34 @@ def bounded_step(d: Floats, right: Floats, free: Sequence[Free], at: Floats) -> 
     return step
 
 
-def sums(table: Floats, errors: Floats, noise: Noise) -> tuple[Floats, Floats]:
+def sums(columns: Sequence[Column], errors: Floats, noise: Noise) -> tuple[Floats, Floats]:
     """X'X and X'e of weighted rows."""
-    x = (table * noise.weight).reshape(len(table), -1)
-    return x @ x.T, x @ (errors * noise.weight).ravel()
+    xx, xy, _, _ = sums_by_fold(columns, errors, noise.weight)[0]
+    return xx, xy
+
+
+def sums_by_fold(
+    columns: Sequence[Column],
+    errors: Floats,
+    weight: Floats,
+    fold: NDArray[np.intp] | None = None,
+    every: int = 1,
+) -> list[FoldSums]:
+    """X'X, X'e, e'e and rows of each fold, in a fixed order of sums: numpy's products add in another order
+    with other numbers of threads, and a search may then end elsewhere. fold: of each row, from 0 on; None:
+    one fold. every: rows are thinned to each so-many-th, which counts for as many."""
+    rows = np.zeros(len(errors), dtype=np.intp) if fold is None else fold
+    folds = int(rows.max()) + 1 if rows.size else 1
+    measured = np.ascontiguousarray(errors)
+    return list(_core.sum_columns(list(columns), measured, weight, rows.tolist(), folds, every))
+
+
+def combined(columns: Sequence[Column], values: Floats, like: Floats) -> Floats:
+    """The sum of the columns, each times its value. like: shape=(n, joints)"""
+    out = np.zeros_like(like)
+    for (joint, column), value in zip(columns, values, strict=True):
+        if joint < 0:
+            out += value * column
+        else:
+            out[:, joint] += value * column
+    return out

@@ -55,7 +55,8 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Free:
-    """A value that is fitted. `joint` -1: of the whole chain; `body`: whose mass it is."""
+    """A value that is fitted. `joint` -1: of the whole chain, or the same at all joints; `body`: whose mass
+    it is."""
 
     field: str
     joint: int
@@ -78,7 +79,7 @@ class Free:
             return point.payload
         if self.field == LINK:
             return dict(point.links).get(self.body, 1.0)
-        return point.value(self.joint, self.field)
+        return point.value(max(self.joint, 0), self.field)
 
     def at(self, point: Point) -> float:
         """On its scale."""
@@ -96,7 +97,7 @@ class Free:
         if self.field == LINK:
             links = tuple(sorted({**dict(point.links), self.body: value}.items()))
             return replace(point, links=links)
-        return point.with_value(self.joint, self.field, value)
+        return point.with_value(slice(None) if self.joint < 0 else self.joint, self.field, value)
 
     def name(self, joints: Sequence[str]) -> str:
         if self.joint >= 0:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing.dynamics.servo.apart import Apart
+from truing.dynamics.servo.arm import LEAST_ARMATURE, LEAST_FRICTION
 from truing.dynamics.servo.data import ServoData, Window
 from truing.dynamics.servo.fit import Fitted, Fitter, Rows, noise_of, rows_of
 from truing.dynamics.servo.free import Sizes, usual_values
@@ -19,13 +20,21 @@ from truing.dynamics.servo.simulator import FIELDS, Point, Simulator
 Floats = NDArray[np.float64]
 
 _MOVING = 0.02  # of the fastest: slower rows are at rest
-_ROUNDS = 8
+_ROUNDS = 20
 _KIND = 3  # joints of one gain in the file, at least: servos of one kind
 _ALIKE = 0.2  # of the logarithm of their gains
 _SAME_SQUARES = 0.3  # more of a joint's squared error, before it is fitted again: its scale is not seen
 _LEAST_ERROR = 1e-6  # [rad | m]
 _SCANNED = 12  # windows that the first scan looks at, at most
 _TORQUES = ("command_gain", "viscous", "coulomb", "armature")
+_STATED = {
+    "command_gain": 0.0,
+    "viscous": LEAST_FRICTION,
+    "coulomb": LEAST_FRICTION,
+    "armature": LEAST_ARMATURE,
+}
+"""Above these a file states a value."""
+_TINY = 1e-12
 _GAINS = np.exp(np.arange(-5.0, 2.1, 1.0))  # times the file's, and what all torques share
 _WIDE = np.exp(np.arange(-4.0, 2.1, 1.5))  # the same of friction and rotors
 _FINE = np.exp(np.array([-0.7, -0.35, 0.35, 0.7]))
@@ -75,6 +84,8 @@ def first_guess(simulator: Simulator | Apart, rows: Rows, point: Point, torque_c
     fine = [([name], _FINE) for name in names]
     for together, factors in [*wide, (names, _GAINS), *fine]:
         columns = [FIELDS.index(name) for name in together]
+        if together == names:  # what limits them is a torque as well
+            columns.append(FIELDS.index("saturation"))
         chains = []
         for factor in (1.0, *factors):
             chains.append(point.chain.copy())
@@ -90,12 +101,32 @@ def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted,
     """The usual parameters fitted to all rows of the fitter."""
     simulator = fitter.simulator
     fitter.progress("groundwork")
-    point = first_guess(simulator, fitter.rows, nominal, data.torque_command)
+    point = with_limits(first_guess(simulator, fitter.rows, nominal, data.torque_command), nominal)
     sizes = sizes_of(simulator, point, fitter.rows.windows)
     free = usual_values(simulator.arm.nominal, sizes, data.torque_command)
     start = np.array([f.at(point) for f in free])
     fitted = fitter.settled(point, free, start, None, _ROUNDS, "groundwork")
-    return _alike(fitter, fitted, nominal), sizes
+    fitted = _alike(fitter, fitted, nominal)
+    point = with_limits(fitted.point, nominal)
+    if not np.array_equal(point.chain, fitted.point.chain):
+        fitted = fitter.settled(point, fitted.free, fitted.start, None, _ROUNDS // 4, "limits of the torques")
+    return fitted, sizes
+
+
+def with_limits(point: Point, nominal: Point) -> Point:
+    """The file's limits of the torques, times the factor that all torques of a joint have in common: motion
+    says them but for one factor, and a limit that stayed would be another one. Of torques that all grew (or
+    all fell) the factor is their median; else there is none."""
+    columns = [FIELDS.index(name) for name in _TORQUES]
+    limit = FIELDS.index("saturation")
+    unstated = nominal.chain[:, columns] <= np.array([_STATED[name] for name in _TORQUES])
+    now, then = np.maximum(point.chain[:, columns], _TINY), np.maximum(nominal.chain[:, columns], _TINY)
+    logs = np.where(unstated, np.nan, np.log(now / then))
+    alike = np.abs(np.nansum(np.sign(logs), axis=1)) == np.sum(~unstated, axis=1)
+    shared = np.where(alike, np.nanmedian(logs, axis=1), 0.0)
+    chain = point.chain.copy()
+    chain[:, limit] = nominal.chain[:, limit] * np.exp(shared)
+    return replace(point, chain=chain)
 
 
 def _alike(fitter: Fitter, fitted: Fitted, nominal: Point) -> Fitted:

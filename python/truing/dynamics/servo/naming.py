@@ -6,7 +6,7 @@ linearisation, one after the other, as long as folds that were not fitted are pr
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,10 +14,19 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.servo.candidates import Candidate, candidate_columns, candidates_of
-from truing.dynamics.servo.chain import PARAMETERS
-from truing.dynamics.servo.fit import Fitted, Fitter, Noise, noise_of
+from truing.dynamics.servo.fit import (
+    Column,
+    Fitted,
+    Fitter,
+    FoldSums,
+    Noise,
+    change_of,
+    combined,
+    noise_of,
+    sums_by_fold,
+)
 from truing.dynamics.servo.free import USUAL, Free, Sizes, moved
-from truing.dynamics.servo.simulator import Function, Point
+from truing.dynamics.servo.simulator import FIELDS, Function, Point
 
 Floats = NDArray[np.float64]
 
@@ -28,11 +37,18 @@ SURE_NATS = 10.0  # of a refit: instead of these, where folds are too unlike for
 OTHER_LAWS = 0.2  # part of a joint's error that other laws than the catalogue's may well be
 NAMED = 0.2  # what is less sure is fitted, and not named
 UNKNOWN = 0.5  # so sure at least must be that there is what nobody knows
+_INEXACT = 0.03  # of what a law explains: so much it may miss as no law of the catalogue is a machine's
+_MEMBER = 0.05  # of the best one's weight: who has less is not of its class
 _CLASS_NATS, _CLASS_R2, _SAME_R2, _TEMPERED, _FAR_NATS = 6.0, 0.95, 0.5, 0.5, 25.0
 _LATE_R2 = 0.95  # of a delay, that damping and the others do as well: these are one class
 _ONE_RECORDING = 0.9  # the most that folds of one recording are worth
 _REFITTED, _REFITTED_EACH = 6, 4  # of the candidates, without linearisation; of each joint, if there are more
-_FIRST_ROUNDS, _MORE_ROUNDS = 2, 4  # of a refit: from each start, from the best of these
+_FIRST_ROUNDS, _MORE_ROUNDS = 1, 5  # of a refit: from each start, from the best of these
+_STRAIGHT = 5.0  # standard errors from a fit: so far its derivatives are taken to hold
+_OF_ARM = 5, 2  # the same of what is of the whole arm, where every joint is refitted; of one effect
+_LEAST_PART = 0.05  # of what the usual parameters leave at a joint, that a name removes
+_STARTS = 2  # that a refit is begun from: those of least error
+_HOPELESS = 0.3  # of the best refit's nats: what a refit has won after its first rounds, or it ends
 _WIDE = (0.5, 2.0)  # of a prior: sizes that a candidate is looked at
 _FRICTIONS = (1.0, 0.4, 0.05)  # times the dry friction that stands beside it
 _OF_INPUTS = ("gain_law", "thermal_friction", "supply_gain", "warmup")
@@ -44,6 +60,7 @@ _MOST_ROWS = 15000  # of which sums are made; more are thinned
 _LEAST_UNKNOWN = 0.05  # as LEAST_GAIN, of free functions
 INPUTS = ("speed", "load", "angle", "command_error", "time", "directed_load", "directed_angle")
 _PLACES = 6  # of a free function
+_PLACES_OF_TIME = 24  # the same of time, in which what comes by the clock comes and goes
 
 
 @dataclass
@@ -68,28 +85,61 @@ class Weight:
     point: Point  # the chain without it
 
 
+@dataclass(frozen=True)
+class Refit:
+    """A rival that was refitted in the place of what was taken."""
+
+    other: Candidate
+    behind: float  # nats
+    best: float  # nats that the one won that was taken
+
+
 @dataclass
 class Account:
     """What was found, fitted to all training rows."""
 
     fitted: Fitted
+    standard: Fitted  # with the usual parameters alone
     found: list[Candidate]
     sizes: Sizes
     nominal: Point
     not_testable: list[tuple[str, tuple[str, ...], str]] = field(default_factory=list)
-    refits: dict[str, list[tuple[Candidate, float]]] = field(default_factory=dict)
-    """By label and joint of what was taken: rivals that were refitted, and how far behind they stayed."""
+    refits: dict[tuple[str, tuple[str, ...]], list[Refit]] = field(default_factory=dict)
+    """By the place of what was taken: rivals that were refitted where it was."""
     weights: list[Weight] = field(default_factory=list)
-    vetoed: list[Candidate] = field(default_factory=list)  # held-out motion is predicted no better with them
+    vetoed: list[tuple[Candidate, str]] = field(default_factory=list)  # and why they are not named
 
 
 @dataclass
 class Sums:
     """Normal equations by fold, of the columns that are fitted and of the candidates."""
 
-    folds: list[tuple[Floats, Floats, float, float]]
+    folds: list[FoldSums]
     always: int  # columns of what is fitted stand first
     noise: Noise
+
+
+def squares_of_folds(
+    sums: Sums, fitted: Fitted, more: Sequence[int] = (), prior: Floats | None = None
+) -> Floats:
+    """Squares of each fold by the fit to the others, linear at the fit, with its priors: what motion hardly
+    shows would otherwise go anywhere. Nor do values go further than derivatives hold. more: further columns
+    that are in, numbered as in `sums`, and their priors."""
+    columns = [*range(sums.always), *more]
+    extra = np.zeros(0) if prior is None else prior
+    precision = np.array([*(f.prior for f in fitted.free), *extra]) ** -2.0
+    away = np.array([f.at(fitted.point) - s for f, s in zip(fitted.free, fitted.start, strict=True)])
+    pull = precision * np.array([*away, *np.zeros(len(extra))])
+    parts = [(xx[np.ix_(columns, columns)], xy[columns], yy) for xx, xy, yy, _ in sums.folds]
+    xx, xy = sum(part[0] for part in parts), sum(part[1] for part in parts)
+    sigma = np.sqrt(np.diag(np.linalg.inv(xx + np.diag(precision))))
+    known = slice(0, sums.always)
+    out = []
+    for here, right, squares in parts:
+        values = np.linalg.solve(xx - here + np.diag(precision), xy - right - pull)
+        values[known] = np.clip(values[known], -_STRAIGHT * sigma[known], _STRAIGHT * sigma[known])
+        out.append(squares - 2.0 * float(values @ right) + float(values @ here @ values))
+    return np.array(out)
 
 
 class Namer:
@@ -115,41 +165,36 @@ class Namer:
     def sums(
         self,
         fitted: Fitted,
-        more: Sequence[Floats],
+        more: Sequence[Column],
         errors: Floats | None = None,
         noise: Noise | None = None,
         folds_of_rows: NDArray[np.intp] | None = None,
     ) -> Sums:
         """Noise is what all columns together leave; rows count for as many as their noise goes on for."""
         rows = self.fitter.rows
-        every = max(1, math.ceil(len(rows.fold) / _MOST_ROWS))
         errors = fitted.errors if errors is None else errors
-        table = np.concatenate([fitted.columns, np.array(more).reshape(-1, *errors.shape)])
-        noise = noise or self._noise(table, errors, len(fitted.columns))
-        x = (table[:, ::every] * noise.weight).reshape(len(table), -1)
-        y = (errors[::every] * noise.weight).ravel()
+        columns = [*fitted.columns, *more]
+        noise = noise or self._noise(columns, errors, len(fitted.columns))
         which = rows.fold if folds_of_rows is None else folds_of_rows
-        fold = np.repeat(which[::every], self.joints)
-        folds = []
+        fold = np.unique(which, return_inverse=True)[1]
         count = float(np.sum(1.0 / noise.effect))
-        for number in np.unique(fold):
-            at = fold == number
-            part, right = x[:, at] * math.sqrt(every), y[at] * math.sqrt(every)
-            here = float(np.sum(which == number)) * count
-            folds.append((part @ part.T, part @ right, float(right @ right), here))
+        some = sums_by_fold(columns, errors, noise.weight, fold, self._every())
+        here = np.bincount(fold)
+        folds = [(xx, xy, yy, float(n) * count) for (xx, xy, yy, _), n in zip(some, here, strict=True)]
         return Sums(folds, len(fitted.columns), noise)
 
-    def _noise(self, table: Floats, errors: Floats, always: int) -> Noise:
+    def _every(self) -> int:
+        return max(1, math.ceil(len(self.fitter.rows.fold) / _MOST_ROWS))
+
+    def _noise(self, columns: Sequence[Column], errors: Floats, always: int) -> Noise:
         """What a ridge fit of everything leaves, joint by joint."""
         rms = np.maximum(np.sqrt(np.mean(errors**2, axis=0)), self.resolution)
-        x = (table / rms).reshape(len(table), -1)
-        y = (errors / rms).ravel()
-        scale = np.sqrt(np.maximum(np.sum(x * x, axis=1), 1e-30))
-        x = x / scale[:, None]
-        ridge = np.full(len(table), 1e-3)
+        xx, xy, _, _ = sums_by_fold(columns, errors, 1.0 / rms, every=self._every())[0]
+        scale = np.sqrt(np.maximum(np.diag(xx), 1e-30))
+        ridge = np.full(len(columns), 1e-3)
         ridge[:always] = 1e-6
-        left = errors - (np.linalg.solve(x @ x.T + np.diag(ridge), x @ y) @ x).reshape(errors.shape) * rms
-        return noise_of(left, self.fitter.rows, self.resolution)
+        values = np.linalg.solve(xx / np.outer(scale, scale) + np.diag(ridge), xy / scale) / scale
+        return noise_of(errors - combined(columns, values, errors), self.fitter.rows, self.resolution)
 
     def ranked(
         self, sums: Sums, groups: Sequence[Sequence[int]], costs: Sequence[float], prior: Floats
@@ -174,12 +219,23 @@ class Namer:
         whole = float((before - after).sum() / before.sum())
         return whole > least / self.joints and bool(nats > SURE_NATS or roots.mean() > SURE_GAIN * error)
 
+    def _enough(self, one: Candidate, seen: Mapping[tuple[str, tuple[str, ...]], int]) -> bool:
+        """Whether as many were refitted as may be: of a joint, or of the arm and each of its effects."""
+        there = [place for place, joint in seen.items() if joint == one.joint]
+        if one.joint < 0:
+            return len(there) >= _OF_ARM[0] or [name for name, _ in there].count(one.effect) >= _OF_ARM[1]
+        return len(there) >= (_REFITTED if self.joints == 1 else _REFITTED_EACH)
+
+    def matters(self, standard: Fitted, one: Candidate, before: Fitted, after: Fitted) -> bool:
+        """Whether a refit removes more of its joint's error than encoders' steps make, and than a part of
+        what the usual parameters leave there: the laws themselves are no nearer to a machine's."""
+        squares = [np.mean(some.errors**2, axis=0) for some in (before, after, standard)]
+        enough = squares[0] - squares[1] > np.maximum(self.resolution**2, _LEAST_PART * squares[2])
+        return bool(np.any(enough) if one.joint < 0 else enough[one.joint])
+
     def folds_of(self, fitted: Fitted, noise: Noise, folds_of_rows: NDArray[np.intp] | None = None) -> Floats:
         """Squares of each fold, by the fit to the others, linear at the fit."""
-        sums = self.sums(fitted, [], None, noise, folds_of_rows)
-        return np.asarray(
-            _core.rank_columns(sums.folds, list(range(sums.always)), [], [], _priors(fitted))[0].folds
-        )
+        return squares_of_folds(self.sums(fitted, [], None, noise, folds_of_rows), fitted)
 
     def carries(self, one: Candidate, before: Fitted, after: Fitted, noise: Noise) -> bool:
         """Whether what goes with an input that changes from recording to recording predicts values of it that
@@ -192,7 +248,7 @@ class Namer:
     # ---- the search
 
     def run(self, fitted: Fitted, sizes: Sizes, nominal: Point) -> Account:
-        account = Account(fitted, [], sizes, nominal)
+        account = Account(fitted, fitted, [], sizes, nominal)
         refused: set[tuple[str, int]] = set()
         while len(account.found) < self.most:
             self.fitter.progress(f"candidates beside {len(account.found)} that were named")
@@ -228,16 +284,21 @@ class Namer:
             one, fitted = account.found[at], account.fitted
             less = self.without(account, at, noise)
             rest = Account(
-                less, [c for k, c in enumerate(account.found) if k != at], account.sizes, account.nominal
+                less,
+                account.standard,
+                [c for k, c in enumerate(account.found) if k != at],
+                account.sizes,
+                account.nominal,
             )
             best, seen = self.best_beside(rest, set(), joint)
             if not best or best[0][1].place == one.place:
                 continue
-            gain, other, refit = best[0]
+            _, other, refit = best[0]
             new = self.fitter.cost(refit.errors, refit.point, refit.free, refit.start, seen)
             old = self.fitter.cost(fitted.errors, fitted.point, fitted.free, fitted.start, seen)
             if old - new > _BETTER:
                 self.fitter.progress(f"{other.effect} in the place of {one.effect} {' '.join(one.joints)}")
+                account.refits[other.place] = _rivals(less, seen, best, 0)
                 account.found[at] = other
                 account.found.append(account.found.pop(at))
                 account.fitted = self.polished(refit, seen)
@@ -273,12 +334,10 @@ class Namer:
             taken.setdefault(one.joint, k)
         taken = {-1: 0} if best[0][1].joint < 0 else {j: k for j, k in taken.items() if j >= 0}
         for k in taken.values():
-            gain, one, _ = best[k]
+            one = best[k][1]
             self.fitter.progress(f"{one.effect} {' '.join(one.joints)} is taken")
             account.found.append(one)
-            account.refits[f"{one.label} {one.joint}"] = [
-                (other, gain - theirs) for theirs, other, _ in best[k + 1 :] if other.joint == one.joint
-            ]
+            account.refits[one.place] = _rivals(account.fitted, noise, best, k)
         refits = [best[k][1:] for k in taken.values()]
         account.fitted = self.polished(_together(account.fitted, refits), noise)
         refused.clear()
@@ -293,8 +352,9 @@ class Namer:
         there = {c.place for c in account.found}
         candidates = [c for c in candidates if c.place not in there and not self._fitted(fitted, c)]
         if joint is not None:
-            candidates = [c for c in candidates if c.joint == joint]
-        with self.fitter.only(-1 if joint is None else joint, fitted):
+            here = (joint, -1) if self.joints == 1 else (joint,)
+            candidates = [c for c in candidates if c.joint in here]
+        with self.fitter.beside(fitted):
             return self._best_of(account, refused, candidates, base)
 
     def _best_of(
@@ -312,12 +372,11 @@ class Namer:
         order = sorted(ranks, key=lambda r: -max(r.score, starts[r.candidate][0]))
         best: list[tuple[float, Candidate, Fitted]] = []
         seen: dict[tuple[str, tuple[str, ...]], int] = {}  # places, and their joints
-        most = _REFITTED if self.joints == 1 else _REFITTED_EACH
         for rank in order:
             one, (promised, start) = candidates[rank.candidate], starts[rank.candidate]
             if max(rank.score, promised) < THRESHOLD:
                 break
-            if list(seen.values()).count(one.joint) >= most:
+            if self._enough(one, seen):
                 continue
             if one.place in seen or (one.label, one.joint) in refused:
                 continue
@@ -326,13 +385,14 @@ class Namer:
                 points.append(_linear_start(one, rank, fitted.point))
             if not points:
                 continue
+            points.append(one.on(fitted.point))
             seen[one.place] = one.joint
-            joint_alone = -1 if one.free[0].field == "supply_sag" else one.joint
-            with self.fitter.only(joint_alone, fitted):
-                gain, refit = self._refit(fitted, one, points, sums.noise)
+            so_far = max((nats for nats, other, _ in best if other.joint == one.joint), default=0.0)
+            gain, refit = self._refit(fitted, one, points, sums.noise, so_far)
             after = self.folds_of(refit, sums.noise)
             before = self.folds_of(fitted, sums.noise)
             fine = gain > THRESHOLD and self.predicts(before, after, LEAST_GAIN, gain)
+            fine = fine and self.matters(account.standard, one, fitted, refit)
             if fine and self.carries(one, fitted, refit, sums.noise):
                 best.append((gain, one, refit))
             else:
@@ -348,25 +408,30 @@ class Namer:
         out: list[tuple[float, Point | None]] = [(-math.inf, None)] * len(candidates)
         labels: dict[str, list[int]] = {}
         for k, one in enumerate(candidates):
-            if one.joint >= 0:
-                labels.setdefault(one.label, []).append(k)
+            labels.setdefault(one.label, []).append(k)
         tried, points = [], []
         for members in labels.values():
-            for number in range(len(_sizes(candidates[members[0]]))):
-                for friction in _FRICTIONS:
+            one = candidates[members[0]]
+            for number in range(len(_sizes(one))):
+                for friction in _FRICTIONS if one.joint >= 0 or self.joints == 1 else _FRICTIONS[:1]:
                     changed = fitted.point
                     for k in members:
                         changed = _wide(candidates[k], changed, number, friction)
                     points.append(changed)
                     tried.append(members)
-        follows = {j: _Follow(fitted, j, noise) for j in {c.joint for c in candidates if c.joint >= 0}}
+        follows = [_Follow(fitted, j, noise) for j in range(self.joints)]
         for members, point, motion in zip(tried, points, self.fitter.motions(points), strict=True):
             errors = self.fitter.errors(motion)
             for k in members:
-                follow = follows[candidates[k].joint]
-                gain, step = follow.gain(errors, point)
+                joint = candidates[k].joint
+                here = follows if joint < 0 else [follows[joint]]
+                found = [follow.gain(errors, point) for follow in here]
+                gain = sum(nats for nats, _ in found)
                 if gain > out[k][0]:
-                    out[k] = (gain, follow.moved(fitted.point, point, step))
+                    base = point if joint < 0 else fitted.point
+                    for follow, (_, step) in zip(here, found, strict=True):
+                        base = follow.moved(base, point, step)
+                    out[k] = (gain, base)
         return out
 
     def _fitted(self, fitted: Fitted, one: Candidate) -> bool:
@@ -374,35 +439,43 @@ class Namer:
         return any((f.field, f.joint, f.body) in names for f in one.free)
 
     def _refit(
-        self, fitted: Fitted, one: Candidate, points: Sequence[Point], noise: Noise
+        self, fitted: Fitted, one: Candidate, points: Sequence[Point], noise: Noise, best: float
     ) -> tuple[float, Fitted]:
         """The candidate and what is fitted at its joint, without linearisation: nats that it wins. points:
-        where to begin."""
+        where to begin. best: nats of the best refit until now."""
         before = self.fitter.cost(fitted.errors, fitted.point, fitted.free, fitted.start, noise)
         mine = [k for k, f in enumerate(fitted.free) if one.joint < 0 or f.joint == one.joint or f.joint < 0]
-        if one.joint < 0:
-            mine = [k for k in mine if fitted.free[k].field in ("command_gain", "coulomb", "zero")]
         free = [*(fitted.free[k] for k in mine), *one.free]
         doing = f"{one.effect} {' '.join(one.joints)}"
         tries = []
-        for point in points:
+        motions = self.fitter.motions(points)
+        costs = [
+            self.fitter.cost(self.fitter.errors(m), p, [], np.zeros(0), noise)
+            for m, p in zip(motions, points, strict=True)
+        ]
+        for k in np.argsort(costs, kind="stable")[:_STARTS]:
+            point = points[k]
             start = np.array([*(fitted.start[k] for k in mine), *(_begin(f, one, point) for f in one.free)])
             tries.append(self.fitter.fit(point, free, start, noise, _FIRST_ROUNDS, doing))
         some = min(tries, key=lambda t: t.cost)
         start = some.start
-        some = self.fitter.fit(some.point, free, start, noise, _MORE_ROUNDS, doing)
         others = [k for k in range(len(fitted.free)) if k not in mine]
-        rest = [fitted.free[k] for k in others]
-        starts = fitted.start[others]
-        after = self.fitter.cost(some.errors, some.point, [*rest, *free], np.array([*starts, *start]), noise)
-        columns = fitted.columns.copy()
-        columns[mine] = some.columns[: len(mine)]
-        some.columns = np.concatenate([columns, some.columns[len(mine) :]])
+        every = [*(fitted.free[k] for k in others), *free]
+        starts = np.array([*fitted.start[others], *start])
+        after = self.fitter.cost(some.errors, some.point, every, starts, noise)
+        if before - after > _HOPELESS * best:
+            seen = some.errors, some.columns
+            some = self.fitter.fit(some.point, free, start, noise, _MORE_ROUNDS, doing, seen)
+            after = self.fitter.cost(some.errors, some.point, every, starts, noise)
+        columns = list(fitted.columns)
+        for k, column in zip(mine, some.columns, strict=False):
+            columns[k] = column
+        some.columns = [*columns, *some.columns[len(mine) :]]
         some.free = [*fitted.free, *one.free]
         some.start = np.array([*fitted.start, *start[len(mine) :]])
         return before - after, some
 
-    def polished(self, refit: Fitted, noise: Noise, rounds: int = 2) -> Fitted:
+    def polished(self, refit: Fitted, noise: Noise, rounds: int = _MORE_ROUNDS) -> Fitted:
         return self.fitter.settled(refit.point, refit.free, refit.start, noise, rounds, "all that is named")
 
     def without(self, account: Account, at: int, noise: Noise) -> Fitted:
@@ -411,21 +484,55 @@ class Namer:
         drop = {(f.field, f.joint, f.body) for f in one.free}
         keep = [k for k, f in enumerate(fitted.free) if (f.field, f.joint, f.body) not in drop]
         mine = [k for k in keep if one.joint < 0 or fitted.free[k].joint in (one.joint, -1)]
-        point = one.off(fitted.point)
-        with self.fitter.only(one.joint, fitted):
-            some = self.fitter.fit(
-                point, [fitted.free[k] for k in mine], fitted.start[mine], noise, 2, f"without {one.effect}"
-            )
-        columns = fitted.columns.copy()
-        columns[mine] = some.columns
+        point, free = one.off(fitted.point), [fitted.free[k] for k in mine]
+        # Usual values have made up for what goes: they may as well begin where they were without any name.
+        usual = [f for f in free if any(f == other for other in account.standard.free)]
+        other = point
+        for f in usual:
+            other = f.put(other, f.at(account.standard.point))
+        with self.fitter.beside(fitted):
+            tries = [
+                self.fitter.fit(p, free, fitted.start[mine], noise, _MORE_ROUNDS, f"without {one.effect}")
+                for p in (point, other)
+            ]
+        some = min(tries, key=lambda t: t.cost)
+        columns = list(fitted.columns)
+        for k, column in zip(mine, some.columns, strict=True):
+            columns[k] = column
         return replace(
             fitted,
             point=some.point,
             free=[fitted.free[k] for k in keep],
             start=fitted.start[keep],
             errors=some.errors,
-            columns=columns[keep],
+            columns=[columns[k] for k in keep],
         )
+
+
+def _rivals(
+    fitted: Fitted, noise: Noise, best: Sequence[tuple[float, Candidate, Fitted]], at: int
+) -> list[Refit]:
+    """Refits that may stand in the place of one of them. What is of the whole arm stands in the place of a
+    joint's by what it does at that joint."""
+    nats, one, refit = best[at]
+
+    def at_joint(some: Fitted) -> float:
+        squares = fitted.errors[:, one.joint] ** 2 - some.errors[:, one.joint] ** 2
+        return 0.5 * float(np.sum(squares)) * float(noise.weight[one.joint]) ** 2
+
+    out = []
+    for k, (theirs, other, some) in enumerate(best):
+        if k == at or not _meet(one, other):
+            continue
+        whole = one.joint >= 0 > other.joint
+        behind = at_joint(refit) - at_joint(some) if whole else nats - theirs
+        out.append(Refit(other, max(behind, 0.0), nats))
+    return out
+
+
+def _meet(one: Candidate, other: Candidate) -> bool:
+    """Whether one may stand in the other's place: at one joint, or one of them of the whole arm."""
+    return one.joint == other.joint or min(one.joint, other.joint) < 0
 
 
 def _together(fitted: Fitted, refits: Sequence[tuple[Candidate, Fitted]]) -> Fitted:
@@ -448,23 +555,24 @@ class _Follow:
         mine = [k for k, f in enumerate(fitted.free) if f.joint == joint]
         self.free = [fitted.free[k] for k in mine]
         self.start = fitted.start[mine]
-        self.x = fitted.columns[mine, :, joint] * self.weight
+        self.x = np.array([fitted.columns[k][1] for k in mine]) * self.weight
         self.precision = np.array([f.prior**-2 for f in self.free])
-        self.inverse = np.linalg.inv(self.x @ self.x.T + np.diag(self.precision + 1e-9))
+        xx = sums_by_fold([(0, one) for one in self.x], self.x[0][:, None], np.ones(1))[0][0]
+        self.inverse = np.linalg.inv(xx + np.diag(self.precision + 1e-9))
         self.before = self._cost(fitted.errors[:, joint] * self.weight, fitted.point, np.zeros(len(mine)))
 
     def _cost(self, errors: Floats, point: Point, step: Floats) -> float:
         at = np.array([f.at(point) for f in self.free]) + step - self.start
-        return 0.5 * float(errors @ errors + np.sum(self.precision * at**2))
+        return 0.5 * float(np.sum(errors**2) + np.sum(self.precision * at**2))
 
     def gain(self, errors: Floats, point: Point) -> tuple[float, Floats]:
         """Nats, and the steps."""
         e = errors[:, self.joint] * self.weight
         at = np.array([f.at(point) for f in self.free])
-        step = self.inverse @ (self.x @ e - self.precision * (at - self.start))
+        step = self.inverse @ (np.einsum("kn,n->k", self.x, e) - self.precision * (at - self.start))
         most = np.array([_FARTHEST * f.prior for f in self.free])
         step = np.clip(step, -most, most)
-        return self.before - self._cost(e - step @ self.x, point, step), step
+        return self.before - self._cost(e - np.einsum("k,kn->n", step, self.x), point, step), step
 
     def moved(self, base: Point, changed: Point, step: Floats) -> Point:
         """The base with this joint as in `changed`, and the steps."""
@@ -479,12 +587,8 @@ def _sizes(one: Candidate) -> list[float]:
         return [1.0]
     free = one.free[0]
     return [
-        s for s in (*_WIDE, *(-w for w in _WIDE)) if free.low <= s * free.prior + _neutral(one) <= free.high
+        s for s in (*_WIDE, *(-w for w in _WIDE)) if free.low <= s * free.prior + one.neutral <= free.high
     ]
-
-
-def _neutral(one: Candidate) -> float:
-    return PARAMETERS[one.free[0].field].neutral
 
 
 def _wide(one: Candidate, point: Point, number: int, friction: float) -> Point:
@@ -493,7 +597,11 @@ def _wide(one: Candidate, point: Point, number: int, friction: float) -> Point:
     point = one.on(point)
     if one.begin is None:
         free = one.free[0]
-        point = free.put(point, _neutral(one) + sizes[min(number, len(sizes) - 1)] * free.prior)
+        point = free.put(point, one.neutral + sizes[min(number, len(sizes) - 1)] * free.prior)
+    if one.joint < 0:
+        chain = point.chain.copy()
+        chain[:, FIELDS.index("coulomb")] *= friction
+        return replace(point, chain=chain)
     return point.with_value(one.joint, "coulomb", friction * point.value(one.joint, "coulomb"))
 
 
@@ -504,10 +612,6 @@ def _linear_start(one: Candidate, rank: Rank, point: Point) -> Point:
         change = float(np.clip(rank.values[0], -new.prior, new.prior))
         point = new.put(point, new.at(point) + change)
     return point
-
-
-def _priors(fitted: Fitted) -> Floats:
-    return np.array([f.prior for f in fitted.free])
 
 
 def _begin(free: Free, one: Candidate, point: Point) -> float:
@@ -574,8 +678,9 @@ def _resolution(fitter: Fitter) -> Floats:
 class Sureness:
     """Of one effect that was found."""
 
-    probability: float
-    confounded: tuple[tuple[Candidate, float], ...]  # and their probabilities
+    probability: float  # its own part of its class's
+    confounded: tuple[tuple[Candidate, float], ...]  # what could stand in its place, and their parts
+    of_class: float  # that it is one of these
 
 
 def sureness(namer: Namer, account: Account, single: bool) -> list[Sureness]:
@@ -590,38 +695,44 @@ def sureness(namer: Namer, account: Account, single: bool) -> list[Sureness]:
     out = []
     for at, one in enumerate(account.found):
         mine = [k for k, f in enumerate(fitted.free) if f in one.free]
-        shown = fitted.columns[mine]
+        shown = [fitted.columns[k] for k in mine]
         change = np.array([fitted.free[k].at(fitted.point) for k in mine]) - np.array(
             [f.at(one.off(fitted.point)) for f in one.free]
         )
         if one.begin is not None or not np.isfinite(change).all():  # of a limit: all that it does
             off = namer.fitter.motions([one.off(fitted.point)])[0]
-            shown, change = (base - off)[None], np.ones(1)
-        part = np.tensordot(change, shown, 1)
+            shown, change = [(-1, base - off)], np.ones(1)
+        part = combined(shown, change, base)
         keep = [k for k in range(len(fitted.free)) if k not in mine]
-        less = replace(fitted, free=[fitted.free[k] for k in keep], columns=fitted.columns[keep])
-        sums = namer.sums(less, [part, *columns], fitted.errors + part)
+        less = replace(fitted, free=[fitted.free[k] for k in keep], columns=[fitted.columns[k] for k in keep])
+        sums = namer.sums(less, [(-1, part), *columns], fitted.errors + part)
         groups, costs, prior = _groups(sums, less, [replace(one, begin=1.0), *others])
         ranks = namer.ranked(sums, groups, costs, prior)[1]
-        out.append(_sure(namer, one, others, account.weights[at], ranks, single))
+        refits = account.refits.get(one.place, ())
+        out.append(_sure(namer.joints, one, others, account.weights[at], ranks, refits, single))
     return out
 
 
 def _sure(
-    namer: Namer,
+    joints: int,
     one: Candidate,
     others: Sequence[Candidate],
     weight_of: Weight,
     ranks: Sequence[Rank],
+    refits: Sequence[Refit],
     single: bool,
 ) -> Sureness:
-    mine = ranks[0]
-    loss = mine.score
-    in_class, outside = 1.0, math.exp(-_TEMPERED * min(loss, 700.0))
+    loss = ranks[0].score
+    outside = math.exp(-_TEMPERED * min(loss, 700.0))
     rivals: dict[tuple[str, tuple[str, ...]], tuple[Candidate, float]] = {}
+    for refit in refits:
+        # Of refits both laws are inexact, and by a part of what they explain.
+        weight = math.exp(-refit.behind / max(1.0 / _TEMPERED, _INEXACT * refit.best))
+        if weight > _MEMBER and refit.other.place != one.place:
+            rivals[refit.other.place] = (refit.other, weight)
     for rank in sorted(ranks[1:], key=lambda r: -r.score):
         other = others[rank.candidate - 1]
-        if other.place in rivals or other.place == one.place:
+        if other.place in rivals or other.place == one.place or not _meet(one, other):
             continue
         behind = loss - rank.score
         weight = math.exp(-_TEMPERED * max(behind, 0.0))
@@ -629,18 +740,18 @@ def _sure(
             continue
         if behind < _CLASS_NATS or rank.explains_best > _CLASS_R2:
             rivals[other.place] = (other, weight)
-            in_class += weight
         elif behind < _FAR_NATS:
             outside += weight
+    in_class = 1.0 + sum(weight for _, weight in rivals.values())
     before, after = weight_of.before, weight_of.after
     gain = float((before - after).sum() / before.sum()) if before.sum() > 0.0 else 0.0
-    part = max(0.0, gain) * namer.joints
+    part = max(0.0, gain) * joints
     law = part**2 / (part**2 + OTHER_LAWS**2)
-    probability = in_class / (in_class + outside) * law
-    total = in_class + outside
+    if single:
+        law = min(law, _ONE_RECORDING)
+    total = (in_class + outside) / law if law > 0.0 else math.inf
     return Sureness(
-        min(probability, _ONE_RECORDING) if single else probability,
-        tuple((other, weight / total) for other, weight in rivals.values()),
+        1.0 / total, tuple((other, weight / total) for other, weight in rivals.values()), in_class / total
     )
 
 
@@ -651,14 +762,15 @@ def late(namer: Namer, account: Account) -> list[int]:
     candidates, _, base = namer.all_candidates(fitted.point, account.sizes)
     some = [c for c in candidates if c.effect == "delay"]
     out = []
-    for one, column in zip(some, candidate_columns(namer.fitter, fitted.point, base, some), strict=True):
+    for one, (_, y) in zip(some, candidate_columns(namer.fitter, fitted.point, base, some), strict=True):
         j = one.joint
         mine = [k for k, f in enumerate(fitted.free) if f.joint == j and f.field in USUAL]
-        x, y = fitted.columns[mine, :, j], column[:, j]
-        scale = np.sqrt(np.maximum(np.sum(x * x, axis=1), 1e-30))
-        x = x / scale[:, None]
-        fit = np.linalg.solve(x @ x.T + 1e-6 * np.eye(len(x)), x @ y) @ x
-        if float(np.sum((y - fit) ** 2)) < (1.0 - _LATE_R2) * float(np.sum(y * y)):
+        usual = [(0, fitted.columns[k][1]) for k in mine]
+        xx, xy, yy, _ = sums_by_fold(usual, y[:, None], np.ones(1))[0]
+        scale = np.sqrt(np.maximum(np.diag(xx), 1e-30))
+        right = xy / scale
+        fit = np.linalg.solve(xx / np.outer(scale, scale) + 1e-6 * np.eye(len(right)), right)
+        if yy - float(right @ fit) < (1.0 - _LATE_R2) * yy:
             out.append(j)
     return out
 
@@ -683,7 +795,7 @@ def unknown(namer: Namer, account: Account, single: bool) -> list[FoundFunction]
     fitted, sizes = account.fitted, account.sizes
     motions, torques = namer.fitter.simulator.run([fitted.point], namer.fitter.rows.windows, torques=True)
     base, found = motions[0], []
-    labels = [(name, place) for name in INPUTS for place in range(_PLACES)]
+    labels = [(name, place) for name in INPUTS for place in range(_places(name))]
     ranges = {
         (name, j): _range(namer, name, j, base, torques[0]) for name in INPUTS for j in range(namer.joints)
     }
@@ -693,16 +805,15 @@ def unknown(namer: Namer, account: Account, single: bool) -> list[FoundFunction]
         functions: list[Function] = []
         for j in range(namer.joints):
             low, width = ranges[name, j]
-            values = np.zeros(_PLACES)
+            values = np.zeros(_places(name))
             values[place] = size[j]
             functions.append((j, name, low, width, values))
         points.append(replace(fitted.point, functions=tuple(functions)))
-    columns, owners = [], []
+    columns: list[Column] = []
+    owners = []
     for (name, place), motion in zip(labels, namer.fitter.motions(points), strict=True):
         for j in range(namer.joints):
-            alone = np.zeros_like(base)
-            alone[:, j] = np.clip(motion[:, j] - base[:, j], -3.0, 3.0) / size[j]
-            columns.append(alone)
+            columns.append((j, change_of(motion, base, float(size[j]), j)))
             owners.append((name, j, place))
     sums = namer.sums(fitted, columns)
     groups, keys = [], []
@@ -712,20 +823,25 @@ def unknown(namer: Namer, account: Account, single: bool) -> list[FoundFunction]
             keys.append((name, j))
     costs = [math.log(len(keys))] * len(keys)
     prior = np.array([*(f.prior for f in fitted.free), *(0.3 * sizes.torque[j] for _, j, _ in owners)])
-    before, ranks = namer.ranked(sums, groups, costs, prior)
+    ranks = namer.ranked(sums, groups, costs, prior)[1]
+    before = squares_of_folds(sums, fitted)
     taken: set[int] = set()
     for rank in sorted(ranks, key=lambda r: -r.score):
         name, j = keys[rank.candidate]
-        if rank.score < THRESHOLD or j in taken or not namer.predicts(before, rank.folds, _LEAST_UNKNOWN):
+        if rank.score < THRESHOLD or j in taken:
             continue
-        gain = float((before - rank.folds).sum() / before.sum())
+        group = groups[rank.candidate]
+        after = squares_of_folds(sums, fitted, group, prior[group])
+        if not namer.predicts(before, after, _LEAST_UNKNOWN):
+            continue
+        gain = float((before - after).sum() / before.sum())
         part = max(0.0, gain) * namer.joints
         probability = part**2 / (part**2 + OTHER_LAWS**2)
         if probability < UNKNOWN:
             continue
         taken.add(j)
         low, width = ranges[name, j]
-        sigma = _sigmas(sums, groups[rank.candidate], prior)
+        sigma = _sigmas(sums, group, prior)
         shown = min(probability, _ONE_RECORDING) if single else probability
         found.append(FoundFunction(j, name, low, width, rank.values, sigma, shown, gain))
     return found
@@ -755,4 +871,8 @@ def _range(namer: Namer, name: str, j: int, motion: Floats, torque: Floats) -> t
         values = torque[:, j] if name == "load" else rows.measured[:, j]
         low, high = np.quantile(values, [0.01, 0.99])
     del motion
-    return float(low), max(float(high - low), 1e-6) / (_PLACES - 1)
+    return float(low), max(float(high - low), 1e-6) / (_places(name) - 1)
+
+
+def _places(name: str) -> int:
+    return _PLACES_OF_TIME if name == "time" else _PLACES

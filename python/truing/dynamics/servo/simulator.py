@@ -42,7 +42,8 @@ class Point:
     links: tuple[tuple[str, float], ...] = ()  # body, mass and inertia over the model's
     functions: tuple[Function, ...] = field(default=(), compare=False)
 
-    def with_value(self, joint: int, name: str, value: float) -> Point:
+    def with_value(self, joint: int | slice, name: str, value: float) -> Point:
+        """With this value of a joint, or of several."""
         chain = self.chain.copy()
         chain[joint, FIELDS.index(name)] = value
         return replace(self, chain=chain)
@@ -92,19 +93,18 @@ class Simulator:
         self._spaces = [_addresses(m, d) for m, d in zip(self._models, self._datas, strict=True)]
         self._calls = _functions(mujoco)
         joints = [self.model.joint(name) for name in arm.nominal.joints]
-        self.core_arm = _core.ServoArm(
-            [int(joint.qposadr[0]) for joint in joints],
-            [int(joint.dofadr[0]) for joint in joints],
-            data.step,
-            int(self.model.nbody),
-            np.array(self.model.opt.gravity),
-            data.torque_command,
-        )
+        self._places = [int(joint.qposadr[0]) for joint in joints], [int(joint.dofadr[0]) for joint in joints]
+        self.core_arm = self.core_arm_with(data.step)
         self.core_recordings = [
             _core.ServoRecording(s.step, s.command, s.smooth, s.speed, s.gain, s.supply, s.enabled, s.warmth)
             for s in data.streams
         ]
         self.dofs = np.array([int(joint.dofadr[0]) for joint in joints])
+
+    def core_arm_with(self, step: float) -> _core.ServoArm:
+        """Where the joints are; simulated in steps of so many seconds."""
+        gravity = np.array(self.model.opt.gravity)
+        return _core.ServoArm(*self._places, step, int(self.model.nbody), gravity, self.data.torque_command)
 
     def run(
         self,

@@ -16,7 +16,7 @@ from truing.dynamics.servo.chain import PARAMETERS, ServoChain
 from truing.dynamics.servo.data import ServoData
 from truing.dynamics.servo.fit import Fitted, sums
 from truing.dynamics.servo.free import USUAL, Free
-from truing.dynamics.servo.naming import NAMED, Account, FoundFunction, Namer, Sureness
+from truing.dynamics.servo.naming import Account, FoundFunction, Namer, Sureness
 from truing.dynamics.servo.result import (
     FoundServoEffect,
     ServoAlternative,
@@ -88,8 +88,9 @@ _SEPARATED = {
     "current_offset": "record the same motion with the arm turned over",
 }
 _USUAL_SEPARATED = "record steps, slow reversals and a chirp of each joint alone"
-_TOGETHER = 0.9  # correlation over recordings at which two inputs cannot be told apart
+_TOGETHER = 0.9  # rank correlation (Spearman 1904) over recordings: inputs that rose in one order
 _DEPARTS = 3.0  # standard errors from the file's value: a usual parameter departs from it
+_TOLD = 3  # causes in the sentence
 _SAME = 0.05  # of a prior's standard deviation: too little to be called another value
 
 
@@ -111,7 +112,7 @@ class Parts:
     held: Sequence[Floats]
     """Errors on held-out windows: of nominal, standard, named, of the named without each effect, and of the
     standard chain with each usual parameter as the file has it (`USUAL`). shape=(rows, joints)"""
-    held_rows: NDArray[np.intp]  # number of each row's window
+    held_rows: NDArray[np.intp]  # number of each row's block of time
     notes: Sequence[str]
     late: Sequence[int]  # joints at which damping and a delay do the same
 
@@ -123,20 +124,15 @@ def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
         "standard": chain_of(parts.standard.point, parts.simulator.arm.nominal),
         "named": chain_of(parts.account.fitted.point, parts.simulator.arm.nominal),
     }
-    small: list[str] = []
-    named = _named(parts, covariance, small)
+    named = _named(parts, covariance)
     effects = [*named, *_usual(parts, covariance)]
     unknown = [_unknown(f, chains["nominal"]) for f in parts.functions]
     classes = _classes(parts, named)
     verdict, sentence = _verdict(parts, named, unknown)
     warnings = list(parts.notes)
-    if small:
-        warnings.append(
-            f"fitted, and too small to be named, as something else may look so: {', '.join(small)}"
-        )
-    if parts.account.vetoed:
-        places = ", ".join(_place(one) for one in parts.account.vetoed)
-        warnings.append(f"not named, as held-out motion is predicted no better with it: {places}")
+    for why in dict.fromkeys(why for _, why in parts.account.vetoed):
+        places = ", ".join(_place(one) for one, other in parts.account.vetoed if other == why)
+        warnings.append(f"not named, as {why}: {places}")
     if parts.single:
         warnings.append("one recording only: folds are blocks of its time, and no name is surer than 0.9")
     held = tuple(dict.fromkeys(s.name for s in parts.data.streams if s.test))
@@ -201,9 +197,9 @@ def held_share(
     without: Floats, with_it: Floats, whole: Floats, window: NDArray[np.intp]
 ) -> tuple[float, float, float]:
     """Part of the squares of `whole` (or `without`, where this is more; each joint in units of its own) that
-    goes, and its 90 % interval over windows.
+    goes, and its 90 % interval over blocks of time.
 
-    without, with_it, whole: shape=(n, joints), errors of held-out rows. window: shape=(n,), of each row.
+    without, with_it, whole: shape=(n, joints), errors of held-out rows. window: shape=(n,), each row's block.
     """
     scale = np.maximum(np.sqrt(np.mean(whole**2, axis=0)), 1e-9)
     gains = np.sum(((without / scale) ** 2 - (with_it / scale) ** 2), axis=1)
@@ -221,13 +217,10 @@ def _rms(errors: Floats, joint: int) -> float:
     return float(np.sqrt(np.mean(some**2)))
 
 
-def _named(parts: Parts, covariance: ServoCovariance, small: list[str]) -> list[FoundServoEffect]:
+def _named(parts: Parts, covariance: ServoCovariance) -> list[FoundServoEffect]:
     out = []
     standard, named = parts.held[1], parts.held[2]
     for k, (one, sure) in enumerate(zip(parts.account.found, parts.sure, strict=True)):
-        if sure.probability < NAMED:
-            small.append(_place(one))
-            continue
         without = parts.held[3 + k]
         share, low, high = held_share(without, named, standard, parts.held_rows)
         values = tuple(
@@ -258,8 +251,12 @@ def _place(one: Candidate) -> str:
     return one.effect + (f" at {', '.join(one.joints)}" if one.joints else "")
 
 
+def _plain(effect: str) -> str:
+    return _PLAIN.get(effect, effect.replace("_", " "))
+
+
 def _sentence(effect: str, joints: Sequence[str], values: Sequence[ServoParameter]) -> str:
-    plain = _PLAIN.get(effect, effect.replace("_", " "))
+    plain = _plain(effect)
     text = plain[:1].upper() + plain[1:] + (f" at {', '.join(joints)}" if joints else "")
     sizes = ", ".join(f"{v.value:.3g} ± {v.sigma:.2g}{'' if v.unit == '1' else ' ' + v.unit}" for v in values)
     return f"{text}: {sizes}" if sizes else text
@@ -354,7 +351,7 @@ def _scale_class(named: Sequence[FoundServoEffect]) -> ServoClass:
 def _orders(data: ServoData) -> list[ServoClass]:
     """Temperature, gain, supply that rose together from recording to recording."""
     means = {
-        name: np.array([float(np.mean(getattr(s, name))) for s in data.streams])
+        name: np.array([float(np.mean(getattr(s, name))) for s in data.streams if not s.test])
         for name in ("gain", "warmth", "supply")
         if name in data.varies
     }
@@ -367,8 +364,8 @@ def _orders(data: ServoData) -> list[ServoClass]:
     names = list(means)
     for i, one in enumerate(names):
         for other in names[i + 1 :]:
-            a, b = (np.log(np.maximum(means[n], 1e-9)) if n == "gain" else means[n] for n in (one, other))
-            if a.size < 3 or a.std() < 1e-9 or b.std() < 1e-9 or abs(np.corrcoef(a, b)[0, 1]) < _TOGETHER:
+            a, b = _ranks(means[one]), _ranks(means[other])
+            if a.size < 3 or not a.std() or not b.std() or abs(np.corrcoef(a, b)[0, 1]) < _TOGETHER:
                 continue
             out.append(
                 ServoClass(
@@ -380,6 +377,13 @@ def _orders(data: ServoData) -> list[ServoClass]:
                 )
             )
     return out
+
+
+def _ranks(values: Floats) -> Floats:
+    """Places in their order; the mean of the places where values are the same."""
+    _, inverse, counts = np.unique(np.round(values, 9), return_inverse=True, return_counts=True)
+    last = np.cumsum(counts)
+    return np.asarray((last - 0.5 * (counts - 1))[inverse])
 
 
 # ---- verdict --------------------------------------------------------------------------------------
@@ -398,16 +402,31 @@ def _verdict(
 
     if named and found > standard:
         return "does_not_hold", "What was found does not hold on motion that it was not fitted to."
-    start = f"Held-out motion is off by {size(nominal)} (rms, mean of the joints) with the file's model, by"
-    usual = f" {size(standard)} with gain, damping, friction and rotor fitted"
+    usual = (
+        f"Held-out motion is off by {size(nominal)} with the file's model, {size(standard)} with the usual"
+    )
     if named:
-        what = "; ".join(e.sentence.split(":")[0] for e in named[:3])
-        more = f"; and {len(named) - 3} smaller" if len(named) > 3 else ""
         verdict = "effects+unknown" if unknown else "effects"
-        return verdict, f"{start}{usual}, by {size(found)} with what was named: {what}{more}."
+        return verdict, f"{usual} parameters fitted, {size(found)} with {_causes(named)}."
     if unknown:
-        return "unknown", f"{start}{usual}: what is left goes with inputs that no known effect explains."
-    return "none", f"{start}{usual}: beyond these no effect predicts motion that it was not fitted to."
+        return (
+            "unknown",
+            f"{usual} parameters fitted: what is left goes with inputs that no known effect explains.",
+        )
+    return "none", f"{usual} parameters fitted: beyond these no effect predicts motion it was not fitted to."
+
+
+def _causes(named: Sequence[FoundServoEffect]) -> str:
+    """The largest in plain words, one effect at several joints once, and how many smaller ones there are."""
+    joints: dict[str, list[str]] = {}
+    for one in named:
+        joints.setdefault(one.effect, []).extend(one.joints)
+    some = list(joints)[:_TOLD]
+    told = [_plain(effect) + (f" ({', '.join(joints[effect])})" if joints[effect] else "") for effect in some]
+    smaller = sum(one.effect not in some for one in named)
+    if smaller:
+        told.append(f"{smaller} smaller")
+    return " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
 
 
 def _where(parts: Parts) -> dict[str, object]:
