@@ -112,8 +112,7 @@ std::vector<ColumnSums> sum_columns(const std::vector<ColumnValues>& columns, co
       const JointFold& part = parts[f * joints + j];
       for (std::size_t b = 0; b < part.columns.size(); ++b) {
         for (std::size_t a = 0; a < part.columns.size(); ++a)
-          out[f].xx(part.columns[a], part.columns[b]) +=
-              part.gram.xx(static_cast<Index>(a), static_cast<Index>(b));
+          out[f].xx(part.columns[a], part.columns[b]) += part.gram.xx(static_cast<Index>(a), static_cast<Index>(b));
         out[f].xy[part.columns[b]] += part.gram.xy[static_cast<Index>(b)];
       }
       out[f].yy += part.gram.yy;

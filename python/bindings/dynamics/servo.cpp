@@ -126,6 +126,31 @@ std::vector<ColumnGain> ranked(const std::vector<Sums>& given, const std::vector
   return rank_columns(folds, always, candidates, costs, prior);
 }
 
+/// Sums over columns, and the evidence from them.
+void bind_columns(py::module_& m) {
+  m.def("sum_columns", &summed, py::arg("columns"), py::arg("measured"), py::arg("weight"), py::arg("fold"),
+        py::arg("folds") = 1, py::arg("every") = 1, py::arg("threads") = 1,
+        R"(Of each fold X^T X, X^T y, y^T y and the number of rows, weighted; the same bits whatever the threads.
+
+columns: a joint and its values, shape=(rows,), or -1 and those of all joints, shape=(rows, joints). measured: y,
+shape=(rows, joints). weight: of each joint. fold: of each row, from 0 on. every: rows are thinned to each
+so-many-th. Raises InputError: shapes that do not fit, folds or joints that there are not.)");
+  py::class_<ColumnGain>(m, "ColumnGain", "What adding a candidate's columns would win.")
+      .def_readonly("score", &ColumnGain::score, "Log Bayes factor less the candidate's cost [nats].")
+      .def_readonly("scale", &ColumnGain::scale, "Of the prior, the most likely one.")
+      .def_readonly("share", &ColumnGain::share, "Of the squares that are left, the part that it removes.")
+      .def_readonly("rank", &ColumnGain::rank, "Columns that the data can see.")
+      .def_readonly("values", &ColumnGain::values, "Of its columns.")
+      .def_readonly("folds", &ColumnGain::folds, "Squares of each fold, by the fit to the others.")
+      .def_readonly("explains_best", &ColumnGain::explains_best,
+                    "Of what the candidate of the best score does, the part that this one can do.");
+  m.def("rank_columns", &ranked, py::arg("folds"), py::arg("always"), py::arg("candidates"), py::arg("costs"),
+        py::arg("prior"),
+        R"(Evidence of candidates beside columns that are always in; the first entry is that of none.
+
+folds: of each X^T X, X^T y, y^T y and the number of rows that count. Raises InputError: other shapes.)");
+}
+
 }  // namespace
 
 void bind_servo(py::module_& m) {
@@ -190,27 +215,7 @@ as long as the call takes. Raises InputError: shapes that do not fit, addresses 
 
 paths: of every kind of masses, those of every recording; a set's `bodies` is the number of its kind. Raises InputError:
 shapes that do not fit, masses without paths.)");
-  m.def("sum_columns", &summed, py::arg("columns"), py::arg("measured"), py::arg("weight"), py::arg("fold"),
-        py::arg("folds") = 1, py::arg("every") = 1, py::arg("threads") = 1,
-        R"(Of each fold X^T X, X^T y, y^T y and the number of rows, weighted; the same bits whatever the threads.
-
-columns: a joint and its values, shape=(rows,), or -1 and those of all joints, shape=(rows, joints). measured: y,
-shape=(rows, joints). weight: of each joint. fold: of each row, from 0 on. every: rows are thinned to each
-so-many-th. Raises InputError: shapes that do not fit, folds or joints that there are not.)");
-  py::class_<ColumnGain>(m, "ColumnGain", "What adding a candidate's columns would win.")
-      .def_readonly("score", &ColumnGain::score, "Log Bayes factor less the candidate's cost [nats].")
-      .def_readonly("scale", &ColumnGain::scale, "Of the prior, the most likely one.")
-      .def_readonly("share", &ColumnGain::share, "Of the squares that are left, the part that it removes.")
-      .def_readonly("rank", &ColumnGain::rank, "Columns that the data can see.")
-      .def_readonly("values", &ColumnGain::values, "Of its columns.")
-      .def_readonly("folds", &ColumnGain::folds, "Squares of each fold, by the fit to the others.")
-      .def_readonly("explains_best", &ColumnGain::explains_best,
-                    "Of what the candidate of the best score does, the part that this one can do.");
-  m.def("rank_columns", &ranked, py::arg("folds"), py::arg("always"), py::arg("candidates"), py::arg("costs"),
-        py::arg("prior"),
-        R"(Evidence of candidates beside columns that are always in; the first entry is that of none.
-
-folds: of each X^T X, X^T y, y^T y and the number of rows that count. Raises InputError: other shapes.)");
+  bind_columns(m);
 }
 
 }  // namespace truing::python

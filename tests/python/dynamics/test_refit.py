@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""A simulator's model is the best that its format can hold: what it lacks is left out before the rest is fitted."""
+"""A simulator's model is the best that its format can hold: the rest is fitted without what it lacks."""
 
 from __future__ import annotations
 

@@ -174,8 +174,8 @@ struct ColumnRows {
   Eigen::Index every = 1;  ///< rows are thinned to each so-many-th, which counts for as many
 };
 
-/// Normal equations by fold of weighted rows. The order of the sums is fixed: the same bits whatever the threads. Throws
-/// std::invalid_argument: folds or joints that there are not.
+/// Normal equations by fold of weighted rows. The order of the sums is fixed: the same bits whatever the threads.
+/// Throws std::invalid_argument: folds or joints that there are not.
 std::vector<ColumnSums> sum_columns(const std::vector<ColumnValues>& columns, const ColumnRows& rows, int threads);
 
 /// What adding columns to those that are always in would win.

@@ -32,8 +32,10 @@ _SHORTEST = 1.0  # [s] of a stretch that is fitted to
 
 
 def lacking(robot: _core.Robot, left: Iterable[NotWritten]) -> list[str]:
-    """Parameters that a format does not hold, and that friction and bodies can make up for. left: what it has no
-    place for."""
+    """Parameters that a format does not hold, and that friction and bodies can make up for.
+
+    left: what it has no place for.
+    """
     names = {item.name for item in left if item.name.split(".")[0] in _TAKEN_UP}
     return [
         parameter
@@ -86,8 +88,8 @@ def fit_without(
     instead: bool = True,
 ) -> _core.Robot:
     """The robot without these parameters: friction, bodies and rotor inertias fitted anew to all of the
-    recordings. cutoff: [Hz], as the robot was fitted with; None: the usual one. instead: with laws of friction
-    that the format `to` holds, at joints that lose one.
+    recordings. cutoff: [Hz], as the robot was fitted with; None: the usual one. instead: with laws of
+    friction that the format `to` holds, at joints that lose one.
 
     Raises InputError on recordings that nothing can be fitted to.
     """

@@ -38,9 +38,9 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
 
     Returns the findings, and robot and recordings with what is certain corrected (`applied`): units and
     signs of speeds and angles that derivatives or limits prove, signs of torques that both friction and
-    weight contradict, and torques that are late by 40 ms or more. `cutoff` is that of the low-pass that both sides of
-    the equation of motion are to go through: the usual one, or where the recorded torques end. A `mistake` is not corrected: until it is,
-    effects that are named are doubtful.
+    weight contradict, and torques that are late by 40 ms or more. `cutoff` is that of the low-pass that both
+    sides of the equation of motion are to go through: the usual one, or where the recorded torques end. A
+    `mistake` is not corrected: until it is, effects that are named are doubtful.
 
     Raises InputError on a robot or recordings that cannot be used.
     """

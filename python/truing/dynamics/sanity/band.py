@@ -3,8 +3,8 @@
 """Where recorded torques end: a low-pass that they went through before they were written.
 
 Dry friction turns at once, so torques of a robot have content at all frequencies, which falls as 1/f, and so
-has what a model with dry friction expects. Of torques that were low-passed nothing is left above some frequency,
-at all joints alike. Spectra are Welch's (1967): overlapping stretches under Hann's window.
+has what a model with dry friction expects. Of torques that were low-passed nothing is left above some
+frequency, at all joints alike. Spectra are Welch's (1967): overlapping stretches under Hann's window.
 """
 
 from __future__ import annotations
@@ -67,8 +67,9 @@ def cutoff_below(frequency: float) -> float:
 
 def finding(frequency: float) -> RecordingFinding:
     words = (
-        f"the torques were low-passed at about {frequency:.1f} Hz before they were recorded: nothing is left of"
-        f" dry friction above it; what they are compared with is low-passed at {cutoff_below(frequency):.1f} Hz"
+        f"the torques were low-passed at about {frequency:.1f} Hz before they were recorded: nothing is left"
+        f" of dry friction above it; what they are compared with is low-passed at"
+        f" {cutoff_below(frequency):.1f} Hz"
     )
     return RecordingFinding("torques_low_passed", (), (), words, frequency, "Hz", True)
 

@@ -91,9 +91,9 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
     recording: Annotated[
         Sequence[Path],
         File(
-            "What the robot was fitted to: on it sizes of what is not written are stated, and friction and bodies"
-            " are fitted anew without that. May be repeated. Default: what RESULT was fitted to; of a robot.yaml"
-            " a motion through the robot's range.",
+            "What the robot was fitted to: on it sizes of what is not written are stated, and friction and"
+            " bodies are fitted anew without that. May be repeated. Default: what RESULT was fitted to; of a"
+            " robot.yaml a motion through the robot's range.",
             metavar="REC",
             several=True,
         ),
