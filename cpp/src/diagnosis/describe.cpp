@@ -453,8 +453,8 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   for (const int site : sites) {
     for (Curve& curve : curves_of_function(work, decision, g, site)) out.curves.push_back(std::move(curve));
   }
-  if (!out.curves.empty() && e.inputs.size() == 1 && e.site != "base") out.looks_like = shape_of(out.curves[0]);
-  out.looks_like += unrecorded_cause(work, e);
+  if (!out.curves.empty() && e.inputs.size() == 1 && e.site != "base")
+    out.looks_like = shape_of(out.curves[0]) + unrecorded_cause(work, e);
   if (e.inputs.size() == 2) out.looks_like = "depends on both " + out.inputs[0] + " and " + out.inputs[1];
   if (e.site == "base") out.looks_like = "the base moves as a function of " + out.inputs[0];
   return out;
