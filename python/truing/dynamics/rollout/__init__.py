@@ -221,7 +221,7 @@ def words_of(judged: Judgement, written: str = "MJCF", refitted: bool = False) -
         "nominal": "the nominal model",
         "standard": "standard practice",
         "named": "what was named",
-        "exported": f"the {written} alone" + (", fitted anew without what it lacks," if refitted else ""),
+        "exported": f"the {written} alone" + (" (fitted anew without what it lacks)" if refitted else ""),
     }
     names = {model: name for model, name in names.items() if model in judged.simulated}
     off = {model: shown(judged.worst_joint(model, horizon), unit) for model in names}
