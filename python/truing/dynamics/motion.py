@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,9 +64,14 @@ class Track:
 
     def one_payload(self, begin: float, end: float) -> bool:
         """Whether it does not change between two times [s]."""
-        mass = self.payload[:, 0]
-        rows = (self.torque_time >= begin - _SAME_TIME) & (self.torque_time <= end + _SAME_TIME)
-        return not rows.any() or bool(np.ptp(mass[rows]) <= PAYLOAD_STEP * mass.max())
+        first, last = np.searchsorted(self.torque_time, (begin - _SAME_TIME, end + _SAME_TIME))
+        mass = self.payload[first:last, 0]
+        return mass.size == 0 or bool(np.ptp(mass) <= PAYLOAD_STEP * self.heaviest)
+
+    @cached_property
+    def heaviest(self) -> float:
+        """[kg] the largest payload."""
+        return float(self.payload[:, 0].max())
 
 
 @dataclass(frozen=True)

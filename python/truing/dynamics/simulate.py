@@ -155,8 +155,10 @@ def windows_of(
         spans = [(float(made.time[0]), float(made.time[-1]))] if within is None else within[number]
         for begin, end in spans:
             for start in _starts(made, begin + smoothing, end - smoothing - longest, longest, every):
-                whole = np.all(free[(made.time >= start) & (made.time <= start + longest)])
-                if whole and made.one_payload(start, start + longest):
+                rows = slice(
+                    np.searchsorted(made.time, start), np.searchsorted(made.time, start + longest, "right")
+                )
+                if free[rows].all() and made.one_payload(start, start + longest):
                     numbers.append(number)
                     starts.append(start)
     if not starts:
