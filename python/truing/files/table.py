@@ -40,6 +40,7 @@ _MOST_COLUMNS = 2000
 _MOST_CELLS = 200_000_000  # 1.6 GB of doubles
 _LARGEST_CSV = 8_000_000_000  # [bytes]
 _LARGEST_COVARIATE = 1e30  # its square, and sums of such squares, are still numbers
+_READ_AHEAD = 1 << 18  # [bytes] of a column of a Parquet file read in parts; else a row group is held
 # What programs write for "no value"; "nan" is not among them: a number that came out as NaN is another
 # matter.
 _EMPTY = ["", "NA", "N/A", "#N/A", "null", "NULL"]
@@ -229,7 +230,12 @@ class Table:
         """
         first = 0
         try:
-            with pa.parquet.ParquetFile(self.path, read_dictionary=self._text_columns()) as file:
+            with pa.parquet.ParquetFile(
+                self.path,
+                read_dictionary=self._text_columns(),
+                pre_buffer=False,
+                buffer_size=_READ_AHEAD,
+            ) as file:
                 for groups in _lots_of_groups(file.metadata, rows):
                     for batch in file.iter_batches(batch_size=rows, row_groups=groups):
                         part = copy.copy(self)
