@@ -4,16 +4,29 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from truing.dynamics import Recording, identify, load_recordings, predict, with_payload
+from truing.dynamics import (
+    Recording,
+    check_recordings,
+    diagnose,
+    identify,
+    load_recordings,
+    predict,
+    with_payload,
+)
 from truing.errors import InputError
+from truing.files import load_robot
 from truing.model import AppliedEffect, Robot
 from truing.testing.dynamics import NOISE, USUAL, coloured_noise, demo_arm, fourier_motion
 
+REAL = Path(os.environ.get("TRUING_REALDATA", ""))
+CONSTANTS = np.array((12.0, 11.0, 9.5, 4.0, 4.5, 3.5))  # [Nm/A]
+PLACE = (0.02, -0.04, 0.11)  # [m]
 OFF = (0.12, -0.10, 0.08, -0.15, 0.05)  # of the drives' constants, J1 … J5
 LOAD = 5.0  # [kg]
 
@@ -25,6 +38,14 @@ def motion(seed: int, seconds: float = 24.0) -> Recording:
     )
 
 
+def usual_friction(arm: Robot) -> list[AppliedEffect]:
+    return [
+        AppliedEffect(effect, [joint.name], {f"{effect}.{joint.name}": values[k]})
+        for joint, values in zip(arm.joints, USUAL, strict=True)
+        for k, effect in enumerate(("coulomb", "viscous"))
+    ]
+
+
 def test_known_payloads_give_masses_and_drive_constants_within_3_percent() -> None:
     arm = demo_arm()
     truth = arm.copy()
@@ -32,16 +53,11 @@ def test_known_payloads_give_masses_and_drive_constants_within_3_percent() -> No
         assert joint.mass is not None
         joint.mass *= factor
     bodies = truth.copy()
-    friction = [
-        AppliedEffect(effect, [joint.name], {f"{effect}.{joint.name}": values[k]})
-        for joint, values in zip(arm.joints, USUAL, strict=True)
-        for k, effect in enumerate(("coulomb", "viscous"))
-    ]
     drives = [
         AppliedEffect("motor_constant", [joint.name], {f"motor_constant.{joint.name}": off})
         for joint, off in zip(arm.joints, OFF, strict=False)
     ]
-    truth.torque_effects = [*friction, *drives]
+    truth.torque_effects = [*usual_friction(arm), *drives]
     recordings = []
     for seed in range(5):
         loaded = with_payload([motion(seed)], LOAD * (seed % 2), (0.0, 0.0, 0.1))[0]
@@ -57,6 +73,55 @@ def test_known_payloads_give_masses_and_drive_constants_within_3_percent() -> No
     wanted, rigid = (np.asarray(predict(robot, motion(9)).torque) for robot in (bodies, found))
     scale = (wanted * rigid).sum(axis=0) / (wanted**2).sum(axis=0)  # of all that is weighed, joint by joint
     assert scale[:5] == pytest.approx(np.ones(5), abs=0.03)
+
+
+def currents(loads: tuple[float, ...], seconds: float = 24.0) -> list[Recording]:
+    """What drives of such constants draw, with loads at PLACE, where that is not stated."""
+    arm = demo_arm()
+    arm.torque_effects = usual_friction(arm)
+    out = []
+    for seed, load in enumerate(loads):
+        one = with_payload([motion(20 + seed, seconds)], load, PLACE)[0]
+        torque = np.asarray(predict(arm, one, cutoff=30.0).torque)
+        noise = coloured_noise(torque.shape, np.random.default_rng([9, seed])) * NOISE * torque.std(axis=0)
+        mass = {"payload_kg": np.full(len(one), load)}
+        out.append(one.replace(columns=mass, current=(torque + noise) / CONSTANTS))
+    return out
+
+
+def test_a_known_load_tells_the_constants_of_drives_and_where_it_hangs() -> None:
+    checked = check_recordings(demo_arm(), currents((0.0, LOAD, 0.0, LOAD)))
+    of_drives, of_place = checked.findings
+    assert (of_drives.finding, of_drives.applied, of_drives.unit) == ("gain_from_load", True, "Nm/A")
+    found = np.array([joint.torque_per_ampere for joint in checked.robot.joints], dtype=float)
+    assert found[:5] == pytest.approx(CONSTANTS[:5], rel=0.03)
+    assert of_place.finding == "load_place" and of_place.applied
+    hangs = [checked.recordings[1].columns[f"payload_{axis}_m"][0] for axis in "xyz"]
+    assert hangs == pytest.approx(PLACE, abs=0.004)
+    diagnosis = diagnose(checked.robot, checked.recordings)
+    assert "payload_place" not in [one.effect for one in diagnosis.effects]
+    assert "motor_constant" not in [one.effect for one in diagnosis.effects]
+
+
+@pytest.mark.parametrize("loads", [(0.0, 0.0), (LOAD, LOAD)])
+def test_loads_that_are_all_the_same_tell_no_constants(loads: tuple[float, ...]) -> None:
+    found = check_recordings(demo_arm(), currents(loads, 12.0)).findings
+    assert [one.finding for one in found] == ["gain_unknown"]
+
+
+@pytest.mark.realdata
+def test_the_load_of_a_real_arm_tells_its_drives_constants() -> None:
+    if not os.environ.get("TRUING_REALDATA") or not (REAL / "dyn_ur10e").exists():
+        pytest.skip("TRUING_REALDATA does not hold dyn_ur10e")
+    robot = load_robot(REAL / "dyn_ur10e" / "robot.urdf", any_tool=True)
+    names = ("h10_20s", "h12_30s", "h14_50s", "h14_50s_load")
+    recordings = load_recordings([REAL / "dyn_ur10e" / f"{name}.csv" for name in names], robot)
+    checked = check_recordings(robot, recordings)
+    assert {"gain_from_load", "load_place"} <= {one.finding for one in checked.findings}
+    found = np.array([joint.torque_per_ampere for joint in checked.robot.joints], dtype=float)
+    low = np.array((10.0, 10.6956, 8.4566, 9.0029, 9.48, 10.1232))  # of two papers; J1 carries no weight
+    high = np.array((14.87, 13.26, 11.13, 10.62, 11.03, 11.47))
+    assert (found[1:] > 0.95 * low[1:]).all() and (found[1:] < 1.05 * high[1:]).all()
 
 
 def test_a_payload_is_put_where_none_is_stated() -> None:

@@ -21,8 +21,9 @@ from truing.dynamics.sanity.findings import (
     RecordingFinding as RecordingFinding,
 )
 from truing.dynamics.sanity.grids import gaps_of, grids_of
+from truing.dynamics.sanity.known_load import known_load
 from truing.dynamics.sanity.readings import readings
-from truing.dynamics.sanity.scales import scales
+from truing.dynamics.sanity.scales import constants_by_masses, gain_unknown, scales
 from truing.dynamics.sanity.speeds import speeds
 
 Floats = NDArray[np.float64]
@@ -38,9 +39,10 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
 
     Returns the findings, and robot and recordings with what is certain corrected (`applied`): units and
     signs of speeds and angles that derivatives or limits prove, signs of torques that both friction and
-    weight contradict, and torques that are late by 40 ms or more. `cutoff` is that of the low-pass that both
-    sides of the equation of motion are to go through: the usual one, or where the recorded torques end. A
-    `mistake` is not corrected: until it is, effects that are named are doubtful.
+    weight contradict, torques that are late by 40 ms or more, and what a load of known mass tells: constants
+    of drives of which currents alone were recorded, and where it hangs. `cutoff` is that of the low-pass that
+    both sides of the equation of motion are to go through: the usual one, or where the recorded torques end.
+    A `mistake` is not corrected: until it is, effects that are named are doubtful.
 
     Raises InputError on a robot or recordings that cannot be used.
     """
@@ -56,7 +58,8 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     grids = [grid for grid in grids if len(grid.rows)]
     if grids:
         read = readings(robot, grids)
-        found += [*read.findings, *scales(robot, read.fit, _scale_known(robot, recordings))]
+        unknown = _without_constant(robot, recordings)
+        found += [*read.findings, *scales(robot, read.fit, unknown)]
         # Recorded speeds are by now the derivatives of the angles, and go with them.
         recordings = [
             _scaled(one, read.position.get(one.name), read.position.get(one.name)) for one in recordings
@@ -68,6 +71,11 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
             late = lag.shifts(robot, grids)
             found += lag.findings(late, len(recordings))
             recordings = [_shifted_back(one, late.get(one.name, 0.0)) for one in recordings]
+            load = known_load(robot, recordings, unknown, constants_by_masses(read.fit, unknown))
+            robot, recordings, unknown = load.robot, load.recordings, load.unknown
+            found += load.findings
+        if unknown:
+            found.append(gain_unknown(robot, read.fit, unknown))
     if not any(one.mistake and one.finding == "position_unit" for one in found):
         found += columns.rest(robot, grids)
     found += [*columns.values(robot, recordings), *columns.alone(recordings)]
@@ -88,11 +96,12 @@ def _scaled(recording: _core.Recording, by_speed: Floats | None, by_angle: Float
     return recording.replace(**fields) if fields else recording
 
 
-def _scale_known(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> list[bool]:
-    """Of every joint, whether its torque was measured, or its current by a drive whose constant is known."""
+def _without_constant(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> list[int]:
+    """Joints whose current was recorded in place of the torque, of drives whose constant is not known."""
     return [
-        joint.torque_per_ampere is not None or not any(_by_current(one, k) for one in recordings)
+        k
         for k, joint in enumerate(driven_joints(robot))
+        if joint.torque_per_ampere is None and any(_by_current(one, k) for one in recordings)
     ]
 
 

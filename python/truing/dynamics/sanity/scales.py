@@ -8,11 +8,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.recorded import driven_joints
 from truing.dynamics.sanity.findings import RecordingFinding, listed
 from truing.dynamics.sanity.readings import Fit
+
+Floats = NDArray[np.float64]
 
 SEEN = 0.3  # of the variance that the rigid torque must explain to say anything of a scale
 SCALE = 2.0  # largest ratio between model and measurement that is the diagnosis' matter
@@ -20,19 +23,13 @@ THOUSAND = 250.0  # from this ratio on it is one of units
 RATED = 2.0  # spread of ratios to a joint's limit that is one of percentages
 
 
-def scales(robot: _core.Robot, fit: Fit, known: Sequence[bool]) -> list[RecordingFinding]:
-    """Torques that are far from the model's by a factor; of drives without a constant (`known`: it is, or the
-    torque was measured), which constant the model's masses would need.
-    """
+def scales(robot: _core.Robot, fit: Fit, unknown: Sequence[int]) -> list[RecordingFinding]:
+    """Torques that are far from the model's by a factor; `unknown` joints have no scale yet."""
     joints = driven_joints(robot)
     names = [joint.name for joint in joints]
-    seen = [j for j in range(len(joints)) if fit.by_rigid[j] > SEEN and fit.scale[j] > 0.0]
-    out = []
-    unknown = [j for j in range(len(joints)) if not known[j]]
-    if unknown:
-        out.append(_gain_unknown(names, unknown, [j for j in seen if j in unknown], fit))
-    rest = [j for j in seen if known[j]]
+    rest = [j for j in _seen(fit) if j not in unknown]
     ratio = {j: float(fit.scale[j]) for j in rest}
+    out: list[RecordingFinding] = []
     if not rest:
         return out
     middle = float(np.median(list(ratio.values())))
@@ -64,21 +61,35 @@ def _gains(names: Sequence[str], ratio: dict[int, float]) -> list[RecordingFindi
     return [RecordingFinding("gain", (), tuple(names[j] for j in wrong), words, worst, "-")]
 
 
-def _gain_unknown(
-    names: Sequence[str], unknown: Sequence[int], seen: Sequence[int], fit: Fit
-) -> RecordingFinding:
+def gain_unknown(robot: _core.Robot, fit: Fit, unknown: Sequence[int]) -> RecordingFinding:
+    """Of drives without a constant: which one the model's masses would need."""
+    names = [joint.name for joint in driven_joints(robot)]
     words = (
         f"{listed([names[j] for j in unknown])}: currents without torque_per_ampere: masses and drive"
         " constants share one scale"
     )
-    per_ampere = {j: 1.0 / float(fit.scale[j]) for j in seen}
+    per_ampere = {j: 1.0 / float(fit.scale[j]) for j in _seen(fit) if j in unknown}
     if per_ampere:
         said = listed([f"{names[j]} {value:.3g}" for j, value in per_ampere.items()], 8)
         words += f"; with the model's masses it would be {said} Nm/A (--torque-per-ampere)"
-    value = float(np.median(list(per_ampere.values()))) if per_ampere else math.nan
-    return RecordingFinding(
-        "gain_unknown", (), tuple(names[j] for j in unknown), words, value if per_ampere else 1.0, "Nm/A"
-    )
+    value = float(np.median(list(per_ampere.values()))) if per_ampere else 1.0
+    return RecordingFinding("gain_unknown", (), tuple(names[j] for j in unknown), words, value, "Nm/A")
+
+
+def constants_by_masses(fit: Fit, unknown: Sequence[int]) -> Floats:
+    """[Nm/A | N/A] shape=(joints,) of drives that the model's masses would need; where those say nothing,
+    that of the other joints; 1 of a drive that is known.
+    """
+    by_masses = {j: 1.0 / fit.scale[j] for j in _seen(fit) if j in unknown}
+    out = np.ones(len(fit.scale))
+    for j in unknown:
+        out[j] = by_masses.get(j, np.median(list(by_masses.values())) if by_masses else 1.0)
+    return out
+
+
+def _seen(fit: Fit) -> list[int]:
+    """Joints whose rigid torque is seen in what was measured."""
+    return [j for j in range(len(fit.scale)) if fit.by_rigid[j] > SEEN and fit.scale[j] > 0.0]
 
 
 def _percent_of(joints: Sequence[_core.Joint], ratio: dict[int, float]) -> str:
