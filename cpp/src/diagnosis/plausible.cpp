@@ -11,12 +11,23 @@
 
 namespace truing::diagnosis {
 
-constexpr double kForSure = 2.0;  ///< standard errors beyond what is plausible
+constexpr double kForSure = 2.0;          ///< standard errors beyond what is plausible
+constexpr double kLargestWarming = 50.0;  ///< [K] of a robot that runs warm, times what is plausible per kelvin
+
+/// Growth over time, where no temperature was recorded.
+static bool is_growth(const Explanation& e) {
+  return e.kind == Explanation::Kind::drift && e.law_test == LawTest::times_the_lengths;
+}
+
+/// No machine has more, in the unit of the candidate's columns; 0: unknown.
+static double plausible_size(const Work& work, const Explanation& e) {
+  return effect_traits(work, e).plausible * (is_growth(e) ? kLargestWarming : 1.0);
+}
 
 /// The parameter that is farthest beyond; no column: none is.
 static TooLarge too_large_at(const Work& work, const Evidence::State& state, int group) {
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(group)];
-  const double plausible = effect_traits(work, e).plausible;
+  const double plausible = plausible_size(work, e);
   TooLarge out;
   if (!(plausible > 0.0)) return out;
   double farthest = 0.0;
@@ -39,7 +50,7 @@ std::vector<TooLarge> too_large_in(const Work& work, const Evidence::State& stat
   std::vector<TooLarge> out;
   for (const int g : state.choice.groups) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
-    if (e.kind != Explanation::Kind::catalogue || e.period > 0.0) continue;
+    if ((e.kind != Explanation::Kind::catalogue && !is_growth(e)) || e.period > 0.0) continue;
     const TooLarge one = too_large_at(work, state, g);
     if (one.column >= 0) out.push_back(one);
   }
@@ -70,9 +81,9 @@ static std::string in_words(const Work& work, const TooLarge& one) {
   const std::string& unit = work.design.column_units[static_cast<std::size_t>(one.column)];
   const bool converted = unit == traits.reported.of;
   const double factor = converted ? traits.reported.factor : 1.0;
-  const std::string shown = converted ? traits.reported.unit : unit;
-  return "like " + plain(e.effect) + " of " + number(factor * one.size, 2) + " " + shown +
-         ", more than machines have (" + number(factor * traits.plausible, 2) + " " + shown + ")";
+  const std::string shown = converted ? " " + traits.reported.unit : unit == "-" ? "" : " " + unit;
+  return "like " + plain(e.effect) + " of " + number(factor * one.size, 2) + shown + ", more than machines have (" +
+         number(factor * plausible_size(work, e), 2) + shown + ")";
 }
 
 void describe_what_is_too_large(const Work& work, const Evidence& evidence, const Decision& decision, Diagnosis* out) {

@@ -283,12 +283,10 @@ double warmed_up(double t) {
   return t < until ? warm : warm * std::exp(-(t - until) / 0.15);
 }
 
-TEST_CASE("without a temperature column warm links grow by name, and the frame does not drift") {
-  const std::size_t rows = 240;
-  const auto share = [rows](const Inputs& in) { return static_cast<double>(in.row) / rows; };
-  // Every length by the same fraction: 0.3 permille at most, some 15 K of aluminium.
+/// Every length by the same fraction.
+Effect all_lengths_grow(const std::function<double(const Inputs&)>& by) {
   Effect grown{"grown", "", {}, false};
-  grown.terms = [share](const Robot& robot, std::size_t, const truing::Measurements&) {
+  grown.terms = [by](const Robot& robot, std::size_t, const truing::Measurements&) {
     std::vector<Term> terms;
     for (const Joint& joint : robot.joints) {
       for (const auto& [value, length] : {std::make_pair("a", joint.a), std::make_pair("d", joint.d)}) {
@@ -297,12 +295,20 @@ TEST_CASE("without a temperature column warm links grow by name, and the frame d
         term.parameter = "grown.size";
         term.unit = "-";
         term.site = joint.name + "." + value;
-        term.basis = [share, metres = length](const Inputs& in) { return 3e-4 * metres * warmed_up(share(in)); };
+        term.basis = [by, metres = length](const Inputs& in) { return metres * by(in); };
         terms.push_back(term);
       }
     }
     return terms;
   };
+  return grown;
+}
+
+TEST_CASE("without a temperature column warm links grow by name, and the frame does not drift") {
+  const std::size_t rows = 240;
+  const auto share = [rows](const Inputs& in) { return static_cast<double>(in.row) / rows; };
+  // 0.3 permille at most, some 15 K of aluminium.
+  const Effect grown = all_lengths_grow([share](const Inputs& in) { return 3e-4 * warmed_up(share(in)); });
   for (const bool timed : {true, false}) {
     auto table = measured(arm(), {grown}, rows, 1100);
     std::vector<double> time(rows);
@@ -322,6 +328,16 @@ TEST_CASE("without a temperature column warm links grow by name, and the frame d
     REQUIRE(largest != d.effects[0].parameters.end());
     CHECK(largest->value == doctest::Approx(3e-4 * warmed_up(0.6)).epsilon(0.1));
   }
+}
+
+TEST_CASE("lengths that grow by more than any warmth makes are not called warm") {
+  const std::size_t rows = 240;  // 1 % of aluminium is 430 K
+  const Effect stretched = all_lengths_grow(
+      [rows](const Inputs& in) { return 1e-2 * warmed_up(static_cast<double>(in.row) / static_cast<double>(rows)); });
+  const Diagnosis d = diagnose(arm(), measured(arm(), {stretched}, rows, 1103)->data);
+  INFO(names(d));
+  CHECK(std::none_of(d.effects.begin(), d.effects.end(), [](const auto& e) { return e.effect == "thermal"; }));
+  CHECK(d.after.rms <= d.gap.rms);
 }
 
 TEST_CASE("without a temperature column a zero that moves over time is unknown, and warmth may be its cause") {
