@@ -76,7 +76,7 @@ KnownPayload = Annotated[
     tuple[float, tuple[float, float, float]] | None,
     PayloadAt(
         "Known payload of recordings that have no column payload_kg, a point at the tool, or at X,Y,Z in its"
-        " frame: '2.8kg@0,0,60mm'.",
+        " frame: '2.8kg@0,0,60mm'; of those that have one and no place, the place.",
         panel=READING,
     ),
 ]

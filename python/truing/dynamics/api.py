@@ -128,7 +128,8 @@ def plan(
 def with_payload(
     recordings: Sequence[Recording], mass: float, place: tuple[float, float, float] = (0.0, 0.0, 0.0)
 ) -> list[Recording]:
-    """The recordings with a payload that is known, in those that do not state one (column payload_kg).
+    """The recordings with a payload that is known, in those that do not state one (column payload_kg); in
+    those that state its mass and not where it is, with the place.
 
     mass: [kg], a point. place: [m] of its centre in the tool's frame.
 
@@ -136,18 +137,15 @@ def with_payload(
     """
     if not (np.isfinite([mass, *place]).all() and mass >= 0.0):
         raise InputError(f"payload: found {mass:g} kg at {place}, expected a mass of zero or more at a place")
-    stated = dict(zip(PAYLOAD_COLUMNS, (mass, *place), strict=True))
-    return [
-        recording
-        if "payload_kg" in recording.columns
-        else recording.replace(
-            columns={
-                **recording.columns,
-                **{name: np.full(len(recording), value) for name, value in stated.items()},
-            }
-        )
-        for recording in recordings
-    ]
+    of_mass, *of_place = PAYLOAD_COLUMNS
+    out = []
+    for recording in recordings:
+        new = {} if of_mass in recording.columns else {of_mass: mass}
+        if not any(name in recording.columns for name in of_place) and (new or any(place)):
+            new |= dict(zip(of_place, place, strict=True))
+        added = {name: np.full(len(recording), value) for name, value in new.items()}
+        out.append(recording.replace(columns={**recording.columns, **added}) if added else recording)
+    return out
 
 
 def markdown_table() -> str:

@@ -126,8 +126,11 @@ def test_the_load_of_a_real_arm_tells_its_drives_constants() -> None:
 
 def test_a_payload_is_put_where_none_is_stated() -> None:
     stated = motion(0, 2.0).replace(name="stated", columns={"payload_kg": np.full(200, 1.0)})
-    kept, added = with_payload([stated, motion(1, 2.0)], 2.0, (0.0, 0.1, 0.0))
+    kept, placed = (with_payload([stated], 2.0, place)[0] for place in ((0.0, 0.0, 0.0), (0.0, 0.1, 0.0)))
     assert set(kept.columns) == {"payload_kg"} and kept.columns["payload_kg"][0] == 1.0
+    assert placed.columns["payload_kg"][0] == 1.0 and placed.columns["payload_y_m"][0] == 0.1
+    assert with_payload([placed], 2.0, (0.0, 0.0, 0.3))[0].columns["payload_z_m"][0] == 0.0
+    (added,) = with_payload([motion(1, 2.0)], 2.0, (0.0, 0.1, 0.0))
     assert added.columns["payload_kg"][5] == 2.0 and added.columns["payload_y_m"][5] == 0.1
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.api import PAYLOAD_COLUMNS, identify
+from truing.dynamics.api import PAYLOAD_COLUMNS, identify, with_payload
 from truing.dynamics.recorded import driven_joints
 from truing.dynamics.sanity.findings import RecordingFinding, listed
 from truing.errors import InputError
@@ -77,7 +77,8 @@ def known_load(
     out = list(recordings)
     loads = [mass for mass in masses if mass > 0.0]
     if no_place and len(loads) == 1 and (fit.place_sigmas < _PLACED).all():
-        out = [_hung(one, fit.place) for one in out]
+        x, y, z = fit.place.tolist()
+        out = with_payload(out, 0.0, (x, y, z))
         findings.append(_place_found(fit, loads[0]))
     return KnownLoad(robot, out, findings, [k for k in unknown if k not in told])
 
@@ -139,11 +140,6 @@ def _with_constants(robot: _core.Robot, joints: Sequence[int], constants: Floats
     return robot
 
 
-def _hung(recording: _core.Recording, place: Floats) -> _core.Recording:
-    stated = {name: np.full(len(recording), value) for name, value in zip(_PLACE, place, strict=True)}
-    return recording.replace(columns={**recording.columns, **stated})
-
-
 def _constants_found(joints: Sequence[_core.Joint], told: Sequence[int], fit: _Fit) -> RecordingFinding:
     sigmas = fit.constants * fit.sigmas
     said = [f"{joints[k].name} {fit.constants[k]:.3g} +- {sigmas[k]:.2g}" for k in told]
@@ -158,7 +154,7 @@ def _place_found(fit: _Fit, mass: float) -> RecordingFinding:
     said = ", ".join(f"{v:.3f}" for v in fit.place)
     words = (
         f"where the load of {mass:g} kg hangs is not stated: found {said} m"
-        f" (+- {fit.place_sigmas.max():.2g} m) from the tool's frame, and used (columns payload_x_m,"
-        " payload_y_m, payload_z_m)"
+        f" (+- {fit.place_sigmas.max():.2g} m) from the tool's frame, and used (for predict: --payload"
+        f" {mass:g}kg@{','.join(f'{1e3 * v:.0f}' for v in fit.place)}mm)"
     )
     return RecordingFinding("load_place", (), (), words, float(np.linalg.norm(fit.place)), "m", applied=True)
