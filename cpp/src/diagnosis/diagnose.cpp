@@ -453,6 +453,10 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
 
   // 8. How far: the exact refit, on all rows.
   std::vector<InputColumn> of_all_rows;
+  for (const auto& [departure, law] : departures_from_laws(work, decision)) {
+    decision.corrects[departure] = law;
+    names.erase(departure);
+  }
   if (thinned && has_functions(work, decision)) of_all_rows = make_inputs(work.linear.at, whole.data);
   const std::vector<InputColumn>& inputs = thinned ? of_all_rows : work.inputs;
   const Fitted fitted = fit_exactly(whole, work, inputs, robot, decision, resampled, &result);

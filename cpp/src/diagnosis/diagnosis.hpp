@@ -77,8 +77,8 @@ struct Decision {
   SearchOptions search;   ///< with the threshold raised to what noise alone reaches
   double p_gap = 1.0;
   double p_left = 1.0;
-  std::vector<Evidence::Gain> first;  ///< every group alone
-  std::map<int, int> corrects;  ///< a law's correction, or a free function that is one: the group whose law it corrects
+  std::vector<Evidence::Gain> first;     ///< every group alone
+  std::map<int, int> corrects;           ///< a law's correction, or what is one: the group whose law it corrects
   std::vector<TooLarge> too_large{};     ///< set aside: the rest was decided without them
   std::vector<FunctionBeside> beside{};  ///< the likeliest of those that were not taken
 };
@@ -236,6 +236,8 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
 bool is_function_beside(const Work& work, const Decision& decision, const Explanation& name);
 Resampled resample(const Work& work, const Decision& decision);
 /// How often the selection on resampled folds finds the group's class again.
+/// Names that are what a larger law at their joint leaves of the motion, by group, and the group of that law.
+std::map<int, int> departures_from_laws(const Work& work, const Decision& decision);
 double selection_frequency(const Work& work, const Resampled& resampled, const Sureness& sure, int group);
 double calibrated(double posterior, double selection_frequency, double removal_loss);
 
