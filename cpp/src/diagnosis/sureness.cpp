@@ -312,17 +312,15 @@ double selection_frequency(const Work& work, const Resampled& resampled, const S
   return back / draws;
 }
 
-/// Stated confidence from what it rests on: the posterior of the class, how often resampled poses bring it back, and
-/// what is lost without it. Mapped so that it says how often such names were right on development sets of the
-/// examination (docs/method/exam.md).
-double calibrated(double posterior, double selection_frequency, double removal_loss) {
-  const double score = 0.45 * posterior + 0.35 * selection_frequency + 0.2 * std::min(removal_loss, 40.0) / 40.0;
-  constexpr double kMap[6][2] = {{0.0, 0.05}, {0.5, 0.3}, {0.7, 0.66}, {0.9, 0.88}, {0.975, 0.9}, {0.998, 0.96}};
-  for (int k = 1; k < 6; ++k) {
-    if (score <= kMap[k][0])
-      return kMap[k - 1][1] + (score - kMap[k - 1][0]) / (kMap[k][0] - kMap[k - 1][0]) * (kMap[k][1] - kMap[k - 1][1]);
-  }
-  return kMap[5][1];
+/// Stated confidence: the posterior of the class, times how often names were right on development sets of the
+/// examination (docs/method/exam.md) that resampled poses brought back as often, and whose removal raised the error of
+/// poses that the fit did not see by as much. A logistic map (Platt 1999, "Probabilistic outputs for support vector
+/// machines").
+double calibrated(double posterior, double selection_frequency, double gain) {
+  constexpr double kConstant = 0.3, kOfFrequency = 1.8, kOfGain = 9.5;
+  constexpr double kLargeGain = 0.3;  ///< of the error: more says no more
+  const double log_odds = kConstant + kOfFrequency * selection_frequency + kOfGain * std::clamp(gain, 0.0, kLargeGain);
+  return posterior / (1.0 + std::exp(-log_odds));
 }
 
 }  // namespace truing::diagnosis
