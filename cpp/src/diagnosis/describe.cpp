@@ -344,6 +344,7 @@ static void draw_law(const Work& work, const Decision& decision, int g, FoundEff
     const auto corrected = decision.corrects.find(other);
     if (corrected == decision.corrects.end() || corrected->second != g) continue;
     const Explanation& correction = named[static_cast<std::size_t>(other)];
+    if (is_named(correction)) continue;  // in words, by add_departures
     const std::string driver = work.inputs[static_cast<std::size_t>(correction.inputs[0])].name;
     out->note +=
         (out->note.empty() ? "" : "; ") + std::string("its law is not the simple one: see the curve over ") + driver;
@@ -360,6 +361,20 @@ static void draw_law(const Work& work, const Decision& decision, int g, FoundEff
   if (traits.moves == Moves::base) {
     for (std::size_t c = 0; c < 3 && c < work.design.base_columns.size(); ++c)
       out->curves.push_back(curve_of(work, decision, g, {driver, work.design.base_columns[c]}));
+  }
+}
+
+/// What is named by itself elsewhere, and is a departure from this law here: fitted with it, and said in its note.
+static void add_departures(const Work& work, const Decision& decision, int g, const Identification& refitted,
+                           FoundEffect* out) {
+  for (const auto& [other, corrected] : decision.corrects) {
+    const Explanation& departure = work.design.candidates.named[static_cast<std::size_t>(other)];
+    if (corrected != g || !is_named(departure) || !is_among(decision.state.choice.groups, other)) continue;
+    if (!out->note.empty()) out->note += "; ";
+    out->note += "its law is not the simple one: what it leaves looks like " + plain(departure.effect);
+    if (const std::string also = identify_as(departure); !also.empty()) out->identify_as += "," + also;
+    for (Parameter& parameter : parameters_of(work, decision.state, departure, refitted))
+      out->parameters.push_back(std::move(parameter));
   }
 }
 
@@ -390,6 +405,7 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   for (const std::size_t c : columns_of_law(work, decision, g, {})) columns.push_back(decision.state.columns[c]);
   out.size_at_tip = size_at_tip(work, decision.state, columns);
   draw_law(work, decision, g, &out);
+  add_departures(work, decision, g, refitted, &out);
   return out;
 }
 

@@ -34,7 +34,7 @@ constexpr double kHardlyLess = 0.98;       ///< of the gap: what is left of it w
 constexpr double kManyOutliers = 0.05;     ///< of the rows, from which on they are no exceptions
 constexpr double kSmallGain = 0.02;        ///< of the error, that is not worth a line if it may be none
 constexpr double kNamed = 0.5;             ///< a name is given to what is more likely right than wrong
-constexpr double kLawInQuestion = 0.85;    ///< at most so likely is a law that a function of its input does as well as
+constexpr double kLawInQuestion = 0.9;     ///< at most so likely is a law that a function of its input does as well as
 
 void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
   std::string error;
@@ -164,11 +164,14 @@ std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evide
                                          Decision* decision) {
   for (;;) {
     std::map<int, Named> out;
+    const UnseenErrors with = unseen_errors(work, decision->state.choice);
     for (std::size_t at = 0; at < decision->state.choice.groups.size(); ++at) {
       const int g = decision->state.choice.groups[at];
       if (!is_named(work.design.candidates.named[static_cast<std::size_t>(g)])) continue;
       const Sureness sure = how_sure(work, evidence, decision->state, at);
-      double probability = calibrated(sure.raw, selection_frequency(work, resampled, sure, g), sure.removal_loss);
+      const Choice less = without(decision->state.choice, work.design.candidates.groups, at);
+      double probability = calibrated(sure.raw, selection_frequency(work, resampled, sure, g),
+                                      shrink_of(unseen_errors(work, less), with));
       const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(g)];
       if (sure.law_in_question || is_function_beside(work, *decision, name))
         probability = std::min(probability, kLawInQuestion);
@@ -337,6 +340,8 @@ void describe_all(const Work& work, const Evidence& evidence, const Decision& de
   std::map<int, double> by_corrections;  // of the effects whose law is corrected
   for (std::size_t at = 0; at < chosen.size(); ++at) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(chosen[at])];
+    if (is_named(e) && corrects_a_law(decision, chosen[at]))
+      by_corrections[decision.corrects.at(chosen[at])] += shares[at];
     if (e.kind != Kind::free && e.kind != Kind::law) continue;
     UnknownEffect unknown = describe_unknown(work, evidence, decision, at);
     // A small correction of a law is a remark; a large one is something that nobody has named.
@@ -448,6 +453,10 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   std::map<int, Named> names = keep_what_is_likely(work, evidence, resampled, &decision);
   while (keep_what_is_confirmed(work, evidence, &decision))  // without what was not likely
     names = keep_what_is_likely(work, evidence, resampled, &decision);
+  for (const auto& [departure, law] : departures_from_laws(work, decision)) {
+    decision.corrects[departure] = law;
+    names.erase(departure);
+  }
   result.p_gap = decision.p_gap;
   result.remaining_structure_p = decision.p_left;
 

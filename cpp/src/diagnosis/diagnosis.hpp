@@ -77,8 +77,8 @@ struct Decision {
   SearchOptions search;   ///< with the threshold raised to what noise alone reaches
   double p_gap = 1.0;
   double p_left = 1.0;
-  std::vector<Evidence::Gain> first;  ///< every group alone
-  std::map<int, int> corrects;  ///< a law's correction, or a free function that is one: the group whose law it corrects
+  std::vector<Evidence::Gain> first;     ///< every group alone
+  std::map<int, int> corrects;           ///< a law's correction, or what is one: the group whose law it corrects
   std::vector<TooLarge> too_large{};     ///< set aside: the rest was decided without them
   std::vector<FunctionBeside> beside{};  ///< the likeliest of those that were not taken
 };
@@ -141,7 +141,9 @@ double cross_validated(const Work& work, const Choice& choice);
 bool predicts_better(const Eigen::VectorXd& one, const Eigen::VectorXd& other, double factor);
 /// Of every training fold by a fit to the others, and of the poses held out by the fit to all training folds.
 UnseenErrors unseen_errors(const Work& work, const Choice& choice);
-/// Fraction by which the root mean square shrinks, and its 90 % interval over draws of the folds.
+/// Fraction by which the root mean square shrinks.
+double shrink_of(const UnseenErrors& before, const UnseenErrors& after);
+/// The same, and its 90 % interval over draws of the folds.
 Share shrinkage(const UnseenErrors& before, const UnseenErrors& after, int draws, std::uint64_t seed);
 
 // --- decide.cpp: what explains the gap -------------------------------------------------------------------------------
@@ -234,10 +236,12 @@ bool contains(const Explanation& large, const Explanation& small);
 Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at);
 /// A function of what the name's law depends on moves the same joint beside it: the law is not quite right.
 bool is_function_beside(const Work& work, const Decision& decision, const Explanation& name);
+/// Names that are what a larger law at their joint leaves of the motion, by group, and the group of that law.
+std::map<int, int> departures_from_laws(const Work& work, const Decision& decision);
 Resampled resample(const Work& work, const Decision& decision);
 /// How often the selection on resampled folds finds the group's class again.
 double selection_frequency(const Work& work, const Resampled& resampled, const Sureness& sure, int group);
-double calibrated(double posterior, double selection_frequency, double removal_loss);
+double calibrated(double posterior, double selection_frequency, double gain);
 
 // --- refit.cpp: how far the error shrinks ----------------------------------------------------------------------------
 

@@ -23,7 +23,7 @@ Share percentile_interval(std::vector<double> values, double center) {
   if (values.size() < 5) return out;
   // Folds are few and whole: their spread is a little less than that of poses (measured by the examination,
   // docs/method/exam.md).
-  constexpr double kWider = 1.25;
+  constexpr double kWider = 1.45;
   const double median = quantile(&values, 0.5);
   out.low = center + kWider * (quantile(&values, 0.05) - median);
   out.high = center + kWider * (quantile(&values, 0.95) - median);

@@ -172,6 +172,48 @@ bool is_function_beside(const Work& work, const Decision& decision, const Explan
   });
 }
 
+/// A cause with a law of its own; of many links' values, of orders of gears and of functions there is none.
+static bool is_law(const Work& work, const Explanation& e) {
+  const EffectTraits& traits = effect_traits(work, e);
+  return is_named(e) && traits.stands_for != StandsFor::link_geometry && traits.search != Search::by_order;
+}
+
+/// Laws are seldom exact, and what one leaves looks like another one: the joint was not set to zero where the law says;
+/// where both go with the joint's own angle, little is left; what is warm is not as warm as the sensor says, and the
+/// frame seems to wander.
+static bool is_departure(const Work& work, const Explanation& small, const Explanation& large, double ratio) {
+  constexpr double kLittle = 0.3;  ///< of the larger law's motion of the tip
+  const EffectTraits &one = effect_traits(work, small), &other = effect_traits(work, large);
+  if (ratio >= 1.0 || same_name(small, large)) return false;
+  if (one.driver == Driver::time) return other.driver == Driver::temperature;
+  if (small.joints != large.joints) return false;
+  if (one.driver == Driver::constant && one.moves == other.moves) return true;
+  return follows_own_angle(one) && follows_own_angle(other) && ratio < kLittle;
+}
+
+std::map<int, int> departures_from_laws(const Work& work, const Decision& decision) {
+  std::vector<std::pair<double, int>> laws;  // the largest first
+  for (const int g : decision.state.choice.groups) {
+    if (!is_law(work, work.design.candidates.named[static_cast<std::size_t>(g)])) continue;
+    const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(g)].columns;
+    laws.emplace_back(size_at_tip(work, decision.state, columns), g);
+  }
+  std::sort(laws.rbegin(), laws.rend());
+  std::map<int, int> out;
+  for (std::size_t small = 1; small < laws.size(); ++small) {
+    for (std::size_t large = 0; large < small; ++large) {
+      const auto [size, group] = laws[large];
+      if (out.count(group) || out.count(laws[small].second) || !(size > 0.0)) continue;
+      const auto named = [&](int g) -> const Explanation& {
+        return work.design.candidates.named[static_cast<std::size_t>(g)];
+      };
+      if (is_departure(work, named(laws[small].second), named(group), laws[small].first / size))
+        out[laws[small].second] = group;
+    }
+  }
+  return out;
+}
+
 /// A bootstrap draw of the folds.
 static Gram drawn(const std::vector<Gram>& folds, Random* random) {
   std::vector<double> times(folds.size(), 0.0);
@@ -270,17 +312,15 @@ double selection_frequency(const Work& work, const Resampled& resampled, const S
   return back / draws;
 }
 
-/// Stated confidence from what it rests on: the posterior of the class, how often resampled poses bring it back, and
-/// what is lost without it. Mapped so that it says how often such names were right on development sets of the
-/// examination (docs/method/exam.md).
-double calibrated(double posterior, double selection_frequency, double removal_loss) {
-  const double score = 0.45 * posterior + 0.35 * selection_frequency + 0.2 * std::min(removal_loss, 40.0) / 40.0;
-  constexpr double kMap[6][2] = {{0.0, 0.05}, {0.5, 0.3}, {0.7, 0.66}, {0.9, 0.88}, {0.975, 0.9}, {0.998, 0.96}};
-  for (int k = 1; k < 6; ++k) {
-    if (score <= kMap[k][0])
-      return kMap[k - 1][1] + (score - kMap[k - 1][0]) / (kMap[k][0] - kMap[k - 1][0]) * (kMap[k][1] - kMap[k - 1][1]);
-  }
-  return kMap[5][1];
+/// Stated confidence: the posterior of the class, times how often names were right on development sets of the
+/// examination (docs/method/exam.md) that resampled poses brought back as often, and whose removal raised the error of
+/// poses that the fit did not see by as much. A logistic map (Platt 1999, "Probabilistic outputs for support vector
+/// machines").
+double calibrated(double posterior, double selection_frequency, double gain) {
+  constexpr double kConstant = 0.3, kOfFrequency = 1.8, kOfGain = 9.5;
+  constexpr double kLargeGain = 0.3;  ///< of the error: more says no more
+  const double log_odds = kConstant + kOfFrequency * selection_frequency + kOfGain * std::clamp(gain, 0.0, kLargeGain);
+  return posterior / (1.0 + std::exp(-log_odds));
 }
 
 }  // namespace truing::diagnosis

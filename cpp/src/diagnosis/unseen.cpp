@@ -99,9 +99,16 @@ UnseenErrors unseen_errors(const Work& work, const Choice& choice) {
   return out;
 }
 
+static double sum_of(const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0); }
+
+static double shrink_of(double from, double to) { return 1.0 - std::sqrt(to / std::max(from, 1e-300)); }
+
+double shrink_of(const UnseenErrors& before, const UnseenErrors& after) {
+  return shrink_of(sum_of(before.square_of_fold), sum_of(after.square_of_fold));
+}
+
 Share shrinkage(const UnseenErrors& before, const UnseenErrors& after, int draws, std::uint64_t seed) {
   const std::size_t folds = before.square_of_fold.size();
-  const auto shrink = [](double from, double to) { return 1.0 - std::sqrt(to / std::max(from, 1e-300)); };
   Random random(seed);
   std::vector<double> drawn;
   for (int r = 0; r < draws; ++r) {
@@ -111,10 +118,9 @@ Share shrinkage(const UnseenErrors& before, const UnseenErrors& after, int draws
       from += before.square_of_fold[fold];
       to += after.square_of_fold[fold];
     }
-    drawn.push_back(shrink(from, to));
+    drawn.push_back(shrink_of(from, to));
   }
-  const auto sum = [](const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0); };
-  return percentile_interval(std::move(drawn), shrink(sum(before.square_of_fold), sum(after.square_of_fold)));
+  return percentile_interval(std::move(drawn), shrink_of(before, after));
 }
 
 }  // namespace truing::diagnosis
