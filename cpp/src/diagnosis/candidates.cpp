@@ -448,13 +448,15 @@ bool is_left_out(const DiagnoseOptions& options, const std::string& effect) {
 }
 
 std::vector<std::pair<std::string, double>> lengths_of_link(const Robot& robot, const std::string& joint) {
+  // As of the effect `thermal`: an offset found where the drawing has none is no beam, and what grows stays the same.
+  constexpr double kShortest = 1e-3;  ///< [m]
   const Joint& link = robot.joints[robot.joint_index(joint)];
   const Eigen::Vector3d origin = link.T_parent_joint.translation();
   const std::pair<const char*, double> lengths[5] = {
       {"a", link.a}, {"d", link.d}, {"x", origin.x()}, {"y", origin.y()}, {"z", origin.z()}};
   std::vector<std::pair<std::string, double>> out;
   for (const auto& [value, length] : lengths) {
-    if ((value[0] >= 'x') == (robot.convention == Convention::urdf) && length != 0.0)
+    if ((value[0] >= 'x') == (robot.convention == Convention::urdf) && std::abs(length) >= kShortest)
       out.push_back({joint + "." + value, length});
   }
   return out;

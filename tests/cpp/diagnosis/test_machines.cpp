@@ -9,6 +9,7 @@
 #include <cmath>
 #include <functional>
 
+#include "diagnosis/candidates.hpp"
 #include "support/arms.hpp"
 #include "support/four_bar.hpp"
 #include "support/sanitized.hpp"
@@ -327,6 +328,18 @@ TEST_CASE("without a temperature column warm links grow by name, and the frame d
         [](const truing::Parameter& a, const truing::Parameter& b) { return std::abs(a.value) < std::abs(b.value); });
     REQUIRE(largest != d.effects[0].parameters.end());
     CHECK(largest->value == doctest::Approx(3e-4 * warmed_up(0.6)).epsilon(0.1));
+  }
+}
+
+TEST_CASE("an offset that is found where the drawing has none does not grow, and what grows stays the same") {
+  Robot bent = arm();
+  for (Joint& joint : bent.joints) {
+    if (joint.a == 0.0) joint.a = 3e-4;
+    if (joint.d == 0.0) joint.d = -2e-4;
+  }
+  for (const Joint& joint : bent.joints) {
+    const auto found = truing::diagnosis::lengths_of_link(bent, joint.name);
+    CHECK(found == truing::diagnosis::lengths_of_link(arm(), joint.name));
   }
 }
 
