@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 import warnings
 from pathlib import Path
 
@@ -200,6 +201,22 @@ def test_comments_are_passed_over_and_lines_still_counted(tmp_path: Path) -> Non
     commented[12] = commented[12].replace(",one", ",nan")
     path.write_text("\n".join(commented) + "\n")
     assert "line 13, column 'tau1_Nm': found 'nan', expected a finite number" in refusal(path)
+
+
+@pytest.mark.parametrize("length", range(3))
+def test_nothing_is_read_beyond_a_file_that_fills_its_last_page(tmp_path: Path, length: int) -> None:
+    """The byte after it is that of another mapping: here one that must not be read."""
+    lines = text_of(table())
+    lines[-2] += "0" * length  # decimals; some lengths of the last line end a search early
+    lines[-1] += "0" * (-len("\n".join([*lines, ""])) % mmap.PAGESIZE)
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join([*lines, ""]))
+    size = path.stat().st_size
+    assert size % mmap.PAGESIZE == 0
+    unreadable = [mmap.mmap(-1, size, prot=0) for _ in range(500)]  # no gap is left elsewhere
+    (found,) = load_recordings(path, ROBOT)
+    assert np.array_equal(found.time, T)
+    del unreadable
 
 
 def test_column_names_may_be_a_comment_as_numpy_writes_them(tmp_path: Path) -> None:
