@@ -444,7 +444,7 @@ class Table:
         if not self._comments:
             return str(self.path), 1
         with self.path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            # Not mmap.find, which reads a byte beyond files that fill their last page (CPython before 3.11.5).
+            # Not mmap.find: before CPython 3.11.5 it reads a byte beyond a file that fills its last page.
             if not re.search(rb"\n#", data) and self._header == 1 and not self._header_is_comment:
                 return str(self.path), 1
             kept = re.sub(rb"(?m)^#.*\n?", b"", data[:].removeprefix(_MARK))
