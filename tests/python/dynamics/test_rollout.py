@@ -17,6 +17,7 @@ from pages import charts_of, visible
 from truing.dynamics import Recording, TorqueDiagnosis, diagnose
 from truing.dynamics.result import write_diagnosis
 from truing.dynamics.rollout import Rollout, held_out_blocks, held_out_rows, rollout, rollout_dict, spans_of
+from truing.dynamics.sanity import band
 from truing.dynamics.simulate import Judgement, judge
 from truing.testing.dynamics import SimulatedMotion, simulate_motion
 
@@ -76,6 +77,15 @@ def test_the_report_draws_simulated_motion_over_the_real_one(
     shown = [trace["name"] for trace in chart["data"] if trace["visible"]]
     assert shown == ["measured", "nominal", "standard", "named", "exported", "start"]
     assert len(chart["layout"]["updatemenus"][0]["buttons"]) == 6
+
+
+def test_the_report_says_that_low_passed_torques_drive_the_models_badly(
+    simulated: SimulatedMotion, found: TorqueDiagnosis, judged: Rollout, tmp_path: Path
+) -> None:
+    for sanity, said in (((), False), ((band.finding(1.9),), True)):
+        write_diagnosis(tmp_path, found, simulated.recordings, judged, sanity=sanity)
+        page = visible((tmp_path / "report.html").read_text(encoding="utf-8"))
+        assert ("These torques end at 1.9 Hz" in page) is said
 
 
 def test_what_moves_worse_than_before_is_said(

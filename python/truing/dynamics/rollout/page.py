@@ -46,6 +46,17 @@ TURN = 2.0 * math.pi  # [rad] a simulation that is so far off has left
 FAR = 100.0  # [m] the same
 
 
+def _low_passed(result: Mapping[str, Any]) -> str:
+    """Of torques that were low-passed before they were recorded: what no model can make good."""
+    ends = [one["value"] for one in result.get("sanity", ()) if one["finding"] == "torques_low_passed"]
+    if not ends:
+        return ""
+    return (
+        f" These torques end at {ends[0]:.2g} Hz: what friction takes while a joint turns is not in them, and"
+        " every model is farther off than with torques as the drives gave them."
+    )
+
+
 def rollout_card(
     page: Page,
     result: Mapping[str, Any],
@@ -70,7 +81,7 @@ def rollout_card(
     page.add(error_table(found, "held_out", MODELS))
     page.add(
         f'<p class="note">{found["windows"]} simulations of each model (MuJoCo) begin at measured states and'
-        f" {_DRIVEN[result.get('driven_by', 'torques')]}</p>"
+        f" {_DRIVEN[result.get('driven_by', 'torques')]}{_low_passed(result)}</p>"
     )
     items = "".join(
         f'<div class="apart">{escaped(text[:1].upper() + text[1:])}.</div>' for text in found["worse"]
