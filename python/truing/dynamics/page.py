@@ -28,7 +28,8 @@ Floats = NDArray[np.float64]
 NOMINAL, UNKNOWN = "#98a2ad", "#8a5bb5"
 HEAT = [[0, "#ffffff"], [0.25, "#fdf0d5"], [0.5, "#f6bd60"], [0.75, "#dd6b2f"], [1, "#8f1d1d"]]
 CAUSES = 3  # that the headline names
-FEW = 2  # joints of a cause that the headline names, of more only the first
+FEW = 2  # joints of a cause that the headline names, of more their number
+ROOM = 115  # characters of the causes in a headline of two lines
 LONG = 75  # characters of a headline in large type
 POINTS = 3000  # of a line, over time
 TRACE_SECONDS = 20.0  # of a prediction's report: what one can look at
@@ -245,25 +246,32 @@ def beyond_standard(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [effect for effect in result["effects"] if not effect["standard"]]
 
 
-def causes_in_words(result: Mapping[str, Any], most: int = CAUSES) -> str:
-    """The largest causes, each with all of its joints, and how many more there are."""
+def causes_in_words(result: Mapping[str, Any]) -> str:
+    """The largest causes with their joints, and how many more there are, as much of it as two lines hold."""
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for effect in beyond_standard(result):
         key = effect["effect"] if effect["effect"] != "coupling" else f"{effect['effect']} {effect['joints']}"
         groups.setdefault(key, []).append(effect)
     ordered = sorted(groups.values(), key=lambda group: -sum(effect["share"] or 0.0 for effect in group))
-    texts = []
-    for group in ordered[:most]:
-        if group[0]["effect"] == "coupling":
-            texts.append(f"{plain(group[0])} ({group[0]['joints'][1]} on {group[0]['joints'][0]})")
-            continue
-        joints = [joint for effect in group for joint in effect["joints"]]
-        where = (
-            ", ".join(joints) if len(joints) <= FEW else f"{', '.join(joints[:1])} and {len(joints) - 1} more"
-        )
-        texts.append(plain(group[0]) + (f" ({where})" if joints else ""))
-    rest = sum(len(group) for group in ordered[most:])
-    return "; ".join(texts) + (f"; and {rest} smaller" if rest else "")
+    text = ""
+    for most in range(CAUSES, 0, -1):
+        rest = sum(len(group) for group in ordered[most:])
+        for few in (FEW, 1):
+            text = "; ".join(_cause(group, few) for group in ordered[:most])
+            text += f"; and {rest} smaller" if rest else ""
+            if len(text) <= ROOM:
+                return text
+    return text
+
+
+def _cause(group: Sequence[Mapping[str, Any]], few: int) -> str:
+    """A cause and its joints, of more than a few of them their number."""
+    if group[0]["effect"] == "coupling":
+        return f"{plain(group[0])} ({group[0]['joints'][1]} on {group[0]['joints'][0]})"
+    joints = [joint for effect in group for joint in effect["joints"]]
+    if not joints:
+        return plain(group[0])
+    return f"{plain(group[0])} ({', '.join(joints) if len(joints) <= few else f'{len(joints)} joints'})"
 
 
 def _kicker(command: str, result: Mapping[str, Any], recordings: int, badge: str = "") -> str:

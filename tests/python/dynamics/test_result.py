@@ -17,6 +17,7 @@ import pytest
 import truing
 from pages import charts_of, visible
 from truing.dynamics import Recording, TorqueDiagnosis, diagnose, identify, predict
+from truing.dynamics.page import ROOM, causes_in_words
 from truing.dynamics.result import (
     diagnosis_page,
     prediction_columns,
@@ -202,3 +203,25 @@ def test_the_same_seed_gives_the_same_recordings() -> None:
     one, other, third = (simulate_motion(seconds=2.0, recordings=1, held_out=0, seed=s) for s in (3, 3, 4))
     np.testing.assert_array_equal(one.recordings[0].torque, other.recordings[0].torque)
     assert np.abs(one.recordings[0].torque - third.recordings[0].torque).max() > 1.0
+
+
+def test_the_headline_holds_in_two_lines_whatever_joints_are_called() -> None:
+    def cause(effect: str, joint: str, share: float, words: str) -> dict[str, Any]:
+        return {
+            "effect": effect,
+            "joints": [joint],
+            "standard": False,
+            "share": share,
+            "sentence": f"{words} at {joint}: 1 +- 0.1 Nm",
+        }
+
+    names = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint"]
+    load = [cause("load_friction", name, 0.2, "Friction that grows with the load") for name in names[:2]]
+    assert causes_in_words({"effects": load}) == (
+        "friction that grows with the load (shoulder_pan_joint, shoulder_lift_joint)"
+    )
+    rotors = [cause("armature", name, 0.1, "Inertia of the motor's rotor") for name in names]
+    said = causes_in_words({"effects": [*load, *rotors]})
+    assert said == "friction that grows with the load (2 joints); inertia of the motor's rotor (3 joints)"
+    reversal = cause("presliding", names[2], 0.05, "Friction that builds up after a reversal")
+    assert len(causes_in_words({"effects": [*load, *rotors, reversal]})) <= ROOM
