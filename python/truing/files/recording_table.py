@@ -191,11 +191,18 @@ class _Layout:
             wanted = [f"q{number_of[index]}_{unit}" for unit in units]
             close = [name for name in self.others if name.lower() in wanted]
             close = close or difflib.get_close_matches(wanted[0], self.others, n=1, cutoff=0.8)
-            hint = f"did you mean {close[0]!r}? " if close else ""
+            hint = f"did you mean {close[0]!r}? " if close else self._shorter_arm(index)
             self.table.refuse(
                 f"there is no column {' or '.join(wanted)}, the position of joint {joint.name!r}; {hint}"
                 f"the columns are {listed(self.table.names)}"
             )
+
+    def _shorter_arm(self, first: int) -> str:
+        """Of joints that were not recorded up to the tip, such as a gripper's: how they are left out."""
+        there = self.tables.get("position", {})
+        if not there or any(index in there for index in range(first, len(self.joints))):
+            return ""
+        return "joints up to the tip are left out by the name of the link before them (--tip-link); "
 
 
 class _Reader:

@@ -281,6 +281,12 @@ def test_column_names_may_be_a_comment_as_numpy_writes_them(tmp_path: Path) -> N
             {"t_s": T, "q1_rad": Q1, "Q2_m": Q2},
             "no column q2_m or q2_mm, the position of joint 'S'; did you mean",
         ),
+        (
+            {"t_s": T, "q1_rad": Q1},
+            "the position of joint 'S'; joints up to the tip are left out by the name of the link before them"
+            " (--tip-link); the columns are t_s, q1_rad",
+        ),
+        ({"t_s": T, "q2_m": Q2}, "the position of joint 'J1'; the columns are t_s, q2_m"),
         ({"q1_rad": Q1, "q2_m": Q2}, "there is no column t_s (or t_ms, t_us, t_ns)"),
         ({"time": T, "q1_rad": Q1, "q2_m": Q2}, "the name 'time' says no unit: call the column time_s"),
         (
