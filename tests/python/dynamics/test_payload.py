@@ -103,6 +103,13 @@ def test_a_known_load_tells_the_constants_of_drives_and_where_it_hangs() -> None
     assert "motor_constant" not in [one.effect for one in diagnosis.effects]
 
 
+def test_recordings_that_state_no_load_beside_a_known_one_are_said() -> None:
+    first, *others = currents((0.0, LOAD, 0.0, LOAD))
+    checked = check_recordings(demo_arm(), [first.replace(columns={}), *others])
+    said = next(one.evidence for one in checked.findings if one.finding == "load_place")
+    assert said.endswith(f"no payload_kg in {first.name}: taken to be without a payload")
+
+
 @pytest.mark.parametrize("loads", [(0.0, 0.0), (LOAD, LOAD)])
 def test_loads_that_are_all_the_same_tell_no_constants(loads: tuple[float, ...]) -> None:
     found = check_recordings(demo_arm(), currents(loads, 12.0)).findings

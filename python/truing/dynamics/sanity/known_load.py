@@ -79,7 +79,9 @@ def known_load(
     if no_place and len(loads) == 1 and (fit.place_sigmas < _PLACED).all():
         x, y, z = fit.place.tolist()
         out = with_payload(out, 0.0, (x, y, z))
-        findings.append(_place_found(fit, loads[0]))
+        findings.append(
+            _place_found(fit, loads[0], [one.name for one in recordings if _MASS not in one.columns])
+        )
     return KnownLoad(robot, out, findings, [k for k in unknown if k not in told])
 
 
@@ -150,11 +152,13 @@ def _constants_found(joints: Sequence[_core.Joint], told: Sequence[int], fit: _F
     return RecordingFinding("gain_from_load", (), names, words, middle, "Nm/A", applied=True)
 
 
-def _place_found(fit: _Fit, mass: float) -> RecordingFinding:
+def _place_found(fit: _Fit, mass: float, unstated: Sequence[str]) -> RecordingFinding:
     said = ", ".join(f"{v:.3f}" for v in fit.place)
     words = (
         f"where the load of {mass:g} kg hangs is not stated: found {said} m"
         f" (+- {fit.place_sigmas.max():.2g} m) from the tool's frame, and used (for predict: --payload"
         f" {mass:g}kg@{','.join(f'{1e3 * v:.0f}' for v in fit.place)}mm)"
     )
+    if unstated:
+        words += f"; no {_MASS} in {listed(unstated)}: taken to be without a payload"
     return RecordingFinding("load_place", (), (), words, float(np.linalg.norm(fit.place)), "m", applied=True)
