@@ -47,13 +47,13 @@ FAR = 100.0  # [m] the same
 
 
 def _low_passed(result: Mapping[str, Any]) -> str:
-    """Of torques that were low-passed before they were recorded: what no model can make good."""
+    """Of torques that were low-passed before they were recorded: what drives the models is incomplete."""
     ends = [one["value"] for one in result.get("sanity", ()) if one["finding"] == "torques_low_passed"]
     if not ends:
         return ""
     return (
-        f" These torques end at {ends[0]:.2g} Hz: what friction takes while a joint turns is not in them, and"
-        " every model is farther off than with torques as the drives gave them."
+        f" These torques end at {ends[0]:.2g} Hz: what friction takes while a joint turns is not in them, so"
+        " part of the errors may be the recording's."
     )
 
 
