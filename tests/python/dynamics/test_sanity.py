@@ -17,6 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 import truing
+from truing import _core
 from truing.dynamics import (
     CheckedRecordings,
     Recording,
@@ -25,9 +26,11 @@ from truing.dynamics import (
     diagnose,
     load_recordings,
 )
+from truing.dynamics.magnitudes import are_magnitudes, commands_for_magnitudes
 from truing.dynamics.sanity.columns import resolution
 from truing.dynamics.sanity.grids import grids_of
 from truing.dynamics.sanity.readings import rows_of
+from truing.dynamics.servo import by_commands
 from truing.errors import InputError
 from truing.files import write_table
 from truing.testing.dynamics import HIDDEN, USUAL, demo_arm, simulate_motion
@@ -111,6 +114,39 @@ def test_of_real_recordings_only_what_is_known_of_them_is_said(folder: str) -> N
         assert {"single_j2", "single_j3", "single_j5", "ptp10"} <= set(
             rest.recordings
         ) and rest.value == 100.0
+
+
+# ---- Magnitudes -------------------------------------------------------------------------------------
+def without_sign(motions: list[Recording]) -> list[Recording]:
+    return with_fields(motions, torque=lambda one: np.abs(one.torque))
+
+
+def test_torques_without_their_sign_are_a_mistake_of_their_own() -> None:
+    finding = only(check_recordings(ARM, without_sign(MOTIONS)))
+    assert finding.finding == "torque_magnitude" and finding.mistake
+
+
+def test_torques_that_hold_a_weight_all_the_time_are_no_magnitudes() -> None:
+    """Two joints whose weight pulls to one side, the others at rest."""
+    arm = demo_arm()
+    time = np.arange(0.0, 10.0, STEP)
+    position = np.zeros((len(time), len(arm.driven_joints())))
+    position[:, 1] = position[:, 2] = 0.1 * np.sin(time)
+    still = np.zeros_like(position)
+    weight = np.asarray(_core.rigid_torques(arm, position, still, still))
+    torque = np.abs(weight) + 0.01 * np.sign(np.cos(time))[:, None] * (np.abs(weight) > 1.0)
+    recording = Recording("held", time=time, position=position, torque=torque)
+    assert (np.abs(weight[:, 1:3]).min(axis=0) > 1.0).all()
+    assert not are_magnitudes(arm, [recording])
+
+
+def test_commands_take_the_place_of_magnitudes_and_of_nothing_else() -> None:
+    commanded = with_fields(command=lambda one: one.position)
+    assert all(one.torque.shape[1] for one in commands_for_magnitudes(ARM, commanded))
+    with pytest.warns(truing.InputWarning, match="magnitudes"):
+        taken = commands_for_magnitudes(ARM, without_sign(commanded))
+    assert by_commands(taken)
+    assert not by_commands(commands_for_magnitudes(ARM, without_sign(MOTIONS)))
 
 
 # ---- Low-passed torques ----------------------------------------------------------------------------

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.magnitudes import are_magnitudes
 from truing.dynamics.recorded import driven_joints
 from truing.dynamics.sanity import band, columns, lag
 from truing.dynamics.sanity.findings import (
@@ -56,7 +57,10 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     if _any_change(by_angle):
         grids = grids_of(robot, recordings)
     grids = [grid for grid in grids if len(grid.rows)]
-    if grids:
+    magnitudes = are_magnitudes(robot, recordings)
+    if magnitudes:
+        found.append(columns.magnitudes())
+    elif grids:
         read = readings(robot, grids)
         unknown = _without_constant(robot, recordings)
         found += [*read.findings, *scales(robot, read.fit, unknown)]

@@ -53,6 +53,13 @@ def alone(recordings: Sequence[_core.Recording]) -> list[RecordingFinding]:
     return [RecordingFinding("one_recording", (), (), f"{words} surer than 90 %", 1.0, "recordings", True)]
 
 
+def magnitudes() -> RecordingFinding:
+    """Torques or currents without the way they push."""
+    words = "torques never change their sign though their joints turn both ways and hold up no weight:"
+    words += " they are magnitudes. Record them with their sign, or commands (u1_rad …), which are enough"
+    return RecordingFinding("torque_magnitude", (), (), words, 0.0, "Nm", mistake=True)
+
+
 # ---- The clock -------------------------------------------------------------------------------------
 def clock(recordings: Sequence[_core.Recording]) -> tuple[list[RecordingFinding], list[_core.Recording]]:
     """Gaps, and steps that differ; and the recordings, with even steps where the motion says so."""

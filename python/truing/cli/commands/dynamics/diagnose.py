@@ -71,9 +71,11 @@ class Command(TorqueCommand[Answer | ServoAnswer]):
 
     def load(self, progress: run.Progress) -> CheckedRecordings:
         from truing.dynamics import CheckedRecordings
+        from truing.dynamics.magnitudes import commands_for_magnitudes
         from truing.dynamics.servo import by_commands
 
         robot, recordings = self.read(self.recordings)
+        recordings = commands_for_magnitudes(robot, recordings)
         if by_commands(recordings):
             return CheckedRecordings(robot, tuple(recordings), ())
         return checked((robot, recordings))
