@@ -149,6 +149,48 @@ def test_commands_take_the_place_of_magnitudes_and_of_nothing_else() -> None:
     assert not by_commands(commands_for_magnitudes(ARM, without_sign(MOTIONS)))
 
 
+# ---- Which way is down --------------------------------------------------------------------------------
+def tilted(arm: truing.Robot, angle: float, about: tuple[float, float, float]) -> truing.Robot:
+    """The robot whose file says that gravity points elsewhere, turned by an angle [rad] (Rodrigues)."""
+    down, axis = np.array(arm.gravity), np.array(about)
+    out = arm.copy()
+    out.gravity = down * math.cos(angle) + np.cross(axis, down) * math.sin(angle)
+    return out
+
+
+@pytest.mark.parametrize("angle", [0.4, 0.8, math.pi / 2, math.pi])
+def test_a_robot_that_hangs_otherwise_than_its_file_says_is_turned(angle: float) -> None:
+    checked = check_recordings(tilted(ARM, angle, (0.28, 0.96, 0.0)), MOTIONS)
+    finding = only(checked)
+    assert finding.finding == "gravity_direction" and finding.applied
+    assert np.allclose(checked.robot.gravity, ARM.gravity, atol=1e-9)
+
+
+def test_a_direction_of_gravity_off_the_coarse_ones_is_found_to_two_degrees() -> None:
+    mounted = tilted(ARM, 0.7, (0.28, 0.96, 0.0))
+    recordings = [  # as the mounted robot would feel it
+        one.replace(
+            torque=np.asarray(one.torque)
+            + _core.rigid_torques(mounted, one.position, 0.0 * one.position, 0.0 * one.position)
+            - _core.rigid_torques(ARM, one.position, 0.0 * one.position, 0.0 * one.position)
+        )
+        for one in MOTIONS
+    ]
+    found = np.array(check_recordings(ARM, recordings).robot.gravity)
+    assert np.linalg.norm(found) == pytest.approx(9.81)
+    assert np.degrees(np.arccos(found @ mounted.gravity / 9.81**2)) < 2.0
+
+
+def test_torques_without_the_weight_are_a_mistake() -> None:
+    still = [0.0 * one.position for one in MOTIONS]
+    recordings = [
+        one.replace(torque=np.asarray(one.torque) - _core.rigid_torques(ARM, one.position, rest, rest))
+        for one, rest in zip(MOTIONS, still, strict=True)
+    ]
+    finding = only(check_recordings(ARM, recordings))
+    assert finding.finding == "gravity_removed" and finding.mistake
+
+
 # ---- Low-passed torques ----------------------------------------------------------------------------
 def low_passed(table: Any, step: float, frequency: float) -> Any:
     """Without what is above, by the Fourier transform of the table beside its mirror image."""

@@ -68,7 +68,7 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
         recordings = [
             _scaled(one, read.position.get(one.name), read.position.get(one.name)) for one in recordings
         ]
-        robot, recordings = _turned(robot, recordings, read.torque)
+        robot, recordings = _turned(_mounted(robot, read.gravity), recordings, read.torque)
         if _any_change(read.torque) or _any_change(read.position):
             grids = grids_of(robot, recordings)
         if not any(one.mistake for one in found):
@@ -113,6 +113,15 @@ def _by_current(recording: _core.Recording, k: int) -> bool:
     current, torque = recording.current, recording.torque
     there = bool(current.shape[1]) and not np.isnan(current[0, k])
     return there and (not torque.shape[1] or bool(np.isnan(torque[0, k])))
+
+
+def _mounted(robot: _core.Robot, gravity: Sequence[float]) -> _core.Robot:
+    """The robot with this gravity [m/s^2] in its base frame."""
+    if tuple(robot.gravity) == tuple(gravity):
+        return robot
+    robot = robot.copy()
+    robot.gravity = np.array(gravity)
+    return robot
 
 
 def _any_change(factors: Mapping[str, Floats]) -> bool:

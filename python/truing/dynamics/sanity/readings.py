@@ -4,7 +4,7 @@
 
 Each joint's torque is a multiple of the model's rigid torque, plus friction and an offset. The multiple and
 the friction must not be negative: a motor does not gain energy from friction, nor do masses weigh upwards.
-What such a fit leaves is compared over readings: signs, order and units of columns.
+What such a fit leaves is compared over readings: signs, order and units of columns, and which way is down.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.recorded import driven_joints
+from truing.dynamics.sanity import gravity
 from truing.dynamics.sanity.findings import RecordingFinding, listed
 from truing.dynamics.sanity.grids import Grid
 
@@ -32,8 +33,10 @@ POOR = 0.3  # of the variance: a joint that leaves more is worth a look
 GAIN = 0.4  # of a joint's variance: from here on another reading is far better
 PART = 0.5  # and it must leave at most this part of what the joints in question left
 FITS = 0.25  # of the variance: more must not be left of a joint that is read with another sign
+SEEN, SEVERAL = 0.02, 2  # of the variance that a joint left; joints that leave half of it or less
 FAIR = 0.08  # of the variance: where a joint leaves more, other orders are looked at
-GAIN_OF_ORDER, PART_OF_ORDER = 0.08, 1.0 / 3.0  # the same, of all joints together
+OF_ALL = ("torque_order", "joint_order", "gravity_direction", "gravity_removed")  # joints together
+GAIN_OF_ALL, PART_OF_ALL = 0.08, 1.0 / 3.0  # gain and part, of all joints together
 RIVAL = 0.8  # of the gain: another reading that reaches this is as good
 NOT_AT_ALL, WELL = 0.8, 0.2  # of the variance: a sign is certain where it takes one to the other
 BEYOND = 4.0  # times the limit of a joint: no angle is there
@@ -61,6 +64,7 @@ class Reading:
     torque_order: tuple[int, ...]
     position: tuple[float, ...]
     torque: tuple[float, ...]
+    gravity: tuple[float, ...]  # [m/s^2] in the base frame
 
 
 @dataclass(frozen=True)
@@ -110,7 +114,7 @@ class _Model:
 
     def __init__(self, robot: _core.Robot, rows: Rows) -> None:
         self.robot, self.rows = robot, rows
-        self.rigid: dict[tuple[object, object], Floats] = {}
+        self.rigid: dict[tuple[object, object], list[Floats]] = {}
         self.parts: dict[tuple[object, ...], tuple[float, ...]] = {}
 
     def fit(self, reading: Reading) -> Fit:
@@ -120,7 +124,7 @@ class _Model:
     def _fit_of(self, reading: Reading, j: int) -> tuple[float, ...]:
         """Of one joint; computed once for each torque and each way to read the angles."""
         column = reading.torque_order[j]
-        key = (reading.order, reading.position, j, column, reading.torque[column])
+        key = (reading.order, reading.position, j, column, reading.torque[column], reading.gravity)
         if key not in self.parts:
             rows, own = self.rows, reading.order[j]
             factor = reading.position[own]
@@ -135,12 +139,26 @@ class _Model:
         return self.parts[key]
 
     def _rigid_of(self, reading: Reading) -> Floats:
+        """Rigid torques are linear in gravity: those without it, and by each axis of it."""
         key = (reading.order, reading.position)
         if key not in self.rigid:
             order, factor = list(reading.order), np.array(reading.position)
-            motion = ((x * factor)[:, order] for x in (self.rows.q, self.rows.qd, self.rows.qdd))
-            self.rigid[key] = np.asarray(_core.rigid_torques(self.robot, *motion))
-        return self.rigid[key]
+            motion = [(x * factor)[:, order] for x in (self.rows.q, self.rows.qd, self.rows.qdd)]
+            still = [motion[0], np.zeros_like(motion[0]), np.zeros_like(motion[0])]
+            axes = [np.asarray(_core.rigid_torques(_under(self.robot, one), *still)) for one in np.eye(3)]
+            self.rigid[key] = [
+                np.asarray(_core.rigid_torques(_under(self.robot, np.zeros(3)), *motion)),
+                *axes,
+            ]
+        without, *axes = self.rigid[key]
+        return without + sum(size * axis for size, axis in zip(reading.gravity, axes, strict=True))
+
+
+def _under(robot: _core.Robot, down: Floats) -> _core.Robot:
+    """The robot with this gravity [m/s^2] in its base frame."""
+    out = robot.copy()
+    out.gravity = down
+    return out
 
 
 def _not_negative(gram: Floats, right: Floats, there: NDArray[np.intp]) -> Floats:
@@ -185,9 +203,10 @@ def _fit_joint(columns: Floats, torque: Floats) -> tuple[float, ...]:
 
 
 # ---- Readings --------------------------------------------------------------------------------------
-def as_written(joints: int) -> Reading:
+def as_written(robot: _core.Robot) -> Reading:
+    joints = len(robot.driven_joints())
     identity, ones = tuple(range(joints)), (1.0,) * joints
-    return Reading(identity, identity, ones, ones)
+    return Reading(identity, identity, ones, ones, tuple(float(one) for one in robot.gravity))
 
 
 def _candidates(reading: Reading, revolute: Sequence[bool], poor: Sequence[int]) -> Iterator[_Candidate]:
@@ -202,6 +221,22 @@ def _candidates(reading: Reading, revolute: Sequence[bool], poor: Sequence[int])
         factors = zip(reading.position, revolute, strict=True)
         position = tuple(factor * (size if turns else 1.0) for factor, turns in factors)
         yield _Candidate(kind, (), replace(reading, position=position))
+
+
+def _downs(model: _Model, reading: Reading) -> Iterator[_Candidate]:
+    """Gravity the other way that fits best; and torques that the weight was taken off."""
+    size = float(np.linalg.norm(reading.gravity))
+    if not size > 0.0:
+        return
+
+    def read(direction: Floats) -> Reading:
+        return replace(reading, gravity=tuple(float(one) for one in size * direction))
+
+    down = gravity.best_direction(
+        lambda direction: float(np.nan_to_num(model.fit(read(direction)).left, nan=1.0).sum())
+    )
+    yield _Candidate("gravity_direction", (), read(down))
+    yield _Candidate("gravity_removed", (), read(np.zeros(3)))
 
 
 def _turned(factors: tuple[float, ...], k: int) -> tuple[float, ...]:
@@ -236,7 +271,7 @@ def _orders(model: _Model, reading: Reading, names: Sequence[str]) -> Iterator[_
         while True:
             tried = {_swapped(order, i, j) for i, j in itertools.combinations(range(n), 2)}
             other = min(sorted(tried), key=left)
-            if left(other) > best - GAIN_OF_ORDER / n:
+            if left(other) > best - GAIN_OF_ALL / n:
                 break
             best, order = left(other), other
         changed = tuple(j for j in range(n) if order[j] != j)
@@ -255,13 +290,14 @@ def better_reading(
     names, revolute = [joint.name for joint in joints], [joint.type == "revolute" for joint in joints]
     model = _Model(robot, rows)
     few = POOR if reading else FAIR
-    reading = reading or as_written(len(joints))
+    reading = reading or as_written(robot)
     fit = model.fit(reading)
     found: list[_Found] = []
     while len(found) < 2 * len(joints):
         poor = [int(j) for j in np.flatnonzero(fit.left > POOR)]
         candidates = list(_candidates(reading, revolute, poor)) if poor else []
         if np.any(fit.left > few):
+            candidates += _downs(model, reading)
             candidates += _orders(model, reading, names)
         tried = [
             (gain, candidate, other)
@@ -279,7 +315,7 @@ def better_reading(
         ]
         found.append(_what_was_found(candidate, fit, other, rivals[0][1].finding if rivals else ""))
         reading, fit = candidate.reading, other
-    plain = as_written(len(joints))
+    plain = as_written(robot)
     in_order = (reading.order, reading.torque_order) == (plain.order, plain.torque_order)
     found = [replace(one, certain=one.certain and in_order) for one in found]  # else: of which column?
     return found, reading, fit
@@ -291,13 +327,12 @@ def _gain(fit: Fit, other: Fit, candidate: _Candidate) -> float:
     gain = float((before - after).sum())
     if (np.isnan(other.left) & ~np.isnan(fit.left)).any():
         return 0.0
-    if candidate.finding in ("torque_order", "joint_order"):
-        # Joints with friction and hardly any weight fit in any order: all of them together decide.
-        return (
-            gain
-            if gain > GAIN_OF_ORDER and np.nansum(other.left) < PART_OF_ORDER * np.nansum(fit.left)
-            else 0.0
-        )
+    if candidate.finding in OF_ALL:
+        # Joints with friction and hardly any weight fit in any order and position: all together decide.
+        far = gain > GAIN_OF_ALL and np.nansum(other.left) < PART_OF_ALL * np.nansum(fit.left)
+        # A spring at one joint may look like weight; another way of down shows at several.
+        better = np.count_nonzero((before > SEEN) & (after < PART * before))
+        return gain if far and better >= SEVERAL else 0.0
     about = list(candidate.joints) or list(range(len(before)))
     if candidate.joints and after[about].max() > FITS:  # a spring, say, that the model lacks
         return 0.0
@@ -313,9 +348,9 @@ def _what_was_found(candidate: _Candidate, fit: Fit, other: Fit, rival: str) -> 
     about = list(candidate.joints) or list(range(len(fit.left)))
     before = float(np.nanmax(fit.left[about]))
     after = float(np.nanmax(other.left[about]))
-    certain = (
-        candidate.finding == "torque_sign"
-        and not rival
+    certain = not rival and (
+        candidate.finding == "gravity_direction"
+        or candidate.finding == "torque_sign"
         and before > NOT_AT_ALL
         and after < WELL
         and bool((other.by_rigid[about] > BOTH).all() and (other.by_friction[about] > BOTH).all())
@@ -332,6 +367,8 @@ _READINGS = {
     "joint_order": "the joints are in another order: {1}",
     "angles_in_deg": "the angles are in deg, not in rad",
     "angles_in_rad": "the angles are in rad, not in deg",
+    "gravity_direction": "gravity points along {2} of the base, not as the robot's file has it",
+    "gravity_removed": "the torques do not hold the weight of the links, as if a controller had taken it off",
 }
 _KINDS = {"angles_in_deg": "position_unit", "angles_in_rad": "position_unit"}
 
@@ -345,6 +382,7 @@ class Read:
     findings: tuple[RecordingFinding, ...]
     torque: dict[str, Floats]  # by recording, shape=(joints,)
     position: dict[str, Floats]
+    gravity: tuple[float, ...]  # [m/s^2] in the base frame
     fit: Fit
 
 
@@ -356,12 +394,14 @@ def readings(robot: _core.Robot, grids: Sequence[Grid]) -> Read:
     for grid in grids:
         if len(grids) > 1 and len(grid.rows):
             more, own, _ = better_reading(robot, rows_of([grid], ROWS_OF_ONE), reading)
-            cases += [(one, own, (grid.name,)) for one in more]
+            cases += [(_of_one_alone(one), own, (grid.name,)) for one in more]
     cases = [(_with_limits(one, joints, grids, names), own, names) for one, own, names in cases]
     torque = {grid.name: np.ones(len(joints)) for grid in grids}
     position = {grid.name: np.ones(len(joints)) for grid in grids}
     for one, _, names in cases:
         for name in names if one.certain else ():
+            if one.finding == "gravity_direction":
+                continue
             if one.finding == "torque_sign":
                 torque[name][list(one.joints)] *= -1.0
             else:
@@ -371,7 +411,14 @@ def readings(robot: _core.Robot, grids: Sequence[Grid]) -> Read:
         one, _, names = case
         groups.setdefault((one.finding, one.rival, one.certain, len(names) == len(grids)), []).append(case)
     words = [_finding(group, [joint.name for joint in joints], len(grids)) for group in groups.values()]
-    return Read(tuple(words), torque, position, fit)
+    downs = [own.gravity for one, own, _ in cases if one.finding == "gravity_direction" and one.certain]
+    down = downs[0] if downs else as_written(robot).gravity
+    return Read(tuple(words), torque, position, down, fit)
+
+
+def _of_one_alone(one: _Found) -> _Found:
+    """A robot hangs one way: no single recording of several changes that."""
+    return replace(one, certain=one.certain and one.finding != "gravity_direction")
 
 
 def _with_limits(
@@ -397,7 +444,9 @@ def _finding(
     joints = tuple(names[j] for j in sorted({j for one, _, _ in group for j in one.joints}))
     where = tuple(dict.fromkeys(name for _, _, some in group for name in some))
     order = reading.order if first.finding == "joint_order" else reading.torque_order
-    said = _READINGS[first.finding].format(listed(joints), ", ".join(names[k] for k in _inverse(order)))
+    down = gravity.in_words(np.array(reading.gravity))
+    ordered = ", ".join(names[k] for k in _inverse(order))
+    said = _READINGS[first.finding].format(listed(joints), ordered, down)
     before, after = (max(getattr(one, key) for one, _, _ in group) for key in ("before", "after"))
     words = "" if len(where) == recordings else f"{listed(where)}: "
     words += (
@@ -405,7 +454,7 @@ def _finding(
         f" {100 * before:.0f} %"
     )
     if first.rival:
-        words += f"; as well if {_READINGS[first.rival].format(listed(joints), '(exchanged)')}"
+        words += f"; as well if {_READINGS[first.rival].format(listed(joints), '(exchanged)', 'another way')}"
     words += "; corrected" if first.certain else f". {_advice(first.finding, names, order)}"
     kind = _KINDS.get(first.finding, first.finding)
     where = () if len(where) == recordings else where
@@ -424,4 +473,8 @@ def _advice(finding: str, names: Sequence[str], order: Sequence[int]) -> str:
         return f"Run again with --joints {','.join(names[k] for k in _inverse(order))}"
     if finding in _KINDS:
         return "Correct the unit in the names of the columns, and run again"
+    if finding == "gravity_direction":
+        return "Write it as `gravity` into robot.yaml, or turn the base of the URDF, and run again"
+    if finding == "gravity_removed":
+        return "Record the whole torque of the drives, and run again"
     return "Correct the columns (or the axis in the model), and run again"
