@@ -181,6 +181,26 @@ def test_a_direction_of_gravity_off_the_coarse_ones_is_found_to_two_degrees() ->
     assert np.degrees(np.arccos(found @ mounted.gravity / 9.81**2)) < 2.0
 
 
+@pytest.mark.parametrize("size", [10.0, 60.0])
+def test_a_force_at_the_tool_is_no_other_way_of_down(size: float) -> None:
+    force = {"tool_force.x": 0.8 * size, "tool_force.y": 0.6 * size, "tool_force.z": 0.0}
+    simulated = simulate_motion(seed=20, seconds=14.0, hidden={"tool_force": ([], force)})
+    checked = check_recordings(simulated.nominal, simulated.recordings)
+    assert "gravity_direction" not in kinds(checked)
+
+
+@pytest.mark.realdata
+@pytest.mark.parametrize(("folder", "angle"), [("dyn_ur10", 0.35), ("dyn_tx40", 1.57), ("dyn_tx40", 3.14)])
+def test_real_arms_are_found_to_stand_upright(folder: str, angle: float) -> None:
+    if not os.environ.get("TRUING_REALDATA") or not (REAL / folder).exists():
+        pytest.skip(f"TRUING_REALDATA does not hold {folder}")
+    robot = truing.load_robot(REAL / folder / "robot.urdf", any_tool=True)
+    recordings = load_recordings(str(REAL / folder / "*.csv"), robot)
+    checked = check_recordings(tilted(robot, angle, (0.6, 0.8, 0.0)), recordings)
+    assert "gravity_direction" in kinds(checked)
+    assert np.allclose(checked.robot.gravity, robot.gravity, atol=1e-9)
+
+
 def test_torques_without_the_weight_are_a_mistake() -> None:
     still = [0.0 * one.position for one in MOTIONS]
     recordings = [

@@ -11,6 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from truing import _core
+
 Floats = NDArray[np.float64]
 
 WIDE, NARROW = math.radians(30.0), math.radians(0.5)  # steps from the best of the coarse directions
@@ -36,6 +38,32 @@ def best_direction(left: Callable[[Floats], float]) -> Floats:
             step *= 0.5
     plain = max(COARSE, key=lambda one: float(one @ best))
     return plain if float(plain @ best) > math.cos(AS_NEAR) else best
+
+
+def held_against(robot: _core.Robot, q: Floats) -> Floats:
+    """J^T f of a force of one at the tool along each axis of the base: what a mass of one there would weigh.
+    shape=(n, joints, 3)
+    """
+    alone = robot.copy()
+    for joint in alone.joints:
+        joint.mass, joint.inertia, joint.rotor_inertia = 0.0, np.zeros((3, 3)), 0.0
+    alone.joints[-1].mass = 1.0
+    if robot.targets:
+        alone.joints[-1].center_of_mass = np.array(robot.targets[0].T_last_target)[:3, 3]
+    return np.stack([weight(alone, axis, q) for axis in np.eye(3)], axis=-1)
+
+
+def weight(robot: _core.Robot, down: Floats, q: Floats) -> Floats:
+    """Torques that hold the links at rest under this gravity [m/s^2] in the base frame. shape=(n, joints)"""
+    robot = under(robot, down)
+    return np.asarray(_core.rigid_torques(robot, q, np.zeros_like(q), np.zeros_like(q)))
+
+
+def under(robot: _core.Robot, down: Floats) -> _core.Robot:
+    """The robot with this gravity [m/s^2] in its base frame."""
+    out = robot.copy()
+    out.gravity = down
+    return out
 
 
 def in_words(gravity: Floats) -> str:

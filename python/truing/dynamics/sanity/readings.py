@@ -34,8 +34,9 @@ GAIN = 0.4  # of a joint's variance: from here on another reading is far better
 PART = 0.5  # and it must leave at most this part of what the joints in question left
 FITS = 0.25  # of the variance: more must not be left of a joint that is read with another sign
 SEEN, SEVERAL = 0.02, 2  # of the variance that a joint left; joints that leave half of it or less
+AS_GOOD = 0.9  # of the gain of another gravity: a force at the tool with more may be all there is
 FAIR = 0.08  # of the variance: where a joint leaves more, other orders are looked at
-OF_ALL = ("torque_order", "joint_order", "gravity_direction", "gravity_removed")  # joints together
+OF_ALL = ("torque_order", "joint_order", "gravity_removed")  # joints together
 GAIN_OF_ALL, PART_OF_ALL = 0.08, 1.0 / 3.0  # gain and part, of all joints together
 RIVAL = 0.8  # of the gain: another reading that reaches this is as good
 NOT_AT_ALL, WELL = 0.8, 0.2  # of the variance: a sign is certain where it takes one to the other
@@ -126,39 +127,62 @@ class _Model:
         column = reading.torque_order[j]
         key = (reading.order, reading.position, j, column, reading.torque[column], reading.gravity)
         if key not in self.parts:
-            rows, own = self.rows, reading.order[j]
-            factor = reading.position[own]
-            torque = reading.torque[column] * rows.torque[:, column]
-            moves = rows.moving[:, own] & ~np.isnan(torque)
-            columns = (
-                self._rigid_of(reading)[:, j],
-                math.copysign(1.0, factor) * rows.direction[:, own],
-                factor * rows.qd[:, own],
-            )
-            self.parts[key] = _fit_joint(np.column_stack(columns)[moves], torque[moves])
+            columns, torque, _ = self._rows_of(reading, j)
+            self.parts[key] = _fit_joint(columns, torque)
         return self.parts[key]
+
+    def _rows_of(self, reading: Reading, j: int) -> tuple[Floats, Floats, Bools]:
+        """Of one joint: rigid torque, direction and speed; measured torque; and in which rows it moves."""
+        rows, column, own = self.rows, reading.torque_order[j], reading.order[j]
+        factor = reading.position[own]
+        torque = reading.torque[column] * rows.torque[:, column]
+        moves = rows.moving[:, own] & ~np.isnan(torque)
+        columns = (
+            self._rigid_of(reading)[:, j],
+            math.copysign(1.0, factor) * rows.direction[:, own],
+            factor * rows.qd[:, own],
+        )
+        return np.column_stack(columns)[moves], torque[moves], moves
 
     def _rigid_of(self, reading: Reading) -> Floats:
         """Rigid torques are linear in gravity: those without it, and by each axis of it."""
         key = (reading.order, reading.position)
         if key not in self.rigid:
-            order, factor = list(reading.order), np.array(reading.position)
-            motion = [(x * factor)[:, order] for x in (self.rows.q, self.rows.qd, self.rows.qdd)]
-            still = [motion[0], np.zeros_like(motion[0]), np.zeros_like(motion[0])]
-            axes = [np.asarray(_core.rigid_torques(_under(self.robot, one), *still)) for one in np.eye(3)]
+            motion = [self._read(x, reading) for x in (self.rows.q, self.rows.qd, self.rows.qdd)]
+            weightless = gravity.under(self.robot, np.zeros(3))
             self.rigid[key] = [
-                np.asarray(_core.rigid_torques(_under(self.robot, np.zeros(3)), *motion)),
-                *axes,
+                np.asarray(_core.rigid_torques(weightless, *motion)),
+                *(gravity.weight(self.robot, axis, motion[0]) for axis in np.eye(3)),
             ]
         without, *axes = self.rigid[key]
         return without + sum(size * axis for size, axis in zip(reading.gravity, axes, strict=True))
 
+    def _read(self, columns: Floats, reading: Reading) -> Floats:
+        return np.asarray((columns * np.array(reading.position))[:, list(reading.order)])
 
-def _under(robot: _core.Robot, down: Floats) -> _core.Robot:
-    """The robot with this gravity [m/s^2] in its base frame."""
-    out = robot.copy()
-    out.gravity = down
-    return out
+    def left_with_force(self, reading: Reading) -> float:
+        """What is left, over all joints, with the constant force at the tool that fits best."""
+        pulls = gravity.held_against(self.robot, self._read(self.rows.q, reading))
+        sides, torques = [], []
+        for j in range(len(reading.order)):
+            left, scale, *_ = self._fit_of(reading, j)
+            if math.isnan(left):
+                continue
+            columns, torque, moves = self._rows_of(reading, j)
+            used = columns if scale > 0.0 else columns[:, 1:]
+            both = _without(used, np.column_stack([torque, pulls[moves, j]]))
+            both /= torque.std() * math.sqrt(len(torque))
+            torques.append(both[:, 0])
+            sides.append(both[:, 1:])
+        side, torque = np.concatenate(sides), np.concatenate(torques)
+        force = np.linalg.lstsq(side, torque, rcond=None)[0]
+        return float(np.sum((torque - side @ force) ** 2))
+
+
+def _without(columns: Floats, values: Floats) -> Floats:
+    """What least squares by these columns and an offset leaves of the values."""
+    x = np.column_stack([columns, np.ones(len(columns))])
+    return np.asarray(values - x @ np.linalg.lstsq(x, values, rcond=None)[0])
 
 
 def _not_negative(gram: Floats, right: Floats, there: NDArray[np.intp]) -> Floats:
@@ -224,7 +248,9 @@ def _candidates(reading: Reading, revolute: Sequence[bool], poor: Sequence[int])
 
 
 def _downs(model: _Model, reading: Reading) -> Iterator[_Candidate]:
-    """Gravity the other way that fits best; and torques that the weight was taken off."""
+    """Gravity the other way that fits best, unless a constant force at the tool does nearly as well; and
+    torques that the weight was taken off.
+    """
     size = float(np.linalg.norm(reading.gravity))
     if not size > 0.0:
         return
@@ -232,10 +258,13 @@ def _downs(model: _Model, reading: Reading) -> Iterator[_Candidate]:
     def read(direction: Floats) -> Reading:
         return replace(reading, gravity=tuple(float(one) for one in size * direction))
 
-    down = gravity.best_direction(
-        lambda direction: float(np.nan_to_num(model.fit(read(direction)).left, nan=1.0).sum())
-    )
-    yield _Candidate("gravity_direction", (), read(down))
+    def left(one: Reading) -> float:
+        return float(np.nan_to_num(model.fit(one).left, nan=0.0).sum())
+
+    down = read(gravity.best_direction(lambda direction: left(read(direction))))
+    as_it_is = left(reading)
+    if as_it_is - model.left_with_force(reading) < AS_GOOD * (as_it_is - left(down)):
+        yield _Candidate("gravity_direction", (), down)
     yield _Candidate("gravity_removed", (), read(np.zeros(3)))
 
 
@@ -289,15 +318,16 @@ def better_reading(
     joints = driven_joints(robot)
     names, revolute = [joint.name for joint in joints], [joint.type == "revolute" for joint in joints]
     model = _Model(robot, rows)
-    few = POOR if reading else FAIR
+    few, seen = (POOR, POOR) if reading else (FAIR, SEEN)
     reading = reading or as_written(robot)
     fit = model.fit(reading)
     found: list[_Found] = []
     while len(found) < 2 * len(joints):
         poor = [int(j) for j in np.flatnonzero(fit.left > POOR)]
         candidates = list(_candidates(reading, revolute, poor)) if poor else []
-        if np.any(fit.left > few):
+        if np.any(fit.left > seen):
             candidates += _downs(model, reading)
+        if np.any(fit.left > few):
             candidates += _orders(model, reading, names)
         tried = [
             (gain, candidate, other)
@@ -327,12 +357,15 @@ def _gain(fit: Fit, other: Fit, candidate: _Candidate) -> float:
     gain = float((before - after).sum())
     if (np.isnan(other.left) & ~np.isnan(fit.left)).any():
         return 0.0
-    if candidate.finding in OF_ALL:
-        # Joints with friction and hardly any weight fit in any order and position: all together decide.
-        far = gain > GAIN_OF_ALL and np.nansum(other.left) < PART_OF_ALL * np.nansum(fit.left)
-        # A spring at one joint may look like weight; another way of down shows at several.
+    if candidate.finding == "gravity_direction":
+        # A spring at one joint may look like weight; another way of down shows at several, and harms none.
         better = np.count_nonzero((before > SEEN) & (after < PART * before))
-        return gain if far and better >= SEVERAL else 0.0
+        good = gain > GAIN_OF_ALL and better >= SEVERAL and (after < before + SEEN).all()
+        return gain if good else 0.0
+    if candidate.finding in OF_ALL:
+        # Joints with friction and hardly any weight fit in any order: all of them together decide.
+        far = gain > GAIN_OF_ALL and np.nansum(other.left) < PART_OF_ALL * np.nansum(fit.left)
+        return gain if far else 0.0
     about = list(candidate.joints) or list(range(len(before)))
     if candidate.joints and after[about].max() > FITS:  # a spring, say, that the model lacks
         return 0.0
