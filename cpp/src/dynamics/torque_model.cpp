@@ -112,6 +112,7 @@ MatrixXd TorqueModel::torque_by_direction(Motion* motion) const {
   }
   MatrixXd out = torque_of_others(motion);
   motion->torque = seen_ ? seen : out;
+  motion->bodies = seen_ ? seen_->links_ : links_;
   add_terms(terms_, true, *motion, &out);
   return out;
 }

@@ -56,6 +56,23 @@ def test_hidden_effects_are_named_with_their_sizes() -> None:
     assert percent(found, "named").max() < 5 < percent(found, "standard").max()
 
 
+@pytest.mark.parametrize("off", [0.0, 0.3])  # of the masses in the file
+def test_a_tilted_base_is_named_with_its_angle(off: float) -> None:
+    tilt = np.array([0.03, -0.04, 0.0])
+    robot = SIMULATED.nominal.copy()
+    robot.gravity = np.array(robot.gravity) + np.cross(tilt, robot.gravity)
+    for joint, factor in zip(
+        robot.joints, np.random.default_rng(3).uniform(1 - off, 1 + off, 6), strict=True
+    ):
+        assert joint.mass is not None
+        joint.mass *= factor
+    found = diagnose(robot, SIMULATED.recordings)
+    parameters = {p.name: p.value for e in found.effects if e.effect == "base_tilt" for p in e.parameters}
+    assert parameters["base_tilt.x"] == pytest.approx(tilt[0], rel=0.15)
+    assert parameters["base_tilt.y"] == pytest.approx(tilt[1], rel=0.15)
+    assert percent(found, "named").max() < 5.0
+
+
 def test_nothing_is_named_where_nothing_is_hidden() -> None:
     simulated = simulate_motion(seed=4, hidden={})
     found = diagnose(simulated.nominal, simulated.recordings)
@@ -148,6 +165,21 @@ def test_ur10e_held_out_torque_and_the_payload_that_nobody_told() -> None:
     mass = next(p.value for p in first.parameters if p.name == "payload.m")
     assert mass == pytest.approx(2.805, rel=0.15)
     assert any("share one scale" in c.sentence for c in loaded.classes)
+
+
+@pytest.mark.realdata
+def test_the_angle_of_a_real_arm_whose_file_is_turned_is_found() -> None:
+    folder = real("dyn_ur10e")
+    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
+    for index, gain in zip(robot.driven_joints(), UR10E_GAINS, strict=True):
+        robot.joints[index].torque_per_ampere = gain
+    tilt = np.radians(5.0) * np.array([0.6, 0.8, 0.0])
+    robot.gravity = np.array(robot.gravity) + np.cross(tilt, robot.gravity)
+    files = [path for path in sorted(folder.glob("h*.csv")) if "load" not in path.name]
+    found = diagnose(robot, load_recordings(files, robot))
+    effect = next(e for e in found.effects if e.effect == "base_tilt")
+    assert effect.probability > 0.9
+    assert [p.value for p in effect.parameters] == pytest.approx(tilt[:2], abs=np.radians(0.3))
 
 
 @pytest.mark.realdata

@@ -358,6 +358,21 @@ def test_tool_force_acts_on_the_tool(tmp_path: Path) -> None:
         assert found - rigid == pytest.approx(J @ force, abs=1e-6)
 
 
+def test_a_tilted_base_is_another_gravity(tmp_path: Path) -> None:
+    tilt = np.array([0.02, -0.05, 0.0])
+    robot = arm("urdf")
+    tilted = robot.replace(
+        torque_effects=[AppliedEffect("base_tilt", [], {"base_tilt.x": tilt[0], "base_tilt.y": tilt[1]})]
+    )
+    other = robot.replace(gravity=np.array(robot.gravity) - np.cross(tilt, robot.gravity))
+    exported = export(tilted, "mjcf", tmp_path)
+    assert exported.not_written == ()
+    for q, qd, qdd in states(5, 4):
+        expected = pinocchio_torques(other, q, qd, qdd)
+        assert mujoco_torques(exported, q, qd, qdd) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert "base_tilt" in [one.name for one in export(tilted, "urdf", tmp_path / "urdf").not_written]
+
+
 def test_what_belongs_to_the_measurement_is_said_and_not_written(tmp_path: Path) -> None:
     effects = [
         applied("motor_constant", J1=0.1),

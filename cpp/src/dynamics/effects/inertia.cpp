@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Masses: links, rotors, payload.
+// Masses: links, rotors, payload, and which way they weigh.
 
 #include <algorithm>
 #include <cmath>
@@ -109,6 +109,37 @@ std::vector<TorqueForm> payload_place(const Robot& robot, std::size_t, const Mot
   return {form};
 }
 
+/// What the torques change by when the base turns by a small angle about one of its axes: gravity g becomes
+/// g - axis x g in it, and torques are linear in gravity. shape=(rows, joints)
+MatrixXd weight_turned(const Motion& m, int axis) {
+  Robot turned = *m.robot;
+  turned.gravity = -Eigen::Vector3d::Unit(axis).cross(m.robot->gravity);
+  const MatrixXd rest = MatrixXd::Zero(m.rows(), m.q.cols());
+  return RigidChain(turned).torques(m.q, rest, rest, m.bodies);
+}
+
+// A base that does not stand as the file has it. About the vertical nothing changes.
+std::vector<TorqueForm> base_tilt(const Robot& robot, std::size_t, const MotionRange&) {
+  if (link_parameters(robot).isZero()) throw Unsuited("the links' masses are not known");
+  if (robot.gravity.isZero()) throw Unsuited("there is no gravity");
+  Index vertical = 0;
+  robot.gravity.cwiseAbs().maxCoeff(&vertical);
+  TorqueForm form;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis == vertical) continue;
+    TorqueTerm term;
+    term.parameter = std::string("base_tilt.") + "xyz"[axis];
+    term.unit = "rad";
+    for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
+    term.prior = 0.02;
+    term.needs_torque = true;  // of the links as the fit has them
+    term.needs_rigid = term.needs_direction = false;
+    term.basis = [axis](const Motion& m) { return weight_turned(m, axis); };
+    form.push_back(within(std::move(term), -0.5, 0.5));  // beyond that a base is mounted otherwise, not tilted
+  }
+  return {form};
+}
+
 std::vector<TorqueForm> armature(const Robot& robot, std::size_t joint, const MotionRange& range) {
   const auto at = static_cast<Index>(joint);
   const double prior = std::max(range.torque[at], 1e-3) / std::max(range.acceleration[at], 0.1);
@@ -146,7 +177,14 @@ std::vector<TorqueEffect> inertia_effects() {
                           "a column `payload_kg`"};
   out.push_back({"payload_place", "the centre of mass of the payload that is known is elsewhere than stated",
                  payload_place, false, traits});
+  traits.family = TorqueFamily::gravity;
   traits.mujoco = SimulatorPlace::field;
+  traits.plain = "a tilted base";
+  traits.documentation = {"change of the links' weight when the base turns: gravity g - axis x g",
+                          "`base_tilt.x`, `.y`, `.z` [rad] about the base's axes that are not vertical",
+                          "links whose masses are known"};
+  out.push_back({"base_tilt", "the base does not stand as the file has it", base_tilt, false, traits});
+  traits.family = TorqueFamily::inertia;
   traits.usual = true;
   traits.plain = "inertia of the motor's rotor";
   traits.urdf = SimulatorPlace::none;

@@ -22,11 +22,13 @@ from truing.chains import coupling_of
 from truing.dynamics.export import beside, isaaclab, mjcf, refit, urdf
 from truing.dynamics.export.chain import Chain, chain_of, file_name
 from truing.dynamics.export.parts import (
+    IN_GRAVITY,
     NotWritten as NotWritten,
     Reference,
     parts_of,
     recorded_motion,
     reference_motion,
+    with_gravity_turned,
 )
 from truing.dynamics.recorded import Recorded
 from truing.errors import InputError
@@ -107,7 +109,8 @@ def export(
             "source is not used for mjcf, whose chain is written anew: leave it out, or export to urdf"
         )
     text = None if source is None else _source_text(Path(source))
-    whole = _written(robot, to, text, recordings)
+    upright = with_gravity_turned(robot)
+    whole = _written(upright, to, text, recordings)
     alone, parameters, why_not = _refitted(whole, to, text, recordings, cutoff)
     files = dict(alone.files)
     if whole.callbacks:
@@ -115,6 +118,10 @@ def export(
     if whole.callbacks and alone is not whole:
         files[CALLBACKS_MODEL] = whole.files[whole.main]
     left = sorted(alone.left, key=lambda item: -item.size if math.isfinite(item.size) else -math.inf)
+    if to != "mjcf" and upright is not robot:
+        way = ", ".join(f"{value:.4g}" for value in upright.gravity)
+        reason = f"gravity is the scene's: ({way}) m/s^2 in the base frame"
+        left.append(NotWritten(IN_GRAVITY, math.nan, reason))
     where = "the recordings" if recordings else "a motion through the robot's range at the torques of gravity"
     files[NOT_WRITTEN] = listed(robot.name, to, left, where, parameters, why_not)
     inputs = [] if source is None else [Path(source)]

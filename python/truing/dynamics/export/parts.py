@@ -62,6 +62,7 @@ _PARTS = {
 }
 """What follows the joint in the names of an effect's parameters; nothing where it is not listed."""
 IN_BODIES = ("link_inertia", "payload")
+IN_GRAVITY = "base_tilt"
 ONLY_MEASURED = {
     "motor_constant": "belongs to the measurement: divide measured torques by one plus this",
     "torque_lag": "belongs to the measurement: the torque was read so much later than the motion",
@@ -137,6 +138,22 @@ def _turned(parts: dict[str, float]) -> dict[str, float]:
 
 def rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
+
+
+def with_gravity_turned(robot: _core.Robot) -> _core.Robot:
+    """The robot whose `gravity` has what its base is tilted by, g - tilt x g, in place of the effect."""
+    gravity, rest = np.array(robot.gravity), []
+    for applied in robot.torque_effects:
+        if applied.effect == IN_GRAVITY:
+            tilt = [applied.parameters.get(f"{IN_GRAVITY}.{axis}", 0.0) for axis in "xyz"]
+            gravity = gravity - np.cross(tilt, robot.gravity)
+        else:
+            rest.append(applied)
+    return (
+        robot.replace(gravity=gravity, torque_effects=rest)
+        if len(rest) < len(robot.torque_effects)
+        else robot
+    )
 
 
 def reference_motion(robot: _core.Robot, chain: Chain) -> Reference:
