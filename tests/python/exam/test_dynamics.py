@@ -44,7 +44,7 @@ NAMES = [arm.name for arm in EVERY]
 CATALOGUE = set(
     """viscous_law stribeck presliding asymmetric_friction load_friction position_friction ripple armature
     link_inertia payload spring motor_constant torque_lag time_offset coupling joint_elasticity backlash
-    thermal_friction warmup tool_force""".split()
+    thermal_friction warmup tool_force base_tilt""".split()
 )
 REAL = pytest.mark.skipif(
     bool(recordings.missing("development") or recordings.missing("examination")),

@@ -129,6 +129,20 @@ def torques(arm: Arm, q: Floats, qd: Floats, qdd: Floats) -> Floats:
     return found
 
 
+def weight_along(arm: Arm, q: Floats, way: Floats) -> Floats:
+    """Torques that hold the links at rest against this gravity, shape=(rows, n) [Nm]. way: shape=(3,) [m/s^2]
+    in the base's axes.
+    """
+    motion = sweep(arm, q, np.zeros_like(q), np.zeros_like(q))
+    found = np.zeros_like(q)
+    for k, link in enumerate(arm.links):
+        center = motion.origin[k] + motion.rotation[k] @ link.com
+        for j in range(k + 1):
+            moment = np.cross(center - motion.origin[j], -link.mass * way)
+            found[:, j] += np.sum(motion.axis[j] * moment, axis=1)
+    return found
+
+
 def tool_points(arm: Arm, q: Floats) -> tuple[Floats, Floats]:
     """Tool in the base's axes, shape=(rows, 3) [m], and how it moves with every joint, shape=(rows, n, 3)
     [m/rad].

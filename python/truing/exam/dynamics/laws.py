@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from truing.exam.dynamics.bodies import tool_points
+from truing.exam.dynamics.bodies import GRAVITY, tool_points, weight_along
 from truing.exam.dynamics.motions import STEP
 from truing.exam.dynamics.physics import Motion
 from truing.exam.dynamics.robots import Arm, Floats, loaded
@@ -252,6 +252,13 @@ def tool_force(arm: Arm, j: int, rng: Generator) -> Hidden:
     return Hidden("tool_force", (), pull)
 
 
+def base_tilt(arm: Arm, j: int, rng: Generator) -> Hidden:
+    """A base that stands askew: weight along the floor, too. (Of the whole arm: j is not used.)"""
+    turn = rng.uniform(0.0, 2.0 * np.pi)
+    side = float(np.linalg.norm(GRAVITY)) * np.array([np.cos(turn), np.sin(turn), 0.0])
+    return Hidden("base_tilt", (), lambda s: weight_along(arm, s.motion.q, side), 0.15)
+
+
 def coupling(arm: Arm, j: int, rng: Generator) -> Hidden:
     """A belt or a differential wrist: the neighbour's own losses and its rotor felt at this joint too."""
     k = j - 1 if j == arm.n - 1 or (j > 0 and rng.random() < 0.5) else j + 1
@@ -358,6 +365,7 @@ LISTED: dict[str, Maker] = {
         armature,
         spring,
         tool_force,
+        base_tilt,
         coupling,
         link_inertia,
         payload,

@@ -39,7 +39,7 @@ _COARSE = 5  # rows of 1 ms between those on which sizes are found
 _ENCODER_BITS = (17, 20)
 INERTIAL = frozenset({"link_inertia", "payload", "armature", "motor_constant"})
 """What wrong inertials are rightly called, or look like."""
-ARM_WIDE = frozenset({"payload", "tool_force", "time_offset"})
+ARM_WIDE = frozenset({"payload", "tool_force", "base_tilt", "time_offset"})
 
 Label = dict[str, Any]
 Table = dict[str, Floats]

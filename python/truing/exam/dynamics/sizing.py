@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truing.exam.dynamics.bodies import regressor, tool_points
+from truing.exam.dynamics.bodies import regressor, tool_points, weight_along
 from truing.exam.dynamics.laws import Scene, stop
 from truing.exam.dynamics.robots import Floats
 
@@ -186,6 +186,10 @@ def _whole_arm(view: View) -> list[Rival]:
     moves = [tool_points(s.arm, s.motion.q)[1] for s in view.scenes]
     pulls = [view.stacked([m[:, :, c] for m in moves]) for c in range(3)]
     found.append(Rival("tool_force", (), (np.stack(pulls, axis=1),)))
+    tilts = [
+        view.stacked([weight_along(s.arm, s.motion.q, way) for s in view.scenes]) for way in np.eye(3)[:2]
+    ]
+    found.append(Rival("base_tilt", (), (np.stack(tilts, axis=1),)))
     return found
 
 
