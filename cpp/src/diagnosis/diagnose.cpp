@@ -469,6 +469,7 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   judge_noise(repeats, work, decision, &result);
   describe_all(work, evidence, decision, names, fitted.by_catalogue.found, &result);
   describe_what_is_too_large(work, evidence, decision, &result);
+  say_what_is_negative(&result);
   scale_to_exact(&result);
   merge_the_same(&result);
   question_noise(repeats, whole.data, &result);

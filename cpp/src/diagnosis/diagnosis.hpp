@@ -226,6 +226,8 @@ class Gears {
 std::vector<TooLarge> too_large_in(const Work& work, const Evidence::State& state);
 /// They are candidates no more. Columns that were appended since there were `groups` of them go as well.
 void set_aside(const std::vector<TooLarge>& too_large, std::size_t groups, const Grams& grams, Work* work);
+/// Warns of parameters below zero that no machine has so.
+void say_what_is_negative(Diagnosis* out);
 /// What looks like an effect that no machine has: said of the unknown at its joint, or as one of its own.
 void describe_what_is_too_large(const Work& work, const Evidence& evidence, const Decision& decision, Diagnosis* out);
 

@@ -86,6 +86,19 @@ static std::string in_words(const Work& work, const TooLarge& one) {
          number(factor * plausible_size(work, e), 2) + shown + ")";
 }
 
+void say_what_is_negative(Diagnosis* out) {
+  for (const FoundEffect& found : out->effects) {
+    const auto known = std::find_if(catalogue().begin(), catalogue().end(),
+                                    [&](const Effect& effect) { return effect.name == found.effect; });
+    if (known == catalogue().end() || known->traits.if_negative.empty()) continue;
+    for (const Parameter& p : found.parameters) {
+      const bool its_own = p.name.rfind(found.effect + ".", 0) == 0;  // not the moment of an unknown weight
+      if (its_own && p.value + kForSure * p.sigma < 0.0)
+        out->warnings.push_back(p.name + " is below zero, and " + known->traits.if_negative);
+    }
+  }
+}
+
 void describe_what_is_too_large(const Work& work, const Evidence& evidence, const Decision& decision, Diagnosis* out) {
   for (const TooLarge& one : decision.too_large) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(one.group)];

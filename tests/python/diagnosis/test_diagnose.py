@@ -586,6 +586,24 @@ def test_identify_takes_what_was_named(applied: AppliedEffect, asked: str) -> No
         assert truing.identify(robot, data, free="tool.*", effects=text).test.after.rms < 0.9 * found.gap.rms
 
 
+@pytest.mark.parametrize("hangs", [False, True])
+def test_a_joint_that_gives_way_upwards_is_asked_whether_the_robot_hangs(hangs: bool) -> None:
+    robot = truing.load_robot(ROBOT)
+    centers = ([0, -0.02, 0], [-0.135, 0, 0], [-0.02, 0, 0.03], [0, -0.1, 0], [0, 0, 0], [0, 0, -0.01])
+    for joint, mass, center in zip(robot.joints, (6, 4, 5, 2, 1, 0.5), centers, strict=True):
+        joint.mass, joint.center_of_mass = mass, center
+    true = robot.copy()
+    true.gravity = [0.0, 0.0, 9.81 if hangs else -9.81]
+    true.effects = [AppliedEffect("joint_compliance", ["J2"], {"joint_compliance.J2": 3e-5})]
+    joints = random_joints(robot, 220, 4)
+    positions = np.asarray(truing.predict(true, truing.Measurements(joints)).position)
+    noise = np.random.default_rng(6).normal(0, NOISE, (220, 3))
+    found = truing.diagnose(robot, truing.Measurements(joints, positions=positions + noise))
+    (effect,) = [e for e in found.effects if e.effect == "joint_compliance"]
+    assert np.sign(effect.parameters[0].value) == (-1.0 if hangs else 1.0)
+    assert any("joint_compliance.J2 is below zero" in text for text in found.warnings) == hangs
+
+
 def test_an_effect_that_is_left_out_is_not_considered() -> None:
     robot, data = truing.load_robot(ROBOT), measured("effects")
     found = truing.diagnose(robot, data, leave_out="backlash")

@@ -166,10 +166,11 @@ struct EffectTraits {
   std::vector<std::string> mimicked_by{};  ///< effects that may do the same, and show only with a column of their own
   std::vector<ContainedIn> contained_in{};
   std::vector<SeparatedBy> separated_by{};
-  double prior = 1e-2;      ///< motion [rad | m] of its site that it may well make
-  double usual = 0.0;       ///< size of its parameters, in their unit: what a simulation draws; 0: unknown
-  double plausible = 0.0;   ///< no machine in working order has more, in the same unit; 0: unknown
-  std::string main_part{};  ///< which of several parameters is meant by the effect's name alone, "cos1"
+  double prior = 1e-2;        ///< motion [rad | m] of its site that it may well make
+  double usual = 0.0;         ///< size of its parameters, in their unit: what a simulation draws; 0: unknown
+  double plausible = 0.0;     ///< no machine in working order has more, in the same unit; 0: unknown
+  std::string if_negative{};  ///< what a parameter below zero may mean, where machines have none; empty: they do
+  std::string main_part{};    ///< which of several parameters is meant by the effect's name alone, "cos1"
   ReportUnit reported{};
   EffectDocumentation documentation{};
 };

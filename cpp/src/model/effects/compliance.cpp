@@ -255,6 +255,8 @@ Effect joint_compliance_effect() {
   traits.separated_by = {{Experiment::target_on_elbow, "link_compliance"}, {Experiment::another_payload}};
   traits.usual = 2e-6;
   traits.plausible = 5e-3;
+  traits.if_negative =
+      "no joint gives way against its weight: where a robot hangs from a ceiling, `gravity` of its file says so";
   traits.documentation = {"c · gravity torque τ", "`joint_compliance.J2` [rad/Nm, m/N]",
                           "masses in the robot, or `payload_kg` (then of the payload alone)"};
   return effect;
