@@ -524,32 +524,66 @@ static Evidence::State search_named(const Work& work, const Decision& so_far) {
   return search_causes(work, evidence, so_far, std::move(best));
 }
 
-/// All links together, and the size of their errors: what predicts other poses better than the choice does, beside it
-/// or in its place. Few poses cannot say which link it is, and still know better than nothing.
+/// All links together beside other groups, with the size of their errors that predicts other poses best.
+static Choice with_links(const Work& work, int links, const Choice& others) {
+  double least = 1e300;
+  Choice best;
+  for (const double scale : {1.0, 0.3, 0.1, 0.03, 0.01}) {
+    Choice choice = others;
+    choice.groups.push_back(links);
+    choice.scales.push_back(scale);
+    const double squares = cross_validated(work, choice);
+    if (squares >= least) continue;
+    least = squares;
+    best = std::move(choice);
+  }
+  return best;
+}
+
+/// What the search would choose from these sums alone.
+static Choice search_again(const Work& work, const Decision& decision, const Gram& train) {
+  const Shortlist list = shortlist(work, decision.state.choice.groups);
+  const Evidence evidence(train.of(list.columns), list.groups, list.nuisance, list.prior);
+  Choice found = evidence.search(decision.search).choice;
+  for (int& group : found.groups) group = list.which[static_cast<std::size_t>(group)];
+  return found;
+}
+
+/// Do names that were chosen among many predict other poses better, for sure, than all links together do? Each fold is
+/// predicted by names that were chosen without it.
+static bool names_predict_better(const Work& work, const Decision& decision, const Choice& links) {
+  const Eigen::VectorXd by_names =
+      squares_of_parts(work, [&](const Gram& train) { return search_again(work, decision, train); });
+  return predicts_better(by_names, squares_of_parts(work, [&](const Gram&) { return links; }), 1.0);
+}
+
+/// Few poses cannot say which link it is, nor which of many causes that would do as well. What is known of every robot
+/// beforehand, that its links are not as drawn, is believed before names that do not predict other poses better.
 static void prefer_links_that_predict(const Work& work, Decision* out) {
   const auto& named = work.design.candidates.named;
-  const auto links =
+  const auto at =
       std::find_if(named.begin(), named.end(), [](const Explanation& e) { return e.kind == Kind::all_geometry; });
-  if (links == named.end()) return;
-  const int group = static_cast<int>(links - named.begin());
+  if (at == named.end()) return;
+  const int links = static_cast<int>(at - named.begin());
   const auto columns =
-      static_cast<double>(work.design.candidates.groups[static_cast<std::size_t>(group)].columns.size());
+      static_cast<double>(work.design.candidates.groups[static_cast<std::size_t>(links)].columns.size());
   if (work.grams.train.n > kManyValues * columns) return;  // then the evidence decides
-  const Choice others = without_these(out->state.choice, {group});
-  const Eigen::VectorXd now = squares_of_folds(work, out->state.choice);
-  double best = 1e300;
-  Choice better;
-  for (const double scale : {1.0, 0.3, 0.1, 0.03, 0.01}) {
-    for (Choice choice : {Choice{}, others}) {
-      choice.groups.push_back(group);
-      choice.scales.push_back(scale);
-      const Eigen::VectorXd squares = squares_of_folds(work, choice);
-      if (squares.sum() >= best || !predicts_better(squares, now, kMuchBetter)) continue;
-      best = squares.sum();
-      better = choice;
-    }
+  const auto has_links = [&](const Choice& choice) {
+    return std::find(choice.groups.begin(), choice.groups.end(), links) != choice.groups.end();
+  };
+  const Evidence evidence = evidence_now(work);
+  const Choice now = out->state.choice, alone = with_links(work, links, {}),
+               beside = with_links(work, links, without_these(now, {links}));
+  if (has_links(now)) {
+    out->state = evidence.evaluate(beside);
+  } else if (names_predict_better(work, *out, alone)) {
+    if (predicts_better(squares_of_folds(work, beside), squares_of_folds(work, now), kMuchBetter))
+      out->state = evidence.evaluate(beside);
+  } else if (predicts_better(squares_of_folds(work, alone), squares_of_folds(work, {}), kMuchBetter)) {
+    const Choice start = with_links(work, links, without_names(work, now));
+    const Evidence::State found = keep_what_predicts(work, evidence.search(out->search, start));
+    out->state = has_links(found.choice) ? found : evidence.evaluate(alone);
   }
-  if (!better.groups.empty()) out->state = evidence_now(work).evaluate(better);
 }
 
 bool links_predict(const Work& work, const Choice& choice, std::size_t at) {
@@ -596,7 +630,7 @@ static Decision explain(Work* work, const Robot& robot) {
   }
   question_laws(work, robot, &out);
   prefer_links_that_predict(*work, &out);
-  if (out.p_gap > options.false_alarm) {
+  if (out.p_gap > options.false_alarm && work->given.beyond_repeats <= kLackOfFit) {
     const bool only_named = std::all_of(out.state.choice.groups.begin(), out.state.choice.groups.end(), [&](int g) {
       return is_candidate(work->design.candidates.named[static_cast<std::size_t>(g)]);
     });

@@ -29,7 +29,6 @@ namespace {
 
 using Kind = Explanation::Kind;
 constexpr double kCorrectionShare = 0.05;  ///< of the gap, from which on a law's correction is something unknown
-constexpr double kLackOfFit = 4.0;         ///< standard errors beyond repeats, from which on what is left is no noise
 constexpr double kHardlyLess = 0.98;       ///< of the gap: what is left of it where nothing was explained
 constexpr double kManyOutliers = 0.05;     ///< of the rows, from which on they are no exceptions
 constexpr double kSmallGain = 0.02;        ///< of the error, that is not worth a line if it may be none
@@ -77,6 +76,11 @@ Registered register_data(const Robot& robot, const Checked& checked, const Diagn
   out.cluster = pose_groups(out.data);
   out.frames = fit_frames(robot, out.data, options);
   out.set = out.frames.set;
+  const Repeats repeats = noise_of_repeats(out.data);
+  if (repeats.enough()) {
+    const Residuals left = residuals(out.frames.robot, out.data, options.own_effects, options.threads);
+    out.beyond_repeats = lack_of_fit(out.data, lengths_of(left, out.data.rows), out.set, repeats);
+  }
   return out;
 }
 
@@ -377,10 +381,9 @@ void scale_to_exact(Diagnosis* out) {
 }
 
 /// A gap that nothing has a shape for, as far as repeats can tell it from noise.
-void question_noise(const Repeats& repeats, const Measurements& data, Diagnosis* out) {
-  if (!out->effects.empty() || !out->unknown.empty() || !out->noise_from_repeats) return;
-  const double excess = lack_of_fit(data, out->error_before, out->set, repeats);
-  if (excess > kLackOfFit) out->unknown.push_back(describe_lack_of_fit(*out, excess));
+void question_noise(double beyond_repeats, Diagnosis* out) {
+  if (!out->effects.empty() || !out->unknown.empty()) return;
+  if (beyond_repeats > kLackOfFit) out->unknown.push_back(describe_lack_of_fit(*out, beyond_repeats));
 }
 
 Verdict verdict_of(const Diagnosis& d) {
@@ -465,14 +468,13 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   if (thinned && has_functions(work, decision)) of_all_rows = make_inputs(work.linear.at, whole.data);
   const std::vector<InputColumn>& inputs = thinned ? of_all_rows : work.inputs;
   const Fitted fitted = fit_exactly(whole, work, inputs, robot, decision, resampled, &result);
-  const Repeats repeats = noise_of_repeats(whole.data);
-  judge_noise(repeats, work, decision, &result);
+  judge_noise(noise_of_repeats(whole.data), work, decision, &result);
   describe_all(work, evidence, decision, names, fitted.by_catalogue.found, &result);
   describe_what_is_too_large(work, evidence, decision, &result);
   say_what_is_negative(&result);
   scale_to_exact(&result);
   merge_the_same(&result);
-  question_noise(repeats, whole.data, &result);
+  question_noise(whole.beyond_repeats, &result);
   for (const SanityFinding& finding : checked.findings) {
     if (finding.mistake) result.unknown = {describe_mistake(result, finding)};
   }

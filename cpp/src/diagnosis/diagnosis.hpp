@@ -5,6 +5,7 @@
 // One diagnosis as it goes: its working state, and the steps that diagnose.cpp puts in order.
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -29,6 +30,8 @@ struct Registered {
   std::vector<std::int32_t> cluster;  ///< pose group of every row
   std::vector<std::int8_t> set;       ///< 0 train, 1 test, for every row
   Identification frames;              ///< base and targets found, everything else nominal
+  /// Standard errors by which held-out errors of the frames exceed what repeats show. 0: of those there are too few.
+  double beyond_repeats = 0.0;
 };
 
 /// What noise is.
@@ -136,6 +139,9 @@ void extend_grams(const Design& design, double design_effect, Grams* grams);
 
 /// Sum of squares on every training fold, of the fit to the others.
 Eigen::VectorXd squares_of_folds(const Work& work, const Choice& choice);
+/// Sum of squares on every training fold where the choice, too, was made without it and others: nested cross-validation
+/// (Varma and Simon 2006). A quarter of the folds at a time; `choose`: from the sums of the other folds.
+Eigen::VectorXd squares_of_parts(const Work& work, const std::function<Choice(const Gram&)>& choose);
 double cross_validated(const Work& work, const Choice& choice);
 /// Does one choice predict the folds better than another, by this factor and for sure?
 bool predicts_better(const Eigen::VectorXd& one, const Eigen::VectorXd& other, double factor);
@@ -147,6 +153,8 @@ double shrink_of(const UnseenErrors& before, const UnseenErrors& after);
 Share shrinkage(const UnseenErrors& before, const UnseenErrors& after, int draws, std::uint64_t seed);
 
 // --- decide.cpp: what explains the gap -------------------------------------------------------------------------------
+
+constexpr double kLackOfFit = 4.0;  ///< standard errors beyond repeats, from which on what is left is no noise
 
 inline bool is_named(const Explanation& e) {
   return e.kind == Explanation::Kind::catalogue || e.kind == Explanation::Kind::all_geometry ||

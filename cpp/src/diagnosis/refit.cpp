@@ -139,34 +139,44 @@ static RefitTask refit_task(const Work& work, const std::vector<InputColumn>& in
   return out;
 }
 
-/// The size of a group is that of most of its parameters; one that stands far out gets a wider prior of its own: the EM
-/// step of a Student-t prior (Tipping 2001, Sparse Bayesian learning), here with one degree of freedom and without the
-/// posterior's own variance. True: some did.
-static bool widen(const std::map<std::string, double>& usual, const Identification& found,
-                  std::map<std::string, double>* priors) {
-  constexpr double kFarOut = 1.5;  ///< standard deviations
-  bool any = false;
+/// The size of a group is that of most of its parameters, and a few are many times larger: every parameter has a
+/// variance of its own. One EM step of a Student-t prior of one degree of freedom about the group's `usual` size
+/// (Tipping 2001, Sparse Bayesian learning): its posterior mean square and the usual variance, half each.
+static void give_each_its_size(const std::map<std::string, double>& usual, const Identification& found,
+                               std::map<std::string, double>* priors) {
   for (const Parameter& p : found.parameters) {
     const auto prior = usual.find(p.name);
     if (prior == usual.end() || p.frozen) continue;
-    const double away = p.value - p.nominal;
-    if (std::abs(away) < kFarOut * prior->second) continue;
-    (*priors)[p.name] = std::sqrt(0.5 * (prior->second * prior->second + away * away));
-    any = true;
+    double& size = (*priors)[p.name];
+    const double away = p.value - p.nominal,
+                 error = std::min(p.sigma, size);  // of a posterior: no more than the prior's
+    size = std::sqrt(0.5 * (prior->second * prior->second + away * away + error * error));
   }
-  return any;
+}
+
+/// No value has moved by a tenth of its standard error.
+static bool settled(const Identification& before, const Identification& after) {
+  for (std::size_t k = 0; k < after.parameters.size(); ++k) {
+    const Parameter &was = before.parameters[k], &is = after.parameters[k];
+    if (!is.frozen && std::abs(is.value - was.value) > 0.1 * is.sigma) return false;
+  }
+  return true;
 }
 
 Refit refit(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
             const Evidence::State& state, const std::vector<int>& groups) {
-  constexpr int kWidenings = 2;
+  constexpr int kRounds = 8;
   Measurements data = whole.data;
   data.set = whole.set;
   RefitTask task = refit_task(work, inputs, robot, state, groups);
   const std::map<std::string, double> usual = task.options.priors;
   Refit out{identify(task.start, data, task.options), task.options.own_effects};
-  for (int k = 0; k < kWidenings && widen(usual, out.found, &task.options.priors); ++k)
+  for (int round = 0; round < kRounds && !usual.empty(); ++round) {
+    give_each_its_size(usual, out.found, &task.options.priors);
+    const Identification before = std::move(out.found);
     out.found = identify(task.start, data, task.options);
+    if (settled(before, out.found)) break;
+  }
   return out;
 }
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numeric>
 
@@ -56,6 +57,23 @@ Eigen::VectorXd squares_of_folds(const Work& work, const Choice& choice) {
   Eigen::VectorXd out(static_cast<Eigen::Index>(fits.without.size()));
   for (std::size_t k = 0; k < fits.without.size(); ++k)
     out[static_cast<Eigen::Index>(k)] = held_out_squares(work.grams.train_folds[k], fits.columns, fits.without[k]);
+  return out;
+}
+
+Eigen::VectorXd squares_of_parts(const Work& work, const std::function<Choice(const Gram&)>& choose) {
+  constexpr std::size_t kParts = 4;
+  const std::vector<Gram>& folds = work.grams.train_folds;
+  Eigen::VectorXd out(static_cast<Eigen::Index>(folds.size()));
+  for (std::size_t part = 0; part < kParts; ++part) {
+    Gram others;
+    for (std::size_t k = 0; k < folds.size(); ++k) {
+      if (k % kParts != part) others.add(folds[k]);
+    }
+    const Evidence evidence(others, work.design.candidates.groups, work.design.nuisance, work.design.prior);
+    const Evidence::State state = evidence.evaluate(choose(others));
+    for (std::size_t k = part; k < folds.size(); k += kParts)
+      out[static_cast<Eigen::Index>(k)] = held_out_squares(folds[k], state.columns, state.solution);
+  }
   return out;
 }
 
