@@ -64,7 +64,9 @@ def steady_warming(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | N
 
 
 def long_metre(specimen: Specimen, chain: Chain, rng: Generator) -> Twin | None:
-    """A tracker's metre against all lengths of the arm."""
+    """A tracker's metre against all lengths of the arm. A slide's travel is no length of a link."""
+    if chain.prismatic.any():
+        return None
     return Twin(laws.scale(0, rng), "link_geometry", -1, _plan(specimen, chain, rng), frozenset({"t"}))
 
 

@@ -31,7 +31,7 @@ pytest.importorskip("mujoco")
 
 import candidates
 from candidates import crashing, endless, environment, leaving, misnaming, silent, without_robot
-from truing.exam import families, laws, machine_laws, names, recordings, sealing, sets, surprises
+from truing.exam import confounded, families, laws, machine_laws, names, recordings, sealing, sets, surprises
 from truing.exam.answers import (
     Answer,
     Named,
@@ -64,7 +64,7 @@ from truing.exam.score import (
     write_markdown,
 )
 from truing.exam.sitting import LeftOut, Paper, sit as sit_one
-from truing.exam.sizing import View
+from truing.exam.sizing import View, lookalikes
 from truing.exam.workers import Lost, dealt
 from truing.exam.worlds import Truth
 
@@ -340,6 +340,17 @@ def test_linear_columns_agree_with_differences(which: str) -> None:
             part[:] = 1e-6 * rng.normal(size=part.shape)
         moved = sweep(chain, inputs.readings, changes, inputs.target).tip - view.context.state.tip
         assert np.abs(moved - view.displaced(changes)).max() < 1e-9
+
+
+@pytest.mark.parametrize(("which", "specimen"), EVERY)
+def test_a_long_metre_has_a_twin_where_links_make_the_same_motion(which: str, specimen: Specimen) -> None:
+    """A slide's travel is no length of a link."""
+    _, chain = placed(specimen)
+    view = View(laws.Context(chain, some_inputs(specimen, chain, poses=60)))
+    scale = laws.scale(0, np.random.default_rng(0))
+    moved = view.displaced(scale.sized(1e-4).changes(view.context))
+    alike = ("link_geometry", -1) in lookalikes(view, moved, scale, frozenset({"t"}))
+    assert alike == (confounded.long_metre(specimen, chain, np.random.default_rng(0)) is not None)
 
 
 def test_sizes_are_what_the_label_says() -> None:
