@@ -540,20 +540,23 @@ static Choice with_links(const Work& work, int links, const Choice& others) {
   return best;
 }
 
-/// What the search would choose from these sums alone.
-static Choice search_again(const Work& work, const Decision& decision, const Gram& train) {
+/// What the search would choose from these sums alone, `beside` other groups.
+static Choice search_again(const Work& work, const Decision& decision, const Gram& train, Choice beside) {
   const Shortlist list = shortlist(work, decision.state.choice.groups);
   const Evidence evidence(train.of(list.columns), list.groups, list.nuisance, list.prior);
-  Choice found = evidence.search(decision.search).choice;
+  for (int& group : beside.groups)
+    group = static_cast<int>(std::find(list.which.begin(), list.which.end(), group) - list.which.begin());
+  Choice found = evidence.search(decision.search, beside).choice;
   for (int& group : found.groups) group = list.which[static_cast<std::size_t>(group)];
   return found;
 }
 
 /// Do names that were chosen among many predict other poses better, for sure, than all links together do? Each fold is
-/// predicted by names that were chosen without it.
-static bool names_predict_better(const Work& work, const Decision& decision, const Choice& links) {
+/// predicted by names that were chosen without it. Functions were tested by themselves, and stand beside both.
+static bool names_predict_better(const Work& work, const Decision& decision, const Choice& functions,
+                                 const Choice& links) {
   const Eigen::VectorXd by_names =
-      squares_of_parts(work, [&](const Gram& train) { return search_again(work, decision, train); });
+      squares_of_parts(work, [&](const Gram& train) { return search_again(work, decision, train, functions); });
   return predicts_better(by_names, squares_of_parts(work, [&](const Gram&) { return links; }), 1.0);
 }
 
@@ -572,17 +575,18 @@ static void prefer_links_that_predict(const Work& work, Decision* out) {
     return std::find(choice.groups.begin(), choice.groups.end(), links) != choice.groups.end();
   };
   const Evidence evidence = evidence_now(work);
-  const Choice now = out->state.choice, alone = with_links(work, links, {}),
+  const Choice now = out->state.choice, functions = without_names(work, now),
+               in_place = with_links(work, links, functions),
                beside = with_links(work, links, without_these(now, {links}));
+  const bool has_names = now.groups.size() > functions.groups.size();
   if (has_links(now)) {
     out->state = evidence.evaluate(beside);
-  } else if (names_predict_better(work, *out, alone)) {
+  } else if (has_names && names_predict_better(work, *out, functions, in_place)) {
     if (predicts_better(squares_of_folds(work, beside), squares_of_folds(work, now), kMuchBetter))
       out->state = evidence.evaluate(beside);
-  } else if (predicts_better(squares_of_folds(work, alone), squares_of_folds(work, {}), kMuchBetter)) {
-    const Choice start = with_links(work, links, without_names(work, now));
-    const Evidence::State found = keep_what_predicts(work, evidence.search(out->search, start));
-    out->state = has_links(found.choice) ? found : evidence.evaluate(alone);
+  } else if (predicts_better(squares_of_folds(work, in_place), squares_of_folds(work, functions), kMuchBetter)) {
+    const Evidence::State found = keep_what_predicts(work, evidence.search(out->search, in_place));
+    out->state = has_links(found.choice) ? found : evidence.evaluate(in_place);
   }
 }
 
