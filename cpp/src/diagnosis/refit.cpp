@@ -165,13 +165,13 @@ static bool settled(const Identification& before, const Identification& after) {
 
 Refit refit(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
             const Evidence::State& state, const std::vector<int>& groups) {
-  constexpr int kRounds = 8;
+  constexpr int kMostRounds = 8;
   Measurements data = whole.data;
   data.set = whole.set;
   RefitTask task = refit_task(work, inputs, robot, state, groups);
   const std::map<std::string, double> usual = task.options.priors;
   Refit out{identify(task.start, data, task.options), task.options.own_effects};
-  for (int round = 0; round < kRounds && !usual.empty(); ++round) {
+  for (int round = 0; round < kMostRounds && !usual.empty(); ++round) {
     give_each_its_size(usual, out.found, &task.options.priors);
     const Identification before = std::move(out.found);
     out.found = identify(task.start, data, task.options);
