@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.servo import PARAMETERS, ServoDiagnosis, servo_diagnose, servo_dict
-from truing.dynamics.servo.apart import Apart
-from truing.dynamics.servo.api import Prepared, _veto as vetoed, prepare
+from truing.dynamics.servo.apart import Apart, longer_step
+from truing.dynamics.servo.api import Judge, Prepared, _veto as vetoed, prepare
 from truing.dynamics.servo.candidates import Candidate, candidates_of
 from truing.dynamics.servo.data import servo_data
 from truing.dynamics.servo.export.held import held, uses_of
@@ -208,6 +208,36 @@ def test_one_joint_alone_is_the_same_joint(tmp_path: Path) -> None:
     apart = Apart(of.simulator)
     every, alone = apart.run([point], of.windows)[0][0], apart.run([point], of.windows, only=[1])[0][0]
     assert np.array_equal(every[:, 1], alone[:, 1]) and not alone[:, 0].any()
+
+
+def test_joints_side_by_side_do_what_each_does_alone(tmp_path: Path) -> None:
+    """More of them than go through a window at once."""
+    file, recordings = moved_by_itself(tmp_path)
+    of = prepare(file, recordings, window=np.inf)
+    apart, base = Apart(of.simulator), point_of(of.arm.nominal)
+    values = {"delay": 0.02, "backlash": 0.05, "supply_sag": 0.2, "presliding": 0.02, "rate_limit": 0.5}
+    points = [base, *(base.with_value(0, name, value) for name, value in values.items())]
+    joints = [-1, 0, -1, 0, 0, -1]
+    together = apart.run(points, of.windows, only=joints)[0]
+    for point, joint, motion in zip(points, joints, together, strict=True):
+        assert np.array_equal(apart.run([point], of.windows, only=[joint])[0][0], motion)
+
+
+def test_steps_of_joints_apart_are_the_longest_that_rows_are_whole_numbers_of(file: Path) -> None:
+    """Of a simulator that takes 11 steps a row, which no other number divides."""
+    data = replace(prepared_of(file, recordings_of(file)).data, step=STEP / 11.0)
+    assert longer_step(data, 0.0) == pytest.approx(STEP / 11.0)
+    assert longer_step(data, 0.004) == pytest.approx(STEP / 3.0)
+    assert longer_step(data, 0.02) == pytest.approx(STEP)
+
+
+def test_a_chain_is_judged_once(file: Path) -> None:
+    of = prepared_of(file, recordings_of(file))
+    nominal = point_of(of.arm.nominal)
+    judge = Judge(of, Apart(of.simulator), nominal, nominal.with_value(0, "coulomb", 0.1))
+    first = judge.errors([nominal, judge.standard, nominal])
+    assert judge.whole.runs == 2 and first[0] is first[2]
+    assert np.array_equal(judge.errors([judge.standard])[0], first[1]) and judge.whole.runs == 2
 
 
 def test_an_anchor_makes_errors_those_of_the_whole_arm(tmp_path: Path) -> None:

@@ -144,7 +144,7 @@ ServoMotion simulate_servos(const ServoCalls& calls, const std::vector<ServoWork
                             const std::vector<ServoWindow>& windows, const std::vector<ServoSet>& sets, bool torques);
 
 /// The same joint by joint, each along the measured motion of the others: no simulator is called. `paths`: of every
-/// kind of masses, those of every recording; a set's `bodies` is the number of its kind.
+/// kind of masses, those of every recording (empty: no window is of it); a set's `bodies` is the number of its kind.
 ServoMotion simulate_servos_apart(const ServoArm& arm, const std::vector<std::vector<ServoPath>>& paths,
                                   const std::vector<ServoRecording>& recordings,
                                   const std::vector<ServoWindow>& windows, const std::vector<ServoSet>& sets,

@@ -39,7 +39,10 @@ class Apart:
         self.step = longer_step(self.data, step)
         self._core_arm = simulator.core_arm_with(self.step)
         self._paths: dict[tuple[object, ...], list[_core.ServoPath]] = {}
-        self._known: dict[str, list[Tables]] = {}
+        self._known: dict[tuple[str, int], Tables] = {}
+        none = np.zeros((0, len(names)))
+        self._turned = self._turns.astype(float)
+        self._unseen = _core.ServoPath(none, none, none, none, self._turned)
 
     def run(
         self,
@@ -54,7 +57,8 @@ class Apart:
         kinds: dict[tuple[object, ...], int] = {}
         for p in points:
             kinds.setdefault(_masses(p), len(kinds))
-        paths = [self._path(p) for p in {_masses(p): p for p in points}.values()]
+        streams = tuple(sorted({w.stream for w in windows}))
+        paths = [self._path(p, streams) for p in {_masses(p): p for p in points}.values()]
         sets = [
             _core.ServoSet(p.chain, p.weight, kinds[_masses(p)], list(p.functions), joint)
             for p, joint in zip(points, moved, strict=True)
@@ -67,34 +71,37 @@ class Apart:
 
     # ---- what the joints feel
 
-    def _path(self, point: Point) -> list[_core.ServoPath]:
-        """Of every recording. Torques are linear in masses: others than the model's add what one does."""
-        key = _masses(point)
+    def _path(self, point: Point, streams: tuple[int, ...]) -> list[_core.ServoPath]:
+        """Of these recordings."""
+        key = (*_masses(point), streams)
         if key not in self._paths:
-            tables = self._tables("", Point(point.chain))
-            for body, scale in point.links:
-                tables = _more(
-                    tables,
-                    self._tables(f"link {body}", Point(point.chain, links=((body, 2.0),))),
-                    scale - 1.0,
-                )
-            if point.payload:
-                one = Point(point.chain, payload=1.0, place=point.place)
-                tables = _more(tables, self._tables("payload", one), point.payload)
-            turns = self._turns.astype(float)
-            self._paths[key] = [_core.ServoPath(*t, turns) for t in tables]
+            paths = [self._unseen] * len(self.data.streams)
+            for k in streams:
+                paths[k] = _core.ServoPath(*self._of_masses(point, k), self._turned)
+            self._paths[key] = paths
             if len(self._paths) > 40:  # of fits of masses, which come by once
                 self._paths.pop(next(iter(self._paths)))
         return self._paths[key]
 
-    def _tables(self, name: str, point: Point) -> list[Tables]:
+    def _of_masses(self, point: Point, stream: int) -> Tables:
+        """Torques are linear in masses: others than the model's add what one does."""
+        tables = self._tables("", Point(point.chain), stream)
+        for body, scale in point.links:
+            one = Point(point.chain, links=((body, 2.0),))
+            tables = _more(tables, self._tables(f"link {body}", one, stream), scale - 1.0)
+        if point.payload:
+            one = Point(point.chain, payload=1.0, place=point.place)
+            tables = _more(tables, self._tables("payload", one, stream), point.payload)
+        return tables
+
+    def _tables(self, name: str, point: Point, stream: int) -> Tables:
         """Of the model's masses (""), or what one further unit of a mass adds to these."""
-        if name not in self._known:
-            found = [self._along(stream, point) for stream in self.data.streams]
+        if (name, stream) not in self._known:
+            found = self._along(self.data.streams[stream], point)
             if name:
-                found = _more(found, self._tables("", Point(point.chain)), -1.0)
-            self._known[name] = found
-        return self._known[name]
+                found = _more(found, self._tables("", Point(point.chain), stream), -1.0)
+            self._known[name, stream] = found
+        return self._known[name, stream]
 
     def _along(self, stream: Stream, point: Point) -> Tables:
         """Newton and Euler along a recording (Luh et al. 1980), without the joint's own acceleration."""
@@ -106,16 +113,17 @@ class Apart:
         torque, one = np.empty((rows, n)), np.empty(m.nv)
         axes, anchors = np.empty((rows, n, 3)), np.empty((rows, n, 3))
         centres, turns = np.empty((rows, m.nbody, 3)), np.empty((rows, m.nbody, 9))
+        q, v, qdd, axis_of, anchor_of = d.qpos, d.qvel, d.qacc, d.xaxis, d.xanchor
+        centre_of, turn_of = d.xipos, d.ximat
         for k in range(rows):
-            d.qpos[places], d.qvel[self.dofs] = stream.smooth[k], stream.speed[k]
-            d.qacc[self.dofs] = acceleration[k]
+            q[places], v[self.dofs], qdd[self.dofs] = stream.smooth[k], stream.speed[k], acceleration[k]
             mujoco.mj_kinematics(m, d)
             mujoco.mj_comPos(m, d)
             mujoco.mj_comVel(m, d)
             mujoco.mj_rne(m, d, 1, one)
             torque[k] = one[self.dofs]
-            axes[k], anchors[k] = d.xaxis[self._joints], d.xanchor[self._joints]
-            centres[k], turns[k] = d.xipos, d.ximat
+            axes[k], anchors[k] = axis_of[self._joints], anchor_of[self._joints]
+            centres[k], turns[k] = centre_of, turn_of
         turned = turns.reshape(rows, m.nbody, 3, 3)
         inertia, cosine, sine = np.empty((rows, n)), np.zeros((rows, n)), np.zeros((rows, n))
         gravity = np.asarray(m.opt.gravity)
@@ -141,12 +149,10 @@ class Apart:
 
 
 def longer_step(data: ServoData, longest: float) -> float:
-    """The longest step up to `longest` [s] that is whole steps of the simulator's, and of which the rows of
-    all recordings are whole numbers apart."""
-    rows = [round(s.step / data.step) for s in data.streams]
-    most = math.gcd(*rows)
-    fits = [k for k in range(1, most + 1) if most % k == 0 and k * data.step <= longest * (1.0 + 1e-6)]
-    return data.step * max([1, *fits])
+    """The longest step up to `longest` [s], no shorter than the simulator's, of which the rows of all
+    recordings are whole numbers apart."""
+    apart = data.step * math.gcd(*(round(s.step / data.step) for s in data.streams))
+    return apart / math.ceil(apart / max(longest, data.step) - 1e-6)
 
 
 def _masses(point: Point) -> tuple[object, ...]:
@@ -154,11 +160,9 @@ def _masses(point: Point) -> tuple[object, ...]:
     return (point.payload, point.place if point.payload else None, links)
 
 
-def _more(tables: Sequence[Tables], others: Sequence[Tables], times: float) -> list[Tables]:
-    out = []
-    for (a, b, c, d), (e, f, g, h) in zip(tables, others, strict=True):
-        out.append((a + times * e, b + times * f, c + times * g, d + times * h))
-    return out
+def _more(tables: Tables, others: Tables, times: float) -> Tables:
+    a, b, c, d = (one + times * other for one, other in zip(tables, others, strict=True))
+    return a, b, c, d
 
 
 def _descendants(model: object, bodies: NDArray[np.intp]) -> list[NDArray[np.intp]]:

@@ -16,7 +16,7 @@ from truing import _core
 from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.arm import ServoArm, servo_arm
 from truing.dynamics.servo.data import ServoData, Window, servo_data, windows_of
-from truing.dynamics.servo.fit import Fitted, Fitter, Rows, rows_of
+from truing.dynamics.servo.fit import Fitter, Rows, rows_of
 from truing.dynamics.servo.free import USUAL
 from truing.dynamics.servo.ground import groundwork
 from truing.dynamics.servo.judge import judged, traces_of
@@ -135,15 +135,13 @@ def servo_diagnose(
     account = namer.run(standard, sizes, nominal)
     fitter.progress("judging by held-out motion")
     single = len({prepared.data.streams[w.stream].fold for w in prepared.train}) < 2
-    while True:
-        held, rows = _held_out(prepared, standard, account, nominal)
-        sure = sureness(namer, account, single)
-        vetoed = _veto(sure, held, rows, namer.resolution)
-        if vetoed is None:
-            break
+    judge = Judge(prepared, apart, nominal, standard.point)
+    sure = sureness(namer, account, single)
+    while (vetoed := judge.veto(sure, account, namer.resolution)) is not None:
         at, why = vetoed
         account.vetoed.append((account.found[at], why))
         namer.drop(account, at)
+        sure = sureness(namer, account, single)
     functions = unknown(namer, account, single)
     models = {"nominal": nominal, "standard": standard.point, "named": account.fitted.point}
     parts = Parts(
@@ -158,8 +156,8 @@ def servo_diagnose(
         functions,
         judged(prepared.simulator, prepared.windows, models, window),
         traces_of(prepared.simulator, prepared.windows, models),
-        held,
-        rows,
+        judge.held(account, [f.field for f in standard.free]),
+        judge.blocks,
         prepared.arm.notes,
         late(namer, account),
     )
@@ -190,20 +188,53 @@ def _veto(
     return min(failed)[2:] if failed else None
 
 
-def _held_out(
-    prepared: Prepared, standard: Fitted, account: Account, nominal: Point
-) -> tuple[list[Floats], NDArray[np.intp]]:
-    """Errors on held-out windows (on all, where none is), of every chain that is compared: see
-    `Parts.held`. And the number of each row's block of time."""
-    windows = [w for w in prepared.windows if w.test] or prepared.train
-    rows = rows_of(prepared.data, windows)
-    fitter = Fitter(prepared.simulator, rows)
-    points = [nominal, standard.point, account.fitted.point, *(w.point for w in account.weights)]
-    for name in (n for n in USUAL if any(f.field == n for f in standard.free)):
-        back = standard.point.chain.copy()
-        back[:, FIELDS.index(name)] = nominal.chain[:, FIELDS.index(name)]
-        points.append(replace(standard.point, chain=back))
-    return [fitter.errors(motion) for motion in fitter.motions(points)], _blocks(prepared.data, rows)
+class Judge:
+    """Chains on held-out windows (on all, where none is), simulated once each."""
+
+    def __init__(self, prepared: Prepared, apart: Apart, nominal: Point, standard: Point) -> None:
+        windows = [w for w in prepared.windows if w.test] or prepared.train
+        self.rows = rows_of(prepared.data, windows)
+        self.blocks = _blocks(prepared.data, self.rows)
+        self.nominal, self.standard = nominal, standard
+        self.whole, self._apart = Fitter(prepared.simulator, self.rows), Fitter(apart, self.rows)
+        self._known: dict[bytes, Floats] = {}
+
+    def errors(self, points: Sequence[Point]) -> list[Floats]:
+        """Of the whole arm."""
+        new = {_key(p): p for p in points if _key(p) not in self._known}
+        for key, motion in zip(new, self.whole.motions(list(new.values())), strict=True):
+            self._known[key] = self.whole.errors(motion)
+        return [self._known[_key(p)] for p in points]
+
+    def held(self, account: Account, usual: Sequence[str]) -> list[Floats]:
+        """Errors of every chain that is compared: see `Parts.held`. usual: fields that are always fitted."""
+        points = [*self._compared(account), *(w.point for w in account.weights)]
+        for name in (n for n in USUAL if n in usual):
+            back = self.standard.chain.copy()
+            back[:, FIELDS.index(name)] = self.nominal.chain[:, FIELDS.index(name)]
+            points.append(replace(self.standard, chain=back))
+        return self.errors(points)
+
+    def veto(self, sure: Sequence[Sureness], account: Account, resolution: Floats) -> tuple[int, str] | None:
+        """`_veto`: by what joints apart do without each effect, beside the whole arm with all, as the search
+        is; where nothing is vetoed so, by what the whole arm does."""
+        compared = self.errors(self._compared(account))
+        without = [w.point for w in account.weights]
+        named = account.fitted.point
+        alone = [self._apart.errors(motion) for motion in self._apart.motions([named, *without])]
+        near = [compared[2] + errors - alone[0] for errors in alone[1:]]
+        vetoed = _veto(sure, [*compared, *near], self.blocks, resolution)
+        if vetoed is not None:
+            return vetoed
+        return _veto(sure, [*compared, *self.errors(without)], self.blocks, resolution)
+
+    def _compared(self, account: Account) -> list[Point]:
+        return [self.nominal, self.standard, account.fitted.point]
+
+
+def _key(point: Point) -> bytes:
+    rest = (point.weight, point.payload, point.place, point.links)
+    return point.chain.tobytes() + repr(rest).encode()
 
 
 def _blocks(data: ServoData, rows: Rows) -> NDArray[np.intp]:

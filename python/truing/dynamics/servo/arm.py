@@ -137,7 +137,7 @@ class _Reader:
             f"<mujoco model={quoteattr(self.path.stem)}>",
             '  <compiler angle="radian" autolimits="false" boundmass="0" balanceinertia="false"/>',
             f'  <option gravity="{gravity}" integrator="implicitfast">',
-            '    <flag contact="disable" limit="disable" autoreset="disable"/>',
+            '    <flag contact="disable" limit="disable" island="disable" autoreset="disable"/>',
             "  </option>",
             "  <worldbody>",
             *(line for b in children.get(0, []) for line in self._element(b, children, 2)),

@@ -173,8 +173,11 @@ class Fitter:
             best = self.fit(best.point, free, start, noise, 2, doing)
         return best
 
-    def columns(self, point: Point, free: Sequence[Free], exact: bool = False) -> tuple[Floats, list[Column]]:
-        """Errors of the point, and the change of the position with each value on its scale.
+    def columns(
+        self, point: Point, free: Sequence[Free], exact: bool = False, known: Floats | None = None
+    ) -> tuple[Floats, list[Column]]:
+        """Errors of the point, and the change of the position with each value on its scale. known: the
+        point's motion, where it was simulated.
 
         One value is changed at all joints in one simulation, and what a joint does then is taken for its
         own: how joints move each other is left out (of geared arms some percent). Steps are judged by whole
@@ -193,10 +196,10 @@ class Fitter:
                 changed = one.put(changed, one.at(point) + step)
                 steps[k] = one.at(changed) - one.at(point)
             points.append(changed)
-        motions = self.motions([point, *points])
-        base = motions[0]
+        motions = self.motions(points if known is not None else [*points, point])
+        base = known if known is not None else motions.pop()
         out: list[Column] = [(-1, np.zeros(0))] * len(free)
-        for members, motion in zip(groups.values(), motions[1:], strict=True):
+        for members, motion in zip(groups.values(), motions, strict=True):
             for k in members:
                 joint = -1 if exact and base.shape[1] > 1 else free[k].joint
                 out[k] = joint, change_of(motion, base, steps[k], joint)
@@ -216,12 +219,12 @@ class Fitter:
         noise: Noise | None,
         rounds: int,
         doing: str = "",
-        seen: tuple[Floats, list[Column]] | None = None,
+        shown: bool = True,
     ) -> Fitted:
         """Gauss-Newton with Levenberg's damping. noise: None: every joint's rms before each round, so that
-        all joints count alike. seen: errors and columns at the point, where they are known."""
+        all joints count alike. shown: whether columns are wanted where it ends."""
         free = list(free)
-        errors, table = seen or self.columns(point, free)
+        errors, table = self.columns(point, free)
         fixed = noise
         least = 1e-6 * np.ones(errors.shape[1])
         for number in range(rounds):
@@ -234,23 +237,25 @@ class Fitter:
                 point,
                 *(moved(point, free, step) for step in self._steps(point, free, start, errors, table, noise)),
             ]
-            point, after = self._best(tried, errors, free, start, noise)
+            point, after, motion = self._best(tried, errors, free, start, noise)
             if not after < before:
                 break
-            done = after > before * (1.0 - _LAST)
-            if number + 1 == rounds or done:
-                errors, table = self.columns(point, free)
+            last = number + 1 == rounds or after > before * (1.0 - _LAST)
+            if last and not shown:
+                errors, table = self.errors(self.motions([point])[0] if motion is None else motion), []
+            else:
+                errors, table = self.columns(point, free, known=motion)
+            if last:
                 break
-            errors, table = self.columns(point, free)
         noise = fixed or Noise(np.maximum(np.sqrt(np.mean(errors**2, axis=0)), least), np.ones(len(least)))
         cost = self.cost(errors, point, free, start, noise)
         return Fitted(point, free, start, errors, table, noise, cost)
 
     def _best(
         self, tried: Sequence[Point], errors: Floats, free: Sequence[Free], start: Floats, noise: Noise
-    ) -> tuple[Point, float]:
-        """The best of points, the first of which has these errors, and its cost. Joints apart do not know of
-        each other: each takes what is best for it."""
+    ) -> tuple[Point, float, Floats | None]:
+        """The best of points, the first of which has these errors, its cost, and its motion if it was
+        simulated. Joints apart do not know of each other: each takes what is best for it."""
         motions = self.motions(tried[1:])
         some = [errors, *(self.errors(motion) for motion in motions)]
         costs = np.array(
@@ -259,10 +264,13 @@ class Fitter:
         sags = np.any(tried[0].chain[:, FIELDS.index("supply_sag")] != 0.0)
         if not isinstance(self.simulator, Apart) or sags or any(one.joint < 0 for one in free):
             best = int(np.argmin(costs.sum(axis=1)))
-            return tried[best], float(costs[best].sum())
+            return tried[best], float(costs[best].sum()), motions[best - 1] if best else None
         each = np.argmin(costs, axis=0)
         chain = np.array([tried[k].chain[j] for j, k in enumerate(each)])
-        return replace(tried[0], chain=chain), float(costs.min(axis=0).sum())
+        motion = None
+        if np.all(each > 0):
+            motion = np.column_stack([motions[k - 1][:, j] for j, k in enumerate(each)])
+        return replace(tried[0], chain=chain), float(costs.min(axis=0).sum()), motion
 
     def _joint_costs(
         self, errors: Floats, point: Point, free: Sequence[Free], start: Floats, noise: Noise

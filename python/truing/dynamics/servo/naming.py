@@ -456,7 +456,7 @@ class Namer:
         for k in np.argsort(costs, kind="stable")[:_STARTS]:
             point = points[k]
             start = np.array([*(fitted.start[k] for k in mine), *(_begin(f, one, point) for f in one.free)])
-            tries.append(self.fitter.fit(point, free, start, noise, _FIRST_ROUNDS, doing))
+            tries.append(self.fitter.fit(point, free, start, noise, _FIRST_ROUNDS, doing, shown=False))
         some = min(tries, key=lambda t: t.cost)
         start = some.start
         others = [k for k in range(len(fitted.free)) if k not in mine]
@@ -464,9 +464,10 @@ class Namer:
         starts = np.array([*fitted.start[others], *start])
         after = self.fitter.cost(some.errors, some.point, every, starts, noise)
         if before - after > _HOPELESS * best:
-            seen = some.errors, some.columns
-            some = self.fitter.fit(some.point, free, start, noise, _MORE_ROUNDS, doing, seen)
+            some = self.fitter.fit(some.point, free, start, noise, _MORE_ROUNDS, doing)
             after = self.fitter.cost(some.errors, some.point, every, starts, noise)
+        else:
+            some.errors, some.columns = self.fitter.columns(some.point, free)
         columns = list(fitted.columns)
         for k, column in zip(mine, some.columns, strict=False):
             columns[k] = column
@@ -557,22 +558,24 @@ class _Follow:
         self.start = fitted.start[mine]
         self.x = np.array([fitted.columns[k][1] for k in mine]) * self.weight
         self.precision = np.array([f.prior**-2 for f in self.free])
-        xx = sums_by_fold([(0, one) for one in self.x], self.x[0][:, None], np.ones(1))[0][0]
-        self.inverse = np.linalg.inv(xx + np.diag(self.precision + 1e-9))
-        self.before = self._cost(fitted.errors[:, joint] * self.weight, fitted.point, np.zeros(len(mine)))
+        self.most = np.array([_FARTHEST * f.prior for f in self.free])
+        self.xx = sums_by_fold([(0, one) for one in self.x], self.x[0][:, None], np.ones(1))[0][0]
+        self.inverse = np.linalg.inv(self.xx + np.diag(self.precision + 1e-9))
+        away = np.array([f.at(fitted.point) for f in self.free]) - self.start
+        self.before = self._cost(float(np.sum((fitted.errors[:, joint] * self.weight) ** 2)), away)
 
-    def _cost(self, errors: Floats, point: Point, step: Floats) -> float:
-        at = np.array([f.at(point) for f in self.free]) + step - self.start
-        return 0.5 * float(np.sum(errors**2) + np.sum(self.precision * at**2))
+    def _cost(self, squares: float, away: Floats) -> float:
+        return 0.5 * (squares + float(np.sum(self.precision * away**2)))
 
     def gain(self, errors: Floats, point: Point) -> tuple[float, Floats]:
         """Nats, and the steps."""
         e = errors[:, self.joint] * self.weight
-        at = np.array([f.at(point) for f in self.free])
-        step = self.inverse @ (np.einsum("kn,n->k", self.x, e) - self.precision * (at - self.start))
-        most = np.array([_FARTHEST * f.prior for f in self.free])
-        step = np.clip(step, -most, most)
-        return self.before - self._cost(e - np.einsum("k,kn->n", step, self.x), point, step), step
+        away = np.array([f.at(point) for f in self.free]) - self.start
+        right = np.einsum("kn,n->k", self.x, e)
+        step = self.inverse @ (right - self.precision * away)
+        step = np.clip(step, -self.most, self.most)
+        squares = float(np.sum(e**2)) - 2.0 * float(step @ right) + float(step @ self.xx @ step)
+        return self.before - self._cost(squares, away + step), step
 
     def moved(self, base: Point, changed: Point, step: Floats) -> Point:
         """The base with this joint as in `changed`, and the steps."""
