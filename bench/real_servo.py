@@ -23,7 +23,15 @@ from servo_replay import Usual, as_published, ask_sysid, firmware_scale, of_file
 
 import truing
 from truing.dynamics import Recording, load_recordings
-from truing.dynamics.servo import ServoDiagnosis, servo_diagnose
+from truing.dynamics.servo import PARAMETERS, ServoDiagnosis, servo_diagnose
+from truing.dynamics.servo.apart import Apart
+from truing.dynamics.servo.api import LONGEST_STEP, prepare
+from truing.dynamics.servo.data import Window
+from truing.dynamics.servo.fit import Fitter, rows_of
+from truing.dynamics.servo.free import free_value
+from truing.dynamics.servo.ground import groundwork, sizes_of
+from truing.dynamics.servo.naming import Account, Namer
+from truing.dynamics.servo.simulator import chain_of, point_of
 
 ROOT = Path(__file__).resolve().parent.parent
 START, END = "<!-- table -->", "<!-- end -->"
@@ -33,6 +41,9 @@ SO101_TRAIN = ("multisine", "step_response")
 SO101_MAIN = ("slow_precision", "random_waypoints")
 SO101_MORE = ("inertia_coupling", "lissajous_pattern", "pick_place")
 WINDOW = 5.0  # [s]
+SENSITIVITY_SECONDS, SENSITIVITY_AIM = 140.0, 6.0  # [s]
+SENSITIVITY_FIELDS = ("delay", "damping_gain", "viscous_law", "load_friction", "spring")  # beside the usual
+ROUND_RECORDINGS, ROUND_AIM = 10, 2.0  # of 6 s each; [s]
 
 Floats = NDArray[np.float64]
 
@@ -55,38 +66,51 @@ def xl330(folder: Path, sysid: Path) -> list[str]:
     recordings = list(load_recordings(sorted(folder.glob("*.csv")), truing.load_robot(file, any_tool=True)))
     train, test = ([r for r in recordings if r.test == held] for held in (False, True))
     lines = ["**XL330, firmware gain 200 held out**", ""]
-    lines += ["| | rms [deg] | processor s |", "| --- | --- | --- |"]
-    command = np.concatenate([r.command - r.position for r in test])
-    lines.append(f"| the command taken as the response | {degrees(command)[0]:.2f} | |")
-    lines.append(f"| the MJCF | {judged(file, of_file(file, ['q1']), test):.2f} | |")
-    lines += by_truing(file, recordings, test)
+    lines += ["| | rms [deg] | on the recordings fitted | processor s |", "| --- | --- | --- | --- |"]
+    command = [degrees(np.concatenate([r.command - r.position for r in some]))[0] for some in (test, train)]
+    lines.append(f"| the command taken as the response | {command[0]:.2f} | {command[1]:.2f} | |")
+    lines.append(f"| the MJCF | {both(file, of_file(file, ['q1']), test, train)} | |")
+    lines += by_truing(file, recordings, test, train)
     answer = ask_sysid(sysid, sysid_task(file, ["q1"], train, XL330_REFERENCE))
     if isinstance(answer, str):
-        return [*lines, f"| mujoco.sysid, gain, damping, dry friction, rotor | {answer} | |", ""]
+        return [*lines, f"| mujoco.sysid, gain, damping, dry friction, rotor | {answer} | | |", ""]
     gain, damping, friction, armature = (
         np.array(answer[name]) for name in ("gain", "damping", "frictionloss", "armature")
     )
     theirs = Usual(gain, damping, friction, armature, np.zeros(1))
     lines.append(
         f"| mujoco.sysid {answer['version']}, gain, damping, dry friction, rotor"
-        f" | {judged(file, theirs, test):.2f} | {answer['processor_seconds']:.1f} |"
+        f" | {both(file, theirs, test, train)} | {answer['processor_seconds']:.1f} |"
     )
     return [*lines, ""]
 
 
-def by_truing(file: Path, recordings: Sequence[Recording], test: Sequence[Recording]) -> list[str]:
+def both(file: Path, usual: Usual, test: Sequence[Recording], train: Sequence[Recording]) -> str:
+    return " | ".join(f"{judged(file, usual, some):.2f}" for some in (test, train))
+
+
+def by_truing(
+    file: Path, recordings: Sequence[Recording], test: Sequence[Recording], train: Sequence[Recording]
+) -> list[str]:
     """Its usual parameters, replayed as the peer's; and what it names, in its own simulation."""
+    begun = time.process_time()
+    of = prepare(file, list(recordings))
+    fitter = Fitter(Apart(of.simulator, LONGEST_STEP), rows_of(of.data, of.train))
+    standard, _ = groundwork(fitter, point_of(of.arm.nominal), of.data)
+    alone = time.process_time() - begun
+    chain = chain_of(standard.point, of.arm.nominal)
+    drive = chain.drives[0]
+    law = (XL330_REFERENCE / chain.gain_reference) ** drive.gain_law
+    values = (drive.command_gain * law, drive.viscous, drive.coulomb, drive.armature, drive.zero)
+    usual = both(file, Usual(*(np.array([value]) for value in values)), test, train)
     begun = time.process_time()
     found = servo_diagnose(file, list(recordings))
     seconds = time.process_time() - begun
-    drive, chain = found.chains["standard"].drives[0], found.chains["standard"]
-    law = (XL330_REFERENCE / chain.gain_reference) ** drive.gain_law
-    values = (drive.command_gain * law, drive.viscous, drive.coulomb, drive.armature, drive.zero)
-    usual = Usual(*(np.array([value]) for value in values))
-    error = float(np.degrees(found.rollout.errors["named"][0, -1]))
+    named = np.degrees([found.rollout.errors["named"][0, -1], found.rollout.train["named"][0]])
     return [
-        f"| truing, gain, damping, dry friction, rotor, zero | {judged(file, usual, test):.2f} | |",
-        f"| truing, and what it names: {names_of(found)} | {error:.2f} | {seconds:.1f} |",
+        f"| truing, gain, damping, dry friction, rotor, zero | {usual} | {alone:.1f} |",
+        f"| truing, and what it names: {names_of(found)} | {' | '.join(f'{e:.2f}' for e in named)}"
+        f" | {seconds:.1f} |",
     ]
 
 
@@ -100,14 +124,18 @@ def names_of(found: ServoDiagnosis) -> str:
     return ", ".join(named) or "nothing"
 
 
-def so101(folder: Path) -> list[str]:
-    file = folder / "robot.xml"
-    robot = truing.load_robot(file, any_tool=True, tip_link="gripper")  # without the jaw
+def so101_recordings(folder: Path) -> list[Recording]:
+    robot = truing.load_robot(folder / "robot.xml", any_tool=True, tip_link="gripper")  # without the jaw
     names = (*SO101_TRAIN, *SO101_MAIN, *SO101_MORE)
-    recordings = [
+    return [
         one.replace(test=one.name not in SO101_TRAIN)
         for one in load_recordings([folder / f"{name}.csv" for name in names], robot)
     ]
+
+
+def so101(folder: Path) -> list[str]:
+    file = folder / "robot.xml"
+    recordings = so101_recordings(folder)
     begun = time.process_time()
     found = servo_diagnose(file, recordings, joints=SO101_JOINTS, window=WINDOW)
     seconds = time.process_time() - begun
@@ -132,6 +160,69 @@ def so101(folder: Path) -> list[str]:
     return [*lines, ""]
 
 
+def speed(data: Path) -> list[str]:
+    """Seconds of what a diagnosis is made of, beside what is aimed at by the clock."""
+    lines = [f"**Speed, {os.cpu_count()} cores**", ""]
+    lines += ["| | s by the clock | aim | processor s |", "| --- | --- | --- | --- |"]
+    if (folder := data / "dyn_so101").exists():
+        lines += sensitivities(folder)
+    if (folder := data / "dyn_xl330").exists():
+        lines.append(one_round(folder))
+    return [*lines, ""]
+
+
+def sensitivities(folder: Path) -> list[str]:
+    """Of 50 values over 140 s of five joints, in one batch."""
+    of = prepare(folder / "robot.xml", so101_recordings(folder), joints=SO101_JOINTS, window=WINDOW)
+    windows: list[Window] = []
+    for window in of.train:
+        seconds = [w.rows * of.data.streams[w.stream].step for w in windows]
+        if sum(seconds) < SENSITIVITY_SECONDS:
+            windows.append(window)
+    point, apart = point_of(of.arm.nominal), Apart(of.simulator, LONGEST_STEP)
+    sizes = sizes_of(apart, point, windows)
+    names = [*(name for name, known in PARAMETERS.items() if known.usual), *SENSITIVITY_FIELDS]
+    free = [free_value(name, joint, sizes) for name in names for joint in range(len(SO101_JOINTS))]
+    ways = (
+        (of.simulator, True, "the whole arm in MuJoCo, each value by itself", f"{SENSITIVITY_AIM:g}"),
+        (of.simulator, False, "the same, one value at all joints at once", ""),
+        (apart, False, "joints apart, as the search takes them", ""),
+    )
+    lines = []
+    for simulator, exact, how, aim in ways:
+        fitter, begun = Fitter(simulator, rows_of(of.data, windows)), clocks()
+        fitter.columns(point, free, exact)
+        what = f"one batch of {len(free)} sensitivities over {SENSITIVITY_SECONDS:g} s of SO-101: {how}"
+        lines.append(timed(what, aim, begun))
+    return lines
+
+
+def clocks() -> tuple[float, float]:
+    return time.perf_counter(), time.process_time()
+
+
+def timed(what: str, aim: str, begun: tuple[float, float]) -> str:
+    wall, processor = (now - then for now, then in zip(clocks(), begun, strict=True))
+    return f"| {what} | {wall:.1f} | {aim} | {processor:.1f} |"
+
+
+def one_round(folder: Path) -> str:
+    """One joint, a minute of it: all candidates ranked, the best refitted without linearisation."""
+    robot = truing.load_robot(folder / "robot.xml", any_tool=True)
+    fitted = [one for one in load_recordings(sorted(folder.glob("*.csv")), robot) if not one.test]
+    of = prepare(folder / "robot.xml", [one.replace(test=False) for one in fitted[:ROUND_RECORDINGS]])
+    rows = rows_of(of.data, of.windows)
+    fitter, nominal = Fitter(Apart(of.simulator, LONGEST_STEP), rows), point_of(of.arm.nominal)
+    standard, sizes = groundwork(fitter, nominal, of.data)
+    namer = Namer(fitter, (), 1)
+    count = len(namer.all_candidates(standard.point, sizes)[0])
+    length = sum(w.rows * of.data.streams[w.stream].step for w in of.windows)
+    begun = clocks()
+    best, _ = namer.best_beside(Account(standard, standard, [], sizes, nominal), set())
+    what = f"one joint (XL330), {length:.0f} s of it, {count} candidates, refits included: one round"
+    return timed(f"{what} ({len(best)} may be named)", f"{ROUND_AIM:g}", begun)
+
+
 def held_out(found: ServoDiagnosis, model: str, recordings: Sequence[Recording]) -> Floats:
     """[deg] rms of a chain over the rows of all of the recordings, joint by joint."""
     rows = [len(one) for one in recordings]
@@ -149,6 +240,8 @@ def report(data: Path, sysid: Path) -> list[str]:
         lines += xl330(folder, sysid)
     if (folder := data / "dyn_so101").exists():
         lines += so101(folder)
+    if lines:
+        lines += speed(data)
     print("\n".join(lines))
     return lines
 
