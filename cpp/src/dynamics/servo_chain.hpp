@@ -72,9 +72,10 @@ class ServoDrive {
     const double most = d(F::rate_limit) * step_;
     wanted_ = limited_ ? wanted_ + std::clamp(command.value - wanted_, -most, most) : command.value;
     integral_ += enabled_(now.row) * (wanted_ - d(F::zero) - encoder(now.angle)) * step_;
-    ServoActs acts{0.0, d(F::viscous), 0.0};
+    const bool on = enabled_(now.row) >= 0.5;
+    ServoActs acts{0.0, viscous(on), 0.0};
     if (has_rotor_) {
-      turn_rotor(now, command, &acts);
+      turn_rotor(now, command, on, &acts);
     } else {
       torque_ = drive_torque(now, command, now.angle, now.speed);
       // Linearly implicit in the speed, or a small inertia would not bear the gain.
@@ -206,6 +207,9 @@ class ServoDrive {
 
   // ---- friction
 
+  /// A motor that is switched off (its bridge open) does not brake: its part of the damping is not there.
+  double viscous(bool on) const { return d(F::viscous) * (on ? 1.0 : 1.0 - d(F::back_emf)); }
+
   double friction_level(const ServoMoment& now, double speed) const {
     double level = d(F::coulomb) + d(F::load_friction) * std::abs(torque_);
     if (d(F::stribeck) != 0.0) level += d(F::stribeck) * std::exp(-square(speed / d(F::stribeck_speed)));
@@ -231,12 +235,14 @@ class ServoDrive {
     const double stiffest = kContact * inertia / (h * h);
     stiffness_ = d(F::elasticity) > 0.0 ? std::min(1.0 / d(F::elasticity), stiffest) : stiffest;
     rub_ = 2.0 * kContactDamping * std::sqrt(stiffness_ * inertia) * (d(F::elasticity) > 0.0 ? 0.1 : 1.0);
-    per_inertia_ = h / (inertia + h * d(F::viscous));
-    per_inertia_touching_ = h / (inertia + h * (d(F::viscous) + rub_ + h * stiffness_));
+    for (const bool on : {false, true}) {
+      per_inertia_[on] = h / (inertia + h * viscous(on));
+      per_inertia_touching_[on] = h / (inertia + h * (viscous(on) + rub_ + h * stiffness_));
+    }
   }
 
   /// Rotor and link are two bodies with a play and a spring between: the torque on the link.
-  void turn_rotor(const ServoMoment& now, const Held& command, ServoActs* acts) {
+  void turn_rotor(const ServoMoment& now, const Held& command, bool on, ServoActs* acts) {
     const double h = step_ / kRotorSteps, half = 0.5 * d(F::backlash);
     double angle = now.angle, sum = 0.0, touching = 0.0;
     for (int k = 0; k < kRotorSteps; ++k) {
@@ -244,8 +250,8 @@ class ServoDrive {
       const bool touches = half == 0.0 || twist != 0.0;
       const double passed = touches ? stiffness_ * twist + rub_ * (rotor_speed_ - now.speed) : 0.0;
       torque_ = drive_torque(now, command, on_motor_ ? rotor_ : angle, on_motor_ ? rotor_speed_ : now.speed);
-      const double force = torque_ - passed - d(F::viscous) * rotor_speed_;
-      const double part = touches ? per_inertia_touching_ : per_inertia_;
+      const double force = torque_ - passed - viscous(on) * rotor_speed_;
+      const double part = touches ? per_inertia_touching_[on] : per_inertia_[on];
       const double free = rotor_speed_ + part * force;
       const double level = d(F::presliding) > 0.0 ? 0.0 : friction_level(now, rotor_speed_);
       rotor_speed_ = std::copysign(std::max(0.0, std::abs(free) - part * level), free);
@@ -299,7 +305,8 @@ class ServoDrive {
   Input command_, position_, gain_, supply_, enabled_, warmth_;
   double step_, row_step_, rate_;
   bool torque_command_ = false, has_rotor_ = false, on_motor_ = false, limited_ = false;
-  double stiffness_ = 0.0, rub_ = 0.0, per_inertia_ = 0.0, per_inertia_touching_ = 0.0;
+  double stiffness_ = 0.0, rub_ = 0.0;
+  double per_inertia_[2] = {}, per_inertia_touching_[2] = {};  ///< of the rotor's step, switched off and on
   // What the joint carries from step to step.
   double integral_ = 0.0;  ///< of the command error [rad s]
   double wanted_ = 0.0;    ///< command, as the rate limit lets it follow

@@ -332,6 +332,52 @@ def test_no_command_no_torque(file: Path) -> None:
     assert abs(motion[-1, 0]) < 0.1 and abs(motion[0, 0] - 0.8) < 0.01
 
 
+def switched_off(file: Path, **values: float) -> list[_core.Recording]:
+    """Six recordings of the pendulum: it follows commands, is held up, lets go and swings."""
+    out = []
+    for number in range(6):
+        command = np.asarray(resting(number).command).copy()
+        command[220:] = 0.5 + 0.1 * number
+        columns = {"enabled": (np.arange(len(command)) < 300).astype(float)}
+        rest = recording(f"r{number}", command, 0.0 * command, number >= 4).replace(columns=columns)
+        of = prepare(file, [replace_test(rest)], window=np.inf)
+        point = point_of(of.arm.nominal)
+        for field, value in values.items():
+            point = point.with_value(0, field, value)
+        motion = np.concatenate([np.zeros((1, 1)), of.simulator.run([point], of.windows)[0][0]])
+        noise = 5e-4 * np.random.default_rng(100 + number).standard_normal(motion.shape)
+        out.append(rest.replace(position=np.round((motion + noise) / ENCODER) * ENCODER))
+    return out
+
+
+def test_a_motor_brakes_while_it_is_switched_on_alone(file: Path) -> None:
+    """With a play the rotor's friction is another one's to compute."""
+    of = prepared_of(file, [one.replace(test=False) for one in switched_off(file)[:1]])
+    on = slice(0, 299)
+    for play in (0.0, 0.05):
+        brakes = point_of(of.arm.nominal).with_value(0, "backlash", play)
+        free = brakes.with_value(0, "back_emf", 0.9)
+        first, second = of.simulator.run([brakes, free], of.windows)[0]
+        assert np.array_equal(first[on], second[on])
+        assert np.abs(second[400:]).max() > 1.3 * np.abs(first[400:]).max()
+
+
+def test_a_motor_that_does_not_brake_when_it_is_off_is_named(file: Path) -> None:
+    kept = {"back_emf", "viscous_law", "stribeck", "load_friction", "payload"}
+    found = servo_diagnose(
+        file, switched_off(file, back_emf=0.7), leave_out=names_left(kept), window=np.inf, max_effects=2
+    )
+    assert names(found)[:1] == ["back_emf"]
+    assert found.chains["named"].drives[0].back_emf == pytest.approx(0.7, abs=0.1)
+
+
+def test_what_no_switch_shows_is_not_testable(file: Path) -> None:
+    of = prepared_of(file, recordings_of(file))
+    sizes = Sizes(*(np.ones(1) for _ in range(4)))
+    found, idle = candidates_of(of.arm, of.data, point_of(of.arm.nominal), sizes, np.ones((9, 1)), ())
+    assert "back_emf" not in {c.effect for c in found} and "back_emf" in {effect for effect, _, _ in idle}
+
+
 def diagnosed(file: Path, noise: float = 5e-4, **values: float) -> ServoDiagnosis:
     return servo_diagnose(file, recordings_of(file, noise, **values), window=np.inf)
 

@@ -225,7 +225,12 @@ def test_what_no_servo_of_a_simulator_has_is_replaced_and_listed(
     source: Path, tmp_path: Path, recording: truing.dynamics.Recording
 ) -> None:
     drive = replace(
-        truth_chain().drives[1], drive_law=0.6, drive_reference=0.5, load_friction=0.2, thermal_friction=0.01
+        truth_chain().drives[1],
+        drive_law=0.6,
+        drive_reference=0.5,
+        load_friction=0.2,
+        thermal_friction=0.01,
+        back_emf=0.4,
     )
     chain = replace(truth_chain(), drives=(truth_chain().drives[0], drive))
     uses = uses_of(chain, [recording])
@@ -239,7 +244,8 @@ def test_what_no_servo_of_a_simulator_has_is_replaced_and_listed(
     written = export_servo(chain, "mjcf", tmp_path / "out", source=source, recordings=[recording])
     read = yaml.safe_load((tmp_path / "out" / "not_written.yaml").read_text())
     names = [item["name"] for item in read["not_written"]]
-    assert set(names) == {"drive_law.elbow", "load_friction.elbow", "thermal_friction.elbow"}
+    laws = ("drive_law", "load_friction", "thermal_friction", "back_emf")
+    assert set(names) == {f"{law}.elbow" for law in laws}
     sizes = {item.name: item.size for item in written.not_written}
     assert sizes["drive_law.elbow"] == pytest.approx(np.sqrt(np.mean((torque - values.gain * error) ** 2)))
     assert sizes["thermal_friction.elbow"] == pytest.approx(10 * 0.01 * 0.03)

@@ -30,6 +30,7 @@ enum class ServoField : int {
   coulomb,
   viscous,
   viscous_law,
+  back_emf,
   stribeck,
   stribeck_speed,
   load_friction,

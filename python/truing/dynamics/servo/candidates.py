@@ -27,6 +27,7 @@ _FROM_NEUTRAL = (
     "gain_law",
     "dead_band",
     "viscous_law",
+    "back_emf",
     "load_friction",
     "asymmetric_friction",
     "thermal_friction",
@@ -121,6 +122,7 @@ def _idle(data: ServoData) -> dict[str, str]:
             "thermal_friction",
             "temperatures (temp1_C … or temp_C) were not recorded, or do not change",
         ),
+        ("enabled", "back_emf", "no servo was switched off (enabled …) while it was recorded"),
     ):
         if needs not in data.varies:
             out[name] = words

@@ -15,7 +15,7 @@ In every step of the simulation, with `u` the command of `delay` seconds ago, no
               + asymmetric_friction sign(dq/dt)
     level *= 1 + thermal_friction (temperature - its reference) + warmup t
     friction = dry, at most `level` (elastic over `presliding` of travel) + viscous dq/dt
-              + viscous_law dq/dt |dq/dt|
+              + viscous_law dq/dt |dq/dt|; of viscous the part back_emf is not there where `enabled` is 0
     joint  = tau + current_offset - spring q - friction - gravity_scale * gravity, with `armature` on it
 
 All values are those at the joint, SI. Where a joint slides read m for rad and N for Nm.
@@ -189,6 +189,16 @@ class ServoJoint:
         "torque/speed^2",
         "friction that grows with the square of speed",
         spread=0.5,
+    )
+    back_emf: float = _value(
+        0.0,
+        "back_emf",
+        "1",
+        "one",
+        "part of viscous friction that the motor makes, and not while it is switched off",
+        spread=0.5,
+        low=0.0,
+        high=1.0,
     )
     stribeck: float = _value(
         0.0, "stribeck", "Nm", "torque", "dry friction more at rest than at speed", spread=0.3

@@ -59,7 +59,7 @@ class ServoData:
     gain_reference: float
     supply_reference: float
     temperature_reference: float
-    varies: frozenset[str]  # of 'gain', 'supply', 'warmth', what changes
+    varies: frozenset[str]  # of 'gain', 'supply', 'warmth', 'enabled', what changes
     recordings: tuple[str, ...]
     blocks: bool  # blocks of time are held out, and not recordings
 
@@ -138,7 +138,7 @@ def servo_data(
         references["gain"],
         references["supply"],
         references["warmth"],
-        frozenset(name for name in ("gain", "supply", "warmth") if _changes(read[name])),
+        frozenset(name for name in inputs if _changes(read[name])),
         tuple(r.name for r in recordings),
         blocks,
     )

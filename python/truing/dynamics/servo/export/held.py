@@ -187,7 +187,7 @@ def _mean_load_friction(joint: str, drive: ServoJoint, use: Use, left: list[NotW
 
 
 def _by_inputs(joint: str, drive: ServoJoint, use: Use, left: list[NotWritten]) -> None:
-    """What goes with supply, temperature and time: simulators have none of these."""
+    """What goes with supply, temperature, time and the switch: simulators have none of these."""
     torque = _rms(drive_torque(drive, use.error)) if use.known else math.nan
     for name, value, size, at in (
         ("supply_gain", drive.supply_gain, 0.1 * drive.supply_gain * torque, "written for the mean supply"),
@@ -203,6 +203,12 @@ def _by_inputs(joint: str, drive: ServoJoint, use: Use, left: list[NotWritten]) 
             drive.warmup,
             600.0 * abs(drive.warmup) * drive.coulomb,
             "written as at the start; size: 600 s later",
+        ),
+        (
+            "back_emf",
+            drive.back_emf,
+            drive.back_emf * drive.viscous * _rms(use.speed),
+            "written for a servo that is switched on",
         ),
     ):
         if value:
@@ -220,6 +226,7 @@ def without(drive: ServoJoint) -> ServoJoint:
         supply_sag=0.0,
         thermal_friction=0.0,
         warmup=0.0,
+        back_emf=0.0,
         backlash=drive.backlash if drive.motor_encoder > 0.5 else 0.0,
         elasticity=drive.elasticity if drive.motor_encoder > 0.5 else 0.0,
     )
