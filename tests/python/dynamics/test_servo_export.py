@@ -25,9 +25,12 @@ from truing.cli import main
 from truing.dynamics.commanded import CommandRunner, commanded_mjcf, commanded_track
 from truing.dynamics.servo.arm import servo_arm
 from truing.dynamics.servo.chain import ServoChain, ServoJoint
+from truing.dynamics.servo.data import Window, servo_data
 from truing.dynamics.servo.export import export_servo
+from truing.dynamics.servo.export.fitted import at_firmware, firmware_of, fitted_without
 from truing.dynamics.servo.export.held import drive_torque, held, uses_of
 from truing.dynamics.servo.export.verified import judge_servo
+from truing.dynamics.servo.simulator import Simulator, point_of
 from truing.errors import InputError, InputWarning
 from truing.files import commanded_columns, write_table
 from truing.report.json_text import to_json
@@ -249,6 +252,52 @@ def test_what_no_servo_of_a_simulator_has_is_replaced_and_listed(
     sizes = {item.name: item.size for item in written.not_written}
     assert sizes["drive_law.elbow"] == pytest.approx(np.sqrt(np.mean((torque - values.gain * error) ** 2)))
     assert sizes["thermal_friction.elbow"] == pytest.approx(10 * 0.01 * 0.03)
+
+
+def simulated(
+    chain: ServoChain, source: Path, recording: truing.dynamics.Recording
+) -> truing.dynamics.Recording:
+    """The recording's commands, moved by a chain."""
+    data = servo_data([recording.replace(test=False)], 2)
+    whole = [Window(0, 0, len(data.streams[0].time) - 1)]
+    motion = Simulator(servo_arm(source), data).run([point_of(chain)], whole)[0][0]
+    position = np.concatenate([np.asarray(recording.position[:1]), motion])
+    return recording.replace(position=position[: len(recording)])
+
+
+def test_joints_that_lose_a_law_are_fitted_anew(source: Path, recording: truing.dynamics.Recording) -> None:
+    chain = truth_chain().with_drive("elbow", load_friction=0.5, back_emf=0.5, presliding=0.0, stribeck=0.0)
+    moved = simulated(chain, source, recording)
+    nearest = held(chain, uses_of(chain, [moved]))
+    found = fitted_without(chain, nearest, source, [moved])
+    assert found.drive("elbow").load_friction == 0.0 and found.drive("elbow").back_emf == 0.0
+    assert found.drives[0] == chain.drives[0]  # it loses nothing
+    values = nearest.joints["elbow"]
+    before = found.with_drive(
+        "elbow",
+        **{**vars(chain.drives[1]), "load_friction": 0.0, "back_emf": 0.0, "coulomb": values.friction},
+    )
+    errors = [
+        np.std(np.asarray(simulated(one, source, moved).position - moved.position)[:, 1])
+        for one in (before, found)
+    ]
+    assert errors[1] < 0.8 * errors[0]
+
+
+def test_gains_are_those_at_the_firmwares_gain_that_the_arm_will_have(
+    source: Path, tmp_path: Path, recording: truing.dynamics.Recording
+) -> None:
+    chain = replace(truth_chain(), gain_reference=100.0).with_drive("elbow", gain_law=0.5)
+    used = recording.replace(columns={"kp_raw": np.full(len(recording), 400.0)})
+    export_servo(chain, "mjcf", tmp_path / "out", source=source, used=[used])
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "robot.xml"))
+    assert model.actuator_gainprm[0, 0] == pytest.approx(4.0 * 30.0)
+    assert held(at_firmware(chain, 4.0), uses_of(chain, [])).joints["elbow"].gain == pytest.approx(2.0 * 12.0)
+    # Several gains are none that a model could have.
+    mixed = [used, used.replace(columns={"kp_raw": np.full(len(recording), 200.0)})]
+    assert firmware_of(chain, mixed) == 1.0 and firmware_of(chain, [recording]) == 1.0
+    text = (tmp_path / "out" / "not_written.yaml").read_text()
+    assert "gains are those at the firmware's gain 400" in text
 
 
 def test_a_torque_for_the_commands_speed_is_a_shorter_delay(source: Path) -> None:

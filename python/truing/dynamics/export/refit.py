@@ -70,7 +70,7 @@ def training(
 
 def _rows(recording: _core.Recording, rows: NDArray[np.intp], number: int) -> _core.Recording:
     n = len(recording)
-    tables = ("time", "position", "speed", "torque", "current")
+    tables = ("time", "position", "speed", "torque", "current", "command", "torque_command")
     whole = {name: np.asarray(getattr(recording, name)) for name in tables}
     columns = {name: np.asarray(column)[rows] for name, column in recording.columns.items()}
     parts: dict[str, Any] = {

@@ -136,13 +136,14 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
         return Loaded(robot, train, motion, _cutoff(self.result / "result.json"))
 
     def _load_servo(self) -> LoadedServo:
+        from truing.dynamics.export.refit import training as rows_not_held
         from truing.dynamics.servo.export import MODEL, MOTION, load_servo_result
         from truing.files import load_commanded_motion, load_recordings, load_robot
 
         result = load_servo_result(self.result)
         motion = self.result / MOTION
         rows = load_commanded_motion(motion, result.chains["named"].prismatic) if motion.exists() else []
-        training = [recording for recording, held in rows if not held.all()]
+        training = rows_not_held(rows)
         if self.recording or self.held_out:
             arm = load_robot(self.result / MODEL, any_tool=True)
             if self.recording:
@@ -166,6 +167,7 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
                 out,
                 source=self.source or result.mjcf,
                 recordings=loaded.training,
+                used=[recording for recording, held in loaded.held_out if held.any()],
                 calibration=self.calibration,
             )
             files = {path.name: path.read_text(encoding="utf-8") for path in out.iterdir()}

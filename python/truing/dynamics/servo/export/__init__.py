@@ -18,6 +18,7 @@ from truing.dynamics.export import NOT_WRITTEN, export, listed
 from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.servo.chain import ServoChain
 from truing.dynamics.servo.export import isaaclab, lerobot, mjcf
+from truing.dynamics.servo.export.fitted import at_firmware, firmware_of, fitted_without
 from truing.dynamics.servo.export.held import held, uses_of
 from truing.errors import InputError
 from truing.files import load_robot
@@ -48,23 +49,29 @@ def export_servo(
     *,
     source: Path | str,
     recordings: Sequence[_core.Recording] = (),
+    used: Sequence[_core.Recording] = (),
     calibration: Path | None = None,
 ) -> ServoExported:
     """Writes an arm with its drives as a diagnosis from commands found them, into the folder `out`.
 
     chain: `chains["named"]` of a ServoDiagnosis. to: "mjcf" (MuJoCo 4), "urdf", "isaaclab" (actuators.py) or
     "lerobot" (zeros). source: the file that was diagnosed, whose meshes and names stay in an MJCF, or its
-    text (`ServoDiagnosis.mjcf`). recordings: motion on which what cannot be written is replaced, and its size
-    stated. calibration: of lerobot, the JSON that the arm was recorded with. not_written.yaml lists what is
-    missing.
+    text (`ServoDiagnosis.mjcf`). recordings: motion to which joints are fitted anew that lose a law, and on
+    which the size of that is stated. used: motion of the kind that the model is for: gains are those at the
+    firmware's gain that it has throughout, else at the chain's reference. calibration: of lerobot, the JSON
+    that the arm was recorded with. not_written.yaml lists what is missing.
 
     Raises InputError: unknown target, a source that MuJoCo does not take or that is another arm's, a
     calibration of other motors, MuJoCo is not installed.
     """
     if to not in get_args(ServoTarget):
         raise InputError(f"{to!r} is not known, expected one of {', '.join(get_args(ServoTarget))}")
+    chain = at_firmware(chain, firmware_of(chain, used))
     uses = uses_of(chain, recordings)
     values = held(chain, uses)
+    if to != "lerobot":
+        fitted = fitted_without(chain, values, source, recordings)
+        values = replace(values, joints=held(fitted, uses).joints)
     files: dict[str, str]
     if to == "lerobot":
         files, left = lerobot.write(chain, calibration)

@@ -29,7 +29,7 @@ def chain_paths(
     mjcf: the arm without drives. recordings: those of the windows, in their order. A window begins at the row
     that is nearest to its start.
     """
-    data = _at_references(servo_data(recordings, len(chain.joints)), chain)
+    data = at_references(servo_data(recordings, len(chain.joints)), chain)
     simulator = Simulator(ServoArm("", mjcf, chain, ()), data)
     some = [
         _window(data, int(t), float(s), windows) for s, t in zip(windows.starts, windows.track, strict=True)
@@ -46,7 +46,7 @@ def chain_paths(
     return out
 
 
-def _at_references(data: ServoData, chain: ServoChain) -> ServoData:
+def at_references(data: ServoData, chain: ServoChain) -> ServoData:
     """Firmware gain, supply and temperature, counted from the chain's references."""
     gain, supply = data.gain_reference / chain.gain_reference, data.supply_reference / chain.supply_reference
     warmer = data.temperature_reference - chain.temperature_reference
