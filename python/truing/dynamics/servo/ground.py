@@ -14,7 +14,7 @@ from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.arm import LEAST_ARMATURE, LEAST_FRICTION
 from truing.dynamics.servo.data import ServoData, Window
 from truing.dynamics.servo.fit import Fitted, Fitter, Rows, noise_of, rows_of
-from truing.dynamics.servo.free import Sizes, usual_values
+from truing.dynamics.servo.free import Free, Sizes, usual_values
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator
 
 Floats = NDArray[np.float64]
@@ -26,6 +26,7 @@ _ALIKE = 0.2  # of the logarithm of their gains
 _SAME_SQUARES = 0.3  # more of a joint's squared error, before it is fitted again: its scale is not seen
 _LEAST_ERROR = 1e-6  # [rad | m]
 _SCANNED = 12  # windows that the first scan looks at, at most
+_RUBS = 0.1  # of a joint's usual torque: dry friction
 _TORQUES = ("command_gain", "viscous", "coulomb", "armature")
 _STATED = {
     "command_gain": 0.0,
@@ -105,12 +106,28 @@ def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted,
     sizes = sizes_of(simulator, point, fitter.rows.windows)
     free = usual_values(simulator.arm.nominal, sizes, data.torque_command)
     start = np.array([f.at(point) for f in free])
-    fitted = fitter.settled(point, free, start, None, _ROUNDS, "groundwork")
+    begin = _better_start(fitter, point, sizes, free, start)
+    fitted = fitter.settled(begin, free, start, None, _ROUNDS, "groundwork")
     fitted = _alike(fitter, fitted, nominal)
     point = with_limits(fitted.point, nominal)
     if not np.array_equal(point.chain, fitted.point.chain):
         fitted = fitter.settled(point, fitted.free, fitted.start, None, _ROUNDS // 4, "limits of the torques")
     return fitted, sizes
+
+
+def _better_start(fitter: Fitter, point: Point, sizes: Sizes, free: Sequence[Free], start: Floats) -> Point:
+    """Where a fit ends best, joint by joint, of two: one begins at the point, one with rotors as heavy as
+    what they move and with dry friction. A rotor that a scan left at next to nothing does not come back, as
+    damping has taken its place."""
+    chain = point.chain.copy()
+    chain[:, FIELDS.index("armature")] = sizes.inertia
+    chain[:, FIELDS.index("coulomb")] = _RUBS * sizes.torque
+    fits = [
+        fitter.fit(one, free, start, None, _ROUNDS, "groundwork", shown=False)
+        for one in (point, replace(point, chain=chain))
+    ]
+    best = np.argmin([np.mean(fit.errors**2, axis=0) for fit in fits], axis=0)
+    return replace(point, chain=np.array([fits[k].point.chain[j] for j, k in enumerate(best)]))
 
 
 def with_limits(point: Point, nominal: Point) -> Point:
