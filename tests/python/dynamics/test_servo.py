@@ -28,12 +28,23 @@ from truing.dynamics.servo.fit import Fitter, rows_of
 from truing.dynamics.servo.free import Sizes, free_value, usual_values
 from truing.dynamics.servo.ground import (
     _better_start as better_start,
+    _from_file as from_file,
     first_guess,
     groundwork,
+    shared_scale,
     sizes_of,
     with_limits,
 )
-from truing.dynamics.servo.naming import Rank, Refit, Sureness, Weight, _sure as sure_of
+from truing.dynamics.servo.naming import (
+    Account,
+    Namer,
+    Rank,
+    Refit,
+    Sureness,
+    Weight,
+    _sure as sure_of,
+    unknown,
+)
 from truing.dynamics.servo.result import FoundServoEffect
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, chain_of, point_of
 from truing.dynamics.servo.words import _causes as causes, _orders as orders_of
@@ -353,6 +364,73 @@ def test_a_rotor_that_a_scan_left_at_nothing_comes_back(tmp_path: Path) -> None:
     assert (np.std(error, axis=0) < 1.01 * np.std(alone, axis=0)).all()
     assert np.std(error[:, 2]) < 0.5 * np.std(alone[:, 2])
     assert scanned.value(2, "armature") < 1e-3 < both.value(2, "armature")
+
+
+def test_torques_that_share_a_factor_are_one_departure(file: Path) -> None:
+    nominal = point_of(prepared_of(file, recordings_of(file)).arm.nominal)
+    fields = ("command_gain", "viscous", "coulomb", "armature")
+    scaled = nominal
+    for field, factor in zip(fields, (0.8, 0.82, 0.79, 0.7), strict=True):
+        scaled = scaled.with_value(0, field, factor * nominal.value(0, field))
+    assert shared_scale(scaled, nominal)[0] == pytest.approx(np.median(np.log([0.8, 0.82, 0.79, 0.7])))
+    assert shared_scale(nominal, nominal)[0] == 0.0
+    grown = scaled.with_value(0, "coulomb", 2.0 * nominal.value(0, "coulomb"))
+    assert shared_scale(grown, nominal)[0] == 0.0
+
+
+def test_usual_parameters_depart_by_more_than_the_factor_that_all_share(file: Path) -> None:
+    """A heavier arm is that of weaker drives: the gain says so, and nothing beside it does."""
+    of = prepared_of(file, [one.replace(test=False) for one in recordings_of(file)])
+    heavy = replace(point_of(of.arm.nominal), links=(("arm", 1.25),))
+    motion = of.simulator.run([heavy], of.windows)[0][0]
+    rows = of.windows[0].rows
+    recordings = [
+        one.replace(position=np.concatenate([one.position[:1], motion[k * rows : (k + 1) * rows]]))
+        for k, one in enumerate(recordings_of(file))
+    ]
+    every = {known.effect for known in PARAMETERS.values()} | {"payload", "link_inertia"}
+    found = servo_diagnose(file, recordings, leave_out=sorted(every), window=np.inf)
+    said = {one.effect: one.probability for one in found.effects}
+    assert said["command_gain"] > 0.99 and said["viscous"] == 0.0
+    assert found.chains["standard"].drives[0].viscous == pytest.approx(0.07 / 1.25, rel=0.1)  # kv is damping
+
+
+def test_a_light_joints_torques_are_the_files_where_these_move_the_arm_better(tmp_path: Path) -> None:
+    file, recordings = moved_by_itself(tmp_path)
+    of = prepare(file, recordings, window=np.inf)
+    fitter, nominal = Fitter(Apart(of.simulator), rows_of(of.data, of.windows)), point_of(of.arm.nominal)
+    sizes = sizes_of(fitter.simulator, nominal, fitter.rows.windows)
+    free = usual_values(of.arm.nominal, sizes, False)
+    drifted = nominal
+    for field in ("command_gain", "viscous", "coulomb", "armature"):
+        drifted = drifted.with_value(1, field, 2.7 * nominal.value(1, field))
+    start = np.array([one.at(drifted) for one in free])
+    fitter.anchor(drifted)
+    fitted = fitter.fit(drifted, free, start, None, 0)
+    back = from_file(fitter, fitted, nominal)
+    assert back.point.value(1, "command_gain") == pytest.approx(nominal.value(1, "command_gain"), rel=0.05)
+    again = from_file(fitter, back, nominal)
+    assert np.mean(again.errors**2) <= 1.01 * np.mean(back.errors**2)
+
+
+def test_nothing_unknown_is_said_of_what_encoders_do_not_show(file: Path) -> None:
+    """A bump of the torque at one angle."""
+    of = prepared_of(file, [replace_test(one) for one in recordings_of(file)])
+    point = point_of(of.arm.nominal)
+    bump = (0, "angle", -0.9, 0.3, np.array([0.0, 0.0, 0.0, 0.3, -0.3, 0.0, 0.0]))
+    motion = of.simulator.run([replace(point, functions=(bump,))], of.windows)[0][0]
+    moved = [
+        one.replace(position=np.concatenate([one.position[:1], part]))
+        for one, part in zip(recordings_of(file), np.split(motion, 6), strict=True)
+    ]
+    of = prepared_of(file, moved)
+    fitter = Fitter(Apart(of.simulator), rows_of(of.data, of.train))
+    standard, sizes = groundwork(fitter, point, of.data)
+    namer, account = Namer(fitter, (), 1), Account(standard, standard, [], sizes, point)
+    (found,) = unknown(namer, account, False)
+    assert found.input in ("angle", "directed_angle")
+    namer.resolution = np.array([0.5])
+    assert not unknown(namer, account, False)
 
 
 def test_no_command_no_torque(file: Path) -> None:

@@ -24,10 +24,11 @@ _ROUNDS = 20
 _KIND = 3  # joints of one gain in the file, at least: servos of one kind
 _ALIKE = 0.2  # of the logarithm of their gains
 _SAME_SQUARES = 0.3  # more of a joint's squared error, before it is fitted again: its scale is not seen
+_NEAR = 10.0  # times a joint's squared error: with the file's torques they may still be the better ones
 _LEAST_ERROR = 1e-6  # [rad | m]
 _SCANNED = 12  # windows that the first scan looks at, at most
 _RUBS = 0.1  # of a joint's usual torque: dry friction
-_TORQUES = ("command_gain", "viscous", "coulomb", "armature")
+TORQUES = ("command_gain", "viscous", "coulomb", "armature")
 _STATED = {
     "command_gain": 0.0,
     "viscous": LEAST_FRICTION,
@@ -80,7 +81,7 @@ def first_guess(simulator: Simulator | Apart, rows: Rows, point: Point, torque_c
     every = max(1, len(rows.windows) // _SCANNED)
     few = rows_of(simulator.data, rows.windows[::every])
     fitter = Fitter(simulator, few)
-    names = [name for name in _TORQUES if not (torque_command and name == "command_gain")]
+    names = [name for name in TORQUES if not (torque_command and name == "command_gain")]
     wide = [([name], _GAINS if name == "command_gain" else _WIDE) for name in names]
     fine = [([name], _FINE) for name in names]
     for together, factors in [*wide, (names, _GAINS), *fine]:
@@ -108,7 +109,7 @@ def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted,
     start = np.array([f.at(point) for f in free])
     begin = _better_start(fitter, point, sizes, free, start)
     fitted = fitter.settled(begin, free, start, None, _ROUNDS, "groundwork")
-    fitted = _alike(fitter, fitted, nominal)
+    fitted = _alike(fitter, _from_file(fitter, fitted, nominal), nominal)
     point = with_limits(fitted.point, nominal)
     if not np.array_equal(point.chain, fitted.point.chain):
         fitted = fitter.settled(point, fitted.free, fitted.start, None, _ROUNDS // 4, "limits of the torques")
@@ -134,22 +135,58 @@ def with_limits(point: Point, nominal: Point) -> Point:
     """The file's limits of the torques, times the factor that all torques of a joint have in common: motion
     says them but for one factor, and a limit that stayed would be another one. Of torques that all grew (or
     all fell) the factor is their median; else there is none."""
-    columns = [FIELDS.index(name) for name in _TORQUES]
     limit = FIELDS.index("saturation")
-    unstated = nominal.chain[:, columns] <= np.array([_STATED[name] for name in _TORQUES])
-    now, then = np.maximum(point.chain[:, columns], _TINY), np.maximum(nominal.chain[:, columns], _TINY)
-    logs = np.where(unstated, np.nan, np.log(now / then))
-    alike = np.abs(np.nansum(np.sign(logs), axis=1)) == np.sum(~unstated, axis=1)
-    shared = np.where(alike, np.nanmedian(logs, axis=1), 0.0)
     chain = point.chain.copy()
-    chain[:, limit] = nominal.chain[:, limit] * np.exp(shared)
+    chain[:, limit] = nominal.chain[:, limit] * np.exp(shared_scale(point, nominal))
     return replace(point, chain=chain)
+
+
+def shared_scale(point: Point, nominal: Point) -> Floats:
+    """Logarithm of the factor over the file's that all torques of a joint have in common; 0: there is none.
+    shape=(joints,)"""
+    columns = [FIELDS.index(name) for name in TORQUES]
+    unstated = nominal.chain[:, columns] <= np.array([_STATED[name] for name in TORQUES])
+    now, then = np.maximum(point.chain[:, columns], _TINY), np.maximum(nominal.chain[:, columns], _TINY)
+    out = np.zeros(len(unstated))
+    for j, stated in enumerate(~unstated):
+        logs = np.log(now / then)[j, stated]
+        if logs.size and abs(np.sum(np.sign(logs))) == logs.size:
+            out[j] = np.median(logs)
+    return out
+
+
+def _from_file(fitter: Fitter, fitted: Fitted, nominal: Point) -> Fitted:
+    """Joints that the whole arm moves better with the file's torques begin again there: of a light joint
+    alone, along the measured motion of the others, the scale of all torques is hardly seen, and may end
+    anywhere."""
+    chain, columns = fitted.point.chain, [FIELDS.index(name) for name in TORQUES]
+    file = chain.copy()
+    file[:, columns] = nominal.chain[:, columns]
+    before, other = np.mean(fitted.errors**2, axis=0), fitter.other
+    motion = fitter.motions([replace(fitted.point, chain=file)])[0]
+    near = np.mean(fitter.errors(motion) ** 2, axis=0) < _NEAR * before
+    if not near.any():
+        return fitted
+    begin = replace(fitted.point, chain=np.where(near[:, None], file, chain))
+    fitter.anchor(begin)
+    after = np.mean(fitter.errors(fitter.motions([begin])[0]) ** 2, axis=0)
+    better = near & (after < before)
+    fitter.other = other
+    if not better.any():
+        return fitted
+    point = replace(fitted.point, chain=np.where(better[:, None], file, chain))
+    start = [
+        one.at(point) if one.field in TORQUES and better[one.joint] else mean
+        for one, mean in zip(fitted.free, fitted.start, strict=True)
+    ]
+    noise = noise_of(fitted.errors, fitter.rows, _LEAST_ERROR * np.ones(len(chain)))
+    return fitter.settled(point, fitted.free, np.array(start), noise, _ROUNDS // 2, "torques of the file")
 
 
 def _alike(fitter: Fitter, fitted: Fitted, nominal: Point) -> Fitted:
     """Drives to which the file gives one gain are servos of one kind: joints whose motion says nothing of the
     scale of their torques, as light ones, have that of the others (the median of the gains)."""
-    gain, torques = FIELDS.index("command_gain"), np.array([FIELDS.index(name) for name in _TORQUES])
+    gain, torques = FIELDS.index("command_gain"), np.array([FIELDS.index(name) for name in TORQUES])
     if not any(f.field == "command_gain" for f in fitted.free):
         return fitted
     chain, scaled = fitted.point.chain, fitted.point.chain.copy()
@@ -165,7 +202,7 @@ def _alike(fitter: Fitter, fitted: Fitted, nominal: Point) -> Fitted:
     point = replace(fitted.point, chain=np.where(unseen[:, None], scaled, chain))
     free, start = list(fitted.free), fitted.start.copy()
     for k, one in enumerate(free):
-        if one.field in _TORQUES and unseen[one.joint]:
+        if one.field in TORQUES and unseen[one.joint]:
             start[k] = one.at(point)
             free[k] = replace(one, prior=_ALIKE) if one.field == "command_gain" else one
     noise = noise_of(fitted.errors, fitter.rows, _LEAST_ERROR * np.ones(len(chain)))

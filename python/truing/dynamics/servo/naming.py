@@ -840,8 +840,9 @@ def unknown(namer: Namer, account: Account, single: bool) -> list[FoundFunction]
         gain = float((before - after).sum() / before.sum())
         part = max(0.0, gain) * namer.joints
         probability = part**2 / (part**2 + OTHER_LAWS**2)
-        if probability < UNKNOWN:
-            continue
+        moves = combined([columns[k - sums.always] for k in group], rank.values, base)[:, j]
+        if probability < UNKNOWN or float(np.std(moves)) < namer.resolution[j]:
+            continue  # by less than the encoders' steps show
         taken.add(j)
         low, width = ranges[name, j]
         sigma = _sigmas(sums, group, prior)

@@ -16,6 +16,7 @@ from truing.dynamics.servo.chain import PARAMETERS, ServoChain
 from truing.dynamics.servo.data import ServoData
 from truing.dynamics.servo.fit import Fitted, sums
 from truing.dynamics.servo.free import USUAL, Free
+from truing.dynamics.servo.ground import TORQUES, shared_scale
 from truing.dynamics.servo.naming import Account, FoundFunction, Namer, Sureness
 from truing.dynamics.servo.result import (
     FoundServoEffect,
@@ -271,12 +272,16 @@ def _usual(parts: Parts, covariance: ServoCovariance) -> list[FoundServoEffect]:
     out = []
     first = 3 + len(parts.account.found)
     nominal, standard = parts.held[0], parts.held[1]
+    scales = shared_scale(parts.standard.point, parts.nominal)
     for k, name in enumerate(n for n in USUAL if any(f.field == n for f in parts.standard.free)):
         back = parts.held[first + k]
         for j, joint in enumerate(joints):
             free = next(f for f in parts.account.fitted.free if f.field == name and f.joint == j)
             value = _parameter(parts, covariance, free, parts.nominal)
-            change = abs(free.at(parts.standard.point) - free.at(parts.nominal))
+            change = free.at(parts.standard.point) - free.at(parts.nominal)
+            # What all torques have in common is one departure, and the gain's where there is one.
+            shared = not parts.data.torque_command and name in TORQUES[1:]
+            change = abs(change - scales[j]) if shared else abs(change)
             at = covariance.names.index(free.name(joints))
             sigma = math.sqrt(float(covariance.matrix[at, at]))
             departs = change > max(_DEPARTS * sigma, _SAME * free.prior)
