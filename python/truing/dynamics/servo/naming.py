@@ -60,7 +60,7 @@ _MOST_ROWS = 15000  # of which sums are made; more are thinned
 _LEAST_UNKNOWN = 0.05  # as LEAST_GAIN, of free functions
 INPUTS = ("speed", "load", "angle", "command_error", "time", "directed_load", "directed_angle")
 _PLACES = 6  # of a free function
-_PLACES_OF_TIME = 24  # the same of time, in which what comes by the clock comes and goes
+_NARROW = 24, ("time", "angle", "directed_angle")  # the same where a cause may be narrow: a gust, a detent
 
 
 @dataclass
@@ -841,8 +841,8 @@ def unknown(namer: Namer, account: Account, single: bool) -> list[FoundFunction]
         part = max(0.0, gain) * namer.joints
         probability = part**2 / (part**2 + OTHER_LAWS**2)
         moves = combined([columns[k - sums.always] for k in group], rank.values, base)[:, j]
-        if probability < UNKNOWN or float(np.std(moves)) < namer.resolution[j]:
-            continue  # by less than the encoders' steps show
+        if probability < UNKNOWN or float(np.std(moves)) < namer.resolution[j] / _RESOLUTION:
+            continue  # by less than a step of its encoder
         taken.add(j)
         low, width = ranges[name, j]
         sigma = _sigmas(sums, group, prior)
@@ -879,4 +879,4 @@ def _range(namer: Namer, name: str, j: int, motion: Floats, torque: Floats) -> t
 
 
 def _places(name: str) -> int:
-    return _PLACES_OF_TIME if name == "time" else _PLACES
+    return _NARROW[0] if name in _NARROW[1] else _PLACES
