@@ -8,6 +8,7 @@ import importlib.util
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -20,6 +21,7 @@ from truing.dynamics.export.refit import lacking, training
 from truing.dynamics.runner import runnable
 from truing.dynamics.simulate import judge
 from truing.errors import InputError
+from truing.model import AppliedEffect
 from truing.testing.dynamics import SimulatedMotion, simulate_motion
 
 HIDDEN = {
@@ -121,6 +123,19 @@ def test_a_urdf_gets_friction_for_presliding_and_inertia_for_rotors(
     }
     assert lacking(simulated.truth, exported.not_written) == list(exported.refitted)
     assert exported.callbacks is None and exported.callbacks_model is None
+
+
+def test_no_law_of_the_speed_stands_for_friction_that_goes_with_time(
+    simulated: SimulatedMotion, trained: list[Recording], tmp_path: Path
+) -> None:
+    warm = AppliedEffect("warmup", ["J1"], {"warmup.J1.coulomb": -0.01})
+    robot = simulated.truth.replace(torque_effects=[*simulated.truth.torque_effects, warm])
+    exported = export(robot, "mjcf", tmp_path, recordings=trained)
+    assert "warmup.J1.coulomb" in exported.refitted
+    joints = ElementTree.parse(exported.model).iter("joint")
+    damping = {joint.get("name"): np.array(joint.get("damping", "").split(), float) for joint in joints}
+    assert np.all(damping["J1"][1:] == 0.0)
+    assert np.any(damping["J2"][1:] != 0.0)  # which loses friction of the load
 
 
 def test_what_was_held_out_is_not_fitted_to(simulated: SimulatedMotion) -> None:

@@ -23,8 +23,9 @@ from truing.errors import InputError
 
 _ANEW = ("coulomb", "viscous", "current_offset", "viscous_law", "stribeck", "presliding", "armature")
 """Effects that are fitted anew where the robot carries them; the others stay as they are."""
-_FRICTION = {"load_friction", "viscous_law", "stribeck", "position_friction", "thermal_friction", "warmup"}
-_TAKEN_UP = _FRICTION | {"presliding", "armature"}
+_OF_MOTION = {"load_friction", "viscous_law", "stribeck", "position_friction"}
+"""Laws of friction that one of the speed can stand for in part; what goes with warmth or time it cannot."""
+_TAKEN_UP = _OF_MOTION | {"thermal_friction", "warmup", "presliding", "armature"}
 """Effects that Coulomb friction, damping and bodies can make up for."""
 _NO_FORMS = ("viscous_law.root", "viscous_law.saturating")  # no format holds these
 _NONE_HELD_OUT = 1e-6  # test_share at which no recording and no block of time is held out
@@ -105,7 +106,7 @@ def fit_without(
     lost = {
         joint
         for effect in robot.torque_effects
-        if effect.effect in _FRICTION and set(effect.parameters) & set(parameters)
+        if effect.effect in _OF_MOTION and set(effect.parameters) & set(parameters)
         for joint in effect.joints
     }
     if instead and to == "mjcf":
