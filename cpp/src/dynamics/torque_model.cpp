@@ -92,8 +92,9 @@ TorqueModel TorqueModel::seeing(const TorqueModel& other) const {
 
 MatrixXd TorqueModel::torque_of_others(Motion* motion) const {
   MatrixXd out = chain_.torques(motion->q, motion->qd, motion->qdd, links_);
-  out += motion->qdd * rotors_;  // it is symmetric
   add_payload(*motion, &out);
+  motion->carried = out;
+  out += motion->qdd * rotors_;  // it is symmetric
   add_terms(terms_, false, *motion, &out);
   return out;
 }
@@ -104,15 +105,17 @@ MatrixXd TorqueModel::torque(Motion* motion) const {
 }
 
 MatrixXd TorqueModel::torque_by_direction(Motion* motion) const {
-  MatrixXd seen;
+  MatrixXd seen, carried;
   if (seen_) {
     const MatrixXd mine = std::exchange(motion->direction, directions_of(*motion, seen_->turns_));
     seen = seen_->torque_of_others(motion);
+    carried = motion->carried;
     motion->direction = mine;
   }
   MatrixXd out = torque_of_others(motion);
   motion->torque = seen_ ? seen : out;
   motion->bodies = seen_ ? seen_->links_ : links_;
+  if (seen_) motion->carried = carried;
   add_terms(terms_, true, *motion, &out);
   return out;
 }

@@ -3,6 +3,8 @@
 
 // What a robot carries acts in every motion, also in one that could not have shown it.
 
+#include <cmath>
+
 #include <doctest/doctest.h>
 
 #include "dynamics/torque_model.hpp"
@@ -67,4 +69,31 @@ TEST_CASE("what a model needs the torque for sees that of another where it was t
   const Eigen::MatrixXd found = model.seeing(strong).torque(&motion);
   CHECK((found - others - 0.5 * seen.cwiseAbs()).cwiseAbs().maxCoeff() < 1e-9);
   CHECK((seen - others).cwiseAbs().minCoeff() > 99.0);
+}
+
+TEST_CASE("a link that crosses its play falls out of the motor's torque, and its impact gives back what it missed") {
+  const Robot robot = one_joint();  // its axis is upright: inertia is all the load
+  const double play = 5e-3, step = 0.01, inertia = 2.0 * 0.1 * 0.1;
+  const std::vector<TorqueTerm> found = terms("backlash", {{"", play}, {".crossed", play}});
+  REQUIRE(found.size() == 1);
+  CHECK(terms("backlash", {{"", play}}).size() == 1);  // crossed as wide as it is
+  const Eigen::Index rows = 200, turn = 100;
+  Motion motion;
+  motion.robot = &robot;
+  motion.step = step;
+  motion.time = Eigen::VectorXd::LinSpaced(rows, 0.0, step * (rows - 1));
+  motion.q = motion.qd = Eigen::MatrixXd::Zero(rows, 1);
+  motion.qdd = Eigen::MatrixXd::Ones(rows, 1);
+  motion.qdd.bottomRows(rows - turn).setConstant(-1.0);  // from here on the link is faster than the motor
+  const Eigen::VectorXd load = dynamics::TorqueModel(robot, {}).torque(&motion);
+  CHECK(load[0] == doctest::Approx(inertia));
+  const Eigen::VectorXd change = play * found.front().basis(motion);
+  const Eigen::Index landed = turn + 10;  // sqrt(2 play / 1 rad/s^2) = 0.1 s
+  CHECK(change.head(turn - 2).cwiseAbs().maxCoeff() < 1e-12);
+  CHECK((load + change).segment(turn + 2, 6).cwiseAbs().maxCoeff() < 1e-9 * inertia);
+  CHECK(change.tail(rows - landed - 4).cwiseAbs().maxCoeff() < 1e-12);
+  double speed = 0.0, place = 0.0;
+  for (const double torque : change) place += step * (speed += step * torque / inertia);
+  CHECK(place == doctest::Approx(play));
+  CHECK(std::abs(speed) < 1e-9);
 }

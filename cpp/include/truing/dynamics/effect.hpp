@@ -29,9 +29,9 @@ struct Motion {
   Eigen::MatrixXd qdd;        ///< shape=(rows, joints) [rad/s^2 | m/s^2]
   Eigen::MatrixXd direction;  ///< shape=(rows, joints) -1 ... 1: of the motion, as dry friction knows it
   Eigen::MatrixXd torque;     ///< shape=(rows, joints) [Nm | N] that the model predicts in all, friction included
-  /// shape=(10 * links,) inertial parameters of the links in the model that `torque` is of.
-  Eigen::VectorXd bodies;
-  Eigen::MatrixXd links;  ///< shape=(rows, joints) [Nm | N] of the links alone, as `robot` has them
+  Eigen::VectorXd bodies;     ///< shape=(10 * links,) inertial parameters of the links in the model that predicts it
+  Eigen::MatrixXd links;      ///< shape=(rows, joints) [Nm | N] of the links alone, as `robot` has them
+  Eigen::MatrixXd carried;    ///< the same as the model that predicts `torque` has them, and its payload
   /// Of every joint, shape=(rows, 10 * links) each: torque for an inertial parameter of one (mass, first moments, xx yy
   /// zz xy xz yz about the origin of the frame after the link), link after link. Empty where no term needs it.
   std::vector<Eigen::MatrixXd> rigid;

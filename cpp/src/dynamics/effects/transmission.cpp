@@ -87,37 +87,104 @@ MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
   return (chain.torques(q, qd, qdd, pi) - m.links) / step;
 }
 
-TorqueTerm moved_link(const Robot& robot, std::size_t joint, std::string parameter, std::string unit, double prior,
-                      std::function<VectorXd(const Motion&)> dq) {
+/// A term that all joints' torques have.
+TorqueTerm of_all_joints(const Robot& robot, std::string parameter, std::string unit, double prior) {
   if (link_parameters(robot).isZero()) throw Unsuited("the links' masses are not known");
   TorqueTerm term;
   term.parameter = std::move(parameter);
   term.unit = std::move(unit);
   term.prior = prior;
-  term.needs_torque = true;
-  term.needs_rigid = false;
+  term.needs_rigid = term.needs_direction = false;
   for (std::size_t j = 0; j < robot.driven_count(); ++j) term.joints.push_back(j);
-  term.basis = [joint, dq = std::move(dq)](const Motion& m) {
-    return torque_change(m, static_cast<Index>(joint), dq(m));
-  };
-  return within(std::move(term), 0.0);  // a link stands behind its motor
+  return term;
 }
 
 // A drive that gives way (Spong 1987): the link stands tau / K behind the motor.
 std::vector<TorqueForm> joint_elasticity(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  const double prior = 5e-3 / torque_prior(range, joint);
-  return {{moved_link(robot, joint, parameter_name("joint_elasticity", robot, joint),
-                      is_revolute(robot, joint) ? "rad/Nm" : "m/N", prior,
-                      [joint](const Motion& m) -> VectorXd { return -m.torque.col(static_cast<Index>(joint)); })}};
+  const auto at = static_cast<Index>(joint);
+  TorqueTerm term = of_all_joints(robot, parameter_name("joint_elasticity", robot, joint),
+                                  is_revolute(robot, joint) ? "rad/Nm" : "m/N", 5e-3 / torque_prior(range, joint));
+  term.needs_torque = true;
+  term.basis = [at](const Motion& m) { return torque_change(m, at, -m.torque.col(at)); };
+  return {{within(std::move(term), 0.0)}};  // a link stands behind its motor
 }
 
-// Play: the link stands half of it behind the motor, on the side that the torque pushes it to.
-std::vector<TorqueForm> backlash(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  const double soft = 0.1 * torque_prior(range, joint);
-  return {{moved_link(robot, joint, parameter_name("backlash", robot, joint), angle_unit(robot, joint), 3e-3,
-                      [joint, soft](const Motion& m) -> VectorXd {
-                        return -0.5 * (m.torque.col(static_cast<Index>(joint)).array() / soft).tanh();
-                      })}};
+// --- play
+
+/// Where the link stands in a play, ahead of its middle. While the motor carries the link it stands on the side that
+/// the load pushes it to, behind the motor of one above zero; when the load turns round, the link flies freely, with
+/// the acceleration -load / inertia relative to the motor, until it meets the other side and stays there (Nordin and
+/// Gutman, Controlling mechanical systems with backlash, Automatica 38, 2002; an impact without rebound).
+VectorXd flight_in_play(const VectorXd& load, const VectorXd& inertia, double play, double step) {
+  constexpr int kParts = 8;  // of a row: a flight may take less than one
+  const double side = 0.5 * play, h = step / kParts;
+  VectorXd out(load.size());
+  double place = 0.0, speed = 0.0;
+  if (load.size() > 0) out[0] = place = load[0] > 0.0 ? -side : side;
+  for (Index i = 1; i < load.size(); ++i) {
+    for (int part = 0; part < kParts; ++part) {
+      const double on = (part + 0.5) / kParts;
+      const double pull = -(load[i - 1] + on * (load[i] - load[i - 1])) / inertia[i];
+      place += h * (speed + 0.5 * h * pull);
+      speed += h * pull;
+      if (std::abs(place) < side) continue;
+      place = std::copysign(side, place);
+      speed = 0.0;
+    }
+    out[i] = place;
+  }
+  return out;
+}
+
+/// Torques of all joints for an acceleration of one of this joint alone: its column of the mass matrix.
+MatrixXd felt_inertia(const Motion& m, Index joint) {
+  Robot weightless = *m.robot;
+  weightless.gravity.setZero();
+  const MatrixXd still = MatrixXd::Zero(m.rows(), m.q.cols());
+  MatrixXd one = still;
+  one.col(joint).setOnes();
+  return RigidChain(weightless).torques(m.q, still, one, link_parameters(*m.robot));
+}
+
+const char* const kCrossed = "crossed";
+const char* const kBefore = "before";
+constexpr double kLeastInertia = 1e-9;  ///< [kg m^2] a link that has none flies at once
+
+// The link falls out of the motor's torque for as long as it flies, and its impact gives back at once what was missed.
+// The load is that of the links: friction is the motor's. `crossed` is the play whose flights the column has, and which
+// is scaled to the play that is found; `before` the part of the inertia at the joint that is the rotor's and stays with
+// the motor.
+TorqueForm backlash_over(const Robot& robot, std::size_t joint, double crossed, double before, double prior) {
+  const auto at = static_cast<Index>(joint);
+  TorqueTerm term = of_all_joints(robot, parameter_name("backlash", robot, joint), angle_unit(robot, joint), prior);
+  term.needs_torque = true;
+  term.basis = [=](const Motion& m) -> MatrixXd {
+    MatrixXd inertia = felt_inertia(m, at);
+    const VectorXd load = m.carried.col(at) - before * inertia.col(at).cwiseProduct(m.qdd.col(at));
+    inertia.col(at) *= 1.0 - before;
+    const VectorXd place = flight_in_play(load, inertia.col(at).cwiseMax(kLeastInertia), crossed, m.step);
+    return inertia.array().colwise() * (rate_of(rate_of(place, m.step), m.step).col(0).array() / crossed);
+  };
+  term.constants[parameter_name("backlash", robot, joint, kCrossed)] = crossed;
+  if (before > 0.0) term.constants[parameter_name("backlash", robot, joint, kBefore)] = before;
+  return {within(std::move(term), 0.4 * crossed, 2.5 * crossed)};
+}
+
+std::vector<TorqueForm> backlash(const Robot& robot, std::size_t joint, const MotionRange&) {
+  std::vector<TorqueForm> out;
+  for (const double before : {0.0, 0.3}) {
+    for (const double crossed : {2e-3, 4e-3, 8e-3, 16e-3, 32e-3})
+      out.push_back(backlash_over(robot, joint, crossed, before, crossed));
+  }
+  return out;
+}
+
+TorqueForm backlash_with(const Robot& robot, std::size_t joint, const std::map<std::string, double>& constants) {
+  const std::string play = parameter_name("backlash", robot, joint);
+  const std::string crossed = parameter_name("backlash", robot, joint, kCrossed);
+  const auto before = constants.find(parameter_name("backlash", robot, joint, kBefore));
+  return backlash_over(robot, joint, constant_of(constants, constants.count(crossed) > 0 ? crossed : play),
+                       before == constants.end() ? 0.0 : before->second, 1.0);
 }
 
 // --- what pulls at the tool
@@ -182,9 +249,9 @@ std::vector<TorqueEffect> transmission_effects() {
                           "`joint_elasticity.J2` [rad/Nm]", "two encoders, or fast motion"};
   out.push_back({"joint_elasticity", "gear or belt gives way under torque", joint_elasticity, true, traits});
   traits.plain = "play";
-  traits.documentation = {"change of the torques when the link stands half the play to the side of the torque",
-                          "`backlash.J2` [rad]", "two encoders, or fast motion"};
-  out.push_back({"backlash", "play between motor and link", backlash, true, traits});
+  traits.documentation = {"M_j e'', e: where the link stands in the play, on a side or in free flight, -load / M_jj",
+                          "`backlash.J2` [rad] with `.crossed` [rad], `.before` [-]", "a load that turns round"};
+  out.push_back({"backlash", "play between motor and link", backlash, true, traits, backlash_with});
   traits.family = TorqueFamily::gravity;
   traits.plain = "a force at the tool";
   traits.documentation = {"J^T f", "`tool_force.x .y .z` [N], in the base's axes", "several postures"};
