@@ -308,7 +308,7 @@ double mean_percent(const TorqueErrors& errors) {
   return std::exp(logs / std::max(n, 1.0));
 }
 
-/// What was found, the largest first, in plain words; and how many more.
+/// What was found, in plain words; and how many more.
 std::string causes_of(const std::vector<FoundTorqueEffect>& effects) {
   std::string text;
   std::size_t named = 0, more = 0;
@@ -320,7 +320,7 @@ std::string causes_of(const std::vector<FoundTorqueEffect>& effects) {
     }
     text += (text.empty() ? "" : "; ") + e.plain + at_joints(e.joints);
   }
-  return more > 0 ? text + "; and " + std::to_string(more) + " smaller" : text;
+  return more > 0 ? text + "; and " + std::to_string(more) + " more" : text;
 }
 
 /// What stands beside what was named, in words.

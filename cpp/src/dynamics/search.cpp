@@ -118,7 +118,7 @@ bool Search::may_enter(const Choice& choice, int group, bool free_functions) con
                       [&](int in) { return same_place(design_.groups[static_cast<std::size_t>(in)], g); });
 }
 
-/// Folds that were not fitted, by enough in the mean and for sure: the mean of the folds' gains is above zero by 1.5
+/// Folds that were not fitted, by enough in the mean and for sure: the mean of the folds' gains is above zero by 2
 /// standard errors, gains as roots, or a single fold could decide.
 bool Search::predicts(const VectorXd& before, const VectorXd& after, const SearchLimits& limits) const {
   double n = 0.0, gains = 0.0, roots = 0.0, squares = 0.0;

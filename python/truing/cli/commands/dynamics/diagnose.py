@@ -173,7 +173,7 @@ def print_diagnosis(result: Mapping[str, Any]) -> None:
             "what causes it, and what part of the squared error it removes", head, lines[:LISTED], words=True
         )
     if len(lines) > LISTED:
-        say(f"and {len(lines) - LISTED} smaller: see the report")
+        say(f"and {len(lines) - LISTED} more: see the report")
     for unknown in result["unknown"]:
         say(f"unknown: something at {unknown['joint']} goes with {joined(unknown['inputs'], 3)}")
     for one in result["classes"][:3]:
