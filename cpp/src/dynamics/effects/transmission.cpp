@@ -116,14 +116,14 @@ std::vector<TorqueForm> joint_elasticity(const Robot& robot, std::size_t joint, 
 /// the acceleration -load / inertia relative to the motor, until it meets the other side and stays there (Nordin and
 /// Gutman, Controlling mechanical systems with backlash, Automatica 38, 2002; an impact without rebound).
 VectorXd flight_in_play(const VectorXd& load, const VectorXd& inertia, double play, double step) {
-  constexpr int kParts = 8;  // of a row: a flight may take less than one
-  const double side = 0.5 * play, h = step / kParts;
+  constexpr int kStepsOfARow = 8;  // of a row: a flight may take less than one
+  const double side = 0.5 * play, h = step / kStepsOfARow;
   VectorXd out(load.size());
   double place = 0.0, speed = 0.0;
   if (load.size() > 0) out[0] = place = load[0] > 0.0 ? -side : side;
   for (Index i = 1; i < load.size(); ++i) {
-    for (int part = 0; part < kParts; ++part) {
-      const double on = (part + 0.5) / kParts;
+    for (int part = 0; part < kStepsOfARow; ++part) {
+      const double on = (part + 0.5) / kStepsOfARow;
       const double pull = -(load[i - 1] + on * (load[i] - load[i - 1])) / inertia[i];
       place += h * (speed + 0.5 * h * pull);
       speed += h * pull;
