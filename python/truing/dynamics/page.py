@@ -472,12 +472,12 @@ def _css(model: str) -> str:
 
 # ---- Causes ----------------------------------------------------------------------------------------
 def size_text(effect: Mapping[str, Any], most: int = 3) -> str:
-    """ "0.0653 ± 0.0023"; constants of the law without an error."""
+    """ "0.0653 ± 0.0023"; constants of the law without an error; of several parameters which."""
     texts = []
     for p in effect["parameters"][:most]:
         unit = "" if p["unit"] in ("-", "") else f" {p['unit']}"
         parts = p["name"].split(".")
-        named = len(effect["parameters"]) > 1 and len(parts) > 2
+        named = len(effect["parameters"]) > 1 and parts[-1] not in effect["joints"]
         word = f"{parts[-1]} " if named else ""
         sigma = "" if p["frozen"] or not p["sigma"] else f" ± {figures_text(p['sigma'], 2)}"
         texts.append(f"{word}{figures_text(p['value'])}{sigma}{unit}")

@@ -103,6 +103,16 @@ def test_a_known_load_tells_the_constants_of_drives_and_where_it_hangs() -> None
     assert "motor_constant" not in [one.effect for one in diagnosis.effects]
 
 
+def test_a_base_that_is_not_level_is_not_taken_for_a_constant() -> None:
+    arm = demo_arm()
+    arm.gravity = np.array(arm.gravity) + np.cross([0.04, -0.05, 0.0], arm.gravity)
+    checked = check_recordings(arm, currents((0.0, LOAD, 0.0, LOAD)))
+    found = np.array([joint.torque_per_ampere for joint in checked.robot.joints], dtype=float)
+    assert found[0] == pytest.approx(CONSTANTS[0], rel=0.06)  # it carries weight by the tilt alone
+    assert found[1:5] == pytest.approx(CONSTANTS[1:5], rel=0.03)
+    assert "base_tilt" in [one.effect for one in diagnose(checked.robot, checked.recordings).effects]
+
+
 def test_recordings_that_state_no_load_beside_a_known_one_are_said() -> None:
     first, *others = currents((0.0, LOAD, 0.0, LOAD))
     checked = check_recordings(demo_arm(), [first.replace(columns={}), *others])

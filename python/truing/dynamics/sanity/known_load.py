@@ -11,7 +11,7 @@ k / (1 + d) until that settles (Gauss and Newton).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,7 @@ _ROUNDS = 8
 _SETTLED = 1e-3  # of a constant
 _TOLD = 0.1  # of a constant: standard error up to which it is taken
 _PLACED = 0.02  # [m] standard error of a place up to which it is taken
+_LEVEL, _SURE = 0.01, 5.0  # [rad], standard errors: a tilt beyond both is one
 _MASS, *_PLACE = PAYLOAD_COLUMNS
 
 
@@ -49,6 +50,7 @@ class _Fit:
     sigmas: Floats  # shape=(joints,) of these, relative
     place: Floats  # shape=(3,) [m] in the tool's frame
     place_sigmas: Floats  # shape=(3,) [m]
+    is_tilted: bool  # the base, for sure
 
 
 def known_load(
@@ -103,15 +105,32 @@ def _fitted(
 ) -> _Fit | None:
     """None: it does not settle, or cannot be fitted."""
     names = [joint.name for joint in driven_joints(robot)]
-    asked = [_core.EffectRequest(effect, []) for effect in _USUAL]
+    asked = {effect: list[str]() for effect in _USUAL}
     if unknown:
-        asked.append(_core.EffectRequest("motor_constant", [names[k] for k in unknown]))
+        asked["motor_constant"] = [names[k] for k in unknown]
     if no_place:
-        asked.append(_core.EffectRequest("payload_place", []))
+        asked["payload_place"] = []
+    if not np.any(robot.gravity):
+        return _settled(robot, recordings, unknown, start, asked)
+    tilted = _settled(robot, recordings, unknown, start, {**asked, "base_tilt": []})
+    if tilted is None or tilted.is_tilted:  # else a base that is not level would be taken for a constant
+        return tilted
+    return _settled(robot, recordings, unknown, tilted.constants, asked)
+
+
+def _settled(
+    robot: _core.Robot,
+    recordings: Sequence[_core.Recording],
+    unknown: Sequence[int],
+    start: Floats,
+    asked: Mapping[str, Sequence[str]],
+) -> _Fit | None:
+    names = [joint.name for joint in driven_joints(robot)]
+    effects = [_core.EffectRequest(effect, list(joints)) for effect, joints in asked.items()]
     constants = np.array(start, dtype=float)
     for _ in range(_ROUNDS):
         try:
-            fit = identify(_with_constants(robot, unknown, constants), recordings, effects=asked)
+            fit = identify(_with_constants(robot, unknown, constants), recordings, effects=effects)
         except InputError:
             return None
         off, sigmas = (np.zeros(len(names)) for _ in range(2))
@@ -122,7 +141,9 @@ def _fitted(
         constants /= 1.0 + off
         if (np.abs(off) < np.maximum(_SETTLED, sigmas / 10.0)).all():
             place = np.array([_value(fit, f"payload_place.{axis}") for axis in "xyz"])
-            return _Fit(constants, sigmas / (1.0 + off), place[:, 0], place[:, 1])
+            tilts = [_value(fit, f"base_tilt.{axis}") for axis in "xyz"]
+            is_tilted = any(abs(tilt) > max(_LEVEL, _SURE * sigma) for tilt, sigma in tilts)
+            return _Fit(constants, sigmas / (1.0 + off), place[:, 0], place[:, 1], is_tilted)
     return None
 
 
