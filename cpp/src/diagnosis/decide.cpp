@@ -543,7 +543,8 @@ static Choice with_links(const Work& work, int links, const Choice& others) {
 /// What the search would choose from these sums alone, `beside` other groups.
 static Choice search_again(const Work& work, const Decision& decision, const Gram& train, Choice beside) {
   const Shortlist list = shortlist(work, decision.state.choice.groups);
-  const Evidence evidence(train.of(list.columns), list.groups, list.nuisance, list.prior);
+  const Gram some = train.of(list.columns);
+  const Evidence evidence(some, list.groups, list.nuisance, list.prior);
   for (int& group : beside.groups)
     group = static_cast<int>(std::find(list.which.begin(), list.which.end(), group) - list.which.begin());
   Choice found = evidence.search(decision.search, beside).choice;

@@ -79,9 +79,10 @@ struct Choice {
 class Evidence {
  public:
   /// `nuisance`: columns that are always in, with a flat prior. `prior[k]`: the size that column k's parameter may
-  /// have.
+  /// have. `gram` and `groups` must outlive it.
   Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance,
            const Eigen::VectorXd& prior);
+  Evidence(const Gram&&, const std::vector<ColumnGroup>&, std::vector<int>, const Eigen::VectorXd&) = delete;
 
   /// A choice evaluated.
   struct State {
