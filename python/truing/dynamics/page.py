@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing.dynamics.rollout.page import joint_menu, response_card, rollout_card
+from truing.dynamics.sanity.readings import FINDINGS as READING_FINDINGS
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, faded, labelled_bars, packed
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.scene import RobotPicture
@@ -317,8 +318,14 @@ def _headline(result: Mapping[str, Any], recordings: int) -> str:
         badge += '<span class="verdict bad">worse in motion</span>'
     return (
         f"<header>{_kicker('diagnose', result, recordings, badge)}<h1"
-        f"{' class=long' if length > LONG else ''}>{text}</h1>{_about(result)}{_moves(result)}</header>"
+        f"{' class=long' if length > LONG else ''}>{text}</h1>{_corrected(result)}{_about(result)}{_moves(result)}</header>"
     )
+
+
+def _corrected(result: Mapping[str, Any]) -> str:
+    """What was read otherwise than it is written, before anything else: a line each."""
+    found = [f for f in result["sanity"] if f["applied"] and f["finding"] in READING_FINDINGS]
+    return "".join(f'<p class="sub"><b>Corrected first:</b> {escaped(f["evidence"])}.</p>' for f in found)
 
 
 # ---- The recordings themselves ---------------------------------------------------------------------

@@ -16,7 +16,7 @@ import pytest
 
 import truing
 from pages import charts_of, visible
-from truing.dynamics import Recording, TorqueDiagnosis, diagnose, identify, predict
+from truing.dynamics import Recording, RecordingFinding, TorqueDiagnosis, diagnose, identify, predict
 from truing.dynamics.page import ROOM, causes_in_words
 from truing.dynamics.result import (
     diagnosis_page,
@@ -78,6 +78,16 @@ def test_result_has_what_the_contract_lists(result: dict[str, Any]) -> None:
     assert result["warnings"][0] == "a warning about the input"
     for key in ("unknown", "classes", "not_testable"):
         assert isinstance(result[key], list)
+
+
+@pytest.mark.parametrize("applied", [True, False])
+def test_what_was_corrected_stands_below_the_headline(
+    simulated: SimulatedMotion, found: TorqueDiagnosis, tmp_path: Path, applied: bool
+) -> None:
+    finding = RecordingFinding("gravity_direction", (), (), "gravity points up", 90.0, "%", applied)
+    write_diagnosis(tmp_path, found, simulated.recordings, sanity=[finding])
+    header = (tmp_path / "report.html").read_text(encoding="utf-8").split("</header>")[0]
+    assert ("gravity points up" in header) is applied
 
 
 def test_the_headline_has_the_numbers_of_the_sentence(folder: Path, result: dict[str, Any]) -> None:
