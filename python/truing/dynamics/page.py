@@ -318,7 +318,8 @@ def _headline(result: Mapping[str, Any], recordings: int) -> str:
         badge += '<span class="verdict bad">worse in motion</span>'
     return (
         f"<header>{_kicker('diagnose', result, recordings, badge)}<h1"
-        f"{' class=long' if length > LONG else ''}>{text}</h1>{_corrected(result)}{_about(result)}{_moves(result)}</header>"
+        f"{' class=long' if length > LONG else ''}>{text}</h1>"
+        f"{_corrected(result)}{_about(result)}{_moves(result)}</header>"
     )
 
 
