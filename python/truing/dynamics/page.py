@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing.dynamics.rollout.page import joint_menu, response_card, rollout_card
-from truing.dynamics.sanity.readings import FINDINGS as READING_FINDINGS
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, faded, labelled_bars, packed
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.scene import RobotPicture
@@ -40,6 +39,7 @@ AXIS = ("standard", "named")  # models that the axis of errors is for; others ma
 HEADROOM = 1.6  # of that axis over their largest error
 _EXACT = 1e-9  # [%] no error is smaller
 EMPTY_BIN = 0.005  # of a joint's rows: parts of the motion with fewer say nothing
+READ_OTHERWISE = ("gravity_direction", "torque_sign", "position_unit")  # findings that change what is read
 TONES = {
     "none": ("no gap beyond noise", "good"),
     "effects": ("explained", "found"),
@@ -325,7 +325,7 @@ def _headline(result: Mapping[str, Any], recordings: int) -> str:
 
 def _corrected(result: Mapping[str, Any]) -> str:
     """What was read otherwise than it is written, before anything else: a line each."""
-    found = [f for f in result["sanity"] if f["applied"] and f["finding"] in READING_FINDINGS]
+    found = [f for f in result["sanity"] if f["applied"] and f["finding"] in READ_OTHERWISE]
     return "".join(f'<p class="sub"><b>Corrected first:</b> {escaped(f["evidence"])}.</p>' for f in found)
 
 

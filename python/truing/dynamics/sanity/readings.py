@@ -404,8 +404,6 @@ _READINGS = {
     "gravity_removed": "the torques do not hold the weight of the links, as if a controller had taken it off",
 }
 _KINDS = {"angles_in_deg": "position_unit", "angles_in_rad": "position_unit"}
-FINDINGS = frozenset(_KINDS.get(name, name) for name in _READINGS)
-"""Of columns, or of the robot's file, that say something else than what is so."""
 
 
 @dataclass(frozen=True)
