@@ -38,9 +38,13 @@ def are_magnitudes(robot: _core.Robot, recordings: Sequence[_core.Recording]) ->
 def commands_for_magnitudes(
     robot: _core.Robot, recordings: Sequence[_core.Recording]
 ) -> list[_core.Recording]:
-    """The recordings without torques and currents, where these are magnitudes and commands are there."""
+    """The recordings without torques and currents, where these are magnitudes and commands are there. Those
+    that are read in pieces stay as they are.
+    """
     recordings = list(recordings)
-    commanded = all(one.command.shape[1] or one.torque_command.shape[1] for one in recordings)
+    commanded = all(
+        one.pieces is None and (one.command.shape[1] or one.torque_command.shape[1]) for one in recordings
+    )
     if not recordings or not commanded or not are_magnitudes(robot, recordings):
         return recordings
     warnings.warn(
@@ -66,14 +70,19 @@ def _both_ways(recordings: Sequence[_core.Recording]) -> NDArray[np.bool_]:
 
 def _held_up(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> NDArray[np.bool_]:
     """Joints that the model's weight pulls to one side all the time. shape=(joints,)"""
-    rows = [slice(None, None, max(1, np.size(one.time) // ROWS)) for one in recordings]
-    position = np.concatenate([one.position[some] for one, some in zip(recordings, rows, strict=True)])
-    torque = np.concatenate(
-        [measured_torque(robot, one)[some] for one, some in zip(recordings, rows, strict=True)]
-    )
+    motion, torque = [], []
+    for one in recordings:
+        some = slice(None, None, max(1, np.size(one.time) // ROWS))
+        motion.append(np.asarray(one.position)[some])
+        torque.append(measured_torque(robot, one)[some])
+    position = np.concatenate(motion)
     still = np.zeros_like(position)
     weight = np.asarray(_core.rigid_torques(robot, position, still, still))
     up = (weight > 0.0).mean(axis=0)
-    size = np.sqrt(np.mean(weight**2, axis=0))
-    loaded = size > WEIGHTLESS * np.sqrt(np.nanmean(np.nan_to_num(torque) ** 2, axis=0))
+    loaded = _size(weight) > WEIGHTLESS * _size(np.nan_to_num(np.concatenate(torque)))
     return np.asarray(loaded & (np.maximum(up, 1.0 - up) > HELD))
+
+
+def _size(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Root mean square of each column."""
+    return np.asarray(np.sqrt(np.mean(columns**2, axis=0)))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.magnitudes import are_magnitudes
 from truing.dynamics.recorded import driven_joints
-from truing.dynamics.sanity import band, columns, lag
+from truing.dynamics.sanity import band, columns, gravity, lag
 from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
@@ -68,7 +68,9 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
         recordings = [
             _scaled(one, read.position.get(one.name), read.position.get(one.name)) for one in recordings
         ]
-        robot, recordings = _turned(_mounted(robot, read.gravity), recordings, read.torque)
+        if read.gravity != tuple(robot.gravity):
+            robot = gravity.under(robot, np.array(read.gravity))
+        robot, recordings = _turned(robot, recordings, read.torque)
         if _any_change(read.torque) or _any_change(read.position):
             grids = grids_of(robot, recordings)
         if not any(one.mistake for one in found):
@@ -113,15 +115,6 @@ def _by_current(recording: _core.Recording, k: int) -> bool:
     current, torque = recording.current, recording.torque
     there = bool(current.shape[1]) and not np.isnan(current[0, k])
     return there and (not torque.shape[1] or bool(np.isnan(torque[0, k])))
-
-
-def _mounted(robot: _core.Robot, gravity: Sequence[float]) -> _core.Robot:
-    """The robot with this gravity [m/s^2] in its base frame."""
-    if tuple(robot.gravity) == tuple(gravity):
-        return robot
-    robot = robot.copy()
-    robot.gravity = np.array(gravity)
-    return robot
 
 
 def _any_change(factors: Mapping[str, Floats]) -> bool:
