@@ -147,6 +147,8 @@ def test_commands_take_the_place_of_magnitudes_and_of_nothing_else() -> None:
         taken = commands_for_magnitudes(ARM, without_sign(commanded))
     assert by_commands(taken)
     assert not by_commands(commands_for_magnitudes(ARM, without_sign(MOTIONS)))
+    in_pieces = [one.replace(pieces=lambda one=one: iter([one]), end=1.0) for one in without_sign(commanded)]
+    assert not by_commands(commands_for_magnitudes(ARM, in_pieces))
 
 
 # ---- Which way is down --------------------------------------------------------------------------------
