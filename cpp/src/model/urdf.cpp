@@ -155,8 +155,20 @@ std::vector<urdf::JointConstSharedPtr> joints_between(const urdf::ModelInterface
   return path;
 }
 
-// A link and all that is fixed to it, side branches too (a motor, a camera), in the frame of the link that `T` was
-// started from. What hangs on a further moving joint off the chain is left out: where it is, is not known.
+// An arm with a gripper ends where its fingers part: the last link that all chains share, if anything moves before it.
+std::string where_they_part(const urdf::ModelInterface& model, const urdf::Link& base,
+                            const std::vector<std::string>& ends) {
+  std::vector<urdf::JointConstSharedPtr> shared = joints_between(model, base, *model.getLink(ends.front()));
+  for (const std::string& end : ends) {
+    const std::vector<urdf::JointConstSharedPtr> path = joints_between(model, base, *model.getLink(end));
+    const auto part = std::mismatch(shared.begin(), shared.end(), path.begin(), path.end()).first;
+    shared.erase(part, shared.end());
+  }
+  const auto moves = [](const urdf::JointConstSharedPtr& joint) { return joint->type != urdf::Joint::FIXED; };
+  if (std::none_of(shared.begin(), shared.end(), moves)) return "";
+  return "; they part at '" + shared.back()->child_link_name + "', the tip of an arm whose gripper is the rest";
+}
+
 struct Body {
   double mass;
   Vector3d center;   ///< of mass
@@ -176,13 +188,22 @@ Body body_of(const urdf::Inertial& inertial, const Isometry3d& T) {
   return {inertial.mass, T_link_body.translation(), R.isIdentity(0.0) ? I : symmetric(R * I * R.transpose())};
 }
 
+bool is_in(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// A link and all that it carries up to the chain's next moving joints: side branches too (a motor, a camera, a
+// gripper's fingers), in the frame of the link that `T` was started from. Where joints off the chain stand is not
+// known: they are taken at zero, as a gripper that is left out would weigh nothing, and their links are told.
 void collect_bodies(const urdf::ModelInterface& model, const urdf::Link& link, const Isometry3d& T,
-                    std::vector<Body>* bodies) {
+                    const std::vector<std::string>& chain, std::vector<Body>* bodies,
+                    std::vector<std::string>* off_chain) {
   if (link.inertial) bodies->push_back(body_of(*link.inertial, T));
   for (const urdf::JointSharedPtr& joint : link.child_joints) {
-    if (joint->type != urdf::Joint::FIXED) continue;
+    if (is_in(chain, joint->name)) continue;
+    if (joint->type != urdf::Joint::FIXED) off_chain->push_back(joint->child_link_name);
     collect_bodies(model, *model.getLink(joint->child_link_name), T * frame_of(joint->parent_to_joint_origin_transform),
-                   bodies);
+                   chain, bodies, off_chain);
   }
 }
 
@@ -225,9 +246,7 @@ void take_mimic(const urdf::Joint& source, Joint& joint) {
   joint.offset = source.mimic->offset;
 }
 
-void take_inertia(const urdf::ModelInterface& model, const urdf::Link& link, Joint& joint) {
-  std::vector<Body> bodies;
-  collect_bodies(model, link, Isometry3d::Identity(), &bodies);
+void take_inertia(const std::vector<Body>& bodies, Joint& joint) {
   if (bodies.empty()) return;
   double mass = 0.0;
   Vector3d moment = Vector3d::Zero();
@@ -266,6 +285,7 @@ struct Chain {
   std::vector<Isometry3d>
       T_link_parent;      ///< fixed joints folded in: from the link after the last moving joint to <parent>
   std::string last_link;  ///< child of the last moving joint
+  std::vector<std::string> off_chain;  ///< links that the chain carries and that move by joints of their own
 };
 
 void require_drivers_in_chain(const Robot& robot) {
@@ -319,7 +339,12 @@ Chain read_chain(const std::string& urdf_text, const std::string& base_link, con
   chain.robot.convention = Convention::urdf;
   Isometry3d T_link_parent = Isometry3d::Identity();
   std::vector<urdf::JointConstSharedPtr> sources;
-  for (const urdf::JointConstSharedPtr& source : joints_between(*model, *base, *tip)) {
+  const std::vector<urdf::JointConstSharedPtr> path = joints_between(*model, *base, *tip);
+  std::vector<std::string> moving;
+  for (const urdf::JointConstSharedPtr& source : path) {
+    if (source->type != urdf::Joint::FIXED) moving.push_back(source->name);
+  }
+  for (const urdf::JointConstSharedPtr& source : path) {
     const Isometry3d T_parent_joint = frame_of(source->parent_to_joint_origin_transform);
     if (source->type == urdf::Joint::FIXED) {
       T_link_parent = T_link_parent * T_parent_joint;
@@ -332,7 +357,10 @@ Chain read_chain(const std::string& urdf_text, const std::string& base_link, con
     take_axis(*source, joint);
     take_limits(*source, joint);
     take_mimic(*source, joint);
-    take_inertia(*model, *model->getLink(source->child_link_name), joint);
+    std::vector<Body> bodies;
+    collect_bodies(*model, *model->getLink(source->child_link_name), Isometry3d::Identity(), moving, &bodies,
+                   &chain.off_chain);
+    take_inertia(bodies, joint);
     take_drive_limits(*source, joint);
     chain.robot.joints.push_back(joint);
     sources.push_back(source);
@@ -472,6 +500,11 @@ Robot robot_from_urdf(const std::string& urdf_text, const std::string& base_link
   return read_chain(urdf_text, base_link, tip_link).robot;
 }
 
+std::vector<std::string> links_off_chain(const std::string& urdf_text, const std::string& base_link,
+                                         const std::string& tip_link) {
+  return read_chain(urdf_text, base_link, tip_link).off_chain;
+}
+
 std::string last_moving_link(const std::string& urdf_text, const std::string& base_link) {
   const urdf::ModelInterfaceSharedPtr model = parse(urdf_text);
   const urdf::LinkConstSharedPtr base = base_link.empty() ? model->getRoot() : link_named(*model, base_link, "base");
@@ -480,8 +513,9 @@ std::string last_moving_link(const std::string& urdf_text, const std::string& ba
   if (ends.empty()) throw std::invalid_argument("nothing moves below base link '" + base->name + "'");
   if (ends.size() > 1) {
     std::sort(ends.begin(), ends.end());
-    throw std::invalid_argument("name the tip link: below '" + base->name + "' " + std::to_string(ends.size()) +
-                                " chains move, that end at " + listed(ends));
+    throw std::invalid_argument("name the tip link (--tip-link, tip_link=): below '" + base->name + "' " +
+                                std::to_string(ends.size()) + " chains move, that end at " + listed(ends) +
+                                where_they_part(*model, *base, ends));
   }
   return ends.front();
 }

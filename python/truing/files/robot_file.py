@@ -329,9 +329,16 @@ def _from_urdf(path: Path, base_link: str, tip_link: str, any_tool: bool) -> _co
         if any_tool and not tip_link:
             tip_link = _core.last_moving_link(text, base_link)
         robot = _core.robot_from_urdf(text, base_link, tip_link)
+        off_chain = _core.links_off_chain(text, base_link, tip_link) if any_tool else []
     except ValueError as error:
         # The parser quotes the file, line ends and all.
         raise InputError(f"{path}: {' '.join(str(error).split())[:1000]}") from None
+    if off_chain:
+        warnings.warn(
+            f"{path}: moves off the chain, its mass merged as it stands at zero: {listed(off_chain, 6)}",
+            InputWarning,
+            stacklevel=4,
+        )
     return robot
 
 

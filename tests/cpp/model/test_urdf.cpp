@@ -183,7 +183,7 @@ TEST_CASE("limits, types and couplings come over") {
   CHECK(robot.joints[3].offset == 0.2);
 }
 
-TEST_CASE("masses fixed to a moving link are merged, what moves on a branch is not") {
+TEST_CASE("masses that a moving link carries are merged, what moves on a branch as it stands at zero") {
   const Robot robot = truing::robot_from_urdf(arm, "", "tcp");
   REQUIRE(robot.joints[0].mass);
   CHECK(*robot.joints[0].mass == doctest::Approx(6.0));
@@ -191,7 +191,10 @@ TEST_CASE("masses fixed to a moving link are merged, what moves on a branch is n
   const Vector3d expected = (4.0 * Vector3d(0.1, 0, 0) + 2.0 * Vector3d(0.3, -0.2, 0)) / 6.0;
   CHECK((robot.joints[0].center_of_mass - expected).norm() < 1e-15);
   CHECK(!robot.joints[1].mass);
-  CHECK(!robot.joints[3].mass);
+  REQUIRE(robot.joints[3].mass);
+  CHECK(*robot.joints[3].mass == 9.0);  // of the finger
+  CHECK(truing::links_off_chain(arm, "", "tcp") == std::vector<std::string>{"finger"});
+  CHECK(truing::links_off_chain(arm, "", "finger").empty());
 }
 
 namespace {
@@ -302,7 +305,12 @@ TEST_CASE("the last moving link is found whatever is fixed to it, unless several
   CHECK(truing::robot_from_urdf(three_ends, "", "l1").joints.size() == 1);
   CHECK(refused(arm, "") == "finger");
   const std::string two_chains = replaced(three_ends, R"(name="h" type="fixed")", R"(name="h" type="continuous")");
-  CHECK(refused(two_chains, "") == "name the tip link: below 'l0' 2 chains move, that end at l1, stand");
+  CHECK(refused(two_chains, "") ==
+        "name the tip link (--tip-link, tip_link=): below 'l0' 2 chains move, that end at l1, stand");
+  const std::string gripper = two_links("", "", no_limits, R"(<link name="left"/><link name="right"/>
+      <joint name="g" type="continuous"><parent link="l2"/><child link="left"/></joint>
+      <joint name="h" type="continuous"><parent link="l2"/><child link="right"/></joint>)");
+  CHECK(contains(refused(gripper, ""), "they part at 'l2', the tip of an arm whose gripper is the rest"));
   CHECK(refused(three_ends, "l1") == "nothing moves below base link 'l1'");
   CHECK(contains(refused(three_ends, "l9"), "base link 'l9' does not exist"));
 }

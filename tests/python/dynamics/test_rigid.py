@@ -62,6 +62,36 @@ def test_torques_of_published_urdfs_are_pinocchios(name: str) -> None:
     assert_torques_are_pinocchios(path.read_text())
 
 
+GRIPPER = """
+  <link name="left"><inertial><origin xyz="0.01 0.02 0.03"/><mass value="0.4"/>
+    <inertia ixx="2e-3" iyy="1e-3" izz="1.5e-3" ixy="1e-4" ixz="0" iyz="0"/></inertial></link>
+  <link name="tip"><inertial><origin xyz="0 0 0.02"/><mass value="0.1"/>
+    <inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="slide" type="prismatic"><origin xyz="0 0.03 0.1" rpy="0.3 0 0.2"/><parent link="tcp"/>
+    <child link="left"/><axis xyz="0 1 0"/><limit lower="0" upper="0.04" effort="1" velocity="1"/></joint>
+  <joint name="swing" type="revolute"><origin xyz="0 0 0.05" rpy="0 0.4 0"/><parent link="left"/>
+    <child link="tip"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+def test_a_gripper_weighs_what_it_weighs_at_zero() -> None:
+    plain = skewed_inertias(ARM)
+    text = plain.replace("</robot>", GRIPPER)
+    model = pin.buildModelFromXML(text)
+    held = [model.getJointId("slide"), model.getJointId("swing")]
+    model = pin.buildReducedModel(model, held, pin.neutral(model))
+    robot = _core.robot_from_urdf(text, "", "tcp")
+    assert _core.links_off_chain(text, "", "tcp") == ["left", "tip"]
+    both = Both.read(plain)
+    q, qd, qdd = (np.random.default_rng(8).uniform(-3, 3, (20, robot.driven_count)) for _ in range(3))
+    C, data = coupling(both), model.createData()
+    rows = zip(q, qd, qdd, strict=True)
+    theirs = np.array([C.T @ pin.rnea(model, data, both.configuration(a), C @ b, C @ c) for a, b, c in rows])
+    ours = _core.rigid_torques(robot, q, qd, qdd)
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-10 * np.abs(theirs).max())
+    assert np.abs(_core.rigid_torques(both.robot, q, qd, qdd) - theirs).max() > 1.0
+
+
 def test_tables_of_another_shape_are_refused() -> None:
     robot = Both.read(ARM).robot
     right = np.zeros((4, robot.driven_count))
