@@ -103,12 +103,16 @@ class Judgement:
         """shape=(joints,) [rad | m]"""
         return np.asarray(np.sqrt(np.mean(self.errors(model, horizon) ** 2, axis=0)))
 
-    def worst_joint(self, model: str, horizon: float) -> float:
-        """[rad | m] median over the windows of the largest error of a joint; of those that turn, unless none
+    def worst_joints(self, model: str, horizon: float) -> Floats:
+        """shape=(n,) [rad | m]: the largest error of a joint in each window; of those that turn, unless none
         does."""
         slides = np.array(self.windows.prismatic)
         errors = np.abs(self.errors(model, horizon))
-        return float(np.median((errors if slides.all() else errors[:, ~slides]).max(axis=1)))
+        return np.asarray((errors if slides.all() else errors[:, ~slides]).max(axis=1))
+
+    def worst_joint(self, model: str, horizon: float) -> float:
+        """[rad | m] median over the windows of the largest error of a joint."""
+        return float(np.median(self.worst_joints(model, horizon)))
 
     def rows(self) -> list[dict[str, Any]]:
         """One row per model and horizon, for tables and result.json."""

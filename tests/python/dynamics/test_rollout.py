@@ -16,7 +16,15 @@ import truing
 from pages import charts_of, visible
 from truing.dynamics import Recording, TorqueDiagnosis, diagnose
 from truing.dynamics.result import write_diagnosis
-from truing.dynamics.rollout import Rollout, held_out_blocks, held_out_rows, rollout, rollout_dict, spans_of
+from truing.dynamics.rollout import (
+    Rollout,
+    held_out_blocks,
+    held_out_rows,
+    moves_worse,
+    rollout,
+    rollout_dict,
+    spans_of,
+)
 from truing.dynamics.sanity import band
 from truing.dynamics.simulate import Judgement, judge
 from truing.testing.dynamics import SimulatedMotion, simulate_motion
@@ -88,7 +96,7 @@ def test_the_report_says_that_low_passed_torques_drive_the_models_badly(
         assert ("These torques end at 1.9 Hz" in page) is said
 
 
-def test_what_moves_worse_than_before_is_said(
+def test_whatmoves_worse_than_before_is_said(
     simulated: SimulatedMotion, found: TorqueDiagnosis, tmp_path: Path
 ) -> None:
     # As if the robot found were the nominal one, and standard practice had all effects.
@@ -103,6 +111,22 @@ def test_what_moves_worse_than_before_is_said(
     assert "In motion what was named is worse than standard practice" in result["sentence"]
     assert set(part["worse"]) <= set(result["warnings"])
     assert "worse in motion" in visible((tmp_path / "report.html").read_text(encoding="utf-8"))
+
+
+def test_motion_is_worse_where_windows_agree_that_it_is() -> None:
+    random = np.random.default_rng(3)
+    its = np.abs(random.normal(size=60))
+    noise = np.abs(random.normal(size=(400, 2, 60)))
+    false = np.mean([moves_worse(one, other, "rad", np.median) for one, other in noise])
+    assert (
+        false < 0.05
+    )  # models that are equally good, though medians of 60 differ by 5 % in a third of cases
+    assert moves_worse(1.2 * its, its, "rad", np.median)
+    assert not moves_worse(1.04 * its, its, "rad", np.median)
+    # Who has left is no farther off than who has left.
+    assert not moves_worse(30.0 + its, 10.0 + its, "rad", np.median)
+    assert not moves_worse(np.full(60, np.nan), 10.0 + its, "rad", np.median)
+    assert moves_worse(np.full(60, np.nan), its, "rad", np.median)
 
 
 def test_blocks_held_out_are_those_of_the_core(simulated: SimulatedMotion) -> None:
