@@ -80,7 +80,7 @@ def test_the_model_alone_moves_better_than_with_friction_that_stands_in(
     judged = judge(models, held, horizons=(0.5, 2.0), most=40)
     for horizon in judged.windows.horizons:
         whole, alone, instead = (judged.worst_joint(name, horizon) for name in models)
-        assert whole < alone < 1.01 * instead
+        assert whole < alone < 1.02 * instead
     assert alone < 0.9 * instead  # 2 s ahead
 
 
@@ -135,7 +135,26 @@ def test_no_law_of_the_speed_stands_for_friction_that_goes_with_time(
     joints = ElementTree.parse(exported.model).iter("joint")
     damping = {joint.get("name"): np.array(joint.get("damping", "").split(), float) for joint in joints}
     assert np.all(damping["J1"][1:] == 0.0)
-    assert np.any(damping["J2"][1:] != 0.0)  # which loses friction of the load
+
+
+def test_no_written_friction_pushes_at_speeds_that_nobody_recorded(tmp_path: Path) -> None:
+    """A polynomial follows friction that saturates by a negative power of the speed, without end."""
+    bends = {"viscous_law": (["J2"], {"viscous_law.J2.saturating": 40.0, "viscous_law.J2.v0": 0.5})}
+    simulated = simulate_motion(seconds=8.0, recordings=4, held_out=1, hidden=bends)
+    trained = [recording for recording in simulated.recordings if not recording.test]
+    free = identify(
+        simulated.nominal,
+        trained,
+        effects="coulomb,viscous,viscous_law",
+        leave_out_forms=("viscous_law.root", "viscous_law.saturating"),
+    )
+    (law,) = [e for e in free.robot.torque_effects if e.effect == "viscous_law" and "J2" in e.joints]
+    assert min(law.parameters.values()) < 0.0  # what the best fit has
+    exported = export(simulated.truth, "mjcf", tmp_path, recordings=trained)
+    assert "viscous_law.J2.saturating" in exported.refitted
+    for joint in ElementTree.parse(exported.model).iter("joint"):
+        powers = np.trim_zeros(np.array(joint.get("damping", "").split(), float), "b")
+        assert powers.size == 0 or powers[-1] > 0.0
 
 
 def test_what_was_held_out_is_not_fitted_to(simulated: SimulatedMotion) -> None:
