@@ -16,6 +16,7 @@ from truing.files.common import PathLike, listed, shown
 from truing.files.recording_bag import is_bag, read_bag
 from truing.files.recording_lerobot import LeRobotUnits, is_lerobot, read_lerobot
 from truing.files.recording_parts import split_joints
+from truing.files.recording_rtde import is_rtde, read_rtde
 from truing.files.recording_table import read_table
 
 _WILD = "*?["
@@ -41,7 +42,8 @@ def load_recordings(
 
     Of a bag (rosbag2, .mcap, .db3, .bag; needs truing[bags]) the joint states are read: position, velocity,
     effort of the joints by name. Every episode of a LeRobot data set (its folder) is a recording: the state
-    of the joints by name, and the actions as commands.
+    of the joints by name, and the actions as commands. A CSV file of Universal Robots' RTDE (timestamp,
+    actual_q_0, actual_current_0 ..., as its recorder and ur_rtde write it) is read by its outputs' names.
 
     A Parquet file of more than 25 million cells stays on disk: every pass over the recording reads it again,
     a piece at a time (`Recording.pieces`). It is one recording, of one set.
@@ -69,6 +71,8 @@ def load_recordings(
                 f"{path}: is a folder, and neither a bag (metadata.yaml) nor a LeRobot data set"
                 f" (meta/info.json): its files are meant by {str(path / '*.csv')!r}"
             )
+        elif is_rtde(path):
+            out += read_rtde(path, name, robot, names)
         else:
             out += read_table(path, name, robot, names)
     return tuple(out)

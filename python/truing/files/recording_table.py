@@ -328,9 +328,16 @@ def read_table(
 ) -> list[_core.Recording]:
     """The recordings of a CSV or Parquet file: one, or one for each run of rows of a set."""
     table = Table(path, comments=True)
-    layout = _Layout(table, robot, joints)
     if table.is_parquet and table.count_rows() * len(table.names) > MOST_IN_MEMORY:
-        return [read_in_pieces(table, layout, name)]
+        return [read_in_pieces(table, _Layout(table, robot, joints), name)]
+    return recordings_of(table, name, robot, joints)
+
+
+def recordings_of(
+    table: Table, name: str, robot: _core.Robot, joints: Sequence[str] | None
+) -> list[_core.Recording]:
+    """The same of a table in memory, whose columns are called as in a file."""
+    layout = _Layout(table, robot, joints)
     table.read(layout.numbers, _labels(layout))
     return _recordings_in(table, layout, name, robot)
 
