@@ -28,11 +28,12 @@ Floats = NDArray[np.float64]
 _LARGEST_MJCF = 64_000_000
 _BEFORE_ROOT = {"<?": "?>", "<!--": "-->", "<!": ">"}  # what begins so, and how it ends
 _DAMPING = ("viscous", "viscous_law.quadratic", "viscous_law.cubic")
+_ROOTS = ("mujoco", "mujocoinclude")  # of a part MuJoCo says that it is none
 _ROOT = re.compile(r"<([\w.:-]+)")
 
 
 def is_mjcf(path: Path) -> bool:
-    """Whether the root element of an XML file is `mujoco`."""
+    """Whether the root element of an XML file is `mujoco`, or that of a part."""
     if path.suffix.lower() != ".xml":
         return False
     text = decoded(path, read_bytes(path, _LARGEST_MJCF))
@@ -41,7 +42,7 @@ def is_mjcf(path: Path) -> bool:
         ending = next((end for start, end in _BEFORE_ROOT.items() if text.startswith(start, at)), None)
         if ending is None:
             match = _ROOT.match(text, at)
-            return match is not None and match[1] == "mujoco"
+            return match is not None and match[1] in _ROOTS
         end = text.find(ending, at)
         at = text.find("<", end + len(ending)) if end >= 0 else -1
     return False

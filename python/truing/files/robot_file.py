@@ -54,7 +54,7 @@ FORMAT = "truing-robot/1"
 _KIND = "robot file"
 _LARGEST_URDF = 64_000_000
 MOST_JOINTS = 200
-_URDF_SUFFIXES = (".urdf", ".xml")
+_URDF_SUFFIXES = (".urdf", ".xml", ".xacro")
 _CONTROLLER_SUFFIXES = (".conf", ".urp", ".cfg", ".json")
 _TOOL = "tool"
 # Parameters are called after joints and targets (J2.a, tool.x), and these two are taken (base.x,
@@ -325,6 +325,10 @@ def _from_urdf(path: Path, base_link: str, tip_link: str, any_tool: bool) -> _co
     text = decoded(path, read_bytes(path, _LARGEST_URDF))
     if not text.strip():
         raise InputError(f"{path}: is empty, expected a URDF")
+    if "<xacro:" in text:
+        raise InputError(
+            f"{path}: is a xacro, expected a URDF: `xacro {path.name} > robot.urdf` (ROS) writes one"
+        )
     try:
         if any_tool and not tip_link:
             tip_link = _core.last_moving_link(text, base_link)

@@ -96,6 +96,7 @@ FLOORS = {
         "recording_table",
         "recording_bag",
         "recording_lerobot",
+        "recording_rtde",
         "recording_file",
         "residual_file",
         "scene_file",

@@ -704,3 +704,11 @@ def test_tables_keep_every_bit_and_leave_gaps_empty(tmp_path: Path) -> None:
     assert (tmp_path / "plain.csv").read_text().splitlines()[:2] == ["name", "a"]
     with pytest.raises(ValueError, match="different lengths"):
         write_table(tmp_path / "bad.csv", {"x": [1.0], "y": [1.0, 2.0]})
+
+
+@pytest.mark.parametrize("name", ["arm.urdf.xacro", "arm.urdf"])
+def test_a_xacro_is_refused_with_how_it_becomes_a_urdf(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_text('<robot name="a"><xacro:include filename="b.xacro"/></robot>', encoding="utf-8")
+    with pytest.raises(InputError, match=f"is a xacro, expected a URDF: `xacro {name} > robot.urdf`"):
+        load_robot(path)
