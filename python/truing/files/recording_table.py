@@ -18,7 +18,7 @@ import numpy as np
 
 from truing import _core
 from truing.errors import InputWarning
-from truing.files.common import listed
+from truing.files.common import listed, shown
 from truing.files.recording_parts import checked_times, joints_of_numbers, make_recordings, table_of
 from truing.files.table import Floats, Table
 from truing.limits import LARGEST_NUMBER
@@ -117,10 +117,13 @@ class _Layout:
         if number not in self.joint_of:
             if self.chosen:
                 return  # a joint that is none of the robot's, as the caller said
+            names = [joint.name for joint in self.joints]
+            there = max(int(found[2]) for found in map(_OF_JOINT.fullmatch, self.table.names) if found)
+            several = ",".join([*names, *"-" * (there - len(names))])
             self.table.refuse(
-                f"the robot has {len(self.joints)} joints with a reading:"
-                f" {listed([joint.name for joint in self.joints])}; where the file has others, say with"
-                " joints= which of the robot's each number is ('-' for none)",
+                f"the robot has {len(names)} joints with a reading: {listed(names)}; where the file has"
+                " others, say with --joints (in Python: joints=) which of the robot's each number is,"
+                f" '-' for none: {shown(several, 200)} if the last are others",
                 column=name,
             )
         index = self.joint_of[number]

@@ -272,7 +272,8 @@ def test_column_names_may_be_a_comment_as_numpy_writes_them(tmp_path: Path) -> N
             table(payload=1.0),
             "column 'payload': there is no unit in the name, expected payload_kg or payload_g",
         ),
-        (table(q3_rad=1.0), "column 'q3_rad': the robot has 2 joints with a reading: J1, S"),
+        (table(q3_rad=1.0), "column 'q3_rad': the robot has 2 joints with a reading: J1, S;"),
+        (table(q3_rad=1.0), "'-' for none: 'J1,S,-' if the last are others"),
         (
             {"t_s": T, "q1_m": Q1, "q2_m": Q2},
             "column 'q1_m': found the unit 'm' in the name, expected q1_rad",
