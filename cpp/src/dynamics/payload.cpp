@@ -11,6 +11,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 const char* const kPayload = "payload_kg";
+const char* const kPayloadFound = "payload_found";
 
 namespace {
 
@@ -71,7 +72,8 @@ MatrixXd torques_of(const Motion& motion, const MatrixXd& parameters) {
 }  // namespace
 
 bool is_of_payload(const std::string& column) {
-  return column == kPayload || column == kPlace[0] || column == kPlace[1] || column == kPlace[2];
+  return column == kPayload || column == kPayloadFound || column == kPlace[0] || column == kPlace[1] ||
+         column == kPlace[2];
 }
 
 VectorXd payload_of(const Motion& motion) { return column_of(motion, kPayload); }
@@ -87,9 +89,15 @@ MatrixXd payload_shifted(const Motion& motion, int axis) {
   return payload_of(motion).asDiagonal() * torques_of(motion, point_mass_moved(place_of(motion), along));
 }
 
+bool payload_was_found(const MotionRange& range) {
+  const auto found = range.columns.find(kPayloadFound);
+  return found != range.columns.end() && found->second.second > 0.0;
+}
+
 bool payload_varies(const MotionRange& range) {
-  const auto found = range.columns.find(kPayload);
-  return found != range.columns.end() && found->second.second > found->second.first;
+  const auto stated = range.columns.find(kPayload);
+  const bool varies = stated != range.columns.end() && stated->second.second > stated->second.first;
+  return varies && !payload_was_found(range);
 }
 
 }  // namespace truing::dynamics

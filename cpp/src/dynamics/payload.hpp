@@ -16,7 +16,10 @@ namespace truing::dynamics {
 /// The column that says how heavy the payload is.
 extern const char* const kPayload;
 
-/// payload_kg and those that say where it is.
+/// The column that is above zero where the payload was found from these torques: nobody weighed it.
+extern const char* const kPayloadFound;
+
+/// payload_kg and those that say where it is, and whether it was found.
 bool is_of_payload(const std::string& column);
 
 /// Its mass in every row [kg]; zero where the recording has no such column.
@@ -28,6 +31,9 @@ Eigen::MatrixXd payload_shifted(const Motion& motion, int axis);
 
 /// Adds its torques to `torque`, shape=(rows, joints): Y of the last link times the parameters of a point mass.
 void add_payload(const Motion& motion, Eigen::MatrixXd* torque);
+
+/// Whether it was found from torques, in some recording.
+bool payload_was_found(const MotionRange& range);
 
 /// Whether masses can be told from the drives' constants: the links alone, which are not known, take up a payload that
 /// is the same everywhere.

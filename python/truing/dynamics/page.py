@@ -39,7 +39,12 @@ AXIS = ("standard", "named")  # models that the axis of errors is for; others ma
 HEADROOM = 1.6  # of that axis over their largest error
 _EXACT = 1e-9  # [%] no error is smaller
 EMPTY_BIN = 0.005  # of a joint's rows: parts of the motion with fewer say nothing
-READ_OTHERWISE = ("gravity_direction", "torque_sign", "position_unit")  # findings that change what is read
+READ_OTHERWISE = (
+    "gravity_direction",
+    "torque_sign",
+    "position_unit",
+    "load_differs",
+)  # findings that change what is read
 TONES = {
     "none": ("no gap beyond noise", "good"),
     "effects": ("explained", "found"),

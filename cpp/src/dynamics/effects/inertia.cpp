@@ -92,9 +92,16 @@ std::vector<TorqueForm> payload(const Robot& robot, std::size_t, const MotionRan
   return forms;
 }
 
+/// What a robot carries it has in every recording, also where nothing hangs at it.
+bool carries(const Robot& robot, const std::string& name) {
+  return std::any_of(robot.torque_effects.begin(), robot.torque_effects.end(),
+                     [&](const AppliedEffect& applied) { return applied.effect == name; });
+}
+
 std::vector<TorqueForm> payload_place(const Robot& robot, std::size_t, const MotionRange& range) {
   const auto stated = range.columns.find(kPayload);
-  if (stated == range.columns.end() || !(stated->second.second > 0.0))
+  const bool known = stated != range.columns.end() && stated->second.second > 0.0 && !payload_was_found(range);
+  if (!known && !carries(robot, "payload_place"))
     throw MissingColumn("needs the column payload_kg, a payload of known mass");
   TorqueForm form;
   for (int axis = 0; axis < 3; ++axis) {

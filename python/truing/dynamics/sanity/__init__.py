@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.magnitudes import are_magnitudes
 from truing.dynamics.recorded import driven_joints
-from truing.dynamics.sanity import band, columns, gravity, lag
+from truing.dynamics.sanity import band, columns, gravity, lag, loads
 from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
@@ -80,6 +80,10 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
             load = known_load(robot, recordings, unknown, constants_by_masses(read.fit, unknown))
             robot, recordings, unknown = load.robot, load.recordings, load.unknown
             found += load.findings
+            if not unknown:
+                carried = loads.loads_of(robot, recordings, grids)
+                recordings = loads.with_loads(recordings, carried)
+                found += loads.found(carried)
         if unknown:
             found.append(gain_unknown(robot, read.fit, unknown))
     if not any(one.mistake and one.finding == "position_unit" for one in found):

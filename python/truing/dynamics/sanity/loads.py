@@ -1,0 +1,240 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Do some recordings carry a load that the others do not, and that nobody told?
+
+No fold of recordings can show it, as what is fitted to the others does not know it. So the torques of all are
+taken by one set of links; by friction and offsets of each recording alone, which change with the day; and by
+a load of each half of a recording: what both halves carry alike, and the lightest recording does not, hangs
+at its tool.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.dynamics.api import PAYLOAD_COLUMNS
+from truing.dynamics.recorded import driven_joints
+from truing.dynamics.sanity.findings import RecordingFinding, listed
+from truing.dynamics.sanity.grids import Grid
+
+Floats = NDArray[np.float64]
+
+ROWS = 300  # of each recording
+FEWEST = 40  # measured torques of half a recording
+ROUNDS = 3  # of weighing joints by what is left of their torques
+SURE = 6.0  # standard errors by which masses differ
+PART = 0.5  # of the squares that a recording leaves without its load, at most, with it
+REACH = 1.0  # [m] no load hangs farther from the tool
+RIDGE = 1e-6  # of the links' mean square column: what motion does not show stays the file's
+OF_LOAD = 4  # parameters of a link that a load adds to: mass, and mass times centre
+_COLUMNS = (
+    *PAYLOAD_COLUMNS,
+    "payload_found",
+)  # of a recording; the last is above zero where nobody weighed it
+
+
+@dataclass(frozen=True)
+class Load:
+    """What hangs at the tool of recordings, more than of the lightest one."""
+
+    recordings: tuple[str, ...]
+    mass: float  # [kg]
+    sigma: float  # [kg]
+    place: tuple[float, float, float]  # [m] of its centre in the tool's frame
+
+
+def loads_of(robot: _core.Robot, recordings: Sequence[_core.Recording], grids: Sequence[Grid]) -> list[Load]:
+    """Loads that recordings carry and the lightest of them does not; none where loads are stated."""
+    stated = any(
+        np.any(one.columns[name]) for one in recordings for name in PAYLOAD_COLUMNS if name in one.columns
+    )
+    if stated or any(one.pieces is not None for one in recordings):
+        return []
+    seen = [halves for grid in grids if len(halves := _halves(robot, grid)) == 2]
+    if len(seen) < 2:
+        return []
+    fit = _Fit.of(seen, len(driven_joints(robot)))
+    lightest, *others = _groups(fit)
+    T_tool_last = np.linalg.inv(np.array(robot.targets[0].T_last_target)) if robot.targets else np.eye(4)
+    out = []
+    for group in others:
+        load = fit.mean(group) - fit.mean(lightest)
+        place = T_tool_last @ np.append(load[1:] / load[0], 1.0)
+        if np.linalg.norm(place[:3]) < REACH:
+            sigma = math.hypot(fit.sigma(group), fit.sigma(lightest))
+            names = tuple(fit.names[k] for k in sorted(group))
+            out.append(
+                Load(names, float(load[0]), sigma, (float(place[0]), float(place[1]), float(place[2])))
+            )
+    return out
+
+
+def found(loads: Sequence[Load]) -> list[RecordingFinding]:
+    """What is said of loads, which are taken into account."""
+    return [_found(load) for load in loads]
+
+
+def _found(load: Load) -> RecordingFinding:
+    x, y, z = (1e3 * v for v in load.place)
+    words = (
+        f"{listed(load.recordings)} {'carries' if len(load.recordings) == 1 else 'carry'} {load.mass:.2f} kg"
+        f" (+- {load.sigma:.2g}) more than the lightest, at {x:.0f} {y:.0f} {z:.0f} mm in the tool's frame:"
+        f" taken into account (for predict: --payload {load.mass:.2f}kg@{x:.0f},{y:.0f},{z:.0f}mm)"
+    )
+    return RecordingFinding("load_differs", load.recordings, (), words, load.mass, "kg", applied=True)
+
+
+def with_loads(recordings: Sequence[_core.Recording], loads: Sequence[Load]) -> list[_core.Recording]:
+    """The recordings with what each of them carries, marked as found: nobody weighed it, and it does not tell
+    drives' constants."""
+    if not loads:
+        return list(recordings)
+    of_name = {name: (load.mass, *load.place, 1.0) for load in loads for name in load.recordings}
+    out = []
+    for one in recordings:
+        values = of_name.get(one.name, np.zeros(len(_COLUMNS)))
+        carried = {name: np.full(len(one), v) for name, v in zip(_COLUMNS, values, strict=True)}
+        out.append(one.replace(columns={**one.columns, **carried}))
+    return out
+
+
+def _groups(fit: _Fit) -> list[list[int]]:
+    """Recordings that carry the same, the lightest first."""
+    groups: list[list[int]] = []
+    for k in np.argsort(fit.loads[:, 0]).tolist():
+        if groups and not _is_heavier(fit, k, groups[-1]):
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    return groups
+
+
+def _is_heavier(fit: _Fit, k: int, group: Sequence[int]) -> bool:
+    apart = fit.loads[k, 0] - fit.mean(group)[0]
+    if apart < SURE * math.hypot(fit.sigma([k]), fit.sigma(group)):
+        return False
+    return fit.squares(k, fit.loads[k]) < PART * fit.squares(k, fit.mean(group))
+
+
+@dataclass(frozen=True)
+class _Half:
+    """Rows of half a recording, joint below joint, without what its friction and offsets take up."""
+
+    name: str
+    links: Floats  # shape=(n, 10 links) torques by the parameters of the links
+    left: Floats  # shape=(n,) [Nm | N] measured torques less those of the file's links
+    joint: NDArray[np.intp]  # shape=(n,)
+
+    @property
+    def load(self) -> Floats:
+        return self.links[:, -10 : -10 + OF_LOAD]
+
+
+def _halves(robot: _core.Robot, grid: Grid) -> list[_Half]:
+    rows = grid.rows[:: max(1, len(grid.rows) // ROWS)]
+    halves = (_half(robot, grid, part) for part in np.array_split(rows, 2))
+    return [half for half in halves if len(half.left) >= FEWEST]
+
+
+def _half(robot: _core.Robot, grid: Grid, rows: NDArray[np.intp]) -> _Half:
+    motion = grid.q[rows], grid.qd[rows], grid.qdd[rows]
+    regressor = np.asarray(_core.torque_regressor(robot, *motion))
+    left = grid.torque[rows] - np.asarray(_core.rigid_torques(robot, *motion))
+    parts, joints = [], []
+    for j in range(left.shape[1]):
+        there = ~np.isnan(left[:, j])
+        usual = [grid.direction[rows, j], grid.qd[rows, j], grid.qdd[rows, j], np.ones(len(rows))]
+        x, both = np.column_stack(usual)[there], np.column_stack([regressor[:, j], left[:, j]])[there]
+        parts.append(both - x @ (np.linalg.pinv(x.T @ x, hermitian=True) @ (x.T @ both)))
+        joints.append(np.full(len(both), j))
+    whole = np.concatenate(parts)
+    return _Half(grid.name, whole[:, :-1], whole[:, -1], np.concatenate(joints))
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Loads of recordings over links that they have in common."""
+
+    halves: list[list[_Half]]
+    weight: Floats  # shape=(joints,) one over what is left of a joint's torque, rms
+    links: Floats  # shape=(10 links,) what their parameters are more than the file's
+    loads: Floats  # shape=(recordings, 4) [kg, kg m] of the last link, in each
+    variance: Floats  # shape=(recordings,) [kg^2] of the masses
+
+    @classmethod
+    def of(cls, seen: list[list[_Half]], joints: int) -> _Fit:
+        """Least squares, joints weighed by what is left of them. What noise that goes on from row to row adds
+        to the variance shows where two halves of a recording do not carry the same."""
+        halves = [half for two in seen for half in two]
+        weight = np.ones(joints)
+        for _ in range(ROUNDS):
+            links, loads, variance = _solved(halves, weight)
+            squares, n = np.zeros(joints), np.zeros(joints)
+            for half, load in zip(halves, loads, strict=True):
+                squares += np.bincount(half.joint, _left(half, links, load) ** 2, joints)
+                n += np.bincount(half.joint, minlength=joints)
+            rms = np.sqrt(squares / np.maximum(n, 1))
+            weight = 1.0 / np.maximum(rms, 1e-6 * rms.max())
+        apart = loads[0::2, 0] - loads[1::2, 0]
+        between = variance[0::2] + variance[1::2]
+        coloured = max(1.0, float(np.mean(apart**2 / between)))
+        share = (1.0 / variance)[:, None]
+        both = (share[0::2] * loads[0::2] + share[1::2] * loads[1::2]) / (share[0::2] + share[1::2])
+        return cls(seen, weight, links, both, coloured / (1.0 / variance[0::2] + 1.0 / variance[1::2]))
+
+    @property
+    def names(self) -> list[str]:
+        return [two[0].name for two in self.halves]
+
+    def mean(self, group: Sequence[int]) -> Floats:
+        """Load of recordings that carry the same. shape=(4,)"""
+        return np.asarray(np.average(self.loads[group], axis=0, weights=1.0 / self.variance[group]))
+
+    def sigma(self, group: Sequence[int]) -> float:
+        """[kg] standard error of its mass."""
+        return float(1.0 / np.sqrt(np.sum(1.0 / self.variance[group])))
+
+    def squares(self, k: int, load: Floats) -> float:
+        """What a recording leaves with a load, in units of what joints leave."""
+        return float(
+            sum(
+                np.sum((self.weight[half.joint] * _left(half, self.links, load)) ** 2)
+                for half in self.halves[k]
+            )
+        )
+
+
+def _left(half: _Half, links: Floats, load: Floats) -> Floats:
+    return np.asarray(half.left - half.links @ links - half.load @ load)
+
+
+def _solved(halves: Sequence[_Half], weight: Floats) -> tuple[Floats, Floats, Floats]:
+    """Common links, loads of the halves, shape=(halves, 4), and variances of their masses, the links being
+    known: by elimination of the loads (Schur)."""
+    grams, cross, own, right_of_links, right_of_loads = [], [], [], [], []
+    for half in halves:
+        w = weight[half.joint][:, None]
+        x, y, z = w * half.links, w * half.load, w[:, 0] * half.left
+        grams.append(x.T @ x)
+        cross.append(x.T @ y)
+        own.append(y.T @ y)
+        right_of_links.append(x.T @ z)
+        right_of_loads.append(y.T @ z)
+    whole = np.sum(grams, axis=0)
+    ridge = RIDGE * float(np.trace(whole)) / len(whole)
+    inverses = [np.linalg.inv(one + ridge * np.eye(OF_LOAD)) for one in own]
+    reduced = (
+        whole + ridge * np.eye(len(whole)) - sum(c @ i @ c.T for c, i in zip(cross, inverses, strict=True))
+    )
+    side = np.sum(right_of_links, axis=0) - sum(
+        c @ i @ r for c, i, r in zip(cross, inverses, right_of_loads, strict=True)
+    )
+    links = np.linalg.solve(reduced, side)
+    loads = [i @ (r - c.T @ links) for i, r, c in zip(inverses, right_of_loads, cross, strict=True)]
+    return links, np.array(loads), np.array([i[0, 0] for i in inverses])
