@@ -152,6 +152,15 @@ def test_a_load_that_some_recordings_carry_untold_is_found_and_taken_into_accoun
     assert {one.effect for one in found.not_testable} >= {"motor_constant", "payload_place"}
 
 
+def test_of_an_untold_load_on_unknown_drives_it_is_asked_to_weigh_it() -> None:
+    made = [one.replace(columns={}) for one in currents((0.0, LOAD, 0.0))]
+    checked = check_recordings(demo_arm(), made)
+    (said,) = [one for one in checked.findings if one.finding == "load_differs"]
+    assert said.mistake and not said.applied and said.recordings == (made[1].name,)
+    assert said.value == pytest.approx(LOAD, rel=0.3) and "state it" in said.evidence
+    assert all("payload_kg" not in one.columns for one in checked.recordings)
+
+
 @pytest.mark.parametrize("loads", [(0.0, 0.0, 0.0), (LOAD, LOAD, LOAD)])
 def test_loads_that_are_all_the_same_are_no_difference(loads: tuple[float, ...]) -> None:
     findings = check_recordings(demo_arm(), untold(loads)).findings

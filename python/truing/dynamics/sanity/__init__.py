@@ -8,6 +8,7 @@ What is certain is corrected, and said; all else is only said.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -80,10 +81,14 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
             load = known_load(robot, recordings, unknown, constants_by_masses(read.fit, unknown))
             robot, recordings, unknown = load.robot, load.recordings, load.unknown
             found += load.findings
-            if not unknown:
+            if unknown:
+                constants = constants_by_masses(read.fit, unknown)
+                scaled = [replace(grid, torque=grid.torque * constants) for grid in grids]
+                found += [loads.to_be_weighed(one) for one in loads.loads_of(robot, recordings, scaled)]
+            else:
                 carried = loads.loads_of(robot, recordings, grids)
                 recordings = loads.with_loads(recordings, carried)
-                found += loads.found(carried)
+                found += [loads.used(one) for one in carried]
         if unknown:
             found.append(gain_unknown(robot, read.fit, unknown))
     if not any(one.mistake and one.finding == "position_unit" for one in found):

@@ -75,19 +75,29 @@ def loads_of(robot: _core.Robot, recordings: Sequence[_core.Recording], grids: S
     return out
 
 
-def found(loads: Sequence[Load]) -> list[RecordingFinding]:
-    """What is said of loads, which are taken into account."""
-    return [_found(load) for load in loads]
-
-
-def _found(load: Load) -> RecordingFinding:
+def used(load: Load) -> RecordingFinding:
+    """What is said of a load that is taken into account."""
     x, y, z = (1e3 * v for v in load.place)
     words = (
-        f"{listed(load.recordings)} {'carries' if len(load.recordings) == 1 else 'carry'} {load.mass:.2f} kg"
-        f" (+- {load.sigma:.2g}) more than the lightest, at {x:.0f} {y:.0f} {z:.0f} mm in the tool's frame:"
-        f" taken into account (for predict: --payload {load.mass:.2f}kg@{x:.0f},{y:.0f},{z:.0f}mm)"
+        f"{_who(load)} {load.mass:.2f} kg (+- {load.sigma:.2g}) more than the lightest, at"
+        f" {x:.0f} {y:.0f} {z:.0f} mm in the tool's frame: taken into account"
+        f" (for predict: --payload {load.mass:.2f}kg@{x:.0f},{y:.0f},{z:.0f}mm)"
     )
     return RecordingFinding("load_differs", load.recordings, (), words, load.mass, "kg", applied=True)
+
+
+def to_be_weighed(load: Load) -> RecordingFinding:
+    """What is said of a load where drives' constants are not known, so that its mass is not."""
+    words = (
+        f"{_who(load)} more than the lightest, some {load.mass:.2g} kg by the constants that the file's"
+        " masses would need, and no payload_kg says so: state it, 0 in the others, and it tells the drives'"
+        " constants"
+    )
+    return RecordingFinding("load_differs", load.recordings, (), words, load.mass, "kg", mistake=True)
+
+
+def _who(load: Load) -> str:
+    return f"{listed(load.recordings)} {'carries' if len(load.recordings) == 1 else 'carry'}"
 
 
 def with_loads(recordings: Sequence[_core.Recording], loads: Sequence[Load]) -> list[_core.Recording]:
