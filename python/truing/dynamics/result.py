@@ -58,12 +58,13 @@ def diagnosis_dict(
     """What ``result.json`` of ``truing dynamics diagnose`` holds. `sanity`: findings of `check_recordings`;
     `warnings`: more of them, first.
     """
-    motion = rollout_dict(rollout)
+    motion, sanity = rollout_dict(rollout), list(sanity)
+    verdict, sentence = verdict_of(found, sanity)
     return {
         **_head("diagnose"),
         "robot": found.robot.name,
-        "verdict": found.verdict,
-        "sentence": ". ".join([found.sentence.rstrip("."), *motion.get("verdict", ())]),
+        "verdict": verdict,
+        "sentence": ". ".join([sentence, *motion.get("verdict", ())]),
         "effects": [_effect(e) for e in found.effects],
         "covariance": covariance_dict(parameters_of(found), found.covariance),
         "unknown": [_unknown(u) for u in found.unknown],
@@ -80,6 +81,19 @@ def diagnosis_dict(
         "design_effect": list(found.design_effect),
         "warnings": [*warnings, *found.warnings, *motion.get("worse", ())],
     }
+
+
+def verdict_of(found: _core.TorqueDiagnosis, sanity: Sequence[RecordingFinding]) -> tuple[str, str]:
+    """Verdict and its sentence: friction that differs from recording to recording is a gap, though no effect
+    is."""
+    differs = next((one for one in sanity if one.finding == "friction_differs"), None)
+    if found.verdict != "none" or differs is None:
+        return found.verdict, found.sentence.rstrip(".")
+    return (
+        "unknown",
+        f"Friction differs from recording to recording, by {differs.value:.0f} % at {differs.joints[0]},"
+        " and no column tells why; no other gap is left",
+    )
 
 
 def fit_dict(

@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,8 +26,10 @@ from truing.dynamics import (
     check_recordings,
     diagnose,
     load_recordings,
+    predict,
 )
 from truing.dynamics.magnitudes import are_magnitudes, commands_for_magnitudes
+from truing.dynamics.result import verdict_of
 from truing.dynamics.sanity.columns import resolution
 from truing.dynamics.sanity.grids import grids_of
 from truing.dynamics.sanity.readings import rows_of
@@ -114,6 +117,34 @@ def test_of_real_recordings_only_what_is_known_of_them_is_said(folder: str) -> N
         assert {"single_j2", "single_j3", "single_j5", "ptp10"} <= set(
             rest.recordings
         ) and rest.value == 100.0
+
+
+# ---- Friction of each recording ---------------------------------------------------------------------
+FACTORS = (0.7, 1.0, 1.3)
+
+
+def warmed(one: Recording, factor: float) -> Recording:
+    """With so many times the friction of J2 and J5."""
+    truth = SIMULATED.truth
+    friction = predict(truth, one).torque - predict(truth.replace(torque_effects=[]), one).torque
+    return one.replace(torque=one.torque + (factor - 1.0) * friction * np.array((0, 1, 0, 0, 1, 0)))
+
+
+def test_friction_that_differs_from_recording_to_recording_is_no_noise() -> None:
+    motions = [warmed(one, factor) for one, factor in zip(MOTIONS, FACTORS, strict=True)]
+    checked = check_recordings(ARM, motions)
+    finding = only(checked)
+    assert finding.finding == "friction_differs" and not finding.mistake and not finding.applied
+    assert {"J2"} <= set(finding.joints) <= {"J2", "J5"}
+    assert finding.value == pytest.approx(100.0 * np.std(FACTORS), rel=0.35)
+    nothing = SimpleNamespace(verdict="none", sentence="No gap beyond noise.")
+    assert verdict_of(nothing, checked.findings)[0] == "unknown"
+    assert verdict_of(nothing, checked.findings)[1].startswith(
+        "Friction differs from recording to recording, by"
+    )
+    assert verdict_of(nothing, ()) == ("none", "No gap beyond noise")
+    warm = [one.replace(columns={"temp_C": np.full(len(one), 25.0 + k)}) for k, one in enumerate(motions)]
+    assert check_recordings(ARM, warm).findings == ()  # a column may tell why
 
 
 # ---- Magnitudes -------------------------------------------------------------------------------------

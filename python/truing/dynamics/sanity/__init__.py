@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.magnitudes import are_magnitudes
 from truing.dynamics.recorded import driven_joints
-from truing.dynamics.sanity import band, columns, gravity, lag, loads
+from truing.dynamics.sanity import band, between, columns, gravity, lag, loads
 from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
@@ -89,6 +89,8 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
                 carried = loads.loads_of(robot, recordings, grids)
                 recordings = loads.with_loads(recordings, carried)
                 found += [loads.used(one) for one in carried]
+            if not any(one.finding == "load_differs" for one in found):
+                found += between.friction_differs(robot, recordings, grids)
         if unknown:
             found.append(gain_unknown(robot, read.fit, unknown))
     if not any(one.mistake and one.finding == "position_unit" for one in found):
