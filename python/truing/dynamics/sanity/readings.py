@@ -38,7 +38,7 @@ AS_GOOD = 0.9  # of the gain of another gravity: a force at the tool with more m
 FAIR = 0.08  # of the variance: where a joint leaves more, other orders are looked at
 OF_ALL = ("torque_order", "joint_order", "gravity_removed")  # joints together
 GAIN_OF_ALL, PART_OF_ALL = 0.08, 1.0 / 3.0  # gain and part, of all joints together
-RIVAL = 0.8  # of the gain: another reading that reaches this is as good
+AS_LITTLE = 2.0  # times what the best reading leaves of a joint: another that leaves more is not as good
 NOT_AT_ALL, WELL = 0.8, 0.2  # of the variance: a sign is certain where it takes one to the other
 BEYOND = 4.0  # times the limit of a joint: no angle is there
 BOTH = 0.05  # of the variance: rigid torque and friction both speak of the sign
@@ -339,9 +339,9 @@ def better_reading(
         if not tried:
             break
         best = max(tried, key=lambda one: one[0])
-        gain, candidate, other = best
+        _, candidate, other = best
         rivals = [
-            one for one in tried if one is not best and one[0] > RIVAL * gain and _alike(one[1], candidate)
+            one for one in tried if one is not best and _alike(one[1], candidate) and _as_good(one[2], other)
         ]
         found.append(_what_was_found(candidate, fit, other, rivals[0][1].finding if rivals else ""))
         reading, fit = candidate.reading, other
@@ -370,6 +370,13 @@ def _gain(fit: Fit, other: Fit, candidate: _Candidate) -> float:
     if candidate.joints and after[about].max() > FITS:  # a spring, say, that the model lacks
         return 0.0
     return gain if gain > GAIN and after[about].sum() < PART * before[about].sum() else 0.0
+
+
+def _as_good(rival: Fit, best: Fit) -> bool:
+    """Whether a reading leaves as little of every joint as the best one does. The gain would not tell: where
+    most of the torques was unexplained, a reading that explains four fifths has gained nearly as much.
+    """
+    return not bool((rival.left > AS_LITTLE * np.maximum(best.left, SEEN)).any())
 
 
 def _alike(one: _Candidate, other: _Candidate) -> bool:
