@@ -245,9 +245,12 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   TorqueGrams grams = sum_grams(*columns, problem.nominal, model, problem.train);
   std::vector<Noise> noise = noise_of_all(problem, *columns, grams, groundwork.noise);
   Choice choice;
-  // What noise is, and the torque that some terms need, are those of the model found in the round before.
-  for (int round = 0; round < 2; ++round) {
-    if (round > 0 && !problem.fitted_before) {
+  // The torque that some terms need is that of the model found in the round before. What was chosen over another torque
+  // than it makes now leaves errors that are no noise, in which what would mend them drowns: so noise is what
+  // everything leaves, and only in the last round what the model found leaves.
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds; ++round) {
+    if (round + 1 == kRounds && !problem.fitted_before) {
       const std::vector<FrictionTurn> before = problem.range.turns;
       Refit refit(problem, *design, choice, model, noise);
       choose_turns(&problem, [&] { return refit.errors(); });
@@ -262,7 +265,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
     const Search search(*design, sums, nuisance);
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);
     model = fitted_model(problem, *design, sums, search, choice);
-    noise = noise_of(problem.tiles, model, problem.train);
+    if (round + 2 >= kRounds) noise = noise_of(problem.tiles, model, problem.train);
   }
   const TorqueGrams held_out = sum_grams(*columns, problem.nominal, model, problem.test);
   columns.reset();  // large

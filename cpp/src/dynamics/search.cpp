@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 namespace truing::dynamics {
 namespace {
@@ -12,8 +13,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kSureGain = 2.0;  ///< standard errors over the folds
 
 bool same_place(const TorqueGroup& a, const TorqueGroup& b) {
   return a.effect == b.effect && a.joints == b.joints && a.inputs == b.inputs;
@@ -118,22 +117,25 @@ bool Search::may_enter(const Choice& choice, int group, bool free_functions) con
                       [&](int in) { return same_place(design_.groups[static_cast<std::size_t>(in)], g); });
 }
 
-/// Folds that were not fitted, by enough in the mean and for sure: the mean of the folds' gains is above zero by 2
-/// standard errors, gains as roots, or a single fold could decide.
+/// Folds that were not fitted, by enough over all of them, and over those that are left without the quarter that gains
+/// most, or a single fold could decide.
 bool Search::predicts(const VectorXd& before, const VectorXd& after, const SearchLimits& limits) const {
-  double n = 0.0, gains = 0.0, roots = 0.0, squares = 0.0;
-  for (Index f = 0; f < before.size(); ++f) {
-    if (!(before[f] > 0.0)) continue;  // nothing moved
-    const double gain = (before[f] - after[f]) / before[f];
-    n += 1.0;
-    gains += gain;
-    roots += std::copysign(std::sqrt(std::abs(gain)), gain);
-    squares += std::abs(gain);
-  }
-  if (n < 2.0) return false;
-  const double mean = roots / n, spread = std::sqrt(std::max(0.0, squares / n - mean * mean) * n / (n - 1.0));
+  std::vector<std::pair<double, double>> folds;  // gain, and what it is a part of
+  for (Index f = 0; f < before.size(); ++f)
+    if (before[f] > 0.0) folds.emplace_back(before[f] - after[f], before[f]);  // else nothing moved
+  if (folds.size() < 2) return false;
+  std::sort(folds.begin(), folds.end());
   // Every joint counts alike in the sum: one joint's errors are the part that it has of it.
-  return gains / n > limits.least_gain / static_cast<double>(joints_) && mean > kSureGain * spread / std::sqrt(n);
+  const double least = limits.least_gain / static_cast<double>(joints_);
+  const auto gains = [&](std::size_t count) {
+    double gain = 0.0, of = 0.0;
+    for (std::size_t k = 0; k < count; ++k) {
+      gain += folds[k].first;
+      of += folds[k].second;
+    }
+    return gain > least * of;
+  };
+  return gains(folds.size()) && gains(folds.size() - (folds.size() + 3) / 4);
 }
 
 /// Parameters of the group within what machines have; what is beyond stands for something else.

@@ -14,6 +14,7 @@ import truing
 from truing.dynamics import Recording, diagnose, identify, load_recordings, predict
 from truing.dynamics.api import markdown_table
 from truing.errors import InputError
+from truing.exam.dynamics import sets
 from truing.model import AppliedEffect, Robot
 from truing.testing.dynamics import HIDDEN, simulate_motion
 
@@ -190,6 +191,27 @@ def test_the_coupled_wrist_of_a_tx40_is_named_first() -> None:
     first = beyond_standard(found)[:2]
     assert {("coupling", ("joint_5", "joint_6")), ("coupling", ("joint_6", "joint_5"))} == set(first)
     assert all(e.probability <= 0.9 for e in found.effects if not e.standard)  # one recording
+
+
+@pytest.mark.realdata
+def test_friction_chosen_over_another_torque_takes_no_rotor_with_it() -> None:
+    """With blocks 2, 4, 7 and 9 held out, load friction of three fifths was fitted to the dry friction of the
+    fourth joint; over the torque that it makes itself it leaves more than it found.
+    """
+    folder = real("dyn_tx40")
+    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
+    found = diagnose(robot, load_recordings([folder / "run.csv"], robot), cutoff=20.0, test_share=0.4)
+    assert ("armature", ("joint_4",)) in beyond_standard(found)
+    assert np.exp(np.log(percent(found, "named")).mean()) < 9.5  # 10.4 before
+
+
+def test_a_recording_of_short_strokes_outvotes_no_others(tmp_path: Path) -> None:
+    """Friction that changes over a turn, twice the noise, which one slow recording of four hardly shows."""
+    robot, recordings = sets.build("development/single/22@3611").write(tmp_path)
+    arm = truing.load_robot(robot)
+    assert beyond_standard(diagnose(arm, load_recordings(recordings, arm)))[:1] == [
+        ("position_friction", ("J1",))
+    ]
 
 
 @pytest.mark.realdata

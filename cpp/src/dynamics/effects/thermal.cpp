@@ -4,8 +4,10 @@
 // Friction that changes as the arm gets warm.
 
 #include <algorithm>
+#include <utility>
 
 #include "dynamics/effects/families.hpp"
+#include "dynamics/prepare.hpp"
 
 namespace truing::dynamics {
 namespace {
@@ -25,16 +27,19 @@ std::string temperature_column(std::size_t joint, const MotionRange& range) {
   throw MissingColumn("needs the column " + own + " or temp_C with temperatures that differ");
 }
 
+/// Friction that changes by more than the joint's whole torque while it is recorded stands for something else.
 TorqueForm friction_times(const char* effect, const Robot& robot, std::size_t joint, const MotionRange& range,
                           double size, const std::string& per, const Column& factor) {
   const auto at = static_cast<Index>(joint);
-  const double torque = 0.3 * std::max(range.torque[at], 1e-3) / size;
+  const double torque = torque_prior(range, joint) / size, fastest = std::max(range.speed[at], kSpeedAtRest);
   const std::string unit = torque_unit(robot, joint);
-  return {term_at(joint, parameter_name(effect, robot, joint, "coulomb"), unit + "/" + per, torque,
-                  [at, factor](const Motion& m) -> ArrayXd { return m.direction.col(at).array() * factor(m); }),
-          term_at(joint, parameter_name(effect, robot, joint, "viscous"),
-                  unit + " s/(" + angle_unit(robot, joint) + " " + per + ")", torque / std::max(range.speed[at], 0.01),
-                  [at, factor](const Motion& m) -> ArrayXd { return m.qd.col(at).array() * factor(m); })};
+  TorqueTerm coulomb =
+      term_at(joint, parameter_name(effect, robot, joint, "coulomb"), unit + "/" + per, 0.3 * torque,
+              [at, factor](const Motion& m) -> ArrayXd { return m.direction.col(at).array() * factor(m); });
+  TorqueTerm viscous = term_at(joint, parameter_name(effect, robot, joint, "viscous"),
+                               unit + " s/(" + angle_unit(robot, joint) + " " + per + ")", 0.3 * torque / fastest,
+                               [at, factor](const Motion& m) -> ArrayXd { return m.qd.col(at).array() * factor(m); });
+  return {within(std::move(coulomb), -torque, torque), within(std::move(viscous), -torque / fastest, torque / fastest)};
 }
 
 std::vector<TorqueForm> thermal_friction(const Robot& robot, std::size_t joint, const MotionRange& range) {
