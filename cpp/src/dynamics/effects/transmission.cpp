@@ -77,14 +77,14 @@ std::vector<TorqueForm> spring(const Robot& robot, std::size_t joint, const Moti
 /// What the torques change by when the joint stands `dq` further on than it was read: shape=(rows, joints).
 MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
   const RigidChain chain(*m.robot);
-  const VectorXd pi = link_parameters(*m.robot);
   const double step = 1e-4 / std::max(dq.cwiseAbs().maxCoeff(), 1e-12);  // rad: small against any posture
   const MatrixXd dqd = rate_of(dq, m.step), dqdd = rate_of(dqd, m.step);
+  const MatrixXd before = chain.torques(m.q, m.qd, m.qdd, m.bodies);
   MatrixXd q = m.q, qd = m.qd, qdd = m.qdd;
   q.col(joint) += step * dq;
   qd.col(joint) += step * dqd;
   qdd.col(joint) += step * dqdd;
-  return (chain.torques(q, qd, qdd, pi) - m.links) / step;
+  return (chain.torques(q, qd, qdd, m.bodies) - before) / step;
 }
 
 /// A term that all joints' torques have.
@@ -136,14 +136,15 @@ VectorXd flight_in_play(const VectorXd& load, const VectorXd& inertia, double pl
   return out;
 }
 
-/// Torques of all joints for an acceleration of one of this joint alone: its column of the mass matrix.
+/// Torques of all joints for an acceleration of one of this joint alone: its column of the mass matrix, of the links as
+/// the fit has them.
 MatrixXd felt_inertia(const Motion& m, Index joint) {
   Robot weightless = *m.robot;
   weightless.gravity.setZero();
   const MatrixXd still = MatrixXd::Zero(m.rows(), m.q.cols());
   MatrixXd one = still;
   one.col(joint).setOnes();
-  return RigidChain(weightless).torques(m.q, still, one, link_parameters(*m.robot));
+  return RigidChain(weightless).torques(m.q, still, one, m.bodies);
 }
 
 const char* const kCrossed = "crossed";
