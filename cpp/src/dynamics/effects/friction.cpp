@@ -61,29 +61,24 @@ TorqueForm saturating_with(const Robot& robot, std::size_t joint, double v0, dou
   return {within(undirected(std::move(term)), 0.0)};  // friction that falls is Stribeck's
 }
 
-/// With a power of the speed. Below zero it would push where a simulation is faster than the recordings were, without
-/// end: what grows less than the speed has a root or saturates.
-TorqueForm growing(const Robot& robot, std::size_t joint, const char* power, const std::string& unit, double prior,
-                   Column column) {
-  return {within(undirected(term_at(joint, parameter_name(kLaw, robot, joint, power), unit, prior, std::move(column))),
-                 0.0)};
-}
-
 std::vector<TorqueForm> viscous_law(const Robot& robot, std::size_t joint, const MotionRange& range) {
   const double torque = torque_prior(range, joint);
   const double fastest = std::max(range.speed[static_cast<Index>(joint)], kSpeedAtRest);
   const std::string unit = torque_unit(robot, joint), angle = angle_unit(robot, joint);
   std::vector<TorqueForm> out;
-  out.push_back(growing(robot, joint, "quadratic", unit + " s^2/" + angle + "^2", torque / (fastest * fastest),
-                        [joint](const Motion& m) -> ArrayXd { return speed(m, joint) * speed(m, joint).abs(); }));
-  out.push_back(growing(robot, joint, "cubic", unit + " s^3/" + angle + "^3", torque / std::pow(fastest, 3.0),
-                        [joint](const Motion& m) -> ArrayXd { return speed(m, joint).cube(); }));
+  out.push_back(
+      {undirected(term_at(joint, parameter_name(kLaw, robot, joint, "quadratic"), unit + " s^2/" + angle + "^2",
+                          torque / (fastest * fastest),
+                          [joint](const Motion& m) -> ArrayXd { return speed(m, joint) * speed(m, joint).abs(); }))});
+  out.push_back({undirected(term_at(joint, parameter_name(kLaw, robot, joint, "cubic"), unit + " s^3/" + angle + "^3",
+                                    torque / std::pow(fastest, 3.0),
+                                    [joint](const Motion& m) -> ArrayXd { return speed(m, joint).cube(); }))});
   out.push_back({within(
       term_at(joint, parameter_name(kLaw, robot, joint, "root"), unit + " (s/" + angle + ")^0.5",
               torque / std::sqrt(fastest),
               [joint](const Motion& m) -> ArrayXd { return direction(m, joint) * speed(m, joint).abs().sqrt(); }),
       0.0)});
-  for (const double part : {0.05, 0.15, 0.4}) out.push_back(saturating_with(robot, joint, part * fastest, torque));
+  for (const double part : {0.05, 0.15, 0.4, 1.0}) out.push_back(saturating_with(robot, joint, part * fastest, torque));
   return out;
 }
 
