@@ -416,6 +416,16 @@ double rows_counted(const Noise& noise, std::size_t fold) {
 
 }  // namespace
 
+namespace {
+
+/// Where a number stands among ascending ones; -1: it is not among them.
+Index place_in(const std::vector<int>& ascending, int number) {
+  const auto found = std::lower_bound(ascending.begin(), ascending.end(), number);
+  return found != ascending.end() && *found == number ? static_cast<Index>(found - ascending.begin()) : -1;
+}
+
+}  // namespace
+
 FoldGram::FoldGram(TorqueGrams grams, std::size_t fold, const std::vector<Noise>& noise)
     : grams_(std::move(grams)), fold_(fold) {
   for (std::size_t j = 0; j < grams_->size(); ++j) {
@@ -425,6 +435,21 @@ FoldGram::FoldGram(TorqueGrams grams, std::size_t fold, const std::vector<Noise>
     yy_ += weights_[j] * gram.yy;
     n_ += rows * gram.n;
   }
+}
+
+VectorXd FoldGram::products(const std::vector<int>& columns, int with) const {
+  VectorXd out = VectorXd::Zero(static_cast<Index>(columns.size()));
+  for (std::size_t j = 0; j < grams_->size(); ++j) {
+    const Gram& gram = (*grams_)[j].folds[fold_];
+    const std::vector<int>& mine = (*grams_)[j].columns;
+    const Index at = place_in(mine, with);
+    if (gram.xx.size() == 0 || at < 0) continue;
+    for (Index k = 0; k < out.size(); ++k) {
+      const Index row = place_in(mine, columns[static_cast<std::size_t>(k)]);
+      if (row >= 0) out[k] += weights_[j] * gram.xx(row, at);
+    }
+  }
+  return out;
 }
 
 Gram FoldGram::of(const std::vector<int>& columns) const {
@@ -437,9 +462,8 @@ Gram FoldGram::of(const std::vector<int>& columns) const {
     const std::vector<int>& mine = (*grams_)[j].columns;  // ascending
     at.clear();
     for (Index k = 0; k < p; ++k) {
-      const auto found = std::lower_bound(mine.begin(), mine.end(), columns[static_cast<std::size_t>(k)]);
-      if (found != mine.end() && *found == columns[static_cast<std::size_t>(k)])
-        at.emplace_back(k, static_cast<Index>(found - mine.begin()));
+      const Index place = place_in(mine, columns[static_cast<std::size_t>(k)]);
+      if (place >= 0) at.emplace_back(k, place);
     }
     for (const auto& [a, from] : at) {
       const double* const column = gram.xx.col(from).data();

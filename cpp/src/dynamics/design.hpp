@@ -102,6 +102,8 @@ class FoldGram {
  public:
   FoldGram(TorqueGrams grams, std::size_t fold, const std::vector<Noise>& noise);
   Gram of(const std::vector<int>& columns) const;
+  /// Of several columns with one.
+  Eigen::VectorXd products(const std::vector<int>& columns, int with) const;
 
  private:
   TorqueGrams grams_;

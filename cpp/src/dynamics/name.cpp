@@ -38,37 +38,20 @@ class Naming {
   explicit Naming(const Account& account)
       : design_(*account.design),
         sums_(*account.sums),
-        held_out_(*account.held_out),
         search_(*account.search),
         choice_(account.choice),
         state_(search_.state(choice_)),
-        fit_(fit_of(sums_, state_.columns, state_.precision)) {
-    squares_ = folds_and_held_out(choice_);
-    standard_ = folds_and_held_out({});
-  }
+        fit_(fit_of(sums_, state_.columns, state_.precision)),
+        squares_(search_.squares_of_folds(state_)) {}
 
   const Fit& fit() const { return fit_; }
   const Evidence::State& state() const { return state_; }
 
-  /// Fraction of the standard model's squares that the group removes, and its interval over folds and held-out rows.
-  Share share(std::size_t at) const {
-    const VectorXd less = folds_and_held_out(Search::without(choice_, at));
-    const VectorXd gain = less - squares_;
-    Share out;
-    out.value = gain.sum() / standard_.sum();
-    const auto n = static_cast<double>(gain.size());
-    const double spread = std::sqrt((gain.array() - gain.mean()).square().sum() / std::max(1.0, n - 1.0) * n);
-    out.low = out.value - 1.645 * spread / standard_.sum();
-    out.high = out.value + 1.645 * spread / standard_.sum();
-    return out;
-  }
-
   /// No law here is exact: what removes a small part of the error that a joint has without it, on folds that were not
   /// fitted, may stand for something else. All joints count alike in the sum of squares.
   double not_another_law(std::size_t at) const {
-    const Index folds = static_cast<Index>(sums_.folds.size());
     const VectorXd less = search_.squares_of_folds(Search::without(choice_, at));
-    const double gain = (less - squares_.head(folds)).sum() / less.sum();
+    const double gain = (less - squares_).sum() / less.sum();
     const double part = std::max(0.0, gain) * search_.joints();
     return part * part / (part * part + kOtherLaws * kOtherLaws);
   }
@@ -137,6 +120,12 @@ class Naming {
     return probability(at, confounded) * not_another_law(at);
   }
 
+  /// It is surer than not. No posterior is above one, and it takes longer to find.
+  bool is_likely(std::size_t at) const {
+    std::vector<TorqueAlternative> ignored;
+    return not_another_law(at) >= kNamed && sure(at, &ignored) >= kNamed;
+  }
+
   VectorXd values_of(const TorqueGroup& group) const {
     VectorXd out(static_cast<Index>(group.columns.size()));
     for (Index k = 0; k < out.size(); ++k) out[k] = value_of(group.columns[static_cast<std::size_t>(k)]);
@@ -162,22 +151,46 @@ class Naming {
 
   bool is_in(int g) const { return std::find(choice_.groups.begin(), choice_.groups.end(), g) != choice_.groups.end(); }
 
-  VectorXd folds_and_held_out(const Choice& choice) const {
-    const VectorXd folds = search_.squares_of_folds(choice);
-    VectorXd out(folds.size() + static_cast<Index>(held_out_.folds.size()));
-    out.head(folds.size()) = folds;
-    for (std::size_t f = 0; f < held_out_.folds.size(); ++f)
-      out[folds.size() + static_cast<Index>(f)] = search_.squares_on(held_out_.folds[f], choice);
-    return out;
-  }
-
   const TorqueDesign& design_;
   const Sums& sums_;
-  const Sums& held_out_;
   const Search& search_;
   const Choice& choice_;
   Evidence::State state_;
   Fit fit_;
+  VectorXd squares_;  ///< of folds that were not fitted
+};
+
+/// Fractions of the standard model's squares that the groups of a choice remove.
+class Shares {
+ public:
+  explicit Shares(const Account& account)
+      : account_(account), squares_(folds_and_held_out(account.choice)), standard_(folds_and_held_out({})) {}
+
+  /// With its interval over folds and held-out rows.
+  Share of(std::size_t at) const {
+    const VectorXd gain = folds_and_held_out(Search::without(account_.choice, at)) - squares_;
+    Share out;
+    out.value = gain.sum() / standard_.sum();
+    const auto n = static_cast<double>(gain.size());
+    const double spread = std::sqrt((gain.array() - gain.mean()).square().sum() / std::max(1.0, n - 1.0) * n);
+    out.low = out.value - 1.645 * spread / standard_.sum();
+    out.high = out.value + 1.645 * spread / standard_.sum();
+    return out;
+  }
+
+ private:
+  VectorXd folds_and_held_out(const Choice& choice) const {
+    const Evidence::State state = account_.search->state(choice);
+    const VectorXd folds = account_.search->squares_of_folds(state);
+    const std::vector<FoldGram>& held_out = account_.held_out->folds;
+    VectorXd out(folds.size() + static_cast<Index>(held_out.size()));
+    out.head(folds.size()) = folds;
+    for (std::size_t f = 0; f < held_out.size(); ++f)
+      out[folds.size() + static_cast<Index>(f)] = Search::squares_on(held_out[f], state);
+    return out;
+  }
+
+  const Account& account_;
   VectorXd squares_, standard_;
 };
 
@@ -242,6 +255,7 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Accou
   std::vector<FoundTorqueEffect> out;
   const TorqueDesign& design = *account.design;
   const Choice& choice = account.choice;
+  const Shares shares(account);
   for (std::size_t k = 0; k < choice.groups.size(); ++k) {
     const TorqueGroup& group = group_of(design, choice.groups[k]);
     FoundTorqueEffect found;
@@ -249,7 +263,7 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Accou
     found.joints = group.joints;
     found.standard = group.standard && !problem.fitted_before && !account.inertias_given;
     found.parameters = parameters_of(design, group.columns, naming.fit());
-    found.share = naming.share(k);
+    found.share = shares.of(k);
     found.probability = naming.sure(k, &found.confounded_with);
     if (found.probability < kNamed) {
       small->push_back(group.effect + (group.joints.empty() ? "" : " at " + listed(group.joints)));
@@ -271,8 +285,11 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Accou
   return out;
 }
 
-std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& naming, const Choice& choice,
-                                      const std::vector<Noise>& noise, bool single) {
+std::vector<UnknownTorque> unknown_of(const Account& account, const Naming& naming, const std::vector<Noise>& noise,
+                                      bool single) {
+  const TorqueDesign& design = *account.design;
+  const Choice& choice = account.choice;
+  const Shares shares(account);
   std::vector<UnknownTorque> out;
   for (std::size_t k = 0; k < choice.groups.size(); ++k) {
     const TorqueGroup& group = group_of(design, choice.groups[k]);
@@ -280,7 +297,7 @@ std::vector<UnknownTorque> unknown_of(const TorqueDesign& design, const Naming& 
     UnknownTorque unknown;
     unknown.joint = group.joints.front();
     unknown.inputs = group.inputs;
-    unknown.share = naming.share(k);
+    unknown.share = shares.of(k);
     std::vector<TorqueAlternative> ignored;
     unknown.probability = naming.sure(k, &ignored);
     if (unknown.probability < kUnknown) continue;
@@ -471,9 +488,9 @@ std::vector<double> sureness(const Account& account) {
 bool hides_another(const Account& account, const std::vector<double>& sure, std::size_t at) {
   Account less = account;
   less.choice = Search::without(account.choice, at);
-  const std::vector<double> then = sureness(less);
-  for (std::size_t k = 0; k < then.size(); ++k) {
-    if (sure[k < at ? k : k + 1] < kNamed && then[k] >= kNamed) return true;
+  const Naming then(less);
+  for (std::size_t k = 0; k < less.choice.groups.size(); ++k) {
+    if (sure[k < at ? k : k + 1] < kNamed && then.is_likely(k)) return true;
   }
   return false;
 }
@@ -503,8 +520,7 @@ Choice likely_of(const Account& account) {
   const Naming naming(account);
   Choice out;
   for (std::size_t k = 0; k < account.choice.groups.size(); ++k) {
-    std::vector<TorqueAlternative> ignored;
-    if (naming.sure(k, &ignored) < kNamed) continue;
+    if (!naming.is_likely(k)) continue;
     out.groups.push_back(account.choice.groups[k]);
     out.scales.push_back(account.choice.scales[k]);
   }
@@ -524,7 +540,7 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
     out.warnings.push_back("fitted, and too small to be named, as something else may look so: " + listed(small));
   }
   const bool any = !out.effects.empty();
-  out.unknown = unknown_of(*functions.design, all, functions.choice, noise_of_functions, problem.single);
+  out.unknown = unknown_of(functions, all, noise_of_functions, problem.single);
   for (FoundTorqueEffect& standard : standard_effects(problem, account, naming, noise))
     out.effects.push_back(std::move(standard));
   out.covariance = covariance_of(*account.design, naming.fit(), parameters_in(out.effects));

@@ -65,33 +65,55 @@ Choice Search::without(const Choice& choice, std::size_t at) {
 }
 
 FoldFit::FoldFit(const Sums& sums, std::size_t fold, const std::vector<int>& nuisance, const VectorXd& precision)
-    : sums_(sums), fold_(sums.folds[fold]), nuisance_(nuisance), known_(sums.all.xx.cols(), false) {
+    : sums_(sums),
+      fold_(sums.folds[fold]),
+      nuisance_(nuisance),
+      columns_(static_cast<std::size_t>(sums.all.xx.cols())) {
   const Gram all = sums.all.of(nuisance), held = fold_.of(nuisance);
   MatrixXd d = all.xx - held.xx;
   d.diagonal() += precision;
   factor_ = factorised(std::move(d));
-  right_ = factor_.matrixL().solve(all.xy - held.xy);
-  half_.resize(static_cast<Index>(nuisance.size()), sums.all.xx.cols());
+  half_y_ = factor_.matrixL().solve(all.xy - held.xy);
+  follow_y_ = factor_.matrixU().solve(half_y_);
+  held_xx_ = held.xx;
+  left_y_ = held.xy - held.xx * follow_y_;
+  left_yy_ = held.yy - follow_y_.dot(held.xy + left_y_);
 }
 
-double FoldFit::squares(const Evidence::State& state) {
-  const auto n = static_cast<Index>(nuisance_.size()), m = static_cast<Index>(state.columns.size()) - n;
-  const Gram all = sums_.all.of(state.columns), held = fold_.of(state.columns);
-  const MatrixXd d = all.xx - held.xx;
-  const VectorXd right = all.xy - held.xy;
-  MatrixXd half(n, m);
-  for (Index k = 0; k < m; ++k) {
-    const int column = state.columns[static_cast<std::size_t>(n + k)];
-    if (!known_[static_cast<std::size_t>(column)]) half_.col(column) = factor_.matrixL().solve(d.col(n + k).head(n));
-    known_[static_cast<std::size_t>(column)] = true;
-    half.col(k) = half_.col(column);
+const FoldFit::Column& FoldFit::column(int number) {
+  Column& out = columns_[static_cast<std::size_t>(number)];
+  if (out.half.size() == 0) {
+    out.held = fold_.products(nuisance_, number);
+    VectorXd others(out.held.size());
+    for (Index k = 0; k < others.size(); ++k) others[k] = sums_.all.xx(nuisance_[static_cast<std::size_t>(k)], number);
+    out.half = factor_.matrixL().solve(others - out.held);
+    out.follow = factor_.matrixU().solve(out.half);
+    out.left = out.held - held_xx_ * out.follow;
   }
-  MatrixXd rest = d.bottomRightCorner(m, m) - half.transpose() * half;
+  return out;
+}
+
+// With the nuisance columns N eliminated, a column x is x - N b of the others' fit, b = (N^T N)^-1 N^T x.
+double FoldFit::squares(const Evidence::State& state) {
+  const std::vector<int> chosen(state.columns.begin() + static_cast<std::ptrdiff_t>(nuisance_.size()),
+                                state.columns.end());
+  const auto m = static_cast<Index>(chosen.size());
+  const Gram held = fold_.of(chosen), all = sums_.all.of(chosen);
+  MatrixXd rest = all.xx - held.xx, squares = held.xx;
+  VectorXd right = all.xy - held.xy, product = held.xy;
+  for (Index i = 0; i < m; ++i) {
+    const Column& one = column(chosen[static_cast<std::size_t>(i)]);
+    right[i] -= one.half.dot(half_y_);
+    product[i] -= one.held.dot(follow_y_) + one.follow.dot(left_y_);
+    for (Index k = 0; k <= i; ++k) {
+      const Column& other = column(chosen[static_cast<std::size_t>(k)]);
+      rest(i, k) -= one.half.dot(other.half);
+      squares(i, k) -= one.follow.dot(other.left) + one.held.dot(other.follow);
+    }
+  }
   rest.diagonal() += state.precision.tail(m);
-  VectorXd solution(n + m);
-  solution.tail(m) = factorised(std::move(rest)).solve(right.tail(m) - half.transpose() * right_);
-  solution.head(n) = factor_.matrixU().solve(right_ - half * solution.tail(m));
-  return squares_left(held, solution);
+  const VectorXd solution = factorised(rest.selfadjointView<Eigen::Lower>()).solve(right);
+  return left_yy_ - 2.0 * solution.dot(product) + solution.dot(squares.selfadjointView<Eigen::Lower>() * solution);
 }
 
 VectorXd Search::squares_of_folds(const Choice& choice) const { return squares_of_folds(evidence_.evaluate(choice)); }
@@ -102,8 +124,7 @@ VectorXd Search::squares_of_folds(const Evidence::State& state) const {
   return out;
 }
 
-double Search::squares_on(const FoldGram& other, const Choice& choice) const {
-  const Evidence::State state = evidence_.evaluate(choice);
+double Search::squares_on(const FoldGram& other, const Evidence::State& state) {
   return squares_left(other.of(state.columns), state.solution);
 }
 

@@ -32,13 +32,23 @@ class FoldFit {
   double squares(const Evidence::State& state);
 
  private:
+  /// One of the columns x beside the nuisance columns N; of these only what was asked for is known.
+  struct Column {
+    Eigen::VectorXd held;    ///< N^T x on the fold
+    Eigen::VectorXd half;    ///< L^-1 N^T x on the others
+    Eigen::VectorXd follow;  ///< what the nuisance columns' values give way by, for a value of one
+    Eigen::VectorXd left;    ///< N^T (x - N follow) on the fold
+  };
+  const Column& column(int number);
+
   const Sums& sums_;
   const FoldGram& fold_;
   const std::vector<int>& nuisance_;
-  Eigen::LLT<Eigen::MatrixXd> factor_;  ///< L L^T of the nuisance columns
-  Eigen::VectorXd right_;               ///< L^-1 of their right-hand side
-  Eigen::MatrixXd half_;                ///< L^-1 of their products with every column, where known_
-  std::vector<bool> known_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;          ///< L L^T of the nuisance columns on the others
+  Eigen::MatrixXd held_xx_;                     ///< their products on the fold
+  Eigen::VectorXd half_y_, follow_y_, left_y_;  ///< as of a column, of the torque
+  double left_yy_ = 0.0;                        ///< squared error of the nuisance columns alone
+  std::vector<Column> columns_;                 ///< by number
 };
 
 /// Candidates over one set of sums.
@@ -59,7 +69,7 @@ class Search {
   Eigen::VectorXd squares_of_folds(const Choice& choice) const;
   Eigen::VectorXd squares_of_folds(const Evidence::State& state) const;
   /// Squared error on other rows, by the fit to all folds.
-  double squares_on(const FoldGram& other, const Choice& choice) const;
+  static double squares_on(const FoldGram& other, const Evidence::State& state);
 
   /// The choice less its group number `at`.
   static Choice without(const Choice& choice, std::size_t at);

@@ -1,0 +1,97 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Fits that leave out a fold, from sums in which the columns that are always in are eliminated, against dense ones.
+
+#include <memory>
+#include <random>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <Eigen/Dense>
+
+#include "dynamics/search.hpp"
+
+using namespace truing;
+using namespace truing::dynamics;
+
+namespace {
+
+constexpr int kFolds = 3, kColumns = 7;
+const std::vector<int> kNuisance = {0, 1, 4};
+
+/// Rows of two joints that share some columns, by joint and fold.
+struct Rows {
+  std::vector<std::vector<int>> columns = {{0, 1, 2, 3, 5}, {1, 3, 4, 6}};
+  std::vector<std::vector<Eigen::MatrixXd>> x{2};
+  std::vector<std::vector<Eigen::VectorXd>> y{2};
+
+  Rows() {
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> normal(0.0, 1.0);
+    for (std::size_t j = 0; j < 2; ++j) {
+      for (int f = 0; f < kFolds; ++f) {
+        x[j].push_back(Eigen::MatrixXd::Zero(30, kColumns));
+        for (const int c : columns[j])
+          for (double& value : x[j].back().col(c)) value = normal(random);
+        y[j].push_back(Eigen::VectorXd::Zero(30));
+        for (double& value : y[j].back()) value = normal(random);
+        y[j].back() += x[j].back() * Eigen::VectorXd::LinSpaced(kColumns, -1.0, 2.0);
+      }
+    }
+  }
+
+  TorqueGrams grams() const {
+    auto out = std::make_shared<std::vector<JointGrams>>();
+    for (std::size_t j = 0; j < 2; ++j) {
+      out->push_back({columns[j], {}});
+      for (std::size_t f = 0; f < kFolds; ++f) {
+        const Eigen::MatrixXd mine = x[j][f](Eigen::all, columns[j]);
+        out->back().folds.push_back({mine.transpose() * mine, mine.transpose() * y[j][f], y[j][f].squaredNorm(), 30.0});
+      }
+    }
+    return out;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a fold is judged as by a dense fit to the others") {
+  const Rows rows;
+  const TorqueGrams grams = rows.grams();
+  std::vector<Noise> noise(2);
+  noise[0].sigma = 0.5;
+  noise[1].design_effect = 2.0;
+  Sums sums;
+  for (std::size_t f = 0; f < kFolds; ++f) sums.folds.emplace_back(grams, f, noise);
+  sums.all = sum_of_folds(*grams, noise, kColumns);
+  sums.precision = Eigen::VectorXd::Zero(kColumns);
+  const Eigen::VectorXd flat = Eigen::VectorXd::Constant(3, 1e-3);
+  for (std::size_t held = 0; held < kFolds; ++held) {
+    FoldFit fit(sums, held, kNuisance, flat);
+    for (const std::vector<int>& chosen : std::vector<std::vector<int>>{{}, {6}, {2, 3}, {5, 2, 6}}) {
+      CAPTURE(held);
+      CAPTURE(chosen.size());
+      Evidence::State state;
+      state.columns = kNuisance;
+      state.columns.insert(state.columns.end(), chosen.begin(), chosen.end());
+      state.precision = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(state.columns.size()), 0.2);
+      state.precision.head(3) = flat;
+      Eigen::MatrixXd normal = state.precision.asDiagonal();
+      Eigen::VectorXd right = Eigen::VectorXd::Zero(normal.rows());
+      const double weights[] = {1.0 / 0.25, 0.5};
+      for (std::size_t f = 0; f < kFolds; ++f) {
+        for (std::size_t j = 0; j < 2 && f != held; ++j) {
+          const Eigen::MatrixXd x = rows.x[j][f](Eigen::all, state.columns);
+          normal += weights[j] * x.transpose() * x;
+          right += weights[j] * x.transpose() * rows.y[j][f];
+        }
+      }
+      const Eigen::VectorXd solution = normal.ldlt().solve(right);
+      double squares = 0.0;
+      for (std::size_t j = 0; j < 2; ++j)
+        squares += weights[j] * (rows.y[j][held] - rows.x[j][held](Eigen::all, state.columns) * solution).squaredNorm();
+      CHECK(fit.squares(state) == doctest::Approx(squares).scale(0).epsilon(1e-11));
+    }
+  }
+}
