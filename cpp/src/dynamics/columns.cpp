@@ -148,6 +148,7 @@ DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design)
   for (const TorqueTerm& term : design.terms) {
     needs_rigid_ = needs_rigid_ || (term.link_parameter < 0 && term.needs_rigid);
     needs_torque_ = needs_torque_ || term.needs_torque;
+    needs_inertia_ = needs_inertia_ || term.needs_inertia;
   }
 }
 
@@ -159,6 +160,7 @@ const std::vector<MatrixXd>& DesignColumns::links_of(Tile* tile, std::vector<Mat
 
 void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&)>& wanted, Tables* tables) const {
   if (needs_rigid_) fill_rigid(&tile->motion);
+  if (needs_inertia_) fill_inertia(&tile->motion);
   std::vector<MatrixXd> made;
   std::vector<Index> next(by_joint_.size(), 0);
   std::map<std::string, std::pair<std::size_t, Index>> made_already;  // by TorqueTerm::column: joint and place

@@ -42,7 +42,7 @@ class DesignColumns {
   const TorqueDesign& design_;
   RigidChain chain_;
   std::vector<std::vector<int>> by_joint_;
-  bool needs_rigid_ = false, needs_torque_ = false;
+  bool needs_rigid_ = false, needs_torque_ = false, needs_inertia_ = false;
   mutable std::vector<Tables> kept_;  ///< by tile; empty: not yet made
   mutable std::vector<char> stale_;   ///< by tile: turned() since
 };

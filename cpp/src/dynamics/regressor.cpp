@@ -338,6 +338,22 @@ std::vector<Eigen::MatrixXd> regressor_columns(const RigidChain& chain, const Ei
   return out;
 }
 
+// Without gravity and at rest, an acceleration of one of a joint alone takes its column.
+std::vector<Eigen::MatrixXd> mass_matrix_columns(const Robot& robot, const Eigen::MatrixXd& q,
+                                                 const Eigen::VectorXd& links) {
+  Robot weightless = robot;
+  weightless.gravity.setZero();
+  const RigidChain chain(weightless);
+  const Eigen::MatrixXd still = Eigen::MatrixXd::Zero(q.rows(), q.cols());
+  std::vector<Eigen::MatrixXd> out;
+  for (Eigen::Index k = 0; k < chain.driven(); ++k) {
+    Eigen::MatrixXd one = still;
+    one.col(k).setOnes();
+    out.push_back(chain.torques(q, still, one, links));
+  }
+  return out;
+}
+
 // Kinetic energy of the rotors 1/2 sum I_i (C qd)_i^2: their mass matrix is C^T diag(I) C.
 Eigen::MatrixXd rotor_matrix(const Robot& robot) {
   const Eigen::MatrixXd coupling = coupling_matrix(robot);

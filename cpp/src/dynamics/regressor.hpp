@@ -76,6 +76,10 @@ void require_table(const char* name, const Eigen::MatrixXd& table, Eigen::Index 
 std::vector<Eigen::MatrixXd> regressor_columns(const RigidChain& chain, const Eigen::MatrixXd& q,
                                                const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd);
 
+/// Columns of the mass matrix of the robot's links at every row, joint by joint: shape=(rows, joints) each.
+std::vector<Eigen::MatrixXd> mass_matrix_columns(const Robot& robot, const Eigen::MatrixXd& q,
+                                                 const Eigen::VectorXd& links);
+
 /// Mass matrix of the rotors [kg m^2 | kg], of the joints that have a reading.
 Eigen::MatrixXd rotor_matrix(const Robot& robot);
 

@@ -36,6 +36,13 @@ void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, cons
   }
 }
 
+void fill_inertia(Motion* motion) {
+  const Eigen::VectorXd bodies = motion->bodies.size() > 0 ? motion->bodies : link_parameters(*motion->robot);
+  if (!motion->inertia.empty() && motion->inertia_of == bodies) return;
+  motion->inertia = mass_matrix_columns(*motion->robot, motion->q, bodies);
+  motion->inertia_of = bodies;
+}
+
 namespace {
 
 std::uint64_t next_number() {
@@ -116,6 +123,8 @@ MatrixXd TorqueModel::torque_by_direction(Motion* motion) const {
   motion->torque = seen_ ? seen : out;
   motion->bodies = seen_ ? seen_->links_ : links_;
   if (seen_) motion->carried = carried;
+  if (std::any_of(terms_.begin(), terms_.end(), [](const ValuedTerm& v) { return v.term.needs_inertia; }))
+    fill_inertia(motion);
   add_terms(terms_, true, *motion, &out);
   return out;
 }

@@ -28,6 +28,9 @@ std::vector<ValuedTerm> valued_terms(const Robot& robot, const MotionRange& rang
 void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, const Motion& motion,
                Eigen::MatrixXd* torque);
 
+/// Makes Motion::inertia where it is not there yet, or is that of other bodies.
+void fill_inertia(Motion* motion);
+
 /// A robot's torques with the payload that the recording states, and a correction beside them.
 class TorqueModel {
  public:

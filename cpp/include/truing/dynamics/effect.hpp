@@ -35,6 +35,10 @@ struct Motion {
   /// Of every joint, shape=(rows, 10 * links) each: torque for an inertial parameter of one (mass, first moments, xx yy
   /// zz xy xz yz about the origin of the frame after the link), link after link. Empty where no term needs it.
   std::vector<Eigen::MatrixXd> rigid;
+  /// Of every joint, shape=(rows, joints) each: torques for an acceleration of one of this joint alone, its column of
+  /// the mass matrix of `bodies`. Empty where no term needs it.
+  std::vector<Eigen::MatrixXd> inertia;
+  Eigen::VectorXd inertia_of;  ///< the bodies that it is of
   /// shape=(rows,) each: the further columns of the recording.
   std::map<std::string, Eigen::VectorXd> columns;
 
@@ -54,6 +58,7 @@ struct TorqueTerm {
   bool only_alternative = false;
   bool needs_rigid = true;      ///< the basis may look at Motion::rigid
   bool needs_direction = true;  ///< the basis may look at Motion::direction
+  bool needs_inertia = false;   ///< the basis looks at Motion::inertia
   /// Terms of one joint each that have the same name here have the same basis: it is evaluated once. Empty: no other
   /// has it.
   std::string column{};

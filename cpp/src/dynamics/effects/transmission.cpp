@@ -122,6 +122,10 @@ VectorXd flight_in_play(const VectorXd& load, const VectorXd& inertia, double pl
   double place = 0.0, speed = 0.0;
   if (load.size() > 0) out[0] = place = load[0] > 0.0 ? -side : side;
   for (Index i = 1; i < load.size(); ++i) {
+    out[i] = place;
+    const bool is_held =
+        speed == 0.0 && std::abs(place) == side && place * load[i - 1] <= 0.0 && place * load[i] <= 0.0;
+    if (is_held) continue;
     for (int part = 0; part < kStepsOfARow; ++part) {
       const double on = (part + 0.5) / kStepsOfARow;
       const double pull = -(load[i - 1] + on * (load[i] - load[i - 1])) / inertia[i];
@@ -136,17 +140,6 @@ VectorXd flight_in_play(const VectorXd& load, const VectorXd& inertia, double pl
   return out;
 }
 
-/// Torques of all joints for an acceleration of one of this joint alone: its column of the mass matrix, of the links as
-/// the fit has them.
-MatrixXd felt_inertia(const Motion& m, Index joint) {
-  Robot weightless = *m.robot;
-  weightless.gravity.setZero();
-  const MatrixXd still = MatrixXd::Zero(m.rows(), m.q.cols());
-  MatrixXd one = still;
-  one.col(joint).setOnes();
-  return RigidChain(weightless).torques(m.q, still, one, m.bodies);
-}
-
 const char* const kCrossed = "crossed";
 const char* const kBefore = "before";
 constexpr double kLeastInertia = 1e-9;  ///< [kg m^2] a link that has none flies at once
@@ -158,9 +151,9 @@ constexpr double kLeastInertia = 1e-9;  ///< [kg m^2] a link that has none flies
 TorqueForm backlash_over(const Robot& robot, std::size_t joint, double crossed, double before, double prior) {
   const auto at = static_cast<Index>(joint);
   TorqueTerm term = of_all_joints(robot, parameter_name("backlash", robot, joint), angle_unit(robot, joint), prior);
-  term.needs_torque = true;
+  term.needs_torque = term.needs_inertia = true;
   term.basis = [=](const Motion& m) -> MatrixXd {
-    MatrixXd inertia = felt_inertia(m, at);
+    MatrixXd inertia = m.inertia[joint];
     const VectorXd load = m.carried.col(at) - before * inertia.col(at).cwiseProduct(m.qdd.col(at));
     inertia.col(at) *= 1.0 - before;
     const VectorXd place = flight_in_play(load, inertia.col(at).cwiseMax(kLeastInertia), crossed, m.step);
