@@ -49,6 +49,7 @@ TorquePrediction predict(const Robot& robot, const Recording& recording, double 
   options.cutoff = cutoff;
   options.torque_per_ampere = drive_constants(robot, recordings, &warnings);
   options.short_stretches = true;  // every row has a prediction
+  options.one_pass = true;
   const MotionRange range = range_of(Tiles(recordings, robot, options, 1));
   const TorqueModel model(robot, valued_terms(robot, range, own_effects));
   const RigidChain chain(robot);

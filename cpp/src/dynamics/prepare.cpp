@@ -12,6 +12,7 @@
 #include "dynamics/payload.hpp"
 #include "dynamics/regressor.hpp"
 #include "dynamics/stretch.hpp"
+#include "dynamics/tile_file.hpp"
 #include "math/batch.hpp"
 #include "math/statistics.hpp"
 #include "math/text.hpp"
@@ -130,23 +131,40 @@ void for_each_tile(const Recording& recording, std::size_t number, const Robot& 
   }
 }
 
-Tiles::Tiles(const std::vector<Recording>& recordings, const Robot& robot, PrepareOptions options, int threads)
-    : recordings_(recordings), robot_(robot), options_(std::move(options)), threads_(threads) {
-  constexpr double kMostKept = 100.0 * 1024 * 1024;  ///< [bytes]
+namespace {
+
+/// What all rows take in memory, columns and tiles together [bytes]; infinity where a recording is longer than memory.
+double size_in_memory(const std::vector<Recording>& recordings) {
   double numbers = 0.0;
   for (const Recording& recording : recordings) {
-    if (recording.read) return;
+    if (recording.read) return std::numeric_limits<double>::infinity();
     const double each =
         5.0 * static_cast<double>(recording.position.cols() + 1) + static_cast<double>(recording.columns.size());
     numbers += each * static_cast<double>(recording.rows());
   }
-  kept_ = sizeof(double) * numbers < kMostKept;
-  if (!kept_) return;
-  std::vector<std::vector<Tile>> parts(recordings.size());
+  return sizeof(double) * numbers;
+}
+
+}  // namespace
+
+Tiles::Tiles(const std::vector<Recording>& recordings, const Robot& robot, PrepareOptions options, int threads)
+    : recordings_(recordings), robot_(robot), options_(std::move(options)), threads_(threads) {
+  constexpr double kMostKept = 100.0 * 1024 * 1024;  ///< [bytes]
+  kept_ = size_in_memory(recordings) < kMostKept;
+  if (kept_)
+    keep();
+  else if (!options_.one_pass)
+    write();
+}
+
+Tiles::~Tiles() = default;
+
+void Tiles::keep() {
+  std::vector<std::vector<Tile>> parts(recordings_.size());
   math::for_each_on_threads(
-      recordings.size(), threads, {},
+      recordings_.size(), threads_, {},
       [&](std::size_t r) {
-        for_each_tile(recordings[r], r, robot, options_, [&](Tile& tile) {
+        for_each_tile(recordings_[r], r, robot_, options_, [&](Tile& tile) {
           parts[r].push_back(std::move(tile));
           return true;
         });
@@ -156,39 +174,60 @@ Tiles::Tiles(const std::vector<Recording>& recordings, const Robot& robot, Prepa
   for (std::size_t k = 0; k < tiles_.size(); ++k) tiles_[k].number = k;
 }
 
+void Tiles::write() {
+  file_ = std::make_unique<TileFile>();
+  bool good = true;
+  for (std::size_t r = 0; r < recordings_.size() && good; ++r)
+    for_each_tile(recordings_[r], r, robot_, options_, [&](Tile& tile) { return good = file_->add(tile); });
+  if (!good) file_.reset();
+}
+
 Index Tiles::kept_rows() const {
   Index rows = 0;
   for (const Tile& tile : tiles_) rows += tile.count;
   return kept_ ? rows : -1;
 }
 
-void Tiles::for_each(const std::function<bool(std::size_t)>& wanted,
-                     const std::function<void(Tile&, std::size_t)>& work,
-                     const std::function<void(std::size_t)>& done) const {
-  std::vector<Tile*> lot;
-  const auto run = [&] {
-    math::for_each_on_threads(lot.size(), threads_, {}, [&](std::size_t k) { work(*lot[k], k); }, 1);
-    for (std::size_t k = 0; k < lot.size(); ++k) done(k);
-    lot.clear();
-  };
+void Tiles::for_each(const std::function<bool(std::size_t)>& wanted, const Work& work, const Done& done) const {
   if (kept_) {
-    for (Tile& tile : tiles_) {
-      if (wanted(tile.recording)) lot.push_back(&tile);
-      if (lot.size() == kTogether) run();
-    }
-    return run();
+    std::vector<Tile*> all;
+    for (Tile& tile : tiles_)
+      if (wanted(tile.recording)) all.push_back(&tile);
+    return in_lots(all.size(), [&](std::size_t number, std::size_t) -> Tile& { return *all[number]; }, work, done);
   }
   std::vector<Tile> made(kTogether);
+  if (file_) {
+    std::vector<std::size_t> all;
+    for (std::size_t k = 0; k < file_->size(); ++k)
+      if (wanted(file_->recording(k))) all.push_back(k);
+    const auto read = [&](std::size_t number, std::size_t k) -> Tile& {
+      return made[k] = file_->read(all[number], robot_);
+    };
+    return in_lots(all.size(), read, work, done);
+  }
+  std::size_t count = 0;
+  const auto run = [&] {
+    in_lots(count, [&](std::size_t, std::size_t k) -> Tile& { return made[k]; }, work, done);
+    count = 0;
+  };
   for (std::size_t r = 0; r < recordings_.size(); ++r) {
     if (!wanted(r)) continue;
     for_each_tile(recordings_[r], r, robot_, options_, [&](Tile& tile) {
-      made[lot.size()] = std::move(tile);
-      lot.push_back(&made[lot.size()]);
-      if (lot.size() == kTogether) run();
+      made[count++] = std::move(tile);
+      if (count == kTogether) run();
       return true;
     });
   }
   run();
+}
+
+void Tiles::in_lots(std::size_t count, const std::function<Tile&(std::size_t, std::size_t)>& tile, const Work& work,
+                    const Done& done) const {
+  for (std::size_t begin = 0; begin < count; begin += kTogether) {
+    const std::size_t some = std::min(kTogether, count - begin);
+    math::for_each_on_threads(some, threads_, {}, [&](std::size_t k) { work(tile(begin + k, k), k); }, 1);
+    for (std::size_t k = 0; k < some; ++k) done(k);
+  }
 }
 
 namespace {

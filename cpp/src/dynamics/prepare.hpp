@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -57,6 +58,7 @@ struct PrepareOptions {
   double cutoff = 8.0;                    ///< [Hz]
   std::vector<double> torque_per_ampere;  ///< [Nm/A | N/A] of joints measured by current
   bool short_stretches = false;           ///< those between gaps that are shorter than the filter, too
+  bool one_pass = false;                  ///< nobody asks for the tiles twice: they are not written to disk
 };
 
 /// Calls `use` with each tile of a recording, in order of time, as long as it returns true. Of a recording that is read
@@ -64,21 +66,24 @@ struct PrepareOptions {
 void for_each_tile(const Recording& recording, std::size_t number, const Robot& robot, const PrepareOptions& options,
                    const std::function<bool(Tile&)>& use);
 
-/// The tiles of recordings: kept, where they are few, and else made anew in every pass, so that memory does not grow
-/// with the rows.
+class TileFile;
+
+/// The tiles of recordings: kept, where they are few, and else on disk, so that memory does not grow with the rows.
+/// Where the disk has no room for them they are made anew in every pass.
 class Tiles {
  public:
   /// Both must outlive it. Throws as for_each_tile.
   Tiles(const std::vector<Recording>& recordings, const Robot& robot, PrepareOptions options, int threads);
+  ~Tiles();
 
+  using Work = std::function<void(Tile&, std::size_t k)>;
+  using Done = std::function<void(std::size_t k)>;
   /// So many tiles are worked on side by side.
   static constexpr std::size_t kTogether = 8;
   /// Calls work(tile, k) for the tiles of the wanted recordings, several at a time on several threads, k below
   /// kTogether, and after each such lot done(k) for each of them in their order: sums that are added up there do not
   /// depend on the number of threads.
-  void for_each(const std::function<bool(std::size_t recording)>& wanted,
-                const std::function<void(Tile&, std::size_t k)>& work,
-                const std::function<void(std::size_t k)>& done) const;
+  void for_each(const std::function<bool(std::size_t recording)>& wanted, const Work& work, const Done& done) const;
 
   const std::vector<Recording>& recordings() const { return recordings_; }
   /// Rows that the fit sees of all tiles together, where these are kept; -1: they are made anew.
@@ -89,12 +94,19 @@ class Tiles {
   int threads() const { return threads_; }
 
  private:
+  void keep();
+  void write();
+  /// `tile`: the one of this number, as k of its lot.
+  void in_lots(std::size_t count, const std::function<Tile&(std::size_t number, std::size_t k)>& tile, const Work& work,
+               const Done& done) const;
+
   const std::vector<Recording>& recordings_;
   const Robot& robot_;
   PrepareOptions options_;
   int threads_ = 0;
   bool kept_ = false;
   mutable std::vector<Tile> tiles_;
+  std::unique_ptr<TileFile> file_;  ///< null: tiles are kept, or made anew
 };
 
 /// What the recordings hold together.

@@ -164,6 +164,7 @@ std::vector<TorqueBlock> sum_torques(const Robot& robot, const Recording& record
   std::vector<std::string> unsaid;
   prepare.torque_per_ampere = drive_constants(robot, recordings, &unsaid);
   prepare.cutoff = options.cutoff;
+  prepare.one_pass = true;
   const Tiles tiles(recordings, robot, prepare, options.threads);
   const MotionRange range = range_of_no_recording(robot);
   const TorqueDesign design = usual_design(robot, range);

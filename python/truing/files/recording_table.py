@@ -55,7 +55,7 @@ _OF_JOINT = re.compile(r"(qd|ud|q|tau|i|u|temp)([1-9][0-9]*)(?:_(.*))?", re.ASCI
 _SETS = ("train", "test")
 _LARGEST_TIME = 1e11  # [s] seconds since any epoch are fewer
 _LARGEST_COVARIATE = 1e12
-MOST_IN_MEMORY = 25_000_000  # cells: larger Parquet files are read in pieces, in every pass over them anew
+MOST_IN_MEMORY = 25_000_000  # cells: larger Parquet files are read in pieces
 PIECE_ROWS = 65_536
 
 

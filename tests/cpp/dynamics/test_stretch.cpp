@@ -6,6 +6,7 @@
 #include <doctest/doctest.h>
 
 #include "dynamics/prepare.hpp"
+#include "dynamics/tile_file.hpp"
 #include "math/random.hpp"
 #include "support/swung_arm.hpp"
 #include "truing/dynamics.hpp"
@@ -99,6 +100,57 @@ TEST_CASE("tiles of a recording that is read are those of one in memory, to the 
       CHECK(found[k].measured == expected[k].measured);
       CHECK(found[k].moving == expected[k].moving);
     }
+  }
+}
+
+TEST_CASE("tiles come back from disk to the bit, in any order") {
+  const Robot robot = swung::level_arm();
+  const std::vector<dynamics::Tile> expected = tiles_of(recording(260.0), robot);
+  dynamics::TileFile file;
+  for (const dynamics::Tile& tile : expected) REQUIRE(file.add(tile));
+  REQUIRE(file.size() == expected.size());
+  for (const std::size_t k : {3, 0, 2, 1}) {
+    const dynamics::Tile found = file.read(k, robot);
+    CHECK(found.motion.robot == &robot);
+    CHECK(found.motion.step == expected[k].motion.step);
+    CHECK(found.weights == expected[k].weights);
+    CHECK(found.stride == expected[k].stride);
+    CHECK(found.first == expected[k].first);
+    CHECK(found.count == expected[k].count);
+    CHECK(found.motion.time == expected[k].motion.time);
+    CHECK(found.motion.q == expected[k].motion.q);
+    CHECK(found.motion.qd == expected[k].motion.qd);
+    CHECK(found.motion.qdd == expected[k].motion.qdd);
+    CHECK(found.motion.links == expected[k].motion.links);
+    CHECK(found.motion.columns == expected[k].motion.columns);
+    CHECK(found.measured == expected[k].measured);
+    CHECK(found.moving == expected[k].moving);
+  }
+}
+
+TEST_CASE("a recording that is longer than memory is read once, however many passes there are") {
+  const Robot robot = swung::level_arm();
+  std::vector<Recording> recordings = {read_in_pieces(recording(260.0), 65536)};
+  int times = 0;
+  recordings[0].read = [&times, read = recordings[0].read]() { return ++times, read(); };
+  for (const bool one_pass : {false, true}) {
+    dynamics::PrepareOptions options;
+    options.torque_per_ampere = {1.0, 1.0};
+    options.one_pass = one_pass;
+    times = 0;
+    const dynamics::Tiles tiles(recordings, robot, options, 2);
+    std::vector<Eigen::Index> rows;
+    for (int pass = 0; pass < 3; ++pass) {
+      Eigen::Index counted = 0;
+      std::vector<Eigen::Index> lot(dynamics::Tiles::kTogether);
+      tiles.for_each([](std::size_t) { return true; },
+                     [&](dynamics::Tile& tile, std::size_t k) { lot[k] = tile.count; },
+                     [&](std::size_t k) { counted += lot[k]; });
+      rows.push_back(counted);
+    }
+    CHECK(rows[0] > 0);
+    CHECK(rows == std::vector<Eigen::Index>(3, rows[0]));
+    CHECK(times == (one_pass ? 3 : 1));
   }
 }
 
