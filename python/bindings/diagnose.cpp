@@ -66,6 +66,12 @@ void bind_findings(py::module_& m) {
   auto share = define_result<Share>(m, "Share");
   share.def("__repr__", [](const Share& s) { return repr(s); });
 
+  auto fall = define_result<HeldOutFall>(m, "HeldOutFall");
+  fall.def("__repr__", [](const HeldOutFall& f) {
+    return "HeldOutFall(" + millimetres(f.mean) + " +- " + millimetres(f.sigma) + ", " + std::to_string(f.poses) +
+           " poses)";
+  });
+
   auto alternative = define_result<Alternative>(m, "Alternative");
   alternative.def("__repr__",
                   [](const Alternative& a) { return "Alternative(" + at_joints(a.effect, a.joints) + ")"; });

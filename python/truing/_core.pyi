@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'ColumnGain', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'FreeParameter', 'Frozen', 'GroupChoice', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'Motion', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'RowSums', 'SanityFinding', 'Scene', 'SeenColumns', 'ServoArm', 'ServoBodies', 'ServoPath', 'ServoRecording', 'ServoSet', 'ServoWindow', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueBlock', 'TorqueClass', 'TorqueColumns', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueSumOptions', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'choose_groups', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'free_parameters', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'links_off_chain', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'rank_columns', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_at', 'robot_from_urdf', 'robot_with_torques', 'rotation_from_rpy', 'rpy_from_rotation', 'seen_columns', 'servo_fields', 'servo_inputs', 'simulate_servos', 'simulate_servos_apart', 'simulate_streams', 'sum_columns', 'sum_rows', 'sum_torques', 'torque_columns', 'torque_effects', 'torque_regressor', 'torques_of_bodies', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'ColumnGain', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'FreeParameter', 'Frozen', 'GroupChoice', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'HeldOutFall', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'Motion', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'RowSums', 'SanityFinding', 'Scene', 'SeenColumns', 'ServoArm', 'ServoBodies', 'ServoPath', 'ServoRecording', 'ServoSet', 'ServoWindow', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueBlock', 'TorqueClass', 'TorqueColumns', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueSumOptions', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'choose_groups', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'free_parameters', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'joint_motion', 'lacks_directions', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'rank_columns', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_at', 'robot_from_urdf', 'robot_with_torques', 'rotation_from_rpy', 'rpy_from_rotation', 'seen_columns', 'servo_fields', 'servo_inputs', 'simulate_servos', 'simulate_servos_apart', 'simulate_streams', 'sum_columns', 'sum_rows', 'sum_torques', 'torque_columns', 'torque_effects', 'torque_regressor', 'torques_of_bodies', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -2325,6 +2325,33 @@ class Share:
         """
         1: all of it.
         """
+class HeldOutFall:
+    """
+    How the error of a held-out pose falls with what was found, pose by pose: of its rms error, so that
+    no single pose far out decides.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def mean(self) -> float:
+        """
+        [m] over the poses: error without what was found, less that with it.
+        """
+    @property
+    def poses(self) -> int:
+        """
+        Number of held-out poses.
+        """
+    @property
+    def probability(self) -> float:
+        """
+        That errors of other poses fall, too: Student's t of the paired differences.
+        """
+    @property
+    def sigma(self) -> float:
+        """
+        [m] standard error of the mean, by its scatter over the poses.
+        """
 class Alternative:
     """
     An effect that would explain the data as well.
@@ -2805,12 +2832,17 @@ class Diagnosis:
         'partly explained': more than the noise, and at most half of the gap
         'not explained': more than half of the gap; or nothing was named
         'no gap': there was none beyond noise
-        'does not hold': held-out errors are no less with what was found
+        'does not hold': held-out errors are larger with what was found, for sure
         """
     @property
     def gap(self) -> ErrorStatistics:
         """
         Held-out errors with base, targets (and anchor) fitted only.
+        """
+    @property
+    def held_out_fall(self) -> HeldOutFall:
+        """
+        How sure held-out poses are that what was found holds.
         """
     @property
     def joint_record(self) -> str:
@@ -2921,7 +2953,7 @@ class Diagnosis:
         'effects': named, and nothing is left
         'unknown': a gap that no effect of the catalogue explains
         'effects+unknown': named, and something is left
-        'does_not_hold': what was found does not make the error of held-out poses less: nothing of it is in `robot`
+        'does_not_hold': what was found makes errors of held-out poses larger, for sure: nothing of it is in `robot`
         """
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -7365,7 +7397,7 @@ class TorqueDiagnosis:
         'effects': named, and nothing is left
         'unknown': a gap that no effect of the catalogue explains
         'effects+unknown': named, and something is left
-        'does_not_hold': what was found does not make the error of held-out poses less: nothing of it is in `robot`
+        'does_not_hold': what was found makes errors of held-out poses larger, for sure: nothing of it is in `robot`
         """
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -8218,12 +8250,6 @@ def link_parameters(robot: Robot) -> typing.Annotated[numpy.typing.NDArray[numpy
     Of a link: mass, mass times centre of mass (x, y, z), inertia about the origin of the frame after the link (xx, yy, zz,
     xy, xz, yz) [kg, kg m, kg m^2]; what is not known is zero.
     """
-def links_off_chain(urdf_text: str, base_link: str = '', tip_link: str = '') -> list[str]:
-    """
-    Links that the chain carries and that move by joints of their own, as a gripper's fingers do.
-    
-    Their masses are merged into the link that carries them, as they stand at zero. Raises InputError as robot_from_urdf.
-    """
 def nearest_contact(scene: Scene, robot: Robot, joints: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], target: typing.SupportsInt | typing.SupportsIndex = 0) -> Contact:
     """
     The nearest pair at these readings, effects left out; without names when there is none to look at.
@@ -8298,7 +8324,7 @@ def robot_from_urdf(urdf_text: str, base_link: str = '', tip_link: str = '') -> 
     The chain from `base_link` to `tip_link` of a URDF text, as a robot of convention 'urdf'.
     
     Fixed joints are folded into the next moving joint, the last ones into the tool; masses and inertias of links are
-    merged the same way, also of what moves off the chain (fingers), as it stands at zero; `mimic` becomes `driven_by`, `<dynamics>` the torque effects coulomb and viscous. Empty link names: the only root, the only leaf.
+    merged the same way; `mimic` becomes `driven_by`, `<dynamics>` the torque effects coulomb and viscous. Empty link names: the only root, the only leaf.
     Raises InputError: not a URDF, unknown base or tip (lists the links there are), tip not below base, planar or
     floating joint.
     """

@@ -43,7 +43,7 @@ enum class Verdict {
   effects,              ///< named, and nothing is left
   unknown,              ///< a gap that no effect of the catalogue explains
   effects_and_unknown,  ///< "effects+unknown": named, and something is left
-  does_not_hold,        ///< what was found does not make the error of held-out poses less: nothing of it is in `robot`
+  does_not_hold,        ///< what was found makes errors of held-out poses larger, for sure: nothing of it is in `robot`
 };
 
 /// How much of the gap the named effects leave, as mean squares of held-out errors beyond the noise.
@@ -52,7 +52,7 @@ enum class Explained {
   partly_explained,  ///< "partly explained": more than the noise, and at most half of the gap
   not_explained,     ///< "not explained": more than half of the gap; or nothing was named
   no_gap,            ///< "no gap": there was none beyond noise
-  does_not_hold,     ///< "does not hold": held-out errors are no less with what was found
+  does_not_hold,     ///< "does not hold": held-out errors are larger with what was found, for sure
 };
 
 /// A fraction and its 90 % interval.
@@ -60,6 +60,15 @@ struct Share {
   double value = 0.0;  ///< 1: all of it
   double low = 0.0;    ///< lower end
   double high = 0.0;   ///< upper end
+};
+
+/// How the error of a held-out pose falls with what was found, pose by pose: of its rms error, so that no single pose
+/// far out decides.
+struct HeldOutFall {
+  std::size_t poses = 0;     ///< number of held-out poses
+  double mean = 0.0;         ///< [m] over the poses: error without what was found, less that with it
+  double sigma = 0.0;        ///< [m] standard error of the mean, by its scatter over the poses
+  double probability = 0.5;  ///< that errors of other poses fall, too: Student's t of the paired differences
 };
 
 /// An effect that would explain the data as well.
@@ -187,6 +196,7 @@ struct Diagnosis {
   double noise_floor = 0.0;                 ///< [m] rms length of a row's error that is noise
   bool noise_from_repeats = false;          ///< the noise is that of repeated poses, not what a flexible fit leaves
   Share shrink;                             ///< of the held-out rms, by `robot`: 1 - its error / gap
+  HeldOutFall held_out_fall;                ///< how sure held-out poses are that what was found holds
   double closable = 0.0;  ///< fraction of the gap's mean square above the noise floor that the named effects close
   double p_gap = 1.0;     ///< p-value of the gap: probability of a gain as large under noise alone
   ErrorStatistics after;  ///< held-out errors with all named effects, corrections of their laws and drifts included

@@ -640,19 +640,37 @@ static std::string would_have_shown(std::vector<Detectable> detectable) {
          (converted ? shown.unit : easiest.unit) + " would have shown.";
 }
 
+/// "the error of the 5 poses held out falls by 0.12 mm in the mean, with a standard error of 0.2 mm".
+static std::string fall_in_words(const HeldOutFall& fall) {
+  return "the error of the " + std::to_string(fall.poses) + " poses held out " + (fall.mean < 0.0 ? "rises" : "falls") +
+         " by " + millimetres(std::abs(fall.mean)) + " in the mean, with a standard error of " +
+         millimetres(fall.sigma);
+}
+
 static std::string causes_in_words(const Diagnosis& d) {
   if (d.effects.empty())
     return "There is a gap of " + millimetres(d.gap.rms) + " that no effect of the catalogue explains.";
+  if (d.after.rms > d.gap.rms)
+    return "Held-out poses neither confirm nor contradict what explains the others: " + largest_causes(d) + ".";
   return "The gap of " + millimetres(d.gap.rms) + " shrinks to " + millimetres(d.after.rms) + ": " + largest_causes(d) +
          ".";
+}
+
+/// How sure it is where held-out poses leave a doubt.
+static std::string doubt_in_words(const Diagnosis& d) {
+  const HeldOutFall& fall = d.held_out_fall;
+  if (d.effects.empty() || fall.poses < 2 || fall.probability > kConfirmed) return "";
+  return " That other poses gain by it is sure to " + number(100.0 * fall.probability, 2) +
+         " %: " + fall_in_words(fall) + "." + (d.after.rms > d.gap.rms ? answerable_questions(d) : "") +
+         " Measure more poses.";
 }
 
 static std::string failure_in_words(const Diagnosis& d) {
   const double after = d.effects.empty() ? d.after_unknown.rms : d.after.rms;
   return "The model found does not hold on poses that it never saw: their error of " + millimetres(d.gap.rms) +
          " would be " + millimetres(after) + " with " +
-         (d.effects.empty() ? std::string("the functions found") : largest_causes(d)) +
-         ". Nothing of it is in the robot's file." + answerable_questions(d) +
+         (d.effects.empty() ? std::string("the functions found") : largest_causes(d)) + " (" +
+         fall_in_words(d.held_out_fall) + "). Nothing of it is in the robot's file." + answerable_questions(d) +
          " Measure more poses, spread over the whole range.";
 }
 
@@ -694,7 +712,7 @@ std::string sentence_of(const Diagnosis& d) {
            millimetres(d.noise_floor) + "." + would_have_shown(d.detectable);
   }
   if (d.verdict == Verdict::does_not_hold) return failure_in_words(d);
-  return causes_in_words(d) + unknown_in_words(d);
+  return causes_in_words(d) + doubt_in_words(d) + unknown_in_words(d);
 }
 
 }  // namespace truing::diagnosis

@@ -29,7 +29,6 @@ namespace {
 
 using Kind = Explanation::Kind;
 constexpr double kCorrectionShare = 0.05;  ///< of the gap, from which on a law's correction is something unknown
-constexpr double kHardlyLess = 0.98;       ///< of the gap: what is left of it where nothing was explained
 constexpr double kManyOutliers = 0.05;     ///< of the rows, from which on they are no exceptions
 constexpr double kSmallGain = 0.02;        ///< of the error, that is not worth a line if it may be none
 constexpr double kNamed = 0.5;             ///< a name is given to what is more likely right than wrong
@@ -243,6 +242,7 @@ bool has_functions(const Work& work, const Decision& decision) {
 struct Fitted {
   Refit by_catalogue, by_named, by_all;
   Residuals after_all;
+  HeldOutFall by_robot;  ///< by `by_catalogue` alone
 };
 
 Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs,
@@ -276,9 +276,16 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
   out->gap = judged(out->error_before);
   out->after = judged(out->error_after);
   out->after_unknown = judged(lengths(fitted.after_all));
+  const auto fall_to = [&](const std::vector<double>& errors) {
+    return fall_of(out->error_before, errors, whole.set, whole.cluster);
+  };
+  if (!every_group.empty())
+    out->held_out_fall = fall_to(named_groups.empty() ? lengths(fitted.after_all) : out->error_after);
   if (catalogue_groups.empty()) return fitted;
-  const double by_robot = judged(lengths(left_by(out->robot, whole.options.own_effects))).rms;
-  out->shrink = percentile_interval(resampled.shrink, out->gap.rms > 0.0 ? 1.0 - by_robot / out->gap.rms : 0.0);
+  const std::vector<double> by_robot = lengths(left_by(out->robot, whole.options.own_effects));
+  fitted.by_robot = fall_to(by_robot);
+  out->shrink =
+      percentile_interval(resampled.shrink, out->gap.rms > 0.0 ? 1.0 - judged(by_robot).rms / out->gap.rms : 0.0);
   return fitted;
 }
 
@@ -387,11 +394,7 @@ void question_noise(double beyond_repeats, Diagnosis* out) {
 }
 
 Verdict verdict_of(const Diagnosis& d) {
-  const bool by_functions = std::any_of(d.unknown.begin(), d.unknown.end(),
-                                        [](const UnknownEffect& unknown) { return !unknown.inputs.empty(); });
-  const ErrorStatistics& after = d.effects.empty() && by_functions ? d.after_unknown : d.after;
-  const bool hardly_less = after.rms > kHardlyLess * d.gap.rms && d.shrink.low < 0.0;
-  if (after.rms > d.gap.rms || hardly_less) return Verdict::does_not_hold;
+  if (d.held_out_fall.probability < kContradicted) return Verdict::does_not_hold;
   if (d.effects.empty()) return d.unknown.empty() ? Verdict::none : Verdict::unknown;
   return d.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown;
 }
@@ -480,7 +483,8 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   }
   share_the_gap(&result);
   result.verdict = verdict_of(result);
-  if (result.verdict == Verdict::does_not_hold || result.shrink.value < 0.0) {  // no robot worse than nothing
+  const bool contradicted = result.verdict == Verdict::does_not_hold || fitted.by_robot.probability < kContradicted;
+  if (contradicted) {  // no robot worse than nothing
     result.robot = whole.frames.robot;
     result.shrink = {};
   }

@@ -152,6 +152,13 @@ double shrink_of(const UnseenErrors& before, const UnseenErrors& after);
 /// The same, and its 90 % interval over draws of the folds.
 Share shrinkage(const UnseenErrors& before, const UnseenErrors& after, int draws, std::uint64_t seed);
 
+constexpr double kContradicted = 0.05;  ///< probability that errors of other poses fall, below which they rise for sure
+constexpr double kConfirmed = 0.95;     ///< the same, from which on they fall for sure
+
+/// How errors of held-out poses fall, pose by pose: lengths of all rows' errors without and with what was found.
+HeldOutFall fall_of(const std::vector<double>& before, const std::vector<double>& after,
+                    const std::vector<std::int8_t>& set, const std::vector<std::int32_t>& cluster);
+
 // --- decide.cpp: what explains the gap -------------------------------------------------------------------------------
 
 constexpr double kLackOfFit = 4.0;  ///< standard errors beyond repeats, from which on what is left is no noise

@@ -12,6 +12,7 @@
 #include <numeric>
 
 #include "math/random.hpp"
+#include "math/student.hpp"
 
 namespace truing::diagnosis {
 namespace {
@@ -114,6 +115,32 @@ UnseenErrors unseen_errors(const Work& work, const Choice& choice) {
   }
   for (double& length : out.length) length = std::sqrt(length);
   for (const auto& [fold, square] : squares) out.square_of_fold.push_back(square);
+  return out;
+}
+
+HeldOutFall fall_of(const std::vector<double>& before, const std::vector<double>& after,
+                    const std::vector<std::int8_t>& set, const std::vector<std::int32_t>& cluster) {
+  struct Squares {
+    double before = 0.0, after = 0.0, rows = 0.0;
+  };
+  std::map<std::int32_t, Squares> of_pose;
+  for (std::size_t row = 0; row < before.size(); ++row) {
+    if (!set[row] || !std::isfinite(before[row]) || !std::isfinite(after[row])) continue;
+    Squares& squares = of_pose[cluster[row]];
+    squares.before += before[row] * before[row];
+    squares.after += after[row] * after[row];
+    squares.rows += 1.0;
+  }
+  Eigen::VectorXd fall(static_cast<Eigen::Index>(of_pose.size()));
+  Eigen::Index at = 0;
+  for (const auto& [pose, s] : of_pose) fall[at++] = std::sqrt(s.before / s.rows) - std::sqrt(s.after / s.rows);
+  HeldOutFall out;
+  out.poses = of_pose.size();
+  if (out.poses < 2) return out;
+  const auto n = static_cast<double>(out.poses);
+  out.mean = fall.mean();
+  out.sigma = (fall.array() - out.mean).matrix().norm() / std::sqrt(n * (n - 1.0));
+  if (out.sigma > 0.0) out.probability = student_probability(out.mean / out.sigma, static_cast<int>(out.poses) - 1);
   return out;
 }
 

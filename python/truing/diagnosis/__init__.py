@@ -10,6 +10,7 @@ from truing._core import (
     DiagnoseOptions as DiagnoseOptions,
     Diagnosis as Diagnosis,
     FoundEffect as FoundEffect,
+    HeldOutFall as HeldOutFall,
     NextPose as NextPose,
     SanityFinding as SanityFinding,
     Share as Share,

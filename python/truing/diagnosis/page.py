@@ -142,16 +142,14 @@ def _fall(result: Mapping[str, Any]) -> str:
     if result["effects"]:
         by_robot = gap * (1.0 - shrink["value"])
         same = abs(by_robot - after) <= 0.03 * after
-        less = f"{_percent(1.0 - after / gap if gap else 0.0)} less"
+        less = _less(1.0 - after / gap if gap else 0.0)
         texts.append(
             f'→ <span class="after">{length_text(after)}</span> with'
             f" {'what is' if len(result['effects']) > 1 else 'the effect'} named, {less}"
             + (f" ({sure})" if same else "")
         )
         if not same:  # drifts and corrections of laws are no part of a robot
-            texts.append(
-                f"{length_text(by_robot)} by robot.yaml alone, {_percent(shrink['value'])} less ({sure})"
-            )
+            texts.append(f"{length_text(by_robot)} by robot.yaml alone, {_less(shrink['value'])} ({sure})")
     free = _free(result)
     if free:
         texts.append(
@@ -160,6 +158,10 @@ def _fall(result: Mapping[str, Any]) -> str:
             f"for what is unknown{'' if texts else ', not by anything known'}"
         )
     return "; ".join(texts)
+
+
+def _less(share: float) -> str:
+    return f"{_percent(abs(share))} {'more' if share < 0.0 else 'less'}"
 
 
 def _free(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:

@@ -74,6 +74,12 @@ def diagnosis_dict(found: _core.Diagnosis, *, warnings: Iterable[str] = ()) -> d
         "after": {**statistics_dict(found.after), "remaining_structure_p": found.remaining_structure_p},
         "after_unknown": statistics_dict(found.after_unknown),
         "shrink": {"value": found.shrink.value, "ci": _interval(found.shrink)},
+        "held_out_fall": {
+            "poses": found.held_out_fall.poses,
+            "mean_m": found.held_out_fall.mean,
+            "sigma_m": found.held_out_fall.sigma,
+            "probability": found.held_out_fall.probability,
+        },
         "effects": [_effect(e, found.robot) for e in found.effects],
         "unknown": [_unknown(u, found.robot) for u in found.unknown],
         "where": {

@@ -1,0 +1,73 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// How sure held-out poses are that errors fall.
+
+#include <doctest/doctest.h>
+
+#include <numeric>
+
+#include "diagnosis/diagnosis.hpp"
+
+using truing::Diagnosis;
+using truing::FoundEffect;
+using truing::HeldOutFall;
+using truing::Verdict;
+using truing::diagnosis::fall_of;
+using truing::diagnosis::kConfirmed;
+using truing::diagnosis::kContradicted;
+using truing::diagnosis::sentence_of;
+
+namespace {
+
+/// Every row a pose of its own, all held out.
+HeldOutFall fall_of_poses(const std::vector<double>& before, const std::vector<double>& after) {
+  std::vector<std::int32_t> poses(before.size());
+  std::iota(poses.begin(), poses.end(), 0);
+  return fall_of(before, after, std::vector<std::int8_t>(before.size(), 1), poses);
+}
+
+bool is_sure(const HeldOutFall& fall) { return fall.probability < kContradicted || fall.probability > kConfirmed; }
+
+}  // namespace
+
+TEST_CASE("five poses whose errors scatter neither confirm nor contradict what was found") {
+  const HeldOutFall fall = fall_of_poses({1e-3, 1e-3, 1e-3, 1e-3, 1e-3}, {0.5e-3, 0.4e-3, 0.7e-3, 0.9e-3, 3.1e-3});
+  CHECK(fall.poses == 5);
+  CHECK(fall.mean == doctest::Approx(-0.12e-3));  // and its rms rises by half
+  CHECK(!is_sure(fall));
+  CHECK(fall_of_poses({1e-3, 1.1e-3, 1.2e-3, 1e-3}, {0.5e-3, 0.7e-3, 0.6e-3, 0.6e-3}).probability > kConfirmed);
+  CHECK(fall_of_poses({1e-3, 1.1e-3, 1.2e-3, 1e-3}, {1.5e-3, 1.7e-3, 1.6e-3, 1.6e-3}).probability < kContradicted);
+  CHECK(fall_of_poses({1e-3}, {2e-3}).probability == 0.5);
+  CHECK(fall_of_poses({1e-3, 2e-3}, {1e-3, 2e-3}).probability == 0.5);
+}
+
+TEST_CASE("rows of one held-out pose count as one, and rows that were learned from do not count") {
+  const HeldOutFall fall = fall_of({1e-3, 1e-3, 2e-3, 9.0}, {0.0, 0.0, 1e-3, 0.0}, {1, 1, 1, 0}, {0, 0, 1, 2});
+  CHECK(fall.poses == 2);
+  CHECK(fall.mean == doctest::Approx(1e-3));
+}
+
+TEST_CASE("the sentence says how sure held-out poses are") {
+  Diagnosis d;
+  d.verdict = Verdict::effects;
+  d.gap.rms = 1e-3;
+  d.after.rms = 0.8e-3;
+  FoundEffect spring;
+  spring.effect = "joint_compliance";
+  spring.joints = {"J2"};
+  d.effects = {spring};
+  d.held_out_fall = {5, 0.1e-3, 0.1e-3, 0.8};
+  CHECK(sentence_of(d) ==
+        "The gap of 1 mm shrinks to 0.8 mm: joint compliance at J2. That other poses gain by it is sure to 80 %: the "
+        "error of the 5 poses held out falls by 0.1 mm in the mean, with a standard error of 0.1 mm. Measure more "
+        "poses.");
+  d.after.rms = 1.2e-3;
+  d.held_out_fall = {5, -0.1e-3, 0.1e-3, 0.2};
+  CHECK(sentence_of(d).find("Held-out poses neither confirm nor contradict what explains the others: joint "
+                            "compliance at J2. That other poses gain by it is sure to 20 %: the error of the 5 poses "
+                            "held out rises by 0.1 mm") == 0);
+  d.after.rms = 0.8e-3;
+  d.held_out_fall = {30, 0.2e-3, 0.02e-3, 0.999};
+  CHECK(sentence_of(d) == "The gap of 1 mm shrinks to 0.8 mm: joint compliance at J2.");
+}
