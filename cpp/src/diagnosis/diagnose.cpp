@@ -10,10 +10,12 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <stdexcept>
 
 #include "diagnosis/diagnosis.hpp"
+#include "diagnosis/gravity.hpp"
 #include "diagnosis/sanity.hpp"
 #include "diagnosis/where.hpp"
 #include "math/statistics.hpp"
@@ -121,6 +123,16 @@ Work prepare(Registered given) {
   work.noise = std::move(weighted.noise);
   work.grams = make_grams(work.design, work.noise.design_effect, options.threads);
   return work;
+}
+
+/// The same; where springs show another gravity than the robot's file has, with that one.
+Work prepare_under_gravity(Registered* whole, const std::vector<std::int32_t>& rows, Robot* robot, Diagnosis* out) {
+  Work work = prepare(part_of(*whole, rows));
+  const std::optional<Eigen::Vector3d> down = whole->mistaken ? std::nullopt : other_gravity(work);
+  if (!down) return work;
+  robot->gravity = whole->frames.robot.gravity = *down;
+  out->sanity.push_back(gravity_finding(*down));
+  return prepare(part_of(*whole, rows));
 }
 
 void say_what_is_not_testable(const Work& work, Diagnosis* out) {
@@ -425,8 +437,9 @@ bool DiagnoseOptions::is_valid(std::string* error) const {
   return true;
 }
 
-Diagnosis diagnose(const Robot& robot, const Measurements& given, const DiagnoseOptions& options) {
-  refuse_what_cannot_be_used(robot, given, options);
+Diagnosis diagnose(const Robot& as_written, const Measurements& given, const DiagnoseOptions& options) {
+  refuse_what_cannot_be_used(as_written, given, options);
+  Robot robot = as_written;
   Diagnosis result;
   result.seed = options.seed;
 
@@ -436,9 +449,8 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   result.joint_record = checked.joint_record;
 
   // 1. Registration: the gap.
-  const Registered whole = register_data(robot, checked, options);
+  Registered whole = register_data(robot, checked, options);
   result.set = whole.set;
-  result.robot_before = whole.frames.robot;
   if (checked.inferred_direction) result.directions = copied(whole.data.direction, whole.data.rows);
 
   // 1. and 2. Columns, noise and weights, of all rows or, of very many, evenly some.
@@ -447,7 +459,8 @@ Diagnosis diagnose(const Robot& robot, const Measurements& given, const Diagnose
   if (thinned)
     result.warnings.push_back("searched on " + std::to_string(rows.size()) + " of " + std::to_string(whole.data.rows) +
                               " rows; fitted and judged on all");
-  Work work = prepare(part_of(whole, rows));
+  Work work = prepare_under_gravity(&whole, rows, &robot, &result);
+  result.robot_before = whole.frames.robot;
   say_what_is_not_testable(work, &result);
   say_outliers(work, rows, &result);
 

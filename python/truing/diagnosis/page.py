@@ -51,6 +51,7 @@ STRUCTURE = 0.05  # where the test of what is left finds structure below it
 MANY_OUTLIERS = 0.05  # of the rows: so many are no exceptions
 CONTENDER = 0.25  # of a cause's probability: an alternative that must be reckoned with
 FEW_PARAMETERS = 3  # more are no size that one can look at
+READ_OTHERWISE = ("gravity_direction",)  # findings that change what is read
 ALIKE = 0.05  # of the gap: inputs that explain as much as each other, within this
 _TONES = {
     "no gap": "good",
@@ -123,8 +124,14 @@ def _headline(result: Mapping[str, Any], rows: Rows) -> str:
         f'<header><p class="kicker">truing diagnose · {escaped(result.get("robot"))} ·'
         f' {counted(rows.count, "row")}<span class="verdict'
         f' {tone}">{label}</span></p><h1{size}>{escaped(first)}</h1>{more}<p'
-        f' class="sub">{numbers}</p></header>'
+        f' class="sub">{numbers}</p>{_corrected(result)}</header>'
     )
+
+
+def _corrected(result: Mapping[str, Any]) -> str:
+    """What was read otherwise than it is written, a line each."""
+    found = [f for f in result["sanity"] if f["kind"] in READ_OTHERWISE]
+    return "".join(f'<p class="sub"><b>Corrected first:</b> {escaped(f["text"])}</p>' for f in found)
 
 
 def _fall(result: Mapping[str, Any]) -> str:
@@ -173,7 +180,7 @@ def trouble(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Findings about the data that make conclusions doubtful; the others of `sanity` say how the data were
     read.
     """
-    calm = {"direction"}
+    calm = {"direction", *READ_OTHERWISE}
     if result["joint_record"] in ("", "q"):
         calm.add("joint_record")
     if not _many_outliers(result):

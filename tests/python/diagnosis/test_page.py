@@ -303,6 +303,13 @@ def test_how_the_data_were_read_is_no_trouble() -> None:
     assert "columns dir1" in text
 
 
+def test_a_gravity_that_was_corrected_is_said_in_the_head() -> None:
+    text = "gravity points along -1.00 0.00 0.00 of the base, not as the file has it."
+    result = some_result("effects", sanity=[{"kind": "gravity_direction", "text": text, "rows": []}])
+    page = visible(diagnosis_report(result, some_rows()))
+    assert f"Corrected first: {text}" in page and "Look at the data first" not in page
+
+
 @pytest.mark.parametrize(("outliers", "first"), [(3, False), (12, True)])
 def test_rows_that_count_little_are_a_warning_when_they_are_many(outliers: int, first: bool) -> None:
     found = [{"kind": "outliers", "text": "rows stand far out.", "rows": []}]
