@@ -2661,8 +2661,8 @@ class SanityFinding:
     @property
     def kind(self) -> str:
         """
-        'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'convention', 'duplicates', 'direction',
-        'lag', 'moved_target', 'constant' or 'outliers'.
+        'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'convention', 'gravity_direction',
+        'duplicates', 'direction', 'lag', 'moved_target', 'constant' or 'outliers'.
         """
     @property
     def mistake(self) -> bool:
