@@ -601,7 +601,8 @@ bool links_predict(const Work& work, const Choice& choice, std::size_t at) {
 static std::vector<FunctionBeside> functions_beside(const FreeScan& scan) {
   std::vector<FunctionBeside> out;
   for (const FreeGain& found : scan.best) {
-    if (found.what.inputs.size() == 1) out.push_back({found.what.site, found.what.inputs[0], found.gain.evidence});
+    const bool of_one = found.what.inputs.size() == 1;
+    out.push_back({found.what.site, found.what.inputs, of_one ? found.gain.evidence : found.gain.score});
   }
   return out;
 }

@@ -67,11 +67,11 @@ struct TooLarge {
   ColumnGroup candidate{};  ///< as it was
 };
 
-/// What a free function of one input would still win, at a joint.
+/// What a free function of one or two inputs would still win, at a joint.
 struct FunctionBeside {
   std::string joint;
-  int input = -1;
-  double evidence = 0.0;  ///< log Bayes factor
+  std::vector<int> inputs;
+  double evidence = 0.0;  ///< log Bayes factor; of two inputs less what having tried all of them costs
 };
 
 /// Everything that was decided.
@@ -245,6 +245,12 @@ void set_aside(const std::vector<TooLarge>& too_large, std::size_t groups, const
 void say_what_is_negative(Diagnosis* out);
 /// What looks like an effect that no machine has: said of the unknown at its joint, or as one of its own.
 void describe_what_is_too_large(const Work& work, const Evidence& evidence, const Decision& decision, Diagnosis* out);
+
+// --- local_shapes.cpp: steps, corners and bumps ----------------------------------------------------------------------
+
+/// What the best of them would win at a joint along an input [nats], less what having scanned all of them costs.
+double best_local_shape(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint,
+                        int input);
 
 // --- sureness.cpp: how sure that is ----------------------------------------------------------------------------------
 

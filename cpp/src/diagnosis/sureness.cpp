@@ -109,6 +109,20 @@ class Contest {
   bool like_geometry_;
 };
 
+/// A smooth law against a step, a corner or a bump of its input: in its place or beside it.
+static bool is_shape_as_good(const Work& work, const Evidence& evidence, const Evidence::State& state,
+                             const Contest& contest, int group) {
+  const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(group)];
+  if (name.kind != Kind::catalogue || name.joints.size() != 1 || name.period > 0.0) return false;
+  const std::size_t joint = work.given.frames.robot.joint_index(name.joints[0]);
+  const bool of_angle = name.driver.empty() && follows_own_angle(effect_traits(work, name));
+  const int input = input_named(work, of_angle ? input_name(Driver::angle, joint) : name.driver);
+  if (input < 0) return false;
+  const double cost = work.design.candidates.groups[static_cast<std::size_t>(group)].cost;
+  return best_local_shape(work, evidence, state, joint, input) > 0.0 ||
+         best_local_shape(work, evidence, contest.less(), joint, input) > contest.removal_loss() + cost - kClassNats;
+}
+
 /// A law against any function of its input at the joint, with knots. Where the law is right, the function pays for its
 /// many columns and finds nothing beside it.
 static bool is_law_in_question(const Work& work, const Evidence& evidence, const Evidence::State& state,
@@ -138,7 +152,9 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
   const Contest contest(work, evidence, state, at);
   Sureness out;
   out.removal_loss = contest.removal_loss();
-  out.law_in_question = is_law_in_question(work, evidence, state, contest, state.choice.groups[at]);
+  const int group = state.choice.groups[at];
+  out.law_in_question = is_law_in_question(work, evidence, state, contest, group) ||
+                        is_shape_as_good(work, evidence, state, contest, group);
   double all = 1.0 + std::exp(-kTempered * std::max(0.0, out.removal_loss)), of_class = 1.0;
   for (const Evidence::Gain& gain : contest.gains()) {
     if (!contest.is_rival(gain.group)) continue;
@@ -161,14 +177,16 @@ bool is_function_beside(const Work& work, const Decision& decision, const Explan
   const EffectTraits& traits = effect_traits(work, name);
   const std::string own_angle = input_name(Driver::angle, work.given.frames.robot.joint_index(name.joints[0]));
   return std::any_of(decision.beside.begin(), decision.beside.end(), [&](const FunctionBeside& f) {
-    const InputColumn& input = work.inputs[static_cast<std::size_t>(f.input)];
-    const bool is_angle =
-        input.joint >= 0 && input.name == input_name(Driver::angle, static_cast<std::size_t>(input.joint));
-    // A zero that is wrong may be a part of any function of the angles.
-    const bool of_these = traits.driver == Driver::other_angles ? is_angle && input.name != own_angle
-                          : traits.driver == Driver::constant   ? is_angle
-                                                                : input.name == name.driver;
-    return f.joint == name.joints[0] && of_these && f.evidence > kNats;
+    const auto concerns = [&](int k) {
+      const InputColumn& input = work.inputs[static_cast<std::size_t>(k)];
+      const bool is_angle =
+          input.joint >= 0 && input.name == input_name(Driver::angle, static_cast<std::size_t>(input.joint));
+      // A zero that is wrong may be a part of any function of the angles.
+      return traits.driver == Driver::other_angles ? is_angle && input.name != own_angle
+             : traits.driver == Driver::constant   ? is_angle
+                                                   : input.name == name.driver;
+    };
+    return f.joint == name.joints[0] && f.evidence > kNats && std::any_of(f.inputs.begin(), f.inputs.end(), concerns);
   });
 }
 

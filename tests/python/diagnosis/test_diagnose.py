@@ -387,6 +387,20 @@ def test_of_25_poses_that_are_too_few_it_is_said_what_they_can_answer() -> None:
     assert float(shown) == pytest.approx(1e3 * max(d.size_at_tip for d in small), rel=0.01)
 
 
+@pytest.mark.parametrize(
+    ("joint", "place", "size", "seed"), [(4, -0.2269, 1.777e-4, 2), (3, -0.1176, 1.971e-4, 4)]
+)
+def test_a_name_that_a_step_explains_as_well_is_not_certain(
+    joint: int, place: float, size: float, seed: int
+) -> None:
+    nominal = truing.load_robot(example("ur10"))
+    data = truing.simulate(nominal, poses=160, noise=3e-5, lengths=0.0, angles=0.0, seed=seed).data
+    read = np.array(data.joints)
+    read[:, joint] -= size * (read[:, joint] > place)
+    found = truing.diagnose(nominal, data.replace(joints=read))
+    assert found.effects and all(effect.probability <= 0.9 for effect in found.effects)
+
+
 def test_what_held_out_poses_contradict_ends_with_status_1(capsys: pytest.CaptureFixture[str]) -> None:
     right = measured("effects")
     # The rows held out have the backlash the other way round.
