@@ -27,7 +27,7 @@ using Eigen::Vector3d;
 
 constexpr double kWide = 30.0 * kPi / 180.0, kNarrow = 0.5 * kPi / 180.0;  ///< steps from the best coarse direction
 constexpr double kAsNear = 2.5 * kPi / 180.0;                              ///< two directions that are one
-constexpr double kNats = 10.0;          ///< that another direction wins, before a second look
+constexpr double kNatsWon = 10.0;       ///< that another direction wins, before a second look
 constexpr double kBetter = 1.05;        ///< sums of squares of poses that a fit did not see
 constexpr double kSureSpring = 4.0;     ///< standard errors of a spring that shows
 constexpr std::ptrdiff_t kSeveral = 2;  ///< joints: a spring at one may stand for another law
@@ -235,7 +235,7 @@ std::vector<Vector3d> coarse_directions() {
 }
 
 /// Eight directions at an angle [rad] from one.
-std::vector<Vector3d> around(const Vector3d& direction, double angle) {
+std::vector<Vector3d> directions_around(const Vector3d& direction, double angle) {
   const Vector3d side = direction.unitOrthogonal(), up = direction.cross(side);
   std::vector<Vector3d> out;
   for (int k = 0; k < 8; ++k) {
@@ -262,7 +262,7 @@ Vector3d best_direction(const Springs& springs) {
   const std::vector<Vector3d> coarse = coarse_directions();
   auto best = best_of({coarse.begin(), coarse.begin() + 13});  // the others are their opposites
   for (double step = kWide; step > kNarrow;) {
-    const auto other = best_of(around(best.second, step));
+    const auto other = best_of(directions_around(best.second, step));
     if (other.first > best.first)
       best = other;
     else
@@ -289,7 +289,7 @@ std::optional<Vector3d> other_gravity(const Work& work) {
   Vector3d down = best_direction(springs);
   if (are_springs(springs.significance(-down))) down = -down;
   const bool other = down.dot(written) < std::cos(kAsNear) && are_springs(springs.significance(down)) &&
-                     springs.evidence(down) > springs.evidence(written) + kNats;
+                     springs.evidence(down) > springs.evidence(written) + kNatsWon;
   // What a joint does with its own angle looks like weight along another axis, joint by joint.
   if (!other || !predicts_better(springs.squares(down, false), springs.squares(written, true), kBetter))
     return std::nullopt;

@@ -13,7 +13,7 @@ namespace truing::diagnosis {
 namespace {
 
 constexpr int kPlaces = 20;
-constexpr std::size_t kMostValues = 6000;  ///< looked at: of more, whole folds are left out
+constexpr std::size_t kValuesSeen = 6000;  ///< looked at: of more, whole folds are left out
 
 /// One shape at a place, as a function of the input.
 struct Shape {
@@ -52,7 +52,7 @@ double best_local_shape(const Work& work, const Evidence& evidence, const Eviden
                         int input) {
   const Design& design = work.design;
   const InputColumn& along = work.inputs[static_cast<std::size_t>(input)];
-  const Left left = what_is_left(design, state, kMostValues);
+  const Left left = what_is_left(design, state, kValuesSeen);
   std::vector<std::int32_t> rows;
   for (const Eigen::Index i : left.at) {
     const std::int32_t row = design.row[static_cast<std::size_t>(i)];
