@@ -395,6 +395,30 @@ def test_usual_parameters_depart_by_more_than_the_factor_that_all_share(file: Pa
     assert found.chains["standard"].drives[0].viscous == pytest.approx(0.07 / 1.25, rel=0.1)  # kv is damping
 
 
+def departed(found: ServoDiagnosis) -> list[FoundServoEffect]:
+    return [e for e in found.effects if e.standard and e.probability > 0.0]
+
+
+def test_what_a_payload_does_to_the_usual_parameters_may_be_the_payload(file: Path, tmp_path: Path) -> None:
+    heavier = tmp_path / "heavier.xml"
+    text = PENDULUM.replace(
+        'mass="0.4" diaginertia="1e-4 1e-4 1e-4"', 'mass="0.5" diaginertia="1e-4 1e-4 1e-4"'
+    )
+    heavier.write_text(text, encoding="utf-8")
+    found = servo_diagnose(file, recordings_of(heavier, 5e-4))
+    assert departed(found)
+    for one in departed(found):
+        assert one.probability > 0.9
+        assert {"payload", "link_inertia"} & {other.effect for other in one.confounded_with}
+    told = [c for c in found.classes if "may as well be one cause" in c.sentence]
+    assert len(told) == 1 and "payload" in told[0].effects
+
+
+def test_a_weaker_drive_alone_is_nothing_else(file: Path) -> None:
+    found = diagnosed(file, command_gain=3.2)
+    assert [(e.effect, e.confounded_with) for e in departed(found)] == [("command_gain", ())]
+
+
 def test_a_light_joints_torques_are_the_files_where_these_move_the_arm_better(tmp_path: Path) -> None:
     file, recordings = moved_by_itself(tmp_path)
     of = prepare(file, recordings, window=np.inf)

@@ -16,6 +16,7 @@ from truing import _core
 from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.arm import ServoArm, servo_arm
 from truing.dynamics.servo.data import ServoData, Window, servo_data, windows_of
+from truing.dynamics.servo.departures import departures, instead
 from truing.dynamics.servo.fit import Fitter, Rows, rows_of
 from truing.dynamics.servo.free import USUAL
 from truing.dynamics.servo.ground import groundwork
@@ -160,6 +161,8 @@ def servo_diagnose(
         judge.blocks,
         prepared.arm.notes,
         late(namer, account),
+        departed := departures(namer, account),
+        instead(namer, account, departed),
     )
     return diagnosis_of(parts, time.perf_counter() - begun)
 

@@ -37,8 +37,8 @@ SURE_NATS = 10.0  # of a refit: instead of these, where folds are too unlike for
 OTHER_LAWS = 0.2  # part of a joint's error that other laws than the catalogue's may well be
 NAMED = 0.2  # what is less sure is fitted, and not named
 UNKNOWN = 0.5  # so sure at least must be that there is what nobody knows
-_INEXACT = 0.03  # of what a law explains: so much it may miss as no law of the catalogue is a machine's
-_MEMBER = 0.05  # of the best one's weight: who has less is not of its class
+INEXACT = 0.03  # of what a law explains: so much it may miss as no law of the catalogue is a machine's
+MEMBER = 0.05  # of the best one's weight: who has less is not of its class
 _CLASS_NATS, _CLASS_R2, _SAME_R2, _TEMPERED, _FAR_NATS = 6.0, 0.95, 0.5, 0.5, 25.0
 _LATE_R2 = 0.95  # of a delay, that damping and the others do as well: these are one class
 _ONE_RECORDING = 0.9  # the most that folds of one recording are worth
@@ -730,8 +730,8 @@ def _sure(
     rivals: dict[tuple[str, tuple[str, ...]], tuple[Candidate, float]] = {}
     for refit in refits:
         # Of refits both laws are inexact, and by a part of what they explain.
-        weight = math.exp(-refit.behind / max(1.0 / _TEMPERED, _INEXACT * refit.best))
-        if weight > _MEMBER and refit.other.place != one.place:
+        weight = math.exp(-refit.behind / max(1.0 / _TEMPERED, INEXACT * refit.best))
+        if weight > MEMBER and refit.other.place != one.place:
             rivals[refit.other.place] = (refit.other, weight)
     for rank in sorted(ranks[1:], key=lambda r: -r.score):
         other = others[rank.candidate - 1]

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from truing.dynamics.servo.candidates import Candidate
 from truing.dynamics.servo.chain import PARAMETERS, ServoChain
 from truing.dynamics.servo.data import ServoData
+from truing.dynamics.servo.departures import Departure, Instead
 from truing.dynamics.servo.fit import Fitted, sums
 from truing.dynamics.servo.free import USUAL, Free
-from truing.dynamics.servo.ground import TORQUES, shared_scale
 from truing.dynamics.servo.naming import Account, FoundFunction, Namer, Sureness
 from truing.dynamics.servo.result import (
     FoundServoEffect,
@@ -92,9 +92,7 @@ _SEPARATED = {
 }
 _USUAL_SEPARATED = "record steps, slow reversals and a chirp of each joint alone"
 _TOGETHER = 0.9  # rank correlation (Spearman 1904) over recordings: inputs that rose in one order
-_DEPARTS = 3.0  # standard errors from the file's value: a usual parameter departs from it
 _TOLD = 3  # causes in the sentence
-_SAME = 0.05  # of a prior's standard deviation: too little to be called another value
 
 
 @dataclass(frozen=True)
@@ -118,6 +116,8 @@ class Parts:
     held_rows: NDArray[np.intp]  # number of each row's block of time
     notes: Sequence[str]
     late: Sequence[int]  # joints at which damping and a delay do the same
+    departures: Sequence[Departure]  # of the usual parameters from the file
+    instead: Mapping[int, Sequence[Instead]]  # by joint: what alone does the same as these
 
 
 def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
@@ -130,7 +130,7 @@ def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
     named = _named(parts, covariance)
     effects = [*named, *_usual(parts, covariance)]
     unknown = [_unknown(f, chains["nominal"]) for f in parts.functions]
-    classes = _classes(parts, named)
+    classes = [*_classes(parts, named), *_instead(parts)]
     verdict, sentence = _verdict(parts, named, unknown)
     warnings = list(parts.notes)
     for why in dict.fromkeys(why for _, why in parts.account.vetoed):
@@ -234,20 +234,23 @@ def _named(parts: Parts, covariance: ServoCovariance) -> list[FoundServoEffect]:
                 one.effect,
                 one.joints,
                 False,
-                sure.probability,
+                sure.of_class,
                 values,
                 share,
                 (low, high),
                 _rms(without, one.joint),
                 _rms(named, one.joint),
-                tuple(
-                    ServoAlternative(o.effect, o.joints, p, _SEPARATED.get(o.effect, _USUAL_SEPARATED))
-                    for o, p in sure.confounded
-                ),
+                tuple(_alternative(o, p) for o, p in sure.confounded),
                 _sentence(one.effect, one.joints, values),
             )
         )
     return sorted(out, key=lambda e: -e.share)
+
+
+def _alternative(other: Candidate, probability: float) -> ServoAlternative:
+    return ServoAlternative(
+        other.effect, other.joints, probability, _SEPARATED.get(other.effect, _USUAL_SEPARATED)
+    )
 
 
 def _place(one: Candidate) -> str:
@@ -272,19 +275,13 @@ def _usual(parts: Parts, covariance: ServoCovariance) -> list[FoundServoEffect]:
     out = []
     first = 3 + len(parts.account.found)
     nominal, standard = parts.held[0], parts.held[1]
-    scales = shared_scale(parts.standard.point, parts.nominal)
+    of_joint = {(d.free.field, d.free.joint): d for d in parts.departures}
     for k, name in enumerate(n for n in USUAL if any(f.field == n for f in parts.standard.free)):
         back = parts.held[first + k]
         for j, joint in enumerate(joints):
-            free = next(f for f in parts.account.fitted.free if f.field == name and f.joint == j)
-            value = _parameter(parts, covariance, free, parts.nominal)
-            change = free.at(parts.standard.point) - free.at(parts.nominal)
-            # What all torques have in common is one departure, and the gain's where there is one.
-            shared = not parts.data.torque_command and name in TORQUES[1:]
-            change = abs(change - scales[j]) if shared else abs(change)
-            at = covariance.names.index(free.name(joints))
-            sigma = math.sqrt(float(covariance.matrix[at, at]))
-            departs = change > max(_DEPARTS * sigma, _SAME * free.prior)
+            departure = of_joint[name, j]
+            value = _parameter(parts, covariance, departure.free, parts.nominal)
+            departs = departure.certain
             scale = max(float(np.sum(np.maximum(nominal[:, j] ** 2, back[:, j] ** 2))), 1e-18)
             share = float(np.sum(back[:, j] ** 2 - standard[:, j] ** 2)) / scale / len(joints)
             out.append(
@@ -292,13 +289,13 @@ def _usual(parts: Parts, covariance: ServoCovariance) -> list[FoundServoEffect]:
                     PARAMETERS[name].effect,
                     (joint,),
                     True,
-                    1.0 - math.erfc(change / max(sigma, 1e-300) / math.sqrt(2.0)) if departs else 0.0,
+                    departure.probability if departs else 0.0,
                     (value,),
                     max(0.0, share) if departs else 0.0,
                     (max(0.0, share), max(0.0, share)),
                     _rms(back, j),
                     _rms(standard, j),
-                    (),
+                    tuple(_alternative(i.other, i.probability) for i in parts.instead.get(j, ()) if departs),
                     _sentence(PARAMETERS[name].effect, (joint,), (value,)),
                 )
             )
@@ -335,6 +332,30 @@ def _classes(parts: Parts, named: Sequence[FoundServoEffect]) -> list[ServoClass
                 tuple(members),
                 f"These recordings cannot tell apart: {', '.join(members)}",
                 _SEPARATED.get(effect.effect, _USUAL_SEPARATED),
+            )
+        )
+    return out
+
+
+def _instead(parts: Parts) -> list[ServoClass]:
+    """By joint: what departs from the file there, and what alone does the same beside the file's values."""
+    joints = parts.simulator.arm.nominal.joints
+    out = []
+    for j, others in parts.instead.items():
+        if not others:
+            continue
+        departed = [d.free.field for d in parts.departures if d.certain and d.free.joint == j]
+        best = max(others, key=lambda i: i.probability).other
+        alone = ", ".join(_place(i.other) for i in others)
+        out.append(
+            ServoClass(
+                tuple(
+                    [_member(PARAMETERS[name].effect, (joints[j],)) for name in departed]
+                    + [_member(i.other.effect, i.other.joints) for i in others]
+                ),
+                f"What departs from the file at {joints[j]} ({', '.join(departed)}) may as well be one cause:"
+                f" {alone}",
+                _SEPARATED.get(best.effect, _USUAL_SEPARATED),
             )
         )
     return out
