@@ -43,10 +43,10 @@ from truing.dynamics.servo.naming import (
     Sureness,
     Weight,
     _sure as sure_of,
-    unknown,
 )
 from truing.dynamics.servo.result import FoundServoEffect
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, chain_of, point_of
+from truing.dynamics.servo.unknown import Unknown
 from truing.dynamics.servo.words import _causes as causes, _orders as orders_of
 from truing.errors import InputError, InputWarning
 from truing.examples import copy_servo_arm
@@ -451,10 +451,29 @@ def test_nothing_unknown_is_said_of_what_encoders_do_not_show(file: Path) -> Non
     fitter = Fitter(Apart(of.simulator), rows_of(of.data, of.train))
     standard, sizes = groundwork(fitter, point, of.data)
     namer, account = Namer(fitter, (), 1), Account(standard, standard, [], sizes, point)
-    (found,) = unknown(namer, account, False)
+    (found,) = Unknown(namer, account).found(False, lambda point: True)
     assert found.input in ("angle", "directed_angle")
     namer.resolution = np.array([0.5])
-    assert not unknown(namer, account, False)
+    assert not Unknown(namer, account).found(False, lambda point: True)
+
+
+@pytest.mark.slow
+def test_a_hum_is_no_law_of_the_catalogue(file: Path) -> None:
+    """Friction in a band of speeds, which derivatives at the wrong fit show a part of."""
+    of = prepared_of(file, [replace_test(resting(number)) for number in range(6)])
+    speeds = np.arange(-3.0, 3.01, 0.25)
+    loss = 0.15 * np.sign(speeds) * np.exp(-(((np.abs(speeds) - 1.5) / 0.4) ** 2))
+    point = replace(point_of(of.arm.nominal), functions=((0, "speed", -3.0, 0.25, loss),))
+    motion = of.simulator.run([point], of.windows)[0][0]
+    noise = np.random.default_rng(3)
+    moved = []
+    for number, part in enumerate(np.split(motion, 6)):
+        shaken = np.concatenate([np.zeros((1, 1)), part])
+        shaken = shaken + 5e-4 * noise.standard_normal(shaken.shape)
+        moved.append(resting(number).replace(position=np.round(shaken / ENCODER) * ENCODER))
+    found = servo_diagnose(file, moved)
+    assert [one.inputs for one in found.unknown] == [("speed",)]
+    assert not names(found)
 
 
 def test_no_command_no_torque(file: Path) -> None:

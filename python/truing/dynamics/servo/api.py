@@ -21,9 +21,10 @@ from truing.dynamics.servo.fit import Fitter, Rows, rows_of
 from truing.dynamics.servo.free import USUAL
 from truing.dynamics.servo.ground import groundwork
 from truing.dynamics.servo.judge import judged, traces_of
-from truing.dynamics.servo.naming import NAMED, Account, Namer, Sureness, late, sureness, unknown
+from truing.dynamics.servo.naming import NAMED, Account, Namer, Sureness, late, sureness
 from truing.dynamics.servo.result import ServoDiagnosis
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, point_of
+from truing.dynamics.servo.unknown import FoundFunction, Unknown
 from truing.dynamics.servo.words import Parts, diagnosis_of, held_share
 from truing.errors import InputError
 
@@ -137,13 +138,7 @@ def servo_diagnose(
     fitter.progress("judging by held-out motion")
     single = len({prepared.data.streams[w.stream].fold for w in prepared.train}) < 2
     judge = Judge(prepared, apart, nominal, standard.point)
-    sure = sureness(namer, account, single)
-    while (vetoed := judge.veto(sure, account, namer.resolution)) is not None:
-        at, why = vetoed
-        account.vetoed.append((account.found[at], why))
-        namer.drop(account, at)
-        sure = sureness(namer, account, single)
-    functions = unknown(namer, account, single)
+    account, sure, functions = _what_holds(namer, account, judge, single)
     models = {"nominal": nominal, "standard": standard.point, "named": account.fitted.point}
     parts = Parts(
         prepared.simulator,
@@ -165,6 +160,38 @@ def servo_diagnose(
         instead(namer, account, departed),
     )
     return diagnosis_of(parts, time.perf_counter() - begun)
+
+
+def _what_holds(
+    namer: Namer, account: Account, judge: Judge, single: bool
+) -> tuple[Account, list[Sureness], list[FoundFunction]]:
+    """Names that held-out motion does not veto, and what nobody knows beside them. A name that is idle beside
+    such a function goes, if the function is found without it too."""
+    sure = _not_vetoed(namer, account, judge, single)
+    unknown = Unknown(namer, account)
+    functions = unknown.found(single, lambda point: judge.holds(account, point))
+    idle = unknown.idle(functions)
+    if idle is None:
+        return account, sure, functions
+    at, function = idle
+    less = replace(account, found=list(account.found), vetoed=list(account.vetoed))
+    less.vetoed.append((account.found[at], f"what nobody knows goes with the {function.input} in its place"))
+    namer.drop(less, at)
+    found = _what_holds(namer, less, judge, single)
+    if function.joint in {other.joint for other in found[2]}:
+        return found
+    return account, sure, functions
+
+
+def _not_vetoed(namer: Namer, account: Account, judge: Judge, single: bool) -> list[Sureness]:
+    """How sure names are; those that are vetoed leave the account."""
+    sure = sureness(namer, account, single)
+    while (vetoed := judge.veto(sure, account, namer.resolution)) is not None:
+        at, why = vetoed
+        account.vetoed.append((account.found[at], why))
+        namer.drop(account, at)
+        sure = sureness(namer, account, single)
+    return sure
 
 
 def _veto(
@@ -231,13 +258,21 @@ class Judge:
             return vetoed
         return _veto(sure, [*compared, *self.errors(without)], self.blocks, resolution)
 
+    def holds(self, account: Account, point: Point) -> bool:
+        """Whether the joint of a point's function moves better for certain than with all that is named."""
+        joint = [point.functions[0][0]]
+        errors = [one[:, joint] for one in self.errors([*self._compared(account), point])[1:]]
+        share, low, _ = held_share(errors[1], errors[2], errors[0], self.blocks)
+        return low > 0.0 and share >= LEAST_HELD
+
     def _compared(self, account: Account) -> list[Point]:
         return [self.nominal, self.standard, account.fitted.point]
 
 
 def _key(point: Point) -> bytes:
     rest = (point.weight, point.payload, point.place, point.links)
-    return point.chain.tobytes() + repr(rest).encode()
+    functions = b"".join(repr(f[:4]).encode() + f[4].tobytes() for f in point.functions)
+    return point.chain.tobytes() + repr(rest).encode() + functions
 
 
 def _blocks(data: ServoData, rows: Rows) -> NDArray[np.intp]:

@@ -270,7 +270,8 @@ class Fitter:
         motion = None
         if np.all(each > 0):
             motion = np.column_stack([motions[k - 1][:, j] for j, k in enumerate(each)])
-        return replace(tried[0], chain=chain), float(costs.min(axis=0).sum()), motion
+        functions = tuple(f for j, k in enumerate(each) for f in tried[k].functions if f[0] == j)
+        return replace(tried[0], chain=chain, functions=functions), float(costs.min(axis=0).sum()), motion
 
     def _joint_costs(
         self, errors: Floats, point: Point, free: Sequence[Free], start: Floats, noise: Noise
@@ -305,10 +306,11 @@ class Fitter:
 
 def _only_joint(point: Point, base: Point) -> int:
     """The joint at which alone a point differs; -1: others do, or what is of the whole arm."""
-    there = np.flatnonzero(np.any(point.chain != base.chain, axis=1))
+    there = {*np.flatnonzero(np.any(point.chain != base.chain, axis=1))}
+    there |= {f[0] for f in point.functions if not any(f is g for g in base.functions)}
     whole = ("weight", "payload", "place", "links")
     same = all(getattr(point, name) == getattr(base, name) for name in whole)
-    return int(there[0]) if same and there.size == 1 and not point.functions else -1
+    return int(there.pop()) if same and len(there) == 1 else -1
 
 
 def change_of(motion: Floats, base: Floats, step: float, joint: int) -> Floats:

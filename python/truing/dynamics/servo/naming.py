@@ -20,13 +20,12 @@ from truing.dynamics.servo.fit import (
     Fitter,
     FoldSums,
     Noise,
-    change_of,
     combined,
     noise_of,
     sums_by_fold,
 )
 from truing.dynamics.servo.free import USUAL, Free, Sizes, moved
-from truing.dynamics.servo.simulator import FIELDS, Function, Point
+from truing.dynamics.servo.simulator import FIELDS, Point
 
 Floats = NDArray[np.float64]
 
@@ -36,12 +35,11 @@ SURE_GAIN = 2.0  # standard errors over the folds
 SURE_NATS = 10.0  # of a refit: instead of these, where folds are too unlike for standard errors
 OTHER_LAWS = 0.2  # part of a joint's error that other laws than the catalogue's may well be
 NAMED = 0.2  # what is less sure is fitted, and not named
-UNKNOWN = 0.5  # so sure at least must be that there is what nobody knows
 INEXACT = 0.03  # of what a law explains: so much it may miss as no law of the catalogue is a machine's
 MEMBER = 0.05  # of the best one's weight: who has less is not of its class
 _CLASS_NATS, _CLASS_R2, _SAME_R2, _TEMPERED, _FAR_NATS = 6.0, 0.95, 0.5, 0.5, 25.0
 _LATE_R2 = 0.95  # of a delay, that damping and the others do as well: these are one class
-_ONE_RECORDING = 0.9  # the most that folds of one recording are worth
+ONE_RECORDING = 0.9  # the most that folds of one recording are worth
 _REFITTED, _REFITTED_EACH = 6, 4  # of the candidates, without linearisation; of each joint, if there are more
 _FIRST_ROUNDS, _MORE_ROUNDS = 1, 5  # of a refit: from each start, from the best of these
 _STRAIGHT = 5.0  # standard errors from a fit: so far its derivatives are taken to hold
@@ -55,12 +53,8 @@ _OF_INPUTS = ("gain_law", "thermal_friction", "supply_gain", "warmup")
 _LEAST_GROUPS = 3
 _BETTER = 3.0  # nats: of a name that takes another's place
 _FARTHEST = 0.6  # of a prior: that derivatives are followed
-_RESOLUTION = 0.3  # of the usual step between distinct readings: no error is smaller
+RESOLUTION = 0.3  # of the usual step between distinct readings: no error is smaller
 _MOST_ROWS = 15000  # of which sums are made; more are thinned
-_LEAST_UNKNOWN = 0.05  # as LEAST_GAIN, of free functions
-INPUTS = ("speed", "load", "angle", "command_error", "time", "directed_load", "directed_angle")
-_PLACES = 6  # of a free function
-_NARROW = 24, ("time", "angle", "directed_angle")  # the same where a cause may be narrow: a gust, a detent
 
 
 @dataclass
@@ -311,19 +305,29 @@ class Namer:
         noise = self._noise(fitted.columns, fitted.errors, len(fitted.columns))
         squares = self.folds_of(fitted, noise)
         for at, one in enumerate(account.found):
-            less = self.without(account, at, noise)
-            before = self.folds_of(less, noise)
-            loss = self.fitter.cost(less.errors, less.point, less.free, less.start, noise) - self.fitter.cost(
-                fitted.errors, fitted.point, fitted.free, fitted.start, noise
-            )
-            if loss < THRESHOLD or not self.predicts(before, squares, LEAST_GAIN, loss):
+            less, weight, needed = self.weighed(account, at, noise, squares)
+            if not needed:
                 self.fitter.progress(f"{one.effect} {' '.join(one.joints)} is idle")
                 account.found.pop(at)
                 account.fitted = self.polished(less, noise)
                 return True
-            weights.append(Weight(before, squares, loss, less.point))
+            weights.append(weight)
         account.weights = weights
         return False
+
+    def weighed(
+        self, account: Account, at: int, noise: Noise, squares: Floats
+    ) -> tuple[Fitted, Weight, bool]:
+        """The account without one of what was found, what that loses, and whether folds that were not fitted
+        are predicted better with it. squares: of these folds, with it."""
+        fitted = account.fitted
+        less = self.without(account, at, noise)
+        before = self.folds_of(less, noise)
+        loss = self.fitter.cost(less.errors, less.point, less.free, less.start, noise) - self.fitter.cost(
+            fitted.errors, fitted.point, fitted.free, fitted.start, noise
+        )
+        needed = loss >= THRESHOLD and self.predicts(before, squares, LEAST_GAIN, loss)
+        return less, Weight(before, squares, loss, less.point), needed
 
     def _round(self, account: Account, refused: set[tuple[str, int]]) -> bool:
         best, noise = self.best_beside(account, refused)
@@ -672,7 +676,7 @@ def _resolution(fitter: Fitter) -> Floats:
     out = []
     for column in fitter.rows.measured.T:
         distinct = np.unique(np.round(column, 9))
-        out.append(_RESOLUTION * float(np.quantile(np.diff(distinct), 0.05)) if distinct.size > 1 else 1e-6)
+        out.append(RESOLUTION * float(np.quantile(np.diff(distinct), 0.05)) if distinct.size > 1 else 1e-6)
     return np.asarray(np.maximum(np.array(out), 1e-7))
 
 
@@ -751,7 +755,7 @@ def _sure(
     part = max(0.0, gain) * joints
     law = part**2 / (part**2 + OTHER_LAWS**2)
     if single:
-        law = min(law, _ONE_RECORDING)
+        law = min(law, ONE_RECORDING)
     total = (in_class + outside) / law if law > 0.0 else math.inf
     return Sureness(
         1.0 / total, tuple((other, weight / total) for other, weight in rivals.values()), in_class / total
@@ -776,107 +780,3 @@ def late(namer: Namer, account: Account) -> list[int]:
         if yy - float(right @ fit) < (1.0 - _LATE_R2) * yy:
             out.append(j)
     return out
-
-
-# ---- unknown --------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class FoundFunction:
-    """A torque as a function of an input that nothing of the catalogue explains."""
-
-    joint: int
-    input: str
-    low: float
-    width: float
-    values: Floats  # [Nm] at the places
-    sigmas: Floats
-    probability: float
-    share: float
-
-
-def unknown(namer: Namer, account: Account, single: bool) -> list[FoundFunction]:
-    """Free functions of speed, load, angle, command error and time at every joint, beside what was found."""
-    fitted, sizes = account.fitted, account.sizes
-    motions, torques = namer.fitter.simulator.run([fitted.point], namer.fitter.rows.windows, torques=True)
-    base, found = motions[0], []
-    labels = [(name, place) for name in INPUTS for place in range(_places(name))]
-    ranges = {
-        (name, j): _range(namer, name, j, base, torques[0]) for name in INPUTS for j in range(namer.joints)
-    }
-    size = 0.02 * sizes.torque
-    points = []
-    for name, place in labels:
-        functions: list[Function] = []
-        for j in range(namer.joints):
-            low, width = ranges[name, j]
-            values = np.zeros(_places(name))
-            values[place] = size[j]
-            functions.append((j, name, low, width, values))
-        points.append(replace(fitted.point, functions=tuple(functions)))
-    columns: list[Column] = []
-    owners = []
-    for (name, place), motion in zip(labels, namer.fitter.motions(points), strict=True):
-        for j in range(namer.joints):
-            columns.append((j, change_of(motion, base, float(size[j]), j)))
-            owners.append((name, j, place))
-    sums = namer.sums(fitted, columns)
-    groups, keys = [], []
-    for name in INPUTS:
-        for j in range(namer.joints):
-            groups.append([sums.always + k for k, o in enumerate(owners) if o[:2] == (name, j)])
-            keys.append((name, j))
-    costs = [math.log(len(keys))] * len(keys)
-    prior = np.array([*(f.prior for f in fitted.free), *(0.3 * sizes.torque[j] for _, j, _ in owners)])
-    ranks = namer.ranked(sums, groups, costs, prior)[1]
-    before = squares_of_folds(sums, fitted)
-    taken: set[int] = set()
-    for rank in sorted(ranks, key=lambda r: -r.score):
-        name, j = keys[rank.candidate]
-        if rank.score < THRESHOLD or j in taken:
-            continue
-        group = groups[rank.candidate]
-        after = squares_of_folds(sums, fitted, group, prior[group])
-        if not namer.predicts(before, after, _LEAST_UNKNOWN):
-            continue
-        gain = float((before - after).sum() / before.sum())
-        part = max(0.0, gain) * namer.joints
-        probability = part**2 / (part**2 + OTHER_LAWS**2)
-        moves = combined([columns[k - sums.always] for k in group], rank.values, base)[:, j]
-        if probability < UNKNOWN or float(np.std(moves)) < namer.resolution[j] / _RESOLUTION:
-            continue  # by less than a step of its encoder
-        taken.add(j)
-        low, width = ranges[name, j]
-        sigma = _sigmas(sums, group, prior)
-        shown = min(probability, _ONE_RECORDING) if single else probability
-        found.append(FoundFunction(j, name, low, width, rank.values, sigma, shown, gain))
-    return found
-
-
-def _sigmas(sums: Sums, group: Sequence[int], prior: Floats) -> Floats:
-    columns = [*range(sums.always), *group]
-    xx = np.sum([f[0] for f in sums.folds], axis=0)[np.ix_(columns, columns)]
-    covariance = np.linalg.inv(xx + np.diag(prior[columns] ** -2.0))
-    return np.asarray(np.sqrt(np.diag(covariance)[sums.always :]))
-
-
-def _range(namer: Namer, name: str, j: int, motion: Floats, torque: Floats) -> tuple[float, float]:
-    """First place of a function of an input, and the width between places."""
-    rows = namer.fitter.rows
-    streams = namer.data.streams
-    if name == "time":
-        low, high = 0.0, max(s.time[-1] - s.time[0] for s in streams)
-    elif name in ("speed", "command_error"):
-        values = np.concatenate(
-            [s.speed[:, j] if name == "speed" else s.command[:, j] - s.position[:, j] for s in streams]
-        )
-        low, high = np.quantile(values, [0.01, 0.99])
-    elif name == "directed_load":
-        low, high = 0.0, float(np.quantile(np.abs(torque[:, j]), 0.99))
-    else:
-        values = torque[:, j] if name == "load" else rows.measured[:, j]
-        low, high = np.quantile(values, [0.01, 0.99])
-    del motion
-    return float(low), max(float(high - low), 1e-6) / (_places(name) - 1)
-
-
-def _places(name: str) -> int:
-    return _NARROW[0] if name in _NARROW[1] else _PLACES

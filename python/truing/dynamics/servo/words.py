@@ -17,7 +17,7 @@ from truing.dynamics.servo.data import ServoData
 from truing.dynamics.servo.departures import Departure, Instead
 from truing.dynamics.servo.fit import Fitted, sums
 from truing.dynamics.servo.free import USUAL, Free
-from truing.dynamics.servo.naming import Account, FoundFunction, Namer, Sureness
+from truing.dynamics.servo.naming import Account, Namer, Sureness
 from truing.dynamics.servo.result import (
     FoundServoEffect,
     ServoAlternative,
@@ -30,6 +30,7 @@ from truing.dynamics.servo.result import (
     UnknownMotion,
 )
 from truing.dynamics.servo.simulator import Point, Simulator, chain_of
+from truing.dynamics.servo.unknown import FoundFunction
 
 Floats = NDArray[np.float64]
 
