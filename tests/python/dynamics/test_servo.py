@@ -457,6 +457,56 @@ def test_nothing_unknown_is_said_of_what_encoders_do_not_show(file: Path) -> Non
     assert not Unknown(namer, account).found(False, lambda point: True)
 
 
+def on_a_base(gravity: str) -> str:
+    """A shoulder and an elbow whose axes are not parallel."""
+    return f"""<mujoco>
+  <option gravity="{gravity}"/>
+  <worldbody>
+    <body name="upper">
+      <joint name="shoulder" axis="0 1 0" damping="0.1" frictionloss="0.03" armature="0.01"/>
+      <inertial pos="0 0 -0.1" mass="0.5" diaginertia="1e-4 1e-4 1e-4"/>
+      <body name="fore" pos="0 0 -0.2">
+        <joint name="elbow" axis="1 0 0" damping="0.05" frictionloss="0.02" armature="0.005"/>
+        <inertial pos="0 0.02 -0.1" mass="0.3" diaginertia="1e-4 1e-4 1e-4"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><position joint="shoulder" kp="6"/><position joint="elbow" kp="3"/></actuator>
+</mujoco>
+"""
+
+
+def of_two_joints(file: Path) -> list[_core.Recording]:
+    out = []
+    for number in range(6):
+        command = np.column_stack([commands(number)[:, 0], commands(number + 10)[:, 0]])
+        command[:20] = 0.0
+        rest = recording(f"r{number}", command, np.zeros_like(command), number >= 4)
+        of = prepare(file, [replace_test(rest)], window=np.inf)
+        motion = of.simulator.run([point_of(of.arm.nominal)], of.windows)[0][0]
+        shaken = np.concatenate([np.zeros((1, 2)), motion])
+        shaken = shaken + 5e-4 * np.random.default_rng(number).standard_normal(shaken.shape)
+        out.append(rest.replace(position=np.round(shaken / ENCODER) * ENCODER))
+    return out
+
+
+@pytest.mark.slow
+def test_an_arm_on_a_wall_whose_file_stands_is_turned(tmp_path: Path) -> None:
+    standing, wall = tmp_path / "standing.xml", tmp_path / "wall.xml"
+    standing.write_text(on_a_base("0 0 -9.81"), encoding="utf-8")
+    wall.write_text(on_a_base("0 -9.81 0"), encoding="utf-8")  # about the shoulder it would be its zero
+    recordings = of_two_joints(standing)
+    found = servo_diagnose(wall, recordings)
+    gravity = found.chains["named"].gravity
+    assert gravity is not None and np.allclose(gravity, (0.0, 0.0, -9.81), atol=0.6)
+    assert "the base is turned by" in found.warnings[0]
+    assert not names(found) and not found.unknown
+    used = uses_of(found.chains["named"], recordings)
+    exported, _ = write_mjcf(found.chains["named"], held(found.chains["named"], used), used, wall)
+    assert np.allclose(mujoco.MjModel.from_xml_string(exported).opt.gravity, gravity, atol=1e-6)
+    assert servo_diagnose(standing, recordings).chains["named"].gravity is None
+
+
 @pytest.mark.slow
 def test_a_hum_is_no_law_of_the_catalogue(file: Path) -> None:
     """Friction in a band of speeds, which derivatives at the wrong fit show a part of."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,13 +37,19 @@ class Apart:
         self._joints = np.array([simulator.model.joint(name).id for name in names])
         self._turns = np.asarray(self.model.jnt_type)[self._joints] != _SLIDE
         self._moved = _descendants(self.model, np.asarray(self.model.jnt_bodyid)[self._joints])
-        self.step = longer_step(self.data, step)
+        self.longest, self.step = step, longer_step(self.data, step)
         self._core_arm = simulator.core_arm_with(self.step)
         self._paths: dict[tuple[object, ...], list[_core.ServoPath]] = {}
         self._known: dict[tuple[str, int], Tables] = {}
         none = np.zeros((0, len(names)))
         self._turned = self._turns.astype(float)
         self._unseen = _core.ServoPath(none, none, none, none, self._turned)
+
+    def in_gravity(self, gravity: Floats) -> Apart:
+        """The same arm where weight pulls so [m/s^2]."""
+        x, y, z = (float(v) for v in gravity)
+        arm = replace(self.arm, nominal=replace(self.arm.nominal, gravity=(x, y, z)))
+        return Apart(Simulator(arm, self.data, self.whole.threads), self.longest)
 
     def run(
         self,

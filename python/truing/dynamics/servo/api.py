@@ -21,6 +21,7 @@ from truing.dynamics.servo.fit import Fitter, Rows, rows_of
 from truing.dynamics.servo.free import USUAL
 from truing.dynamics.servo.ground import groundwork
 from truing.dynamics.servo.judge import judged, traces_of
+from truing.dynamics.servo.mounting import Grounded, mounting
 from truing.dynamics.servo.naming import NAMED, Account, Namer, Sureness, late, sureness
 from truing.dynamics.servo.result import ServoDiagnosis
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, point_of
@@ -129,11 +130,21 @@ def servo_diagnose(
     prepared = prepare(
         robot, recordings, joints=joints, window=window, test_share=test_share, threads=threads
     )
-    nominal = point_of(prepared.arm.nominal)
+    nominal, rows = point_of(prepared.arm.nominal), rows_of(prepared.data, prepared.train)
+
+    def ground(apart: Apart) -> Grounded:
+        fitter = Fitter(apart, rows, progress)
+        standard, sizes = groundwork(fitter, nominal, prepared.data)
+        return Namer(fitter, leave_out, max_effects), standard, sizes
+
     apart = Apart(prepared.simulator, LONGEST_STEP)
-    fitter = Fitter(apart, rows_of(prepared.data, prepared.train), progress)
-    standard, sizes = groundwork(fitter, nominal, prepared.data)
-    namer = Namer(fitter, leave_out, max_effects)
+    stands, (namer, standard, sizes) = None, ground(apart)
+    if "base_tilt" not in leave_out:
+        stands, (namer, standard, sizes) = mounting(apart, ground, (namer, standard, sizes))
+    fitter = namer.fitter
+    if stands is not None and isinstance(fitter.simulator, Apart):
+        apart, simulator = fitter.simulator, fitter.simulator.whole
+        prepared = replace(prepared, arm=simulator.arm, simulator=simulator)
     account = namer.run(standard, sizes, nominal)
     fitter.progress("judging by held-out motion")
     single = len({prepared.data.streams[w.stream].fold for w in prepared.train}) < 2
@@ -154,7 +165,7 @@ def servo_diagnose(
         traces_of(prepared.simulator, prepared.windows, models),
         judge.held(account, [f.field for f in standard.free]),
         judge.blocks,
-        prepared.arm.notes,
+        [*([stands.sentence()] if stands is not None else []), *prepared.arm.notes],
         late(namer, account),
         departed := departures(namer, account),
         instead(namer, account, departed),

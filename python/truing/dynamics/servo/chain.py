@@ -297,6 +297,8 @@ class ServoChain:
     payload_body: str = ""
     link_scale: Mapping[str, float] = field(default_factory=dict)
     """Mass and inertia of a body over the model's, by its name; those that are not named: 1."""
+    gravity: tuple[float, float, float] | None = None
+    """[m/s^2] in the file's frame, where the base does not stand as the file has it; None: it does."""
     gain_reference: float = 1.0  # firmware gain (kp1_raw) at which command_gain holds
     supply_reference: float = 1.0  # [V]
     temperature_reference: float = 25.0  # [deg C]
@@ -314,6 +316,7 @@ class ServoChain:
         """As result.json has it; a limit that is not there is null."""
         out = {k: v for k, v in asdict(self).items() if k not in ("drives", "joints", "prismatic")}
         out["payload_place"], out["link_scale"] = list(self.payload_place), dict(self.link_scale)
+        out["gravity"] = list(self.gravity) if self.gravity else None
         out["joints"] = {
             joint: {
                 "type": "prismatic" if slides else "revolute",
@@ -328,6 +331,7 @@ class ServoChain:
         """What `to_dict` gave."""
         rest = {k: v for k, v in read.items() if k != "joints"}
         rest["payload_place"] = tuple(rest.get("payload_place", (0.0, 0.0, 0.0)))
+        rest["gravity"] = tuple(rest["gravity"]) if rest.get("gravity") else None
         drives = [
             ServoJoint(**{k: math.inf if v is None else v for k, v in one.items() if k != "type"})
             for one in read["joints"].values()

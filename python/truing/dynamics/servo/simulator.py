@@ -87,6 +87,8 @@ class Simulator:
         self.mujoco, self.arm, self.data = mujoco, arm, data
         self.model = mujoco.MjModel.from_xml_string(arm.mjcf)
         self.model.opt.timestep = data.step
+        if arm.nominal.gravity is not None:
+            self.model.opt.gravity[:] = arm.nominal.gravity
         self.threads = threads if threads > 0 else (os.cpu_count() or 1)
         self.last_body = self.model.body(arm.nominal.payload_body).id if arm.nominal.payload_body else 0
         self._models = [copy.copy(self.model) for _ in range(self.threads)]

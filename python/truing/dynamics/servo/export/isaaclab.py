@@ -134,6 +134,8 @@ def _weights(chain: ServoChain) -> list[NotWritten]:
         out.append(NotWritten("gravity_scale", math.nan, reason))
     if chain.payload_mass:
         out.append(NotWritten("payload", math.nan, reason))
+    if chain.gravity is not None:
+        out.append(NotWritten("gravity", math.nan, "belongs to the scene: turn the base, or set its gravity"))
     return out + [NotWritten(f"link_scale.{body}", math.nan, reason) for body in chain.link_scale]
 
 

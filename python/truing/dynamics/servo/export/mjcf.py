@@ -57,6 +57,8 @@ def write(
     spec.option.timestep = min(float(spec.option.timestep), most)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     _place_masses(mujoco, spec, chain, left)
+    if chain.gravity is not None:
+        spec.option.gravity = list(chain.gravity)
     _place_weights(mujoco, spec, chain, uses, left)
     for joint, values in held.joints.items():
         actuator = _actuator(mujoco, spec, joint)
