@@ -61,7 +61,7 @@ class ServoDrive {
 
   void begin(Eigen::Index row, double angle, double speed) {
     rotor_ = angle;
-    rotor_speed_ = speed;
+    rotor_speed_ = link_speed_ = speed;
     wanted_ = held(static_cast<double>(row) * row_step_ - d(F::delay)).value;
     remember(row);
   }
@@ -245,6 +245,8 @@ class ServoDrive {
   void turn_rotor(const ServoMoment& now, const Held& command, bool on, ServoActs* acts) {
     const double h = step_ / kRotorSteps, half = 0.5 * d(F::backlash);
     double angle = now.angle, sum = 0.0, touching = 0.0;
+    // The link's step was implicit in its own speed: what it was pushed less by, the rotor was pushed back less.
+    rotor_speed_ += step_ * given_ * (now.speed - link_speed_) / (d(F::armature) * (1.0 - kLinkArmature));
     for (int k = 0; k < kRotorSteps; ++k) {
       const double twist = without_band(rotor_ - angle, half);
       const bool touches = half == 0.0 || twist != 0.0;
@@ -254,14 +256,18 @@ class ServoDrive {
       const double part = touches ? per_inertia_touching_[on] : per_inertia_[on];
       const double free = rotor_speed_ + part * force;
       const double level = d(F::presliding) > 0.0 ? 0.0 : friction_level(now, rotor_speed_);
+      const double before = rotor_speed_;
       rotor_speed_ = std::copysign(std::max(0.0, std::abs(free) - part * level), free);
       rotor_ += h * rotor_speed_;
       angle += h * now.speed;
-      sum += passed / kRotorSteps;
+      const double more = touches ? (rub_ + h * stiffness_) * (rotor_speed_ - before) : 0.0;  // implicit as well
+      sum += (passed + more) / kRotorSteps;
       touching += (touches ? 1.0 : 0.0) / kRotorSteps;
     }
     acts->damping = touching * (rub_ + step_ * stiffness_);  // the rotor has friction
     acts->applied = sum + acts->damping * now.speed;
+    given_ = acts->damping;
+    link_speed_ = now.speed;
   }
 
   // ---- functions that no effect explains
@@ -312,6 +318,7 @@ class ServoDrive {
   double wanted_ = 0.0;    ///< command, as the rate limit lets it follow
   double bristle_ = 0.0;   ///< presliding travel [rad]
   double rotor_ = 0.0, rotor_speed_ = 0.0;
+  double given_ = 0.0, link_speed_ = 0.0;       ///< damping of the link by the rotor in the step before, and its speed
   double torque_ = 0.0;                         ///< of the drive, in the step before
   double gain_seen_ = 1.0, gain_factor_ = 1.0;  ///< of the firmware, last seen, and what it multiplies by
 };

@@ -292,6 +292,15 @@ def test_columns_are_the_differences_of_whole_simulations(file: Path) -> None:
         assert np.linalg.norm(column - near) < 0.1 * np.linalg.norm(near)
 
 
+@pytest.mark.parametrize("field", ["backlash", "elasticity"])
+def test_rotor_and_link_with_next_to_nothing_between_move_as_one(file: Path, field: str) -> None:
+    """What the rotor gives to the link it gives: with a heavy rotor all momentum goes through the contact."""
+    of = prepared_of(file, [resting(1).replace(test=False)])
+    rigid = point_of(of.arm.nominal).with_value(0, "armature", 0.03)
+    one, two = of.simulator.run([rigid, rigid.with_value(0, field, 1e-6)], of.windows)[0]
+    assert np.sqrt(np.mean((one - two) ** 2)) < 0.03 * np.std(one)
+
+
 def test_a_value_that_nothing_depends_on_does_not_overflow(file: Path) -> None:
     of = prepared_of(file, recordings_of(file))
     free = free_value("saturation", 0, Sizes(*(np.ones(1) for _ in range(4))))
