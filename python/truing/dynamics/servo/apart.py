@@ -68,8 +68,8 @@ class Apart:
         two = np.array([np.any(p.chain[:, _BETWEEN] > 0.0) for p in points], dtype=bool)
         found: list[tuple[Floats, Floats]] = [(np.zeros(0), np.zeros(0))] * len(points)
         for of_two, core_arm in ((False, self._core_arm), (True, self._core_arm_of_two)):
-            some = np.flatnonzero(two == of_two)
-            if some.size:
+            some = np.flatnonzero(two == of_two).tolist()
+            if some:
                 of = self._run(
                     core_arm, [points[k] for k in some], windows, torques, [moved[k] for k in some]
                 )

@@ -22,6 +22,7 @@ _STEP = 1.0  # [m/s^2] of a difference quotient
 _PRIOR = 9.81  # [m/s^2] of each component
 _LEAST_TILT = math.radians(3.0)  # below it a base stands as the file has it
 _LEAST_GAIN = 0.3  # of the joints' squared errors, geometric mean
+_LEAST_SHARE = 0.1  # of the squared errors, by the columns: less is not worth another fit
 _TURNS = 6  # fits in gravity of another direction
 _SETTLED = math.radians(1.0)
 Grounded = tuple[Namer, Fitted, Sizes]
@@ -58,7 +59,7 @@ def mounting(
         return None, begun
     gravity, best = of_file, begun
     for _ in range(_TURNS):
-        new = _direction(apart, gravity, best)
+        new = _direction(apart, gravity, best, _LEAST_SHARE if best is begun else 0.0)
         if new is None or _angle(new, gravity) < _SETTLED:
             break
         other = ground(apart.in_gravity(new))
@@ -71,9 +72,9 @@ def mounting(
     return Mounting(gravity, of_file, tilt), best
 
 
-def _direction(apart: Apart, gravity: Floats, grounded: Grounded) -> Floats | None:
-    """Gravity as the columns of its components have it, as large as the file's. None: they explain
-    nothing."""
+def _direction(apart: Apart, gravity: Floats, grounded: Grounded, least: float) -> Floats | None:
+    """Gravity as the columns of its components have it, as large as the file's. None: they explain less
+    than a part `least` of the squared errors."""
     namer, fitted, _ = grounded
     base = namer.fitter.motions([fitted.point])[0]
     columns: list[Column] = []
@@ -85,7 +86,7 @@ def _direction(apart: Apart, gravity: Floats, grounded: Grounded) -> Floats | No
     group = [sums.always + k for k in range(3)]
     prior = np.array([*(f.prior for f in fitted.free), *([_PRIOR] * 3)])
     (tilt,) = namer.ranked(sums, [group], [0.0], prior)[1]
-    if tilt.score < THRESHOLD:
+    if tilt.score < THRESHOLD or tilt.share < least:
         return None
     new = gravity + tilt.values
     return np.asarray(new * np.linalg.norm(gravity) / max(float(np.linalg.norm(new)), 1e-9))
