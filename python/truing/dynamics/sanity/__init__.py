@@ -22,7 +22,7 @@ from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
 )
-from truing.dynamics.sanity.grids import gaps_of, grids_of
+from truing.dynamics.sanity.grids import Grid, gaps_of, grids_of
 from truing.dynamics.sanity.known_load import known_load
 from truing.dynamics.sanity.readings import readings
 from truing.dynamics.sanity.scales import constants_by_masses, gain_unknown, scales
@@ -81,16 +81,9 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
             load = known_load(robot, recordings, unknown, constants_by_masses(read.fit, unknown))
             robot, recordings, unknown = load.robot, load.recordings, load.unknown
             found += load.findings
-            if unknown:
-                constants = constants_by_masses(read.fit, unknown)
-                scaled = [replace(grid, torque=grid.torque * constants) for grid in grids]
-                found += [loads.to_be_weighed(one) for one in loads.loads_of(robot, recordings, scaled)]
-            else:
-                carried = loads.loads_of(robot, recordings, grids)
-                recordings = loads.with_loads(recordings, carried)
-                found += [loads.used(one) for one in carried]
-            if not any(one.finding == "load_differs" for one in found):
-                found += between.friction_differs(robot, recordings, grids)
+            constants = constants_by_masses(read.fit, unknown)
+            recordings, differing = _what_differs(robot, recordings, grids, constants if unknown else None)
+            found += differing
         if unknown:
             found.append(gain_unknown(robot, read.fit, unknown))
     if not any(one.mistake and one.finding == "position_unit" for one in found):
@@ -102,6 +95,21 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     found.sort(key=lambda one: (not one.mistake, one.finding in ("at_rest", "gaps", "one_recording")))
     cutoff = _core.TorqueOptions().cutoff if frequency is None else band.cutoff_below(frequency)
     return CheckedRecordings(robot, tuple(recordings), tuple(found), cutoff)
+
+
+def _what_differs(
+    robot: _core.Robot, recordings: list[_core.Recording], grids: Sequence[Grid], constants: Floats | None
+) -> tuple[list[_core.Recording], list[RecordingFinding]]:
+    """What some recordings have and others do not, and no column tells: a load, which is taken into account,
+    or friction. constants: of drives, where they are guessed, so that a mass is no more than that.
+    """
+    seen = grids if constants is None else [replace(grid, torque=grid.torque * constants) for grid in grids]
+    carried = loads.loads_of(robot, recordings, seen)
+    if not carried:
+        return recordings, between.friction_differs(robot, recordings, grids)
+    if constants is not None:
+        return recordings, [loads.to_be_weighed(one) for one in carried]
+    return loads.with_loads(recordings, carried), [loads.used(one) for one in carried]
 
 
 def _scaled(recording: _core.Recording, by_speed: Floats | None, by_angle: Floats | None) -> _core.Recording:
