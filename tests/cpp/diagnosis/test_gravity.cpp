@@ -77,10 +77,10 @@ TEST_CASE("an arm on a wall, a ceiling or a slope is diagnosed under the weight 
   }
 }
 
-TEST_CASE("nothing is said of gravity where the file is right, or where nothing gives way" *
-          doctest::skip(kSanitized)) {
+TEST_CASE("nothing is said of gravity where the file is right, or where nothing gives way") {
   const Eigen::Vector3d upright(0.0, 0.0, -9.81), on_a_wall(-9.81, 0.0, 0.0);
   CHECK(said_of_gravity(diagnosed(upright, 2, 940)).empty());
+  if (kSanitized) return;  // one of them goes through the whole search
   CHECK(said_of_gravity(diagnosed(on_a_wall, 0, 950)).empty());
   // What a joint does with its own angle looks like weight along another axis of the base.
   const truing::AppliedEffect wave = {
