@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 ROWS = 600  # of each recording
 FEWEST = 80  # of them with a measured torque
 PART = 0.25  # of what common friction leaves: what friction of its own must remove
+SPREAD = 0.05  # of dry friction: less is no warmth
 RIDGE = 1e-7  # of the mean square of a column: what no motion shows
 DEPENDENT = 1e-6  # of the largest eigenvalue: smaller ones are of columns that say the same
 
@@ -64,8 +65,11 @@ def friction_differs(
     for j, joint in enumerate(driven_joints(robot)):
         seen = [_rows_of(*one, j) for one in zip(grids, picked, regressors, strict=True)]
         seen = [rows for rows in seen if len(rows.torque) >= FEWEST]
-        if len(seen) > 1 and (removed := _differing(joint.name, seen)).removed > PART:
-            found.append(removed)
+        if len(seen) < 2:
+            continue
+        own = _differing(joint.name, seen)
+        if own.removed > PART and own.spread > SPREAD:
+            found.append(own)
     return [_finding(sorted(found, key=lambda one: -one.removed))] if found else []
 
 
