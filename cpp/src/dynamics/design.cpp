@@ -414,10 +414,6 @@ double rows_counted(const Noise& noise, std::size_t fold) {
   return usual / noise.design_effect;
 }
 
-}  // namespace
-
-namespace {
-
 /// Where a number stands among ascending ones; -1: it is not among them.
 Index place_in(const std::vector<int>& ascending, int number) {
   const auto found = std::lower_bound(ascending.begin(), ascending.end(), number);
