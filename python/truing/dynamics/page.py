@@ -44,6 +44,7 @@ READ_OTHERWISE = (
     "torque_sign",
     "position_unit",
     "load_differs",
+    "load_comes_and_goes",
 )  # findings that change what is read
 TONES = {
     "none": ("no gap beyond noise", "good"),

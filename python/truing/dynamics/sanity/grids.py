@@ -33,6 +33,7 @@ class Grid:
     name: str
     step: float  # [s]
     raw_step: float  # [s] usual step of the recording itself
+    time: Floats  # shape=(n,) [s] the instants, on the recording's clock
     rows: NDArray[np.intp]  # instants of the grid that are not across a gap
     q: Floats  # shape=(n, joints) [rad | m] smoothed
     qd: Floats  # shape=(n, joints) [rad/s | m/s]
@@ -85,6 +86,7 @@ def grid_of(robot: _core.Robot, recording: _core.Recording) -> Grid | None:
         recording.name,
         step,
         usual_step(time),
+        grid,
         np.flatnonzero(free),
         q,
         qd,

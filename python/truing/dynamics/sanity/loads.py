@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Do some recordings carry a load that the others do not, and that nobody told?
+"""Does the robot carry a load in some recordings, or for some of their time, and nobody told?
 
-No fold of recordings can show it, as what is fitted to the others does not know it. So the torques of all are
-taken by one set of links; by friction and offsets of each recording alone, which change with the day; and by
-a load of each half of a recording: what both halves carry alike, and the lightest recording does not, hangs
-at its tool.
+What comes and goes while it is recorded, `grasped` finds. What some recordings carry from end to end no fold
+of them can show, as what is fitted to the others does not know it. So the torques of all are taken by one set
+of links; by friction and offsets of each recording alone, which change with the day; and by a load of each
+half of a recording: what both halves carry alike, and the lightest recording does not, hangs at its tool.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.api import PAYLOAD_COLUMNS
 from truing.dynamics.recorded import driven_joints
+from truing.dynamics.sanity import grasped
 from truing.dynamics.sanity.findings import RecordingFinding, listed
 from truing.dynamics.sanity.grids import Grid
 
@@ -30,6 +31,7 @@ FEWEST = 40  # measured torques of half a recording
 ROUNDS = 3  # of weighing joints by what is left of their torques
 SURE = 6.0  # standard errors by which masses differ
 PART = 0.5  # of the squares that a recording leaves without its load, at most, with it
+PART_OF_ALL = 0.65  # of the squares that all leave without a load that comes and goes, at most, with it
 REACH = 1.0  # [m] no load hangs farther from the tool
 RIDGE = 1e-6  # of the links' mean square column: what motion does not show stays the file's
 OF_LOAD = 4  # parameters of a link that a load adds to: mass, and mass times centre
@@ -47,57 +49,100 @@ class Load:
     mass: float  # [kg]
     sigma: float  # [kg]
     place: tuple[float, float, float]  # [m] of its centre in the tool's frame
+    when: grasped.Grasped | None = None  # it hangs there; None: all the time
+
+    def carried(self, recording: _core.Recording) -> Floats:
+        """Mass at the tool in every row. shape=(n,) [kg]"""
+        if recording.name not in self.recordings:
+            return np.zeros(len(recording))
+        if self.when is None:
+            return np.full(len(recording), self.mass)
+        return np.asarray(self.mass * self.when.carried(recording.name, np.asarray(recording.time)))
 
 
 def loads_of(robot: _core.Robot, recordings: Sequence[_core.Recording], grids: Sequence[Grid]) -> list[Load]:
-    """Loads that recordings carry and the lightest of them does not; none where loads are stated."""
+    """Loads that recordings carry, always or at times, and the lightest does not; none if one is stated."""
     stated = any(
         np.any(one.columns[name]) for one in recordings for name in PAYLOAD_COLUMNS if name in one.columns
     )
     if stated or any(one.pieces is not None for one in recordings):
         return []
+    changing = _changing(robot, grids)
+    if changing is not None:
+        return [changing]
     seen = [halves for grid in grids if len(halves := _halves(robot, grid)) == 2]
     if len(seen) < 2:
         return []
     fit = _Fit.of(seen, len(driven_joints(robot)))
     lightest, *others = _groups(fit)
-    T_tool_last = np.linalg.inv(np.array(robot.targets[0].T_last_target)) if robot.targets else np.eye(4)
     out = []
     for group in others:
         load = fit.mean(group) - fit.mean(lightest)
-        place = T_tool_last @ np.append(load[1:] / load[0], 1.0)
-        if np.linalg.norm(place[:3]) < REACH:
+        place = _in_tool(robot, load)
+        if np.linalg.norm(place) < REACH:
             sigma = math.hypot(fit.sigma(group), fit.sigma(lightest))
             names = tuple(fit.names[k] for k in sorted(group))
-            out.append(
-                Load(names, float(load[0]), sigma, (float(place[0]), float(place[1]), float(place[2])))
-            )
+            out.append(Load(names, float(load[0]), sigma, place))
     return out
+
+
+def _changing(robot: _core.Robot, grids: Sequence[Grid]) -> Load | None:
+    """What the robot picks up, or sets down, while it is recorded; None: nothing."""
+    found = grasped.grasped(robot, grids)
+    if found is None or found.part > PART_OF_ALL or found.load[0] < SURE * found.sigma or not found.changes:
+        return None
+    place = _in_tool(robot, found.load)
+    if np.linalg.norm(place) > REACH:
+        return None
+    names = tuple(name for name, (_, there) in found.states.items() if there.any())
+    return Load(names, float(found.load[0]), found.sigma, place, found)
+
+
+def _in_tool(robot: _core.Robot, load: Floats) -> tuple[float, float, float]:
+    """[m] centre of a load, shape=(4,) [kg, kg m] in the frame after the last link, in the tool's."""
+    T_tool_last = np.linalg.inv(np.array(robot.targets[0].T_last_target)) if robot.targets else np.eye(4)
+    x, y, z, _ = (T_tool_last @ np.append(load[1:] / load[0], 1.0)).tolist()
+    return x, y, z
 
 
 def used(load: Load) -> RecordingFinding:
     """What is said of a load that is taken into account."""
     x, y, z = (1e3 * v for v in load.place)
     words = (
-        f"{_who(load)} {load.mass:.2f} kg (+- {load.sigma:.2g}) more than the lightest, at"
-        f" {x:.0f} {y:.0f} {z:.0f} mm in the tool's frame: taken into account"
-        f" (for predict: --payload {load.mass:.2f}kg@{x:.0f},{y:.0f},{z:.0f}mm)"
+        f"{_who(load)} {load.mass:.2f} kg (+- {load.sigma:.2g}) {_than(load)}, at {x:.0f} {y:.0f} {z:.0f} mm"
+        " in the tool's frame: taken into account (for predict:"
     )
-    return RecordingFinding("load_differs", load.recordings, (), words, load.mass, "kg", applied=True)
+    if load.when is None:
+        words += f" --payload {load.mass:.2f}kg@{x:.0f},{y:.0f},{z:.0f}mm)"
+    else:
+        words += " columns payload_kg, payload_x_m, payload_y_m, payload_z_m)"
+    return RecordingFinding(_finding(load), load.recordings, (), words, load.mass, "kg", applied=True)
 
 
 def to_be_weighed(load: Load) -> RecordingFinding:
     """What is said of a load where drives' constants are not known, so that its mass is not."""
+    rest = "0 where there is none" if load.when else "0 in the others"
     words = (
-        f"{_who(load)} more than the lightest, some {load.mass:.2g} kg by the constants that the file's"
-        " masses would need, and no payload_kg says so: state it, 0 in the others, and it tells the drives'"
-        " constants"
+        f"{_who(load)} some {load.mass:.2g} kg {_than(load)} by the constants that the file's masses would"
+        f" need, and no payload_kg says so: state it, {rest}, and it tells the drives' constants"
     )
-    return RecordingFinding("load_differs", load.recordings, (), words, load.mass, "kg", mistake=True)
+    return RecordingFinding(_finding(load), load.recordings, (), words, load.mass, "kg", mistake=True)
+
+
+def _finding(load: Load) -> str:
+    return "load_differs" if load.when is None else "load_comes_and_goes"
 
 
 def _who(load: Load) -> str:
     return f"{listed(load.recordings)} {'carries' if len(load.recordings) == 1 else 'carry'}"
+
+
+def _than(load: Load) -> str:
+    """What it is compared with."""
+    if load.when is None:
+        return "more than the lightest"
+    changes = load.when.changes
+    return f"at times ({changes} change{'' if changes == 1 else 's'})"
 
 
 def with_loads(recordings: Sequence[_core.Recording], loads: Sequence[Load]) -> list[_core.Recording]:
@@ -105,12 +150,18 @@ def with_loads(recordings: Sequence[_core.Recording], loads: Sequence[Load]) -> 
     drives' constants."""
     if not loads:
         return list(recordings)
-    of_name = {name: (load.mass, *load.place, 1.0) for load in loads for name in load.recordings}
     out = []
     for one in recordings:
-        values = of_name.get(one.name, np.zeros(len(_COLUMNS)))
-        carried = {name: np.full(len(one), v) for name, v in zip(_COLUMNS, values, strict=True)}
-        out.append(one.replace(columns={**one.columns, **carried}))
+        columns = {name: np.zeros(len(one)) for name in _COLUMNS}
+        for load in loads:
+            mass = load.carried(one)
+            values = (
+                np.broadcast_to((1.0, *load.place, 1.0), (len(one), len(_COLUMNS))) * (mass > 0.0)[:, None]
+            )
+            values[:, 0] *= mass
+            for name, column in zip(_COLUMNS, values.T, strict=True):
+                columns[name] += column
+        out.append(one.replace(columns={**one.columns, **columns}))
     return out
 
 
