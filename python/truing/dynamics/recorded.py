@@ -34,6 +34,20 @@ class Recorded(Protocol):
     def columns(self) -> Mapping[str, Any]: ...
 
 
+TABLES = ("position", "speed", "torque", "current", "command", "speed_command", "torque_command")
+
+
+def with_rows(
+    recording: _core.Recording, kept: NDArray[np.bool_], changed: Mapping[str, Floats] | None = None
+) -> _core.Recording:
+    """These rows alone. kept: shape=(n,); changed: tables by name, with all rows, in place of its own."""
+    tables = {name: np.asarray(getattr(recording, name)) for name in TABLES} | dict(changed or {})
+    fields: dict[str, Any] = {name: table[kept] for name, table in tables.items() if table.shape[1]}
+    columns = {name: np.asarray(values)[kept] for name, values in recording.columns.items()}
+    time = np.asarray(recording.time)[kept]
+    return _core.Recording(recording.name, time=time, columns=columns, test=recording.test, **fields)
+
+
 def driven_joints(robot: _core.Robot) -> list[_core.Joint]:
     """The joints that have a reading, in chain order."""
     return [robot.joints[index] for index in robot.driven_joints()]

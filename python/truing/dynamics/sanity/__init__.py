@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.magnitudes import are_magnitudes
-from truing.dynamics.recorded import driven_joints
-from truing.dynamics.sanity import band, between, columns, gravity, lag, loads
+from truing.dynamics.recorded import driven_joints, with_rows
+from truing.dynamics.sanity import band, between, columns, gravity, lag, loads, pushed
 from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
@@ -27,9 +27,9 @@ from truing.dynamics.sanity.known_load import known_load
 from truing.dynamics.sanity.readings import readings
 from truing.dynamics.sanity.scales import constants_by_masses, gain_unknown, scales
 from truing.dynamics.sanity.speeds import speeds
+from truing.dynamics.sanity.switched import Switched, thinned
 
 Floats = NDArray[np.float64]
-_TABLES = ("position", "speed", "torque", "current", "command", "speed_command", "torque_command")
 
 
 def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:
@@ -100,16 +100,48 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
 def _what_differs(
     robot: _core.Robot, recordings: list[_core.Recording], grids: Sequence[Grid], constants: Floats | None
 ) -> tuple[list[_core.Recording], list[RecordingFinding]]:
-    """What some recordings have and others do not, and no column tells: a load, which is taken into account,
-    or friction. constants: of drives, where they are guessed, so that a mass is no more than that.
+    """What is there at times and no column tells: a load, which is taken into account; a push at the tool,
+    whose rows are left out; friction. constants: of drives, where they are guessed, so that a mass is no more
+    than that.
     """
-    seen = grids if constants is None else [replace(grid, torque=grid.torque * constants) for grid in grids]
-    carried = loads.loads_of(robot, recordings, seen)
-    if not carried:
+    if loads.stated(recordings):
         return recordings, between.friction_differs(robot, recordings, grids)
+    found: list[RecordingFinding] = []
+    carried, push = _at_times(robot, _guessed(grids, constants))
+    if push is not None:
+        found.append(pushed.said(push))
+        if found[0].mistake:
+            return recordings, found
+        recordings = pushed.without_pushes(recordings, push)
+        grids = [grid for grid in grids_of(robot, recordings) if len(grid.rows)]
+    carried = carried or loads.loads_of(robot, recordings, _guessed(grids, constants))
+    if not carried:
+        return recordings, [*found, *between.friction_differs(robot, recordings, grids)]
     if constants is not None:
-        return recordings, [loads.to_be_weighed(one) for one in carried]
-    return loads.with_loads(recordings, carried), [loads.used(one) for one in carried]
+        return recordings, [*found, *(loads.to_be_weighed(one) for one in carried)]
+    return loads.with_loads(recordings, carried), [*found, *(loads.used(one) for one in carried)]
+
+
+def _at_times(robot: _core.Robot, grids: Sequence[Grid]) -> tuple[list[loads.Load], Switched | None]:
+    """A load that comes and goes, or a push at the tool, whichever explains more. Pressed upon from below, an
+    arm carries less, too, but nothing that would have to be accelerated.
+    """
+    thin = thinned(robot, grids)
+    if thin is None:
+        return [], None
+    load = loads.picked_up(robot, thin)
+    pushes = [pushed.push_of(robot, thin)]
+    if load is not None and load.when is not None:
+        pushes.append(pushed.push_of(robot, thin, load.when.values[1:] / load.when.values[0]))
+    push = max((one for one in pushes if one is not None), key=lambda one: one.gain, default=None)
+    if load is None or load.when is None:
+        return [], push
+    return ([load], None) if push is None or push.gain <= load.when.gain else ([], push)
+
+
+def _guessed(grids: Sequence[Grid], constants: Floats | None) -> Sequence[Grid]:
+    """With torques by constants of drives, where these are guessed."""
+    return grids if constants is None else [replace(grid, torque=grid.torque * constants) for grid in grids]
 
 
 def _scaled(recording: _core.Recording, by_speed: Floats | None, by_angle: Floats | None) -> _core.Recording:
@@ -179,13 +211,10 @@ def _shifted_back(recording: _core.Recording, late: float) -> _core.Recording:
     kept = (wanted >= time[0]) & (wanted <= time[-1])
     for row in gaps_of(time):
         kept &= (wanted <= time[row]) | (wanted >= time[row + 1])
-    tables: Mapping[str, Any] = {name: np.asarray(getattr(recording, name)) for name in _TABLES}
-    fields: dict[str, Any] = {}
-    for name, table in tables.items():
-        if not table.shape[1]:
-            continue
-        if name in ("torque", "current"):
-            table = np.column_stack([np.interp(wanted, time, column) for column in table.T])
-        fields[name] = table[kept]
-    rest = {name: np.asarray(values)[kept] for name, values in recording.columns.items()}
-    return _core.Recording(recording.name, time=time[kept], columns=rest, test=recording.test, **fields)
+    tables = {name: np.asarray(getattr(recording, name)) for name in ("torque", "current")}
+    late_ones = {
+        name: np.column_stack([np.interp(wanted, time, column) for column in table.T])
+        for name, table in tables.items()
+        if table.shape[1]
+    }
+    return with_rows(recording, kept, late_ones)

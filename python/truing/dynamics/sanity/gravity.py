@@ -40,15 +40,17 @@ def best_direction(left: Callable[[Floats], float]) -> Floats:
     return plain if float(plain @ best) > math.cos(AS_NEAR) else best
 
 
-def held_against(robot: _core.Robot, q: Floats) -> Floats:
+def held_against(robot: _core.Robot, q: Floats, place: Floats | None = None) -> Floats:
     """J^T f of a force of one at the tool along each axis of the base: what a mass of one there would weigh.
-    shape=(n, joints, 3)
+    shape=(n, joints, 3); place: [m] in the frame after the last link, in place of the tool's.
     """
     alone = robot.copy()
     for joint in alone.joints:
         joint.mass, joint.inertia, joint.rotor_inertia = 0.0, np.zeros((3, 3)), 0.0
     alone.joints[-1].mass = 1.0
-    if robot.targets:
+    if place is not None:
+        alone.joints[-1].center_of_mass = place
+    elif robot.targets:
         alone.joints[-1].center_of_mass = np.array(robot.targets[0].T_last_target)[:3, 3]
     return np.stack([weight(alone, axis, q) for axis in np.eye(3)], axis=-1)
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Does the robot carry a load in some recordings, or for some of their time, and nobody told?
 
-What comes and goes while it is recorded, `grasped` finds. What some recordings carry from end to end no fold
+What comes and goes while it is recorded, `switched` finds. What some recordings carry from end to end no fold
 of them can show, as what is fitted to the others does not know it. So the torques of all are taken by one set
 of links; by friction and offsets of each recording alone, which change with the day; and by a load of each
 half of a recording: what both halves carry alike, and the lightest recording does not, hangs at its tool.
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.api import PAYLOAD_COLUMNS
 from truing.dynamics.recorded import driven_joints
-from truing.dynamics.sanity import grasped
 from truing.dynamics.sanity.findings import RecordingFinding, listed
 from truing.dynamics.sanity.grids import Grid
+from truing.dynamics.sanity.switched import Switched, Thinned, switched
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Load:
     mass: float  # [kg]
     sigma: float  # [kg]
     place: tuple[float, float, float]  # [m] of its centre in the tool's frame
-    when: grasped.Grasped | None = None  # it hangs there; None: all the time
+    when: Switched | None = None  # it hangs there; None: all the time
 
     def carried(self, recording: _core.Recording) -> Floats:
         """Mass at the tool in every row. shape=(n,) [kg]"""
@@ -57,19 +57,20 @@ class Load:
             return np.zeros(len(recording))
         if self.when is None:
             return np.full(len(recording), self.mass)
-        return np.asarray(self.mass * self.when.carried(recording.name, np.asarray(recording.time)))
+        return np.asarray(self.mass * self.when.there(recording.name, np.asarray(recording.time)))
+
+
+def stated(recordings: Sequence[_core.Recording]) -> bool:
+    """Some say what they carry, or are read in pieces, of which nothing here is asked."""
+    return any(one.pieces is not None for one in recordings) or any(
+        np.any(one.columns[name]) for one in recordings for name in PAYLOAD_COLUMNS if name in one.columns
+    )
 
 
 def loads_of(robot: _core.Robot, recordings: Sequence[_core.Recording], grids: Sequence[Grid]) -> list[Load]:
-    """Loads that recordings carry, always or at times, and the lightest does not; none if one is stated."""
-    stated = any(
-        np.any(one.columns[name]) for one in recordings for name in PAYLOAD_COLUMNS if name in one.columns
-    )
-    if stated or any(one.pieces is not None for one in recordings):
+    """Loads that recordings carry and the lightest of them does not; none where one is stated."""
+    if stated(recordings):
         return []
-    changing = _changing(robot, grids)
-    if changing is not None:
-        return [changing]
     seen = [halves for grid in grids if len(halves := _halves(robot, grid)) == 2]
     if len(seen) < 2:
         return []
@@ -86,16 +87,20 @@ def loads_of(robot: _core.Robot, recordings: Sequence[_core.Recording], grids: S
     return out
 
 
-def _changing(robot: _core.Robot, grids: Sequence[Grid]) -> Load | None:
+def picked_up(robot: _core.Robot, thin: Thinned) -> Load | None:
     """What the robot picks up, or sets down, while it is recorded; None: nothing."""
-    found = grasped.grasped(robot, grids)
-    if found is None or found.part > PART_OF_ALL or found.load[0] < SURE * found.sigma or not found.changes:
+
+    def columns(q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        return np.asarray(_core.torque_regressor(robot, q, qd, qdd))[:, :, -10 : -10 + OF_LOAD]
+
+    tool = np.array(robot.targets[0].T_last_target)[:3, 3] if robot.targets else np.zeros(3)
+    found = switched(thin, columns, [np.append(1.0, tool)], is_mass=True)
+    if found is None or found.part > PART_OF_ALL or found.values[0] < SURE * found.sigma or not found.changes:
         return None
-    place = _in_tool(robot, found.load)
+    place = _in_tool(robot, found.values)
     if np.linalg.norm(place) > REACH:
         return None
-    names = tuple(name for name, (_, there) in found.states.items() if there.any())
-    return Load(names, float(found.load[0]), found.sigma, place, found)
+    return Load(found.recordings, float(found.values[0]), found.sigma, place, found)
 
 
 def _in_tool(robot: _core.Robot, load: Floats) -> tuple[float, float, float]:

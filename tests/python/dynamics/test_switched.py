@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""A load that comes and goes while it is recorded, and that nobody told."""
+"""What comes and goes while a robot is recorded, and nobody told: a load, a push at its tool."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from truing.dynamics import Recording, check_recordings, diagnose, load_recordings, predict, with_payload
-from truing.dynamics.sanity import RecordingFinding
+from truing.dynamics.sanity import RecordingFinding, gravity
 from truing.files import load_robot
 from truing.model import AppliedEffect, Robot
 from truing.testing.dynamics import NOISE, USUAL, coloured_noise, demo_arm, fourier_motion
@@ -22,6 +22,7 @@ REAL = Path(os.environ.get("TRUING_REALDATA", ""))
 PLACE = (0.02, -0.04, 0.11)  # [m]
 SECONDS = 24.0
 FINDING = "load_comes_and_goes"
+PUSHED = "tool_pushed"
 
 
 def there(recording: Recording, seed: int) -> NDArray[np.float64]:
@@ -61,9 +62,16 @@ def untold(mass: float, count: int = 3, always: Sequence[int] = ()) -> list[Reco
     return out
 
 
-def said(findings: Sequence[RecordingFinding]) -> RecordingFinding:
-    (found,) = [one for one in findings if one.finding == FINDING]
+def said(findings: Sequence[RecordingFinding], name: str = FINDING) -> RecordingFinding:
+    (found,) = [one for one in findings if one.finding in (FINDING, PUSHED)]
+    assert found.finding == name
     return found
+
+
+def pushed(arm: Robot, recording: Recording, force: Sequence[float], seed: int) -> NDArray[np.float64]:
+    """Torques that hold a force [N] at the tool, in the base frame, while it is there. shape=(n, joints)"""
+    by_force = gravity.held_against(arm, np.asarray(recording.position)) @ np.array(force)
+    return np.asarray(by_force * there(recording, seed)[:, None])
 
 
 def test_what_is_picked_up_and_set_down_is_found_with_its_times() -> None:
@@ -86,7 +94,7 @@ def test_what_is_picked_up_and_set_down_is_found_with_its_times() -> None:
 @pytest.mark.parametrize(("mass", "count"), [(0.0, 3), (3.0, 1), (3.0, 3)])
 def test_what_always_hangs_there_does_not_come_and_go(mass: float, count: int) -> None:
     recordings = untold(mass, count, always=range(count))
-    assert FINDING not in [one.finding for one in check_recordings(demo_arm(), recordings).findings]
+    assert not {FINDING, PUSHED} & {one.finding for one in check_recordings(demo_arm(), recordings).findings}
 
 
 def test_on_unknown_drives_it_is_asked_to_weigh_it() -> None:
@@ -99,6 +107,22 @@ def test_on_unknown_drives_it_is_asked_to_weigh_it() -> None:
 def test_a_stated_load_is_not_looked_for() -> None:
     stated = [carrying(one, 3.0, seed) for seed, one in enumerate(untold(3.0))]
     assert FINDING not in [one.finding for one in check_recordings(demo_arm(), stated).findings]
+
+
+@pytest.mark.parametrize("force", [(0.0, 0.0, 60.0), (40.0, -30.0, 0.0)])
+def test_rows_in_which_the_tool_is_pushed_are_left_out(force: tuple[float, float, float]) -> None:
+    arm, free = demo_arm(), untold(0.0, 3)
+    recordings = [
+        one.replace(torque=np.asarray(one.torque) + pushed(arm, one, force, seed))
+        for seed, one in enumerate(free)
+    ]
+    checked = check_recordings(arm, recordings)
+    found = said(checked.findings, PUSHED)
+    assert found.applied and found.value == pytest.approx(np.linalg.norm(force), rel=0.1)
+    for seed, (one, whole) in enumerate(zip(checked.recordings, free, strict=True)):
+        at = there(whole, seed)
+        kept = np.isin(np.asarray(whole.time), np.asarray(one.time))
+        assert np.mean(at[kept]) < 0.01 and kept.sum() > 0.6 * (~at).sum()
 
 
 def real(name: str, constants: Sequence[float] = ()) -> tuple[Robot, list[Recording]]:
@@ -121,7 +145,7 @@ UR10E_CONSTANTS = (10.0, 10.6956, 8.4566, 9.0029, 9.48, 10.1232)  # [Nm/A] publi
 def test_real_arms_that_pick_nothing_up_are_not_said_to(name: str, constants: Sequence[float]) -> None:
     robot, recordings = real(name, constants)
     for some in (recordings, *([one] for one in recordings)):
-        assert FINDING not in [one.finding for one in check_recordings(robot, some).findings]
+        assert not {FINDING, PUSHED} & {one.finding for one in check_recordings(robot, some).findings}
 
 
 @pytest.mark.realdata
@@ -141,3 +165,16 @@ def test_a_load_put_into_torques_of_real_arms_is_found(
         loaded.append(one.replace(current=None, torque=current + with_it - without))
     found = said(check_recordings(robot, loaded).findings)
     assert found.value == pytest.approx(1.5, rel=rel)
+
+
+@pytest.mark.realdata
+def test_a_push_put_into_torques_of_a_real_arm_is_found() -> None:
+    robot, recordings = real("dyn_ur10e", UR10E_CONSTANTS)
+    force = (15.0, -10.0, 10.0)
+    torques = [np.asarray(one.current) * UR10E_CONSTANTS for one in recordings]
+    touching = [
+        one.replace(current=None, torque=torque + pushed(robot, one, force, seed))
+        for seed, (one, torque) in enumerate(zip(recordings, torques, strict=True))
+    ]
+    found = said(check_recordings(robot, touching).findings, PUSHED)
+    assert found.applied and found.value == pytest.approx(np.linalg.norm(force), rel=0.15)

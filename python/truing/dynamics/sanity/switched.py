@@ -1,0 +1,335 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""What comes and goes while a robot is recorded: a load that it picks up, a push at its tool.
+
+Links that all rows have in common, and friction and offsets of each recording, leave a torque that comes and
+goes. It may be that of one load (or force), which is there or not: a hidden Markov model of two states. Its
+values and the links are found by least squares, then the states by Viterbi's recursion (1967), in which a
+change costs; and so on in turns until no state changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truing import _core
+from truing.dynamics.sanity.grids import Grid
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+STEP = 0.05  # [s] between the rows that are looked at, at least
+ROWS = 2000  # of all recordings together, at most
+FEWEST = 40  # rows of a recording
+STRETCH = 1.0  # [s] that is asked alone for how much of it there is, to begin with
+TURNS = 15  # of values and states
+PROMISING = 0.9  # of the squares left without it: what the first guess must get below
+CORRELATED = 0.5  # [s] over which what is left may be alike, at most: it is more while states are wrong
+CHANGE = 20.0  # [nats] that must be gained where it comes or goes
+RIDGE = 1e-6  # of the mean square column: what motion does not show stays the file's
+_TINY = 1e-300
+
+
+Columns = Callable[[Floats, Floats, Floats], Floats]
+"""Of angles, speeds and accelerations, shape=(n, joints) each: torques by the values of what comes and goes,
+shape=(n, joints, values)."""
+
+
+@dataclass(frozen=True)
+class Switched:
+    """What comes and goes, and when it is there."""
+
+    values: Floats
+    sigma: float  # standard error of the first of them
+    part: float  # of the squares left without it: what is left with it
+    gain: float  # [nats] of noise that is white
+    states: dict[str, tuple[Floats, Bools]]  # by recording: instants [s], and whether it is there
+
+    @property
+    def changes(self) -> int:
+        """How often it comes or goes."""
+        return sum(int(np.sum(there[1:] != there[:-1])) for _, there in self.states.values())
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """Those in which it is there for some time."""
+        return tuple(name for name, (_, there) in self.states.items() if there.any())
+
+    @property
+    def share(self) -> float:
+        """Of the time."""
+        return float(np.mean(np.concatenate([there for _, there in self.states.values()])))
+
+    def there(self, recording: str, time: Floats) -> Bools:
+        """Whether it is there at these times [s], shape=(n,): as at the nearest instant."""
+        if recording not in self.states:
+            return np.zeros(len(time), dtype=np.bool_)
+        instants, there = self.states[recording]
+        return there[np.searchsorted(0.5 * (instants[1:] + instants[:-1]), time)]
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Of one recording; what friction, rotors and offsets take up is left out of links and torque."""
+
+    name: str
+    time: Floats  # shape=(n,) [s]
+    motion: tuple[Floats, Floats, Floats]  # shape=(n, joints) each: angles, speeds, accelerations
+    there: Bools  # shape=(joints, n) a torque was measured
+    links: Floats  # shape=(joints, n, 10 links) torques by the parameters of the links
+    torque: Floats  # shape=(joints, n) [Nm | N] less that of the file's links; 0: not measured
+    usual: Floats  # shape=(joints, n, 4) orthonormal columns of friction, rotor and offset
+
+    def without_usual(self, columns: Floats) -> Floats:
+        """shape=(joints, n, k)"""
+        return np.asarray(columns - self.usual @ (self.usual.transpose(0, 2, 1) @ columns))
+
+
+@dataclass(frozen=True)
+class Thinned:
+    """Rows of recordings that are asked what comes and goes."""
+
+    rows: list[_Rows]
+    step: float  # [s] between them
+    gram: Floats  # shape=(joints, 10 links, 10 links) of the links' columns
+    right: Floats  # shape=(joints, 10 links) these times the torques
+
+
+def thinned(robot: _core.Robot, grids: Sequence[Grid]) -> Thinned | None:
+    """None: they are too short, or no torque was measured."""
+    step = max(STEP, sum(len(grid.rows) * grid.step for grid in grids) / ROWS)
+    rows = [one for grid in grids if len((one := _rows(robot, grid, step)).time) >= FEWEST]
+    if not any(one.torque.any() for one in rows):
+        return None
+    gram = sum(one.links.transpose(0, 2, 1) @ one.links for one in rows)
+    right = sum((one.torque[:, None, :] @ one.links)[:, 0] for one in rows)
+    return Thinned(rows, step, np.asarray(gram), np.asarray(right))
+
+
+def switched(of: Thinned, columns: Columns, first: Sequence[Floats], is_mass: bool) -> Switched | None:
+    """What has these columns and explains most by coming and going; None: there is no such.
+
+    first: values to begin with, of any size, beside those that stretches of time have in common. is_mass:
+    the first value is above zero; the links may take up what is always there, so that it is there where more
+    of it is.
+    """
+    arm = _Arm.made(of, columns, is_mass)
+    found = [_in_turns(arm, arm.apart(values)) for values in (*first, arm.in_common())]
+    return max((one for one in found if one is not None), key=lambda one: one.gain, default=None)
+
+
+def _rows(robot: _core.Robot, grid: Grid, step: float) -> _Rows:
+    rows = grid.rows[:: max(1, round(step / grid.step))]
+    motion = grid.q[rows], grid.qd[rows], grid.qdd[rows]
+    torque = (grid.torque[rows] - np.asarray(_core.rigid_torques(robot, *motion))).T
+    there = ~np.isnan(torque)
+    links = np.asarray(_core.torque_regressor(robot, *motion)).transpose(1, 0, 2) * there[:, :, None]
+    ones = np.ones((len(rows), len(torque)))
+    usual = np.stack([grid.direction[rows], grid.qd[rows], grid.qdd[rows], ones]).transpose(2, 1, 0)
+    one = _Rows(
+        grid.name,
+        grid.time[rows],
+        motion,
+        there,
+        links,
+        np.where(there, torque, 0.0),
+        np.linalg.qr(usual * there[:, :, None])[0],
+    )
+    left = one.without_usual(one.torque[:, :, None])[:, :, 0]
+    return replace(one, links=one.without_usual(links), torque=left)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Links, and what comes and goes where it is said to be there."""
+
+    weight: Floats  # shape=(joints,) one over what is left of a joint's torque
+    values: Floats
+    left: list[Floats]  # by recording, shape=(joints, n) [Nm | N]
+
+    @property
+    def squares(self) -> float:
+        return float(sum(np.sum((self.weight[:, None] * one) ** 2) for one in self.left))
+
+    @property
+    def rms(self) -> Floats:
+        """What is left of each joint's torque. shape=(joints,) [Nm | N]"""
+        rms = np.sqrt(np.mean(np.concatenate(self.left, axis=1) ** 2, axis=1))
+        return np.asarray(np.maximum(rms, max(1e-6 * rms.max(), _TINY)))
+
+
+@dataclass(frozen=True)
+class _Arm:
+    of: Thinned
+    own: list[Floats]  # by recording, shape=(joints, n, values) of what comes and goes, whole
+    is_mass: bool
+    without: _Fit  # nothing anywhere
+
+    @classmethod
+    def made(cls, of: Thinned, columns: Columns, is_mass: bool) -> _Arm:
+        own = [columns(*one.motion).transpose(1, 0, 2) * one.there[:, :, None] for one in of.rows]
+        ones = np.ones(len(of.gram))
+        arm = cls(of, own, is_mass, _Fit(ones, np.zeros(own[0].shape[2]), []))
+        first = arm.fit(arm.nowhere(), ones)
+        return replace(arm, without=arm.fit(arm.nowhere(), 1.0 / first.rms))
+
+    def nowhere(self) -> list[Bools]:
+        return [np.zeros(len(one.time), dtype=np.bool_) for one in self.of.rows]
+
+    def fit(self, states: Sequence[Bools], weight: Floats) -> _Fit:
+        """Least squares: normal equations of the links, bordered by those of what comes and goes."""
+        square, width = weight**2, self.of.gram.shape[1]
+        both = width + self.own[0].shape[2]
+        whole, right = np.zeros((both, both)), np.zeros(both)
+        whole[:width, :width], right[:width] = np.tensordot(square, self.of.gram, 1), square @ self.of.right
+        owns = []
+        for one, whole_own, there in zip(self.of.rows, self.own, states, strict=True):
+            own = one.without_usual(whole_own * there[:, None])
+            owns.append(own)
+            weighed = (square[:, None, None] * own).transpose(0, 2, 1)
+            whole[width:, :width] += np.sum(weighed @ one.links, axis=0)
+            whole[width:, width:] += np.sum(weighed @ own, axis=0)
+            right[width:] += np.sum(weighed @ one.torque[:, :, None], axis=0)[:, 0]
+        whole[:width, width:] = whole[width:, :width].T
+        values = np.linalg.solve(whole + RIDGE * np.trace(whole) / both * np.eye(both), right)
+        left = [
+            one.torque - one.links @ values[:width] - own @ values[width:]
+            for one, own in zip(self.of.rows, owns, strict=True)
+        ]
+        return _Fit(weight, values[width:], left)
+
+    def stretches(self) -> Iterator[tuple[int, slice, Floats, Floats]]:
+        """Number of the recording, rows, and the normal equations of what the links leave in each."""
+        length, by = max(2, round(STRETCH / self.of.step)), self.without.weight[:, None]
+        for k, (own, left) in enumerate(zip(self.own, self.without.left, strict=True)):
+            for begin in range(0, left.shape[1], length):
+                rows = slice(begin, begin + length)
+                x = (by[:, :, None] * own[:, rows]).reshape(-1, own.shape[2])
+                yield k, rows, x.T @ x, x.T @ (by * left[:, rows]).ravel()
+
+    def in_common(self) -> Floats:
+        """What stretches have in common, each so much of it as it wants: alternating least squares from the
+        first principal direction.
+        """
+        equations = [(gram, right) for _, _, gram, right in self.stretches()]
+        whole = np.sum([gram for gram, _ in equations], axis=0)
+        whole += (RIDGE * np.trace(whole) + _TINY) * np.eye(len(whole))
+        outer = np.sum([np.outer(right, right) for _, right in equations], axis=0)
+        sizes, vectors = np.linalg.eig(np.linalg.solve(whole, outer))
+        values = np.real(vectors[:, int(np.argmax(np.real(sizes)))])
+        for _ in range(TURNS):
+            much = [_amount(values, gram, right)[0] for gram, right in equations]
+            gram = np.sum([a * a * g for a, (g, _) in zip(much, equations, strict=True)], axis=0)
+            right = np.sum([a * r for a, (_, r) in zip(much, equations, strict=True)], axis=0)
+            values = np.linalg.solve(gram + RIDGE * whole, right)
+            values = values / max(float(np.linalg.norm(values)), _TINY)
+        return np.asarray(values)
+
+    def apart(self, values: Floats) -> list[Bools]:
+        """Stretches that want much of it, and those that want little: two means."""
+        stretches = list(self.stretches())
+        much = np.array([_amount(values, gram, right) for _, _, gram, right in stretches])
+        out = self.nowhere()
+        for (k, rows, _, _), there in zip(stretches, _two_means(*much.T), strict=True):
+            out[k][rows] = there
+        return out
+
+
+def _amount(values: Floats, gram: Floats, right: Floats) -> tuple[float, float]:
+    """How much of these values a stretch wants, and its weight: one over the variance of that."""
+    weight = max(float(values @ gram @ values), _TINY)
+    return float(values @ right) / weight, weight
+
+
+def _two_means(values: Floats, weights: Floats) -> Bools:
+    """Which of the values are nearer to the upper of two means. shape=(n,)"""
+    low, high = np.quantile(values, [0.1, 0.9])
+    for _ in range(TURNS):
+        upper = values > 0.5 * (low + high)
+        if upper.all() or not upper.any():
+            break
+        low = float(np.average(values[~upper], weights=weights[~upper]))
+        high = float(np.average(values[upper], weights=weights[upper]))
+    return np.asarray(values > 0.5 * (low + high))
+
+
+def _in_turns(arm: _Arm, states: list[Bools]) -> Switched | None:
+    """Values and states that agree; None: they explain little, or it is there always or never."""
+    other = [~there for there in states]
+    fit = arm.fit(states, arm.without.weight)
+    if not arm.is_mass and arm.fit(other, arm.without.weight).squares < fit.squares:
+        states, fit = other, arm.fit(other, arm.without.weight)
+    if fit.squares > PROMISING * arm.without.squares:
+        return None
+    for _ in range(TURNS):
+        if arm.is_mass and fit.values[0] < 0.0:
+            states = [~there for there in states]
+        fit = arm.fit(states, 1.0 / fit.rms)
+        new = _states(arm, fit, states)
+        if np.mean(np.concatenate(new)) in (0.0, 1.0):
+            return None
+        if all(np.array_equal(a, b) for a, b in zip(states, new, strict=True)):
+            break
+        states = new
+        fit = arm.fit(states, fit.weight)
+    without = arm.fit(arm.nowhere(), fit.weight)
+    gain = sum(len(there) for there in states) * float(np.sum(np.log(arm.without.rms / fit.rms)))
+    of_name = {one.name: (one.time, there) for one, there in zip(arm.of.rows, states, strict=True)}
+    return Switched(fit.values, _sigma(arm, fit, states), fit.squares / without.squares, gain, of_name)
+
+
+def _states(arm: _Arm, fit: _Fit, states: Sequence[Bools]) -> list[Bools]:
+    """When it is there, by what the fit leaves with and without it."""
+    rows = min(_correlated(fit.left, fit.weight), CORRELATED / arm.of.step)
+    by, out = fit.weight[:, None], []
+    for columns, left, there in zip(arm.own, fit.left, states, strict=True):
+        own = by * (columns @ fit.values)
+        without = by * left + own * there
+        out.append(_viterbi(0.5 * np.sum(without**2 - (without - own) ** 2, axis=0) / max(rows, 1.0)))
+    return out
+
+
+def _correlated(left: Sequence[Floats], weight: Floats) -> float:
+    """Rows that tell as much as one whose noise is its own: (1 + r) / (1 - r) of a first-order process."""
+    square = weight**2
+    after = sum(float(square @ np.sum(one[:, 1:] * one[:, :-1], axis=1)) for one in left)
+    r = min(max(after / max(sum(float(square @ np.sum(one**2, axis=1)) for one in left), _TINY), 0.0), 0.98)
+    return (1.0 + r) / (1.0 - r)
+
+
+def _viterbi(gain: Floats) -> Bools:
+    """Which rows have it: the sum of their gains [nats], less CHANGE a change, is largest. shape=(n,)"""
+    without, with_it = 0.0, 0.0
+    came: list[tuple[bool, bool]] = []  # by row: the row before had it, this one having it not, and having it
+    for here in gain.tolist():
+        came.append((with_it - CHANGE > without, with_it >= without - CHANGE))
+        without, with_it = max(without, with_it - CHANGE), max(with_it, without - CHANGE) + here
+    state, out = with_it > without, []
+    for before in reversed(came):
+        out.append(state)
+        state = before[int(state)]
+    return np.array(out[::-1], dtype=np.bool_)
+
+
+def _sigma(arm: _Arm, fit: _Fit, states: Sequence[Bools]) -> float:
+    """Standard error of the first value, the links being known: how far those of times with it are apart."""
+    firsts, variances = [], []
+    by, width = fit.weight[:, None], len(fit.values)
+    for own, left, there in zip(arm.own, fit.left, states, strict=True):
+        for rows in np.split(np.arange(len(there)), np.flatnonzero(there[1:] != there[:-1]) + 1):
+            for part in np.array_split(rows, 2):
+                if len(part) < 2 * width or not there[part[0]]:
+                    continue
+                x = (by[:, :, None] * own[:, part]).reshape(-1, width)
+                inverse = np.linalg.pinv(x.T @ x, rcond=1e-9, hermitian=True)
+                firsts.append(float((inverse @ (x.T @ (by * left[:, part]).ravel()))[0]))
+                variances.append(float(inverse[0, 0]))
+    if len(firsts) < 2:
+        return float("inf")
+    of_one = np.array(firsts) ** 2 / np.array(variances)
+    coloured = max(1.0, float(np.sum(of_one)) / (len(firsts) - 1))
+    return float(np.sqrt(coloured / np.sum(1.0 / np.array(variances))))
