@@ -10,7 +10,8 @@ change costs; and so on in turns until no state changes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,7 +119,7 @@ def switched(of: Thinned, columns: Columns, first: Sequence[Floats], is_mass: bo
     of it is.
     """
     arm = _Arm.made(of, columns, is_mass)
-    found = [_in_turns(arm, arm.apart(values)) for values in (*first, arm.in_common())]
+    found = [_in_turns(arm, arm.apart(values)) for values in (*first, arm.stretches.in_common())]
     return max((one for one in found if one is not None), key=lambda one: one.gain, default=None)
 
 
@@ -202,47 +203,56 @@ class _Arm:
         ]
         return _Fit(weight, values[width:], left)
 
-    def stretches(self) -> Iterator[tuple[int, slice, Floats, Floats]]:
-        """Number of the recording, rows, and the normal equations of what the links leave in each."""
+    @functools.cached_property
+    def stretches(self) -> _Stretches:
         length, by = max(2, round(STRETCH / self.of.step)), self.without.weight[:, None]
+        places, grams, rights = [], [], []
         for k, (own, left) in enumerate(zip(self.own, self.without.left, strict=True)):
             for begin in range(0, left.shape[1], length):
                 rows = slice(begin, begin + length)
                 x = (by[:, :, None] * own[:, rows]).reshape(-1, own.shape[2])
-                yield k, rows, x.T @ x, x.T @ (by * left[:, rows]).ravel()
-
-    def in_common(self) -> Floats:
-        """What stretches have in common, each so much of it as it wants: alternating least squares from the
-        first principal direction.
-        """
-        equations = [(gram, right) for _, _, gram, right in self.stretches()]
-        whole = np.sum([gram for gram, _ in equations], axis=0)
-        whole += (RIDGE * np.trace(whole) + _TINY) * np.eye(len(whole))
-        outer = np.sum([np.outer(right, right) for _, right in equations], axis=0)
-        sizes, vectors = np.linalg.eig(np.linalg.solve(whole, outer))
-        values = np.real(vectors[:, int(np.argmax(np.real(sizes)))])
-        for _ in range(TURNS):
-            much = [_amount(values, gram, right)[0] for gram, right in equations]
-            gram = np.sum([a * a * g for a, (g, _) in zip(much, equations, strict=True)], axis=0)
-            right = np.sum([a * r for a, (_, r) in zip(much, equations, strict=True)], axis=0)
-            values = np.linalg.solve(gram + RIDGE * whole, right)
-            values = values / max(float(np.linalg.norm(values)), _TINY)
-        return np.asarray(values)
+                places.append((k, rows))
+                grams.append(x.T @ x)
+                rights.append(x.T @ (by * left[:, rows]).ravel())
+        return _Stretches(places, np.array(grams), np.array(rights))
 
     def apart(self, values: Floats) -> list[Bools]:
-        """Stretches that want much of it, and those that want little: two means."""
-        stretches = list(self.stretches())
-        much = np.array([_amount(values, gram, right) for _, _, gram, right in stretches])
+        """Where stretches want much of it, and not little: two means."""
         out = self.nowhere()
-        for (k, rows, _, _), there in zip(stretches, _two_means(*much.T), strict=True):
+        for (k, rows), there in zip(
+            self.stretches.places, _two_means(*self.stretches.wanted(values)), strict=True
+        ):
             out[k][rows] = there
         return out
 
 
-def _amount(values: Floats, gram: Floats, right: Floats) -> tuple[float, float]:
-    """How much of these values a stretch wants, and its weight: one over the variance of that."""
-    weight = max(float(values @ gram @ values), _TINY)
-    return float(values @ right) / weight, weight
+@dataclass(frozen=True)
+class _Stretches:
+    """Normal equations of what the links leave in each of them."""
+
+    places: list[tuple[int, slice]]  # number of the recording, rows
+    gram: Floats  # shape=(stretches, values, values)
+    right: Floats  # shape=(stretches, values)
+
+    def wanted(self, values: Floats) -> tuple[Floats, Floats]:
+        """How much of these values each wants, and its weight: one over the variance of that."""
+        weight = np.maximum(np.einsum("i,sij,j->s", values, self.gram, values), _TINY)
+        return self.right @ values / weight, weight
+
+    def in_common(self) -> Floats:
+        """What they have in common, each so much of it as it wants: alternating least squares from the first
+        principal direction. shape=(values,)
+        """
+        whole = self.gram.sum(axis=0)
+        whole += (RIDGE * np.trace(whole) + _TINY) * np.eye(len(whole))
+        sizes, vectors = np.linalg.eig(np.linalg.solve(whole, self.right.T @ self.right))
+        values = np.real(vectors[:, int(np.argmax(np.real(sizes)))])
+        for _ in range(TURNS):
+            much = self.wanted(values)[0]
+            gram = np.einsum("s,sij->ij", much**2, self.gram)
+            values = np.linalg.solve(gram + RIDGE * whole, much @ self.right)
+            values = values / max(float(np.linalg.norm(values)), _TINY)
+        return np.asarray(values)
 
 
 def _two_means(values: Floats, weights: Floats) -> Bools:
