@@ -45,6 +45,7 @@ READ_OTHERWISE = (
     "position_unit",
     "load_differs",
     "load_comes_and_goes",
+    "tool_pushed",
 )  # findings that change what is read
 TONES = {
     "none": ("no gap beyond noise", "good"),
