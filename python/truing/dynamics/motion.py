@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -46,6 +47,13 @@ class Track:
         cuts = np.flatnonzero(np.diff(self.time) > GAP * self.step)
         begins, ends = self.time[[0, *(cuts + 1)]], self.time[[*cuts, -1]]
         return list(zip(begins.tolist(), ends.tolist(), strict=True))
+
+    def near_gap(self, distance: float) -> NDArray[np.bool_]:
+        """Rows nearer to a gap than `distance` [s]: smoothing mixed both sides of it. shape=(n,)"""
+        out = np.zeros(self.time.size, dtype=bool)
+        for (_, end), (begin, _) in itertools.pairwise(self.stretches):
+            out |= (self.time > end - distance) & (self.time < begin + distance)
+        return out
 
     def near(self, begin: float, end: float) -> Track:
         """The rows between two times, and one more on both sides."""

@@ -221,6 +221,9 @@ def test_windows_leave_gaps_out_and_say_what_is_missing() -> None:
     ends = windows.starts + 0.5
     assert len(windows.starts) > 4
     assert not np.any((windows.starts < 1.8) & (ends > 1.5))
+    track = track_of(gap, two_links(), 0.05)[0]
+    ((_, end), (begin, _)) = track.stretches
+    assert np.array_equal(track.near_gap(0.1), (track.time > end - 0.1) & (track.time < begin + 0.1))
     with pytest.raises(truing.InputError, match="no recording has 10.1 s without a gap"):
         windows_of([recording], two_links(), horizons=(10.0,))
     nothing = Recording("nothing", recording.time, recording.position, np.zeros((0, 0)))

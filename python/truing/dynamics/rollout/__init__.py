@@ -24,7 +24,7 @@ from truing.dynamics.api import identify
 from truing.dynamics.commanded import CommandedTrack
 from truing.dynamics.export import Exported, export, import_mujoco
 from truing.dynamics.export.refit import training
-from truing.dynamics.motion import Track
+from truing.dynamics.motion import SMOOTHING, Track
 from truing.dynamics.recorded import Recorded
 from truing.dynamics.rollout.page import FAR, TURN, main_horizon
 from truing.dynamics.runner import Runnable, runnable
@@ -305,7 +305,7 @@ def paths_of(judged: Judgement) -> list[Mapping[str, Any]]:
             "joint": joint,
             "unit": "°" if windows.units[j] == "rad" else "mm",
             "time": track.time[rows],
-            "measured": scale[j] * track.q[rows, j],
+            "measured": np.where(track.near_gap(SMOOTHING)[rows], np.nan, scale[j] * track.q[rows, j]),
             **_commanded(track, rows, j, scale[j]),
             "ahead": np.concatenate([[*(windows.starts[k] + windows.times), np.nan] for k in chosen]),
             "simulated": {

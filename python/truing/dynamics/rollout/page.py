@@ -254,7 +254,7 @@ def _seen(path: Mapping[str, Any], model: str, low: float, high: float) -> Float
 
 
 def _range(path: Mapping[str, Any]) -> tuple[float, float]:
-    low, high = float(np.min(path["measured"])), float(np.max(path["measured"]))
+    low, high = float(np.nanmin(path["measured"])), float(np.nanmax(path["measured"]))
     more = HEADROOM * max(high - low, 1e-3)
     return low - more, high + more
 
