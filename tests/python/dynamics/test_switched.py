@@ -82,6 +82,8 @@ def test_what_is_picked_up_and_set_down_is_found_with_its_times() -> None:
     assert found.value == pytest.approx(3.0, rel=0.03)
     for seed, one in enumerate(checked.recordings):
         at = there(one, seed)
+        spans = [span for name, *span in found.spans if name == one.name]
+        assert sum(end - begin for begin, end in spans) == pytest.approx(0.01 * at.sum(), rel=0.05)
         mass = np.asarray(one.columns["payload_kg"])
         assert np.mean((mass > 0.0) == at) > 0.97
         assert np.array_equal(mass > 0.0, np.asarray(one.columns["payload_found"]) > 0.0)

@@ -24,6 +24,7 @@ class RecordingFinding:
     unit: str
     applied: bool = False  # it was corrected, or is allowed for, in what follows
     mistake: bool = False  # conclusions are doubtful until it is corrected
+    spans: tuple[tuple[str, float, float], ...] = ()  # recording, begin and end [s] of when; none: always
 
 
 @dataclass(frozen=True)

@@ -121,7 +121,9 @@ def used(load: Load) -> RecordingFinding:
         words += f" --payload {load.mass:.2f}kg@{x:.0f},{y:.0f},{z:.0f}mm)"
     else:
         words += " columns payload_kg, payload_x_m, payload_y_m, payload_z_m)"
-    return RecordingFinding(_finding(load), load.recordings, (), words, load.mass, "kg", applied=True)
+    return RecordingFinding(
+        _finding(load), load.recordings, (), words, load.mass, "kg", applied=True, spans=_spans(load)
+    )
 
 
 def to_be_weighed(load: Load) -> RecordingFinding:
@@ -131,11 +133,17 @@ def to_be_weighed(load: Load) -> RecordingFinding:
         f"{_who(load)} some {load.mass:.2g} kg {_than(load)} by the constants that the file's masses would"
         f" need, and no payload_kg says so: state it, {rest}, and it tells the drives' constants"
     )
-    return RecordingFinding(_finding(load), load.recordings, (), words, load.mass, "kg", mistake=True)
+    return RecordingFinding(
+        _finding(load), load.recordings, (), words, load.mass, "kg", mistake=True, spans=_spans(load)
+    )
 
 
 def _finding(load: Load) -> str:
     return "load_differs" if load.when is None else "load_comes_and_goes"
+
+
+def _spans(load: Load) -> tuple[tuple[str, float, float], ...]:
+    return load.when.spans if load.when is not None else ()
 
 
 def _who(load: Load) -> str:

@@ -45,7 +45,15 @@ def said(found: Switched) -> RecordingFinding:
     applied = found.share < MOST
     words += ": these rows are left out" if applied else ": record it without touching anything"
     return RecordingFinding(
-        "tool_pushed", found.recordings, (), words, size, "N", applied=applied, mistake=not applied
+        "tool_pushed",
+        found.recordings,
+        (),
+        words,
+        size,
+        "N",
+        applied=applied,
+        mistake=not applied,
+        spans=found.spans,
     )
 
 

@@ -61,6 +61,19 @@ class Switched:
         return tuple(name for name, (_, there) in self.states.items() if there.any())
 
     @property
+    def spans(self) -> tuple[tuple[str, float, float], ...]:
+        """Recording, begin and end [s] of the times when it is there."""
+        out = []
+        for name, (instants, there) in self.states.items():
+            bounds = np.concatenate([instants[:1], 0.5 * (instants[1:] + instants[:-1]), instants[-1:]])
+            changes = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]])))
+            out += [
+                (name, round(float(bounds[a]), 3), round(float(bounds[b]), 3))
+                for a, b in changes.reshape(-1, 2)
+            ]
+        return tuple(out)
+
+    @property
     def share(self) -> float:
         """Of the time."""
         return float(np.mean(np.concatenate([there for _, there in self.states.values()])))
