@@ -123,20 +123,17 @@ def _what_differs(
 
 
 def _at_times(robot: _core.Robot, grids: Sequence[Grid]) -> tuple[list[loads.Load], Switched | None]:
-    """A load that comes and goes, or a push at the tool, whichever explains more. Pressed upon from below, an
+    """Loads that come and go, or a push at the tool, whichever explains more. Pressed upon from below, an
     arm carries less, too, but nothing that would have to be accelerated.
     """
     thin = thinned(robot, grids)
     if thin is None:
         return [], None
-    load = loads.picked_up(robot, thin)
-    pushes = [pushed.push_of(robot, thin)]
-    if load is not None and load.when is not None:
-        pushes.append(pushed.push_of(robot, thin, load.when.values[1:] / load.when.values[0]))
-    push = max((one for one in pushes if one is not None), key=lambda one: one.gain, default=None)
-    if load is None or load.when is None:
-        return [], push
-    return ([load], None) if push is None or push.gain <= load.when.gain else ([], push)
+    carried, left = loads.picked_up(robot, thin)
+    places = [None, *(one.when.values[1:] / one.when.values[0] for one in carried if one.when is not None)]
+    pushes = [push for place in places if (push := pushed.push_of(robot, thin, place)) is not None]
+    push = min(pushes, key=lambda one: one.left, default=None)
+    return (carried, None) if push is None or push.left >= left else ([], push.each[0])
 
 
 def _guessed(grids: Sequence[Grid], constants: Floats | None) -> Sequence[Grid]:

@@ -32,6 +32,7 @@ ROUNDS = 3  # of weighing joints by what is left of their torques
 SURE = 6.0  # standard errors by which masses differ
 PART = 0.5  # of the squares that a recording leaves without its load, at most, with it
 PART_OF_ALL = 0.65  # of the squares that all leave without a load that comes and goes, at most, with it
+MOST = 4  # loads that are told apart
 REACH = 1.0  # [m] no load hangs farther from the tool
 RIDGE = 1e-6  # of the links' mean square column: what motion does not show stays the file's
 OF_LOAD = 4  # parameters of a link that a load adds to: mass, and mass times centre
@@ -87,20 +88,23 @@ def loads_of(robot: _core.Robot, recordings: Sequence[_core.Recording], grids: S
     return out
 
 
-def picked_up(robot: _core.Robot, thin: Thinned) -> Load | None:
-    """What the robot picks up, or sets down, while it is recorded; None: nothing."""
+def picked_up(robot: _core.Robot, thin: Thinned) -> tuple[list[Load], float]:
+    """What the robot picks up, or sets down, while it is recorded; what is left of the squares with it."""
 
     def columns(q: Floats, qd: Floats, qdd: Floats) -> Floats:
         return np.asarray(_core.torque_regressor(robot, q, qd, qdd))[:, :, -10 : -10 + OF_LOAD]
 
     tool = np.array(robot.targets[0].T_last_target)[:3, 3] if robot.targets else np.zeros(3)
-    found = switched(thin, columns, [np.append(1.0, tool)], is_mass=True)
-    if found is None or found.part > PART_OF_ALL or found.values[0] < SURE * found.sigma or not found.changes:
-        return None
-    place = _in_tool(robot, found.values)
-    if np.linalg.norm(place) > REACH:
-        return None
-    return Load(found.recordings, float(found.values[0]), found.sigma, place, found)
+    found = switched(thin, columns, [np.append(1.0, tool)], is_mass=True, most=MOST)
+    if found is None or found.part > PART_OF_ALL or not found.changes:
+        return [], 1.0
+    out = []
+    for one in found.each:
+        place = _in_tool(robot, one.values)
+        if one.values[0] < SURE * one.sigma or np.linalg.norm(place) > REACH:
+            return [], 1.0
+        out.append(Load(one.recordings, float(one.values[0]), one.sigma, place, one))
+    return out, found.left
 
 
 def _in_tool(robot: _core.Robot, load: Floats) -> tuple[float, float, float]:
@@ -154,8 +158,8 @@ def _than(load: Load) -> str:
     """What it is compared with."""
     if load.when is None:
         return "more than the lightest"
-    changes = load.when.changes
-    return f"at times ({changes} change{'' if changes == 1 else 's'})"
+    times = len(load.when.spans)
+    return "once" if times == 1 else f"{times} times"
 
 
 def with_loads(recordings: Sequence[_core.Recording], loads: Sequence[Load]) -> list[_core.Recording]:

@@ -13,7 +13,7 @@ from truing import _core
 from truing.dynamics.recorded import with_rows
 from truing.dynamics.sanity import gravity
 from truing.dynamics.sanity.findings import RecordingFinding, listed
-from truing.dynamics.sanity.switched import Switched, Thinned, switched
+from truing.dynamics.sanity.switched import AtTimes, Switched, Thinned, switched
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ MOST = 0.6  # of the time: what pushes longer is not left out
 MARGIN = 0.3  # [s] left out around it
 
 
-def push_of(robot: _core.Robot, thin: Thinned, place: Floats | None = None) -> Switched | None:
+def push_of(robot: _core.Robot, thin: Thinned, place: Floats | None = None) -> AtTimes | None:
     """A force along one direction of the base that comes and goes; None: there is no such. place: [m] where
     it acts, in the frame after the last link; none: at the tool.
     """
@@ -40,7 +40,8 @@ def said(found: Switched) -> RecordingFinding:
     share = 100.0 * found.share
     words = (
         f"{listed(found.recordings)}: something pushes at the tool for {share:.0f} % of the time"
-        f" ({found.changes} changes), by some {size:.2g} N along {gravity.in_words(found.values)} of the base"
+        f" ({len(found.spans)} times), by some {size:.2g} N along {gravity.in_words(found.values)} of the"
+        " base"
     )
     applied = found.share < MOST
     words += ": these rows are left out" if applied else ": record it without touching anything"

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""What comes and goes while a robot is recorded: a load that it picks up, a push at its tool.
+"""What comes and goes while a robot is recorded: loads that it picks up, a push at its tool.
 
 Links that all rows have in common, and friction and offsets of each recording, leave a torque that comes and
-goes. It may be that of one load (or force), which is there or not: a hidden Markov model of two states. Its
-values and the links are found by least squares, then the states by Viterbi's recursion (1967), in which a
-change costs; and so on in turns until no state changes.
+goes. It may be that of one load (or force), which is there or not, or of one of several: a hidden Markov
+model of few states. Values of the loads and the links are found by least squares, then the states by
+Viterbi's recursion (1967), in which a change costs; and so on in turns until no state changes.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from truing.dynamics.sanity.grids import Grid
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Numbers = NDArray[np.intp]
 
 STEP = 0.05  # [s] between the rows that are looked at, at least
 ROWS = 2000  # of all recordings together, at most
@@ -31,6 +32,7 @@ TURNS = 15  # of values and states
 PROMISING = 0.9  # of the squares left without it: what the first guess must get below
 CORRELATED = 0.5  # [s] over which what is left may be alike, at most: it is more while states are wrong
 CHANGE = 20.0  # [nats] that must be gained where it comes or goes
+ANOTHER = 0.8  # of the squares left with fewer of them: what one more must get below
 RIDGE = 1e-6  # of the mean square column: what motion does not show stays the file's
 _TINY = 1e-300
 
@@ -46,14 +48,7 @@ class Switched:
 
     values: Floats
     sigma: float  # standard error of the first of them
-    part: float  # of the squares left without it: what is left with it
-    gain: float  # [nats] of noise that is white
     states: dict[str, tuple[Floats, Bools]]  # by recording: instants [s], and whether it is there
-
-    @property
-    def changes(self) -> int:
-        """How often it comes or goes."""
-        return sum(int(np.sum(there[1:] != there[:-1])) for _, there in self.states.values())
 
     @property
     def recordings(self) -> tuple[str, ...]:
@@ -84,6 +79,16 @@ class Switched:
             return np.zeros(len(time), dtype=np.bool_)
         instants, there = self.states[recording]
         return there[np.searchsorted(0.5 * (instants[1:] + instants[:-1]), time)]
+
+
+@dataclass(frozen=True)
+class AtTimes:
+    """What comes and goes: one of these, or none of them."""
+
+    each: tuple[Switched, ...]
+    changes: int  # how often one comes or goes
+    part: float  # of the squares left without them: what is left with them
+    left: float  # the same as the geometric mean of the joints' parts
 
 
 @dataclass(frozen=True)
@@ -124,16 +129,24 @@ def thinned(robot: _core.Robot, grids: Sequence[Grid]) -> Thinned | None:
     return Thinned(rows, step, np.asarray(gram), np.asarray(right))
 
 
-def switched(of: Thinned, columns: Columns, first: Sequence[Floats], is_mass: bool) -> Switched | None:
+def switched(
+    of: Thinned, columns: Columns, first: Sequence[Floats], is_mass: bool, most: int = 1
+) -> AtTimes | None:
     """What has these columns and explains most by coming and going; None: there is no such.
 
     first: values to begin with, of any size, beside those that stretches of time have in common. is_mass:
     the first value is above zero; the links may take up what is always there, so that it is there where more
-    of it is.
+    of it is. most: different ones, one at a time.
     """
     arm = _Arm.made(of, columns, is_mass)
-    found = [_in_turns(arm, arm.apart(values)) for values in (*first, arm.stretches.in_common())]
-    return max((one for one in found if one is not None), key=lambda one: one.gain, default=None)
+    tried = [_in_turns(arm, arm.apart(values, 2)) for values in (*first, arm.stretches.in_common())]
+    best = min((one for one in tried if one is not None), key=lambda one: one.left, default=None)
+    while best is not None and len(best.each) < most:
+        more = _in_turns(arm, arm.apart(best.each[-1].values, len(best.each) + 2))
+        if more is None or more.left > ANOTHER * best.left:
+            break
+        best = more
+    return best
 
 
 def _rows(robot: _core.Robot, grid: Grid, step: float) -> _Rows:
@@ -162,7 +175,7 @@ class _Fit:
     """Links, and what comes and goes where it is said to be there."""
 
     weight: Floats  # shape=(joints,) one over what is left of a joint's torque
-    values: Floats
+    values: Floats  # shape=(things, values)
     left: list[Floats]  # by recording, shape=(joints, n) [Nm | N]
 
     @property
@@ -187,34 +200,38 @@ class _Arm:
     def made(cls, of: Thinned, columns: Columns, is_mass: bool) -> _Arm:
         own = [columns(*one.motion).transpose(1, 0, 2) * one.there[:, :, None] for one in of.rows]
         ones = np.ones(len(of.gram))
-        arm = cls(of, own, is_mass, _Fit(ones, np.zeros(own[0].shape[2]), []))
+        arm = cls(of, own, is_mass, _Fit(ones, np.zeros((0, own[0].shape[2])), []))
         first = arm.fit(arm.nowhere(), ones)
         return replace(arm, without=arm.fit(arm.nowhere(), 1.0 / first.rms))
 
-    def nowhere(self) -> list[Bools]:
-        return [np.zeros(len(one.time), dtype=np.bool_) for one in self.of.rows]
+    def nowhere(self) -> list[Numbers]:
+        return [np.zeros(len(one.time), dtype=np.intp) for one in self.of.rows]
 
-    def fit(self, states: Sequence[Bools], weight: Floats) -> _Fit:
-        """Least squares: normal equations of the links, bordered by those of what comes and goes."""
-        square, width = weight**2, self.of.gram.shape[1]
-        both = width + self.own[0].shape[2]
+    def fit(self, states: Sequence[Numbers], weight: Floats) -> _Fit:
+        """Least squares: normal equations of the links, bordered by those of what comes and goes. states: the
+        number of the thing that is there; 0: none.
+        """
+        square, width, values = weight**2, self.of.gram.shape[1], self.own[0].shape[2]
+        things = max(int(one.max()) for one in states)
+        both = width + things * values
         whole, right = np.zeros((both, both)), np.zeros(both)
         whole[:width, :width], right[:width] = np.tensordot(square, self.of.gram, 1), square @ self.of.right
         owns = []
-        for one, whole_own, there in zip(self.of.rows, self.own, states, strict=True):
-            own = one.without_usual(whole_own * there[:, None])
+        for one, columns, there in zip(self.of.rows, self.own, states, strict=True):
+            each = [columns * (there == k)[:, None] for k in range(1, things + 1)]
+            own = one.without_usual(np.concatenate([*each, columns[:, :, :0]], axis=2))
             owns.append(own)
             weighed = (square[:, None, None] * own).transpose(0, 2, 1)
             whole[width:, :width] += np.sum(weighed @ one.links, axis=0)
             whole[width:, width:] += np.sum(weighed @ own, axis=0)
             right[width:] += np.sum(weighed @ one.torque[:, :, None], axis=0)[:, 0]
         whole[:width, width:] = whole[width:, :width].T
-        values = np.linalg.solve(whole + RIDGE * np.trace(whole) / both * np.eye(both), right)
+        found = np.linalg.solve(whole + RIDGE * np.trace(whole) / both * np.eye(both), right)
         left = [
-            one.torque - one.links @ values[:width] - own @ values[width:]
+            one.torque - one.links @ found[:width] - own @ found[width:]
             for one, own in zip(self.of.rows, owns, strict=True)
         ]
-        return _Fit(weight, values[width:], left)
+        return _Fit(weight, found[width:].reshape(things, values), left)
 
     @functools.cached_property
     def stretches(self) -> _Stretches:
@@ -229,13 +246,12 @@ class _Arm:
                 rights.append(x.T @ (by * left[:, rows]).ravel())
         return _Stretches(places, np.array(grams), np.array(rights))
 
-    def apart(self, values: Floats) -> list[Bools]:
-        """Where stretches want much of it, and not little: two means."""
+    def apart(self, values: Floats, groups: int) -> list[Numbers]:
+        """Stretches by how much of these values they want, from little to much: means of so many groups."""
         out = self.nowhere()
-        for (k, rows), there in zip(
-            self.stretches.places, _two_means(*self.stretches.wanted(values)), strict=True
-        ):
-            out[k][rows] = there
+        group = _means(*self.stretches.wanted(values), groups)
+        for (k, rows), number in zip(self.stretches.places, group, strict=True):
+            out[k][rows] = number
         return out
 
 
@@ -268,51 +284,66 @@ class _Stretches:
         return np.asarray(values)
 
 
-def _two_means(values: Floats, weights: Floats) -> Bools:
-    """Which of the values are nearer to the upper of two means. shape=(n,)"""
-    low, high = np.quantile(values, [0.1, 0.9])
+def _means(values: Floats, weights: Floats, groups: int) -> Numbers:
+    """Number of the mean that each value is nearest to, ascending (Lloyd 1957). shape=(n,)"""
+    means = np.quantile(values, np.linspace(0.1, 0.9, groups))
     for _ in range(TURNS):
-        upper = values > 0.5 * (low + high)
-        if upper.all() or not upper.any():
+        group = np.searchsorted(0.5 * (means[1:] + means[:-1]), values)
+        there = [group == k for k in range(groups)]
+        if not all(one.any() for one in there):
             break
-        low = float(np.average(values[~upper], weights=weights[~upper]))
-        high = float(np.average(values[upper], weights=weights[upper]))
-    return np.asarray(values > 0.5 * (low + high))
+        means = np.array([np.average(values[one], weights=weights[one]) for one in there])
+    return np.asarray(np.searchsorted(0.5 * (means[1:] + means[:-1]), values))
 
 
-def _in_turns(arm: _Arm, states: list[Bools]) -> Switched | None:
-    """Values and states that agree; None: they explain little, or it is there always or never."""
-    other = [~there for there in states]
+def _in_turns(arm: _Arm, states: list[Numbers]) -> AtTimes | None:
+    """Values and states that agree; None: they explain little, or one is there always or never."""
     fit = arm.fit(states, arm.without.weight)
-    if not arm.is_mass and arm.fit(other, arm.without.weight).squares < fit.squares:
-        states, fit = other, arm.fit(other, arm.without.weight)
+    if not arm.is_mass:  # which of two is nothing?
+        other = [1 - there for there in states]
+        states = min(states, other, key=lambda one: arm.fit(one, arm.without.weight).squares)
+        fit = arm.fit(states, arm.without.weight)
     if fit.squares > PROMISING * arm.without.squares:
         return None
     for _ in range(TURNS):
-        if arm.is_mass and fit.values[0] < 0.0:
-            states = [~there for there in states]
+        if arm.is_mass:
+            states = _lightest_first(states, fit.values[:, 0])
         fit = arm.fit(states, 1.0 / fit.rms)
         new = _states(arm, fit, states)
-        if np.mean(np.concatenate(new)) in (0.0, 1.0):
+        if len(np.unique(np.concatenate(new))) <= len(fit.values):
             return None
         if all(np.array_equal(a, b) for a, b in zip(states, new, strict=True)):
             break
         states = new
         fit = arm.fit(states, fit.weight)
     without = arm.fit(arm.nowhere(), fit.weight)
-    gain = sum(len(there) for there in states) * float(np.sum(np.log(arm.without.rms / fit.rms)))
-    of_name = {one.name: (one.time, there) for one, there in zip(arm.of.rows, states, strict=True)}
-    return Switched(fit.values, _sigma(arm, fit, states), fit.squares / without.squares, gain, of_name)
+    left = float(np.exp(2.0 * np.mean(np.log(fit.rms / arm.without.rms))))
+    changes = sum(int(np.sum(there[1:] != there[:-1])) for there in states)
+    each = tuple(_switched(arm, fit, states, k) for k in range(len(fit.values)))
+    return AtTimes(each, changes, fit.squares / without.squares, left)
 
 
-def _states(arm: _Arm, fit: _Fit, states: Sequence[Bools]) -> list[Bools]:
-    """When it is there, by what the fit leaves with and without it."""
-    rows = min(_correlated(fit.left, fit.weight), CORRELATED / arm.of.step)
+def _switched(arm: _Arm, fit: _Fit, states: Sequence[Numbers], k: int) -> Switched:
+    there = [one == k + 1 for one in states]
+    of_name = {one.name: (one.time, at) for one, at in zip(arm.of.rows, there, strict=True)}
+    return Switched(fit.values[k], _sigma(arm, fit, there), of_name)
+
+
+def _lightest_first(states: Sequence[Numbers], masses: Floats) -> list[Numbers]:
+    """Numbers in the order of the masses: the links take up what is always there, and no mass is negative."""
+    rank = np.argsort(np.argsort(np.concatenate([[0.0], masses])))
+    return [rank[one] for one in states]
+
+
+def _states(arm: _Arm, fit: _Fit, states: Sequence[Numbers]) -> list[Numbers]:
+    """What is there when, by what the fit leaves without it and with each."""
+    rows = max(min(_correlated(fit.left, fit.weight), CORRELATED / arm.of.step), 1.0)
     by, out = fit.weight[:, None], []
-    for columns, left, there in zip(arm.own, fit.left, states, strict=True):
-        own = by * (columns @ fit.values)
-        without = by * left + own * there
-        out.append(_viterbi(0.5 * np.sum(without**2 - (without - own) ** 2, axis=0) / max(rows, 1.0)))
+    for columns, left, now in zip(arm.own, fit.left, states, strict=True):
+        own = [np.zeros_like(left), *(by * (columns @ values) for values in fit.values)]
+        without = by * left + sum(one * (now == k) for k, one in enumerate(own))
+        gain = [0.5 * np.sum(without**2 - (without - one) ** 2, axis=0) / rows for one in own]
+        out.append(_viterbi(np.array(gain).T))
     return out
 
 
@@ -324,24 +355,29 @@ def _correlated(left: Sequence[Floats], weight: Floats) -> float:
     return (1.0 + r) / (1.0 - r)
 
 
-def _viterbi(gain: Floats) -> Bools:
-    """Which rows have it: the sum of their gains [nats], less CHANGE a change, is largest. shape=(n,)"""
-    without, with_it = 0.0, 0.0
-    came: list[tuple[bool, bool]] = []  # by row: the row before had it, this one having it not, and having it
+def _viterbi(gain: Floats) -> Numbers:
+    """The state of every row: the sum of their gains [nats], less CHANGE a change, is largest. shape=(n,)
+
+    gain: shape=(n, states)
+    """
+    numbers = range(gain.shape[1])
+    best = [0.0] * len(numbers)
+    came: list[list[int]] = []  # by row and state: the state of the row before
     for here in gain.tolist():
-        came.append((with_it - CHANGE > without, with_it >= without - CHANGE))
-        without, with_it = max(without, with_it - CHANGE), max(with_it, without - CHANGE) + here
-    state, out = with_it > without, []
+        top = max(numbers, key=best.__getitem__)
+        came.append([k if best[k] >= best[top] - CHANGE else top for k in numbers])
+        best = [max(best[k], best[top] - CHANGE) + here[k] for k in numbers]
+    state, out = max(numbers, key=best.__getitem__), []
     for before in reversed(came):
         out.append(state)
-        state = before[int(state)]
-    return np.array(out[::-1], dtype=np.bool_)
+        state = before[state]
+    return np.array(out[::-1], dtype=np.intp)
 
 
 def _sigma(arm: _Arm, fit: _Fit, states: Sequence[Bools]) -> float:
     """Standard error of the first value, the links being known: how far those of times with it are apart."""
     firsts, variances = [], []
-    by, width = fit.weight[:, None], len(fit.values)
+    by, width = fit.weight[:, None], fit.values.shape[1]
     for own, left, there in zip(arm.own, fit.left, states, strict=True):
         for rows in np.split(np.arange(len(there)), np.flatnonzero(there[1:] != there[:-1]) + 1):
             for part in np.array_split(rows, 2):
