@@ -44,7 +44,7 @@ from truing.dynamics.servo.naming import (
     Weight,
     _sure as sure_of,
 )
-from truing.dynamics.servo.result import FoundServoEffect
+from truing.dynamics.servo.result import FoundServoEffect, ServoParameter, departing
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, chain_of, point_of
 from truing.dynamics.servo.unknown import Unknown
 from truing.dynamics.servo.words import _causes as causes, _orders as orders_of
@@ -753,6 +753,20 @@ def test_the_sentence_fits_into_two_lines() -> None:
 
 def effect_of(effect: str, joint: str, share: float) -> FoundServoEffect:
     return FoundServoEffect(effect, (joint,), False, 0.9, (), share, (share, share), 0.1, 0.0)
+
+
+def usual_of(value: float, standard: float, before: float, sure: float = 1.0) -> FoundServoEffect:
+    """The gain of the file is 10; with the usual parameters 0.01 rad are left."""
+    gain = ServoParameter("command_gain.elbow", value, 0.1, "Nm/rad", 10.0, standard)
+    return FoundServoEffect("command_gain", ("elbow",), True, sure, (gain,), 0.2, (0.2, 0.2), before, 0.01)
+
+
+def test_a_usual_parameter_that_the_file_has_otherwise_is_told() -> None:
+    weak = usual_of(8.0, 8.0, 0.05)
+    assert departing([weak, usual_of(9.9, 9.9, 0.0101), effect_of("delay", "elbow", 0.5)]) == [weak]
+    assert departing([usual_of(8.0, 8.0, 0.05, sure=0.0)]) == []
+    assert departing([usual_of(9.9, 7.0, 0.05)]) == []  # a name beside it takes its place
+    assert departing([usual_of(8.0, 8.0, 0.012)]) == []  # most of the error is something else
 
 
 @pytest.mark.parametrize(

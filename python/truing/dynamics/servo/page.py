@@ -77,6 +77,11 @@ def beyond(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [effect for effect in result["effects"] if not effect["standard"]]
 
 
+def departing(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Usual parameters that the file has otherwise, and that matter."""
+    return [effect for effect in result["effects"] if effect.get("departs")]
+
+
 def main_number(result: Mapping[str, Any]) -> int:
     """Of the main horizon among all."""
     motion = result["rollout"]
@@ -113,6 +118,8 @@ def _badge(result: Mapping[str, Any]) -> tuple[str, str]:
     """In a word or two, and its colour: how much is left counts, not only that there are names."""
     verdict = result["verdict"]
     before, after = (mean_error(result, m) for m in ("standard", "named"))
+    if verdict == "none" and departing(result):
+        return "the file's values differ", "found"
     if verdict == "effects" and not after < EXPLAINED * before:
         return TONES["effects+unknown"]
     return ("no further cause found", "good") if verdict == "none" else TONES[verdict]
@@ -338,7 +345,7 @@ def _value(value: float | None) -> str:
 
 
 def _causes(result: Mapping[str, Any]) -> str:
-    lines = "".join(_cause_line(effect) for effect in beyond(result))
+    lines = "".join(_cause_line(effect) for effect in [*beyond(result), *departing(result)])
     if not lines:
         nothing = "Nothing beyond the usual parameters."
         return f'<section class="card"><h2>What was found</h2><p>{nothing}</p></section>'
@@ -346,9 +353,10 @@ def _causes(result: Mapping[str, Any]) -> str:
         '<section class="card"><h2>What was found</h2><div class="scroll"><table class="causes"><thead><tr>'
         "<th>cause</th><th>joint</th><th>removes</th><th>sure</th><th>size</th><th>with the file</th></tr>"
         f"</thead><tbody>{lines}</tbody></table></div>"
-        '<p class="note">Removes: fraction of the squared error of motion that the usual parameters leave, on'
-        " recordings that were not fitted (90 % interval). Sure: that it is this cause, or one that stands"
-        " behind “or”, which these recordings cannot tell from it.</p></section>"
+        '<p class="note">Removes: fraction of the squared error of motion that the usual parameters leave'
+        " (one of these: that the file leaves), on recordings that were not fitted (90 % interval). Sure:"
+        " that it is this cause, or one that stands behind “or”, which these recordings cannot tell from it."
+        "</p></section>"
     )
 
 

@@ -17,6 +17,7 @@ from truing.report.json_text import without_nan
 
 Floats = NDArray[np.float64]
 WHOLE = float("inf")  # among horizons: to the end of the recording; result.json says "whole"
+MATTERS = 0.1  # of what usual parameters remove: less is no answer to where the error comes from
 MODELS = ("nominal", "standard", "named")
 REGIMES = ("reversals", "slow", "fast", "holding")
 
@@ -60,6 +61,25 @@ class FoundServoEffect:
     after_rms: float  # [rad] with it
     confounded_with: tuple[ServoAlternative, ...] = ()
     sentence: str = ""
+
+
+def departing(effects: Sequence[FoundServoEffect]) -> list[FoundServoEffect]:
+    """Usual parameters that are surely others than the file has, also beside all that is named, and matter:
+    each removes a tenth or more of what all of them remove, and half of the squared error at its joint. The
+    largest first."""
+    removed = {
+        k: max(0.0, e.before_rms**2 - e.after_rms**2)
+        for k, e in enumerate(effects)
+        if e.standard and e.probability > 0.0 and _persists(e.parameters[0])
+    }
+    least = MATTERS * sum(removed.values())
+    told = [k for k, of in removed.items() if of > least and of > effects[k].after_rms ** 2]
+    return [effects[k] for k in sorted(told, key=lambda k: -removed[k])]
+
+
+def _persists(value: ServoParameter) -> bool:
+    """It departs from the file beside what is named at least half as far as without."""
+    return abs(value.value - value.nominal) >= 0.5 * abs(value.standard - value.nominal)
 
 
 @dataclass(frozen=True)
@@ -162,6 +182,7 @@ class ServoDiagnosis:
 
 def servo_dict(found: ServoDiagnosis, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
     """What ``result.json`` of ``truing dynamics diagnose`` holds when there were commands alone."""
+    departed = departing(found.effects)
     out: dict[str, Any] = without_nan(
         {
             "format": "truing-dynamics/1",
@@ -171,7 +192,7 @@ def servo_dict(found: ServoDiagnosis, *, warnings: Iterable[str] = ()) -> dict[s
             "robot": found.robot,
             "verdict": found.verdict,
             "sentence": found.sentence,
-            "effects": [_effect(e) for e in found.effects],
+            "effects": [{**_effect(e), "departs": any(e is one for one in departed)} for e in found.effects],
             "unknown": [
                 {**asdict(u), "inputs": list(u.inputs), "ci": list(u.ci), "curve": [list(p) for p in u.curve]}
                 for u in found.unknown

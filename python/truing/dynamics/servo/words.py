@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -28,6 +29,7 @@ from truing.dynamics.servo.result import (
     ServoRollout,
     ServoTrace,
     UnknownMotion,
+    departing,
 )
 from truing.dynamics.servo.simulator import Point, Simulator, chain_of
 from truing.dynamics.servo.unknown import FoundFunction
@@ -129,10 +131,11 @@ def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
         "named": chain_of(parts.account.fitted.point, parts.simulator.arm.nominal),
     }
     named = _named(parts, covariance)
-    effects = [*named, *_usual(parts, covariance)]
+    usual = _usual(parts, covariance)
+    effects = [*named, *usual]
     unknown = [_unknown(f, chains["nominal"]) for f in parts.functions]
     classes = [*_classes(parts, named), *_instead(parts)]
-    verdict, sentence = _verdict(parts, named, unknown)
+    verdict, sentence = _verdict(parts, named, unknown, departing(usual))
     warnings = list(parts.notes)
     for why in dict.fromkeys(why for _, why in parts.account.vetoed):
         places = ", ".join(_place(one) for one, other in parts.account.vetoed if other == why)
@@ -421,7 +424,10 @@ def _mean_degrees(errors: Floats) -> float:
 
 
 def _verdict(
-    parts: Parts, named: Sequence[FoundServoEffect], unknown: Sequence[UnknownMotion]
+    parts: Parts,
+    named: Sequence[FoundServoEffect],
+    unknown: Sequence[UnknownMotion],
+    departed: Sequence[FoundServoEffect],
 ) -> tuple[str, str]:
     nominal, standard, found = (_mean_degrees(parts.held[k]) for k in range(3))
     slides = any(parts.simulator.arm.nominal.prismatic)
@@ -442,7 +448,23 @@ def _verdict(
             "unknown",
             f"{usual} parameters fitted: what is left goes with inputs that no known effect explains.",
         )
+    if departed:
+        off = f"Held-out motion is off by {size(nominal)} with the file, {size(standard)} with fitted values"
+        return "none", f"{off}: above all {_departed(departed)}."
     return "none", f"{usual} parameters fitted: beyond these no effect predicts motion it was not fitted to."
+
+
+def _departed(usual: Sequence[FoundServoEffect]) -> str:
+    """The largest that differ from the file, "the gain at J2 (2045, not 2555 Nm/rad)"."""
+    told = []
+    for one in usual[:_TOLD]:
+        name = re.sub("^an? ", "the ", _plain(one.effect))
+        value = one.parameters[0]
+        sizes = f"{value.value:.4g}, not {value.nominal:.4g}{'' if value.unit == '1' else ' ' + value.unit}"
+        told.append(f"{name} at {', '.join(one.joints)} ({sizes})")
+    if len(usual) > _TOLD:
+        told.append(f"{len(usual) - _TOLD} smaller")
+    return " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
 
 
 def _causes(named: Sequence[FoundServoEffect]) -> str:

@@ -204,7 +204,7 @@ def print_servo(result: Mapping[str, Any]) -> None:
             e["sentence"].rpartition(": ")[2],
         )
         for e in result["effects"]
-        if not e["standard"]
+        if e["departs"] or not e["standard"]
     ]
     if causes:
         head = ("", "removes", "sure", "size")
