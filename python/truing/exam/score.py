@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truing.exam.answers import Answer, Named, Unknown
 from truing.exam.names import FINDINGS
@@ -21,7 +22,9 @@ _CONFIDENT = 0.9
 _GEOMETRY = ("link_geometry", "joint_offset")  # what lies underneath, by either name
 _SHARED = frozenset({"several", "teeth"})  # one cause on several joints: the smallest may be named or not
 _WHOLE = frozenset({"drift", "scale", "joint_coupling", "time_offset"})
+Floats = NDArray[np.float64]
 _BINS = 10
+_DRAWS = 1000  # of hits by stated probabilities
 _SMALL_SHARE = 0.02
 _TOLD = 5  # sets that a message names
 _FEWEST = 20  # names of a family from which its ECE is judged: of fewer, ten bins show chance
@@ -54,6 +57,7 @@ class Row:
     met: bool | None = None
     percent: bool = True
     brier: float = math.nan  # beside a calibration error
+    chance: tuple[float, float] = (math.nan, math.nan)  # that error of exact probabilities: mean, 95 % below
     note: str = ""  # why it is not judged
 
     def interval(self) -> tuple[float, float]:
@@ -890,6 +894,7 @@ def calibration_row(key: str, text: str, most: float, sheets: Sequence[Sheet]) -
         met=None if few else found.error <= most,
         percent=False,
         brier=found.brier,
+        chance=found.chance,
         note=f"too few to judge: {found.n} names, {_FEWEST} needed" if few else "",
     )
 
@@ -927,6 +932,9 @@ class Calibration:
     error: float  # expected calibration error, in ten bins
     brier: float  # mean squared difference of a probability from 1 (right) or 0 (wrong); Brier 1950
     n: int  # names
+    chance: tuple[float, float] = (math.nan, math.nan)
+    """What the error would be of so many names if the same probabilities were exact: its mean, and what 95 %
+    of draws stay below."""
 
 
 def calibration(sheets: Sequence[Sheet]) -> Calibration:
@@ -945,13 +953,25 @@ def calibration(sheets: Sequence[Sheet]) -> Calibration:
     if not said:
         return Calibration(math.nan, math.nan, 0)
     p, hit = np.clip(np.array(said), 0.0, 1.0), np.array(true)
-    bins = np.minimum((p * _BINS).astype(int), _BINS - 1)
-    error = sum(
-        float(np.sum(bins == b)) / len(p) * abs(float(p[bins == b].mean()) - float(hit[bins == b].mean()))
-        for b in range(_BINS)
-        if (bins == b).any()
+    return Calibration(
+        float(_calibration_error(p, hit)), float(np.mean((p - hit) ** 2)), len(p), _error_by_chance(p)
     )
-    return Calibration(error, float(np.mean((p - hit) ** 2)), len(p))
+
+
+def _calibration_error(p: Floats, hit: Floats) -> Floats:
+    """Of probabilities, shape=(names,), for hits, shape=(..., names): bins' differences of mean probability
+    and frequency, weighed by their names (Naeini et al. 2015)."""
+    bins = np.minimum((p * _BINS).astype(int), _BINS - 1)
+    members = (bins == np.arange(_BINS)[:, None]).astype(float)
+    return np.asarray(np.abs((hit - p) @ members.T).sum(axis=-1) / len(p))
+
+
+def _error_by_chance(p: Floats) -> tuple[float, float]:
+    """Mean and 95 % quantile of the error where the probabilities are exact (consistency resampling, Broecker
+    and Smith 2007)."""
+    hits = (np.random.default_rng(0).random((_DRAWS, len(p))) < p).astype(np.float64)
+    errors = _calibration_error(p, hits)
+    return float(errors.mean()), float(np.quantile(errors, 0.95))
 
 
 def failures(sheets: Sequence[Sheet], lines: Sequence[Line]) -> list[dict[str, Any]]:
@@ -974,6 +994,8 @@ def _cell(row: Row) -> str:
         return "–"
     if not row.percent:
         beside = f", Brier {row.brier:.3g}" if math.isfinite(row.brier) else ""
+        if math.isfinite(row.chance[0]):
+            beside += f"; exact ones {row.chance[0]:.2g}, 95 % below {row.chance[1]:.2g}"
         return (f"{row.value:.3g}" if math.isfinite(row.value) else "∞") + beside
     low, high = row.interval()
     return f"{100 * row.value:.1f} % ({100 * low:.0f}–{100 * high:.0f})"

@@ -1058,6 +1058,22 @@ def test_stated_confidence_is_compared_with_frequency() -> None:
     assert math.isnan(calibration([sheet([], [])]).brier)
 
 
+def test_a_calibration_error_stands_beside_that_of_exact_probabilities() -> None:
+    truth = [("backlash", "J2")]
+    few, many = (
+        [sheet(truth, [Named("backlash", ("J2" if k % 10 < 7 else "J3",), 0.7)]) for k in range(n)]
+        for n in (20, 500)
+    )
+    mean, most = calibration(few).chance
+    # |binomial mean - p| of 20 draws at .7: about sqrt(2 p (1 - p) / (pi n))
+    assert mean == pytest.approx(math.sqrt(2 * 0.7 * 0.3 / (math.pi * 20)), rel=0.1)
+    assert mean < most < 2 * 1.96 * math.sqrt(0.7 * 0.3 / 20)
+    assert calibration(many).chance[1] < mean
+    certain = calibration([sheet(truth, [Named("backlash", ("J2",), 1.0)])] * 20)
+    assert certain.chance == (0.0, 0.0)
+    assert "exact ones" in plain(score(few))
+
+
 def test_a_family_with_few_names_is_said_to_have_few() -> None:
     few = [sheet([("backlash", "J2")], [Named("backlash", ("J3",), 0.95)], family="grid") for _ in range(19)]
     row = score(few).row("calibration_grid")
