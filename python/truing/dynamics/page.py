@@ -233,6 +233,8 @@ def worst_first(result: Mapping[str, Any]) -> list[str]:
 
 def plain(effect: Mapping[str, Any]) -> str:
     """What an effect is, without its joints and sizes: "friction that grows with the load"."""
+    if is_load(effect):
+        return "load at the tool that nobody told"
     text = str(effect["sentence"]).split(":")[0]
     at = text.rfind(" at ") if effect["joints"] else -1
     text = (text if at < 0 else text[:at]) or effect["effect"].replace("_", " ")
@@ -241,6 +243,8 @@ def plain(effect: Mapping[str, Any]) -> str:
 
 def place(effect: Mapping[str, Any]) -> str:
     joints = list(effect["joints"])
+    if is_load(effect):
+        return f"in {_listed(effect['recordings'])}"
     if effect["effect"] == "coupling" and len(joints) == 2:
         return f"at {joints[0]} from {joints[1]}"
     return f"at {_listed(joints)}" if joints else ""
@@ -254,10 +258,17 @@ def beyond_standard(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [effect for effect in result["effects"] if not effect["standard"]]
 
 
+def is_load(effect: Mapping[str, Any]) -> bool:
+    """A load of some recordings, which nobody told: they carry it, and not the robot."""
+    return bool(effect.get("recordings"))
+
+
 def causes_in_words(result: Mapping[str, Any]) -> str:
     """The largest causes with their joints, and how many more there are, as much of it as two lines hold."""
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for effect in beyond_standard(result):
+        if is_load(effect):
+            continue
         key = effect["effect"] if effect["effect"] != "coupling" else f"{effect['effect']} {effect['joints']}"
         groups.setdefault(key, []).append(effect)
     ordered = sorted(groups.values(), key=lambda group: -sum(effect["share"] or 0.0 for effect in group))
@@ -311,12 +322,14 @@ def _moves(result: Mapping[str, Any]) -> str:
 def _headline(result: Mapping[str, Any], recordings: int) -> str:
     label, tone = TONES[result["verdict"]] if not _mistaken(result) else ("data to be corrected", "bad")
     before, after = result["without_names_percent"], mean_percent(result, "named")
-    if beyond_standard(result) and result["verdict"] != "does_not_hold":
+    loads = [effect for effect in beyond_standard(result) if is_load(effect)]
+    if len(beyond_standard(result)) > len(loads) and result["verdict"] != "does_not_hold":
+        carried = "".join(f"{escaped(load['sentence'])}. " for load in loads)
         text = (
-            f'Torque error falls from <span class="before">{_percent(before)}</span> to'
+            f'{carried}Torque error falls from <span class="before">{_percent(before)}</span> to'
             f' <span class="after">{_percent(after)}</span>: {escaped(causes_in_words(result))}'
         )
-        length = len(causes_in_words(result)) + 40
+        length = len(carried) + len(causes_in_words(result)) + 40
     else:
         text = escaped(result["sentence"])
         length = len(text)
@@ -489,6 +502,7 @@ def _css(model: str) -> str:
 def size_text(effect: Mapping[str, Any], most: int = 3) -> str:
     """ "0.0653 ± 0.0023"; constants of the law without an error; of several parameters which."""
     texts = []
+    most += is_load(effect)  # its mass and place
     for p in effect["parameters"][:most]:
         unit = "" if p["unit"] in ("-", "") else f" {p['unit']}"
         parts = p["name"].split(".")
@@ -547,12 +561,17 @@ def _cause_line(effect: Mapping[str, Any]) -> str:
     sure = effect["probability"]
     maybe = others(effect)
     interval = "" if low is None or high is None else f"{100 * low:.1f} to {min(100.0, 100 * high):.1f}"
+    removes = (
+        f'<span class="bar" style="width:{width}px"></span>{100 * share:.1f} %'
+        f' <span class="muted">{interval}</span>'
+    )
+    if is_load(effect):
+        removes = '<span class="muted">taken into account first</span>'
+    size = "" if is_load(effect) else f"{figures_text(effect['rms_Nm'] or 0.0)} Nm"
     return (
         f'<tr><td>{escaped(plain(effect))}<span class="maybe">{escaped(maybe)}</span></td>'
-        f"<td>{escaped(place(effect).removeprefix('at '))}</td>"
-        f'<td><span class="bar" style="width:{width}px"></span>{100 * share:.1f} %'
-        f' <span class="muted">{interval}</span></td>'
-        f'<td class="n">{figures_text(effect["rms_Nm"] or 0.0)} Nm</td>'
+        f"<td>{escaped(place(effect).removeprefix('at '))}</td><td>{removes}</td>"
+        f'<td class="n">{size}</td>'
         f"<td>{'> 99 %' if sure > 0.99 else f'{100 * sure:.0f} %'}</td>"
         f'<td class="wide">{escaped(size_text(effect))}</td></tr>'
     )

@@ -32,6 +32,7 @@ from truing.dynamics.sanity.findings import RecordingFinding
 from truing.dynamics.servo.export import ServoExported
 from truing.dynamics.servo.export.verified import servo_rollout_dict
 from truing.dynamics.simulate import Response
+from truing.dynamics.told import FoundLoad, told
 from truing.files import load_units, looks_of, save_robot, write_table
 from truing.identification.result import parameter_dict
 from truing.report.json_text import to_json, without_nan
@@ -59,13 +60,13 @@ def diagnosis_dict(
     `warnings`: more of them, first.
     """
     motion, sanity = rollout_dict(rollout), list(sanity)
-    verdict, sentence = verdict_of(found, sanity)
+    said = told(found, sanity)
     return {
         **_head("diagnose"),
         "robot": found.robot.name,
-        "verdict": verdict,
-        "sentence": ". ".join([sentence, *motion.get("verdict", ())]),
-        "effects": [_effect(e) for e in found.effects],
+        "verdict": said.verdict,
+        "sentence": ". ".join([said.sentence, *motion.get("verdict", ())]),
+        "effects": [*map(_load, said.loads), *map(_effect, found.effects)],
         "covariance": covariance_dict(parameters_of(found), found.covariance),
         "unknown": [_unknown(u) for u in found.unknown],
         "where": where_dict(found.where, found.errors),
@@ -81,19 +82,6 @@ def diagnosis_dict(
         "design_effect": list(found.design_effect),
         "warnings": [*warnings, *found.warnings, *motion.get("worse", ())],
     }
-
-
-def verdict_of(found: _core.TorqueDiagnosis, sanity: Sequence[RecordingFinding]) -> tuple[str, str]:
-    """Verdict and its sentence: friction that differs from recording to recording is a gap, though no effect
-    is."""
-    differs = next((one for one in sanity if one.finding == "friction_differs"), None)
-    if found.verdict != "none" or differs is None:
-        return found.verdict, found.sentence.rstrip(".")
-    return (
-        "unknown",
-        f"Friction differs from recording to recording, by {differs.value:.0f} % at {differs.joints[0]},"
-        " and no column tells why; no other gap is left",
-    )
 
 
 def fit_dict(
@@ -140,6 +128,23 @@ def _effect(e: _core.FoundTorqueEffect) -> dict[str, Any]:
             for a in e.confounded_with
         ],
         "sentence": e.sentence,
+    }
+
+
+def _load(load: FoundLoad) -> dict[str, Any]:
+    """As an effect; what it removes is not known, as everything else was looked for with it."""
+    return {
+        "effect": load.effect,
+        "joints": [],
+        "recordings": list(load.recordings),
+        "standard": False,
+        "probability": load.probability,
+        "parameters": [asdict(p) for p in load.parameters],
+        "share": None,
+        "ci": [None, None],
+        "rms_Nm": None,
+        "confounded_with": [],
+        "sentence": load.sentence,
     }
 
 

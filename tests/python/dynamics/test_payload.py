@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,9 @@ from truing.dynamics import (
     predict,
     with_payload,
 )
+from truing.dynamics.sanity import loads
+from truing.dynamics.sanity.grids import grids_of
+from truing.dynamics.told import told
 from truing.errors import InputError
 from truing.files import load_robot
 from truing.model import AppliedEffect, Robot
@@ -148,8 +152,44 @@ def test_a_load_that_some_recordings_carry_untold_is_found_and_taken_into_accoun
     assert hangs == pytest.approx(PLACE, abs=0.004)
     found = diagnose(checked.robot, checked.recordings)
     assert found.verdict == "none"
+    said = told(found, checked.findings)
+    assert said.verdict == "effects" and said.sentence.endswith("No other gap beyond noise is left")
+    assert f"{recordings[3].name} carries a load of {lighter.value:.2f} kg that nobody told" in said.sentence
+    assert [(one.effect, one.joints) for one in said.effects if not one.standard] == [("payload", ())] * 2
+    sizes = {p.name: p.value for p in said.loads[1].parameters}
+    assert sizes == pytest.approx({"payload.m": heavier.value, **_named(hangs)})
     # What nobody weighed tells no drive's constant, and no place better than it was found.
     assert {one.effect for one in found.not_testable} >= {"motor_constant", "payload_place"}
+
+
+def _named(place: list[float]) -> dict[str, float]:
+    return {f"payload.{axis}": value for axis, value in zip("xyz", place, strict=True)}
+
+
+def test_a_load_is_known_no_better_than_its_halves_agree() -> None:
+    """Of the last recording one half carries less, and neither half's own noise tells."""
+    recordings = untold((LOAD, LOAD, LOAD))
+    first = np.arange(len(recordings[2])) < len(recordings[2]) // 2
+    lighter = np.asarray(untold((LOAD, LOAD, 0.5 * LOAD))[2].torque)
+    torque = np.where(first[:, None], lighter, np.asarray(recordings[2].torque))
+    arm = demo_arm()
+    mixed = [*recordings[:2], recordings[2].replace(torque=torque)]
+    alike, apart = (
+        loads._Fit.of([loads._halves(arm, grid) for grid in grids_of(arm, them)], 6)
+        for them in (recordings, mixed)
+    )
+    assert alike.sigma([2]) < 0.05 * LOAD
+    assert apart.sigma([2]) >= 0.9 * loads.BY_HALVES * 0.5 * LOAD
+
+
+def test_rows_at_rest_tell_no_load() -> None:
+    """There friction takes up what part of the weight it likes."""
+    arm = demo_arm()
+    (grid, *_) = grids_of(arm, untold((0.0, 0.0)))
+    still = replace(grid, qd=grid.qd.copy())
+    still.qd[: len(grid.qd) // 4] = 0.0
+    counted = [sum(len(half.left) for half in loads._halves(arm, one)) for one in (grid, still)]
+    assert counted[1] < 0.85 * counted[0]
 
 
 def test_of_an_untold_load_on_unknown_drives_it_is_asked_to_weigh_it() -> None:

@@ -16,6 +16,7 @@ import pytest
 
 import truing
 from pages import charts_of, visible
+from truing.cli.commands.dynamics.diagnose import cause_lines
 from truing.dynamics import Recording, RecordingFinding, TorqueDiagnosis, diagnose, identify, predict
 from truing.dynamics.page import ROOM, causes_in_words
 from truing.dynamics.result import (
@@ -25,6 +26,7 @@ from truing.dynamics.result import (
     write_fit,
     write_prediction,
 )
+from truing.dynamics.sanity.findings import FoundParameter
 from truing.report.arrays import unpacked
 from truing.testing.dynamics import HIDDEN, SimulatedMotion, demo_arm, simulate_motion
 
@@ -51,6 +53,32 @@ def folder(
 @pytest.fixture(scope="module")
 def result(folder: Path) -> Any:
     return json.loads((folder / "result.json").read_text(encoding="utf-8"))
+
+
+def test_a_load_that_nobody_told_is_a_cause_in_headline_and_table(
+    simulated: SimulatedMotion, found: TorqueDiagnosis, tmp_path: Path
+) -> None:
+    load = RecordingFinding(
+        "load_differs",
+        ("b", "c"),
+        (),
+        "b and c carry 1.50 kg more than the lightest",
+        1.5,
+        "kg",
+        applied=True,
+        parameters=(FoundParameter("payload.m", 1.5, 0.02, "kg"), FoundParameter("payload.x", 0.1, 0.0, "m")),
+    )
+    result = write_diagnosis(tmp_path, found, simulated.recordings, sanity=[load])
+    first = result["effects"][0]
+    assert (first["effect"], first["joints"], first["recordings"]) == ("payload", [], ["b", "c"])
+    assert first["share"] is None and 0.9 <= first["probability"] < 1.0 and not first["standard"]
+    assert result["sentence"].startswith("b and c carry a load of 1.50 kg that nobody told. The error")
+    text = visible((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert "b and c carry a load of 1.50 kg that nobody told. Torque error falls from" in text
+    assert "load at the tool that nobody told" in text and "taken into account first" in text
+    assert "load" not in causes_in_words({"effects": [first]})
+    lines = cause_lines(result)
+    assert lines[0][:3] == ("payload in b and c", "first", "95 %") and "m 1.50 ± 0.020 kg" in lines[0][3]
 
 
 def test_hidden_effects_are_named_within_their_errors(result: dict[str, Any]) -> None:

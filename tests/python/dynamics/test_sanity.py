@@ -29,11 +29,11 @@ from truing.dynamics import (
     predict,
 )
 from truing.dynamics.magnitudes import are_magnitudes, commands_for_magnitudes
-from truing.dynamics.result import verdict_of
 from truing.dynamics.sanity.columns import resolution
 from truing.dynamics.sanity.grids import grids_of
 from truing.dynamics.sanity.readings import rows_of
 from truing.dynamics.servo import by_commands
+from truing.dynamics.told import told
 from truing.errors import InputError
 from truing.files import write_table
 from truing.testing.dynamics import HIDDEN, USUAL, demo_arm, simulate_motion
@@ -138,11 +138,12 @@ def test_friction_that_differs_from_recording_to_recording_is_no_noise() -> None
     assert {"J2"} <= set(finding.joints) <= {"J2", "J5"}
     assert finding.value == pytest.approx(100.0 * np.std(FACTORS), rel=0.35)
     nothing = SimpleNamespace(verdict="none", sentence="No gap beyond noise.")
-    assert verdict_of(nothing, checked.findings)[0] == "unknown"
-    assert verdict_of(nothing, checked.findings)[1].startswith(
-        "Friction differs from recording to recording, by"
-    )
-    assert verdict_of(nothing, ()) == ("none", "No gap beyond noise")
+    nothing.unknown = ()
+    said = told(nothing, checked.findings)
+    assert said.verdict == "unknown" and [one.joint for one in said.unknown] == [finding.joints[0]]
+    assert said.sentence.startswith("Friction differs from recording to recording, by")
+    quiet = told(nothing)
+    assert (quiet.verdict, quiet.sentence, quiet.unknown) == ("none", "No gap beyond noise", ())
     warm = [one.replace(columns={"temp_C": np.full(len(one), 25.0 + k)}) for k, one in enumerate(motions)]
     assert check_recordings(ARM, warm).findings == ()  # a column may tell why
 

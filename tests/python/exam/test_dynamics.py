@@ -24,6 +24,8 @@ import truing
 pytest.importorskip("mujoco")
 
 import dynamic_candidates as candidates
+from truing.dynamics.sanity.findings import FoundParameter, RecordingFinding
+from truing.dynamics.told import told
 from truing.exam.answers import Answer, Named, Unknown, UnreadableAnswerError
 from truing.exam.dynamics import laws, motions, noise, physics, recordings, scenes, sets
 from truing.exam.dynamics.answers import answer_of, inputs_in
@@ -584,6 +586,36 @@ def test_a_failed_diagnosis_is_wrong_in_every_row_it_belongs_to() -> None:
         one = found.row(line.key)
         assert one.hits == (0 if line.good else one.n), line.key
     assert found.row("failed").n == 7 and len(found.failures) == 7
+
+
+def test_beside_the_load_of_a_real_arm_other_names_are_not_judged() -> None:
+    answer = Answer("effects", (Named("payload", (), 0.95), Named("load_friction", ("J2",), 0.98)))
+    kinds = {"source": "spike", "kind": "real_payload", "effects": [{"effect": "payload", "joints": []}]}
+    real = sheet("missing", answer, **kinds)
+    assert row([real], "missing_payload").hits == 1 and row([real], "missing_wrong").n == 0
+    driven = sheet("missing", answer, effects=kinds["effects"])
+    assert (row([driven], "missing_wrong").hits, row([driven], "missing_wrong").n) == (1, 1)
+
+
+def test_a_load_that_only_the_check_of_recordings_finds_is_a_name_with_its_mass() -> None:
+    load = RecordingFinding(
+        "load_differs",
+        ("b",),
+        (),
+        "",
+        1.5,
+        "kg",
+        True,
+        parameters=(FoundParameter("payload.m", 1.5, 0.1, "kg"),),
+    )
+    nothing = SimpleNamespace(
+        verdict="none", sentence="No gap.", effects=(), unknown=(), classes=(), not_testable=()
+    )
+    answer = answer_of(told(nothing, [load]))
+    assert [(one.effect, one.joints) for one in answer.effects] == [("payload", ())]
+    assert answer.verdict == "effects" and answer.parameters == {"payload.m": 1.5}
+    assert "b carries a load of 1.50 kg that nobody told" in answer.sentence
+    assert answer_of(told(nothing)).effects == ()
 
 
 def test_shortfalls_are_listed_by_set() -> None:

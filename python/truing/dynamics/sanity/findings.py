@@ -13,6 +13,18 @@ _FEW = 4  # names in a sentence
 
 
 @dataclass(frozen=True)
+class FoundParameter:
+    """A value that recordings tell before anything is fitted to all of them."""
+
+    name: str  # as effects name theirs: "payload.m"
+    value: float
+    sigma: float  # standard error; 0: not known
+    unit: str
+    nominal: float = 0.0
+    frozen: bool = False
+
+
+@dataclass(frozen=True)
 class RecordingFinding:
     """What looks odd about recordings of motion, or about how they fit the robot's model."""
 
@@ -25,6 +37,7 @@ class RecordingFinding:
     applied: bool = False  # it was corrected, or is allowed for, in what follows
     mistake: bool = False  # conclusions are doubtful until it is corrected
     spans: tuple[tuple[str, float, float], ...] = ()  # recording, begin and end [s] of when; none: always
+    parameters: tuple[FoundParameter, ...] = ()  # of what it is, where it is an effect
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.api import PAYLOAD_COLUMNS
 from truing.dynamics.recorded import driven_joints
-from truing.dynamics.sanity.findings import RecordingFinding, listed
-from truing.dynamics.sanity.grids import Grid
+from truing.dynamics.sanity.findings import FoundParameter, RecordingFinding, listed
+from truing.dynamics.sanity.grids import SPEED_AT_REST, Grid
 from truing.dynamics.sanity.switched import Switched, Thinned, switched
 
 Floats = NDArray[np.float64]
@@ -30,6 +30,7 @@ ROWS = 300  # of each recording
 FEWEST = 40  # measured torques of half a recording
 ROUNDS = 3  # of weighing joints by what is left of their torques
 SURE = 6.0  # standard errors by which masses differ
+BY_HALVES = 0.25  # of what the halves of a recording differ by: no standard error is smaller
 PART = 0.5  # of the squares that a recording leaves without its load, at most, with it
 PART_OF_ALL = 0.65  # of the squares that all leave without a load that comes and goes, at most, with it
 MOST = 4  # loads that are told apart
@@ -125,9 +126,12 @@ def used(load: Load) -> RecordingFinding:
         words += f" --payload {load.mass:.2f}kg@{x:.0f},{y:.0f},{z:.0f}mm)"
     else:
         words += " columns payload_kg, payload_x_m, payload_y_m, payload_z_m)"
-    return RecordingFinding(
-        _finding(load), load.recordings, (), words, load.mass, "kg", applied=True, spans=_spans(load)
+    parameters = (
+        FoundParameter("payload.m", load.mass, load.sigma, "kg"),
+        *(FoundParameter(f"payload.{axis}", v, 0.0, "m") for axis, v in zip("xyz", load.place, strict=True)),
     )
+    found = RecordingFinding(_finding(load), load.recordings, (), words, load.mass, "kg", applied=True)
+    return replace(found, spans=_spans(load), parameters=parameters)
 
 
 def to_be_weighed(load: Load) -> RecordingFinding:
@@ -224,9 +228,10 @@ def _half(robot: _core.Robot, grid: Grid, rows: NDArray[np.intp]) -> _Half:
     motion = grid.q[rows], grid.qd[rows], grid.qdd[rows]
     regressor = np.asarray(_core.torque_regressor(robot, *motion))
     left = grid.torque[rows] - np.asarray(_core.rigid_torques(robot, *motion))
+    moving = np.abs(motion[1]) > SPEED_AT_REST  # at rest friction takes up a part of the weight
     parts, joints = [], []
     for j in range(left.shape[1]):
-        there = ~np.isnan(left[:, j])
+        there = ~np.isnan(left[:, j]) & moving[:, j]
         usual = [grid.direction[rows, j], grid.qd[rows, j], grid.qdd[rows, j], np.ones(len(rows))]
         x, both = np.column_stack(usual)[there], np.column_stack([regressor[:, j], left[:, j]])[there]
         parts.append(both - x @ (np.linalg.pinv(x.T @ x, hermitian=True) @ (x.T @ both)))
@@ -264,7 +269,8 @@ class _Fit:
         coloured = max(1.0, float(np.mean(apart**2 / between)))
         share = (1.0 / variance)[:, None]
         both = (share[0::2] * loads[0::2] + share[1::2] * loads[1::2]) / (share[0::2] + share[1::2])
-        return cls(seen, weight, links, both, coloured / (1.0 / variance[0::2] + 1.0 / variance[1::2]))
+        known = coloured / (1.0 / variance[0::2] + 1.0 / variance[1::2])
+        return cls(seen, weight, links, both, np.maximum(known, (BY_HALVES * apart) ** 2))
 
     @property
     def names(self) -> list[str]:

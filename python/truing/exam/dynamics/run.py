@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 """The dynamic half of the examination: robots and recordings of motion, handed over as files, for
-`truing.dynamics.diagnose`.
+`truing.dynamics.check_recordings` and `diagnose`.
 """
 
 from __future__ import annotations
@@ -32,11 +32,17 @@ attributes.
 
 
 def diagnose(robot: Path, recordings: Sequence[Path]) -> Any:
-    """The candidate that the examination is for."""
+    """The candidate that the examination is for: what `truing dynamics diagnose` says. Recordings are checked
+    before they are diagnosed, and what the check names in the headline is a name as any other.
+    """
     dynamics = importlib.import_module("truing.dynamics")
     arm = truing.load_robot(robot)
-    model = arm if robot.suffix == ".urdf" else robot  # an MJCF says drives as well
-    return dynamics.diagnose(model, dynamics.load_recordings(list(recordings), arm))
+    read = dynamics.load_recordings(list(recordings), arm)
+    if robot.suffix != ".urdf":  # an MJCF says drives as well
+        return dynamics.diagnose(robot, read)
+    checked = dynamics.check_recordings(arm, read)
+    found = dynamics.diagnose(checked.robot, checked.recordings, cutoff=checked.cutoff)
+    return importlib.import_module("truing.dynamics.told").told(found, checked.findings)
 
 
 def run_exam(

@@ -234,11 +234,11 @@ def print_rollout(result: Mapping[str, Any]) -> None:
 
 def cause_lines(result: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
     """What was named beyond standard practice, as in the report's table."""
-    from truing.dynamics.page import beyond_standard, others, place, size_text
+    from truing.dynamics.page import beyond_standard, is_load, others, place, size_text
 
     lines = []
     for effect in beyond_standard(result):
         name = " ".join(filter(None, (effect["effect"].replace("_", " "), place(effect), others(effect, 1))))
-        share, sure = 100 * (effect["share"] or 0.0), 100 * effect["probability"]
-        lines.append((name, f"{share:.1f} %", f"{sure:.0f} %", size_text(effect)))
+        removes = "first" if is_load(effect) else f"{100 * (effect['share'] or 0.0):.1f} %"
+        lines.append((name, removes, f"{100 * effect['probability']:.0f} %", size_text(effect)))
     return lines
