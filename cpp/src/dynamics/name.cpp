@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <set>
 
 #include "dynamics/judge.hpp"
@@ -31,6 +32,16 @@ constexpr double kContradicted = 0.5;  ///< the most that names are worth which 
 const TorqueGroup& group_of(const TorqueDesign& design, int g) { return design.groups[static_cast<std::size_t>(g)]; }
 
 bool same_name(const TorqueGroup& a, const TorqueGroup& b) { return a.effect == b.effect && a.joints == b.joints; }
+
+/// Stated confidence: the posterior of the class, times how often names were right on development sets of the
+/// examination (docs/method/exam.md) that removed as much of a joint's error on folds which were not fitted, all but
+/// the best one, and beside which there was, or was not, something unknown at the joint. A logistic map (Platt 1999,
+/// "Probabilistic outputs for support vector machines"). Whatever is named is no less likely than not.
+double calibrated(double posterior, double gain, bool beside_unknown) {
+  constexpr double kConstant = 0.5, kOfGain = 3.9, kOfUnknown = -1.3;
+  const double log_odds = kConstant + kOfGain * std::clamp(gain, 0.0, 1.0) + (beside_unknown ? kOfUnknown : 0.0);
+  return std::max(kNamed, posterior / (1.0 + std::exp(-log_odds)));
+}
 
 /// Everything about one chosen group.
 class Naming {
@@ -115,7 +126,19 @@ class Naming {
     }
   }
 
-  /// That it, or one of its class, is there.
+  /// Part of the error that a joint has without it which it removes on folds that were not fitted, without the fold
+  /// that gains most by it.
+  double gain_without_best_fold(std::size_t at) const {
+    const VectorXd less = search_.squares_of_folds(Search::without(choice_, at)), gain = less - squares_;
+    double least = std::numeric_limits<double>::infinity();
+    for (Index f = 0; f < gain.size(); ++f) {
+      const double of = less.sum() - less[f];
+      if (of > 0.0) least = std::min(least, (gain.sum() - gain[f]) / of);
+    }
+    return std::isfinite(least) ? least * search_.joints() : 0.0;
+  }
+
+  /// That it, or one of its class, is there: what decides whether it is named.
   double sure(std::size_t at, std::vector<TorqueAlternative>* confounded) const {
     return probability(at, confounded) * not_another_law(at);
   }
@@ -251,6 +274,7 @@ std::vector<FoundTorqueEffect> standard_effects(const Problem& problem, const Ac
 
 std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Account& account, const Naming& naming,
                                              const std::vector<Noise>& noise, const std::vector<TorqueEffect>& own,
+                                             const std::vector<UnknownTorque>& unknown,
                                              std::vector<std::string>* small) {
   std::vector<FoundTorqueEffect> out;
   const TorqueDesign& design = *account.design;
@@ -264,11 +288,15 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Accou
     found.standard = group.standard && !problem.fitted_before && !account.inertias_given;
     found.parameters = parameters_of(design, group.columns, naming.fit());
     found.share = shares.of(k);
-    found.probability = naming.sure(k, &found.confounded_with);
-    if (found.probability < kNamed) {
+    const double posterior = naming.probability(k, &found.confounded_with);
+    if (posterior * naming.not_another_law(k) < kNamed) {
       small->push_back(group.effect + (group.joints.empty() ? "" : " at " + listed(group.joints)));
       continue;
     }
+    const bool beside_unknown = std::any_of(unknown.begin(), unknown.end(), [&](const UnknownTorque& u) {
+      return std::find(group.joints.begin(), group.joints.end(), u.joint) != group.joints.end();
+    });
+    found.probability = calibrated(posterior, naming.gain_without_best_fold(k), beside_unknown);
     if (problem.single) found.probability = std::min(found.probability, kBlocksOfTime);
     found.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     found.plain = find_torque_effect(group.effect, own).traits.plain;
@@ -535,12 +563,12 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   TorqueDiagnosis out;
   out.warnings = problem.warnings;
   std::vector<std::string> small;
-  out.effects = found_effects(problem, account, naming, noise, own, &small);
+  out.unknown = unknown_of(functions, all, noise_of_functions, problem.single);
+  out.effects = found_effects(problem, account, naming, noise, own, out.unknown, &small);
   if (!small.empty()) {
     out.warnings.push_back("fitted, and too small to be named, as something else may look so: " + listed(small));
   }
   const bool any = !out.effects.empty();
-  out.unknown = unknown_of(functions, all, noise_of_functions, problem.single);
   for (FoundTorqueEffect& standard : standard_effects(problem, account, naming, noise))
     out.effects.push_back(std::move(standard));
   out.covariance = covariance_of(*account.design, naming.fit(), parameters_in(out.effects));
