@@ -448,6 +448,18 @@ VectorXd FoldGram::products(const std::vector<int>& columns, int with) const {
   return out;
 }
 
+double FoldGram::product(int one, int other) const { return products({one}, other)[0]; }
+
+double FoldGram::product(int column) const {
+  double out = 0.0;
+  for (std::size_t j = 0; j < grams_->size(); ++j) {
+    const Gram& gram = (*grams_)[j].folds[fold_];
+    const Index at = place_in((*grams_)[j].columns, column);
+    if (gram.xx.size() > 0 && at >= 0) out += weights_[j] * gram.xy[at];
+  }
+  return out;
+}
+
 Gram FoldGram::of(const std::vector<int>& columns) const {
   const auto p = static_cast<Index>(columns.size());
   Gram out{MatrixXd::Zero(p, p), VectorXd::Zero(p), yy_, n_};

@@ -104,6 +104,9 @@ class FoldGram {
   Gram of(const std::vector<int>& columns) const;
   /// Of several columns with one.
   Eigen::VectorXd products(const std::vector<int>& columns, int with) const;
+  /// Of two columns; of a column with the torque.
+  double product(int one, int other) const;
+  double product(int column) const;
 
  private:
   TorqueGrams grams_;

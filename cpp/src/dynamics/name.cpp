@@ -53,7 +53,7 @@ class Naming {
         choice_(account.choice),
         state_(search_.state(choice_)),
         fit_(fit_of(sums_, state_.columns, state_.precision)),
-        squares_(search_.squares_of_folds(state_)) {}
+        squares_(search_.squares_of_folds(choice_)) {}
 
   const Fit& fit() const { return fit_; }
   const Evidence::State& state() const { return state_; }
@@ -71,13 +71,14 @@ class Naming {
   double probability(std::size_t at, std::vector<TorqueAlternative>* confounded) const {
     const int g = choice_.groups[at];
     const TorqueGroup& mine = group_of(design_, g);
-    const Evidence::State less = search_.state(Search::without(choice_, at));
+    const Choice rest = Search::without(choice_, at);
+    const Evidence::State& less = search_.state(rest);
     // As gains are, so that rivals and the group itself are measured alike.
     const double loss = search_.evidence().gain(less, mine.columns, search_.cost(g)).score;
     const VectorXd theta = values_of(mine);
     std::set<std::pair<std::string, std::vector<std::string>>> seen;
     double in_class = 1.0, outside = std::exp(-kTempered * loss);
-    std::vector<Evidence::Gain> gains = search_.evidence().gains(less);
+    std::vector<Evidence::Gain> gains = search_.gains(rest);
     std::sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
     for (const Evidence::Gain& gain : gains) {
       const TorqueGroup& other = group_of(design_, gain.group);
@@ -108,7 +109,7 @@ class Naming {
       rest.groups.push_back(choice_.groups[k]);
       rest.scales.push_back(choice_.scales[k]);
     }
-    const Evidence::State less = search_.state(rest);
+    const Evidence::State& less = search_.state(rest);
     for (std::size_t g = 0; g < design_.groups.size(); ++g) {
       const TorqueGroup& other = design_.groups[g];
       const bool one_scale = other.joints.size() > 1 && is_alternative(other) && other.family == TorqueFamily::drive;
@@ -203,8 +204,8 @@ class Shares {
 
  private:
   VectorXd folds_and_held_out(const Choice& choice) const {
-    const Evidence::State state = account_.search->state(choice);
-    const VectorXd folds = account_.search->squares_of_folds(state);
+    const Evidence::State& state = account_.search->state(choice);
+    const VectorXd& folds = account_.search->squares_of_folds(choice);
     const std::vector<FoldGram>& held_out = account_.held_out->folds;
     VectorXd out(folds.size() + static_cast<Index>(held_out.size()));
     out.head(folds.size()) = folds;

@@ -49,7 +49,7 @@ Search::Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nu
     : design_(design),
       sums_(sums),
       groups_(column_groups(design)),
-      evidence_(sums_.all, groups_, std::move(nuisance), priors_of(design)) {
+      evidence_(sums_.all, groups_, std::move(nuisance), priors_of(design), estimation::Nuisance::eliminated) {
   const VectorXd flat = evidence_.evaluate({}).precision;
   for (std::size_t f = 0; f < sums.folds.size(); ++f) folds_.emplace_back(sums, f, evidence_.nuisance(), flat);
   for (const TorqueTerm& term : design.terms) {
@@ -89,26 +89,41 @@ const FoldFit::Column& FoldFit::column(int number) {
     out.half = factor_.matrixL().solve(others - out.held);
     out.follow = factor_.matrixU().solve(out.half);
     out.left = out.held - held_xx_ * out.follow;
+    const double product = fold_.product(number);
+    out.right = sums_.all.xy[number] - product - out.half.dot(half_y_);
+    out.product = product - out.held.dot(follow_y_) - out.follow.dot(left_y_);
   }
   return out;
 }
 
+const FoldFit::Pair& FoldFit::pair(int one, int other) {
+  const auto [low, high] = std::minmax(one, other);
+  const auto key = static_cast<std::uint64_t>(low) * columns_.size() + static_cast<std::uint64_t>(high);
+  const auto [at, fresh] = pairs_.try_emplace(key);
+  if (fresh) {
+    const Column &a = column(low), &b = column(high);
+    const double held = fold_.product(low, high);
+    at->second.others = sums_.all.xx(low, high) - held - a.half.dot(b.half);
+    at->second.held = held - a.follow.dot(b.left) - a.held.dot(b.follow);
+  }
+  return at->second;
+}
+
 // With the nuisance columns N eliminated, a column x is x - N b of the others' fit, b = (N^T N)^-1 N^T x.
 double FoldFit::squares(const Evidence::State& state) {
-  const std::vector<int> chosen(state.columns.begin() + static_cast<std::ptrdiff_t>(nuisance_.size()),
-                                state.columns.end());
-  const auto m = static_cast<Index>(chosen.size());
-  const Gram held = fold_.of(chosen), all = sums_.all.of(chosen);
-  MatrixXd rest = all.xx - held.xx, squares = held.xx;
-  VectorXd right = all.xy - held.xy, product = held.xy;
+  const std::size_t always = nuisance_.size();
+  const auto m = static_cast<Index>(state.columns.size() - always);
+  MatrixXd rest(m, m), squares(m, m);
+  VectorXd right(m), product(m);
   for (Index i = 0; i < m; ++i) {
-    const Column& one = column(chosen[static_cast<std::size_t>(i)]);
-    right[i] -= one.half.dot(half_y_);
-    product[i] -= one.held.dot(follow_y_) + one.follow.dot(left_y_);
+    const int number = state.columns[always + static_cast<std::size_t>(i)];
+    const Column& one = column(number);
+    right[i] = one.right;
+    product[i] = one.product;
     for (Index k = 0; k <= i; ++k) {
-      const Column& other = column(chosen[static_cast<std::size_t>(k)]);
-      rest(i, k) -= one.half.dot(other.half);
-      squares(i, k) -= one.follow.dot(other.left) + one.held.dot(other.follow);
+      const Pair& both = pair(number, state.columns[always + static_cast<std::size_t>(k)]);
+      rest(i, k) = both.others;
+      squares(i, k) = both.held;
     }
   }
   rest.diagonal() += state.precision.tail(m);
@@ -116,12 +131,25 @@ double FoldFit::squares(const Evidence::State& state) {
   return left_yy_ - 2.0 * solution.dot(product) + solution.dot(squares.selfadjointView<Eigen::Lower>() * solution);
 }
 
-VectorXd Search::squares_of_folds(const Choice& choice) const { return squares_of_folds(evidence_.evaluate(choice)); }
+Search::Look& Search::look(const Choice& choice) const {
+  const auto [at, fresh] = looks_.try_emplace({choice.groups, choice.scales});
+  if (fresh) at->second.state = evidence_.evaluate(choice);
+  return at->second;
+}
 
-VectorXd Search::squares_of_folds(const Evidence::State& state) const {
-  VectorXd out(static_cast<Index>(folds_.size()));
-  for (std::size_t f = 0; f < folds_.size(); ++f) out[static_cast<Index>(f)] = folds_[f].squares(state);
-  return out;
+const std::vector<Evidence::Gain>& Search::gains(const Choice& choice) const {
+  Look& seen = look(choice);
+  if (seen.gains.empty()) seen.gains = evidence_.gains(seen.state);
+  return seen.gains;
+}
+
+const VectorXd& Search::squares_of_folds(const Choice& choice) const {
+  Look& seen = look(choice);
+  if (seen.squares.size() == 0) {
+    seen.squares.resize(static_cast<Index>(folds_.size()));
+    for (std::size_t f = 0; f < folds_.size(); ++f) seen.squares[static_cast<Index>(f)] = folds_[f].squares(seen.state);
+  }
+  return seen.squares;
 }
 
 double Search::squares_on(const FoldGram& other, const Evidence::State& state) {
@@ -174,7 +202,7 @@ Choice Search::better_forms(Choice choice) const {
   for (std::size_t at = 0; at < choice.groups.size(); ++at) {
     const TorqueGroup& mine = design_.groups[static_cast<std::size_t>(choice.groups[at])];
     if (mine.forms < 2 || mine.effect.empty()) continue;
-    const Evidence::State less = evidence_.evaluate(without(choice, at));
+    const Evidence::State& less = state(without(choice, at));
     Evidence::Gain best;
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       if (!same_place(design_.groups[g], mine) || groups_[g].shadow) continue;
@@ -192,14 +220,14 @@ Choice Search::better_forms(Choice choice) const {
 Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits) const {
   for (bool changed = true; changed;) {
     changed = false;
-    const Evidence::State state = evidence_.evaluate(choice);
-    const VectorXd squares = squares_of_folds(state);
+    const Evidence::State& whole = state(choice);
+    const VectorXd& squares = squares_of_folds(choice);
     for (std::size_t at = 0; at < choice.groups.size(); ++at) {
-      const Evidence::State less = evidence_.evaluate(without(choice, at));
-      const bool possible = !limits.plausible_only || is_plausible(state, choice.groups[at]);
-      const bool wins = possible && less.score < state.score - 0.5 * limits.threshold;
+      const Choice less = without(choice, at);
+      const bool possible = !limits.plausible_only || is_plausible(whole, choice.groups[at]);
+      const bool wins = possible && state(less).score < whole.score - 0.5 * limits.threshold;
       if (wins && predicts(squares_of_folds(less), squares, limits)) continue;
-      choice = less.choice;
+      choice = less;
       changed = true;
       break;
     }
@@ -210,21 +238,19 @@ Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits) cons
 Choice Search::run(Choice choice, const SearchLimits& limits, bool free_functions) const {
   std::vector<int> refused;
   while (static_cast<int>(choice.groups.size()) < limits.most) {
-    const Evidence::State state = evidence_.evaluate(choice);
-    std::vector<Evidence::Gain> gains = evidence_.gains(state);
-    std::sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
-    const VectorXd squares = squares_of_folds(state);
+    std::vector<Evidence::Gain> ranked = gains(choice);
+    std::sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
+    const VectorXd& squares = squares_of_folds(choice);
     bool taken = false;
-    for (const Evidence::Gain& gain : gains) {
+    for (const Evidence::Gain& gain : ranked) {
       if (gain.score < limits.threshold) break;
       if (!may_enter(choice, gain.group, free_functions)) continue;
       if (std::find(refused.begin(), refused.end(), gain.group) != refused.end()) continue;
       Choice grown = choice;
       grown.groups.push_back(gain.group);
       grown.scales.push_back(gain.scale);
-      const Evidence::State with = evidence_.evaluate(grown);
-      const bool possible = !limits.plausible_only || is_plausible(with, gain.group);
-      if (!possible || !predicts(squares, squares_of_folds(with), limits)) {
+      const bool possible = !limits.plausible_only || is_plausible(state(grown), gain.group);
+      if (!possible || !predicts(squares, squares_of_folds(grown), limits)) {
         refused.push_back(gain.group);
         continue;
       }

@@ -5,7 +5,11 @@
 // Which effects explain the torques: one after the other by evidence, and only those that predict folds they were not
 // fitted to.
 
+#include <cstdint>
+#include <map>
 #include <memory>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "dynamics/problem.hpp"
@@ -38,8 +42,15 @@ class FoldFit {
     Eigen::VectorXd half;    ///< L^-1 N^T x on the others
     Eigen::VectorXd follow;  ///< what the nuisance columns' values give way by, for a value of one
     Eigen::VectorXd left;    ///< N^T (x - N follow) on the fold
+    double right = 0.0;      ///< with the torque, less what the nuisance columns take of both: on the others …
+    double product = 0.0;    ///< … and on the fold
   };
   const Column& column(int number);
+  /// Of two such columns, less what the nuisance columns take of them: their product on the others, and on the fold.
+  struct Pair {
+    double others, held;
+  };
+  const Pair& pair(int one, int other);
 
   const Sums& sums_;
   const FoldGram& fold_;
@@ -49,6 +60,7 @@ class FoldFit {
   Eigen::VectorXd half_y_, follow_y_, left_y_;  ///< as of a column, of the torque
   double left_yy_ = 0.0;                        ///< squared error of the nuisance columns alone
   std::vector<Column> columns_;                 ///< by number
+  std::unordered_map<std::uint64_t, Pair> pairs_;
 };
 
 /// Candidates over one set of sums.
@@ -63,11 +75,12 @@ class Search {
   const Evidence& evidence() const { return evidence_; }
   double joints() const { return static_cast<double>(joints_); }
   double cost(int group) const { return groups_[static_cast<std::size_t>(group)].cost; }
-  Evidence::State state(const Choice& choice) const { return evidence_.evaluate(choice); }
+  const Evidence::State& state(const Choice& choice) const { return look(choice).state; }
+  /// What every group would add to it.
+  const std::vector<Evidence::Gain>& gains(const Choice& choice) const;
 
   /// Squared error of every fold, by the fit to the others.
-  Eigen::VectorXd squares_of_folds(const Choice& choice) const;
-  Eigen::VectorXd squares_of_folds(const Evidence::State& state) const;
+  const Eigen::VectorXd& squares_of_folds(const Choice& choice) const;
   /// Squared error on other rows, by the fit to all folds.
   static double squares_on(const FoldGram& other, const Evidence::State& state);
 
@@ -75,6 +88,14 @@ class Search {
   static Choice without(const Choice& choice, std::size_t at);
 
  private:
+  /// A choice that was looked at: naming asks again for what the search has seen.
+  struct Look {
+    Evidence::State state;
+    std::vector<Evidence::Gain> gains;  ///< empty: not yet asked for
+    Eigen::VectorXd squares;            ///< the same
+  };
+  Look& look(const Choice& choice) const;
+
   bool may_enter(const Choice& choice, int group, bool free_functions) const;
   Choice better_forms(Choice choice) const;
   Choice less_what_is_idle(Choice choice, const SearchLimits& limits) const;
@@ -86,6 +107,7 @@ class Search {
   std::vector<ColumnGroup> groups_;
   Evidence evidence_;
   mutable std::vector<FoldFit> folds_;
+  mutable std::map<std::pair<std::vector<int>, std::vector<double>>, Look> looks_;  ///< by groups and scales
   std::size_t joints_ = 1;
 };
 

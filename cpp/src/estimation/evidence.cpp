@@ -148,10 +148,56 @@ Gram GramSum::finish() {
 
 Gram Gram::of(const std::vector<int>& columns) const { return {block(xx, columns, columns), part(xy, columns), yy, n}; }
 
+namespace {
+
+/// Of a column whose prior is flat.
+double flat_ridge(const Gram& gram, int column) { return kFlat * std::max(gram.xx(column, column), 1e-30); }
+
+}  // namespace
+
 Evidence::Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance,
-                   const Eigen::VectorXd& prior)
+                   const Eigen::VectorXd& prior, Nuisance treated)
     : gram_(gram), groups_(groups), nuisance_(std::move(nuisance)), prior_(prior) {
   degrees_of_freedom_ = std::max(1.0, gram.n - static_cast<double>(nuisance_.size()));
+  if (treated == Nuisance::in_factor || nuisance_.empty()) return;
+  eliminated_ = nuisance_.size();
+  Eigen::MatrixXd d = block(gram.xx, nuisance_, nuisance_);
+  for (Eigen::Index k = 0; k < d.rows(); ++k) d(k, k) += flat_ridge(gram, nuisance_[static_cast<std::size_t>(k)]);
+  always_ = factorised(std::move(d));
+  always_half_ = gram.xx(nuisance_, Eigen::all);
+  always_.matrixL().solveInPlace(always_half_);
+  always_half_y_ = always_.matrixL().solve(part(gram.xy, nuisance_));
+  rest_xy_ = gram.xy - always_half_.transpose() * always_half_y_;
+  rest_yy_ = gram.yy - always_half_y_.squaredNorm();
+  rest_rows_.resize(static_cast<std::size_t>(gram.xx.cols()));
+  for (const ColumnGroup& group : groups) rest_of_groups_.push_back(rest(group.columns, group.columns));
+}
+
+std::vector<int> Evidence::factored(const State& state) const {
+  return {state.columns.begin() + static_cast<std::ptrdiff_t>(eliminated_), state.columns.end()};
+}
+
+const Eigen::VectorXd& Evidence::rest_row(int column) const {
+  Eigen::VectorXd& out = rest_rows_[static_cast<std::size_t>(column)];
+  if (out.size() == 0) out = gram_.xx.col(column) - always_half_.transpose() * always_half_.col(column);
+  return out;
+}
+
+Eigen::MatrixXd Evidence::rest(const std::vector<int>& rows, const std::vector<int>& columns) const {
+  Eigen::MatrixXd out = block(gram_.xx, rows, columns);
+  for (Eigen::Index i = 0; eliminated_ > 0 && i < out.rows(); ++i) {
+    const int row = rows[static_cast<std::size_t>(i)];
+    const Eigen::VectorXd& kept = rest_rows_[static_cast<std::size_t>(row)];
+    for (Eigen::Index j = 0; j < out.cols(); ++j) {
+      const int column = columns[static_cast<std::size_t>(j)];
+      out(i, j) = kept.size() > 0 ? kept[column] : out(i, j) - always_half_.col(row).dot(always_half_.col(column));
+    }
+  }
+  return out;
+}
+
+Eigen::VectorXd Evidence::rest(const std::vector<int>& columns) const {
+  return part(eliminated_ == 0 ? gram_.xy : rest_xy_, columns);
 }
 
 // log p(y) = -nu/2 log(y^T y - m^T X^T y) - 1/2 log|X^T X + s^2 P| + 1/2 log|s^2 P| (MacKay 1992, eq. 4.10, with the
@@ -161,7 +207,7 @@ Evidence::State Evidence::evaluate(const Choice& choice) const {
   out.choice = choice;
   out.columns = nuisance_;
   std::vector<double> precision;
-  for (const int k : nuisance_) precision.push_back(-std::max(gram_.xx(k, k), 1e-30));  // negative: flat
+  for (const int k : nuisance_) precision.push_back(-flat_ridge(gram_, k));  // negative: flat
   double cost = 0.0;
   for (std::size_t g = 0; g < choice.groups.size(); ++g) {
     const ColumnGroup& group = groups_[static_cast<std::size_t>(choice.groups[g])];
@@ -171,9 +217,11 @@ Evidence::State Evidence::evaluate(const Choice& choice) const {
       precision.push_back(std::pow(choice.scales[g] * prior_[k], -2.0));
     }
   }
-  const auto p = static_cast<Eigen::Index>(out.columns.size());
-  const Eigen::MatrixXd xx = block(gram_.xx, out.columns, out.columns);
-  const Eigen::VectorXd xy = part(gram_.xy, out.columns);
+  const auto p = static_cast<Eigen::Index>(out.columns.size()), first = static_cast<Eigen::Index>(eliminated_);
+  const std::vector<int> own = factored(out);
+  const Eigen::MatrixXd xx = rest(own, own);
+  const Eigen::VectorXd xy = rest(own);
+  const double yy = eliminated_ == 0 ? gram_.yy : rest_yy_;
   out.precision.resize(p);
   out.sigma2 = gram_.yy / std::max(1.0, gram_.n);
   double log_prior = 0.0;
@@ -182,20 +230,30 @@ Evidence::State Evidence::evaluate(const Choice& choice) const {
     log_prior = 0.0;
     for (Eigen::Index k = 0; k < p; ++k) {
       const double given = precision[static_cast<std::size_t>(k)];
-      const double ridge = given < 0.0 ? -kFlat * given : out.sigma2 * given;
+      const double ridge = given < 0.0 ? -given : out.sigma2 * given;
       out.precision[k] = ridge;
-      d(k, k) += ridge;
+      if (k >= first) d(k - first, k - first) += ridge;
       if (given >= 0.0) log_prior += std::log(ridge);
     }
     out.factor = factorised(std::move(d));
     out.solution = out.factor.solve(xy);
-    out.rss = std::max(gram_.yy - xy.dot(out.solution), 1e-12 * gram_.yy + 1e-300);
+    out.rss = std::max(yy - xy.dot(out.solution), 1e-12 * gram_.yy + 1e-300);
     const double sigma2 = out.rss / degrees_of_freedom_;
     const bool settled = std::abs(sigma2 / out.sigma2 - 1.0) < 1e-3;
     out.sigma2 = sigma2;
     if (settled) break;
   }
   out.evidence = -0.5 * degrees_of_freedom_ * std::log(out.rss) - 0.5 * log_determinant(out.factor) + 0.5 * log_prior;
+  if (eliminated_ > 0) {
+    out.evidence -= 0.5 * log_determinant(always_);
+    Eigen::VectorXd always = always_half_y_;
+    for (std::size_t k = 0; k < own.size(); ++k)
+      always -= out.solution[static_cast<Eigen::Index>(k)] * always_half_.col(own[k]);
+    always_.matrixU().solveInPlace(always);
+    const Eigen::VectorXd others = out.solution;
+    out.solution.resize(p);
+    out.solution << always, others;
+  }
   out.score = out.evidence - cost;
   return out;
 }
@@ -207,12 +265,17 @@ struct Evidence::Projected {
 
 Evidence::Projected Evidence::project(const State& state) const {
   Projected out;
-  const auto p = static_cast<Eigen::Index>(state.columns.size());
-  out.v.resize(p, gram_.xx.cols());
-  for (Eigen::Index i = 0; i < p; ++i)
-    out.v.row(i) = gram_.xx.col(state.columns[static_cast<std::size_t>(i)]).transpose();
+  const std::vector<int> own = factored(state);
+  out.v.resize(static_cast<Eigen::Index>(own.size()), gram_.xx.cols());
+  for (Eigen::Index i = 0; i < out.v.rows(); ++i) {
+    const int column = own[static_cast<std::size_t>(i)];
+    if (eliminated_ == 0)
+      out.v.row(i) = gram_.xx.col(column).transpose();
+    else
+      out.v.row(i) = rest_row(column).transpose();
+  }
   state.factor.matrixL().solveInPlace(out.v);
-  out.u = state.factor.matrixL().solve(part(gram_.xy, state.columns));
+  out.u = state.factor.matrixL().solve(rest(own));
   return out;
 }
 
@@ -257,37 +320,30 @@ Evidence::Gain Evidence::gain_of(const State& state, const Eigen::MatrixXd& a, c
   return best;
 }
 
-namespace {
-
-/// L^-1 X_S^T X of some columns.
-Eigen::MatrixXd projected_on(const Evidence::State& state, const Eigen::MatrixXd& xx, const std::vector<int>& columns) {
-  Eigen::MatrixXd out = block(xx, state.columns, columns);
+Eigen::MatrixXd Evidence::projected_on(const State& state, const std::vector<int>& columns) const {
+  Eigen::MatrixXd out = rest(factored(state), columns);
   state.factor.matrixL().solveInPlace(out);
   return out;
 }
 
-}  // namespace
-
 Evidence::Gain Evidence::gain(const State& state, const std::vector<int>& columns, double cost) const {
-  const Eigen::MatrixXd v = projected_on(state, gram_.xx, columns);
-  const Eigen::VectorXd u = state.factor.matrixL().solve(part(gram_.xy, state.columns));
-  return gain_of(state, block(gram_.xx, columns, columns) - v.transpose() * v,
-                 part(gram_.xy, columns) - v.transpose() * u, part(prior_, columns), cost);
+  const Eigen::MatrixXd v = projected_on(state, columns);
+  const Eigen::VectorXd u = state.factor.matrixL().solve(rest(factored(state)));
+  return gain_of(state, rest(columns, columns) - v.transpose() * v, rest(columns) - v.transpose() * u,
+                 part(prior_, columns), cost);
 }
 
 double Evidence::visible(const State& state, int column) const {
-  Eigen::VectorXd cross(static_cast<Eigen::Index>(state.columns.size()));
-  for (Eigen::Index k = 0; k < cross.size(); ++k)
-    cross[k] = gram_.xx(state.columns[static_cast<std::size_t>(k)], column);
-  return gram_.xx(column, column) - state.factor.matrixL().solve(cross).squaredNorm();
+  const Eigen::VectorXd cross = rest(factored(state), {column}).col(0);
+  return rest({column}, {column})(0, 0) - state.factor.matrixL().solve(cross).squaredNorm();
 }
 
 double Evidence::explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta,
                            const std::vector<int>& by) const {
-  const Eigen::MatrixXd v = projected_on(state, gram_.xx, what), w = projected_on(state, gram_.xx, by);
-  const Eigen::MatrixXd aa = block(gram_.xx, what, what) - v.transpose() * v;
-  const Eigen::MatrixXd ab = block(gram_.xx, what, by) - v.transpose() * w;
-  Eigen::MatrixXd bb = block(gram_.xx, by, by) - w.transpose() * w;
+  const Eigen::MatrixXd v = projected_on(state, what), w = projected_on(state, by);
+  const Eigen::MatrixXd aa = rest(what, what) - v.transpose() * v;
+  const Eigen::MatrixXd ab = rest(what, by) - v.transpose() * w;
+  Eigen::MatrixXd bb = rest(by, by) - w.transpose() * w;
   for (Eigen::Index k = 0; k < bb.rows(); ++k)
     bb(k, k) += 1e-9 * gram_.xx(by[static_cast<std::size_t>(k)], by[static_cast<std::size_t>(k)]) + 1e-300;
   const double all = theta.dot(aa * theta);
@@ -302,9 +358,8 @@ std::vector<Evidence::Gain> Evidence::gains(const State& state) const {
     const std::vector<int>& columns = groups_[g].columns;
     Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
     for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
-    const Eigen::MatrixXd a = block(gram_.xx, columns, columns) - v.transpose() * v;
-    out[g] = gain_of(state, a, part(gram_.xy, columns) - v.transpose() * projected.u, part(prior_, columns),
-                     groups_[g].cost);
+    const Eigen::MatrixXd a = (eliminated_ == 0 ? rest(columns, columns) : rest_of_groups_[g]) - v.transpose() * v;
+    out[g] = gain_of(state, a, rest(columns) - v.transpose() * projected.u, part(prior_, columns), groups_[g].cost);
     if (columns.empty()) out[g].evidence = out[g].score = -1e300;
     out[g].group = static_cast<int>(g);
     for (std::size_t k = 0; k < columns.size(); ++k) {
@@ -439,7 +494,7 @@ std::vector<double> Evidence::null_scores(const State& state, int count, std::ui
     one.v.resize(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
     for (Eigen::Index i = 0; i < one.v.cols(); ++i)
       one.v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
-    const Eigen::MatrixXd a = block(gram_.xx, columns, columns) - one.v.transpose() * one.v;
+    const Eigen::MatrixXd a = rest(columns, columns) - one.v.transpose() * one.v;
     const Eigen::VectorXd size = part(prior_, columns);
     for (const double scale : scales_of(columns.size())) {
       const Eigen::VectorXd ridge = state.sigma2 * (scale * size).array().pow(-2.0).matrix();
@@ -455,8 +510,14 @@ std::vector<double> Evidence::null_scores(const State& state, int count, std::ui
   for (int k = 0; k < count; ++k) {
     auto [xy, yy] = noise.draw(&random);
     xy *= std::sqrt(state.sigma2);
-    const Eigen::VectorXd u = state.factor.matrixL().solve(part(xy, state.columns));
-    const double rss = std::max(state.sigma2 * yy - u.squaredNorm(), 1e-300);
+    yy *= state.sigma2;
+    if (eliminated_ > 0) {
+      const Eigen::VectorXd always = always_.matrixL().solve(part(xy, nuisance_));
+      xy -= always_half_.transpose() * always;
+      yy -= always.squaredNorm();
+    }
+    const Eigen::VectorXd u = state.factor.matrixL().solve(part(xy, factored(state)));
+    const double rss = std::max(yy - u.squaredNorm(), 1e-300);
     double largest = -1e300;
     for (const Prepared& one : prepared) {
       const Eigen::VectorXd b = part(xy, one.group->columns) - one.v.transpose() * u;

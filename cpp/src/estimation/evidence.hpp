@@ -75,21 +75,30 @@ struct Choice {
   std::vector<double> scales;
 };
 
+/// What becomes of the columns that are always in.
+enum class Nuisance {
+  in_factor,   ///< State::factor is of them and of the others
+  eliminated,  ///< once (Schur complement): State::factor is of the others alone, and a choice costs what its own
+               ///< columns do
+};
+
 /// One Gram, its groups, and everything that the search asks of them.
 class Evidence {
  public:
   /// `nuisance`: columns that are always in, with a flat prior. `prior[k]`: the size that column k's parameter may
   /// have. `gram` and `groups` must outlive it.
+  /// With Nuisance::eliminated no two threads may ask at a time: rows of what is left of the Gram are kept.
   Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance,
-           const Eigen::VectorXd& prior);
-  Evidence(const Gram&&, const std::vector<ColumnGroup>&, std::vector<int>, const Eigen::VectorXd&) = delete;
+           const Eigen::VectorXd& prior, Nuisance treated = Nuisance::in_factor);
+  Evidence(const Gram&&, const std::vector<ColumnGroup>&, std::vector<int>, const Eigen::VectorXd&,
+           Nuisance = Nuisance::in_factor) = delete;
 
   /// A choice evaluated.
   struct State {
     Choice choice;
     std::vector<int> columns;   ///< nuisance, then the groups'
     Eigen::VectorXd precision;  ///< prior precision of each column, times the noise variance it has to be multiplied by
-    Eigen::LLT<Eigen::MatrixXd> factor;  ///< of X^T X + sigma^2 P
+    Eigen::LLT<Eigen::MatrixXd> factor;  ///< of X^T X + sigma^2 P; see Nuisance
     Eigen::VectorXd solution;
     double rss = 0.0;  ///< penalised
     double sigma2 = 0.0;
@@ -141,6 +150,14 @@ class Evidence {
  private:
   struct Projected;
   Projected project(const State& state) const;
+  /// Of the columns that State::factor is of.
+  std::vector<int> factored(const State& state) const;
+  /// What the eliminated columns leave of X^T X, of X^T y and of y^T y.
+  Eigen::MatrixXd rest(const std::vector<int>& rows, const std::vector<int>& columns) const;
+  Eigen::VectorXd rest(const std::vector<int>& columns) const;
+  const Eigen::VectorXd& rest_row(int column) const;  ///< kept
+  /// L^-1 of the products of State::factor's columns with some others.
+  Eigen::MatrixXd projected_on(const State& state, const std::vector<int>& columns) const;
   bool may_enter(const State& state, int group) const;
 
   const Gram& gram_;
@@ -148,6 +165,13 @@ class Evidence {
   std::vector<int> nuisance_;
   Eigen::VectorXd prior_;
   double degrees_of_freedom_ = 0.0;  ///< values less nuisance columns
+  std::size_t eliminated_ = 0;       ///< leading columns of a state that its factor is not of
+  Eigen::LLT<Eigen::MatrixXd> always_;
+  Eigen::MatrixXd always_half_;              ///< L^-1 N^T X of the eliminated columns N
+  Eigen::VectorXd always_half_y_, rest_xy_;  ///< L^-1 N^T y, and what is left of X^T y
+  double rest_yy_ = 0.0;
+  mutable std::vector<Eigen::VectorXd> rest_rows_;  ///< by column; empty: not yet asked for
+  std::vector<Eigen::MatrixXd> rest_of_groups_;     ///< each with itself
 };
 
 /// Nats that a group of so many columns has to win from so many values before the search takes it: the threshold, what

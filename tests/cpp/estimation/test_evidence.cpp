@@ -268,3 +268,35 @@ TEST_CASE("one group can do what another does, or a part of it") {
   const Eigen::VectorXd left = problem.x.col(5) - n * n.colPivHouseholderQr().solve(problem.x.col(5));
   CHECK(evidence.visible(state, 5) == doctest::Approx(left.squaredNorm()).scale(0).epsilon(1e-6));
 }
+
+TEST_CASE("what is always in may be eliminated once: every answer stays") {
+  const Problem problem(90, 101);
+  const Eigen::VectorXd y =
+      problem.x.col(2) + 0.2 * problem.x.col(3) - 0.1 * problem.x.col(10) + problem.noise(0.1, 102);
+  const Gram gram = gram_of(problem.x, y);
+  const Evidence whole(gram, problem.groups, problem.nuisance, problem.prior);
+  const Evidence rest(gram, problem.groups, problem.nuisance, problem.prior, Nuisance::eliminated);
+  const auto close = [](double a, double b) { return a == doctest::Approx(b).epsilon(1e-9); };
+  for (const Choice& choice : std::vector<Choice>{{}, {{0}, {0.1}}, {{4, 0}, {0.1, 1.0}}}) {
+    CAPTURE(choice.groups.size());
+    const Evidence::State a = whole.evaluate(choice), b = rest.evaluate(choice);
+    CHECK(a.columns == b.columns);
+    CHECK((a.solution - b.solution).cwiseAbs().maxCoeff() < 1e-9);
+    CHECK((a.precision - b.precision).cwiseAbs().maxCoeff() < 1e-9 * a.precision.maxCoeff());
+    CHECK(close(a.rss, b.rss));
+    CHECK(close(a.sigma2, b.sigma2));
+    CHECK(close(a.score, b.score));
+    const std::vector<Evidence::Gain> gains = whole.gains(a), others = rest.gains(b);
+    for (std::size_t g = 0; g < gains.size(); ++g) {
+      CHECK(close(gains[g].score, others[g].score));
+      CHECK(gains[g].rank == others[g].rank);
+      CHECK(gains[g].scale == others[g].scale);
+      CHECK(close(whole.gain(a, problem.groups[g].columns, 1.0).score,
+                  rest.gain(b, problem.groups[g].columns, 1.0).score));
+    }
+    CHECK(close(whole.visible(a, 7), rest.visible(b, 7)));
+    CHECK(close(whole.explained(a, {5}, Eigen::VectorXd::Ones(1), {7, 8}),
+                rest.explained(b, {5}, Eigen::VectorXd::Ones(1), {7, 8})));
+    CHECK(whole.null_scores(a, 5, 103).back() == doctest::Approx(rest.null_scores(b, 5, 103).back()).epsilon(1e-9));
+  }
+}
