@@ -213,6 +213,12 @@ void RigidChain::regressors(const kernel::RigidFunctions& kernel, const Eigen::M
          });
 }
 
+bool RigidChain::is_near(const Eigen::MatrixXd& q) const {
+  constexpr double kFar = 1e5;  // [rad]
+  if (q.size() == 0) return true;
+  return zero_.cwiseAbs().maxCoeff() + coupling_.cwiseAbs().rowwise().sum().maxCoeff() * q.cwiseAbs().maxCoeff() < kFar;
+}
+
 Eigen::MatrixXd RigidChain::torques(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
                                     const Eigen::VectorXd& parameters) const {
   Eigen::MatrixXd out(q.rows(), driven());
@@ -225,6 +231,26 @@ Eigen::MatrixXd RigidChain::torques(const Eigen::MatrixXd& q, const Eigen::Matri
            tile.column_stride = tile.samples;
            kernel::rigid_functions().torque(program, tile, parameters.data());
            out.middleRows(first, rows) = Eigen::Map<const Eigen::MatrixXd>(block, tile.samples, driven()).topRows(rows);
+         });
+  return out;
+}
+
+std::vector<Eigen::MatrixXd> RigidChain::mass_matrices(const Eigen::MatrixXd& q,
+                                                       const Eigen::VectorXd& parameters) const {
+  const Eigen::MatrixXd rest = Eigen::MatrixXd::Zero(q.rows(), q.cols());
+  std::vector<Eigen::MatrixXd> out(static_cast<std::size_t>(driven()), Eigen::MatrixXd(q.rows(), driven()));
+  thread_local std::vector<double> part;
+  passes(q, rest, rest, 0, q.rows(),
+         [&](const kernel::RigidProgram& program, kernel::RigidTile tile, Eigen::Index first, Eigen::Index rows) {
+           part.resize(static_cast<std::size_t>(driven() * driven() * tile.samples));
+           double* const block = part.data();
+           tile.blocks = &block;
+           tile.column_stride = tile.samples;
+           kernel::rigid_functions().mass_matrix(program, tile, parameters.data());
+           const Eigen::Map<const Eigen::MatrixXd> all(block, tile.samples, driven() * driven());
+           for (Eigen::Index k = 0; k < driven(); ++k)
+             out[static_cast<std::size_t>(k)].middleRows(first, rows) =
+                 all.middleCols(k * driven(), driven()).topRows(rows);
          });
   return out;
 }
@@ -313,6 +339,18 @@ Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> torque_re
   require_table("qdd", qdd, q.rows(), joints);
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> out(q.rows() * joints,
                                                                              kLinkParameters * chain.links());
+  if (chain.is_near(q)) {
+    constexpr Eigen::Index kTogether = 256;  // what is made of these is laid row by row while it is in the cache
+    for (Eigen::Index first = 0; first < q.rows(); first += kTogether) {
+      const Eigen::Index rows = std::min(kTogether, q.rows() - first);
+      const auto part = [&](const Eigen::MatrixXd& table) -> Eigen::MatrixXd { return table.middleRows(first, rows); };
+      const std::vector<Eigen::MatrixXd> columns = regressor_columns(chain, part(q), part(qd), part(qdd));
+      for (Eigen::Index i = 0; i < rows; ++i)
+        for (Eigen::Index j = 0; j < joints; ++j)
+          out.row((first + i) * joints + j) = columns[static_cast<std::size_t>(j)].row(i);
+    }
+    return out;
+  }
   Eigen::MatrixXd Y(joints, out.cols());
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
     const Eigen::VectorXd a = q.row(i), b = qd.row(i), c = qdd.row(i);
@@ -338,20 +376,9 @@ std::vector<Eigen::MatrixXd> regressor_columns(const RigidChain& chain, const Ei
   return out;
 }
 
-// Without gravity and at rest, an acceleration of one of a joint alone takes its column.
 std::vector<Eigen::MatrixXd> mass_matrix_columns(const Robot& robot, const Eigen::MatrixXd& q,
                                                  const Eigen::VectorXd& links) {
-  Robot weightless = robot;
-  weightless.gravity.setZero();
-  const RigidChain chain(weightless);
-  const Eigen::MatrixXd still = Eigen::MatrixXd::Zero(q.rows(), q.cols());
-  std::vector<Eigen::MatrixXd> out;
-  for (Eigen::Index k = 0; k < chain.driven(); ++k) {
-    Eigen::MatrixXd one = still;
-    one.col(k).setOnes();
-    out.push_back(chain.torques(q, still, one, links));
-  }
-  return out;
+  return RigidChain(robot).mass_matrices(q, links);
 }
 
 // Kinetic energy of the rotors 1/2 sum I_i (C qd)_i^2: their mass matrix is C^T diag(I) C.

@@ -37,6 +37,8 @@ class RigidChain {
                   Eigen::Index end, double* const* blocks, Eigen::Index stride) const {
     regressors(kernel::rigid_functions(), q, qd, qdd, begin, end, blocks, stride);
   }
+  /// No joint stands beyond the angles that the kernel takes.
+  bool is_near(const Eigen::MatrixXd& q) const;
   /// On a copy of the kernel of one's choice.
   void regressors(const kernel::RigidFunctions& kernel, const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,
                   const Eigen::MatrixXd& qdd, Eigen::Index begin, Eigen::Index end, double* const* blocks,
@@ -44,6 +46,8 @@ class RigidChain {
   /// The regressor of every row times `parameters` (10 * links), without forming it: shape=(rows, driven).
   Eigen::MatrixXd torques(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
                           const Eigen::VectorXd& parameters) const;
+  /// The mass matrix of links with these parameters in every row: column k of it, shape=(rows, driven), at place k.
+  std::vector<Eigen::MatrixXd> mass_matrices(const Eigen::MatrixXd& q, const Eigen::VectorXd& parameters) const;
   static constexpr Eigen::Index padded(Eigen::Index rows) {
     return (rows + kernel::kSampleMultiple - 1) / kernel::kSampleMultiple * kernel::kSampleMultiple;
   }

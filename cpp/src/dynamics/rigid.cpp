@@ -20,8 +20,9 @@ Eigen::MatrixXd rigid_torques(const Robot& robot, const Eigen::MatrixXd& q, cons
   require_table("qdd", qdd, q.rows(), chain.driven());
 
   const VectorXd parameters = link_parameters(robot);
-  MatrixXd Y(chain.driven(), parameters.size());
   MatrixXd torques = qdd * rotor_matrix(robot);  // it is symmetric
+  if (chain.is_near(q)) return torques += chain.torques(q, qd, qdd, parameters);
+  MatrixXd Y(chain.driven(), parameters.size());
   for (Index row = 0; row < q.rows(); ++row) {
     const VectorXd position = q.row(row), speed = qd.row(row), acceleration = qdd.row(row);
     chain.regressor(position.data(), speed.data(), acceleration.data(), Y);

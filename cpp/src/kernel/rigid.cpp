@@ -171,11 +171,58 @@ void torque(const RigidProgram& program, const RigidTile& tile, const double* pa
   });
 }
 
+/// What an acceleration of one of every reading asks of a link at rest, in the link's axes, and the work that it does
+/// along every reading: M = sum of J^T I J over the links.
+inline void add_masses(const RigidProgram& program, const RigidTile& tile, int i, int first, const Moving& at,
+                       const double* p) {
+  const int driven = program.driven_count;
+  const Vec moment_of_mass = splat_vec(p + 1);
+  double* const local = tile.scratch + 6 * kLanes * driven;  // twists at the link's origin, in its axes
+  for (int k = 0; k < driven; ++k) {
+    const double* twist = tile.scratch + 6 * kLanes * k;
+    const Vec n = load_lanes(twist), v = load_lanes(twist + 3 * kLanes) + cross(n, at.o);
+    store_lanes(local + 6 * kLanes * k, at.turned_back(n));
+    store_lanes(local + 6 * kLanes * k + 3 * kLanes, at.turned_back(v));
+  }
+  for (int k = 0; k < driven; ++k) {
+    const Vec n = load_lanes(local + 6 * kLanes * k), v = load_lanes(local + 6 * kLanes * k + 3 * kLanes);
+    const Vec force = splat(p[0]) * v + cross(n, moment_of_mass);
+    const Vec turning{splat(p[4]) * n.x + splat(p[7]) * n.y + splat(p[8]) * n.z,
+                      splat(p[7]) * n.x + splat(p[5]) * n.y + splat(p[9]) * n.z,
+                      splat(p[8]) * n.x + splat(p[9]) * n.y + splat(p[6]) * n.z};
+    const Vec moment = cross(moment_of_mass, v) + turning;
+    for (int l = 0; l <= k; ++l) {
+      const double* other = local + 6 * kLanes * l;
+      double* out = tile.blocks[0] + (k * driven + l) * tile.column_stride + first;
+      double* mirrored = tile.blocks[0] + (l * driven + k) * tile.column_stride + first;
+      const Pack sum =
+          (i > 0 ? load(out) : Pack{}) + dot(load_lanes(other), moment) + dot(load_lanes(other + 3 * kLanes), force);
+      store(out, sum);
+      store(mirrored, sum);
+    }
+  }
+}
+
+void mass_matrix(const RigidProgram& program, const RigidTile& tile, const double* parameters) {
+  sweep(program, tile, [&](int i, int first, const Moving& at) {
+    add_masses(program, tile, i, first, at, parameters + kLinkColumns * i);
+  });
+}
+
+void sine_cosine_of(const double* angle, int count, double* sine, double* cosine) {
+  for (int first = 0; first < count; first += kLanes) {
+    Pack s, c;
+    sine_cosine(load(angle + first), &s, &c);
+    store(sine + first, s);
+    store(cosine + first, c);
+  }
+}
+
 }  // namespace
 
 #define TRUING_TEXT_OF(x) #x
 #define TRUING_TEXT(x) TRUING_TEXT_OF(x)
 extern const RigidFunctions rigid_table;
-const RigidFunctions rigid_table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE), regressor, torque};
+const RigidFunctions rigid_table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE), regressor, torque, mass_matrix, sine_cosine_of};
 
 }  // namespace truing::kernel::TRUING_KERNEL_NAMESPACE

@@ -32,7 +32,7 @@ struct RigidProgram {
 struct RigidTile {
   int samples;                   ///< a multiple of kSampleMultiple
   const double* motion;          ///< [link][stride]: of the joints, below 1e5 rad
-  const double* rate;            ///< [link][stride]
+  const double* rate;            ///< [link][stride]; a mass matrix does not look at it, nor at the next
   const double* acceleration;    ///< [link][stride]
   std::ptrdiff_t stride;         ///< of these three
   double* const* blocks;         ///< out [driven][link]: first of ten columns; null: this joint does not feel this link
@@ -40,13 +40,17 @@ struct RigidTile {
   double* scratch;               ///< rigid_scratch(program.driven_count) numbers
 };
 
-constexpr std::size_t rigid_scratch(int driven) { return 6 * kSampleMultiple * static_cast<std::size_t>(driven); }
+constexpr std::size_t rigid_scratch(int driven) { return 12 * kSampleMultiple * static_cast<std::size_t>(driven); }
 
 struct RigidFunctions {
   const char* name;
   void (*regressor)(const RigidProgram&, const RigidTile&);
   /// The regressor times `parameters`, ten for each link, without its columns.
   void (*torque)(const RigidProgram&, const RigidTile&, const double* parameters);
+  /// The mass matrix of links with these parameters: at blocks[0] driven * driven columns, row by row of the matrix.
+  void (*mass_matrix)(const RigidProgram&, const RigidTile&, const double* parameters);
+  /// Of `count` angles below 1e5 rad, a multiple of kSampleMultiple; one of the outputs may be the input.
+  void (*sine_cosine)(const double* angle, int count, double* sine, double* cosine);
 };
 
 /// The copy of the same name as functions().

@@ -6,7 +6,9 @@
 
 #include <doctest/doctest.h>
 
+#include "math/constants.hpp"
 #include "support/newton_euler.hpp"
+#include "truing/dynamics/rigid.hpp"
 
 namespace {
 
@@ -14,8 +16,11 @@ using namespace rigid;
 using truing::dynamics::kLinkParameters;
 using truing::dynamics::link_parameters;
 using truing::dynamics::LinkParameters;
+using truing::dynamics::mass_matrix_columns;
+using truing::dynamics::rigid_torques;
 using truing::dynamics::RigidChain;
 using truing::dynamics::set_link_parameters;
+using truing::dynamics::torque_regressor;
 
 /// Every convention, rails, passive joints, ratios and offsets, gravity askew.
 std::vector<Robot> robots() {
@@ -225,6 +230,51 @@ TEST_CASE("torques without the regressor are those by it, on every kind of robot
     const MatrixXd torques = chain.torques(states.q, states.qd, states.qdd, parameters);
     for (Index row = 0; row < 75; ++row)
       CHECK(relative(torques.row(row).transpose(), regressor(chain, states.at(row)) * parameters) < 1e-12);
+  }
+}
+
+TEST_CASE("a column of the mass matrix is what an acceleration of one takes at rest, without gravity") {
+  std::mt19937_64 random(28);
+  for (Robot robot : robots()) {
+    CAPTURE(robot.name);
+    const States states(RigidChain(robot), 75, &random);
+    const VectorXd parameters = link_parameters(robot);
+    const std::vector<MatrixXd> found = mass_matrix_columns(robot, states.q, parameters);
+    robot.gravity.setZero();
+    const RigidChain chain(robot);
+    for (Index row = 0; row < 75; ++row) {
+      MatrixXd mass(chain.driven(), chain.driven());
+      for (Index k = 0; k < chain.driven(); ++k) {
+        const State one{states.q.row(row), VectorXd::Zero(chain.driven()), VectorXd::Unit(chain.driven(), k)};
+        mass.col(k) = regressor(chain, one) * parameters;
+        CHECK(relative(found[static_cast<std::size_t>(k)].row(row).transpose(), mass.col(k)) < 1e-11);
+      }
+    }
+  }
+}
+
+TEST_CASE("beyond the angles that the kernel takes the plain regressor stands in for it") {
+  const Robot robot = arms::ur10();
+  const MatrixXd near = MatrixXd::Constant(1, 6, 0.3), rate = MatrixXd::Constant(1, 6, 0.7);
+  MatrixXd far = near;
+  far(0, 2) += 2.0 * truing::math::kPi * 1e6;
+  CHECK(RigidChain(robot).is_near(near));
+  CHECK_FALSE(RigidChain(robot).is_near(far));
+  const MatrixXd expected = torque_regressor(robot, near, rate, rate), found = torque_regressor(robot, far, rate, rate);
+  CHECK((found - expected).cwiseAbs().maxCoeff() < 1e-7);
+  CHECK((rigid_torques(robot, far, rate, rate) - rigid_torques(robot, near, rate, rate)).cwiseAbs().maxCoeff() < 1e-6);
+}
+
+TEST_CASE("sines and cosines of the kernel are those of the library") {
+  const VectorXd angles = VectorXd::LinSpaced(4000, -2e3, 3e3);
+  for (const char* name : {"scalar", "sse2", "avx2", "avx512"}) {
+    const truing::kernel::RigidFunctions* kernel = truing::kernel::rigid_functions(name);
+    if (!kernel) continue;
+    CAPTURE(name);
+    VectorXd sine = angles, cosine(angles.size());
+    kernel->sine_cosine(sine.data(), static_cast<int>(angles.size()), sine.data(), cosine.data());
+    CHECK((sine.array() - angles.array().sin()).abs().maxCoeff() < 3e-16);
+    CHECK((cosine.array() - angles.array().cos()).abs().maxCoeff() < 3e-16);
   }
 }
 

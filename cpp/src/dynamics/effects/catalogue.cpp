@@ -8,6 +8,8 @@
 
 #include "dynamics/effects/families.hpp"
 #include "dynamics/prepare.hpp"
+#include "dynamics/regressor.hpp"
+#include "kernel/rigid.hpp"
 #include "math/text.hpp"
 
 namespace truing {
@@ -139,6 +141,28 @@ TorqueTerm within(TorqueTerm term, double least, double most) {
   term.most = most;
   return term;
 }
+
+namespace {
+
+/// Sines and cosines beside each other.
+Eigen::ArrayX2d waves(const Eigen::VectorXd& angles) {
+  constexpr double kFar = 1e5;  // [rad] beyond which the kernel does not go
+  if (angles.size() > 0 && !(angles.cwiseAbs().maxCoeff() < kFar)) {
+    Eigen::ArrayX2d out(angles.size(), 2);
+    out << angles.array().sin(), angles.array().cos();
+    return out;
+  }
+  const Eigen::Index all = RigidChain::padded(angles.size());
+  Eigen::ArrayX2d out = Eigen::ArrayX2d::Zero(all, 2);
+  out.col(0).head(angles.size()) = angles;
+  kernel::rigid_functions().sine_cosine(out.data(), static_cast<int>(all), out.data(), out.data() + all);
+  return out;
+}
+
+}  // namespace
+
+Eigen::ArrayXd sines(const Eigen::VectorXd& angles) { return waves(angles).col(0).head(angles.size()); }
+Eigen::ArrayXd cosines(const Eigen::VectorXd& angles) { return waves(angles).col(1).head(angles.size()); }
 
 std::string parameter_name(const char* effect, const Robot& robot, std::size_t joint, const char* part) {
   return std::string(effect) + "." + driven_name(robot, joint) + (part != nullptr ? "." + std::string(part) : "");

@@ -49,6 +49,10 @@ TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, d
 TorqueTerm undirected(TorqueTerm term);
 TorqueTerm within(TorqueTerm term, double least, double most = std::numeric_limits<double>::infinity());
 
+/// Of angles [rad], on the kernel.
+Eigen::ArrayXd sines(const Eigen::VectorXd& angles);
+Eigen::ArrayXd cosines(const Eigen::VectorXd& angles);
+
 /// "coulomb.J2"
 std::string parameter_name(const char* effect, const Robot& robot, std::size_t joint, const char* part = nullptr);
 

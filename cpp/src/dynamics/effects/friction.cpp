@@ -155,11 +155,11 @@ std::vector<TorqueForm> load_friction(const Robot& robot, std::size_t joint, con
 std::vector<TorqueForm> position_friction(const Robot& robot, std::size_t joint, const MotionRange& range) {
   if (!is_revolute(robot, joint)) throw Unsuited("a prismatic joint does not turn");
   const double prior = 0.3 * torque_prior(range, joint);
-  const auto angle = [joint](const Motion& m) -> ArrayXd { return m.q.col(static_cast<Index>(joint)); };
+  const auto angle = [joint](const Motion& m) { return m.q.col(static_cast<Index>(joint)); };
   return {{term_at(joint, parameter_name("position_friction", robot, joint, "sin"), "Nm", prior,
-                   [=](const Motion& m) -> ArrayXd { return direction(m, joint) * angle(m).sin(); }),
+                   [=](const Motion& m) -> ArrayXd { return direction(m, joint) * sines(angle(m)); }),
            term_at(joint, parameter_name("position_friction", robot, joint, "cos"), "Nm", prior,
-                   [=](const Motion& m) -> ArrayXd { return direction(m, joint) * angle(m).cos(); })}};
+                   [=](const Motion& m) -> ArrayXd { return direction(m, joint) * cosines(angle(m)); })}};
 }
 
 TorqueTraits traits(const char* plain, SimulatorPlace mujoco, SimulatorPlace urdf, EffectDocumentation documentation) {

@@ -8,6 +8,7 @@
 
 #include "dynamics/effects/families.hpp"
 #include "dynamics/filter.hpp"
+#include "dynamics/payload.hpp"
 #include "dynamics/regressor.hpp"
 
 namespace truing::dynamics {
@@ -53,9 +54,9 @@ std::vector<TorqueForm> ripple(const Robot& robot, std::size_t joint, const Moti
     const std::string name = parameter_name("ripple", robot, joint);
     const double prior = 0.2 * torque_prior(range, joint);
     out.push_back({term_at(joint, name + ".sin" + std::to_string(k), "Nm", prior,
-                           [at, k](const Motion& m) -> ArrayXd { return (k * m.q.col(at).array()).sin(); }),
+                           [at, k](const Motion& m) -> ArrayXd { return sines(k * m.q.col(at)); }),
                    term_at(joint, name + ".cos" + std::to_string(k), "Nm", prior,
-                           [at, k](const Motion& m) -> ArrayXd { return (k * m.q.col(at).array()).cos(); })});
+                           [at, k](const Motion& m) -> ArrayXd { return cosines(k * m.q.col(at)); })});
     for (TorqueTerm& term : out.back()) {
       term.only_alternative = !seen;
       term.needs_direction = false;
@@ -79,7 +80,8 @@ MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
   const RigidChain chain(*m.robot);
   const double step = 1e-4 / std::max(dq.cwiseAbs().maxCoeff(), 1e-12);  // rad: small against any posture
   const MatrixXd dqd = rate_of(dq, m.step), dqdd = rate_of(dqd, m.step);
-  const MatrixXd before = chain.torques(m.q, m.qd, m.qdd, m.bodies);
+  const MatrixXd made = payload_of(m).isZero(0.0) ? MatrixXd() : chain.torques(m.q, m.qd, m.qdd, m.bodies);
+  const MatrixXd& before = made.size() == 0 ? m.carried : made;
   MatrixXd q = m.q, qd = m.qd, qdd = m.qdd;
   q.col(joint) += step * dq;
   qd.col(joint) += step * dqd;
