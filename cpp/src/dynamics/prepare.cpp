@@ -3,10 +3,13 @@
 #include "dynamics/prepare.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <condition_variable>
 #include <iterator>
 #include <limits>
 #include <memory>
+#include <mutex>
 
 #include "dynamics/filter.hpp"
 #include "dynamics/payload.hpp"
@@ -193,7 +196,7 @@ void Tiles::for_each(const std::function<bool(std::size_t)>& wanted, const Work&
     std::vector<Tile*> all;
     for (Tile& tile : tiles_)
       if (wanted(tile.recording)) all.push_back(&tile);
-    return in_lots(all.size(), [&](std::size_t number, std::size_t) -> Tile& { return *all[number]; }, work, done);
+    return in_order(all.size(), [&](std::size_t number, std::size_t) -> Tile& { return *all[number]; }, work, done);
   }
   std::vector<Tile> made(kTogether);
   if (file_) {
@@ -203,11 +206,14 @@ void Tiles::for_each(const std::function<bool(std::size_t)>& wanted, const Work&
     const auto read = [&](std::size_t number, std::size_t k) -> Tile& {
       return made[k] = file_->read(all[number], robot_);
     };
-    return in_lots(all.size(), read, work, done);
+    return in_order(all.size(), read, work, [&](std::size_t k) {
+      done(k);
+      made[k] = Tile();
+    });
   }
   std::size_t count = 0;
   const auto run = [&] {
-    in_lots(count, [&](std::size_t, std::size_t k) -> Tile& { return made[k]; }, work, done);
+    in_order(count, [&](std::size_t, std::size_t k) -> Tile& { return made[k]; }, work, done);
     count = 0;
   };
   for (std::size_t r = 0; r < recordings_.size(); ++r) {
@@ -221,13 +227,40 @@ void Tiles::for_each(const std::function<bool(std::size_t)>& wanted, const Work&
   run();
 }
 
-void Tiles::in_lots(std::size_t count, const std::function<Tile&(std::size_t, std::size_t)>& tile, const Work& work,
-                    const Done& done) const {
-  for (std::size_t begin = 0; begin < count; begin += kTogether) {
-    const std::size_t some = std::min(kTogether, count - begin);
-    math::for_each_on_threads(some, threads_, {}, [&](std::size_t k) { work(tile(begin + k, k), k); }, 1);
-    for (std::size_t k = 0; k < some; ++k) done(k);
-  }
+// A slot is taken again as soon as what was in it has been added: nobody waits for the slowest of a lot.
+void Tiles::in_order(std::size_t count, const std::function<Tile&(std::size_t, std::size_t)>& tile, const Work& work,
+                     const Done& done) const {
+  std::mutex mutex;
+  std::condition_variable free_slot;
+  std::array<bool, kTogether> worked_on{};
+  std::size_t added = 0;  // so many of the first tiles
+  bool failed = false;
+  const auto add_in_order = [&](std::size_t number) {
+    worked_on[number % kTogether] = true;
+    for (; added < count && worked_on[added % kTogether]; ++added) {
+      worked_on[added % kTogether] = false;
+      done(added % kTogether);
+    }
+  };
+  const auto run = [&](std::size_t number) {
+    {
+      std::unique_lock<std::mutex> lock(mutex);
+      free_slot.wait(lock, [&] { return failed || number < added + kTogether; });
+      if (failed) return;
+    }
+    try {
+      work(tile(number, number % kTogether), number % kTogether);
+      const std::lock_guard<std::mutex> lock(mutex);
+      add_in_order(number);
+    } catch (...) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      failed = true;
+      free_slot.notify_all();
+      throw;
+    }
+    free_slot.notify_all();
+  };
+  math::for_each_on_threads(count, threads_, {}, run, 1);
 }
 
 namespace {

@@ -81,8 +81,8 @@ class Tiles {
   /// So many tiles are worked on side by side.
   static constexpr std::size_t kTogether = 8;
   /// Calls work(tile, k) for the tiles of the wanted recordings, several at a time on several threads, k below
-  /// kTogether, and after each such lot done(k) for each of them in their order: sums that are added up there do not
-  /// depend on the number of threads.
+  /// kTogether, and done(k) for one after the other in their order: sums that are added up there do not depend on the
+  /// number of threads.
   void for_each(const std::function<bool(std::size_t recording)>& wanted, const Work& work, const Done& done) const;
 
   const std::vector<Recording>& recordings() const { return recordings_; }
@@ -96,9 +96,9 @@ class Tiles {
  private:
   void keep();
   void write();
-  /// `tile`: the one of this number, as k of its lot.
-  void in_lots(std::size_t count, const std::function<Tile&(std::size_t number, std::size_t k)>& tile, const Work& work,
-               const Done& done) const;
+  /// `tile`: the one of this number, in slot k.
+  void in_order(std::size_t count, const std::function<Tile&(std::size_t number, std::size_t k)>& tile,
+                const Work& work, const Done& done) const;
 
   const std::vector<Recording>& recordings_;
   const Robot& robot_;

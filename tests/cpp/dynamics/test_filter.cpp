@@ -59,6 +59,23 @@ TEST_CASE("every third row of a filtered record is that row") {
   for (Eigen::Index i = 0; i < some.rows(); ++i) CHECK(some(i, 0) == all(3 * i, 0));
 }
 
+TEST_CASE("where a column is zero for long nothing is summed, and beside it all is") {
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(3000);
+  x.segment(900, 3).setConstant(2.0);
+  x[2999] = 1.0;
+  const Eigen::VectorXd weights = low_pass(8.0, kStep);
+  const Eigen::MatrixXd y = filtered(x, weights, 2);
+  const Eigen::Index half = weights.size() / 2;
+  for (Eigen::Index i = 0; i < y.rows(); ++i) {
+    double sum = 0.0;
+    for (Eigen::Index k = -half; k <= half; ++k) {
+      const Eigen::Index at = 2 * i + k;
+      sum += weights[k + half] * (at < 0 ? -x[-at] : at > 2999 ? 2.0 * x[2999] - x[5998 - at] : x[at]);
+    }
+    CHECK(std::abs(y(i, 0) - sum) < 1e-14);
+  }
+}
+
 TEST_CASE("every copy of the kernel filters as the sum says, and rows do not depend on each other, to the bit") {
   const Eigen::VectorXd x = Eigen::VectorXd::Random(700), weights = Eigen::VectorXd::Random(51);
   for (const char* name : {"scalar", "sse2", "avx2", "avx512"}) {

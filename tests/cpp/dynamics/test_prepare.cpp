@@ -1,6 +1,11 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <chrono>
 #include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <thread>
 
 #include <doctest/doctest.h>
 
@@ -81,4 +86,34 @@ TEST_CASE("rows between gaps are predicted by their own motion, however few they
     const double t = cut.time[i];
     if (t > 9.05 && t < 9.25) CHECK(std::abs(torque(i, 0) - 3.0 * 0.65 * std::cos(1.3 * t)) < 0.15);
   }
+}
+
+TEST_CASE("tiles are added up in their order, however long each of them takes") {
+  const Robot robot = swung::level_arm();
+  std::vector<Recording> recordings;
+  for (int r = 0; r < 30; ++r) recordings.push_back(recording(3.0, 2.0));
+  const dynamics::Tiles tiles(recordings, robot, {}, 3);
+  std::array<std::size_t, dynamics::Tiles::kTogether> in_slot{};
+  std::vector<std::size_t> order;
+  const auto all = [](std::size_t) { return true; };
+  tiles.for_each(
+      all,
+      [&](dynamics::Tile& tile, std::size_t k) {
+        if (tile.recording % 7 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        in_slot[k] = tile.recording;
+      },
+      [&](std::size_t k) { order.push_back(in_slot[k]); });
+  std::vector<std::size_t> expected(recordings.size());
+  std::iota(expected.begin(), expected.end(), 0);
+  CHECK(order == expected);
+}
+
+TEST_CASE("what one tile's work throws comes out, and nobody waits for it") {
+  const Robot robot = swung::level_arm();
+  const std::vector<Recording> recordings(30, recording(3.0, 2.0));
+  const dynamics::Tiles tiles(recordings, robot, {}, 3);
+  const auto work = [](dynamics::Tile& tile, std::size_t) {
+    if (tile.recording == 1) throw std::runtime_error("no more");
+  };
+  CHECK_THROWS_WITH(tiles.for_each([](std::size_t) { return true; }, work, [](std::size_t) {}), "no more");
 }
