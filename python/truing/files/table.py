@@ -82,6 +82,17 @@ def _lots_of_groups(metadata: Any, rows: int) -> Iterator[list[int]]:
         yield lot
 
 
+def _numbers_of(chunk: Any, absent: float) -> NDArray[Any]:
+    """Numbers of an Arrow array, empty cells as `absent`, without a copy where there are none.
+
+    Arrow's own way loads pandas, where that is installed, which takes longer than to read a recording.
+    """
+    full = chunk.fill_null(absent) if chunk.null_count else chunk
+    values = full.buffers()[1] if len(full) else b""
+    kind = np.dtype(full.type.to_pandas_dtype())
+    return np.frombuffer(values, kind, len(full), full.offset * kind.itemsize)
+
+
 class Table:
     """A table on disk. `names` is known at once; `read` loads it; then columns are taken out one by one.
 
@@ -267,12 +278,12 @@ class Table:
             column = column.cast(pa.float64(), safe=False)
         chunks = column.chunks
         if len(chunks) == 1:
-            values = chunks[0].to_numpy(zero_copy_only=False)
+            values = _numbers_of(chunks[0], math.nan)
         else:
             values = np.empty(self.rows)
             start = 0
             for chunk in chunks:
-                values[start : start + len(chunk)] = chunk.to_numpy(zero_copy_only=False)
+                values[start : start + len(chunk)] = _numbers_of(chunk, math.nan)
                 start += len(chunk)
         if not any_value:
             wrong = ~np.isfinite(values)
@@ -310,9 +321,7 @@ class Table:
         codes = np.empty(self.rows, dtype=np.int32)
         start = 0
         for chunk in column.chunks:
-            codes[start : start + len(chunk)] = lookup[
-                chunk.indices.fill_null(len(words)).to_numpy(zero_copy_only=False)
-            ]
+            codes[start : start + len(chunk)] = lookup[_numbers_of(chunk.indices, len(words))]
             start += len(chunk)
         return codes, names
 
@@ -413,7 +422,9 @@ class Table:
                 f" {_MOST_CELLS // len(self.names):,}: take every n-th row"
             )
         try:
-            return pa.parquet.read_table(self.path, partitioning=None, read_dictionary=self._text_columns())
+            # `read_table` loads pandas, where that is installed.
+            with pa.parquet.ParquetFile(self.path, read_dictionary=self._text_columns()) as file:
+                return file.read()
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
 

@@ -6,10 +6,15 @@ from __future__ import annotations
 
 import math
 import mmap
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
 import pytest
 from hypothesis import HealthCheck, example, given, settings, strategies as st
 
@@ -388,3 +393,38 @@ def test_recordings_with_faults(tmp_path_factory: pytest.TempPathFactory, data: 
 @given(text=st.text(alphabet='0123456789.,-+e"#\n\r na', max_size=120))
 def test_recordings_of_any_cells(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
     check(tmp_path_factory.getbasetemp(), b"t_s,q1_rad,q2_m\n" + text.encode())
+
+
+WITHOUT_PANDAS = """
+import sys
+from truing import _core
+from truing.dynamics import load_recordings
+from truing.files import write_table
+
+robot = _core.Robot("arm", joints=[_core.Joint("J1", d=0.3)])
+(found,) = load_recordings(sys.argv[1], robot)
+write_table(sys.argv[2], {"t_s": found.time, "set": ["train", None] * (len(found) // 2)})
+print(len(found), "pandas" in sys.modules)
+"""
+
+
+def test_tables_are_read_and_written_without_loading_pandas(tmp_path: Path) -> None:
+    files = [str(tmp_path / "run.parquet"), str(tmp_path / "again.csv")]
+    write_table(files[0], {"t_s": T, "q1_rad": Q1, "tau1_Nm": Q1, "set": ["train"] * ROWS})
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_PANDAS, *files], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == [str(ROWS), "False"]
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_empty_cells_of_numbers_and_text_come_back(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"table.{ending}"
+    write_table(
+        path, {"a": np.array([1.5, np.nan, -3.0]), "b": ["x", None, "ü"], "c": np.array([True, False, True])}
+    )
+    read = pa.parquet.read_table(path) if ending == "parquet" else pa.csv.read_csv(path)
+    read.validate(full=True)
+    assert read["a"].to_pylist() == [1.5, None, -3.0]
+    assert [word or None for word in read["b"].to_pylist()] == ["x", None, "ü"]
+    assert read["c"].to_pylist() == [True, False, True]
