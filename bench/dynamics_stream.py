@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""A recording of hours, longer than memory: memory and time of its diagnosis, as a user starts it.
+"""Recordings of hours, longer than memory: memory and time of their diagnosis, as a user starts it.
 
-    python bench/dynamics_stream.py --hours 24 [--folder FOLDER]
+    python bench/dynamics_stream.py --hours 2 6 24 [--folder FOLDER]
 
 An arm with hidden effects (`truing.testing.dynamics`) is simulated at 500 Hz and written to a Parquet file of
 80 bytes a row, 3.5 GB for 24 hours; `truing dynamics diagnose` reads it. Not part of `make bench`.
@@ -43,11 +43,13 @@ def noise_of(rows: int, joints: int, random: np.random.Generator) -> Floats:
     return np.fft.irfft(spectrum, size)[:, len(response) - 1 : white.shape[1]].T
 
 
-def motions(truth: truing.Robot, random: np.random.Generator) -> list[tuple[Floats, Floats]]:
+def motions(
+    truth: truing.Robot, random: np.random.Generator, count: int = MOTIONS
+) -> list[tuple[Floats, Floats]]:
     """Angles and torques of pieces, without noise."""
     out = []
     t = np.arange(0.0, PIECE, STEP)
-    for _ in range(MOTIONS):
+    for _ in range(count):
         q = fourier_motion(t, len(truth.driven_joints()), random)
         bare = truing.dynamics.Recording("motion", time=t, position=q)
         out.append((q, np.asarray(truing.dynamics.predict(truth, bare, cutoff=CUT_OFF).torque)))
@@ -92,26 +94,34 @@ def written(folder: Path, hours: float) -> None:
     print(write(folder / "long.parquet", arm.truth, hours))
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--hours", type=float, default=2.0, help="from one on they are read in pieces")
-    parser.add_argument("--folder", type=Path, help="for the recording; default: a temporary one")
-    parser.add_argument("--write", type=Path, help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
-    if arguments.write:
-        written(arguments.write, arguments.hours)
-        return
-    with tempfile.TemporaryDirectory(dir=arguments.folder) as name:
+def measured(parent: Path | None, hours: float) -> str:
+    """A line of what so many hours take. parent: of the recording's folder."""
+    with tempfile.TemporaryDirectory(dir=parent) as name:
         folder = Path(name)
-        command = [sys.executable, __file__, "--hours", str(arguments.hours), "--write", name]
+        command = [sys.executable, __file__, "--hours", str(hours), "--write", name]
         rows = int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
         clock, processor, memory = diagnosed(
             folder / "robot.yaml", folder / "long.parquet", folder / "result"
         )
-    print(
-        f"{arguments.hours:g} h at {1 / STEP:.0f} Hz, {rows} rows: {clock:.0f} s by the clock,"
+    return (
+        f"{hours:g} h at {1 / STEP:.0f} Hz, {rows} rows: {clock:.0f} s by the clock,"
         f" {processor:.0f} s of processor, {1e6 * processor / rows:.1f} us a row, {memory:.0f} MB at most"
     )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--hours", type=float, nargs="+", default=[2.0], help="from two on they are read in pieces"
+    )
+    parser.add_argument("--folder", type=Path, help="for the recording; default: a temporary one")
+    parser.add_argument("--write", type=Path, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.write:
+        written(arguments.write, arguments.hours[0])
+        return
+    for hours in arguments.hours:
+        print(measured(arguments.folder, hours), flush=True)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -235,28 +236,52 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
 
 namespace {
 
-/// What the model and the columns times values leave, in the tile's own rows: shape=(count, joints).
-MatrixXd errors_of(const DesignColumns& columns, const TorqueModel& model, const VectorXd& values, Tile* tile) {
-  set_direction(model.turns(), tile);
-  MatrixXd errors = tile->measured - kept_torque(model, tile);
-  columns.use(tile, false, [&](const DesignColumns::Tables& tables) {
-    for (std::size_t j = 0; j < tables.size(); ++j) {
-      const std::vector<int>& of = columns.of_joint(j);
-      for (std::size_t c = 0; c < of.size(); ++c) {
-        if (values[of[c]] != 0.0)
-          errors.col(static_cast<Index>(j)) -= values[of[c]] * tables[j].col(static_cast<Index>(c));
-      }
+/// What the model and the columns times values leave, in the tile's own rows: shape=(count, joints). Where columns are
+/// not kept, to make every one of them would take longer than to filter what they are together.
+class ErrorsOf {
+ public:
+  ErrorsOf(const DesignColumns& columns, const TorqueModel& model, const VectorXd& values)
+      : columns_(columns), model_(model), values_(values) {
+    if (columns.are_kept()) return;
+    std::vector<ValuedTerm> terms;
+    for (std::size_t c = 0; c < columns.design().terms.size(); ++c) {
+      const double value = values[static_cast<Index>(c)];
+      if (value != 0.0) terms.push_back({columns.design().terms[c], value});
     }
-  });
-  return errors;
-}
+    fitted_ = std::make_unique<TorqueModel>(model.with(terms));
+    // What the robot carries already sees its own torque alone.
+    if (!model.robot().torque_effects.empty()) fitted_ = std::make_unique<TorqueModel>(fitted_->seeing(model));
+  }
+
+  MatrixXd operator()(Tile* tile) const {
+    if (fitted_) return tile->measured - own_torque(*fitted_, tile);
+    set_direction(model_.turns(), tile);
+    MatrixXd errors = tile->measured - kept_torque(model_, tile);
+    columns_.use(tile, false, [&](const DesignColumns::Tables& tables) {
+      for (std::size_t j = 0; j < tables.size(); ++j) {
+        const std::vector<int>& of = columns_.of_joint(j);
+        for (std::size_t c = 0; c < of.size(); ++c) {
+          if (values_[of[c]] != 0.0)
+            errors.col(static_cast<Index>(j)) -= values_[of[c]] * tables[j].col(static_cast<Index>(c));
+        }
+      }
+    });
+    return errors;
+  }
+
+ private:
+  const DesignColumns& columns_;
+  const TorqueModel& model_;
+  const VectorXd& values_;
+  std::unique_ptr<TorqueModel> fitted_;  ///< null: by the columns
+};
 
 }  // namespace
 
 std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const VectorXd& values,
                             const Folds& folds) {
-  return noise_of(
-      columns.tiles(), [&](Tile& tile) -> MatrixXd { return errors_of(columns, model, values, &tile); }, folds);
+  const ErrorsOf errors_of(columns, model, values);
+  return noise_of(columns.tiles(), [&](Tile& tile) { return errors_of(&tile); }, folds);
 }
 
 std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const VectorXd& values,
@@ -264,8 +289,9 @@ std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subt
   const auto joints = static_cast<Index>(columns.tiles().robot().driven_count());
   VectorXd squares = VectorXd::Zero(joints), rows = squares;
   std::vector<std::pair<VectorXd, VectorXd>> lot(Tiles::kTogether);
+  const ErrorsOf errors_of(columns, subtracted, values);
   const auto work = [&](Tile& tile, std::size_t k) {
-    const MatrixXd errors = errors_of(columns, subtracted, values, &tile);
+    const MatrixXd errors = errors_of(&tile);
     const VectorXd time = tile.own_time();
     lot[k] = {VectorXd::Zero(joints), VectorXd::Zero(joints)};
     for (Index i = 0; i < tile.count; ++i) {

@@ -23,6 +23,8 @@ class DesignColumns {
 
   const Tiles& tiles() const { return tiles_; }
   const TorqueDesign& design() const { return design_; }
+  /// They are made once; else anew in every pass.
+  bool are_kept() const { return !kept_.empty(); }
   /// Some of the columns ask for the torque of a model.
   bool any_needs_torque() const { return needs_torque_; }
   /// Numbers of the design's columns that a joint's torque has, ascending.

@@ -3,7 +3,16 @@
 #include "dynamics/tile_file.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <stdexcept>
+#include <string>
+
+#if __has_include(<unistd.h>)
+#include <unistd.h>
+#define TRUING_POSIX 1
+#else
+#define TRUING_POSIX 0
+#endif
 
 namespace truing::dynamics {
 namespace {
@@ -25,9 +34,31 @@ void for_each_table(TileOrConst& tile, const Use& use) {
   whole(tile.moving);
 }
 
+/// Open, and without a name any more; null: not in this folder.
+std::FILE* temporary_file_in([[maybe_unused]] std::string folder) {
+#if TRUING_POSIX
+  folder += "/truing_XXXXXX";
+  const int opened = mkstemp(folder.data());
+  if (opened < 0) return nullptr;
+  unlink(folder.c_str());
+  return fdopen(opened, "w+b");
+#else
+  return nullptr;
+#endif
+}
+
+std::FILE* temporary_file() {
+  const char* const asked_for = std::getenv("TMPDIR");
+  if (asked_for != nullptr && *asked_for != '\0') {
+    if (std::FILE* const file = temporary_file_in(asked_for)) return file;
+  }
+  std::FILE* const file = temporary_file_in("/var/tmp");
+  return file != nullptr ? file : std::tmpfile();
+}
+
 }  // namespace
 
-TileFile::TileFile() : file_(std::tmpfile(), &std::fclose) {}
+TileFile::TileFile() : file_(temporary_file(), &std::fclose) {}
 
 bool TileFile::add(const Tile& tile) {
   const Motion& motion = tile.motion;

@@ -14,7 +14,9 @@
 
 namespace truing::dynamics {
 
-/// A temporary file, which goes with its last user; it needs some 45 bytes for a row at 500 Hz of six joints.
+/// A temporary file, which goes with its last user; it needs some 45 bytes for a row at 500 Hz of six joints. It stands
+/// in the folder that TMPDIR names, else in /var/tmp, which is on a disk where /tmp is memory, else where the system
+/// has temporary files.
 class TileFile {
  public:
   TileFile();

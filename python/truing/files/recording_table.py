@@ -56,7 +56,10 @@ _SETS = ("train", "test")
 _LARGEST_TIME = 1e11  # [s] seconds since any epoch are fewer
 _LARGEST_COVARIATE = 1e12
 MOST_IN_MEMORY = 25_000_000  # cells: larger Parquet files are read in pieces
-PIECE_ROWS = 65_536
+PIECE_ROWS = 65_536  # of a long file: its first ones, which are looked at before anything is fitted
+PASS_ROWS = (
+    16_384  # at a time in every pass over them: what Arrow, NumPy and the core copy of them stays small
+)
 
 
 @dataclass(frozen=True)
@@ -375,9 +378,9 @@ class _Pieces:
     columns: tuple[str, ...]
     test: bool
 
-    def __call__(self) -> Iterator[_core.Recording]:
+    def __call__(self, rows: int | None = None) -> Iterator[_core.Recording]:
         first: float | None = None
-        for part in self.table.parts(PIECE_ROWS, self.layout.numbers, _labels(self.layout)):
+        for part in self.table.parts(rows or PASS_ROWS, self.layout.numbers, _labels(self.layout)):
             reader = _Reader(part, self.layout)
             t = reader.stamps()
             first = float(t[0]) if first is None else first
@@ -398,10 +401,10 @@ def read_in_pieces(table: Table, layout: _Layout, name: str) -> _core.Recording:
     left out.
     """
     survey = _Survey()
-    for part in table.parts(PIECE_ROWS, layout.numbers, _labels(layout)):
+    for part in table.parts(PASS_ROWS, layout.numbers, _labels(layout)):
         survey.add(_Reader(part, layout))
     pieces = _Pieces(table, layout, name, tuple(sorted(survey.columns)), bool(survey.test))
-    return next(iter(pieces())).replace(pieces=pieces, end=survey.end)
+    return next(iter(pieces(PIECE_ROWS))).replace(pieces=pieces, end=survey.end)
 
 
 @dataclass

@@ -256,6 +256,8 @@ class Table:
                         yield part
         except (pa.ArrowException, OSError) as error:
             raise InputError(f"{self.path}: is a damaged Parquet file: {reason(error)[:200]}") from None
+        finally:
+            pa.default_memory_pool().release_unused()  # else it is kept for the next table
 
     def numbers(
         self,

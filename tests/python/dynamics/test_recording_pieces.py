@@ -31,6 +31,7 @@ def simulated() -> SimulatedMotion:
 def small_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recording_table, "MOST_IN_MEMORY", 1000)
     monkeypatch.setattr(recording_table, "PIECE_ROWS", ROWS)
+    monkeypatch.setattr(recording_table, "PASS_ROWS", ROWS)
 
 
 def columns_of(recording: Recording) -> dict[str, np.ndarray]:
