@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 """The torque regressor beside Pinocchio's from Python, on the same states: figures of both for bench/run.py.
+And a diagnosis of ten minutes at 500 Hz.
 
     python bench/dynamics.py build/release/bench/bench_dynamics
 
@@ -17,7 +18,11 @@ import time
 from pathlib import Path
 from typing import Any
 
+import dynamics_stream as stream
 import numpy as np
+
+import truing
+from truing.testing.dynamics import NOISE, simulate_motion
 
 # The arm of bench/dynamics.cpp: modified DH alpha, a, d.
 UR10 = [
@@ -71,6 +76,19 @@ def figures(program: Path) -> dict[str, Any]:
     return out
 
 
+def ten_minutes() -> tuple[float, float]:
+    """Seconds by the clock and of the processor that one recording of ten minutes takes, in memory."""
+    random = np.random.default_rng(1)
+    arm = simulate_motion(recordings=1, held_out=0)
+    ((q, torque),) = stream.motions(arm.truth, random, 1)
+    noisy = torque + stream.noise_of(*torque.shape, random) * NOISE * torque.std(axis=0)
+    t = np.arange(len(q)) * stream.STEP
+    recording = truing.dynamics.Recording("motion", time=t, position=q, torque=noisy)
+    clock, processor = time.perf_counter(), time.process_time()
+    truing.dynamics.diagnose(arm.nominal, [recording])
+    return time.perf_counter() - clock, time.process_time() - processor
+
+
 def main() -> None:
     found = figures(Path(sys.argv[1]))
     for name, value in found.items():
@@ -82,6 +100,8 @@ def main() -> None:
         print(f"with 70 effects, Grams   {with_effects:.1f} times, two threads")
     limit = float(found["grams_70_threads_1"]) / float(found["gram_only"])
     print(f"of the Gram alone        {100 * limit:.0f} %, one thread")
+    clock, processor = ten_minutes()
+    print(f"10 minutes at 500 Hz     {clock:.2f} s by the clock, {processor:.2f} s of processor, diagnosed")
 
 
 if __name__ == "__main__":
