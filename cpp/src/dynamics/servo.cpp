@@ -19,9 +19,9 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kFar = 1e3;        ///< [rad | m] a joint that is so far from its start has left
-constexpr std::size_t kAtOnce = 8;  ///< joints apart that go through a window side by side: they do not wait for
-                                    ///< each other's sums, and a processor works at several at once
+constexpr double kFar = 1e3;         ///< [rad | m] a joint that is so far from its start has left
+constexpr std::size_t kAtOnce = 16;  ///< joints apart that go through a window side by side: they do not wait for
+                                     ///< each other's sums, and a processor works at several at once
 
 /// Cosine and sine, near zero by their series, to 1e-14.
 void turn_of(double x, double* cosine, double* sine) {
@@ -37,6 +37,9 @@ void turn_of(double x, double* cosine, double* sine) {
                y4 * ((1.0 / 362880.0 - y * (1.0 / 39916800.0)) + y2 * (1.0 / 6227020800.0)));
 }
 
+/// Of a link's inertia with all other joints held: so little at least it has where they give way.
+constexpr double kMovesAlone = 0.3;
+
 /// A joint of a set that is simulated.
 struct Lane {
   ServoDrive drive;
@@ -48,20 +51,27 @@ struct Lane {
 class Simulator {
  public:
   Simulator(const ServoCalls& calls, const ServoWorkspace& w, const ServoArm& arm) : calls_(calls), w_(w), arm_(arm) {}
-  void add(const Lane& lane) { w_.armature[arm_.dof[static_cast<std::size_t>(lane.joint)]] = lane.drive.armature(); }
+  void add(const Lane& lane) {
+    w_.armature[arm_.dof[static_cast<std::size_t>(lane.joint)]] = lane.drive.most_armature();
+  }
   void begin(std::size_t k, double angle, double speed) {
     w_.qpos[arm_.qpos[k]] = angle;
     w_.qvel[dof(k)] = speed;
   }
-  void look(std::size_t k, Index /*row*/, double /*part*/, ServoMoment* now) const {
+  void come(Index /*row*/, double /*part*/) {}
+  void look(std::size_t k, ServoMoment* now) const {
     now->angle = angle(k);
     now->speed = w_.qvel[dof(k)];
     now->bias = w_.bias[dof(k)];
+    now->rubbed = w_.constraint[dof(k)];
+    now->inertia = kMovesAlone * w_.inertia_at_zero[dof(k)];
   }
-  void act(std::size_t k, const ServoActs& acts) {
+  void act(std::size_t k, ServoDrive* drive, const ServoMoment& now) {
+    const ServoActs acts = drive->act(now);
     w_.applied[dof(k)] = acts.applied;
     w_.damping[dof(k)] = acts.damping;
     w_.frictionloss[dof(k)] = acts.friction;
+    w_.armature[dof(k)] = acts.armature;
   }
   void step() { calls_.step(w_.model, w_.data); }
   double angle(std::size_t k) const { return w_.qpos[arm_.qpos[k]]; }
@@ -88,32 +98,53 @@ class Apart {
   void add(const Lane& lane) {
     const ServoPath& path = *paths_[lane.set];
     const auto column = [&](const Eigen::MatrixXd& table) { return table.col(lane.joint).data(); };
-    joints_.push_back({column(path.inertia), column(path.bias), column(path.cosine), column(path.sine),
-                       column(recording_.position), path.inertia.rows() - 1, path.turns[lane.joint], weights_[lane.set],
-                       lane.drive.armature()});
+    const double* inertia = column(path.inertia);
+    std::size_t track = 0;
+    while (track < tracks_.size() && tracks_[track].inertia != inertia) ++track;
+    if (track == tracks_.size())
+      tracks_.push_back({inertia,
+                         column(path.bias),
+                         column(path.cosine),
+                         column(path.sine),
+                         column(recording_.position),
+                         path.inertia.rows() - 1,
+                         path.turns[lane.joint],
+                         {}});
+    joints_.push_back({track, weights_[lane.set], lane.drive.armature()});
   }
   void begin(std::size_t k, double angle, double speed) {
     joints_[k].angle = angle;
     joints_[k].speed = speed;
   }
 
-  void look(std::size_t k, Index row, double part, ServoMoment* now) {
+  /// Where a step begins, `part` of the way from a row to the next.
+  void come(Index row, double part) {
+    for (Track& t : tracks_) {
+      const Index next = std::min(row + 1, t.last);
+      const auto between = [&](const double* of) { return of[row] + part * (of[next] - of[row]); };
+      t.now = {between(t.inertia), between(t.bias), between(t.cosine), between(t.sine), between(t.position)};
+    }
+  }
+  void look(std::size_t k, ServoMoment* now) {
     Joint& j = joints_[k];
-    const Index next = std::min(row + 1, j.last);
-    const auto between = [&](const double* of) { return of[row] + part * (of[next] - of[row]); };
-    const double cosine = between(j.cosine);
+    const Track& t = tracks_[j.track];
     double c = 1.0, s = 0.0;
-    turn_of(j.turns * (j.angle - between(j.position)), &c, &s);
+    turn_of(t.turns * (j.angle - t.now.position), &c, &s);
     now->angle = j.angle;
     now->speed = j.speed;
-    now->bias = j.weight * (cosine * c + between(j.sine) * s);
-    j.against = now->bias + between(j.bias) - cosine;
-    j.heavy = between(j.inertia) + j.armature;
+    now->bias = j.weight * (t.now.cosine * c + t.now.sine * s);
+    j.against = now->bias + t.now.bias - t.now.cosine;
+    j.heavy = t.now.inertia + j.armature;
   }
 
   /// (I + h d) v' + h F sgn v' = I v + h (applied - bias), by implicit Coulomb friction (Moreau 1988).
-  void act(std::size_t k, const ServoActs& acts) {
+  void act(std::size_t k, ServoDrive* drive, const ServoMoment& now) {
     Joint& j = joints_[k];
+    if (drive->has_rotor()) {
+      drive->turn(now, j.heavy, j.against, &j.angle, &j.speed);
+      return;
+    }
+    const ServoActs acts = drive->act(now);
     const double h = step_, light = 1.0 / (j.heavy + h * acts.damping);
     const double free = (j.heavy * j.speed + h * (acts.applied - j.against)) * light;
     j.speed = std::copysign(std::max(0.0, std::abs(free) - h * acts.friction * light), free);
@@ -123,10 +154,19 @@ class Apart {
   double angle(std::size_t k) const { return joints_[k].angle; }
 
  private:
-  struct Joint {
-    const double *inertia, *bias, *cosine, *sine, *position;  ///< along the recording
+  /// What a joint goes through, along a recording and now.
+  struct Felt {
+    double inertia = 0.0, bias = 0.0, cosine = 0.0, sine = 0.0, position = 0.0;
+  };
+  struct Track {
+    const double *inertia, *bias, *cosine, *sine, *position;
     Index last;
-    double turns, weight, armature;
+    double turns;
+    Felt now;
+  };
+  struct Joint {
+    std::size_t track;
+    double weight, armature;
     double angle = 0.0, speed = 0.0;
     double against = 0.0, heavy = 0.0;  ///< in this step
   };
@@ -134,6 +174,7 @@ class Apart {
   const ServoRecording& recording_;
   std::vector<const ServoPath*> paths_;
   std::vector<double> weights_;
+  std::vector<Track> tracks_;  ///< of sets of the same masses one a joint
   std::vector<Joint> joints_;
 };
 
@@ -159,7 +200,8 @@ class Run {
     const auto substeps = static_cast<int>(std::lround(r_.step / arm_.step));
     begin(window.first);
     for (Index k = 0; k < window.rows; ++k) {
-      for (int i = 0; i < substeps; ++i) step(window.first + k, static_cast<double>(i) / substeps);
+      for (Lane& lane : lanes_) lane.drive.enter(window.first + k);
+      for (int i = 0; i < substeps; ++i) step(window.first + k, i, static_cast<double>(i) / substeps);
       for (std::size_t l = 0; l < lanes_.size(); ++l) {
         const Lane& lane = lanes_[l];
         const std::size_t set = places[lane.set];
@@ -183,22 +225,24 @@ class Run {
   }
 
   /// One step of the simulator, `part` of the way from a row to the next.
-  void step(Index row, double part) {
+  void step(Index row, int number, double part) {
     if (sags_) {
       std::fill(torques_.begin(), torques_.end(), 0.0);
       for (const Lane& lane : lanes_) torques_[lane.set] += std::abs(lane.drive.torque());
     }
     ServoMoment now;
     now.row = row;
+    now.step = static_cast<std::size_t>(number);
     now.time = time_;
     bool moves = false;
+    moved_->come(row, part);
     for (std::size_t l = 0; l < lanes_.size(); ++l) {
       Lane& lane = lanes_[l];
       if (left_[lane.set]) continue;
       moves = true;
       now.all_torques = torques_[lane.set];
-      moved_->look(l, row, part, &now);
-      moved_->act(l, lane.drive.act(now));
+      moved_->look(l, &now);
+      moved_->act(l, &lane.drive, now);
     }
     if (moves) moved_->step();
     time_ += arm_.step;

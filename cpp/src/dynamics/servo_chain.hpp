@@ -10,6 +10,7 @@
 #include <cmath>
 #include <vector>
 
+#include "dynamics/servo_pair.hpp"
 #include "truing/dynamics/servo.hpp"
 
 namespace truing::dynamics {
@@ -17,15 +18,19 @@ namespace truing::dynamics {
 /// Where a joint stands when a step begins.
 struct ServoMoment {
   Eigen::Index row = 0;  ///< of the recording, at or before now
+  std::size_t step = 0;  ///< of the simulator, counted from the row
   double time = 0.0;     ///< [s] from the recording's first row
   double angle = 0.0, speed = 0.0;
   double bias = 0.0;         ///< [Nm] what weight (and motion) ask of the joint
+  double inertia = 0.0;      ///< [kg m^2 | kg] of the link, no more than it is, of the whole arm
+  double rubbed = 0.0;       ///< [Nm] what dry friction gave the joint in the step before, of the whole arm
   double all_torques = 0.0;  ///< [Nm] sum of the sizes of all drives' in the step before
 };
 
-/// What acts at a joint in a step: a torque, damping that goes with the speed, dry friction that holds.
+/// What acts at a joint in a step: a torque, damping that goes with the speed, dry friction that holds; and the inertia
+/// of the rotor that it carries.
 struct ServoActs {
-  double applied = 0.0, damping = 0.0, friction = 0.0;
+  double applied = 0.0, damping = 0.0, friction = 0.0, armature = 0.0;
 };
 
 /// The chain of one joint over one recording.
@@ -48,12 +53,19 @@ class ServoDrive {
     has_rotor_ = d(F::backlash) > 0.0 || d(F::elasticity) > 0.0;
     on_motor_ = has_rotor_ && d(F::motor_encoder) > 0.5;
     limited_ = std::isfinite(d(F::rate_limit));
-    if (has_rotor_) couple();
+    if (d(F::elasticity) > 0.0)
+      spring_rub_ = 2.0 * kSpringDamping * std::sqrt(d(F::armature) * (1.0 - kLinkArmature) / d(F::elasticity));
+    const auto steps = static_cast<std::size_t>(std::lround(recording.step / arm.step));
+    for (std::size_t k = 0; k < steps; ++k) late_.push_back(late(static_cast<double>(k) * step_ - d(F::delay)));
+    play_ = Play(0.5 * d(F::backlash));
   }
 
+  /// Inertia of the rotor that the joint carries at most.
+  double most_armature() const { return d(F::elasticity) > 0.0 ? armature() : d(F::armature); }
   /// Inertia of the rotor that the joint itself carries.
   double armature() const { return d(F::armature) * (has_rotor_ ? kLinkArmature : 1.0); }
   double zero() const { return d(F::zero); }
+  bool has_rotor() const { return has_rotor_; }
   bool sags() const { return d(F::supply_sag) != 0.0; }
   double torque() const { return torque_; }
   /// The angle as the recording has it.
@@ -61,34 +73,44 @@ class ServoDrive {
 
   void begin(Eigen::Index row, double angle, double speed) {
     rotor_ = angle;
-    rotor_speed_ = link_speed_ = speed;
-    wanted_ = held(static_cast<double>(row) * row_step_ - d(F::delay)).value;
+    rotor_speed_ = speed;
+    play_.begin();
+    side_ = 0.0;
+    pending_ = false;
+    wanted_ = held(row);
+    enter(row);
     remember(row);
+  }
+
+  /// From this row on until the next: what the recording says beside the command.
+  void enter(Eigen::Index row) {
+    on_ = enabled_(row) >= 0.5;
+    enabled_part_ = enabled_(row);
+    gain_factor_ = firmware(gain_(row));
+    supply_factor_ = 1.0 + d(F::supply_gain) * (supply_(row) - 1.0);
+    warmth_factor_ = 1.0 + d(F::thermal_friction) * warmth_(row);
+    viscous_ = viscous(on_);
   }
 
   /// What acts in the step that begins now.
   ServoActs act(const ServoMoment& now) {
-    const Held command = held(now.time - d(F::delay));
-    const double most = d(F::rate_limit) * step_;
-    wanted_ = limited_ ? wanted_ + std::clamp(command.value - wanted_, -most, most) : command.value;
-    integral_ += enabled_(now.row) * (wanted_ - d(F::zero) - encoder(now.angle)) * step_;
-    const bool on = enabled_(now.row) >= 0.5;
-    ServoActs acts{0.0, viscous(on), 0.0};
-    if (has_rotor_) {
-      turn_rotor(now, command, on, &acts);
+    const Held command = commanded(now);
+    ServoActs acts{0.0, viscous_, 0.0, armature()};
+    const bool bends = d(F::presliding) > 0.0;
+    if (has_rotor_ && d(F::elasticity) == 0.0) {
+      turn_with_stops(now, command, bends, &acts);
+    } else if (has_rotor_) {
+      turn_with_spring(now, command, bends, &acts);
     } else {
       torque_ = drive_torque(now, command, now.angle, now.speed);
       // Linearly implicit in the speed, or a small inertia would not bear the gain.
-      const double slope = speed_slope(now, command);
+      const double slope = speed_slope(now, command, now.angle, now.speed);
       acts.applied = torque_ + slope * now.speed;
       acts.damping += slope;
     }
-    acts.applied += functions_at(now) + d(F::current_offset) - d(F::spring) * now.angle;
-    acts.applied -= (d(F::gravity_scale) - 1.0) * now.bias;
-    acts.damping += std::max(0.0, d(F::viscous_law) * std::abs(now.speed));
-    acts.applied -= std::min(0.0, d(F::viscous_law)) * now.speed * std::abs(now.speed);
+    act_beside(now, &acts);
     const double level = friction_level(now, now.speed);
-    if (d(F::presliding) > 0.0) {
+    if (bends) {
       bend(level, now.speed, &acts);
     } else if (!has_rotor_) {
       acts.friction = level;
@@ -96,15 +118,34 @@ class ServoDrive {
     return acts;
   }
 
+  /// The step that begins now of a joint that has a rotor of its own and is looked at apart. inertia: of the link
+  /// [kg m^2 | kg]; against: what it asks for [Nm | N].
+  void turn(const ServoMoment& now, double inertia, double against, double* angle, double* speed) {
+    const Held command = commanded(now);
+    const bool bends = d(F::presliding) > 0.0;
+    PairedBody rotor = driven(now, command, bends);
+    ServoActs beside;
+    act_beside(now, &beside);
+    if (bends) bend(friction_level(now, now.speed), now.speed, &beside);
+    PairedBody link{inertia, now.angle, now.speed, beside.applied - against, beside.damping, 0.0};
+    if (d(F::elasticity) > 0.0) {
+      step_with_spring(step_, 0.5 * d(F::backlash), 1.0 / d(F::elasticity), spring_rub_, &rotor, &link);
+    } else {
+      play_.step(step_, &rotor, &link);
+    }
+    rotor_ = rotor.angle;
+    rotor_speed_ = rotor.speed;
+    *angle = link.angle;
+    *speed = link.speed;
+  }
+
  private:
   using F = ServoField;
   using Index = Eigen::Index;
 
   static constexpr double kTurning = 0.01;        ///< [rad/s | m/s] where friction that is computed here turns round
-  static constexpr double kContact = 0.05;        ///< of J / h^2: stiffness of a play's stops, else not known
-  static constexpr double kContactDamping = 0.7;  ///< of the critical: of stops and springs between rotor and link
+  static constexpr double kSpringDamping = 0.07;  ///< of the critical, with the link held: of a spring
   static constexpr double kLinkArmature = 0.02;   ///< of the rotor's inertia that stays at the link, behind a play
-  static constexpr int kRotorSteps = 4;           ///< of a rotor of its own in one of the simulator's
   static constexpr double kSlope = 1e-5;          ///< of an effort, or [Nm]: step of the derivative of the drive's law
   static constexpr double kStraight = 1e-3;  ///< of the reference: below it a root is a line, or its slope has no end
 
@@ -121,9 +162,18 @@ class ServoDrive {
   struct Held {
     double value = 0.0, slope = 0.0;
   };
+  /// Rows of the command that a step sees: one, so far after the row that it is in, and the part of the next one.
+  struct Late {
+    Index row = 0;
+    double later = 0.0;
+  };
 
   double d(F field) const { return d_[static_cast<std::size_t>(field)]; }
-  double encoder(double angle) const { return on_motor_ ? rotor_ : angle; }
+  double encoder(double angle) const {
+    if (!on_motor_) return angle;
+    if (pending_) return rotor_ + step_ * arrived_speed(angle);
+    return side_ != 0.0 ? angle + side_ * 0.5 * d(F::backlash) : rotor_;
+  }
 
   /// Whole number below, which a call of std::floor would take most of a step for.
   static Index floored(double x) {
@@ -135,31 +185,54 @@ class ServoDrive {
     return std::abs(error) <= band ? 0.0 : error - std::copysign(band, error);
   }
 
-  Held held(double begin) const {
-    const auto value = [&](Index row) { return command_(std::max<Index>(row, 0)); };
-    const auto slope = [&](Index row) { return (value(row) - value(row - 1)) * rate_; };
-    const bool sloped = d(F::damping_gain) != 0.0;
-    const double from = begin * rate_, to = (begin + step_) * rate_;
+  /// A step that begins so long after a row [s] (or before it): what it sees of the commands.
+  Late late(double after) const {
+    const double from = after * rate_, to = (after + step_) * rate_;
     const Index row = floored(from + 1e-9), last = floored(to - 1e-9);
-    if (last <= row) return {value(row), sloped ? slope(row) : 0.0};
-    const double later = (to - static_cast<double>(last)) / (to - from);  // part of the step after the change
-    return {(1.0 - later) * value(row) + later * value(row + 1),
-            sloped ? (1.0 - later) * slope(row) + later * slope(row + 1) : 0.0};
+    return {row, last <= row ? 0.0 : (to - static_cast<double>(last)) / (to - from)};
   }
+
+  Held held(Index row, const Late& at) const {
+    const auto value = [&](Index k) { return command_(std::max<Index>(k, 0)); };
+    const auto slope = [&](Index k) { return (value(k) - value(k - 1)) * rate_; };
+    const bool sloped = d(F::damping_gain) != 0.0;
+    const Index first = row + at.row;
+    if (at.later == 0.0) return {value(first), sloped ? slope(first) : 0.0};
+    const auto mean = [&](double now, double next) { return now + at.later * (next - now); };
+    return {mean(value(first), value(first + 1)), sloped ? mean(slope(first), slope(first + 1)) : 0.0};
+  }
+  double held(Index row) const { return held(row, late(-d(F::delay))).value; }
 
   /// What the rows before a window leave in the joint: integral, rate-limited command, bent bristle.
   void remember(Index row) {
     const bool bends = d(F::presliding) > 0.0, sums = d(F::integral_gain) > 0.0;
     if (!limited_ && !bends && !sums) return;
     const double most = d(F::rate_limit) * row_step_;
-    double command = held(-d(F::delay)).value;
+    double command = held(0);
     for (Index k = 0; k < row; ++k) {
-      const double wanted = held(static_cast<double>(k) * row_step_ - d(F::delay)).value;
+      const double wanted = held(k);
       command = limited_ ? command + std::clamp(wanted - command, -most, most) : wanted;
       integral_ += enabled_(k) * (command - position_(k)) * row_step_;
       bristle_ = std::clamp(bristle_ + position_(k + 1) - position_(k), -d(F::presliding), d(F::presliding));
     }
     if (limited_) wanted_ = command;
+  }
+
+  /// The command of this step, as its rate limit and integral take it.
+  Held commanded(const ServoMoment& now) {
+    const Held command = held(now.row, late_[now.step]);
+    const double most = d(F::rate_limit) * step_;
+    wanted_ = limited_ ? wanted_ + std::clamp(command.value - wanted_, -most, most) : command.value;
+    integral_ += enabled_part_ * (wanted_ - d(F::zero) - encoder(now.angle)) * step_;
+    return command;
+  }
+
+  /// What acts at the link besides drive and friction.
+  void act_beside(const ServoMoment& now, ServoActs* acts) const {
+    acts->applied += functions_at(now) + d(F::current_offset) - d(F::spring) * now.angle;
+    acts->applied -= (d(F::gravity_scale) - 1.0) * now.bias;
+    acts->damping += std::max(0.0, d(F::viscous_law) * std::abs(now.speed));
+    acts->applied -= std::min(0.0, d(F::viscous_law)) * now.speed * std::abs(now.speed);
   }
 
   // ---- the drive
@@ -168,9 +241,9 @@ class ServoDrive {
   double firmware(double gain) {
     if (gain != gain_seen_) {  // seldom: a power at each step would take longer than all else
       gain_seen_ = gain;
-      gain_factor_ = std::pow(gain, d(F::gain_law));
+      gain_power_ = std::pow(gain, d(F::gain_law));
     }
-    return gain_factor_;
+    return gain_power_;
   }
 
   /// Command effort -> torque, an exponent through a reference at which any exponent gives the same.
@@ -184,25 +257,25 @@ class ServoDrive {
 
   /// Torque of the drive for an angle and a speed; the state of its controller is that of this step.
   double drive_torque(const ServoMoment& now, const Held& command, double angle, double speed) {
-    if (enabled_(now.row) < 0.5) return 0.0;
+    if (!on_) return 0.0;
     double tau = 0.0;
     if (torque_command_) {
       tau = d(F::command_gain) * command.value;
     } else {
       const double error = without_band(wanted_ - d(F::zero) - angle, d(F::dead_band));
-      tau = firmware(gain_(now.row)) * (d(F::command_gain) * error + d(F::integral_gain) * integral_);
+      tau = gain_factor_ * (d(F::command_gain) * error + d(F::integral_gain) * integral_);
       tau += d(F::damping_gain) * (command.slope - speed);
     }
     tau = drive_law(tau);
-    tau *= 1.0 + d(F::supply_gain) * (supply_(now.row) - 1.0);
+    tau *= supply_factor_;
     tau *= std::max(0.0, 1.0 - d(F::supply_sag) * now.all_torques);
     return std::clamp(tau, -d(F::saturation), d(F::saturation));
   }
 
-  double speed_slope(const ServoMoment& now, const Held& command) {
+  double speed_slope(const ServoMoment& now, const Held& command, double angle, double speed) {
     if (d(F::damping_gain) == 0.0) return 0.0;
     const double more = kSlope / d(F::damping_gain);
-    return std::max(0.0, (torque_ - drive_torque(now, command, now.angle, now.speed + more)) / more);
+    return std::max(0.0, (torque_ - drive_torque(now, command, angle, speed + more)) / more);
   }
 
   // ---- friction
@@ -214,7 +287,7 @@ class ServoDrive {
     double level = d(F::coulomb) + d(F::load_friction) * std::abs(torque_);
     if (d(F::stribeck) != 0.0) level += d(F::stribeck) * std::exp(-square(speed / d(F::stribeck_speed)));
     if (d(F::asymmetric_friction) != 0.0) level += d(F::asymmetric_friction) * std::tanh(speed / kTurning);
-    return std::max(0.0, level * (1.0 + d(F::thermal_friction) * warmth_(now.row) + d(F::warmup) * now.time));
+    return std::max(0.0, level * (warmth_factor_ + d(F::warmup) * now.time));
   }
 
   /// A bristle that bends up to `presliding`, as stiff as its level asks; implicit in the speed.
@@ -229,45 +302,75 @@ class ServoDrive {
 
   // ---- play and elasticity
 
-  /// What stands between rotor and link: a play, and a spring (or stops).
-  void couple() {
-    const double inertia = d(F::armature) * (1.0 - kLinkArmature), h = step_ / kRotorSteps;
-    const double stiffest = kContact * inertia / (h * h);
-    stiffness_ = d(F::elasticity) > 0.0 ? std::min(1.0 / d(F::elasticity), stiffest) : stiffest;
-    rub_ = 2.0 * kContactDamping * std::sqrt(stiffness_ * inertia) * (d(F::elasticity) > 0.0 ? 0.1 : 1.0);
-    for (const bool on : {false, true}) {
-      per_inertia_[on] = h / (inertia + h * viscous(on));
-      per_inertia_touching_[on] = h / (inertia + h * (viscous(on) + rub_ + h * stiffness_));
+  /// A rotor behind a spring, through a step of the simulator (`step_with_spring`): what the rotor will do goes with
+  /// the link's speed at the end of the step, and is put into the joint's damping; the rotor follows when it is known.
+  void turn_with_spring(const ServoMoment& now, const Held& command, bool bends, ServoActs* acts) {
+    if (pending_) {
+      rotor_speed_ = arrived_speed(now.angle);
+      rotor_ += step_ * rotor_speed_;
     }
+    PairedBody rotor = driven(now, command, bends), link;
+    link.inertia = now.inertia;
+    link.angle = now.angle;
+    link.speed = now.speed;
+    const SpringStep spring(step_, 0.5 * d(F::backlash), 1.0 / d(F::elasticity), spring_rub_, rotor, link);
+    left_.coupled = spring.coupled;
+    left_.momentum = rotor.inertia * rotor.speed + step_ * rotor.applied - spring.pushed;
+    left_.light = 1.0 / (rotor.inertia + step_ * rotor.damping + spring.coupled);
+    left_.most = step_ * rotor.friction * left_.light;
+    link_angle_ = now.angle;
+    pending_ = true;
+    const double free = (left_.momentum + spring.coupled * now.speed) * left_.light;
+    const bool slips = std::abs(free) > left_.most;
+    const double rubbed = slips ? left_.momentum - std::copysign(step_ * rotor.friction, free) : 0.0;
+    acts->damping = spring.coupled * (1.0 - (slips ? spring.coupled * left_.light : 0.0)) / step_;
+    acts->applied = (spring.pushed + spring.coupled * left_.light * rubbed) / step_;
   }
 
-  /// Rotor and link are two bodies with a play and a spring between: the torque on the link.
-  void turn_rotor(const ServoMoment& now, const Held& command, bool on, ServoActs* acts) {
-    const double h = step_ / kRotorSteps, half = 0.5 * d(F::backlash);
-    double angle = now.angle, sum = 0.0, touching = 0.0;
-    // The link's step was implicit in its own speed: what it was pushed less by, the rotor was pushed back less.
-    rotor_speed_ += step_ * given_ * (now.speed - link_speed_) / (d(F::armature) * (1.0 - kLinkArmature));
-    for (int k = 0; k < kRotorSteps; ++k) {
-      const double twist = without_band(rotor_ - angle, half);
-      const bool touches = half == 0.0 || twist != 0.0;
-      const double passed = touches ? stiffness_ * twist + rub_ * (rotor_speed_ - now.speed) : 0.0;
-      torque_ = drive_torque(now, command, on_motor_ ? rotor_ : angle, on_motor_ ? rotor_speed_ : now.speed);
-      const double force = torque_ - passed - viscous(on) * rotor_speed_;
-      const double part = touches ? per_inertia_touching_[on] : per_inertia_[on];
-      const double free = rotor_speed_ + part * force;
-      const double level = d(F::presliding) > 0.0 ? 0.0 : friction_level(now, rotor_speed_);
-      const double before = rotor_speed_;
-      rotor_speed_ = std::copysign(std::max(0.0, std::abs(free) - part * level), free);
-      rotor_ += h * rotor_speed_;
-      angle += h * now.speed;
-      const double more = touches ? (rub_ + h * stiffness_) * (rotor_speed_ - before) : 0.0;  // implicit as well
-      sum += (passed + more) / kRotorSteps;
-      touching += (touches ? 1.0 : 0.0) / kRotorSteps;
+  /// Speed of the rotor at the end of the step that the joint has ended at this angle.
+  double arrived_speed(double angle) const {
+    const double speed = (angle - link_angle_) / step_;
+    return braked((left_.momentum + left_.coupled * speed) * left_.light, left_.most);
+  }
+
+  /// The rotor, and what acts on it in this step: linearly implicit in the speed that its controller sees.
+  PairedBody driven(const ServoMoment& now, const Held& command, bool bends) {
+    const double angle = on_motor_ ? rotor_ : now.angle, speed = on_motor_ ? rotor_speed_ : now.speed;
+    torque_ = drive_torque(now, command, angle, speed);
+    const double slope = on_motor_ ? speed_slope(now, command, angle, speed) : 0.0;
+    const double rotors = d(F::armature) * (1.0 - kLinkArmature);
+    PairedBody rotor{rotors, rotor_, rotor_speed_, torque_ + slope * rotor_speed_, viscous_ + slope, 0.0};
+    if (!bends) rotor.friction = friction_level(now, rotor_speed_);
+    return rotor;
+  }
+
+  /// The same with a play's hard stops: while rotor and link touch the joint carries the whole rotor and what acts on
+  /// it, and in the gap the rotor goes by itself, beside a joint that nothing drives.
+  void turn_with_stops(const ServoMoment& now, const Held& command, bool bends, ServoActs* acts) {
+    const double half = 0.5 * d(F::backlash), inertia = d(F::armature) * (1.0 - kLinkArmature);
+    const double twist = rotor_ - now.angle;
+    double meets = 0.0;  // momentum that the joint gets
+    if (side_ != 0.0) {  // unless the stop had to pull
+      const double kept = inertia * (now.speed - rotor_speed_) / step_;
+      const double given = pushed_ + now.rubbed - rubs_ * now.speed - kept;
+      rotor_ = now.angle + side_ * half;
+      rotor_speed_ = now.speed;
+      if (given * side_ < 0.0) side_ = 0.0;
+    } else if (std::abs(twist) > half) {
+      side_ = std::copysign(1.0, twist);
+      rotor_ = now.angle + side_ * half;
+      meets = inertia * (rotor_speed_ - now.speed);
     }
-    acts->damping = touching * (rub_ + step_ * stiffness_);  // the rotor has friction
-    acts->applied = sum + acts->damping * now.speed;
-    given_ = acts->damping;
-    link_speed_ = now.speed;
+    const PairedBody rotor = driven(now, command, bends);
+    if (side_ == 0.0) {
+      rotor_speed_ = speed_alone(rotor, step_);
+      rotor_ += step_ * rotor_speed_;
+      acts->damping = 0.0;
+      return;
+    }
+    pushed_ = rotor.applied;
+    rubs_ = rotor.damping;
+    *acts = {pushed_ + meets / step_, rubs_, rotor.friction, d(F::armature)};
   }
 
   // ---- functions that no effect explains
@@ -309,18 +412,28 @@ class ServoDrive {
   std::array<double, static_cast<std::size_t>(kServoFields)> d_;
   std::vector<const ServoFunction*> functions_;
   Input command_, position_, gain_, supply_, enabled_, warmth_;
+  std::vector<Late> late_;  ///< of the steps after a row
   double step_, row_step_, rate_;
   bool torque_command_ = false, has_rotor_ = false, on_motor_ = false, limited_ = false;
-  double stiffness_ = 0.0, rub_ = 0.0;
-  double per_inertia_[2] = {}, per_inertia_touching_[2] = {};  ///< of the rotor's step, switched off and on
+  double spring_rub_ = 0.0;
   // What the joint carries from step to step.
   double integral_ = 0.0;  ///< of the command error [rad s]
   double wanted_ = 0.0;    ///< command, as the rate limit lets it follow
   double bristle_ = 0.0;   ///< presliding travel [rad]
   double rotor_ = 0.0, rotor_speed_ = 0.0;
-  double given_ = 0.0, link_speed_ = 0.0;       ///< damping of the link by the rotor in the step before, and its speed
-  double torque_ = 0.0;                         ///< of the drive, in the step before
-  double gain_seen_ = 1.0, gain_factor_ = 1.0;  ///< of the firmware, last seen, and what it multiplies by
+  Play play_;                                      ///< between rotor and link, of a joint apart
+  double side_ = 0.0, pushed_ = 0.0, rubs_ = 0.0;  ///< of a play of the whole arm: as `Play`, and what acted on it
+  /// Of a spring's step that has begun: what decides the rotor's speed when the link's is known.
+  struct Begun {
+    double momentum = 0.0, coupled = 0.0, light = 0.0, most = 0.0;
+  } left_;
+  bool pending_ = false;
+  double link_angle_ = 0.0;
+  double torque_ = 0.0;                        ///< of the drive, in the step before
+  double gain_seen_ = 1.0, gain_power_ = 1.0;  ///< of the firmware, last seen, and what it multiplies by
+  // What holds until the next row.
+  bool on_ = true;
+  double enabled_part_ = 1.0, gain_factor_ = 1.0, supply_factor_ = 1.0, warmth_factor_ = 1.0, viscous_ = 0.0;
 };
 
 }  // namespace truing::dynamics

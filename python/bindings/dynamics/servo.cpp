@@ -33,6 +33,8 @@ ServoWorkspace workspace_of(const Addresses& a) {
                                                      {"qvel", &w.qvel},
                                                      {"qfrc_applied", &w.applied},
                                                      {"qfrc_bias", &w.bias},
+                                                     {"qfrc_constraint", &w.constraint},
+                                                     {"inertia_at_zero", &w.inertia_at_zero},
                                                      {"frictionloss", &w.frictionloss},
                                                      {"damping", &w.damping},
                                                      {"armature", &w.armature},

@@ -299,6 +299,49 @@ def test_rotor_and_link_with_next_to_nothing_between_move_as_one(file: Path, fie
     rigid = point_of(of.arm.nominal).with_value(0, "armature", 0.03)
     one, two = of.simulator.run([rigid, rigid.with_value(0, field, 1e-6)], of.windows)[0]
     assert np.sqrt(np.mean((one - two) ** 2)) < 0.03 * np.std(one)
+    one, two = Apart(of.simulator, LONGEST_STEP).run([rigid, rigid.with_value(0, field, 1e-6)], of.windows)[0]
+    assert np.sqrt(np.mean((one - two) ** 2)) < 0.03 * np.std(one)
+
+
+def rotors(file: Path, encoder: float, **value: float) -> tuple[Prepared, list[Point]]:
+    """A rigid arm, and one whose rotor is behind a play or a spring."""
+    of = prepared_of(file, [resting(0).replace(test=False)])
+    rigid = point_of(of.arm.nominal).with_value(0, "armature", 0.02)
+    (field, at), *_ = value.items()
+    return of, [rigid, rigid.with_value(0, field, at).with_value(0, "motor_encoder", encoder)]
+
+
+def what_it_does(motions: list[Floats]) -> Floats:
+    return np.asarray(motions[1] - motions[0])
+
+
+def in_short_steps(of: Prepared, points: list[Point]) -> Floats:
+    apart = Apart(of.simulator, LONGEST_STEP)
+    apart._core_arm = of.simulator.core_arm_with(STEP / 200.0)
+    return what_it_does(apart.run(points, of.windows)[0])
+
+
+@pytest.mark.parametrize("field, value", [("backlash", 0.03), ("elasticity", 0.05)])
+@pytest.mark.parametrize("encoder", [0.0, 1.0])
+def test_steps_of_a_joint_apart_are_short_enough_for_a_rotor(
+    file: Path, field: str, value: float, encoder: float
+) -> None:
+    of, points = rotors(file, encoder, **{field: value})
+    short = in_short_steps(of, points)
+    long = what_it_does(Apart(of.simulator, LONGEST_STEP).run(points, of.windows)[0])
+    assert np.std(short) > 2e-3
+    assert np.std(long - short) < 0.25 * np.std(short)
+
+
+@pytest.mark.parametrize("field, value", [("backlash", 0.03), ("elasticity", 0.05)])
+@pytest.mark.parametrize("encoder", [0.0, 1.0])
+def test_the_whole_arm_has_a_rotor_as_short_steps_have_it(
+    file: Path, field: str, value: float, encoder: float
+) -> None:
+    of, points = rotors(file, encoder, **{field: value})
+    short = in_short_steps(of, points)
+    whole = what_it_does(of.simulator.run(points, of.windows)[0])
+    assert np.std(whole - short) < 0.2 * np.std(short)
 
 
 def test_a_value_that_nothing_depends_on_does_not_overflow(file: Path) -> None:

@@ -67,7 +67,8 @@ struct ServoCalls {
 struct ServoWorkspace {
   void* model = nullptr;
   void* data = nullptr;
-  double *qpos = nullptr, *qvel = nullptr, *applied = nullptr, *bias = nullptr;                 // of the data
+  double *qpos = nullptr, *qvel = nullptr, *applied = nullptr, *bias = nullptr;  // of the data
+  double *constraint = nullptr, *inertia_at_zero = nullptr;  // of the data; of the model, each joint's own
   double *frictionloss = nullptr, *damping = nullptr, *armature = nullptr, *gravity = nullptr;  // of the model
   double *mass = nullptr, *ipos = nullptr, *iquat = nullptr, *inertia = nullptr;
 };

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.servo.data import ServoData, Stream, Window
-from truing.dynamics.servo.simulator import FIELDS, Point, Simulator
+from truing.dynamics.servo.simulator import Point, Simulator
 from truing.dynamics.smoothing import cubics, rows_within
 
 Floats = NDArray[np.float64]
@@ -23,8 +23,6 @@ Tables = tuple[Floats, Floats, Floats, Floats]
 
 _SMOOTHING = 0.03  # [s] on both sides, of accelerations: they are needed of the other joints alone
 _SLIDE = 2  # mjtJoint
-
-_BETWEEN = [FIELDS.index("backlash"), FIELDS.index("elasticity")]  # rotor and link
 
 
 class Apart:
@@ -41,8 +39,6 @@ class Apart:
         self._moved = _descendants(self.model, np.asarray(self.model.jnt_bodyid)[self._joints])
         self.longest, self.step = step, longer_step(self.data, step)
         self._core_arm = simulator.core_arm_with(self.step)
-        # Rotor and link that meet are quicker than a joint.
-        self._core_arm_of_two = simulator.core_arm_with(longer_step(self.data, 0.0))
         self._paths: dict[tuple[object, ...], list[_core.ServoPath]] = {}
         self._known: dict[tuple[str, int], Tables] = {}
         none = np.zeros((0, len(names)))
@@ -65,26 +61,6 @@ class Apart:
         """As `Simulator.run`. only: of each point the joint that is moved, where the others do not matter;
         -1: all."""
         moved = [-1] * len(points) if only is None else only
-        two = np.array([np.any(p.chain[:, _BETWEEN] > 0.0) for p in points], dtype=bool)
-        found: list[tuple[Floats, Floats]] = [(np.zeros(0), np.zeros(0))] * len(points)
-        for of_two, core_arm in ((False, self._core_arm), (True, self._core_arm_of_two)):
-            some = np.flatnonzero(two == of_two).tolist()
-            if some:
-                of = self._run(
-                    core_arm, [points[k] for k in some], windows, torques, [moved[k] for k in some]
-                )
-                for k, position, torque in zip(some, of[0], of[1] if torques else of[0], strict=True):
-                    found[k] = position, torque
-        return [position for position, _ in found], [torque for _, torque in found] if torques else []
-
-    def _run(
-        self,
-        core_arm: _core.ServoArm,
-        points: Sequence[Point],
-        windows: Sequence[Window],
-        torques: bool,
-        moved: Sequence[int],
-    ) -> tuple[list[Floats], list[Floats]]:
         kinds: dict[tuple[object, ...], int] = {}
         for p in points:
             kinds.setdefault(_masses(p), len(kinds))
@@ -97,7 +73,7 @@ class Apart:
         some = [_core.ServoWindow(w.stream, w.first, w.rows) for w in windows]
         whole = self.whole
         return _core.simulate_servos_apart(
-            core_arm, paths, whole.core_recordings, some, sets, whole.threads, torques
+            self._core_arm, paths, whole.core_recordings, some, sets, whole.threads, torques
         )
 
     # ---- what the joints feel

@@ -261,6 +261,8 @@ def _addresses(model: Any, data: Any) -> dict[str, int]:
         "qvel": data.qvel,
         "qfrc_applied": data.qfrc_applied,
         "qfrc_bias": data.qfrc_bias,
+        "qfrc_constraint": data.qfrc_constraint,
+        "inertia_at_zero": model.dof_M0,
         "frictionloss": model.dof_frictionloss,
         "damping": model.dof_damping,
         "armature": model.dof_armature,
