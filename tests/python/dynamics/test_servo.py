@@ -256,8 +256,26 @@ def test_a_chain_is_judged_once(file: Path) -> None:
     nominal = point_of(of.arm.nominal)
     judge = Judge(of, Apart(of.simulator), nominal, nominal.with_value(0, "coulomb", 0.1))
     first = judge.errors([nominal, judge.standard, nominal])
-    assert judge.whole.runs == 2 and first[0] is first[2]
-    assert np.array_equal(judge.errors([judge.standard])[0], first[1]) and judge.whole.runs == 2
+    once = of.simulator.simulated
+    assert once == 2 * len(judge.rows.windows) and np.array_equal(first[0], first[2])
+    assert np.array_equal(judge.errors([judge.standard])[0], first[1]) and of.simulator.simulated == once
+    function = (0, "speed", -1.0, 1.0, np.array([0.1, 0.0, -0.1]))
+    assert not np.array_equal(judge.errors([replace(nominal, functions=(function,))])[0], first[0])
+
+
+def test_motions_that_are_remembered_are_no_more_than_there_is_room_for(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    of = prepared_of(file, recordings_of(file))
+    rows = sum(w.rows for w in of.windows)
+    monkeypatch.setattr("truing.dynamics.servo.simulator._REMEMBERED", rows)
+    nominal = point_of(of.arm.nominal)
+    other = nominal.with_value(0, "coulomb", 0.1)
+    first = of.simulator.run([nominal], of.windows)[0][0]
+    of.simulator.run([other], of.windows)
+    begun = of.simulator.simulated
+    again = of.simulator.run([nominal], of.windows)[0][0]
+    assert np.array_equal(first, again) and of.simulator.simulated == begun + len(of.windows)
 
 
 def test_an_anchor_makes_errors_those_of_the_whole_arm(tmp_path: Path) -> None:

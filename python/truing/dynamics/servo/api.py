@@ -230,7 +230,7 @@ def _veto(
 
 
 class Judge:
-    """Chains on held-out windows (on all, where none is), simulated once each."""
+    """Chains on held-out windows (on all, where none is)."""
 
     def __init__(self, prepared: Prepared, apart: Apart, nominal: Point, standard: Point) -> None:
         windows = [w for w in prepared.windows if w.test] or prepared.train
@@ -238,14 +238,10 @@ class Judge:
         self.blocks = _blocks(prepared.data, self.rows)
         self.nominal, self.standard = nominal, standard
         self.whole, self._apart = Fitter(prepared.simulator, self.rows), Fitter(apart, self.rows)
-        self._known: dict[bytes, Floats] = {}
 
     def errors(self, points: Sequence[Point]) -> list[Floats]:
         """Of the whole arm."""
-        new = {_key(p): p for p in points if _key(p) not in self._known}
-        for key, motion in zip(new, self.whole.motions(list(new.values())), strict=True):
-            self._known[key] = self.whole.errors(motion)
-        return [self._known[_key(p)] for p in points]
+        return [self.whole.errors(motion) for motion in self.whole.motions(points)]
 
     def held(self, account: Account, usual: Sequence[str]) -> list[Floats]:
         """Errors of every chain that is compared: see `Parts.held`. usual: fields that are always fitted."""
@@ -278,12 +274,6 @@ class Judge:
 
     def _compared(self, account: Account) -> list[Point]:
         return [self.nominal, self.standard, account.fitted.point]
-
-
-def _key(point: Point) -> bytes:
-    rest = (point.weight, point.payload, point.place, point.links)
-    functions = b"".join(repr(f[:4]).encode() + f[4].tobytes() for f in point.functions)
-    return point.chain.tobytes() + repr(rest).encode() + functions
 
 
 def _blocks(data: ServoData, rows: Rows) -> NDArray[np.intp]:

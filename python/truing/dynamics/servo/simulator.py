@@ -9,6 +9,7 @@ import contextlib
 import copy
 import ctypes
 import os
+from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -28,6 +29,7 @@ from truing.files.mjcf_file import quiet
 Floats = NDArray[np.float64]
 FIELDS: tuple[str, ...] = tuple(_core.servo_fields())
 _STEPS_AT_ONCE = 1_500_000  # of the simulator in one call: Ctrl-C is heard between two
+_REMEMBERED = 4_000_000  # numbers, 32 MB: motions that are asked for again are not simulated again
 Function = tuple[int, str, float, float, Floats]
 """A torque added at a joint: its number, of which input, first place, width between places, values [Nm]."""
 
@@ -51,6 +53,12 @@ class Point:
 
     def value(self, joint: int, name: str) -> float:
         return float(self.chain[joint, FIELDS.index(name)])
+
+    def key(self) -> bytes:
+        """The same of points that move alike."""
+        rest = (self.weight, self.payload, self.place, self.links)
+        functions = b"".join(repr(f[:4]).encode() + f[4].tobytes() for f in self.functions)
+        return self.chain.tobytes() + repr(rest).encode() + functions
 
 
 def point_of(chain: ServoChain) -> Point:
@@ -95,6 +103,9 @@ class Simulator:
         self._datas = [mujoco.MjData(model) for model in self._models]
         self._spaces = [_addresses(m, d) for m, d in zip(self._models, self._datas, strict=True)]
         self._calls, self._library = _functions(mujoco)
+        self._known: dict[tuple[bytes, Window], Floats] = {}
+        self._numbers = 0  # of these
+        self.simulated = 0  # chains, times the windows of each
         joints = [self.model.joint(name) for name in arm.nominal.joints]
         self._places = [int(joint.qposadr[0]) for joint in joints], [int(joint.dofadr[0]) for joint in joints]
         self.core_arm = self.core_arm_with(data.step)
@@ -116,7 +127,40 @@ class Simulator:
         torques: bool = False,
         heard: Callable[[int, int], None] | None = None,
     ) -> tuple[list[Floats], list[Floats]]:
-        """Positions and torques of every point, shape=(rows of all windows, joints) each."""
+        """Positions and torques of every point, shape=(rows of all windows, joints) each. Positions of the
+        same chain in the same window are simulated once, while they are remembered."""
+        if torques:
+            return self._run(points, windows, torques, heard)
+        keys = [p.key() for p in points]
+        known = self._known
+        new = {k: p for k, p in zip(keys, points, strict=True) if any((k, w) not in known for w in windows)}
+        some = [w for w in dict.fromkeys(windows) if any((k, w) not in known for k in new)]
+        fresh: dict[tuple[bytes, Window], Floats] = {}
+        if new:
+            for key, motion in zip(new, self._run(list(new.values()), some, False, heard)[0], strict=True):
+                parts = np.split(motion, np.cumsum([w.rows for w in some])[:-1])
+                fresh |= {(key, w): part for w, part in zip(some, parts, strict=True)}
+        seen = ChainMap(fresh, known)
+        motions = [np.concatenate([seen[key, w] for w in windows]) for key in keys]
+        self._remember(fresh)
+        return motions, []
+
+    def _remember(self, fresh: Mapping[tuple[bytes, Window], Floats]) -> None:
+        """What was known longest goes first."""
+        for key, motion in fresh.items():
+            self._numbers += motion.size - (self._known[key].size if key in self._known else 0)
+            self._known[key] = motion
+        while self._numbers > _REMEMBERED:
+            self._numbers -= self._known.pop(next(iter(self._known))).size
+
+    def _run(
+        self,
+        points: Sequence[Point],
+        windows: Sequence[Window],
+        torques: bool,
+        heard: Callable[[int, int], None] | None,
+    ) -> tuple[list[Floats], list[Floats]]:
+        self.simulated += len(points) * len(windows)
         bodies, places = self._bodies(points)
         sets = [
             _core.ServoSet(p.chain, p.weight, place, list(p.functions))
