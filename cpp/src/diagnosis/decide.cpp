@@ -57,8 +57,7 @@ void append(Work* work, Explanation what, const Design::Rows& columns, double co
   design.candidates.named.push_back(std::move(what));
 }
 
-/// Of a free function and what it stands beside, the part that goes in as columns of the design.
-static void append_free(Work* work, const FreeGain& found, std::size_t trials) {
+void append_free(Work* work, const FreeGain& found, std::size_t trials) {
   const Design::Rows columns =
       free_columns(work->design, found.site_columns, work->inputs, found.what.inputs, found.what.knots);
   append(work, found.what, columns, std::log(static_cast<double>(trials)));
@@ -142,7 +141,7 @@ static std::vector<int> columns_of(const Work& work, const std::vector<int>& gro
   return out;
 }
 
-static Choice without_these(const Choice& choice, const std::vector<int>& gone) {
+Choice without_these(const Choice& choice, const std::vector<int>& gone) {
   Choice out;
   for (std::size_t k = 0; k < choice.groups.size(); ++k) {
     if (std::find(gone.begin(), gone.end(), choice.groups[k]) != gone.end()) continue;
@@ -152,8 +151,7 @@ static Choice without_these(const Choice& choice, const std::vector<int>& gone) 
   return out;
 }
 
-/// A free function of these inputs at a joint, with many knots, as one more candidate.
-static int add_fine_function(Work* work, const Robot& robot, std::size_t joint, const std::vector<int>& which) {
+int add_fine_function(Work* work, const Robot& robot, std::size_t joint, const std::vector<int>& which) {
   std::vector<std::int32_t> rows;
   for (std::size_t i = 0; i < work->design.row.size(); ++i) {
     if (work->design.fold[i] < work->design.folds && (i == 0 || work->design.row[i] != work->design.row[i - 1]))
@@ -229,8 +227,7 @@ struct Question {
   std::vector<int> here;  ///< the function, the chosen laws at its joint, and functions of the same inputs there
 };
 
-/// An effect whose law at the joint may be another one.
-static bool has_law_at(const Work& work, const Explanation& e, const std::string& joint) {
+bool has_law_at(const Work& work, const Explanation& e, const std::string& joint) {
   const EffectTraits& traits = effect_traits(work, e);
   return e.joints == std::vector<std::string>{joint} && traits.stands_for != StandsFor::link_geometry &&
          traits.search != Search::by_order;
@@ -634,6 +631,7 @@ static Decision explain(Work* work, const Robot& robot) {
     if (add_free_function(work, scan, &out)) continue;
     if (order_is_better || !gears.take(order, &out)) break;
   }
+  question_bundles(work, robot, &out);
   question_laws(work, robot, &out);
   prefer_links_that_predict(*work, &out);
   if (out.p_gap > options.false_alarm && work->given.beyond_repeats <= kLackOfFit) {

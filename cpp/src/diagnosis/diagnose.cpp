@@ -188,7 +188,7 @@ std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evide
       double probability = calibrated(sure.raw, selection_frequency(work, resampled, sure, g),
                                       shrink_of(unseen_errors(work, less), with));
       const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(g)];
-      if (sure.law_in_question || is_function_beside(work, *decision, name))
+      if (sure.law_in_question || decision->in_question.count(g) || is_function_beside(work, *decision, name))
         probability = std::min(probability, kLawInQuestion);
       // Resampled folds of few poses hardly find all links again, though each fold is predicted better with them.
       const bool holds = links_predict(work, decision->state.choice, at);

@@ -7,10 +7,12 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "diagnosis/design.hpp"
+#include "diagnosis/free_search.hpp"
 #include "diagnosis/linearise.hpp"
 #include "diagnosis/orders.hpp"
 #include "diagnosis/rows.hpp"
@@ -84,6 +86,7 @@ struct Decision {
   std::map<int, int> corrects;           ///< a law's correction, or what is one: the group whose law it corrects
   std::vector<TooLarge> too_large{};     ///< set aside: the rest was decided without them
   std::vector<FunctionBeside> beside{};  ///< the likeliest of those that were not taken
+  std::set<int> in_question{};           ///< groups of which several together may stand for one function
 };
 
 struct Refit {
@@ -170,10 +173,14 @@ inline bool is_named(const Explanation& e) {
 
 /// Traits of the effect that an explanation names.
 const EffectTraits& effect_traits(const Work& work, const Explanation& e);
+/// An effect whose law at the joint may be another one.
+bool has_law_at(const Work& work, const Explanation& e, const std::string& joint);
 /// Index of an input; -1: there is none of that name.
 int input_named(const Work& work, const std::string& name);
 /// A choice less one group, and less what corrects its law.
 Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std::size_t at);
+/// A choice less some groups.
+Choice without_these(const Choice& choice, const std::vector<int>& gone);
 
 /// The groups that may enter first, on a Gram of their columns only: corrections of laws and fine drifts are many
 /// columns.
@@ -191,6 +198,10 @@ Shortlist shortlist(const Work& work, const std::vector<int>& also);
 Evidence evidence_now(const Work& work);
 /// Adds columns of one more candidate to the design, and to nothing else.
 void append(Work* work, Explanation what, const Design::Rows& columns, double cost);
+/// The same of a free function, that was found among so many.
+void append_free(Work* work, const FreeGain& found, std::size_t trials);
+/// A free function of these inputs at a joint, with many knots, as one more candidate: its group.
+int add_fine_function(Work* work, const Robot& robot, std::size_t joint, const std::vector<int>& which);
 /// Groups that do not help, for sure, on poses they were not fitted to go, however well they fit.
 Evidence::State keep_what_predicts(const Work& work, Evidence::State state);
 
@@ -245,6 +256,12 @@ void set_aside(const std::vector<TooLarge>& too_large, std::size_t groups, const
 void say_what_is_negative(Diagnosis* out);
 /// What looks like an effect that no machine has: said of the unknown at its joint, or as one of its own.
 void describe_what_is_too_large(const Work& work, const Evidence& evidence, const Decision& decision, Diagnosis* out);
+
+// --- bundles.cpp: names that together stand for one function ---------------------------------------------------------
+
+/// Each bundle of them against one function in its place: taken, where it is better; else in question, where it is as
+/// good.
+void question_bundles(Work* work, const Robot& robot, Decision* decision);
 
 // --- local_shapes.cpp: steps, corners and bumps ----------------------------------------------------------------------
 

@@ -67,8 +67,9 @@ std::vector<std::int32_t> training_rows(const Design& design) {
 /// Every free function that is tried: so many knots along its inputs as the poses bear.
 class TrialMaker {
  public:
-  TrialMaker(const Design& design, const std::vector<InputColumn>& inputs, std::size_t clusters)
-      : design_(design), inputs_(inputs), rows_(training_rows(design)) {
+  TrialMaker(const Design& design, const std::vector<InputColumn>& inputs, std::size_t clusters,
+             const std::vector<int>& only_of)
+      : design_(design), inputs_(inputs), rows_(training_rows(design)), only_of_(only_of) {
     knots_of_one_ = clusters >= 150 ? 10 : clusters >= 60 ? 7 : 4;
     const int of_two = clusters >= 150 ? 5 : clusters >= 60 ? 4 : 3;
     for (const InputColumn& input : inputs) {
@@ -80,7 +81,7 @@ class TrialMaker {
   std::vector<Trial> run(const Robot& robot) {
     for (std::size_t joint = 0; joint < robot.joints.size(); ++joint) {
       add_one_input(robot.joints[joint].name, joint);
-      add_two_inputs(robot.joints[joint].name, joint);
+      if (only_of_.empty()) add_two_inputs(robot.joints[joint].name, joint);
     }
     if (!design_.base_columns.empty()) add_base();
     return std::move(out_);
@@ -89,10 +90,13 @@ class TrialMaker {
  private:
   const InputColumn& input(int k) const { return inputs_[static_cast<std::size_t>(k)]; }
   int count() const { return static_cast<int>(inputs_.size()); }
+  bool is_wanted(int k) const {
+    return only_of_.empty() || std::find(only_of_.begin(), only_of_.end(), k) != only_of_.end();
+  }
 
   void add_one_input(const std::string& site, std::size_t joint) {
     for (int a = 0; a < count(); ++a) {
-      if (!input(a).constant) add(site, design_.joint_column[joint], {a});
+      if (!input(a).constant && is_wanted(a)) add(site, design_.joint_column[joint], {a});
     }
   }
 
@@ -125,7 +129,7 @@ class TrialMaker {
   /// The base: functions of one input, that are not slow drifts.
   void add_base() {
     for (int a = 0; a < count(); ++a) {
-      if (input(a).constant || is_torque(input(a)) || is_time(input(a))) continue;
+      if (input(a).constant || is_torque(input(a)) || is_time(input(a)) || !is_wanted(a)) continue;
       fine_[static_cast<std::size_t>(a)] = knots_of(input(a), rows_, std::min(knots_of_one_, 5));
       add("base", design_.base_columns, {a});
     }
@@ -154,6 +158,7 @@ class TrialMaker {
   const Design& design_;
   const std::vector<InputColumn>& inputs_;
   const std::vector<std::int32_t> rows_;
+  const std::vector<int>& only_of_;
   int knots_of_one_;
   std::vector<std::vector<double>> fine_, coarse_;  // knots of functions of one input, and of two
   std::vector<Trial> out_;
@@ -283,7 +288,7 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
                    const FreeScanOptions& options) {
   const Left left = what_is_left(design, state, options.most_values);
   const std::vector<Trial> trials =
-      TrialMaker(design, inputs, distinct(clusters_of(design, left.at)).size()).run(robot);
+      TrialMaker(design, inputs, distinct(clusters_of(design, left.at)).size(), options.only_of).run(robot);
   const Eigen::Index p = left.columns.cols();
   const Design::Rows right = right_sides(design, left, options.flips, options.seed);
   const double times = 1.0 / (left.share * design_effect);

@@ -55,6 +55,7 @@ struct FreeScanOptions {
   int flips = 99;
   std::uint64_t seed = 0;
   std::size_t most_values = 20000;  ///< measured values looked at: of more, whole folds are left out
+  std::vector<int> only_of{};       ///< inputs: functions of one of them alone are tried; empty: everything is
 };
 
 /// Scores free functions on what `state` leaves of the training rows. `design_effect`: values that count as one.

@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Names that together stand for one function are held against it together.
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "support/arms.hpp"
+#include "support/sanitized.hpp"
+
+using namespace arms;
+using truing::diagnose;
+using truing::Diagnosis;
+
+namespace {
+
+constexpr double kTipNoise = 3e-5;  // [m] of one coordinate
+
+Robot arm_without_masses() {
+  Robot robot = ur10();
+  for (Joint& j : robot.joints) j.mass.reset();
+  robot.T_measurement_base = somewhere();
+  return robot;
+}
+
+/// Measured where joint `k` stands `beside` what was read; of row and reading.
+std::unique_ptr<Table> measured_beside(std::size_t rows, unsigned seed, std::size_t k,
+                                       const std::function<double(std::size_t, double)>& beside) {
+  const Robot robot = arm_without_masses();
+  auto table = random_joints(robot, rows, seed);
+  const Column read = table->data.joints[k];
+  std::vector<double> stands(rows);
+  for (std::size_t row = 0; row < rows; ++row) stands[row] = read[row] + beside(row, read[row]);
+  table->data.joints[k] = table->add(stands);
+  measure(table.get(), robot, What::position, kTipNoise, seed + 1);
+  table->data.joints[k] = read;
+  return table;
+}
+
+std::string what_was_said(const Diagnosis& d) {
+  std::string out;
+  for (const auto& e : d.effects)
+    out += e.effect + (e.joints.empty() ? "" : ":" + e.joints[0]) + " " + std::to_string(e.probability) + "; ";
+  for (const auto& u : d.unknown) out += "unknown " + u.joint + "; ";
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("a pack that tightens from an angle on is no wrong ratio beside a harmonic" * doctest::skip(kSanitized)) {
+  for (const unsigned seed : {10u, 20u, 30u}) {
+    const auto table = measured_beside(
+        200, seed, 2, [](std::size_t, double q) { return 1.6e-4 * std::pow(std::max(0.0, q + 0.2), 1.5); });
+    const Diagnosis d = diagnose(arm_without_masses(), table->data);
+    CAPTURE(seed);
+    INFO(what_was_said(d));
+    CHECK(d.effects.empty());
+    REQUIRE(d.unknown.size() == 1);
+    CHECK(d.unknown[0].joint == "J3");
+    CHECK(d.unknown[0].inputs == std::vector<std::string>{"q3"});
+  }
+}
+
+TEST_CASE("a first joint that goes with the square of a recorded temperature is no frame that drifts") {
+  constexpr std::size_t kRows = 300;
+  const auto warmer = [](std::size_t row) {
+    return 15.0 * std::sin(3.14 * static_cast<double>(row) / static_cast<double>(kRows));
+  };
+  const auto table = measured_beside(
+      kRows, 40, 0, [&](std::size_t row, double) { return 3e-5 * std::pow((warmer(row) - 9.5) / 4.6, 2.0); });
+  std::vector<double> time(kRows), temperature(kRows);
+  for (std::size_t row = 0; row < kRows; ++row) {
+    time[row] = 24.0 * static_cast<double>(row);
+    temperature[row] = 20.0 + warmer(row);
+  }
+  table->data.time = table->add(time);
+  table->data.temperature = table->add(temperature);
+  const Diagnosis d = diagnose(arm_without_masses(), table->data);
+  INFO(what_was_said(d));
+  CHECK(d.effects.empty());
+  REQUIRE(d.unknown.size() == 1);
+  CHECK(d.unknown[0].joint == "J1");
+  CHECK(d.unknown[0].inputs == std::vector<std::string>{"temp"});
+}
+
+TEST_CASE("two laws of one joint's angle that are both there keep their names") {
+  Robot truth = arm_without_masses();
+  truth.effects = {{"harmonic", {"J3"}, {{"harmonic.J3.cos1", 4e-4}, {"harmonic.J3.sin1", 2e-4}}},
+                   {"axis_wobble", {"J3"}, {{"axis_wobble.J3.cos_x", 4e-4}, {"axis_wobble.J3.sin_y", 4e-4}}}};
+  auto table = random_joints(truth, 200, 50);
+  measure(table.get(), truth, What::position, kTipNoise, 51);
+  const Diagnosis d = diagnose(arm_without_masses(), table->data);
+  INFO(what_was_said(d));
+  CHECK(d.unknown.empty());
+  for (const char* name : {"harmonic", "axis_wobble"}) {
+    CHECK(std::any_of(d.effects.begin(), d.effects.end(),
+                      [&](const auto& e) { return e.effect == name && e.joints == std::vector<std::string>{"J3"}; }));
+  }
+}
