@@ -20,6 +20,7 @@ constexpr int kNullDraws = 200;
 constexpr double kNoBetter = 1.004;   ///< a group must lower the cross-validated sum of squares by more than this
 constexpr double kManyValues = 10.0;  ///< for each parameter of the links: no longer few
 constexpr double kMuchBetter = 1.05;  ///< sums of squares that are worth another choice
+constexpr double kNoChance = 1.5;     ///< sums of squares that noise alone does not make so unequal
 constexpr double kChance = 0.05;      ///< of random signs, that a free function may have at most
 constexpr double kFreeShare = 0.04;   ///< of what is left, that a free function must explain
 constexpr double kWholly = 0.95;      ///< of a function, that a plain shape makes: then it is that shape
@@ -595,6 +596,22 @@ bool links_predict(const Work& work, const Choice& choice, std::size_t at) {
                          kMuchBetter);
 }
 
+/// Noise alone reaches as high a score as any candidate does: names go, unless a function that passed a test of its own
+/// is there. But of few poses that score is no powerful test: where unseen folds lose a third of their squares by the
+/// links, these stay.
+static void keep_what_is_no_chance(const Work& work, Decision* out) {
+  const auto& named = work.design.candidates.named;
+  Choice links;
+  for (std::size_t k = 0; k < out->state.choice.groups.size(); ++k) {
+    const int g = out->state.choice.groups[k];
+    const Explanation& e = named[static_cast<std::size_t>(g)];
+    if (!is_candidate(e)) return;
+    if (e.kind == Kind::all_geometry) links = {{g}, {out->state.choice.scales[k]}};
+  }
+  if (!predicts_better(squares_of_folds(work, links), squares_of_folds(work, {}), kNoChance)) links = {};
+  out->state = evidence_now(work).evaluate(links);
+}
+
 static std::vector<FunctionBeside> functions_beside(const FreeScan& scan) {
   std::vector<FunctionBeside> out;
   for (const FreeGain& found : scan.best) {
@@ -634,12 +651,7 @@ static Decision explain(Work* work, const Robot& robot) {
   question_bundles(work, robot, &out);
   question_laws(work, robot, &out);
   prefer_links_that_predict(*work, &out);
-  if (out.p_gap > options.false_alarm && work->given.beyond_repeats <= kLackOfFit) {
-    const bool only_named = std::all_of(out.state.choice.groups.begin(), out.state.choice.groups.end(), [&](int g) {
-      return is_candidate(work->design.candidates.named[static_cast<std::size_t>(g)]);
-    });
-    if (only_named && !out.state.choice.groups.empty()) out.state = evidence_now(*work).evaluate({});
-  }
+  if (out.p_gap > options.false_alarm && work->given.beyond_repeats <= kLackOfFit) keep_what_is_no_chance(*work, &out);
   return out;
 }
 

@@ -401,6 +401,18 @@ TEST_CASE("of few poses wrong links are believed before names that were chosen a
   }
 }
 
+TEST_CASE("links that predict the folds of few poses stay where noise alone reaches as high a score") {
+  const Robot truth = perturbed(light_arm(), 4e-5, 4e-5, 903);
+  const auto table = measured(truth, 20, 904);
+  const DiagnoseOptions options;
+  const Diagnosis d = diagnose(light_arm(), table->data, options);
+  INFO(d.sentence);
+  CHECK(d.p_gap > options.false_alarm);
+  REQUIRE(d.effects.size() == 1);
+  CHECK(d.effects[0].joints.size() == 6);
+  CHECK(fresh_error(d.robot, truth, 643) < 0.6 * fresh_error(d.robot_before, truth, 643));
+}
+
 TEST_CASE("diagnose finds a displacement by a column of one's own, unknown or with an own effect named") {
   std::vector<double> humidity(160);
   std::mt19937_64 random(510);
