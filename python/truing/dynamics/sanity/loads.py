@@ -120,12 +120,10 @@ def used(load: Load) -> RecordingFinding:
     x, y, z = (1e3 * v for v in load.place)
     words = (
         f"{_who(load)} {load.mass:.2f} kg (+- {load.sigma:.2g}) {_than(load)}, at {x:.0f} {y:.0f} {z:.0f} mm"
-        " in the tool's frame: taken into account (for predict:"
+        " in the tool's frame: taken into account"
     )
     if load.when is None:
-        words += f" --payload {load.mass:.2f}kg@{x:.0f},{y:.0f},{z:.0f}mm)"
-    else:
-        words += " columns payload_kg, payload_x_m, payload_y_m, payload_z_m)"
+        words += f" (for predict: --payload {load.mass:.2f}kg@{x:.0f},{y:.0f},{z:.0f}mm)"
     parameters = (
         FoundParameter("payload.m", load.mass, load.sigma, "kg"),
         *(FoundParameter(f"payload.{axis}", v, 0.0, "m") for axis, v in zip("xyz", load.place, strict=True)),
