@@ -16,7 +16,7 @@ double momentum_of(const PairedBody& rotor, const PairedBody& link) {
 }
 
 /// A motor that turns back and forth, a link that hangs: the link after two seconds, in so many steps.
-PairedBody swung(double half, double compliance, int steps) {
+PairedBody swings_to(double half, double compliance, int steps) {
   PairedBody rotor{0.02, 0.0, 0.0, 0.0, 0.05, 0.03}, link{0.03, 0.0, 0.0, 0.0, 0.0, 0.0};
   Play play(half);
   const double h = 2.0 / steps;
@@ -90,7 +90,7 @@ TEST_CASE("steps of 4 ms end where short ones end") {
   for (const double compliance : {0.0, 0.01, 1e-4})
     for (const double half : {0.0, 0.01}) {
       if (half == 0.0 && compliance == 0.0) continue;
-      const double fine = swung(half, compliance, 200000).angle;
-      CHECK(std::abs(swung(half, compliance, 500).angle - fine) < 0.01);
+      const double fine = swings_to(half, compliance, 200000).angle;
+      CHECK(std::abs(swings_to(half, compliance, 500).angle - fine) < 0.01);
     }
 }
