@@ -12,9 +12,11 @@
 #include "model/effects/traits.hpp"
 
 namespace truing::diagnosis {
-namespace {
 
 using Kind = Explanation::Kind;
+
+namespace {
+
 constexpr double kInQuestion = 3.0;       ///< nats by which the names are better, from which on they are in no question
 constexpr double kForFunctions = 4.0;     ///< nats beyond the threshold, that a free function must win
 constexpr double kPredictsAsWell = 1.06;  ///< times the sum of squares of unseen folds, that the function may leave
