@@ -208,5 +208,5 @@ TEST_CASE("a fit to recordings that are read is that to recordings in memory, on
   CHECK(errors(read_in_pieces(whole, 65536), 2) == found);
   REQUIRE(found.size() == expected.size());
   // Its columns are not kept, and sums are formed in another order; a sine hardly tells inertias apart.
-  for (std::size_t k = 0; k < found.size(); ++k) CHECK(std::abs(found[k] / expected[k] - 1.0) < 1e-6);
+  for (std::size_t k = 0; k < found.size(); ++k) CHECK(std::abs(found[k] / expected[k] - 1.0) < 1e-5);
 }
