@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing.dynamics.rollout.page import joint_menu, response_card, rollout_card
-from truing.dynamics.told import sentence_of
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, faded, labelled_bars, packed
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.scene import RobotPicture
@@ -325,8 +324,7 @@ def _headline(result: Mapping[str, Any], recordings: int) -> str:
     before, after = result["without_names_percent"], mean_percent(result, "named")
     loads = [effect for effect in beyond_standard(result) if is_load(effect)]
     if len(beyond_standard(result)) > len(loads) and result["verdict"] != "does_not_hold":
-        each = [(load["recordings"], load["parameters"][0]["value"], load["sentence"]) for load in loads]
-        carried = f"{escaped(sentence_of(each))}. " if loads else ""
+        carried = f"{escaped(result['load_sentence'])}. " if loads else ""
         text = (
             f'{carried}Torque error falls from <span class="before">{_percent(before)}</span> to'
             f' <span class="after">{_percent(after)}</span>: {escaped(causes_in_words(result))}'

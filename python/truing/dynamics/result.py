@@ -32,7 +32,7 @@ from truing.dynamics.sanity.findings import RecordingFinding
 from truing.dynamics.servo.export import ServoExported
 from truing.dynamics.servo.export.verified import servo_rollout_dict
 from truing.dynamics.simulate import Response
-from truing.dynamics.told import FoundLoad, told
+from truing.dynamics.told import FoundLoad, sentence_of, told
 from truing.files import load_units, looks_of, save_robot, write_table
 from truing.identification.result import parameter_dict
 from truing.report.json_text import to_json, without_nan
@@ -66,6 +66,7 @@ def diagnosis_dict(
         "robot": found.robot.name,
         "verdict": said.verdict,
         "sentence": ". ".join([said.sentence, *motion.get("verdict", ())]),
+        "load_sentence": sentence_of(said.loads),
         "effects": [*map(_load, said.loads), *map(_effect, found.effects)],
         "covariance": covariance_dict(parameters_of(found), found.covariance),
         "unknown": [_unknown(u) for u in found.unknown],

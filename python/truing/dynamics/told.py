@@ -74,8 +74,7 @@ def told(found: _core.TorqueDiagnosis, sanity: Iterable[RecordingFinding] = ()) 
     """found: of the recordings that the check gave back; sanity: its findings."""
     findings = list(sanity)
     loads = tuple(_load(one) for one in findings if one.finding in LOADS and one.applied)
-    of_loads = sentence_of([(one.recordings, one.parameters[0].value, one.sentence) for one in loads])
-    words = [of_loads] if of_loads else []
+    words = [sentence_of(loads)] if loads else []
     differs = next((one for one in findings if one.finding == "friction_differs"), None)
     if found.verdict == "none" and differs is not None:
         friction = (
@@ -92,12 +91,12 @@ def told(found: _core.TorqueDiagnosis, sanity: Iterable[RecordingFinding] = ()) 
     return Told(found, loads, (), verdict, ". ".join([*words, rest]))
 
 
-def sentence_of(loads: Sequence[tuple[Sequence[str], float, str]]) -> str:
-    """Loads that nobody told in one sentence: recordings, mass [kg] and own sentence of each. "": none."""
+def sentence_of(loads: Sequence[FoundLoad]) -> str:
+    """Loads that nobody told in one sentence. "": none."""
     if len(loads) < 2:
-        return "".join(sentence for _, _, sentence in loads)
-    names = list(dict.fromkeys(name for recordings, _, _ in loads for name in recordings))
-    masses = [f"{mass:.2f}" for _, mass, _ in loads]
+        return "".join(load.sentence for load in loads)
+    names = list(dict.fromkeys(name for load in loads for name in load.recordings))
+    masses = [f"{load.parameters[0].value:.2f}" for load in loads]
     carry = "carries" if len(names) == 1 else "carry"
     return f"{listed(names)} {carry} loads of {', '.join(masses[:-1])} and {masses[-1]} kg that nobody told"
 

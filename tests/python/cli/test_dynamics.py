@@ -274,6 +274,8 @@ def test_a_mistake_in_the_recordings_comes_first(
         "value",
         "unit",
         "applied",
+        "parameters",
+        "spans",
         "mistake",
     }
     page = visible((out / "report.html").read_text(encoding="utf-8"))

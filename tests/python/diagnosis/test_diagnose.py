@@ -398,7 +398,8 @@ def test_a_name_that_a_step_explains_as_well_is_not_certain(
     read = np.array(data.joints)
     read[:, joint] -= size * (read[:, joint] > place)
     found = truing.diagnose(nominal, data.replace(joints=read))
-    assert found.effects and all(effect.probability <= 0.9 for effect in found.effects)
+    assert found.effects or found.verdict == "unknown"
+    assert all(effect.probability <= 0.9 for effect in found.effects)
 
 
 def test_what_held_out_poses_contradict_ends_with_status_1(capsys: pytest.CaptureFixture[str]) -> None:

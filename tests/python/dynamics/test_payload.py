@@ -154,7 +154,8 @@ def test_a_load_that_some_recordings_carry_untold_is_found_and_taken_into_accoun
     assert found.verdict == "none"
     said = told(found, checked.findings)
     assert said.verdict == "effects" and said.sentence.endswith("No other gap beyond noise is left")
-    assert f"{recordings[3].name} carries a load of {lighter.value:.2f} kg that nobody told" in said.sentence
+    both = f"loads of {lighter.value:.2f} and {heavier.value:.2f} kg that nobody told"
+    assert both in said.sentence and recordings[3].name in said.sentence
     assert [(one.effect, one.joints) for one in said.effects if not one.standard] == [("payload", ())] * 2
     sizes = {p.name: p.value for p in said.loads[1].parameters}
     assert sizes == pytest.approx({"payload.m": heavier.value, **_named(hangs)})

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from truing.dynamics import Recording, check_recordings, diagnose, load_recordings, predict, with_payload
 from truing.dynamics.sanity import RecordingFinding, gravity
-from truing.dynamics.told import sentence_of
+from truing.dynamics.sanity.findings import FoundParameter
+from truing.dynamics.told import FoundLoad, sentence_of
 from truing.files import load_robot
 from truing.model import AppliedEffect, Robot
 from truing.testing.dynamics import NOISE, USUAL, coloured_noise, demo_arm, fourier_motion
@@ -193,7 +194,9 @@ def test_a_push_put_into_torques_of_a_real_arm_is_found() -> None:
 
 
 def test_several_loads_are_one_sentence() -> None:
-    one = (("a",), 0.5, "a carries a load of 0.50 kg at times that nobody told")
-    assert sentence_of([]) == "" and sentence_of([one]) == one[2]
-    said_of_all = sentence_of([one, (("a", "b"), 1.0, ""), (("b",), 2.0, "")])
+    def load(mass: float, *recordings: str) -> FoundLoad:
+        return FoundLoad(recordings, (FoundParameter("payload.m", mass, 0.01, "kg"),), f"a load of {mass} kg")
+
+    assert sentence_of([]) == "" and sentence_of([load(0.5, "a")]) == "a load of 0.5 kg"
+    said_of_all = sentence_of([load(0.5, "a"), load(1.0, "a", "b"), load(2.0, "b")])
     assert said_of_all == "a and b carry loads of 0.50, 1.00 and 2.00 kg that nobody told"
