@@ -74,7 +74,9 @@ class Switched:
         return float(np.mean(np.concatenate([there for _, there in self.states.values()])))
 
     def there(self, recording: str, time: Floats) -> Bools:
-        """Whether it is there at these times [s], shape=(n,): as at the nearest instant."""
+        """Whether it is there at these times [s], shape=(n,): as at the nearest instant; never in a recording
+        that was too short to be asked.
+        """
         if recording not in self.states:
             return np.zeros(len(time), dtype=np.bool_)
         instants, there = self.states[recording]
