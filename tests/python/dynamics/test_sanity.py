@@ -257,6 +257,47 @@ def test_torques_without_the_weight_are_a_mistake() -> None:
     assert finding.finding == "gravity_removed" and finding.mistake
 
 
+# ---- Angles that are counted otherwise -------------------------------------------------------------
+def counted_otherwise(motions: list[Recording], signs: Floats, quarters: Floats) -> list[Recording]:
+    """As a controller would write them whose zeros are so many quarter turns from the file's."""
+    fields: dict[str, Callable[[Recording], Any]] = {
+        "position": lambda one: one.position * signs + quarters * math.pi / 2.0
+    }
+    for name in ("speed", "torque", "current"):
+        if getattr(motions[0], name).shape[1]:
+            fields[name] = lambda one, name=name: getattr(one, name) * signs
+    return with_fields(motions, **fields)
+
+
+@pytest.mark.parametrize("quarters", [(0, 1, 0, 0, 0, 0), (0, -1, 2, 1, 0, 0)])
+def test_zeros_that_are_quarter_turns_off_are_a_mistake(quarters: tuple[int, ...]) -> None:
+    moved = counted_otherwise(MOTIONS, np.ones(6), np.array(quarters, dtype=float))
+    finding = next(one for one in check_recordings(ARM, moved).findings if one.mistake)
+    assert finding.finding == "angle_convention" and not finding.applied
+    names = [joint.name for joint in ARM.joints]
+    assert finding.joints == tuple(name for name, quarter in zip(names, quarters, strict=True) if quarter)
+    added = {1: "minus 90°", -1: "plus 90°", 2: "plus 180°"}
+    for name, quarter in zip(names, quarters, strict=True):
+        assert not quarter or f"{name} {added[quarter]}" in finding.evidence
+
+
+@pytest.mark.realdata
+@pytest.mark.parametrize("folder", ["dyn_ur10", "dyn_ur10e"])
+def test_real_arms_of_another_convention_are_recognised(folder: str) -> None:
+    if not os.environ.get("TRUING_REALDATA") or not (REAL / folder).exists():
+        pytest.skip(f"TRUING_REALDATA does not hold {folder}")
+    robot = truing.load_robot(REAL / folder / "robot.urdf", any_tool=True)
+    name = {"dyn_ur10": "run", "dyn_ur10e": "h12_20s"}[folder]
+    recordings = load_recordings(str(REAL / folder / f"{name}.csv"), robot)
+    signs, quarters = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0]), np.array([0.0, -1.0, 1.0, 0.0, 0.0, 0.0])
+    moved = counted_otherwise(recordings, signs, quarters)
+    finding = next(one for one in check_recordings(robot, moved).findings if one.mistake)
+    assert finding.finding == "angle_convention"
+    turned = "with the opposite sign (angle and torque)"
+    said = f"shoulder_lift_joint plus 90°, elbow_joint minus 90°, wrist_1_joint {turned}"
+    assert said in finding.evidence
+
+
 # ---- Low-passed torques ----------------------------------------------------------------------------
 def low_passed(table: Any, step: float, frequency: float) -> Any:
     """Without what is above, by the Fourier transform of the table beside its mirror image."""

@@ -12,14 +12,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.recorded import driven_joints
-from truing.dynamics.sanity import gravity
+from truing.dynamics.sanity import conventions, gravity
 from truing.dynamics.sanity.findings import RecordingFinding, listed
 from truing.dynamics.sanity.grids import Grid
 
@@ -28,6 +28,7 @@ Bools = NDArray[np.bool_]
 
 ROWS = 800  # that readings are compared on
 ROWS_OF_ONE = 300  # the same, of a single recording
+ROWS_OF_WAYS = 150  # that ways to count angles are searched on, hundreds of them
 FEWEST = 40  # rows in which a joint moves
 POOR = 0.3  # of the variance: a joint that leaves more is worth a look
 GAIN = 0.4  # of a joint's variance: from here on another reading is far better
@@ -36,7 +37,10 @@ FITS = 0.25  # of the variance: more must not be left of a joint that is read wi
 SEEN, SEVERAL = 0.02, 2  # of the variance that a joint left; joints that leave half of it or less
 AS_GOOD = 0.9  # of the gain of another gravity: a force at the tool with more may be all there is
 FAIR = 0.08  # of the variance: where a joint leaves more, other orders are looked at
-OF_ALL = ("torque_order", "joint_order", "gravity_removed")  # joints together
+HEAVY = 0.5  # of the variance by rigid torque: there angles are seen in it
+OF_ALL = ("torque_order", "joint_order", "angle_convention", "gravity_removed")  # joints together
+# A base upside down is what half a turn of the joint after a vertical one is, and the likelier of the two.
+PLAINER = {"angle_convention": "gravity_direction"}
 GAIN_OF_ALL, PART_OF_ALL = 0.08, 1.0 / 3.0  # gain and part, of all joints together
 AS_LITTLE = 2.0  # times what the best reading leaves of a joint: another that leaves more is not as good
 NOT_AT_ALL, WELL = 0.8, 0.2  # of the variance: a sign is certain where it takes one to the other
@@ -66,6 +70,7 @@ class Reading:
     position: tuple[float, ...]
     torque: tuple[float, ...]
     gravity: tuple[float, ...]  # [m/s^2] in the base frame
+    zero: tuple[float, ...]  # [rad | m] that each joint's angle is more in the robot's file
 
 
 @dataclass(frozen=True)
@@ -115,7 +120,7 @@ class _Model:
 
     def __init__(self, robot: _core.Robot, rows: Rows) -> None:
         self.robot, self.rows = robot, rows
-        self.rigid: dict[tuple[object, object], list[Floats]] = {}
+        self.rigid: dict[tuple[object, ...], list[Floats]] = {}
         self.parts: dict[tuple[object, ...], tuple[float, ...]] = {}
 
     def fit(self, reading: Reading) -> Fit:
@@ -125,10 +130,11 @@ class _Model:
     def _fit_of(self, reading: Reading, j: int) -> tuple[float, ...]:
         """Of one joint; computed once for each torque and each way to read the angles."""
         column = reading.torque_order[j]
-        key = (reading.order, reading.position, j, column, reading.torque[column], reading.gravity)
+        torque = reading.torque[column]
+        key = (reading.order, reading.position, reading.zero, j, column, torque, reading.gravity)
         if key not in self.parts:
-            columns, torque, _ = self._rows_of(reading, j)
-            self.parts[key] = _fit_joint(columns, torque)
+            columns, measured, _ = self._rows_of(reading, j)
+            self.parts[key] = _fit_joint(columns, measured)
         return self.parts[key]
 
     def _rows_of(self, reading: Reading, j: int) -> tuple[Floats, Floats, Bools]:
@@ -146,9 +152,9 @@ class _Model:
 
     def _rigid_of(self, reading: Reading) -> Floats:
         """Rigid torques are linear in gravity: those without it, and by each axis of it."""
-        key = (reading.order, reading.position)
+        key = (reading.order, reading.position, reading.zero)
         if key not in self.rigid:
-            motion = [self._read(x, reading) for x in (self.rows.q, self.rows.qd, self.rows.qdd)]
+            motion = self._angles(reading), *(self._read(x, reading) for x in (self.rows.qd, self.rows.qdd))
             weightless = gravity.under(self.robot, np.zeros(3))
             self.rigid[key] = [
                 np.asarray(_core.rigid_torques(weightless, *motion)),
@@ -160,9 +166,12 @@ class _Model:
     def _read(self, columns: Floats, reading: Reading) -> Floats:
         return np.asarray((columns * np.array(reading.position))[:, list(reading.order)])
 
+    def _angles(self, reading: Reading) -> Floats:
+        return np.asarray(self._read(self.rows.q, reading) + np.array(reading.zero))
+
     def left_with_force(self, reading: Reading) -> float:
         """What is left, over all joints, with the constant force at the tool that fits best."""
-        pulls = gravity.held_against(self.robot, self._read(self.rows.q, reading))
+        pulls = gravity.held_against(self.robot, self._angles(reading))
         sides, torques = [], []
         for j in range(len(reading.order)):
             left, scale, *_ = self._fit_of(reading, j)
@@ -230,7 +239,8 @@ def _fit_joint(columns: Floats, torque: Floats) -> tuple[float, ...]:
 def as_written(robot: _core.Robot) -> Reading:
     joints = len(robot.driven_joints())
     identity, ones = tuple(range(joints)), (1.0,) * joints
-    return Reading(identity, identity, ones, ones, tuple(float(one) for one in robot.gravity))
+    zero = (0.0,) * joints
+    return Reading(identity, identity, ones, ones, tuple(float(one) for one in robot.gravity), zero)
 
 
 def _candidates(reading: Reading, revolute: Sequence[bool], poor: Sequence[int]) -> Iterator[_Candidate]:
@@ -308,6 +318,29 @@ def _orders(model: _Model, reading: Reading, names: Sequence[str]) -> Iterator[_
             yield _Candidate(kind, changed, read(order))
 
 
+def _counted_otherwise(model: _Model, reading: Reading, revolute: Sequence[bool]) -> Iterator[_Candidate]:
+    """Angles from other zeros, and some of them the other way."""
+    rows = model.rows
+    every = max(1, len(rows.q) // ROWS_OF_WAYS)
+    few = _Model(model.robot, Rows(*(getattr(rows, field.name)[::every] for field in fields(rows))))
+
+    def read(ways: tuple[conventions.Way, ...]) -> Reading:
+        position, torque, zero = list(reading.position), list(reading.torque), list(reading.zero)
+        for j, (sign, quarter) in enumerate(ways):
+            position[reading.order[j]] *= sign
+            torque[reading.torque_order[j]] *= sign
+            zero[j] += conventions.angle(quarter)
+        return replace(reading, position=tuple(position), torque=tuple(torque), zero=tuple(zero))
+
+    def left(ways: tuple[conventions.Way, ...]) -> float:
+        return float(np.nan_to_num(few.fit(read(ways)).left, nan=1.0).sum())
+
+    ways = conventions.best_ways(left, revolute, GAIN_OF_ALL / len(revolute))
+    changed = tuple(j for j, way in enumerate(ways) if way != conventions.AS_IT_IS)
+    if len(changed) > 1 or any(quarter for _, quarter in ways):
+        yield _Candidate("angle_convention", changed, read(ways))
+
+
 def better_reading(
     robot: _core.Robot, rows: Rows, reading: Reading | None = None
 ) -> tuple[list[_Found], Reading, Fit]:
@@ -329,6 +362,8 @@ def better_reading(
             candidates += _downs(model, reading)
         if np.any(fit.left > few):
             candidates += _orders(model, reading, names)
+        if poor or np.any((fit.left > few) & (fit.by_rigid > HEAVY)):
+            candidates += _counted_otherwise(model, reading, revolute)
         tried = [
             (gain, candidate, other)
             for candidate in candidates
@@ -338,17 +373,26 @@ def better_reading(
         ]
         if not tried:
             break
-        best = max(tried, key=lambda one: one[0])
-        _, candidate, other = best
-        rivals = [
-            one for one in tried if one is not best and _alike(one[1], candidate) and _as_good(one[2], other)
-        ]
-        found.append(_what_was_found(candidate, fit, other, rivals[0][1].finding if rivals else ""))
+        candidate, other, rival = _chosen(tried)
+        found.append(_what_was_found(candidate, fit, other, rival))
         reading, fit = candidate.reading, other
     plain = as_written(robot)
     in_order = (reading.order, reading.torque_order) == (plain.order, plain.torque_order)
     found = [replace(one, certain=one.certain and in_order) for one in found]  # else: of which column?
     return found, reading, fit
+
+
+def _chosen(tried: Sequence[tuple[float, _Candidate, Fit]]) -> tuple[_Candidate, Fit, str]:
+    """The reading that gains most, or a plainer one that is as good; and another that is, if any."""
+    _, best, fit = max(tried, key=lambda one: one[0])
+    as_good = [
+        (one, own) for _, one, own in tried if one is not best and _alike(one, best) and _as_good(own, fit)
+    ]
+    for one, own in as_good:
+        if one.finding == PLAINER.get(best.finding):
+            return one, own, ""
+    rivals = [one.finding for one, _ in as_good if PLAINER.get(one.finding) != best.finding]
+    return best, fit, rivals[0] if rivals else ""
 
 
 def _gain(fit: Fit, other: Fit, candidate: _Candidate) -> float:
@@ -407,6 +451,7 @@ _READINGS = {
     "joint_order": "the joints are in another order: {1}",
     "angles_in_deg": "the angles are in deg, not in rad",
     "angles_in_rad": "the angles are in rad, not in deg",
+    "angle_convention": "angles are not counted as the robot's file counts them, which would be {3}",
     "gravity_direction": "gravity points along {2} of the base, not as the robot's file has it",
     "gravity_removed": "the torques do not hold the weight of the links, as if a controller had taken it off",
 }
@@ -486,7 +531,9 @@ def _finding(
     order = reading.order if first.finding == "joint_order" else reading.torque_order
     down = gravity.in_words(np.array(reading.gravity))
     ordered = ", ".join(names[k] for k in _inverse(order))
-    said = _READINGS[first.finding].format(listed(joints), ordered, down)
+    signs = [reading.position[k] for k in reading.order]
+    counted = conventions.in_words(names, signs, reading.zero)
+    said = _READINGS[first.finding].format(listed(joints), ordered, down, counted)
     before, after = (max(getattr(one, key) for one, _, _ in group) for key in ("before", "after"))
     words = "" if len(where) == recordings else f"{listed(where)}: "
     words += (
@@ -494,7 +541,9 @@ def _finding(
         f" {100 * before:.0f} %"
     )
     if first.rival:
-        words += f"; as well if {_READINGS[first.rival].format(listed(joints), '(exchanged)', 'another way')}"
+        words += (
+            f"; as well if {_READINGS[first.rival].format(listed(joints), '(exchanged)', 'another way', '')}"
+        )
     words += "; corrected" if first.certain else f". {_advice(first.finding, names, order)}"
     kind = _KINDS.get(first.finding, first.finding)
     where = () if len(where) == recordings else where
@@ -515,6 +564,8 @@ def _advice(finding: str, names: Sequence[str], order: Sequence[int]) -> str:
         return "Correct the unit in the names of the columns, and run again"
     if finding == "gravity_direction":
         return "Write it as `gravity` into robot.yaml, or turn the base of the URDF, and run again"
+    if finding == "angle_convention":
+        return "Correct the columns (or zeros and axes in the model), and run again"
     if finding == "gravity_removed":
         return "Record the whole torque of the drives, and run again"
     return "Correct the columns (or the axis in the model), and run again"
