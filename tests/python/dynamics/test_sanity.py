@@ -722,3 +722,37 @@ def test_one_recording_is_said_to_be_alone() -> None:
 def test_recordings_of_another_robot_are_refused() -> None:
     with pytest.raises(InputError, match="position has shape"):
         check_recordings(ARM.replace(joints=list(ARM.joints)[:3]), MOTIONS)
+
+
+SCARA = """<robot name="scara"><link name="base"/>{links}{joints}</robot>"""
+LINK = """<link name="l{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
+<inertia ixx="{3}" iyy="{3}" izz="{3}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+JOINT = """<joint name="{1}" type="{2}"><parent link="{3}"/><child link="l{0}"/><origin xyz="{4} 0 0"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="100" velocity="5"/></joint>"""
+
+
+def test_a_joint_that_turns_is_never_taken_for_one_that_slides(tmp_path: Path) -> None:
+    """Of the light last joints of a SCARA the columns would fit one another's torques."""
+    links = [(1, 0.2, 8.0, 0.15), (2, 0.18, 6.0, 0.1), (3, 0.0, 1.5, 0.01), (4, 0.01, 0.5, 0.0005)]
+    joints = [
+        (1, "z1", "revolute", "base", 0.0),
+        (2, "z2", "revolute", "l1", 0.4),
+        (3, "z4", "prismatic", "l2", 0.35),
+        (4, "z3", "revolute", "l3", 0.0),
+    ]
+    parts = {"links": "".join(LINK.format(*one) for one in links)}
+    parts["joints"] = "".join(JOINT.format(*one) for one in joints)
+    (tmp_path / "scara.urdf").write_text(SCARA.format(**parts))
+    robot = truing.load_robot(tmp_path / "scara.urdf")
+    random, made = np.random.default_rng(12), []
+    for k in range(3):
+        t = np.arange(0.0, 14.0, STEP)
+        waves = [np.sin(2.0 * math.pi * f * t[:, None] + random.uniform(0, 6, 4)) for f in (0.2, 0.5, 0.9)]
+        q = np.sum(waves, axis=0) * [0.4, 0.5, 0.05, 0.6]
+        qd = np.gradient(q, t, axis=0)
+        friction = np.tanh(qd / 0.01) * [6.0, 4.0, 9.0, 0.2] + qd * [2.0, 2.0, 9.0, 0.05]
+        motors = np.gradient(qd, t, axis=0) * [0.0, 0.0, 0.5, 0.04]
+        rigid = np.asarray(_core.rigid_torques(robot, q, qd, np.gradient(qd, t, axis=0)))
+        noise = random.normal(size=q.shape) * [0.5, 0.3, 0.5, 0.02]
+        made.append(Recording(f"r{k}", time=t, position=q, torque=rigid + friction + motors + noise))
+    assert not {"joint_order", "torque_order"} & set(kinds(check_recordings(robot, made)))

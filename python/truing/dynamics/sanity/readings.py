@@ -288,11 +288,18 @@ def _swapped(order: tuple[int, ...], i: int, j: int) -> tuple[int, ...]:
     return tuple(out)
 
 
-def _orders(model: _Model, reading: Reading, names: Sequence[str]) -> Iterator[_Candidate]:
+def _orders(
+    model: _Model, reading: Reading, names: Sequence[str], revolute: Sequence[bool]
+) -> Iterator[_Candidate]:
     """The best order of the torques, and that of all columns of the joints: from the plainest start (as they
-    are, backwards, by the alphabet) by exchanges of two, as long as one helps.
+    are, backwards, by the alphabet) by exchanges of two, as long as one helps. Columns say by their units
+    whether a joint turns or slides.
     """
     n = len(names)
+
+    def fits(order: Sequence[int]) -> bool:
+        return all(revolute[j] == revolute[k] for j, k in enumerate(order))
+
     alphabet = tuple(int(k) for k in np.argsort(np.argsort(names)))
     for kind in ("torque_order", "joint_order"):
         both = kind == "joint_order"
@@ -305,11 +312,12 @@ def _orders(model: _Model, reading: Reading, names: Sequence[str]) -> Iterator[_
         def left(order: tuple[int, ...], read: Callable[[tuple[int, ...]], Reading] = read) -> float:
             return float(np.nan_to_num(model.fit(read(order)).left, nan=1.0).sum())
 
-        start = min((tuple(range(n)), tuple(range(n))[::-1], alphabet), key=left)
+        start = min(filter(fits, (tuple(range(n)), tuple(range(n))[::-1], alphabet)), key=left)
         best, order = left(start), start
         while True:
-            tried = {_swapped(order, i, j) for i, j in itertools.combinations(range(n), 2)}
-            other = min(sorted(tried), key=left)
+            pairs = itertools.combinations(range(n), 2)
+            tried = {_swapped(order, i, j) for i, j in pairs if revolute[i] == revolute[j]}
+            other = min(sorted(tried), key=left, default=order)
             if left(other) > best - GAIN_OF_ALL / n:
                 break
             best, order = left(other), other
@@ -361,7 +369,7 @@ def better_reading(
         if np.any(fit.left > seen):
             candidates += _downs(model, reading)
         if np.any(fit.left > few):
-            candidates += _orders(model, reading, names)
+            candidates += _orders(model, reading, names, revolute)
         if poor or np.any((fit.left > few) & (fit.by_rigid > HEAVY)):
             candidates += _counted_otherwise(model, reading, revolute)
         tried = [
