@@ -73,16 +73,18 @@ def ur10e(folder: Path, held_out: Sequence[str]) -> Arm:
     robot = robot_of(folder, UR10E_GAINS)
     files = [file for file in sorted(folder.glob("*.csv")) if not file.stem.endswith("_load")]
     recordings = [r for r in load_recordings(files, robot) if not r.test or r.name in held_out]
-    return Arm(f"UR10e, {' + '.join(held_out)}", folder / "robot.urdf", robot, recordings)
+    checked = check_recordings(robot, recordings)
+    return Arm(
+        f"UR10e, {' + '.join(held_out)}", folder / "robot.urdf", checked.robot, list(checked.recordings)
+    )
 
 
 def one_recording(name: str, folder: Path, cutoff: float | None = None) -> Arm:
     """cutoff: [Hz]; None: as the recording shows it."""
     robot = robot_of(folder)
-    recordings = list(load_recordings([folder / "run.csv"], robot))
-    if cutoff is None:
-        cutoff = check_recordings(robot, recordings).cutoff
-    return Arm(name, folder / "robot.urdf", robot, recordings, cutoff)
+    checked = check_recordings(robot, load_recordings([folder / "run.csv"], robot))
+    cutoff = cutoff or checked.cutoff
+    return Arm(name, folder / "robot.urdf", checked.robot, list(checked.recordings), cutoff)
 
 
 def arms(data: Path) -> list[Arm]:
@@ -195,7 +197,7 @@ def loaded(robot: Robot, file: Path) -> list[str]:
         one.replace(columns={name: of for name, of in one.columns.items() if name != "payload_kg"})
         for one in load_recordings([file], robot)
     ]
-    found = diagnose(robot, untold)
+    found = diagnose(robot, check_recordings(robot, untold).recordings)
     mass = next((p.value for p in found.effects[0].parameters if p.name.endswith(".m")), float("nan"))
     named = percent_of(found, "named")
     lines = ["**UR10e with a load, against the robot found**", "", *HEADER]

@@ -22,6 +22,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kBlocks = 10;                ///< of time, where recordings cannot be the folds
+constexpr double kSlowRows = 0.5;          ///< [s] between rows: nobody records motion so rarely
 constexpr std::size_t kFewRecordings = 4;  ///< fewer unmarked ones are parted into blocks of time
 
 double length_of(const Recording& recording) {
@@ -147,6 +148,13 @@ void warn_of_payloads(const std::vector<Recording>& recordings, std::vector<std:
   warnings->push_back("no payload_kg in " + listed(without) + ": taken to be without a payload");
 }
 
+/// Of stamps in milliseconds speeds are a thousand times too small.
+std::string of_slow_rows(const std::vector<Recording>& recordings) {
+  const VectorXd& time = recordings.front().time;
+  const double step = time.size() > 1 ? time[1] - time[0] : 0.0;
+  return step < kSlowRows ? "" : "; rows are " + math::number(step) + " s apart: is t_s in seconds?";
+}
+
 }  // namespace
 
 Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, const ProblemOptions& options)
@@ -159,7 +167,8 @@ Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, c
   range.turns = turns_of(robot);
   if (range.speed.maxCoeff() < kSpeedAtRest) {
     throw std::invalid_argument("nothing moves: no joint of any recording is faster than " +
-                                math::number(kSpeedAtRest) + " rad/s (or m/s), and at rest friction tells nothing");
+                                math::number(kSpeedAtRest) + " rad/s (or m/s), and at rest friction tells nothing" +
+                                of_slow_rows(recordings));
   }
   own_effects = options.own_effects;
   nominal = model_of(robot, *this);

@@ -176,7 +176,7 @@ def test_a_load_is_known_no_better_than_its_halves_agree() -> None:
     arm = demo_arm()
     mixed = [*recordings[:2], recordings[2].replace(torque=torque)]
     alike, apart = (
-        loads._Fit.of([loads._halves(arm, grid) for grid in grids_of(arm, them)], 6)
+        loads.Compared.of([loads._halves(arm, grid) for grid in grids_of(arm, them)], 6)
         for them in (recordings, mixed)
     )
     assert alike.sigma([2]) < 0.05 * LOAD

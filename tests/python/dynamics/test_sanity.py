@@ -31,6 +31,7 @@ from truing.dynamics import (
 from truing.dynamics.magnitudes import are_magnitudes, commands_for_magnitudes
 from truing.dynamics.sanity.columns import resolution
 from truing.dynamics.sanity.grids import grids_of
+from truing.dynamics.sanity.jumps import spikes
 from truing.dynamics.sanity.readings import rows_of
 from truing.dynamics.servo import by_commands
 from truing.dynamics.told import told
@@ -296,6 +297,63 @@ def test_real_arms_of_another_convention_are_recognised(folder: str) -> None:
     turned = "with the opposite sign (angle and torque)"
     said = f"shoulder_lift_joint plus 90°, elbow_joint minus 90°, wrist_1_joint {turned}"
     assert said in finding.evidence
+
+
+# ---- Scales ------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("factor", [0.7, 1.3])
+def test_torques_of_one_recording_on_another_scale_are_no_load(factor: float) -> None:
+    scaled = MOTIONS[1].replace(torque=factor * np.asarray(MOTIONS[1].torque))
+    finding = only(check_recordings(ARM, [MOTIONS[0], scaled, MOTIONS[2]]))
+    assert finding.finding == "gain_differs" and finding.mistake
+    assert finding.recordings == (scaled.name,)
+    assert finding.value == pytest.approx(factor, rel=0.1)
+
+
+def test_torques_on_the_motors_side_are_a_mistake() -> None:
+    ratios = np.array([100.0, 120.0, 100.0, 60.0, 60.0, 50.0])
+    checked = check_recordings(ARM, with_fields(torque=lambda one: one.torque / ratios))
+    finding = next(one for one in checked.findings if one.finding == "gain")
+    assert finding.mistake and finding.value < 0.02
+
+
+# ---- Values that no motion has ---------------------------------------------------------------------
+def test_angles_folded_into_one_turn_go_on() -> None:
+    far = with_fields(position=lambda one: one.position * 1.0 + np.array([3.0, 0, 0, 0, 0, 0]))
+    folded = with_fields(far, position=lambda one: (one.position + math.pi) % (2.0 * math.pi) - math.pi)
+    checked = check_recordings(ARM, folded)
+    finding = next(one for one in checked.findings if one.finding == "angle_folded")
+    assert finding.applied and finding.joints == (ARM.joints[0].name,) and finding.value > 0
+    for one, other in zip(checked.recordings, far, strict=True):
+        turns = (np.asarray(one.position) - other.position)[:, 0] / (2.0 * math.pi)
+        assert np.ptp(turns) < 1e-9 and abs(turns[0] - round(turns[0])) < 1e-9
+
+
+def test_single_values_far_from_their_neighbours_are_replaced() -> None:
+    random = np.random.default_rng(11)
+    rows = random.choice(np.arange(10, len(MOTIONS[0]) - 10, 5), 12, replace=False)
+
+    def glitch(x: Floats) -> Floats:
+        x[rows] += 8.0 * np.ptp(x) * random.choice([-1.0, 1.0], len(rows))
+        return x
+
+    spoilt = with_fields(MOTIONS[:1], torque=lambda one: column(one.torque, 1, glitch))
+    checked = check_recordings(ARM, [*spoilt, *MOTIONS[1:]])
+    finding = only(checked)
+    assert finding.finding == "spikes" and finding.applied and finding.value == len(rows)
+    assert finding.recordings == (MOTIONS[0].name,) and finding.joints == (ARM.joints[1].name,)
+    mended, torque = np.asarray(checked.recordings[0].torque), np.asarray(MOTIONS[0].torque)
+    untouched = np.delete(mended, rows, axis=0) == np.delete(torque, rows, axis=0)
+    assert untouched.all()
+    assert np.abs(mended - torque)[rows].max() < 0.1 * np.ptp(torque[:, 1])
+
+
+def test_steps_of_friction_are_no_spikes() -> None:
+    x = np.sin(np.arange(2000) * 0.01) + 5.0 * np.sign(np.sin(np.arange(2000) * 0.013))
+    assert not spikes(x).any()
+    x[777] += 40.0
+    assert np.flatnonzero(spikes(x)).tolist() == [777]
+    x[::20] += 40.0
+    assert not spikes(x).any(), "of one in twenty nobody knows which are right"
 
 
 # ---- Low-passed torques ----------------------------------------------------------------------------

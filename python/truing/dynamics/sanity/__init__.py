@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.magnitudes import are_magnitudes
 from truing.dynamics.recorded import driven_joints, with_rows
-from truing.dynamics.sanity import band, between, columns, gravity, lag, loads, pushed
+from truing.dynamics.sanity import band, between, columns, gravity, jumps, lag, loads, pushed
 from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
@@ -51,6 +51,9 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     for recording in recordings:
         _core.validate_recording(recording, robot)
     found, recordings = columns.clock(recordings)
+    for mended in (jumps.unfolded, jumps.without_spikes):
+        more, recordings = mended(robot, recordings)
+        found += more
     grids = grids_of(robot, recordings)
     of_speeds, by_speed, by_angle = speeds(robot, grids)
     found += of_speeds
@@ -114,7 +117,12 @@ def _what_differs(
             return recordings, found
         recordings = pushed.without_pushes(recordings, push)
         grids = [grid for grid in grids_of(robot, recordings) if len(grid.rows)]
-    carried = carried or loads.loads_of(robot, recordings, _guessed(grids, constants))
+    fit = None if carried else loads.compared(robot, _guessed(grids, constants))
+    if fit is not None:
+        other_scale = loads.gain_differs(fit)
+        if other_scale:
+            return recordings, [*found, *other_scale]
+        carried = loads.loads_of(robot, fit)
     if not carried:
         return recordings, [*found, *between.friction_differs(robot, recordings, grids)]
     if constants is not None:

@@ -33,6 +33,7 @@ SURE = 6.0  # standard errors by which masses differ
 BY_HALVES = 0.25  # of what the halves of a recording differ by: no standard error is smaller
 PART = 0.5  # of the squares that a recording leaves without its load, at most, with it
 PART_OF_ALL = 0.65  # of the squares that all leave without a load that comes and goes, at most, with it
+GAIN = 1.1  # ratio of the torques of two recordings: from here on it is said
 MOST = 4  # loads that are told apart
 REACH = 1.0  # [m] no load hangs farther from the tool
 RIDGE = 1e-6  # of the links' mean square column: what motion does not show stays the file's
@@ -69,14 +70,37 @@ def stated(recordings: Sequence[_core.Recording]) -> bool:
     )
 
 
-def loads_of(robot: _core.Robot, recordings: Sequence[_core.Recording], grids: Sequence[Grid]) -> list[Load]:
-    """Loads that recordings carry and the lightest of them does not; none where one is stated."""
-    if stated(recordings):
-        return []
+def compared(robot: _core.Robot, grids: Sequence[Grid]) -> Compared | None:
+    """The links that recordings have in common, and a load of each of them; None for one recording alone."""
     seen = [halves for grid in grids if len(halves := _halves(robot, grid)) == 2]
-    if len(seen) < 2:
+    return Compared.of(seen, len(driven_joints(robot))) if len(seen) > 1 else None
+
+
+def gain_differs(fit: Compared) -> list[RecordingFinding]:
+    """Recordings whose torques are a multiple of what the others' are, which no load explains as well."""
+    scales = np.array([fit.scale(k) for k in range(len(fit.names))])
+    usual = float(np.median(scales))
+    apart = [
+        k
+        for k, scale in enumerate(scales)
+        if abs(math.log(max(scale, 1e-3) / usual)) > math.log(GAIN)
+        and fit.squares_scaled(k, scale) < PART * fit.squares_scaled(k, usual)
+        and fit.squares_scaled(k, scale) < fit.squares(k, fit.loads[k])
+    ]
+    if not apart:
         return []
-    fit = _Fit.of(seen, len(driven_joints(robot)))
+    said = listed([f"{fit.names[k]} by {scales[k] / usual:.2f}" for k in apart])
+    words = (
+        f"torques are those of the other recordings times a factor, {said}: another unit, other constants of"
+    )
+    words += " the drives? Bring all to one scale, and run again"
+    worst = max((scales[k] / usual for k in apart), key=lambda ratio: abs(math.log(ratio)))
+    where = tuple(fit.names[k] for k in apart)
+    return [RecordingFinding("gain_differs", where, (), words, float(worst), "-", mistake=True)]
+
+
+def loads_of(robot: _core.Robot, fit: Compared) -> list[Load]:
+    """Loads that recordings carry and the lightest of them does not."""
     lightest, *others = _groups(fit)
     out = []
     for group in others:
@@ -184,7 +208,7 @@ def with_loads(recordings: Sequence[_core.Recording], loads: Sequence[Load]) -> 
     return out
 
 
-def _groups(fit: _Fit) -> list[list[int]]:
+def _groups(fit: Compared) -> list[list[int]]:
     """Recordings that carry the same, the lightest first."""
     groups: list[list[int]] = []
     for k in np.argsort(fit.loads[:, 0]).tolist():
@@ -195,7 +219,7 @@ def _groups(fit: _Fit) -> list[list[int]]:
     return groups
 
 
-def _is_heavier(fit: _Fit, k: int, group: Sequence[int]) -> bool:
+def _is_heavier(fit: Compared, k: int, group: Sequence[int]) -> bool:
     apart = fit.loads[k, 0] - fit.mean(group)[0]
     if apart < SURE * math.hypot(fit.sigma([k]), fit.sigma(group)):
         return False
@@ -208,7 +232,8 @@ class _Half:
 
     name: str
     links: Floats  # shape=(n, 10 links) torques by the parameters of the links
-    left: Floats  # shape=(n,) [Nm | N] measured torques less those of the file's links
+    rigid: Floats  # shape=(n,) [Nm | N] torques of the file's links
+    left: Floats  # shape=(n,) [Nm | N] measured torques less these
     joint: NDArray[np.intp]  # shape=(n,)
 
     @property
@@ -225,21 +250,23 @@ def _halves(robot: _core.Robot, grid: Grid) -> list[_Half]:
 def _half(robot: _core.Robot, grid: Grid, rows: NDArray[np.intp]) -> _Half:
     motion = grid.q[rows], grid.qd[rows], grid.qdd[rows]
     regressor = np.asarray(_core.torque_regressor(robot, *motion))
-    left = grid.torque[rows] - np.asarray(_core.rigid_torques(robot, *motion))
+    rigid = np.asarray(_core.rigid_torques(robot, *motion))
+    left = grid.torque[rows] - rigid
     moving = np.abs(motion[1]) > SPEED_AT_REST  # at rest friction takes up a part of the weight
     parts, joints = [], []
     for j in range(left.shape[1]):
         there = ~np.isnan(left[:, j]) & moving[:, j]
         usual = [grid.direction[rows, j], grid.qd[rows, j], grid.qdd[rows, j], np.ones(len(rows))]
-        x, both = np.column_stack(usual)[there], np.column_stack([regressor[:, j], left[:, j]])[there]
+        columns = np.column_stack([regressor[:, j], rigid[:, j], left[:, j]])
+        x, both = np.column_stack(usual)[there], columns[there]
         parts.append(both - x @ (np.linalg.pinv(x.T @ x, hermitian=True) @ (x.T @ both)))
         joints.append(np.full(len(both), j))
     whole = np.concatenate(parts)
-    return _Half(grid.name, whole[:, :-1], whole[:, -1], np.concatenate(joints))
+    return _Half(grid.name, whole[:, :-2], whole[:, -2], whole[:, -1], np.concatenate(joints))
 
 
 @dataclass(frozen=True)
-class _Fit:
+class Compared:
     """Loads of recordings over links that they have in common."""
 
     halves: list[list[_Half]]
@@ -249,7 +276,7 @@ class _Fit:
     variance: Floats  # shape=(recordings,) [kg^2] of the masses
 
     @classmethod
-    def of(cls, seen: list[list[_Half]], joints: int) -> _Fit:
+    def of(cls, seen: list[list[_Half]], joints: int) -> Compared:
         """Least squares, joints weighed by what is left of them. What noise that goes on from row to row adds
         to the variance shows where two halves of a recording do not carry the same."""
         halves = [half for two in seen for half in two]
@@ -281,6 +308,23 @@ class _Fit:
     def sigma(self, group: Sequence[int]) -> float:
         """[kg] standard error of its mass."""
         return float(1.0 / np.sqrt(np.sum(1.0 / self.variance[group])))
+
+    def _weighed(self, k: int) -> tuple[Floats, Floats]:
+        """Measured torques of a recording and those of the common links, in units of what joints leave."""
+        weights = np.concatenate([self.weight[half.joint] for half in self.halves[k]])
+        measured = np.concatenate([half.left + half.rigid for half in self.halves[k]])
+        common = np.concatenate([half.rigid + half.links @ self.links for half in self.halves[k]])
+        return weights * measured, weights * common
+
+    def scale(self, k: int) -> float:
+        """Measured torques of a recording over those of the common links, by least squares."""
+        measured, common = self._weighed(k)
+        return float(measured @ common / (common @ common))
+
+    def squares_scaled(self, k: int, scale: float) -> float:
+        """What a recording leaves with a multiple of the common links' torques and no load."""
+        measured, common = self._weighed(k)
+        return float(np.sum((measured - scale * common) ** 2))
 
     def squares(self, k: int, load: Floats) -> float:
         """What a recording leaves with a load, in units of what joints leave."""

@@ -18,6 +18,7 @@ from truing.dynamics.sanity.readings import Fit
 Floats = NDArray[np.float64]
 
 SEEN = 0.3  # of the variance that the rigid torque must explain to say anything of a scale
+FAR = 5.0  # ratio of all joints from which on nothing that is named has a meaning
 SCALE = 2.0  # largest ratio between model and measurement that is the diagnosis' matter
 THOUSAND = 250.0  # from this ratio on it is one of units
 RATED = 2.0  # spread of ratios to a joint's limit that is one of percentages
@@ -58,7 +59,11 @@ def _gains(names: Sequence[str], ratio: dict[int, float]) -> list[RecordingFindi
         " masses; a load that the model lacks makes more than 1"
     )
     worst = max(wrong.values(), key=lambda r: abs(math.log(r)))
-    return [RecordingFinding("gain", (), tuple(names[j] for j in wrong), words, worst, "-")]
+    beyond = len(ratio) > 1 and all(not 1.0 / FAR < r < FAR for r in ratio.values())
+    if beyond:
+        words += ", and torques on the motors' side of their gears less"
+    where = tuple(names[j] for j in wrong)
+    return [RecordingFinding("gain", (), where, words, worst, "-", mistake=beyond)]
 
 
 def gain_unknown(robot: _core.Robot, fit: Fit, unknown: Sequence[int]) -> RecordingFinding:
