@@ -43,6 +43,7 @@ READ_OTHERWISE = (
     "gravity_direction",
     "torque_sign",
     "position_unit",
+    "command_unit",
     "load_differs",
     "load_comes_and_goes",
     "tool_pushed",
@@ -91,7 +92,7 @@ def diagnosis_report(
     """
     page = Page(f"{result.get('robot') or 'Robot'}: torques", part_of_page("dynamics"))
     page.add(_headline(result, recordings))
-    page.add(_mistakes(result))
+    page.add(mistakes_card(result))
     page.add('<div class="first">')
     _trace_card(page, traces, worst_first(result))
     _error_card(page, result)
@@ -103,7 +104,7 @@ def diagnosis_report(
     _unknown(page, result)
     page.add(_classes(result))
     page.add(_not_testable(result))
-    page.add(_notes(result))
+    page.add(notes_card(result))
     page.add(warnings_card(result))
     page.add(footer(result))
     return page.html()
@@ -117,14 +118,14 @@ def fit_report(result: Mapping[str, Any], recordings: int) -> str:
         f"<header>{_kicker('identify', result, recordings)}<h1>Held-out torque error: {_percent(before)} with"
         f" the nominal model, {_percent(after)} with what was fitted</h1>{_about(result)}</header>"
     )
-    page.add(_mistakes(result))
+    page.add(mistakes_card(result))
     page.add('<div class="first">')
     page.add(_parameters(result))
     _error_card(page, result)
     page.add("</div>")
     _friction(page, result["friction"])
     page.add(_not_testable(result))
-    page.add(_notes(result))
+    page.add(notes_card(result))
     page.add(warnings_card(result))
     page.add(footer(result))
     return page.html()
@@ -320,7 +321,7 @@ def _moves(result: Mapping[str, Any]) -> str:
 
 
 def _headline(result: Mapping[str, Any], recordings: int) -> str:
-    label, tone = TONES[result["verdict"]] if not _mistaken(result) else ("data to be corrected", "bad")
+    label, tone = TONES[result["verdict"]] if not mistaken_ones(result) else ("data to be corrected", "bad")
     before, after = result["without_names_percent"], mean_percent(result, "named")
     loads = [effect for effect in beyond_standard(result) if is_load(effect)]
     if len(beyond_standard(result)) > len(loads) and result["verdict"] != "does_not_hold":
@@ -339,27 +340,27 @@ def _headline(result: Mapping[str, Any], recordings: int) -> str:
     return (
         f"<header>{_kicker('diagnose', result, recordings, badge)}<h1"
         f"{' class=long' if length > LONG else ''}>{text}</h1>"
-        f"{_corrected(result)}{_about(result)}{_moves(result)}</header>"
+        f"{corrected_lines(result)}{_about(result)}{_moves(result)}</header>"
     )
 
 
-def _corrected(result: Mapping[str, Any]) -> str:
+def corrected_lines(result: Mapping[str, Any]) -> str:
     """What was read otherwise than it is written, before anything else: a line each."""
     found = [f for f in result["sanity"] if f["applied"] and f["finding"] in READ_OTHERWISE]
     return "".join(f'<p class="sub"><b>Corrected first:</b> {escaped(f["evidence"])}.</p>' for f in found)
 
 
 # ---- The recordings themselves ---------------------------------------------------------------------
-def _mistakes(result: Mapping[str, Any]) -> str:
+def mistakes_card(result: Mapping[str, Any]) -> str:
     """What is wrong with the recordings comes before anything that was concluded from them."""
-    return _findings_card("Look at the data first", "card look", _mistaken(result))
+    return _findings_card("Look at the data first", "card look", mistaken_ones(result))
 
 
-def _mistaken(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def mistaken_ones(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [finding for finding in result["sanity"] if finding["mistake"]]
 
 
-def _notes(result: Mapping[str, Any]) -> str:
+def notes_card(result: Mapping[str, Any]) -> str:
     found = [f for f in result["sanity"] if not f["mistake"]]
     return _findings_card("What the recordings look like", "card", found)
 

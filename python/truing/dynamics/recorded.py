@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -46,6 +46,13 @@ def with_rows(
     columns = {name: np.asarray(values)[kept] for name, values in recording.columns.items()}
     time = np.asarray(recording.time)[kept]
     return _core.Recording(recording.name, time=time, columns=columns, test=recording.test, **fields)
+
+
+def by_commands(recordings: Sequence[_core.Recording]) -> bool:
+    """Whether all recordings have commands, and none has torques or currents."""
+    torques = any(r.torque.shape[1] or r.current.shape[1] for r in recordings)
+    commands = all(r.command.shape[1] or r.torque_command.shape[1] for r in recordings)
+    return bool(recordings) and commands and not torques
 
 
 def driven_joints(robot: _core.Robot) -> list[_core.Joint]:

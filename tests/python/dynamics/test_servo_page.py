@@ -16,6 +16,7 @@ import pytest
 
 import truing
 from pages import charts_of, faults_of, visible
+from truing.dynamics.sanity import RecordingFinding
 from truing.dynamics.servo.chain import ServoChain, ServoJoint
 from truing.dynamics.servo.export import is_servo_result, load_servo_result
 from truing.dynamics.servo.page import main_number, mean_error, paths_of, servo_report, telling, worst_first
@@ -220,6 +221,16 @@ def test_the_folder_holds_what_export_and_randomise_read(tmp_path: Path) -> None
     # Where no recording was held out by name, blocks of time were.
     rows = held_rows(replace(found, held_out=("blocks of time",)), recordings, 0.3)
     assert 0.2 < np.mean(rows[0]) < 0.4
+
+
+def test_mistakes_in_the_recordings_come_first() -> None:
+    wrong = RecordingFinding(
+        "command_sign", (), ("elbow",), "elbow goes the other way", -1.0, "-", mistake=True
+    )
+    read = RecordingFinding("command_unit", (), (), "commands are in deg", 57.3, "-", applied=True)
+    page = servo_report(servo_dict(diagnosis(), sanity=[wrong, read]), [])
+    assert "data to be corrected" in page and "Corrected first:</b> commands are in deg" in page
+    assert page.index("elbow goes the other way") < page.index('<div class="first">')
 
 
 @pytest.mark.parametrize(("left", "said"), [(0.2, "explained"), (0.8, "partly explained")])

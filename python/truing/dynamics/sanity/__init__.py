@@ -7,7 +7,7 @@ What is certain is corrected, and said; all else is only said.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.magnitudes import are_magnitudes
-from truing.dynamics.recorded import driven_joints, with_rows
-from truing.dynamics.sanity import band, between, columns, gravity, jumps, lag, loads, pushed
+from truing.dynamics.recorded import by_commands, driven_joints, with_rows
+from truing.dynamics.sanity import band, between, columns, commands, gravity, jumps, lag, loads, pushed
 from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
@@ -30,6 +30,10 @@ from truing.dynamics.sanity.speeds import speeds
 from truing.dynamics.sanity.switched import Switched, thinned
 
 Floats = NDArray[np.float64]
+Check = Callable[
+    [_core.Robot, Sequence[_core.Recording]], tuple[list[RecordingFinding], list[_core.Recording]]
+]
+JUMPS: list[Check] = [jumps.unfolded, jumps.without_frozen, jumps.without_spikes]
 
 
 def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:
@@ -44,16 +48,18 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     weight contradict, torques that are late by 40 ms or more, and what a load of known mass tells: constants
     of drives of which currents alone were recorded, and where it hangs. `cutoff` is that of the low-pass that
     both sides of the equation of motion are to go through: the usual one, or where the recorded torques end.
-    A `mistake` is not corrected: until it is, effects that are named are doubtful.
+    A `mistake` is not corrected: until it is, effects that are named are doubtful. Of recordings of commands
+    alone, units, signs and order of the commands are held against what the joints did.
 
     Raises InputError on a robot or recordings that cannot be used.
     """
     for recording in recordings:
         _core.validate_recording(recording, robot)
+    if by_commands(recordings):
+        return _of_commands(robot, recordings)
     found, recordings = columns.clock(recordings)
-    for mended in (jumps.unfolded, jumps.without_spikes):
-        more, recordings = mended(robot, recordings)
-        found += more
+    more, recordings = _mended(robot, recordings, JUMPS)
+    found += more
     grids = grids_of(robot, recordings)
     of_speeds, by_speed, by_angle = speeds(robot, grids)
     found += of_speeds
@@ -98,6 +104,25 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     found.sort(key=lambda one: (not one.mistake, one.finding in ("at_rest", "gaps", "one_recording")))
     cutoff = _core.TorqueOptions().cutoff if frequency is None else band.cutoff_below(frequency)
     return CheckedRecordings(robot, tuple(recordings), tuple(found), cutoff)
+
+
+def _of_commands(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:
+    """Of recordings without torques: what angles and commands show."""
+    positions = all(one.command.shape[1] for one in recordings)
+    found, recordings = _mended(robot, recordings, [*JUMPS, *([commands.commands] if positions else [])])
+    found.sort(key=lambda one: not one.mistake)
+    return CheckedRecordings(robot, tuple(recordings), tuple(found))
+
+
+def _mended(
+    robot: _core.Robot, recordings: Sequence[_core.Recording], checks: Sequence[Check]
+) -> tuple[list[RecordingFinding], list[_core.Recording]]:
+    found: list[RecordingFinding] = []
+    recordings = list(recordings)
+    for check in checks:
+        more, recordings = check(robot, recordings)
+        found += more
+    return found, recordings
 
 
 def _what_differs(

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Values that no motion has: angles that were folded into one turn, single rows far from their neighbours."""
+"""Values that no motion has: angles that were folded into one turn, single rows far from their neighbours,
+angles of all joints that stay the same for some rows in the middle of a motion."""
 
 from __future__ import annotations
 
@@ -9,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from truing import _core
-from truing.dynamics.recorded import driven_joints
+from truing.dynamics.recorded import driven_joints, with_rows
+from truing.dynamics.sanity.columns import resolution
 from truing.dynamics.sanity.findings import RecordingFinding, listed
 from truing.dynamics.sanity.grids import STILL
 
@@ -23,8 +24,14 @@ TURN = 2.0 * np.pi
 NEAR_A_TURN = 0.5  # [rad] by which a step may miss a whole turn
 WINDOW = 5  # rows whose median a row is held against: two wrong ones in a row are seen
 FAR = 20.0  # times what nine in ten rows are off it
-PART = 0.1  # of a column's range, without the outermost hundredth at each end
+PART = 0.1  # of a torque's range, without the outermost hundredth at each end
+PART_OF_ANGLE, LEAST_ANGLE = 0.02, 0.05  # of an angle's, and [rad | m]: motion goes less far and back
+TIMES = 3.0  # the steps around it: steps to a wrong row and back are larger
 MOST = 0.02  # of the rows; of more nobody knows which are right
+REPEATED, SEVERAL = 3, 2  # rows that are the same, joints that then jump: at least
+NEAR = 5  # rows before and after that tell how fast joints move
+HALF_WAY = 0.5  # of the way that joints would have gone
+COARSE = 4.0  # steps of the encoder: less is no jump
 TABLES = {"position": ("q", "rad", "m"), "torque": ("tau", "Nm", "N"), "current": ("i", "A", "A")}
 
 
@@ -71,7 +78,8 @@ def without_spikes(
         for name, (stem, turning, sliding) in TABLES.items():
             table = np.array(getattr(recording, name))
             for k in range(table.shape[1]):
-                wrong = spikes(table[:, k])
+                of_angle = (PART_OF_ANGLE, LEAST_ANGLE) if name == "position" else (PART, 0.0)
+                wrong = spikes(table[:, k], *of_angle)
                 if not wrong.any() or not np.ptp(recording.position[:, k]) > STILL:
                     continue
                 unit = turning if joints[k].type == "revolute" else sliding
@@ -84,15 +92,72 @@ def without_spikes(
     return _as_one(found), out
 
 
-def spikes(x: Floats) -> Bools:
-    """Rows that are far from the median of the rows around them: no more than two in a row. shape=(n,)"""
+def spikes(x: Floats, part: float = PART, floor: float = 0.0) -> Bools:
+    """Rows that are far from the median of the rows around them: no more than two in a row. shape=(n,)
+    part: of the range, that they are off at least; floor: the same, in the column's unit."""
     nothing = np.zeros(len(x), dtype=np.bool_)
     if len(x) < 10 * WINDOW or np.isnan(x).any():
         return nothing
-    off = np.abs(x - median_filter(x, WINDOW, mode="nearest"))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(x, WINDOW // 2, mode="edge"), WINDOW)
+    off = np.abs(x - np.median(around, axis=1))
     low, high = np.quantile(x, (0.01, 0.99))
-    wrong = np.asarray(off > max(FAR * float(np.quantile(off, 0.9)), PART * float(high - low)))
+    least = max(floor, FAR * float(np.quantile(off, 0.9)), part * float(high - low), COARSE * resolution(x))
+    far = np.concatenate([[False], off > least, [False]])
+    wrong = nothing.copy()
+    for a, b in np.flatnonzero(np.diff(far.astype(np.int8))).reshape(-1, 2):
+        wrong[a:b] = 2 <= a and b <= len(x) - 2 and _there_and_back(x, a, b)
     return wrong if wrong.mean() < MOST else nothing
+
+
+def _there_and_back(x: Floats, a: int, b: int) -> bool:
+    """Whether values step to rows [a, b) and back again, by far more than before and after: a motion that
+    turns in few rows slows down before it does."""
+    there, back = x[a] - x[a - 1], x[b - 1] - x[b]
+    around = max(abs(x[a - 1] - x[a - 2]), abs(x[b + 1] - x[b]) if b + 1 < len(x) else 0.0)
+    return bool(there * back > 0.0 and min(abs(there), abs(back)) > TIMES * around)
+
+
+def without_frozen(
+    robot: _core.Robot, recordings: Sequence[_core.Recording]
+) -> tuple[list[RecordingFinding], list[_core.Recording]]:
+    """Rows in which the last angles were written once more, as where a bus drops out, are left out."""
+    out, where, rows, longest = [], [], 0, 0.0
+    for recording in recordings:
+        stuck = frozen(np.asarray(recording.position))
+        if stuck.any():
+            time = np.asarray(recording.time)
+            where.append(recording.name)
+            rows += int(stuck.sum())
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], stuck.astype(np.int8), [0]])))
+            longest = max(longest, *(time[b - 1] - time[a - 1] for a, b in edges.reshape(-1, 2)))
+            recording = with_rows(recording, ~stuck)
+        out.append(recording)
+    if not where:
+        return [], out
+    words = (
+        f"{listed(where)}: the angles of all joints stay the same for up to {longest:.2g} s while they move,"
+    )
+    words += f" {rows} rows in all, as where a bus drops out: these rows are left out"
+    return [RecordingFinding("frozen", tuple(where), (), words, float(rows), "rows", applied=True)], out
+
+
+def frozen(q: Floats) -> Bools:
+    """Rows that repeat the one before, of all joints, and after which several are where they would have gone:
+    by half of the usual way in so many rows, or more. shape=(n,)"""
+    steps = np.abs(np.diff(q, axis=0))
+    same = np.concatenate([[False], (steps == 0.0).all(axis=1), [False]])
+    out = np.zeros(len(q), dtype=np.bool_)
+    least = steps[steps > 0.0].min(initial=np.inf)  # of the encoders
+    for a, b in 1 + np.flatnonzero(np.diff(same.astype(np.int8))).reshape(-1, 2):
+        length = b - a
+        if length < REPEATED or a < 1 + NEAR or b + NEAR > len(steps):
+            continue
+        before, after = steps[a - 1 - NEAR : a - 1].mean(axis=0), steps[b : b + NEAR].mean(axis=0)
+        usual = 0.5 * (before + after)
+        jumped = (steps[b - 1] > HALF_WAY * length * usual) & (steps[b - 1] > COARSE * least) & (before > 0.0)
+        if np.count_nonzero(jumped) >= SEVERAL:
+            out[a:b] = True
+    return out
 
 
 def _spiked(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.recorded import by_commands as by_commands
 from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.arm import ServoArm, servo_arm
 from truing.dynamics.servo.data import ServoData, Window, servo_data, windows_of
@@ -50,13 +51,6 @@ class Prepared:
     @property
     def train(self) -> list[Window]:
         return [w for w in self.windows if not w.test]
-
-
-def by_commands(recordings: Sequence[_core.Recording]) -> bool:
-    """Whether all recordings have commands, and none has torques or currents."""
-    torques = any(r.torque.shape[1] or r.current.shape[1] for r in recordings)
-    commands = all(r.command.shape[1] or r.torque_command.shape[1] for r in recordings)
-    return bool(recordings) and commands and not torques
 
 
 def prepare(

@@ -17,7 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truing.dynamics.page import TONES, others, place, plain
+from truing.dynamics.page import (
+    TONES,
+    corrected_lines,
+    mistaken_ones,
+    mistakes_card,
+    notes_card,
+    others,
+    place,
+    plain,
+)
 from truing.dynamics.rollout.page import error_text, joint_menu, motion_chart
 from truing.report.charts import AFTER, BEFORE, INK, faded, labelled_bars, packed
 from truing.report.page import Page, footer, part_of_page, warnings_card
@@ -54,6 +63,7 @@ def servo_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, Any]])
     """
     page = Page(f"{result.get('robot') or 'Arm'}: servos", part_of_page("dynamics"))
     _headline(page, result)
+    page.add(mistakes_card(result))
     order = worst_first(result)
     page.add('<div class="first">')
     _motion(page, result, traces, order)
@@ -66,6 +76,7 @@ def servo_report(result: Mapping[str, Any], traces: Sequence[Mapping[str, Any]])
     _unknown(page, result)
     page.add(_usual(result))
     page.add(_not_testable(result))
+    page.add(notes_card(result))
     page.add(warnings_card(result))
     page.add(footer(result))
     return page.html()
@@ -117,6 +128,8 @@ def ahead(horizon: float | str) -> str:
 def _badge(result: Mapping[str, Any]) -> tuple[str, str]:
     """In a word or two, and its colour: how much is left counts, not only that there are names."""
     verdict = result["verdict"]
+    if mistaken_ones(result):
+        return "data to be corrected", "bad"
     before, after = (mean_error(result, m) for m in ("standard", "named"))
     if verdict == "none" and departing(result):
         return "the file's values differ", "found"
@@ -139,7 +152,8 @@ def _headline(page: Page, result: Mapping[str, Any]) -> None:
         f"<h1{' class=long' if len(text) > LONG else ''}>{escaped(text)}</h1>"
         f'<p class="sub">Simulated less real motion on what was held out (<b>{held}</b>), mean of the joints,'
         f' {horizon}: {nominal} with the file, <span class="before">{before}</span> with the usual'
-        f' parameters, <span class="after">{after}</span> with what was named. {USUAL}</p></header>'
+        f' parameters, <span class="after">{after}</span> with what was named. {USUAL}</p>'
+        f"{corrected_lines(result)}</header>"
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.sanity.findings import RecordingFinding
 from truing.dynamics.servo.chain import ServoChain
 from truing.report.json_text import without_nan
 
@@ -180,8 +181,11 @@ class ServoDiagnosis:
         return "\n".join([*lines, *(one.sentence for one in self.classes)])
 
 
-def servo_dict(found: ServoDiagnosis, *, warnings: Iterable[str] = ()) -> dict[str, Any]:
-    """What ``result.json`` of ``truing dynamics diagnose`` holds when there were commands alone."""
+def servo_dict(
+    found: ServoDiagnosis, *, sanity: Iterable[RecordingFinding] = (), warnings: Iterable[str] = ()
+) -> dict[str, Any]:
+    """What ``result.json`` of ``truing dynamics diagnose`` holds when there were commands alone. sanity:
+    findings of `check_recordings`."""
     departed = departing(found.effects)
     out: dict[str, Any] = without_nan(
         {
@@ -210,7 +214,7 @@ def servo_dict(found: ServoDiagnosis, *, warnings: Iterable[str] = ()) -> dict[s
                 "matrix": found.covariance.matrix.tolist(),
                 "prior": found.covariance.prior.tolist(),
             },
-            "sanity": [],
+            "sanity": [asdict(finding) for finding in sanity],
             "not_testable": [
                 {"effect": effect, "joints": list(joints), "why": why}
                 for effect, joints, why in found.not_testable

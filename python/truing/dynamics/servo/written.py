@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.rollout import BLOCKS_OF_TIME, held_out_rows
+from truing.dynamics.sanity.findings import RecordingFinding
 from truing.dynamics.servo.export import MODEL, MOTION
 from truing.dynamics.servo.page import servo_report
 from truing.dynamics.servo.result import ServoDiagnosis, servo_dict
@@ -26,11 +27,13 @@ def write_servo(
     found: ServoDiagnosis,
     recordings: Sequence[_core.Recording],
     *,
+    sanity: Iterable[RecordingFinding] = (),
     warnings: Iterable[str] = (),
     test_share: float = 0.3,
 ) -> dict[str, Any]:
-    """Writes everything, and returns what result.json holds. test_share: as it was diagnosed with."""
-    result = servo_dict(found, warnings=warnings)
+    """Writes everything, and returns what result.json holds. sanity: findings of `check_recordings`, whose
+    recordings these are. test_share: as it was diagnosed with."""
+    result = servo_dict(found, sanity=sanity, warnings=warnings)
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     (folder / MODEL).write_text(found.mjcf, encoding="utf-8")
     prismatic = found.chains["named"].prismatic

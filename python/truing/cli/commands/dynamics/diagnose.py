@@ -70,14 +70,14 @@ class Command(TorqueCommand[Answer | ServoAnswer]):
     threads: Threads = core("TorqueDiagnoseOptions", "threads")
 
     def load(self, progress: run.Progress) -> CheckedRecordings:
-        from truing.dynamics import CheckedRecordings
+        from truing.dynamics import check_recordings
         from truing.dynamics.magnitudes import commands_for_magnitudes
         from truing.dynamics.servo import by_commands
 
         robot, recordings = self.read(self.recordings)
         recordings = commands_for_magnitudes(robot, recordings)
         if by_commands(recordings):
-            return CheckedRecordings(robot, tuple(recordings), ())
+            return check_recordings(robot, recordings)
         return checked((robot, recordings))
 
     def solve(self, loaded: CheckedRecordings, progress: run.Progress) -> Answer | ServoAnswer:
@@ -129,7 +129,12 @@ class Command(TorqueCommand[Answer | ServoAnswer]):
 
         if isinstance(found, ServoAnswer):
             return write_servo(
-                folder, found.found, loaded.recordings, warnings=warnings, test_share=self.test_share
+                folder,
+                found.found,
+                loaded.recordings,
+                sanity=loaded.findings,
+                warnings=warnings,
+                test_share=self.test_share,
             )
         return write_diagnosis(
             folder,
@@ -144,8 +149,6 @@ class Command(TorqueCommand[Answer | ServoAnswer]):
         )
 
     def failure(self, result: Mapping[str, Any]) -> str:
-        if result.get("from") == "commands":
-            return DOES_NOT_HOLD if result["verdict"] == "does_not_hold" else ""
         if mistaken(result) or result["verdict"] != "does_not_hold":
             return mistaken(result)
         return DOES_NOT_HOLD
@@ -185,6 +188,7 @@ def print_diagnosis(result: Mapping[str, Any]) -> None:
 
 def print_servo(result: Mapping[str, Any]) -> None:
     """The verdict from commands, errors by joint, the causes, and what the recordings cannot tell."""
+    print_findings(result)
     say(result["sentence"])
     found = result["rollout"]
     at, main = found["horizon_s"], found["main_horizon_s"]
