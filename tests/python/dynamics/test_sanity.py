@@ -108,7 +108,7 @@ def test_of_real_recordings_only_what_is_known_of_them_is_said(folder: str) -> N
     expected = {
         "dyn_ur10": ["torques_low_passed", "one_recording"],
         "dyn_tx40": ["at_rest", "one_recording"],
-        "dyn_ur10e": ["load_place", "at_rest"],
+        "dyn_ur10e": ["spikes", "load_place", "at_rest"],
     }
     assert [one.finding for one in found] == expected[folder]
     if folder == "dyn_ur10":
@@ -814,3 +814,15 @@ def test_a_joint_that_turns_is_never_taken_for_one_that_slides(tmp_path: Path) -
         noise = random.normal(size=q.shape) * [0.5, 0.3, 0.5, 0.02]
         made.append(Recording(f"r{k}", time=t, position=q, torque=rigid + friction + motors + noise))
     assert not {"joint_order", "torque_order"} & set(kinds(check_recordings(robot, made)))
+
+
+def test_the_zero_of_a_single_joint_is_found(tmp_path: Path) -> None:
+    link, joint = LINK.format(1, 0.2, 8.0, 0.15), JOINT.format(1, "J1", "revolute", "base", 0.0)
+    text = SCARA.format(links=link, joints=joint).replace('xyz="0 0 1"', 'xyz="0 1 0"')
+    (tmp_path / "one.urdf").write_text(text)
+    robot, t = truing.load_robot(tmp_path / "one.urdf"), np.arange(0.0, 14.0, STEP)
+    q = np.sin(0.9 * t[:, None]) + 0.4 * np.sin(2.3 * t[:, None])
+    qd = np.gradient(q, t, axis=0)
+    torque = _core.rigid_torques(robot, q, qd, np.gradient(qd, t, axis=0)) + np.tanh(qd / 0.01)
+    made = [Recording(f"r{k}", time=t, position=q + 0.5 * math.pi, torque=torque) for k in (1, 2)]
+    assert "J1 minus 90°" in next(o for o in check_recordings(robot, made).findings if o.mistake).evidence

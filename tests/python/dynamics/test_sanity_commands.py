@@ -16,6 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 import truing
+from truing import _core
 from truing.dynamics import CheckedRecordings, Recording, RecordingFinding, check_recordings, load_recordings
 from truing.dynamics.sanity.commands import other_order
 from truing.testing.dynamics import demo_arm
@@ -122,3 +123,31 @@ def test_of_real_servos_nothing_is_said(folder: str, tip: str | None) -> None:
         robot = truing.load_robot(REAL / folder / "robot.xml", any_tool=True, tip_link=tip)
     recordings = load_recordings(str(REAL / folder / "*.csv"), robot)
     assert check_recordings(robot, recordings).findings == ()
+
+
+def held_up(seed: int) -> Recording:
+    """Commands are ahead of the angles by what torque takes of a stiff servo, whose noise is small."""
+    random = np.random.default_rng(seed)
+    t = np.arange(0.0, 20.0, 0.01)
+    q = np.sum(
+        [0.35 * np.sin(2.0 * math.pi * f * t[:, None] + random.uniform(0.0, 6.0, 6)) for f in (0.11, 0.31)],
+        axis=0,
+    )
+    qd = np.gradient(q, t, axis=0)
+    torque = np.asarray(_core.rigid_torques(ARM, q, qd, np.gradient(qd, t, axis=0)))
+    scale = torque.std(axis=0)
+    lead = (torque + 0.3 * scale * np.tanh(qd / 0.01)) / (40.0 * scale) + 0.02 * qd
+    return Recording(f"s{seed}", time=t, position=q, command=q + lead + random.normal(0.0, 1e-4, q.shape))
+
+
+def test_angles_of_servos_counted_from_another_zero_or_the_other_way_are_a_mistake() -> None:
+    recordings = [held_up(seed) for seed in (5, 6)]
+    assert check_recordings(ARM, recordings).findings == ()
+    signs, zero = np.array([1, 1, -1, 1, 1, 1]), np.array([0, 0.5 * math.pi, 0, 0, 0, 0])
+    moved = [
+        one.replace(position=one.position * signs + zero, command=one.command * signs + zero)
+        for one in recordings
+    ]
+    said = only(check_recordings(ARM, moved))
+    assert said.finding == "angle_convention" and said.mistake
+    assert f"{JOINTS[1]} minus 90°, {JOINTS[2]} with the opposite sign" in said.evidence

@@ -33,7 +33,9 @@ Floats = NDArray[np.float64]
 Check = Callable[
     [_core.Robot, Sequence[_core.Recording]], tuple[list[RecordingFinding], list[_core.Recording]]
 ]
-JUMPS: list[Check] = [jumps.unfolded, jumps.without_frozen, jumps.without_spikes]
+OF_ANGLES = ("angle_convention", "joint_sign", "joint_order")  # findings that need no scale of torques
+ANGLES: list[Check] = [jumps.unfolded, jumps.without_frozen]
+JUMPS: list[Check] = [*ANGLES, jumps.without_spikes]
 
 
 def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:
@@ -58,7 +60,8 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     if by_commands(recordings):
         return _of_commands(robot, recordings)
     found, recordings = columns.clock(recordings)
-    more, recordings = _mended(robot, recordings, JUMPS)
+    magnitudes = are_magnitudes(robot, recordings)  # they turn back at zero, which is no spike
+    more, recordings = _mended(robot, recordings, ANGLES if magnitudes else JUMPS)
     found += more
     grids = grids_of(robot, recordings)
     of_speeds, by_speed, by_angle = speeds(robot, grids)
@@ -67,7 +70,6 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     if _any_change(by_angle):
         grids = grids_of(robot, recordings)
     grids = [grid for grid in grids if len(grid.rows)]
-    magnitudes = are_magnitudes(robot, recordings)
     if magnitudes:
         found.append(columns.magnitudes())
     elif grids:
@@ -110,8 +112,22 @@ def _of_commands(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> C
     """Of recordings without torques: what angles and commands show."""
     positions = all(one.command.shape[1] for one in recordings)
     found, recordings = _mended(robot, recordings, [*JUMPS, *([commands.commands] if positions else [])])
+    if positions and not any(one.mistake for one in found):
+        found += _angles_by_leads(robot, recordings)
     found.sort(key=lambda one: not one.mistake)
     return CheckedRecordings(robot, tuple(recordings), tuple(found))
+
+
+def _angles_by_leads(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> list[RecordingFinding]:
+    """Zeros, signs and order of angles: how far a command is ahead of its joint goes with the torque."""
+    leads = [one.replace(torque=np.asarray(one.command) - np.asarray(one.position)) for one in recordings]
+    grids = [grid for grid in grids_of(robot, leads) if len(grid.rows)]
+    found = readings(robot, grids, each=False).findings if grids else ()
+    return [
+        replace(one, evidence=f"by how far commands are ahead of the angles, {one.evidence}")
+        for one in found
+        if one.finding in OF_ANGLES
+    ]
 
 
 def _mended(

@@ -33,7 +33,7 @@ def best_ways(
     while True:
         other = min(_neighbours(best, joints, 1), key=cost)
         if cost(other) >= cost(best):
-            other = min(_neighbours(best, joints, 2), key=cost)
+            other = min(_neighbours(best, joints, 2), key=cost, default=best)
         if cost(other) >= cost(best):
             return best
         best = other

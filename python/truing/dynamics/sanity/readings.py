@@ -326,8 +326,10 @@ def _orders(
             yield _Candidate(kind, changed, read(order))
 
 
-def _counted_otherwise(model: _Model, reading: Reading, revolute: Sequence[bool]) -> Iterator[_Candidate]:
-    """Angles from other zeros, and some of them the other way."""
+def _counted_otherwise(
+    model: _Model, reading: Reading, revolute: Sequence[bool], poor: Sequence[int]
+) -> Iterator[_Candidate]:
+    """Angles from other zeros, or the other way: more than the sign of one joint that fits badly."""
     rows = model.rows
     every = max(1, len(rows.q) // ROWS_OF_WAYS)
     few = _Model(model.robot, Rows(*(getattr(rows, field.name)[::every] for field in fields(rows))))
@@ -345,7 +347,7 @@ def _counted_otherwise(model: _Model, reading: Reading, revolute: Sequence[bool]
 
     ways = conventions.best_ways(left, revolute, GAIN_OF_ALL / len(revolute))
     changed = tuple(j for j, way in enumerate(ways) if way != conventions.AS_IT_IS)
-    if len(changed) > 1 or any(quarter for _, quarter in ways):
+    if len(changed) > 1 or any(quarter for _, quarter in ways) or not set(changed) <= set(poor):
         yield _Candidate("angle_convention", changed, read(ways))
 
 
@@ -359,7 +361,8 @@ def better_reading(
     joints = driven_joints(robot)
     names, revolute = [joint.name for joint in joints], [joint.type == "revolute" for joint in joints]
     model = _Model(robot, rows)
-    few, seen = (POOR, POOR) if reading else (FAIR, SEEN)
+    of_all = reading is None  # a robot counts its angles one way: no single recording of several changes that
+    few, seen = (FAIR, SEEN) if of_all else (POOR, POOR)
     reading = reading or as_written(robot)
     fit = model.fit(reading)
     found: list[_Found] = []
@@ -370,8 +373,8 @@ def better_reading(
             candidates += _downs(model, reading)
         if np.any(fit.left > few):
             candidates += _orders(model, reading, names, revolute)
-        if poor or np.any((fit.left > few) & (fit.by_rigid > HEAVY)):
-            candidates += _counted_otherwise(model, reading, revolute)
+        if of_all and (poor or np.any((fit.left > few) & (fit.by_rigid > HEAVY))):
+            candidates += _counted_otherwise(model, reading, revolute, poor)
         tried = [
             (gain, candidate, other)
             for candidate in candidates
@@ -479,12 +482,12 @@ class Read:
     fit: Fit
 
 
-def readings(robot: _core.Robot, grids: Sequence[Grid]) -> Read:
+def readings(robot: _core.Robot, grids: Sequence[Grid], each: bool = True) -> Read:
     """All recordings together, then each: one of them may have been written otherwise."""
     joints = driven_joints(robot)
     found, reading, fit = better_reading(robot, rows_of(grids))
     cases = [(one, reading, tuple(grid.name for grid in grids)) for one in found]
-    for grid in grids:
+    for grid in grids if each else ():
         if len(grids) > 1 and len(grid.rows):
             more, own, _ = better_reading(robot, rows_of([grid], ROWS_OF_ONE), reading)
             cases += [(_of_one_alone(one), own, (grid.name,)) for one in more]
