@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +27,7 @@ from truing.cli.options import (
 )
 from truing.cli.run import Found, Loaded
 from truing.cli.tables import say, table
-from truing.errors import InputError
+from truing.errors import InputError, InputWarning
 
 if TYPE_CHECKING:
     from truing.dynamics import CheckedRecordings, Recording
@@ -202,6 +203,22 @@ def checked(loaded: tuple[Robot, Sequence[Recording]]) -> CheckedRecordings:
 
     require_torques(loaded[1])
     return check_recordings(*loaded)
+
+
+def with_sound_commands(robot: Robot, recordings: Sequence[Recording]) -> Sequence[Recording]:
+    """Recordings of commands alone with what is certain corrected, which a warning says; others as they are.
+    Raises InputError on a mistake in them: both models would be judged by it."""
+    from truing.dynamics import check_recordings
+    from truing.dynamics.recorded import by_commands
+
+    if not by_commands(recordings):
+        return recordings
+    found = check_recordings(robot, recordings)
+    for finding in found.findings:
+        if finding.mistake:
+            raise InputError(finding.evidence)
+        warnings.warn(finding.evidence, InputWarning, stacklevel=2)
+    return found.recordings
 
 
 def mistaken(result: Mapping[str, Any]) -> str:

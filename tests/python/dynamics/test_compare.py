@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ from truing.cli import main
 from truing.dynamics.comparison import Comparison, compare
 from truing.dynamics.export import export
 from truing.dynamics.result import recording_columns
-from truing.files import write_table
+from truing.errors import InputWarning
+from truing.examples import copy_servo_arm
+from truing.files import load_recordings, write_table
 from truing.testing.dynamics import SimulatedMotion, simulate_motion
 
 
@@ -120,3 +123,25 @@ def test_models_that_cannot_be_compared_are_refused(
     assert "nowhere.yaml" in refused(arguments(files, "good.yaml", "nowhere.yaml", out), out, capsys)
     said = refused([*arguments(files, "good.yaml", "bad.yaml", out), "--margin", "5"], out, capsys)
     assert "--margin: found '5'" in said
+
+
+def test_servos_are_not_compared_on_commands_with_another_sign(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arm = copy_servo_arm(tmp_path / "arm") / "arm.xml"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)  # the jaw is left out
+        robot = truing.load_robot(arm, any_tool=True, tip_link="gripper")
+        motion = load_recordings([arm.parent / "recordings"], robot, units="deg")[0]
+    n, out = motion.position.shape[1], tmp_path / "o"
+    for name, factor in (("wrong", -1.0), ("right", 180.0 / np.pi)):
+        command = factor * np.asarray(motion.command)
+        columns = {"t_s": motion.time}
+        columns |= {f"q{k + 1}_rad": motion.position[:, k] for k in range(n)}
+        columns |= {f"u{k + 1}_rad": command[:, k] for k in range(n)}
+        write_table(tmp_path / f"{name}.csv", columns)
+    typed = ["dynamics", "compare", str(arm), str(arm), "--tip-link", "gripper"]
+    assert main([*typed, str(tmp_path / "wrong.csv"), "--out", str(out)]) == 2 and not out.exists()
+    assert "goes the other way than it is sent" in capsys.readouterr().err.splitlines()[-1]
+    assert main([*typed, str(tmp_path / "right.csv"), "--out", str(out)]) == 0
+    assert "warning: commands are in deg, not in rad" in capsys.readouterr().err

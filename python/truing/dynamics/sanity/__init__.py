@@ -59,17 +59,8 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
         _core.validate_recording(recording, robot)
     if by_commands(recordings):
         return _of_commands(robot, recordings)
-    found, recordings = columns.clock(recordings)
-    magnitudes = are_magnitudes(robot, recordings)  # they turn back at zero, which is no spike
-    more, recordings = _mended(robot, recordings, ANGLES if magnitudes else JUMPS)
-    found += more
-    grids = grids_of(robot, recordings)
-    of_speeds, by_speed, by_angle = speeds(robot, grids)
-    found += of_speeds
-    recordings = [_scaled(one, by_speed.get(one.name), by_angle.get(one.name)) for one in recordings]
-    if _any_change(by_angle):
-        grids = grids_of(robot, recordings)
-    grids = [grid for grid in grids if len(grid.rows)]
+    found, recordings, grids = _by_themselves(robot, recordings)
+    magnitudes = are_magnitudes(robot, recordings)
     if magnitudes:
         found.append(columns.magnitudes())
     elif grids:
@@ -106,6 +97,21 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     found.sort(key=lambda one: (not one.mistake, one.finding in ("at_rest", "gaps", "one_recording")))
     cutoff = _core.TorqueOptions().cutoff if frequency is None else band.cutoff_below(frequency)
     return CheckedRecordings(robot, tuple(recordings), tuple(found), cutoff)
+
+
+def _by_themselves(
+    robot: _core.Robot, recordings: Sequence[_core.Recording]
+) -> tuple[list[RecordingFinding], list[_core.Recording], list[Grid]]:
+    """What clocks, angles and speeds show without a model: findings, recordings and their grids."""
+    found, recordings = columns.clock(recordings)
+    magnitudes = are_magnitudes(robot, recordings)  # they turn back at zero, which is no spike
+    more, recordings = _mended(robot, recordings, ANGLES if magnitudes else JUMPS)
+    grids = grids_of(robot, recordings)
+    of_speeds, by_speed, by_angle = speeds(robot, grids)
+    recordings = [_scaled(one, by_speed.get(one.name), by_angle.get(one.name)) for one in recordings]
+    if _any_change(by_angle):
+        grids = grids_of(robot, recordings)
+    return [*found, *more, *of_speeds], recordings, [grid for grid in grids if len(grid.rows)]
 
 
 def _of_commands(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:

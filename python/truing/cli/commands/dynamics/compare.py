@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
 from truing.cli.options import File, Fraction, Seed, keyword
-from truing.cli.recordings import ReadMotion, RecordingFiles
+from truing.cli.recordings import ReadMotion, RecordingFiles, with_sound_commands
 from truing.cli.tables import say, table
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Command(ReadMotion, run.Command[Loaded, "Comparison"]):
 
     def load(self, progress: run.Progress) -> Loaded:
         a, b = self.read_robot(self.model_a), self.read_robot(self.model_b)
-        recordings = self.read_recordings(a, self.recordings)
+        recordings = with_sound_commands(a, self.read_recordings(a, self.recordings))
         held = [recording for recording in recordings if recording.test]
         return Loaded(a, b, held or recordings)
 
