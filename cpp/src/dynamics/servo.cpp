@@ -8,9 +8,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #include "dynamics/servo_chain.hpp"
+#include "dynamics/servo_lanes.hpp"
 #include "math/batch.hpp"
 #include "rooms.hpp"
 
@@ -19,9 +22,9 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kFar = 1e3;         ///< [rad | m] a joint that is so far from its start has left
-constexpr std::size_t kAtOnce = 16;  ///< joints apart that go through a window side by side: they do not wait for
-                                     ///< each other's sums, and a processor works at several at once
+constexpr std::size_t kAtOnce = 16;       ///< joints apart that go through a window side by side: they do not wait for
+                                          ///< each other's sums, and a processor works at several at once
+constexpr std::size_t kLanesAtOnce = 32;  ///< the same of those that are the kernel's
 
 /// Cosine and sine, near zero by their series, to 1e-14.
 void turn_of(double x, double* cosine, double* sine) {
@@ -206,8 +209,8 @@ class Run {
         const Lane& lane = lanes_[l];
         const std::size_t set = places[lane.set];
         const double q = lane.drive.recorded(moved_->angle(l));
-        if (!(std::abs(q) < kFar)) left_[lane.set] = true;
-        out->position[set](row + k, lane.joint) = std::isfinite(q) ? std::clamp(q, -kFar, kFar) : kFar;
+        if (!(std::abs(q) < kServoFar)) left_[lane.set] = true;
+        out->position[set](row + k, lane.joint) = std::isfinite(q) ? std::clamp(q, -kServoFar, kServoFar) : kServoFar;
         if (!out->torque.empty()) out->torque[set](row + k, lane.joint) = lane.drive.torque();
       }
     }
@@ -335,20 +338,62 @@ ServoMotion zeros(std::size_t sets, Index rows, Index joints, bool torques) {
   return out;
 }
 
-/// Sets that go through windows side by side: so many that they have `kAtOnce` joints together.
-std::vector<std::vector<std::size_t>> side_by_side(const std::vector<ServoSet>& sets, std::size_t joints) {
-  std::vector<std::vector<std::size_t>> out;
-  std::size_t lanes = kAtOnce;
-  for (std::size_t k = 0; k < sets.size(); ++k) {
-    const std::size_t more = sets[k].only < 0 ? joints : 1;
-    if (lanes + more > kAtOnce) {
-      out.emplace_back();
-      lanes = 0;
+/// Pieces in groups that have up to so many joints together, each group of windows with the same steps between rows.
+/// Windows that are as long come one after the other.
+std::vector<std::vector<ServoPiece>> grouped(const ServoTask& task, const std::vector<std::size_t>& sets,
+                                             std::size_t most) {
+  std::vector<std::size_t> windows(task.windows.size());
+  std::iota(windows.begin(), windows.end(), std::size_t{0});
+  const auto kind = [&](std::size_t k) {
+    const ServoWindow& w = task.windows[k];
+    return std::make_pair(std::lround(task.recordings[static_cast<std::size_t>(w.recording)].step / task.arm.step),
+                          w.rows);
+  };
+  std::stable_sort(windows.begin(), windows.end(), [&](std::size_t a, std::size_t b) { return kind(a) < kind(b); });
+  std::vector<std::vector<ServoPiece>> out;
+  std::size_t lanes = most;
+  for (std::size_t k = 0; k < windows.size(); ++k) {
+    if (k > 0 && kind(windows[k]).first != kind(windows[k - 1]).first) lanes = most;
+    for (const std::size_t set : sets) {
+      const std::size_t more = task.sets[set].only < 0 ? task.arm.dof.size() : 1;
+      if (lanes + more > most) {
+        out.emplace_back();
+        lanes = 0;
+      }
+      out.back().push_back({set, windows[k]});
+      lanes += more;
     }
-    out.back().push_back(k);
-    lanes += more;
   }
   return out;
+}
+
+/// Whether all of a set's joints that move may be the kernel's.
+bool has_lanes(const ServoTask& task, const ServoSet& set) {
+  const auto value = [&](Index j, ServoField field) { return set.chain(j, static_cast<int>(field)); };
+  const auto joints = static_cast<Index>(task.arm.dof.size());
+  const Index first = std::max(0, set.only), end = set.only < 0 ? joints : set.only + 1;
+  for (Index j = first; j < end; ++j)
+    if (value(j, ServoField::backlash) > 0.0 || value(j, ServoField::elasticity) > 0.0 ||
+        value(j, ServoField::supply_sag) != 0.0)
+      return false;
+  return true;
+}
+
+/// Through the chain as the whole arm has it, the sets of a window side by side.
+void run_with_rotors(const ServoTask& task, const std::vector<ServoPiece>& pieces) {
+  for (std::size_t first = 0; first < pieces.size();) {
+    const std::size_t window = pieces[first].window;
+    const auto recording = static_cast<std::size_t>(task.windows[window].recording);
+    std::vector<const ServoSet*> sets;
+    std::vector<std::size_t> places;
+    for (; first < pieces.size() && pieces[first].window == window; ++first) {
+      places.push_back(pieces[first].set);
+      sets.push_back(&task.sets[pieces[first].set]);
+    }
+    Apart moved(task.arm, task.recordings[recording], task.paths, recording, sets);
+    Run<Apart> run(&moved, task.arm, task.recordings[recording], sets);
+    run.window(task.windows[window], task.rows[window], places, task.out);
+  }
 }
 
 }  // namespace
@@ -406,17 +451,19 @@ ServoMotion simulate_servos_apart(const ServoArm& arm, const std::vector<std::ve
   const std::size_t joints = arm.dof.size();
   const std::vector<Index> rows = rows_of(windows);
   ServoMotion out = zeros(sets.size(), rows.back(), static_cast<Index>(joints), torques);
-  const std::vector<std::vector<std::size_t>> groups = side_by_side(sets, joints);
+  const ServoTask task{arm, paths, recordings, windows, sets, rows, &out};
+  std::vector<std::size_t> plain, others;
+  for (std::size_t k = 0; k < sets.size(); ++k) (has_lanes(task, sets[k]) ? plain : others).push_back(k);
+  const std::vector<std::vector<ServoPiece>> side_by_side = grouped(task, plain, kLanesAtOnce);
+  const std::vector<std::vector<ServoPiece>> alone = grouped(task, others, kAtOnce);
   const auto work = [&](std::size_t k) {
-    const std::vector<std::size_t>& group = groups[k % groups.size()];
-    const std::size_t window = k / groups.size();
-    const auto recording = static_cast<std::size_t>(windows[window].recording);
-    std::vector<const ServoSet*> some;
-    for (const std::size_t set : group) some.push_back(&sets[set]);
-    Apart moved(arm, recordings[recording], paths, recording, some);
-    Run<Apart>(&moved, arm, recordings[recording], some).window(windows[window], rows[window], group, &out);
+    if (k < alone.size()) {
+      run_with_rotors(task, alone[k]);
+    } else {
+      ServoLanes(task, side_by_side[k - alone.size()]).run();
+    }
   };
-  for_each_on_threads(groups.size() * windows.size(), threads, {}, work, 1);
+  for_each_on_threads(alone.size() + side_by_side.size(), threads, {}, work, 1);
   return out;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "dynamics/servo_pair.hpp"
+#include "kernel/drive.hpp"
 #include "truing/dynamics/servo.hpp"
 
 namespace truing::dynamics {
@@ -35,6 +36,9 @@ struct ServoActs {
 
 /// The chain of one joint over one recording.
 class ServoDrive {
+  using F = ServoField;
+  using Index = Eigen::Index;
+
  public:
   ServoDrive(const ServoArm& arm, const ServoRecording& recording, const ServoSet& set, Eigen::Index joint)
       : command_(recording.command, joint),
@@ -70,6 +74,89 @@ class ServoDrive {
   double torque() const { return torque_; }
   /// The angle as the recording has it.
   double recorded(double angle) const { return encoder(angle) + d(F::zero); }
+
+  // ---- what the kernel's lanes take (kernel/drive.hpp), of a joint apart whose rotor is
+  // its link's and whose supply does not sag: put(row of the table, value)
+
+  unsigned laws() const {
+    unsigned out = 0;
+    const auto add = [&out](bool has, unsigned law) { out |= has ? law : 0; };
+    add(torque_command_, kernel::kDriveTorqueCommand);
+    add(d(F::damping_gain) != 0.0, kernel::kDriveDamped);
+    add(d(F::drive_law) != 1.0, kernel::kDriveBent);
+    add(d(F::stribeck) != 0.0, kernel::kDriveStribeck);
+    add(d(F::asymmetric_friction) != 0.0, kernel::kDriveAsymmetric);
+    add(d(F::presliding) > 0.0, kernel::kDrivePresliding);
+    add(!functions_.empty(), kernel::kDriveFunctions);
+    return out;
+  }
+
+  /// What holds for good, and where it stands when it has begun.
+  template <class Put>
+  void values(const Put& put) const {
+    using Row = kernel::DriveRow;
+    put(Row::command_gain, d(F::command_gain));
+    put(Row::integral_gain, d(F::integral_gain));
+    put(Row::damping_gain, d(F::damping_gain));
+    put(Row::most_change, d(F::rate_limit) * step_);
+    put(Row::saturation, d(F::saturation));
+    put(Row::drive_law, d(F::drive_law));
+    put(Row::drive_reference, d(F::drive_reference));
+    put(Row::dead_band, d(F::dead_band));
+    put(Row::coulomb, d(F::coulomb));
+    put(Row::viscous_law, d(F::viscous_law));
+    put(Row::stribeck, d(F::stribeck));
+    put(Row::stribeck_speed, d(F::stribeck_speed));
+    put(Row::load_friction, d(F::load_friction));
+    put(Row::asymmetric_friction, d(F::asymmetric_friction));
+    put(Row::presliding, d(F::presliding));
+    put(Row::warmup, d(F::warmup));
+    put(Row::spring, d(F::spring));
+    put(Row::current_offset, d(F::current_offset));
+    put(Row::gravity_scale, d(F::gravity_scale));
+    put(Row::armature, armature());
+    put(Row::zero, d(F::zero));
+    put(Row::rate, rate_);
+    put(Row::wanted, wanted_);
+    put(Row::integral, integral_);
+    put(Row::bristle, bristle_);
+    for (std::size_t k = 0; k < late_.size(); ++k) {
+      const auto row = static_cast<int>(Row::late) + 2 * static_cast<int>(k);
+      put(static_cast<Row>(row), static_cast<double>(late_[k].row - late_[0].row));
+      put(static_cast<Row>(row + 1), late_[k].later);
+    }
+  }
+
+  /// What holds until the next row, beside the command.
+  template <class Put>
+  void row_values(const Put& put) const {
+    using Row = kernel::DriveRow;
+    put(Row::on, on_ ? 1.0 : 0.0);
+    put(Row::enabled, enabled_part_);
+    put(Row::gain, gain_factor_);
+    put(Row::supply, supply_factor_);
+    put(Row::warmth, warmth_factor_);
+    put(Row::viscous, viscous_);
+  }
+
+  /// The commands that the steps after a row see.
+  template <class Put>
+  void commands(Index row, const Put& put) const {
+    using Row = kernel::DriveRow;
+    const Index first = row + late_[0].row;
+    const auto value = [&](Index k) { return command_(std::max<Index>(k, 0)); };
+    put(Row::command_before, value(first - 1));
+    put(Row::command, value(first));
+    put(Row::command_next, value(first + 1));
+    put(Row::command_after, value(first + 2));
+  }
+
+  /// The functions that are added to it.
+  void lend(std::vector<kernel::DriveFunction>* out) const {
+    for (const ServoFunction* f : functions_)
+      out->push_back({static_cast<kernel::DriveFunction::Input>(f->input), f->low, f->width, f->values.data(),
+                      static_cast<int>(f->values.size())});
+  }
 
   void begin(Eigen::Index row, double angle, double speed) {
     rotor_ = angle;
@@ -140,9 +227,6 @@ class ServoDrive {
   }
 
  private:
-  using F = ServoField;
-  using Index = Eigen::Index;
-
   static constexpr double kTurning = 0.01;        ///< [rad/s | m/s] where friction that is computed here turns round
   static constexpr double kSpringDamping = 0.07;  ///< of the critical, with the link held: of a spring
   static constexpr double kLinkArmature = 0.02;   ///< of the rotor's inertia that stays at the link, behind a play

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "drive.hpp"
 #include "kernel.hpp"
 #include "rigid.hpp"
 
@@ -15,19 +16,23 @@ namespace truing::kernel {
 namespace scalar {
 extern const Functions table;
 extern const RigidFunctions rigid_table;
+extern const DriveFunctions drive_table;
 }  // namespace scalar
 namespace sse2 {
 extern const Functions table;
 extern const RigidFunctions rigid_table;
+extern const DriveFunctions drive_table;
 }  // namespace sse2
 #if TRUING_X86
 namespace avx2 {
 extern const Functions table;
 extern const RigidFunctions rigid_table;
+extern const DriveFunctions drive_table;
 }  // namespace avx2
 namespace avx512 {
 extern const Functions table;
 extern const RigidFunctions rigid_table;
+extern const DriveFunctions drive_table;
 }  // namespace avx512
 #endif
 
@@ -75,6 +80,24 @@ const RigidFunctions* rigid_functions(const char* name) {
 
 const RigidFunctions& rigid_functions() {
   static const RigidFunctions& chosen = *rigid_functions(functions().name);
+  return chosen;
+}
+
+const DriveFunctions* drive_functions(const char* name) {
+  const Functions* found = functions(name);
+  if (!found) return nullptr;
+  for (const DriveFunctions* copy : {&scalar::drive_table, &sse2::drive_table,
+#if TRUING_X86
+                                     &avx2::drive_table, &avx512::drive_table
+#endif
+       }) {
+    if (std::strcmp(copy->name, found->name) == 0) return copy;
+  }
+  return nullptr;
+}
+
+const DriveFunctions& drive_functions() {
+  static const DriveFunctions& chosen = *drive_functions(functions().name);
   return chosen;
 }
 
