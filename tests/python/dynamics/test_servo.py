@@ -225,8 +225,7 @@ def test_one_joint_alone_is_the_same_joint(tmp_path: Path) -> None:
     file, recordings = moved_by_itself(tmp_path)
     of = prepare(file, recordings, window=np.inf)
     point = point_of(of.arm.nominal).with_value(1, "load_friction", 0.2)
-    apart = Apart(of.simulator)
-    every, alone = apart.run([point], of.windows)[0][0], apart.run([point], of.windows, only=[1])[0][0]
+    every, alone = (Apart(of.simulator).run([point], of.windows, only=[joint])[0][0] for joint in (-1, 1))
     assert np.array_equal(every[:, 1], alone[:, 1]) and not alone[:, 0].any()
 
 
@@ -240,7 +239,33 @@ def test_joints_side_by_side_do_what_each_does_alone(tmp_path: Path) -> None:
     joints = [-1, 0, -1, 0, 0, -1]
     together = apart.run(points, of.windows, only=joints)[0]
     for point, joint, motion in zip(points, joints, together, strict=True):
-        assert np.array_equal(apart.run([point], of.windows, only=[joint])[0][0], motion)
+        assert np.array_equal(Apart(of.simulator).run([point], of.windows, only=[joint])[0][0], motion)
+
+
+def test_joints_that_were_simulated_before_are_not_simulated_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of chains that differ at another joint; where one leaves, its arm stands still, as without the rest."""
+    file, recordings = moved_by_itself(tmp_path)
+    of = prepare(file, recordings, window=np.inf)
+    apart, base = Apart(of.simulator), point_of(of.arm.nominal)
+    leaves = base.with_value(0, "command_gain", -1e6).with_value(0, "coulomb", 0.0)
+    both = base.with_value(0, "coulomb", 0.3).with_value(1, "coulomb", 0.2)
+    points = [base, base.with_value(0, "coulomb", 0.3), base.with_value(1, "coulomb", 0.2), both, leaves]
+    sets: list[int] = []
+    simulate = _core.simulate_servos_apart
+
+    def counted(*arguments: object) -> object:
+        sets.append(len(arguments[4]))  # type: ignore[arg-type]
+        return simulate(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(_core, "simulate_servos_apart", counted)
+    first, again = (apart.run(points, of.windows)[0] for _ in range(2))
+    assert sets == [4, 1, 1]  # not `both`; what leaves once more, as a whole
+    for point, *motions in zip(points, first, again, strict=True):
+        expected = Apart(of.simulator).run([point], of.windows)[0][0]
+        assert all(np.array_equal(motion, expected) for motion in motions)
+    assert np.abs(first[-1]).max() == 1e3
 
 
 def test_steps_of_joints_apart_are_the_longest_that_rows_are_whole_numbers_of(file: Path) -> None:

@@ -6,6 +6,7 @@ more than the simulator moves the whole arm. The search looks here; the simulato
 from __future__ import annotations
 
 import math
+from collections import ChainMap
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -14,13 +15,19 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.servo.data import ServoData, Stream, Window
-from truing.dynamics.servo.simulator import Point, Simulator
+from truing.dynamics.servo.simulator import FIELDS, Point, Simulator
 from truing.dynamics.smoothing import cubics, rows_within
 
 Floats = NDArray[np.float64]
 Tables = tuple[Floats, Floats, Floats, Floats]
 """Inertia, bias, weight by cosine and sine of a joint's own turn: `ServoPath`. shape=(n, joints)"""
 
+Lane = tuple[object, ...]
+"""All that the motion of a joint apart goes by: its number, values, masses, functions, windows."""
+
+_SAG = FIELDS.index("supply_sag")
+_FAR = 1e3  # [rad | m]: what is so far has left
+_REMEMBERED = 4_000_000  # numbers, 32 MB
 _SMOOTHING = 0.03  # [s] on both sides, of accelerations: they are needed of the other joints alone
 _SLIDE = 2  # mjtJoint
 
@@ -41,6 +48,9 @@ class Apart:
         self._core_arm = simulator.core_arm_with(self.step)
         self._paths: dict[tuple[object, ...], list[_core.ServoPath]] = {}
         self._known: dict[tuple[str, int], Tables] = {}
+        self._motions: dict[Lane, Floats] = {}
+        self._held = 0  # numbers of these
+        self._numbers: dict[tuple[Window, ...], int] = {}
         none = np.zeros((0, len(names)))
         self._turned = self._turns.astype(float)
         self._unseen = _core.ServoPath(none, none, none, none, self._turned)
@@ -59,8 +69,82 @@ class Apart:
         only: Sequence[int] | None = None,
     ) -> tuple[list[Floats], list[Floats]]:
         """As `Simulator.run`. only: of each point the joint that is moved, where the others do not matter;
-        -1: all."""
-        moved = [-1] * len(points) if only is None else only
+        -1: all. A joint's motion is remembered for a while: chains that differ elsewhere have the same."""
+        moved = [-1] * len(points) if only is None else list(only)
+        if torques or any(np.any(p.chain[:, _SAG] != 0.0) for p in points):  # which joints feel together
+            return self._simulated(points, windows, torques, moved)
+        lanes = [self._lanes(p, windows, joint) for p, joint in zip(points, moved, strict=True)]
+        asked: dict[Lane, None] = {}
+        jobs: list[tuple[int, int]] = []
+        for k, (own, joint) in enumerate(zip(lanes, moved, strict=True)):
+            new = [j for j, lane in own.items() if lane not in self._motions and lane not in asked]
+            jobs += [(k, joint)] if len(new) == len(own) else [(k, j) for j in new]
+            asked |= dict.fromkeys(own[j] for j in new)
+        whole, fresh = self._fresh(points, windows, lanes, jobs)
+        seen = ChainMap(fresh, self._motions)
+        out = [
+            whole[k] if k in whole else self._together([seen.get(lane) for lane in own.values()], joint)
+            for k, (own, joint) in enumerate(zip(lanes, moved, strict=True))
+        ]
+        left = [k for k, motion in enumerate(out) if motion is None]
+        again = self._simulated([points[k] for k in left], windows, False, [moved[k] for k in left])[0]
+        for k, motion in zip(left, again, strict=True):
+            out[k] = motion
+        self._remember(fresh)
+        return [motion for motion in out if motion is not None], []
+
+    def _lanes(self, point: Point, windows: Sequence[Window], only: int) -> dict[int, Lane]:
+        """All that the motion of each joint goes by."""
+        number = self._numbers.setdefault(tuple(windows), len(self._numbers))
+        common = (number, point.weight, _masses(point))
+        functions = [(f[0], (*f[1:4], f[4].tobytes())) for f in point.functions]
+        return {
+            j: (j, point.chain[j].tobytes(), common, tuple(f for joint, f in functions if joint == j))
+            for j in (range(len(point.chain)) if only < 0 else (only,))
+        }
+
+    def _fresh(
+        self,
+        points: Sequence[Point],
+        windows: Sequence[Window],
+        lanes: Sequence[dict[int, Lane]],
+        jobs: Sequence[tuple[int, int]],
+    ) -> tuple[dict[int, Floats], dict[Lane, Floats]]:
+        """Simulates points as a whole (joint -1), or a joint of them: motions of the first, and of joints.
+        Where one leaves, all of its arm stand still: they are no other arm's."""
+        motions = self._simulated([points[k] for k, _ in jobs], windows, False, [j for _, j in jobs])[0]
+        whole: dict[int, Floats] = {}
+        fresh: dict[Lane, Floats] = {}
+        for (k, joint), motion in zip(jobs, motions, strict=True):
+            motion.flags.writeable = False
+            if joint < 0:
+                whole[k] = motion
+            if joint >= 0 or not has_left(motion):
+                fresh |= {lane: motion[:, j] for j, lane in lanes[k].items() if joint in (-1, j)}
+        return whole, fresh
+
+    def _together(self, columns: Sequence[Floats | None], only: int) -> Floats | None:
+        """Of joints that were simulated one by one. None: there is one that was not, or has left."""
+        if any(one is None or (only < 0 and has_left(one)) for one in columns):
+            return None
+        rows = [one for one in columns if one is not None]
+        out = np.zeros((rows[0].size, len(self._turns)), order="F")
+        for j, column in enumerate(rows):
+            out[:, j if only < 0 else only] = column
+        return out
+
+    def _remember(self, fresh: dict[Lane, Floats]) -> None:
+        """What was known longest goes first."""
+        self._motions |= fresh
+        self._held += sum(column.size for column in fresh.values())
+        while self._held > _REMEMBERED:
+            self._held -= self._motions.pop(next(iter(self._motions))).size
+
+    def _simulated(
+        self, points: Sequence[Point], windows: Sequence[Window], torques: bool, moved: Sequence[int]
+    ) -> tuple[list[Floats], list[Floats]]:
+        if not points:
+            return [], []
         kinds: dict[tuple[object, ...], int] = {}
         for p in points:
             kinds.setdefault(_masses(p), len(kinds))
@@ -160,6 +244,10 @@ def longer_step(data: ServoData, longest: float) -> float:
     recordings are whole numbers apart."""
     apart = data.step * math.gcd(*(round(s.step / data.step) for s in data.streams))
     return apart / math.ceil(apart / max(longest, data.step) - 1e-6)
+
+
+def has_left(motion: Floats) -> bool:
+    return bool(np.abs(motion).max() >= _FAR)
 
 
 def _masses(point: Point) -> tuple[object, ...]:
