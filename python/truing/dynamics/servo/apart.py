@@ -200,20 +200,21 @@ class Apart:
         d = mujoco.MjData(m)
         n, rows = self._joints.size, stream.time.size
         acceleration = cubics(stream.speed, rows_within(_SMOOTHING, stream.step), stream.step)[1]
-        places = np.asarray(m.jnt_qposadr)[self._joints]
+        places, dofs = in_a_row(np.asarray(m.jnt_qposadr)[self._joints]), in_a_row(self.dofs)
+        joints = in_a_row(self._joints)
         torque, one = np.empty((rows, n)), np.empty(m.nv)
         axes, anchors = np.empty((rows, n, 3)), np.empty((rows, n, 3))
         centres, turns = np.empty((rows, m.nbody, 3)), np.empty((rows, m.nbody, 9))
         q, v, qdd, axis_of, anchor_of = d.qpos, d.qvel, d.qacc, d.xaxis, d.xanchor
         centre_of, turn_of = d.xipos, d.ximat
         for k in range(rows):
-            q[places], v[self.dofs], qdd[self.dofs] = stream.smooth[k], stream.speed[k], acceleration[k]
+            q[places], v[dofs], qdd[dofs] = stream.smooth[k], stream.speed[k], acceleration[k]
             mujoco.mj_kinematics(m, d)
             mujoco.mj_comPos(m, d)
             mujoco.mj_comVel(m, d)
             mujoco.mj_rne(m, d, 1, one)
-            torque[k] = one[self.dofs]
-            axes[k], anchors[k] = axis_of[self._joints], anchor_of[self._joints]
+            torque[k] = one[dofs]
+            axes[k], anchors[k] = axis_of[joints], anchor_of[joints]
             centres[k], turns[k] = centre_of, turn_of
         turned = turns.reshape(rows, m.nbody, 3, 3)
         inertia, cosine, sine = np.empty((rows, n)), np.zeros((rows, n)), np.zeros((rows, n))
@@ -244,6 +245,13 @@ def longer_step(data: ServoData, longest: float) -> float:
     recordings are whole numbers apart."""
     apart = data.step * math.gcd(*(round(s.step / data.step) for s in data.streams))
     return apart / math.ceil(apart / max(longest, data.step) - 1e-6)
+
+
+def in_a_row(numbers: NDArray[np.intp]) -> slice | NDArray[np.intp]:
+    """A slice, which numpy reads ten times faster, where it takes the same."""
+    first = int(numbers[0])
+    follows = np.array_equal(numbers, np.arange(first, first + numbers.size))
+    return slice(first, first + numbers.size) if follows else numbers
 
 
 def has_left(motion: Floats) -> bool:
