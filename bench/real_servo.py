@@ -27,6 +27,7 @@ from truing.dynamics.servo import PARAMETERS, ServoDiagnosis, servo_diagnose
 from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.api import LONGEST_STEP, prepare
 from truing.dynamics.servo.data import Window
+from truing.dynamics.servo.firm import firmly
 from truing.dynamics.servo.fit import Fitter, rows_of
 from truing.dynamics.servo.free import free_value
 from truing.dynamics.servo.ground import groundwork, sizes_of
@@ -97,6 +98,7 @@ def by_truing(
     of = prepare(file, list(recordings))
     fitter = Fitter(Apart(of.simulator, LONGEST_STEP), rows_of(of.data, of.train))
     standard, _ = groundwork(fitter, point_of(of.arm.nominal), of.data)
+    standard = firmly(Namer(fitter, (), 0), standard)
     alone = time.process_time() - begun
     chain = chain_of(standard.point, of.arm.nominal)
     drive = chain.drives[0]

@@ -24,7 +24,8 @@ from truing.dynamics.servo.candidates import Candidate, candidates_of
 from truing.dynamics.servo.data import servo_data
 from truing.dynamics.servo.export.held import held, uses_of
 from truing.dynamics.servo.export.mjcf import write as write_mjcf
-from truing.dynamics.servo.fit import Fitter, rows_of
+from truing.dynamics.servo.firm import firmly, serves
+from truing.dynamics.servo.fit import Fitted, Fitter, Noise, cut_of, rows_of, sums
 from truing.dynamics.servo.free import Sizes, free_value, usual_values
 from truing.dynamics.servo.ground import (
     _better_start as better_start,
@@ -735,6 +736,70 @@ def test_what_held_out_motion_vetoes_leaves_the_chain(file: Path) -> None:
     assert found.rollout.errors["named"][0, -1] == pytest.approx(
         found.rollout.errors["standard"][0, -1], rel=0.05
     )
+
+
+# ---- values that few rows do not decide ---------------------------------------------------------------
+def stalled(recordings: list[_core.Recording]) -> list[_core.Recording]:
+    """The first is held fast for 1.5 s: angles stay, and then are again what they would have been."""
+    position = np.asarray(recordings[0].position).copy()
+    position[100:250] = position[100]
+    return [one.replace(test=False) for one in (recordings[0].replace(position=position), *recordings[1:])]
+
+
+def groundwork_of(file: Path, recordings: list[_core.Recording]) -> tuple[Namer, Fitted]:
+    of = prepared_of(file, recordings)
+    fitter = Fitter(Apart(of.simulator, LONGEST_STEP), rows_of(of.data, of.windows))
+    standard, _ = groundwork(fitter, point_of(of.arm.nominal), of.data)
+    return Namer(fitter, (), 0), standard
+
+
+def test_a_gradient_is_that_of_the_loss() -> None:
+    random = np.random.default_rng(0)
+    errors, columns = random.standard_normal((50, 2)), random.standard_normal((3, 50))
+    table = [(0, columns[0]), (1, columns[1]), (0, columns[2])]
+    noise = Noise(np.array([0.7, 1.3]), np.ones(2), np.array([0.5, 1.0]))
+
+    def loss(values: Floats) -> float:
+        left = errors.copy()
+        for (joint, column), value in zip(table, values, strict=True):
+            left[:, joint] -= value * column
+        return 0.5 * float(np.sum((noise.counted(left) * noise.weight) ** 2))
+
+    step = 1e-5 * np.eye(3)
+    by_loss = [(loss(-one) - loss(one)) / 2e-5 for one in step]
+    assert sums(*noise.weighed(table, errors), noise)[1] == pytest.approx(by_loss, rel=1e-6)
+    assert loss(np.zeros(3)) < 0.5 * float(np.sum((errors * noise.weight) ** 2))
+
+
+def test_small_errors_are_squared_and_large_ones_go_on_straight() -> None:
+    noise = Noise(np.ones(1), np.ones(1), np.array([2.0]))
+    squares = noise.counted(np.array([[0.5], [-2.0], [3.0], [-4.0]]))[:, 0] ** 2
+    assert squares == pytest.approx([0.25, 4.0, 8.0, 12.0])
+
+
+def test_a_joint_that_mostly_rests_has_a_cut() -> None:
+    errors = np.zeros((100, 1))
+    errors[:10] = 1.0
+    assert cut_of(errors)[0] == pytest.approx(1.345 / 3.0 * np.sqrt(0.1))
+
+
+def test_a_stall_does_not_decide_the_values(file: Path) -> None:
+    truth = point_of(prepared_of(file, recordings_of(file)).arm.nominal).chain
+    namer, standard = groundwork_of(file, stalled(recordings_of(file, 5e-4)))
+    assert serves(namer, standard)
+    firm = firmly(namer, standard)
+
+    def off(fitted: Fitted) -> Floats:
+        return np.array([abs(f.at(fitted.point) - np.log(truth[0, k])) for f, k in fields])
+
+    names = _core.servo_fields()
+    fields = [(f, names.index(f.field)) for f in standard.free if f.field in ("viscous", "command_gain")]
+    assert np.all(off(firm) < 0.5 * off(standard))
+
+
+def test_squares_stay_where_nothing_stands_out(file: Path) -> None:
+    namer, standard = groundwork_of(file, [one.replace(test=False) for one in recordings_of(file, 5e-4)])
+    assert not serves(namer, standard) and firmly(namer, standard) is standard
 
 
 SEARCH = """

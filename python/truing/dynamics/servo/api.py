@@ -18,6 +18,7 @@ from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.arm import ServoArm, servo_arm
 from truing.dynamics.servo.data import ServoData, Window, servo_data, windows_of
 from truing.dynamics.servo.departures import departures, instead
+from truing.dynamics.servo.firm import firm
 from truing.dynamics.servo.fit import Fitter, Rows, rows_of
 from truing.dynamics.servo.free import USUAL
 from truing.dynamics.servo.ground import groundwork
@@ -144,6 +145,9 @@ def servo_diagnose(
     single = len({prepared.data.streams[w.stream].fold for w in prepared.train}) < 2
     judge = Judge(prepared, apart, nominal, standard.point)
     account, sure, functions = _what_holds(namer, account, judge, single)
+    account = firm(namer, account)
+    standard = account.standard
+    judge.standard = standard.point
     models = {"nominal": nominal, "standard": standard.point, "named": account.fitted.point}
     parts = Parts(
         prepared.simulator,

@@ -31,6 +31,10 @@ _LAST = 2e-3  # relative fall of the cost at which a fit ends
 _ANCHORS = 3
 _AGREES = 0.02  # of the rms error: what the anchor may still change
 _LEFT = 3.0  # [rad] an error that is cut: what has left pulls no more than this
+_MEDIAN = 1.4826  # standard deviation of normal errors over the median of their sizes
+_HUBER = 1.345  # of it: 95 % efficient where errors are normal (Huber 1964)
+_LEAST_SCALE = 1.0 / 3.0  # of the rms
+_FIRM_TURNS, _FIRM_ROUNDS = 3, 5
 _LAGS = 400  # rows: longest correlation that is summed
 
 
@@ -61,10 +65,40 @@ class Noise:
 
     sigma: Floats  # shape=(joints,) [rad | m]
     effect: Floats  # shape=(joints,): rows that count as one (Kish 1965)
+    cut: Floats | None = None  # shape=(joints,) [rad | m]: larger errors count in proportion (Huber 1964)
 
     @property
     def weight(self) -> Floats:
         return np.asarray(1.0 / (self.sigma * np.sqrt(self.effect)))
+
+    def counted(self, errors: Floats) -> Floats:
+        """Errors whose squares are twice Huber's loss: e^2 up to the cut c, c (2 |e| - c) beyond."""
+        if self.cut is None:
+            return errors
+        size = np.abs(errors)
+        return np.where(size > self.cut, np.sqrt(self.cut * np.maximum(2.0 * size - self.cut, 0.0)), size)
+
+    def weighed(self, table: Sequence[Column], errors: Floats) -> tuple[Sequence[Column], Floats]:
+        """Columns and errors of the weighted squares whose gradient is the loss's."""
+        return (table, errors) if self.cut is None else scaled(table, errors, huber_roots(errors, self.cut))
+
+
+def cut_of(errors: Floats) -> Floats:
+    """Of each joint, where Huber's loss asks 5 % more rows of normal errors, whose scale the median says (of
+    a joint that mostly rests it says nothing)."""
+    rms = np.sqrt(np.mean(errors**2, axis=0))
+    scale = np.maximum(_MEDIAN * np.median(np.abs(errors), axis=0), _LEAST_SCALE * rms)
+    return np.asarray(_HUBER * np.maximum(scale, 1e-9))
+
+
+def huber_roots(errors: Floats, cut: Floats) -> Floats:
+    """Roots of rows' weights: 1, and c / |e| beyond the cut."""
+    return np.asarray(np.sqrt(np.minimum(1.0, cut / np.maximum(np.abs(errors), 1e-300))))
+
+
+def scaled(table: Sequence[Column], errors: Floats, root: Floats) -> tuple[list[Column], Floats]:
+    """Rows of columns and errors, each times its root."""
+    return [(j, column * (root if j < 0 else root[:, j])) for j, column in table], errors * root
 
 
 def noise_of(errors: Floats, rows: Rows, least: Floats) -> Noise:
@@ -173,6 +207,13 @@ class Fitter:
             best = self.fit(best.point, free, start, noise, 2, doing)
         return best
 
+    def firm(self, fitted: Fitted, doing: str = "") -> Fitted:
+        """A fit's values by Huber's loss, cut anew where each fit ends."""
+        for _ in range(_FIRM_TURNS):
+            noise = replace(fitted.noise, cut=cut_of(fitted.errors))
+            fitted = self.settled(fitted.point, fitted.free, fitted.start, noise, _FIRM_ROUNDS, doing)
+        return replace(fitted, noise=replace(fitted.noise, cut=None))
+
     def columns(
         self, point: Point, free: Sequence[Free], exact: bool = False, known: Floats | None = None
     ) -> tuple[Floats, list[Column]]:
@@ -207,7 +248,7 @@ class Fitter:
 
     def cost(self, errors: Floats, point: Point, free: Sequence[Free], start: Floats, noise: Noise) -> float:
         """Half of the weighted squares, and of the priors'."""
-        squares = float(np.sum((errors * noise.weight) ** 2))
+        squares = float(np.sum((noise.counted(errors) * noise.weight) ** 2))
         priors = sum(((f.at(point) - s) / f.prior) ** 2 for f, s in zip(free, start, strict=True))
         return 0.5 * float(squares + priors)
 
@@ -277,7 +318,7 @@ class Fitter:
         self, errors: Floats, point: Point, free: Sequence[Free], start: Floats, noise: Noise
     ) -> Floats:
         """`cost`, joint by joint; priors of what is of the whole arm stand at the first."""
-        out = 0.5 * np.sum((errors * noise.weight) ** 2, axis=0)
+        out = 0.5 * np.sum((noise.counted(errors) * noise.weight) ** 2, axis=0)
         for one, mean in zip(free, start, strict=True):
             out[max(one.joint, 0)] += 0.5 * ((one.at(point) - mean) / one.prior) ** 2
         return np.asarray(out)
@@ -292,7 +333,7 @@ class Fitter:
         noise: Noise,
     ) -> list[Floats]:
         """Steps of every damping: (X'X + P + mu D) s = X'e - P (x - start)."""
-        xx, xy = sums(table, errors, noise)
+        xx, xy = sums(*noise.weighed(table, errors), noise)
         precision = np.array([f.prior**-2 for f in free])
         at = np.array([f.at(point) for f in free])
         right = xy - precision * (at - start)

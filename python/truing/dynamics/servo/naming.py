@@ -114,26 +114,35 @@ class Sums:
 
 
 def squares_of_folds(
-    sums: Sums, fitted: Fitted, more: Sequence[int] = (), prior: Floats | None = None
+    sums: Sums,
+    fitted: Fitted,
+    more: Sequence[int] = (),
+    prior: Floats | None = None,
+    by: Sequence[FoldSums] | None = None,
 ) -> Floats:
     """Squares of each fold by the fit to the others, linear at the fit, with its priors: what motion hardly
     shows would otherwise go anywhere. Nor do values go further than derivatives hold. more: further columns
-    that are in, numbered as in `sums`, and their priors."""
+    that are in, numbered as in `sums`, and their priors. by: sums that the others are fitted by, of rows that
+    are weighed otherwise."""
     columns = [*range(sums.always), *more]
     extra = np.zeros(0) if prior is None else prior
     precision = np.array([*(f.prior for f in fitted.free), *extra]) ** -2.0
     away = np.array([f.at(fitted.point) - s for f, s in zip(fitted.free, fitted.start, strict=True)])
     pull = precision * np.array([*away, *np.zeros(len(extra))])
-    parts = [(xx[np.ix_(columns, columns)], xy[columns], yy) for xx, xy, yy, _ in sums.folds]
-    xx, xy = sum(part[0] for part in parts), sum(part[1] for part in parts)
+    fits, parts = ([_of_columns(one, columns) for one in some] for some in (by or sums.folds, sums.folds))
+    xx, xy = sum(part[0] for part in fits), sum(part[1] for part in fits)
     sigma = np.sqrt(np.diag(np.linalg.inv(xx + np.diag(precision))))
     known = slice(0, sums.always)
     out = []
-    for here, right, squares in parts:
-        values = np.linalg.solve(xx - here + np.diag(precision), xy - right - pull)
+    for (fitted_xx, fitted_xy, _), (here, right, squares) in zip(fits, parts, strict=True):
+        values = np.linalg.solve(xx - fitted_xx + np.diag(precision), xy - fitted_xy - pull)
         values[known] = np.clip(values[known], -_STRAIGHT * sigma[known], _STRAIGHT * sigma[known])
         out.append(squares - 2.0 * float(values @ right) + float(values @ here @ values))
     return np.array(out)
+
+
+def _of_columns(fold: FoldSums, columns: Sequence[int]) -> tuple[Floats, Floats, float]:
+    return fold[0][np.ix_(columns, columns)], fold[1][columns], fold[2]
 
 
 class Namer:
