@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.servo import PARAMETERS, ServoDiagnosis, servo_diagnose, servo_dict
 from truing.dynamics.servo.apart import Apart, longer_step
-from truing.dynamics.servo.api import LONGEST_STEP, Judge, Prepared, _veto as vetoed, prepare
+from truing.dynamics.servo.api import LONGEST_STEP, Judge, Prepared, _veto as vetoed, prepare, removes
 from truing.dynamics.servo.candidates import Candidate, candidates_of
 from truing.dynamics.servo.data import servo_data
 from truing.dynamics.servo.export.held import held, uses_of
@@ -932,7 +932,7 @@ def test_a_usual_parameter_that_the_file_has_otherwise_is_told() -> None:
 def test_a_name_needs_held_out_motion(without: float, of_class: float, said: str | None) -> None:
     rows = np.ones((100, 1))
     held = [0.2 * rows, 0.05 * rows, 0.01 * rows, without * rows]
-    found = vetoed([Sureness(of_class, (), of_class)], held, np.arange(100) // 10, np.array([1e-3]))
+    found = vetoed([Sureness(of_class, (), of_class)], held, np.arange(100) // 10, np.array([1e-3]), [0])
     assert found is None if said is None else found is not None and said in found[1]
 
 
@@ -941,9 +941,35 @@ def test_a_name_moves_the_arm_by_more_than_encoders_show() -> None:
     held = [0.2 * rows, 5e-4 * rows, 1e-4 * rows, 5e-4 * rows]
     sure = [Sureness(0.9, (), 0.9)]
     blocks = np.arange(100) // 10
-    assert vetoed(sure, held, blocks, np.array([3e-4])) is None
-    found = vetoed(sure, held, blocks, np.array([5e-4]))
+    assert vetoed(sure, held, blocks, np.array([3e-4]), [0]) is None
+    found = vetoed(sure, held, blocks, np.array([5e-4]), [0])
     assert found is not None and "encoders" in found[1]
+
+
+BLOCKS = np.arange(400) // 20
+
+
+def removed(before: Floats, after: Floats) -> tuple[bool, bool]:
+    """By block, of a joint where the usual parameters leave 1."""
+    return removes(*(one[BLOCKS, None] for one in (before, after, np.ones(20))), BLOCKS)
+
+
+def test_held_out_errors_fall_for_certain_in_a_few_seconds_or_in_most() -> None:
+    """In six blocks of twenty; in all, though nearly all of it in one; in as many as they rise in."""
+    few, random = np.ones(20), np.ones(20)
+    few[:6], few[6:], random[::2], random[1::2] = 0.3, 1.005, 1.3, 0.6
+    assert removed(np.ones(20), few)[0]
+    assert removed(np.append([5.0], np.ones(19)), np.append([0.5], np.full(19, 0.9)))[0]
+    assert not removed(np.ones(20), random)[0]
+
+
+def test_held_out_errors_fall_by_enough_of_what_others_leave() -> None:
+    """A tenth of what is there without a name, and 3 % of what other names removed there."""
+    left = np.full(20, np.sqrt(0.15))
+    assert removed(left, np.full(20, np.sqrt(0.10)))[1]
+    assert not removed(left, np.full(20, np.sqrt(0.12)))[1]
+    assert not removed(np.full(20, np.sqrt(0.05)), np.full(20, np.sqrt(0.03)))[1]
+    assert not removed(np.ones(20), np.full(20, np.sqrt(0.92)))[1]
 
 
 def test_a_rival_that_explains_nearly_as_much_shares_the_name() -> None:

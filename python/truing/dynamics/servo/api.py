@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +25,16 @@ from truing.dynamics.servo.free import USUAL
 from truing.dynamics.servo.ground import groundwork
 from truing.dynamics.servo.judge import judged, traces_of
 from truing.dynamics.servo.mounting import Grounded, mounting
-from truing.dynamics.servo.naming import NAMED, Account, Namer, Sureness, late, sureness
+from truing.dynamics.servo.naming import (
+    INEXACT,
+    NAMED,
+    Account,
+    Namer,
+    Sureness,
+    late,
+    rooted_gain,
+    sureness,
+)
 from truing.dynamics.servo.result import ServoDiagnosis
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, point_of
 from truing.dynamics.servo.unknown import FoundFunction, Unknown
@@ -37,6 +47,7 @@ WINDOW = 5.0  # [s] about: longer ones see slow effects better, and forget the s
 MAX_EFFECTS = 12
 LONGEST_STEP = 0.005  # [s] of joints apart, in the search; what is reported is the whole arm's
 LEAST_HELD = 0.1  # of a joint's squared error on held-out motion: other laws may well do less (OTHER_LAWS)
+CERTAIN = 1.645  # standard errors over blocks of held-out motion
 BLOCK = 1.0  # [s] of held-out motion, over which the interval of what a name removes is taken
 
 
@@ -203,26 +214,53 @@ def _not_vetoed(namer: Namer, account: Account, judge: Judge, single: bool) -> l
     return sure
 
 
+def removes(without: Floats, named: Floats, standard: Floats, blocks: NDArray[np.intp]) -> tuple[bool, bool]:
+    """Whether held-out errors fall for certain, and whether by enough: by a tenth of what is there without,
+    and by what other laws may miss of what they removed there (of several joints, counted as one).
+    shape=(rows, joints) each."""
+    scale = np.maximum(np.sqrt(np.mean(standard**2, axis=0)), 1e-9)
+    before, after = (
+        np.asarray(np.bincount(blocks, np.sum((e / scale) ** 2, axis=1)), dtype=float)
+        for e in (without, named)
+    )
+    rows = float(len(blocks))
+    left = float(before.sum()) / rows / standard.shape[1]
+    gain = float((before - after).sum()) / rows
+    enough = gain >= LEAST_HELD * left + INEXACT * max(0.0, 1.0 - left)
+    if before.size < 2:
+        return False, enough
+    # What acts in few seconds is seen by sums; what acts all the time, but mostly in a few, by roots.
+    gains = before - after
+    by_sums = float(gains.mean()), float(gains.std(ddof=1)) / math.sqrt(before.size)
+    sure = any(mean > CERTAIN * error for mean, error in (by_sums, rooted_gain(before, after)))
+    return sure, enough
+
+
 def _veto(
-    sure: Sequence[Sureness], held: Sequence[Floats], blocks: NDArray[np.intp], resolution: Floats
+    sure: Sequence[Sureness],
+    held: Sequence[Floats],
+    blocks: NDArray[np.intp],
+    resolution: Floats,
+    joints: Sequence[int],
 ) -> tuple[int, str] | None:
     """Number of an effect that does not deserve a name, and why: something else may look so (the least sure
     first), held-out motion is not predicted better with it for certain, or it moves the arm by less than
-    encoders show (that which helps least)."""
+    encoders show (that which helps least). joints: of the effects, -1: of the arm."""
     standard, named = held[1], held[2]
     failed: list[tuple[int, float, int, str]] = []
-    for k, (one, without) in enumerate(zip(sure, held[3:], strict=False)):
-        share, low, _ = held_share(without, named, standard, blocks)
+    for k, (one, joint, without) in enumerate(zip(sure, joints, held[3:], strict=False)):
+        own = slice(None) if joint < 0 else slice(joint, joint + 1)
         moved = np.sqrt(np.mean((without - named) ** 2, axis=0))
         if one.of_class < NAMED:
             why = "what it wins is so little that something else may look so"
-        elif low <= 0.0 or share * named.shape[1] < LEAST_HELD:
+        elif not all(removes(without[:, own], named[:, own], standard[:, own], blocks)):
             why = "held-out motion is not predicted better with it for certain"
         elif np.all(moved < resolution):
             why = "it moves the arm by less than the encoders' steps show"
         else:
             continue
         unsure = one.of_class < NAMED
+        share = held_share(without, named, standard, blocks)[0]
         failed.append((0, one.of_class, k, why) if unsure else (1, share, k, why))
     return min(failed)[2:] if failed else None
 
@@ -258,17 +296,17 @@ class Judge:
         named = account.fitted.point
         alone = [self._apart.errors(motion) for motion in self._apart.motions([named, *without])]
         near = [compared[2] + errors - alone[0] for errors in alone[1:]]
-        vetoed = _veto(sure, [*compared, *near], self.blocks, resolution)
+        joints = [one.joint for one in account.found]
+        vetoed = _veto(sure, [*compared, *near], self.blocks, resolution, joints)
         if vetoed is not None:
             return vetoed
-        return _veto(sure, [*compared, *self.errors(without)], self.blocks, resolution)
+        return _veto(sure, [*compared, *self.errors(without)], self.blocks, resolution, joints)
 
     def holds(self, account: Account, point: Point) -> bool:
         """Whether the joint of a point's function moves better for certain than with all that is named."""
         joint = [point.functions[0][0]]
         errors = [one[:, joint] for one in self.errors([*self._compared(account), point])[1:]]
-        share, low, _ = held_share(errors[1], errors[2], errors[0], self.blocks)
-        return low > 0.0 and share >= LEAST_HELD
+        return all(removes(errors[1], errors[2], errors[0], self.blocks))
 
     def _compared(self, account: Account) -> list[Point]:
         return [self.nominal, self.standard, account.fitted.point]

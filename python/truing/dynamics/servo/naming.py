@@ -141,6 +141,14 @@ def squares_of_folds(
     return np.array(out)
 
 
+def rooted_gain(before: Floats, after: Floats) -> tuple[float, float]:
+    """Mean of what parts lose of their squares, as roots, which a few large ones do not decide, and its
+    standard error. A part that had hardly any errors counts for less, or its own would decide."""
+    gain = (before - after) / np.maximum(before + np.median(before), 1e-300)
+    roots = np.copysign(np.sqrt(np.abs(gain)), gain)
+    return float(roots.mean()), float(roots.std(ddof=1)) / math.sqrt(before.size)
+
+
 def _of_columns(fold: FoldSums, columns: Sequence[int]) -> tuple[Floats, Floats, float]:
     return fold[0][np.ix_(columns, columns)], fold[1][columns], fold[2]
 
@@ -212,15 +220,12 @@ class Namer:
         return np.asarray(gains[0].folds), out
 
     def predicts(self, before: Floats, after: Floats, least: float, nats: float = 0.0) -> bool:
-        """Folds that were not fitted: by enough in all, and by two standard errors, gains as roots, or by
-        many nats. A fold that had hardly any errors counts for less, or its own would decide."""
+        """Folds that were not fitted: by enough in all, and by two standard errors, or by many nats."""
         if before.size < 2 or not before.sum() > 0.0:
             return False
-        gain = (before - after) / (before + np.median(before))
-        roots = np.copysign(np.sqrt(np.abs(gain)), gain)
-        error = roots.std(ddof=1) / math.sqrt(before.size)
+        mean, error = rooted_gain(before, after)
         whole = float((before - after).sum() / before.sum())
-        return whole > least / self.joints and bool(nats > SURE_NATS or roots.mean() > SURE_GAIN * error)
+        return whole > least / self.joints and bool(nats > SURE_NATS or mean > SURE_GAIN * error)
 
     def _enough(self, one: Candidate, seen: Mapping[tuple[str, tuple[str, ...]], int]) -> bool:
         """Whether as many were refitted as may be: of a joint, or of the arm and each of its effects."""
