@@ -297,7 +297,7 @@ std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subt
     for (Index i = 0; i < tile.count; ++i) {
       if (folds.fold(tile.recording, time[i]) < 0) continue;
       for (Index j = 0; j < joints; ++j) {
-        if (std::isnan(errors(i, j))) continue;
+        if (std::isnan(errors(i, j)) || tile.inside(i, j) == 0.0) continue;
         lot[k].first[j] += errors(i, j) * errors(i, j);
         lot[k].second[j] += 1.0;
       }

@@ -43,7 +43,11 @@ struct Tile {
   Eigen::Index first = 0;    ///< of the filtered rows those before it only lead in
   Eigen::Index count = 0;    ///< of filtered rows that are this tile's own
   Eigen::MatrixXd measured;  ///< shape=(count, joints) [Nm | N] filtered; NaN: not measured
-  Eigen::MatrixXd moving;    ///< shape=(count, joints): 1 where the joint moves, 0 where it has been at rest a while
+  /// shape=(count, joints): 1 where the joint moves; 0 where it has been at rest a while, and where not `inside`.
+  Eigen::MatrixXd moving;
+  /// shape=(count, joints): 0 at ends of the stretch at which the joint turns: there the filter averages friction that
+  /// nobody recorded.
+  Eigen::MatrixXd inside;
   TileMemory memory;
 
   /// The tile's own rows of basis values given at every row of the motion.

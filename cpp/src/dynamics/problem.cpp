@@ -530,8 +530,8 @@ struct Moments {
 
 using ModelMoments = std::vector<std::vector<Moments>>;  // by model and joint
 
-/// Of one tile, its rows in these folds.
-ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& models, const Folds& folds,
+/// Of one tile, its rows in these folds. `inside`: without those that are not.
+ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& models, const Folds& folds, bool inside,
                         Tile* tile) {
   ModelMoments out;
   const VectorXd time = tile->own_time();
@@ -541,6 +541,7 @@ ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& 
     for (Index i = 0; i < tile->count; ++i) {
       if (folds.fold(tile->recording, time[i]) < 0) continue;
       for (Index j = 0; j < predicted.cols(); ++j) {
+        if (inside && tile->inside(i, j) == 0.0) continue;
         const double y = tile->measured(i, j);
         if (!std::isnan(y)) by_joint[static_cast<std::size_t>(j)].add(y, predicted(i, j));
       }
@@ -552,7 +553,8 @@ ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& 
 
 /// By model and joint.
 std::vector<std::vector<TorqueError>> errors_on(const Folds& folds, const Problem& problem,
-                                                const std::vector<std::pair<std::string, TorqueModel>>& models) {
+                                                const std::vector<std::pair<std::string, TorqueModel>>& models,
+                                                bool inside = false) {
   const std::vector<std::size_t> driven = problem.robot.driven_joints();
   std::vector<ModelMoments> lot(Tiles::kTogether);
   ModelMoments all(models.size(), std::vector<Moments>(driven.size()));
@@ -561,7 +563,7 @@ std::vector<std::vector<TorqueError>> errors_on(const Folds& folds, const Proble
       for (std::size_t j = 0; j < driven.size(); ++j) all[m][j].add(lot[k][m][j]);
   };
   problem.tiles.for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; },
-                         [&](Tile& tile, std::size_t k) { lot[k] = moments_of(models, folds, &tile); }, add);
+                         [&](Tile& tile, std::size_t k) { lot[k] = moments_of(models, folds, inside, &tile); }, add);
   std::vector<std::vector<TorqueError>> out(models.size());
   for (std::size_t m = 0; m < models.size(); ++m)
     for (std::size_t j = 0; j < driven.size(); ++j)
@@ -587,7 +589,7 @@ std::vector<TorqueErrors> errors_of(const Problem& problem,
 // --- the turn of friction ------------------------------------------------------------------------
 
 std::vector<double> rms_of(const Problem& problem, const TorqueModel& model) {
-  const std::vector<std::vector<TorqueError>> errors = errors_on(problem.train, problem, {{"", model}});
+  const std::vector<std::vector<TorqueError>> errors = errors_on(problem.train, problem, {{"", model}}, true);
   std::vector<double> out;
   for (const TorqueError& error : errors.front()) out.push_back(error.rms);
   return out;

@@ -21,6 +21,7 @@ constexpr Index kTileRows = 8192;         ///< of a motion, less what leads in
 constexpr double kForgets = 0.06;         ///< [rad | m] travel after which no play operator knows what was before
 constexpr double kMostLeadIn = 60.0;      ///< [s] of a joint that rests for longer, it is forgotten
 constexpr double kRestWindow = 0.25;      ///< [s] on both sides
+constexpr double kEdge = 1.0;             ///< periods of the cut-off: a turn so near to an end is seen from one side
 
 /// Torques measured, or currents times the drives' constants: NaN throughout where there is neither.
 MatrixXd measured_torque(const Recording& recording, Index begin, Index end,
@@ -236,6 +237,21 @@ Tile Stretch::tile(Index from, Index to) const {
   const Index seen_end = std::min(motion_.end(), (to - 1) * stride_ + window + 1);
   const MatrixXd qd = motion_.rows(seen * stride_, seen_end - seen * stride_).middleCols(joints_, joints_);
   out.moving = moving_rows(qd, window, stride_).middleRows(from - seen, to - from);
+  out.inside = MatrixXd::Ones(to - from, joints_);
+  // A tile that is not the last one ends further from the end of what was read than this.
+  const Index edge = std::min(rows_in(kEdge / options_.cutoff, fine_step_), motion_.end());
+  for (const Index at : {Index{0}, motion_.end() - edge}) {
+    const Index first = std::max(from, (at + stride_ - 1) / stride_);
+    const Index near = std::min(to, (at + edge - 1) / stride_ + 1) - first;
+    if (near <= 0) continue;
+    const MatrixXd qd_there = motion_.rows(at, edge).middleCols(joints_, joints_);
+    for (Index j = 0; j < joints_; ++j) {
+      const double least = qd_there.col(j).minCoeff(), most = qd_there.col(j).maxCoeff();
+      if (least * most > 0.0 || std::max(-least, most) <= kSpeedAtRest) continue;  // it runs on, or rests
+      out.inside.col(j).segment(first - from, near).setZero();
+      out.moving.col(j).segment(first - from, near).setZero();
+    }
+  }
   return out;
 }
 

@@ -32,6 +32,7 @@ void for_each_table(TileOrConst& tile, const Use& use) {
   for (auto& column : tile.motion.columns) whole(column.second);
   whole(tile.measured);
   whole(tile.moving);
+  whole(tile.inside);
 }
 
 /// Open, and without a name any more; null: not in this folder.
@@ -102,6 +103,7 @@ Tile TileFile::read(std::size_t number, const Robot& robot) const {
   out.weights.resize(place.weights);
   out.measured.resize(place.count, place.joints);
   out.moving.resize(place.count, place.joints);
+  out.inside.resize(place.count, place.joints);
   Motion& motion = out.motion;
   motion.robot = &robot;
   motion.step = place.step;

@@ -99,8 +99,32 @@ TEST_CASE("tiles of a recording that is read are those of one in memory, to the 
       CHECK(found[k].motion.columns.at("temp_C") == expected[k].motion.columns.at("temp_C"));
       CHECK(found[k].measured == expected[k].measured);
       CHECK(found[k].moving == expected[k].moving);
+      CHECK(found[k].inside == expected[k].inside);
     }
   }
+}
+
+TEST_CASE("a joint that turns at an end of a stretch is not looked at there") {
+  Recording one;
+  one.name = "ends";
+  one.time = Eigen::VectorXd::LinSpaced(2001, 0.0, 10.0);
+  const Eigen::ArrayXd t = one.time.array();
+  one.position.resize(t.size(), 2);
+  one.position.col(0) = 0.4 * (1.3 * t - 0.08).cos();  // turns after 0.06 s, and not at the end
+  one.position.col(1) = 0.3 * (t / 3.0).sin();         // runs on at both
+  one.torque = Eigen::MatrixXd::Zero(t.size(), 2);
+  const std::vector<dynamics::Tile> tiles = tiles_of(one, swung::level_arm());
+  REQUIRE(tiles.size() == 1);
+  const dynamics::Tile& tile = tiles.front();
+  const Eigen::VectorXd time = tile.own_time();
+  for (Eigen::Index i = 0; i < tile.count; ++i) {
+    const bool near = time[i] < 1.0 / 8.0 - 1e-9;  // a period of the cut-off
+    CHECK(tile.inside(i, 0) == (near ? 0.0 : 1.0));
+    CHECK(tile.moving(i, 0) == tile.inside(i, 0));
+    CHECK(tile.inside(i, 1) == 1.0);
+  }
+  one.position.col(0).setConstant(0.4);  // a joint that rests does not turn
+  CHECK(tiles_of(one, swung::level_arm()).front().inside.minCoeff() == 1.0);
 }
 
 TEST_CASE("tiles come back from disk to the bit, in any order") {
@@ -125,6 +149,7 @@ TEST_CASE("tiles come back from disk to the bit, in any order") {
     CHECK(found.motion.columns == expected[k].motion.columns);
     CHECK(found.measured == expected[k].measured);
     CHECK(found.moving == expected[k].moving);
+    CHECK(found.inside == expected[k].inside);
   }
 }
 
