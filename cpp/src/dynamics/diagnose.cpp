@@ -61,6 +61,12 @@ TorqueDesign whole_design(const Problem& problem, const TorqueDiagnoseOptions& o
   return out;
 }
 
+/// Of held-out recordings: how much a fold counts was found for those that are fitted.
+std::vector<Noise> of_held_out(std::vector<Noise> noise) {
+  for (Noise& one : noise) one.weight_of_fold.resize(0);
+  return noise;
+}
+
 /// The columns that are always in, and the terms of a choice; `choice` becomes that of the part.
 TorqueDesign part_of(const TorqueDesign& whole, const std::vector<int>& nuisance, Choice* choice) {
   TorqueDesign out;
@@ -175,8 +181,9 @@ std::optional<Account> of_given_inertias(const Problem& problem, const TorqueGra
                                          const TorqueGrams& grams_held_out, const std::vector<Noise>& noise,
                                          const Account& free, const SearchLimits& limits) {
   const std::vector<bool> none(free.design->terms.size(), false);
-  Account out = account_of(free.design, sums_of(grams, noise, *free.design, none),
-                           sums_of(grams_held_out, noise, *free.design, none), friction_columns(*free.design));
+  Account out =
+      account_of(free.design, sums_of(grams, noise, *free.design, none),
+                 sums_of(grams_held_out, of_held_out(noise), *free.design, none), friction_columns(*free.design));
   SearchLimits more = limits;
   more.most = static_cast<int>(free.choice.groups.size() + problem.robot.driven_count());
   out.choice = out.search->run(free.choice, more, false);
@@ -210,12 +217,14 @@ Account with_functions(const Problem& problem, const Account& of_effects, const 
   std::vector<bool> priors = inertial_columns(*design);
   if (problem.fitted_before || of_effects.inertias_given) priors.assign(priors.size(), false);
   const TorqueGrams held_out = sum_grams(columns, problem.nominal, model, problem.test);
-  Account out = account_of(design, sums_of(grams, *noise, *design, priors),
-                           sums_of(held_out, *noise, *design, std::vector<bool>(priors.size(), false)), nuisance);
+  Account out =
+      account_of(design, sums_of(grams, *noise, *design, priors),
+                 sums_of(held_out, of_held_out(*noise), *design, std::vector<bool>(priors.size(), false)), nuisance);
   SearchLimits of_functions = limits;
   of_functions.least_gain = std::max(kLeastGainOfFunctions, limits.least_gain);
   of_functions.most = static_cast<int>(choice.groups.size()) + kMostFunctions;
   out.choice = out.search->run(choice, of_functions, true);
+  out.choice = without_functions_that_fail(out, of_functions.least_gain);
   out.inertias_given = of_effects.inertias_given;
   return out;
 }
@@ -269,9 +278,9 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   }
   const TorqueGrams held_out = sum_grams(*columns, problem.nominal, model, problem.test);
   columns.reset();  // large
-  Account free =
-      account_of(design, sums_of(grams, noise, *design, priors),
-                 sums_of(held_out, noise, *design, std::vector<bool>(design->terms.size(), false)), nuisance);
+  Account free = account_of(
+      design, sums_of(grams, noise, *design, priors),
+      sums_of(held_out, of_held_out(noise), *design, std::vector<bool>(design->terms.size(), false)), nuisance);
   free.choice = choice;
   free.choice = without_what_hides(free);
   const auto answer = [&](const Account& account, const TorqueModel& of_account) {

@@ -545,6 +545,45 @@ Choice without_what_hides(Account account) {
   return account.choice;
 }
 
+namespace {
+
+/// Squares on held-out recordings.
+double held_out_squares(const Account& account, const Choice& choice) {
+  const Evidence::State& state = account.search->state(choice);
+  double out = 0.0;
+  for (const FoldGram& fold : account.held_out->folds) out += Search::squares_on(fold, state);
+  return out;
+}
+
+/// Whether held-out recordings hold anything of a group: a joint may rest in them.
+bool is_in_held_out(const Account& account, const TorqueGroup& group) {
+  return std::any_of(account.held_out->folds.begin(), account.held_out->folds.end(),
+                     [&](const FoldGram& fold) { return fold.of(group.columns).xx.trace() > 0.0; });
+}
+
+}  // namespace
+
+// The worst one first: of two that do the same neither gains while the other is in.
+Choice without_functions_that_fail(Account account, double least_gain) {
+  const double least = least_gain / static_cast<double>(account.search->joints());  // as folds are asked
+  for (;;) {
+    const double all = held_out_squares(account, account.choice);
+    std::size_t worst = account.choice.groups.size();
+    double worst_part = least;
+    for (std::size_t k = 0; k < account.choice.groups.size(); ++k) {
+      const TorqueGroup& group = group_of(*account.design, account.choice.groups[k]);
+      if (!group.effect.empty() || !is_in_held_out(account, group)) continue;
+      const double less = held_out_squares(account, Search::without(account.choice, k));
+      const double part = (less - all) / std::max(less, 1e-300);
+      if (part > worst_part) continue;
+      worst = k;
+      worst_part = part;
+    }
+    if (worst == account.choice.groups.size()) return account.choice;
+    account.choice = Search::without(account.choice, worst);
+  }
+}
+
 Choice likely_of(const Account& account) {
   const Naming naming(account);
   Choice out;

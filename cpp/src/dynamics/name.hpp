@@ -14,6 +14,10 @@ namespace truing::dynamics {
 /// The less likely one goes, if then the other is likely.
 Choice without_what_hides(Account account);
 
+/// The choice less free functions that do not remove `least_gain` of a joint's squares on held-out recordings: some of
+/// hundreds that were tried bend to a few folds by chance.
+Choice without_functions_that_fail(Account account, double least_gain);
+
 /// Of an account's choice, what is likely enough to be named.
 Choice likely_of(const Account& account);
 

@@ -151,6 +151,18 @@ TEST_CASE("what may be one factor of all drives is said so, and no link alone is
   CHECK(named > 0);
 }
 
+TEST_CASE("a function that helps the recordings it was fitted to, and no other, is not said") {
+  const auto twisted = [](bool held_out_too) {
+    std::vector<Recording> all = recorded(with_friction(level_arm()));
+    for (Recording& one : all)
+      if (held_out_too || !one.test)
+        one.torque.col(0).array() += 3.0 * (2.0 * one.position.col(1).array()).sin().cube();
+    return dynamics::diagnose(level_arm(), all).unknown;
+  };
+  CHECK(!twisted(true).empty());
+  CHECK(twisted(false).empty());
+}
+
 TEST_CASE("a detent that is narrower than a wide function is unknown over the joint's angle") {
   const TorqueDiagnosis d =
       dynamics::diagnose(level_arm(), recorded_with("detent", [](const Motion& m) -> Eigen::MatrixXd {
