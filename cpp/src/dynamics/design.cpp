@@ -235,8 +235,11 @@ void add_alternatives_of_masses(const Robot& robot, const MotionRange& range, co
   const std::size_t before = design->terms.size();
   for (const NotTestable& one : design->not_testable) {
     if (one.reason != Untestable::same_as_masses) continue;
+    const std::size_t first = design->groups.size();
     add_effect(find_torque_effect(one.effect, own), -1, robot, range, design);
-    if (robot.driven_count() > 1) design->groups.push_back(common_constant(one.effect, robot, design));
+    if (robot.driven_count() < 2) continue;  // else one drive's constant is not the same as all masses
+    for (std::size_t g = first; g < design->groups.size(); ++g) design->groups[g].of_given_masses = true;
+    design->groups.push_back(common_constant(one.effect, robot, design));
   }
   for (std::size_t c = before; c < design->terms.size(); ++c) design->terms[c].only_alternative = true;
 }

@@ -29,6 +29,7 @@ struct TorqueGroup {
   std::vector<std::string> inputs;  ///< of a free function
   double low = 0.0, high = 0.0;     ///< of its first input: first and last knot
   int forms = 1;                    ///< number of forms that the effect has there
+  bool of_given_masses = false;     ///< an alternative of masses; where these are the file's it may be named
   std::vector<int> columns;
 };
 

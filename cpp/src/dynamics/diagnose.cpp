@@ -139,6 +139,15 @@ TorqueModel fitted_model(const Problem& problem, const TorqueDesign& design, con
   return problem.nominal.with(valued(design, fit_of(sums, state.columns, state.precision)));
 }
 
+TorqueModel fitted_model(const Problem& problem, const Account& account) {
+  return fitted_model(problem, *account.design, *account.sums, *account.search, account.choice);
+}
+
+bool has_constant_of_drive(const Account& account) {
+  return std::any_of(account.choice.groups.begin(), account.choice.groups.end(),
+                     [&](int g) { return account.design->groups[static_cast<std::size_t>(g)].of_given_masses; });
+}
+
 /// What is usual but the links' inertias.
 std::vector<int> friction_columns(const TorqueDesign& design) {
   const std::vector<bool> inertial = inertial_columns(design);
@@ -177,17 +186,27 @@ bool as_good(const VectorXd& simple, const VectorXd& flexible) {
 
 // The file's inertias as they are, and single links, rotors, loads that differ from it: where that predicts folds as
 // well as inertias that are all free, it says more with less. What free inertias take up is named here.
-std::optional<Account> of_given_inertias(const Problem& problem, const TorqueGrams& grams,
+std::optional<Account> of_given_inertias(const Problem& problem, const DesignColumns& columns, const TorqueGrams& grams,
                                          const TorqueGrams& grams_held_out, const std::vector<Noise>& noise,
                                          const Account& free, const SearchLimits& limits) {
-  const std::vector<bool> none(free.design->terms.size(), false);
-  Account out =
-      account_of(free.design, sums_of(grams, noise, *free.design, none),
-                 sums_of(grams_held_out, of_held_out(noise), *free.design, none), friction_columns(*free.design));
   SearchLimits more = limits;
   more.most = static_cast<int>(free.choice.groups.size() + problem.robot.driven_count());
-  out.choice = out.search->run(free.choice, more, false);
-  out.inertias_given = true;
+  more.masses_given = true;
+  const auto searched = [&](const TorqueGrams& train, const TorqueGrams& test, const Choice& start) {
+    const std::vector<bool> none(free.design->terms.size(), false);
+    Account out = account_of(free.design, sums_of(train, noise, *free.design, none),
+                             sums_of(test, of_held_out(noise), *free.design, none), friction_columns(*free.design));
+    out.choice = out.search->run(start, more, false);
+    out.inertias_given = true;
+    return out;
+  };
+  Account out = searched(grams, grams_held_out, free.choice);
+  if (has_constant_of_drive(out)) {
+    // Free inertias take a drive's constant up, and its column with it: now it is the torque that the file's give.
+    const TorqueModel model = fitted_model(problem, out);
+    out = searched(sum_grams(columns, problem.nominal, model, problem.train),
+                   sum_grams(columns, problem.nominal, model, problem.test), out.choice);
+  }
   out.choice = without_what_hides(out);
   if (!as_good(out.search->squares_of_folds(out.choice), free.search->squares_of_folds(free.choice))) return {};
   if (!bodies_can_do_it(problem, out)) return {};
@@ -277,7 +296,6 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
     if (round + 2 >= kRounds) noise = noise_of(problem.tiles, model, problem.train);
   }
   const TorqueGrams held_out = sum_grams(*columns, problem.nominal, model, problem.test);
-  columns.reset();  // large
   Account free = account_of(
       design, sums_of(grams, noise, *design, priors),
       sums_of(held_out, of_held_out(noise), *design, std::vector<bool>(design->terms.size(), false)), nuisance);
@@ -288,11 +306,12 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
     const Account functions = with_functions(problem, account, of_account, limits, &noise_of_functions);
     return named(problem, groundwork, account, noise, functions, noise_of_functions);
   };
-  if (!problem.fitted_before) {
-    if (const auto given = of_given_inertias(problem, grams, held_out, noise, free, limits)) {
-      TorqueDiagnosis out = answer(*given, fitted_model(problem, *design, *given->sums, *given->search, given->choice));
-      if (out.verdict != Verdict::does_not_hold) return out;
-    }
+  std::optional<Account> given;
+  if (!problem.fitted_before) given = of_given_inertias(problem, *columns, grams, held_out, noise, free, limits);
+  columns.reset();  // large
+  if (given) {
+    TorqueDiagnosis out = answer(*given, fitted_model(problem, *given));
+    if (out.verdict != Verdict::does_not_hold) return out;
   }
   return answer(free, model);
 }

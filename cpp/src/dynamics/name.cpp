@@ -414,7 +414,10 @@ void add_scale_of_masses(const std::vector<FoundTorqueEffect>& effects, const st
     if (!found.standard && find_torque_effect(found.effect, own).traits.family == TorqueFamily::inertia)
       one.effects.push_back(found.effect);
   }
-  if (one.effects.empty()) return;
+  const bool constant = std::any_of(effects.begin(), effects.end(), [&](const FoundTorqueEffect& found) {
+    return find_torque_effect(found.effect, own).traits.scales_masses;
+  });
+  if (one.effects.empty() && !constant) return;
   for (const TorqueEffect& effect : torque_catalogue()) {
     if (effect.traits.scales_masses) one.effects.push_back(effect.name);
   }

@@ -156,9 +156,10 @@ double Search::squares_on(const FoldGram& other, const Evidence::State& state) {
   return squares_left(other.of(state.columns), state.solution);
 }
 
-bool Search::may_enter(const Choice& choice, int group, bool free_functions) const {
+bool Search::may_enter(const Choice& choice, int group, const SearchLimits& limits, bool free_functions) const {
   const TorqueGroup& g = design_.groups[static_cast<std::size_t>(group)];
-  if (g.effect.empty() != free_functions || groups_[static_cast<std::size_t>(group)].shadow) return false;
+  const bool shadow = groups_[static_cast<std::size_t>(group)].shadow && !(limits.masses_given && g.of_given_masses);
+  if (g.effect.empty() != free_functions || shadow) return false;
   const auto& nuisance = evidence_.nuisance();
   if (!nuisance.empty() && std::find(nuisance.begin(), nuisance.end(), g.columns.front()) != nuisance.end())
     return false;
@@ -244,7 +245,7 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
     bool taken = false;
     for (const Evidence::Gain& gain : ranked) {
       if (gain.score < limits.threshold) break;
-      if (!may_enter(choice, gain.group, free_functions)) continue;
+      if (!may_enter(choice, gain.group, limits, free_functions)) continue;
       if (std::find(refused.begin(), refused.end(), gain.group) != refused.end()) continue;
       Choice grown = choice;
       grown.groups.push_back(gain.group);

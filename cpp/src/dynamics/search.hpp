@@ -23,6 +23,7 @@ struct SearchLimits {
   double least_gain = 0.01;  ///< of the joint's squared error on folds that were not fitted
   int most = 40;
   bool plausible_only = true;  ///< parameters within what machines have
+  bool masses_given = false;   ///< the file's: what is the same as fitted ones may enter
 };
 
 /// Fits to all rows but those of one fold. The columns that are always in are eliminated once (Schur complement): then
@@ -96,7 +97,7 @@ class Search {
   };
   Look& look(const Choice& choice) const;
 
-  bool may_enter(const Choice& choice, int group, bool free_functions) const;
+  bool may_enter(const Choice& choice, int group, const SearchLimits& limits, bool free_functions) const;
   Choice better_forms(Choice choice) const;
   Choice less_what_is_idle(Choice choice, const SearchLimits& limits) const;
   bool is_plausible(const Evidence::State& state, int group) const;

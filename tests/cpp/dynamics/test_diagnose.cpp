@@ -124,16 +124,17 @@ TEST_CASE("drives' constants are not searched for beside masses that are fitted"
                     [](const NotTestable& n) { return n.reason == Untestable::same_as_masses; }));
 }
 
-TEST_CASE("a link's inertia that is named may be a drive's constant, which is not searched for") {
+TEST_CASE("one drive's constant is named beside the file's masses, with the links that it may be as well") {
   Robot truth = with_friction(level_arm());
-  truth.torque_effects.push_back({"motor_constant", {"J1"}, {{"motor_constant.J1", 0.15}}});
+  truth.torque_effects.push_back({"motor_constant", {"J2"}, {{"motor_constant.J2", 0.15}}});
   const TorqueDiagnosis d = dynamics::diagnose(level_arm(), recorded(truth));
-  CHECK(found(d, "motor_constant") == nullptr);
-  const FoundTorqueEffect* inertia = found(d, "link_inertia");
-  REQUIRE(inertia != nullptr);
-  CHECK(std::any_of(inertia->confounded_with.begin(), inertia->confounded_with.end(), [](const TorqueAlternative& a) {
-    return a.effect == "motor_constant" && a.joints == std::vector<std::string>{"J1"};
-  }));
+  const FoundTorqueEffect* constant = found(d, "motor_constant");
+  REQUIRE(constant != nullptr);
+  CHECK(&d.effects.front() == constant);
+  CHECK(constant->joints == std::vector<std::string>{"J2"});
+  CHECK(std::abs(constant->parameters.front().value - 0.15) < 0.02);
+  CHECK(std::any_of(d.classes.begin(), d.classes.end(),
+                    [](const TorqueClass& c) { return c.sentence.find("share one scale") != std::string::npos; }));
 }
 
 TEST_CASE("what may be one factor of all drives is said so, and no link alone is sure") {
