@@ -439,11 +439,22 @@ static Choice without_names(const Work& work, const Choice& choice) {
   return without_these(choice, names);
 }
 
+/// Chance of random signs that a function may have. Where nothing says that there is a gap, it says so by itself.
+static double chance_allowed(const Work& work, const Decision& so_far) {
+  const double false_alarm = work.given.options.false_alarm;
+  const std::vector<int>& chosen = so_far.state.choice.groups;
+  const bool gap = so_far.p_gap <= false_alarm || work.given.beyond_repeats > kLackOfFit ||
+                   !std::all_of(chosen.begin(), chosen.end(), [&](int g) {
+                     return is_candidate(work.design.candidates.named[static_cast<std::size_t>(g)]);
+                   });
+  return gap ? kChance : std::min(kChance, false_alarm);
+}
+
 /// A free function on what is left, if it wins, and what it makes needless goes. True: it was taken.
 static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
   const SearchOptions& search = out->search;
   const bool room = static_cast<int>(out->state.choice.groups.size()) < search.most_groups;
-  if (!room || scan.best.empty() || scan.p > kChance) return false;
+  if (!room || scan.best.empty() || scan.p > chance_allowed(*work, *out)) return false;
   const FreeGain& best = scan.best.front();
   if (!(best.gain.score > search.threshold + 4.0 && best.gain.share > kFreeShare)) return false;
   append_free(work, best, scan.tried);

@@ -108,13 +108,24 @@ static std::vector<int> flexible_columns(const Design& design) {
   return out;
 }
 
-/// Squared length of what every block leaves, in units of its noise.
+/// What rows that were held out show of a fit that did not see them: their noise and the fit's own error.
+static std::array<double, 3> sigma_of_predictions(std::vector<Block> blocks, const Eigen::VectorXd& residual,
+                                                  const std::array<double, 3>& noise) {
+  for (Block& block : blocks) block.training = !block.training;
+  std::array<double, 3> sigma = sigma_of(blocks, residual, 0.0);
+  for (std::size_t kind = 0; kind < 3; ++kind) sigma[kind] = std::max(sigma[kind], noise[kind]);
+  return sigma;
+}
+
+/// Squared length of what every block leaves, in units of what it should leave: `sigma`, and `predicted` of rows held
+/// out.
 static std::vector<double> standardised_squares(const std::vector<Block>& blocks, const Eigen::VectorXd& own,
-                                                const Eigen::VectorXd& residual, const std::array<double, 3>& sigma) {
+                                                const Eigen::VectorXd& residual, const std::array<double, 3>& sigma,
+                                                const std::array<double, 3>& predicted) {
   std::vector<double> out(blocks.size());
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const auto [first, count, kind, training] = blocks[b];
-    const double noise = sigma[static_cast<std::size_t>(kind)];
+    const double noise = (training ? sigma : predicted)[static_cast<std::size_t>(kind)];
     out[b] = own.segment(first, count).cwiseProduct(residual.segment(first, count)).squaredNorm() / (noise * noise);
   }
   return out;
@@ -271,8 +282,10 @@ Weighted weigh(const Design& design, const Measurements& data) {
     const Eigen::VectorXd residual = predicts ? flexible.predicted_residual(out.weight) : flexible.residual();
     const double used = predicts ? 0.0 : flexible.used();
     const std::array<double, 3> sigma = sigma_of(blocks, own.cwiseProduct(residual), used);
-    const std::vector<double> squares = standardised_squares(blocks, own, residual, sigma);
-    const bool tails = round > 0 && has_tails(blocks, squares);
+    const std::array<double, 3> predicted =
+        predicts ? sigma : sigma_of_predictions(blocks, own.cwiseProduct(residual), sigma);
+    const std::vector<double> squares = standardised_squares(blocks, own, residual, sigma, predicted);
+    const bool tails = round > 0 && has_tails(blocks, standardised_squares(blocks, own, residual, sigma, sigma));
     for (std::size_t b = 0; b < blocks.size(); ++b) {
       const auto [first, count, kind, training] = blocks[b];
       const double root = tails ? root_weight(blocks[b], squares[b]) : 1.0;
