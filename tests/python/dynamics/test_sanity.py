@@ -225,6 +225,19 @@ def test_a_force_at_the_tool_is_no_other_way_of_down(size: float) -> None:
 
 
 @pytest.mark.realdata
+def test_a_joint_that_moves_alone_tells_no_shift_of_its_recording() -> None:
+    """In single_j3 of the UR10e its friction looked like torques that are 49 ms ahead."""
+    if not os.environ.get("TRUING_REALDATA") or not (REAL / "dyn_ur10e").exists():
+        pytest.skip("TRUING_REALDATA does not hold dyn_ur10e")
+    robot = truing.load_robot(REAL / "dyn_ur10e" / "robot.urdf", any_tool=True)
+    for index, gain in zip(robot.driven_joints(), (10.0, 10.7, 8.5, 9.0, 9.5, 10.1), strict=True):
+        robot.joints[index].torque_per_ampere = gain
+    unloaded = [one for one in sorted((REAL / "dyn_ur10e").glob("*.csv")) if not one.stem.endswith("_load")]
+    recordings = [one for one in load_recordings(unloaded, robot) if one.name not in ("ptp10", "single_j5")]
+    assert "torque_shift" not in kinds(check_recordings(robot, recordings))
+
+
+@pytest.mark.realdata
 @pytest.mark.parametrize(("folder", "angle"), [("dyn_ur10", 0.35), ("dyn_tx40", 1.57), ("dyn_tx40", 3.14)])
 def test_real_arms_are_found_to_stand_upright(folder: str, angle: float) -> None:
     if not os.environ.get("TRUING_REALDATA") or not (REAL / folder).exists():

@@ -66,7 +66,8 @@ def shifts(robot: _core.Robot, grids: Sequence[Grid]) -> dict[str, float]:
     late = np.full(len(grids), TIMES[best])
     for _ in range(ROUNDS):  # a recording that is shifted spoils what the others expect of it
         expected = [joint.expected(late) for joint in joints]
-        late = np.array([_shift_of(number, joints, expected) for number in range(len(grids))])
+        own = [_shift_of(number, joints, expected) for number in range(len(grids))]
+        late = np.array([together if one is None else one for one in own])
     late = np.where(np.abs(late - together) < SAME, together, late)
     return {
         grid.name: float(one)
@@ -75,9 +76,10 @@ def shifts(robot: _core.Robot, grids: Sequence[Grid]) -> dict[str, float]:
     }
 
 
-def _shift_of(number: int, joints: Sequence[_Joint], expected: Sequence[Floats]) -> float:
-    """Of one recording [s]; 0: no shift is clearly better than none."""
-    score, rows = np.zeros(len(TIMES)), 0
+def _shift_of(number: int, joints: Sequence[_Joint], expected: Sequence[Floats]) -> float | None:
+    """Of one recording [s]; 0: no shift is clearly better than none; None: one of several joints moves alone,
+    and what its friction remembers may look like a shift."""
+    score, rows, moved = np.zeros(len(TIMES)), 0, 0
     for joint, torque in zip(joints, expected, strict=True):
         own = joint.recording == number
         if own.sum() < FEWEST:
@@ -86,6 +88,9 @@ def _shift_of(number: int, joints: Sequence[_Joint], expected: Sequence[Floats])
         error = error - error.mean(axis=0)
         score += own.sum() * np.log(np.einsum("ij,ij->j", error, error))
         rows += int(own.sum())
+        moved += 1
+    if moved == 1 < len(joints):
+        return None
     best = int(np.argmin(score))
     if not rows or best in (0, len(TIMES) - 1):
         return 0.0
