@@ -25,17 +25,19 @@ import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import truing
+from truing.identification import Identification
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from real_data import RECORDINGS, ROOT, Recording, default_folder, fit, load
 from small_sets import ARMS
 
 MOST = 6  # names in a cell
+MANY = 0.05  # of the rows: outliers that are no exceptions, and by which the diagnosis is judged too
 FORMAT = "truing-real-splits/1"
 COLUMNS = {
     "gap": "base and tool",
@@ -52,7 +54,15 @@ Split = dict[str, Any]
 """Errors of one split, None where there are none, and `error`, why."""
 
 
-def millimetres(statistics: truing.common.ErrorStatistics) -> str:
+class Errors(NamedTuple):
+    """Of held-out rows [m], as `truing.common.ErrorStatistics` has them."""
+
+    rms: float
+    median: float
+    p95: float
+
+
+def millimetres(statistics: truing.common.ErrorStatistics | Errors) -> str:
     return f"{1e3 * statistics.rms:.3f} / {1e3 * statistics.median:.3f} / {1e3 * statistics.p95:.3f}"
 
 
@@ -100,12 +110,28 @@ def one(folder: Path, recording: Recording) -> str:
     started = time.perf_counter()
     found = truing.diagnose(robot, data)
     seconds = time.perf_counter() - started
-    geometry = fit(robot, data).test
+    geometry = on_the_same_rows(found, fit(robot, data), data)
     return (
-        f"| {recording.name} | {millimetres(found.gap)} | {millimetres(geometry.after) if geometry else '–'}"
+        f"| {recording.name} | {millimetres(found.gap)} | {millimetres(geometry) if geometry else '–'}"
         f" | {millimetres(found.after)} | {millimetres(found.after_unknown)} | {named(found)} |"
         f" {unknown(found)} | {100 * found.neighbour_share:.0f} % | {seconds:.1f} |"
     )
+
+
+def on_the_same_rows(
+    found: truing.diagnosis.Diagnosis, geometry: Identification, data: truing.Measurements
+) -> Errors | None:
+    """Errors of plain geometry on the held-out rows that the diagnosis is judged by: without a few that stand
+    far out, as `outliers` says. None: no row is held out."""
+    if geometry.test is None:
+        return None
+    left = truing.residuals(geometry.robot, data)
+    errors = np.abs(left.distance) if data.distances is not None else np.linalg.norm(left.position, axis=1)
+    counted = np.asarray(found.set) != 0
+    if len(found.outliers) < MANY * len(counted):
+        counted[np.asarray(found.outliers, dtype=int)] = False
+    errors = errors[counted & np.isfinite(errors)]
+    return Errors(float(np.sqrt(np.mean(errors**2))), *(float(np.quantile(errors, p)) for p in (0.5, 0.95)))
 
 
 # ---- Random splits -------------------------------------------------------------------------------
@@ -130,8 +156,8 @@ def errors_of(robot: truing.Robot, data: truing.Measurements) -> Split:
     except (truing.InputError, ValueError, RuntimeError) as error:
         return {**dict.fromkeys(COLUMNS), "error": f"{type(error).__name__}: {error}"}
     seconds = time.perf_counter() - started
-    geometry = fit(robot, data).test
-    figures = (found.gap, geometry.after if geometry else None, found.after, found.after_unknown)
+    geometry = on_the_same_rows(found, fit(robot, data), data)
+    figures = (found.gap, geometry, found.after, found.after_unknown)
     rms = {name: 1e3 * of.rms if of else None for name, of in zip(COLUMNS, figures, strict=True)}
     return {**rms, "seconds": seconds, "verdict": str(found.verdict), "names": named(found)}
 

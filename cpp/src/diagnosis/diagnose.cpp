@@ -164,7 +164,7 @@ void say_outliers(const Work& work, const std::vector<std::int32_t>& rows, Diagn
   text += many ? " (" + fraction +
                      ") stand so far out that they count for little: what was found is said of the others. "
                      "Either these rows are wrong, or something happens in them that nothing found describes."
-               : " stand so far out that they count for little.";
+               : " stand so far out that they count for little, and held-out errors are those of the others.";
   out->sanity.push_back({"outliers", text, count <= 50 ? out->outliers : std::vector<std::size_t>{}});
 }
 
@@ -250,6 +250,14 @@ bool has_functions(const Work& work, const Decision& decision) {
   });
 }
 
+/// Rows that are held out and count: without a few that stand far out of every fit, which are said.
+std::vector<std::int8_t> judged_rows(const Registered& whole, const Diagnosis& so_far) {
+  std::vector<std::int8_t> out = whole.set;
+  if (static_cast<double>(so_far.outliers.size()) >= kManyOutliers * static_cast<double>(out.size())) return out;
+  for (const std::size_t row : so_far.outliers) out[row] = 0;
+  return out;
+}
+
 /// The decision fitted without linearisation to all rows: what a robot file can hold, what has a name, everything.
 struct Fitted {
   Refit by_catalogue, by_named, by_all;
@@ -278,7 +286,8 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
     return residuals(of, whole.data, own, whole.options.threads);
   };
   const auto lengths = [&](const Residuals& of) { return lengths_of(of, whole.data.rows); };
-  const auto judged = [&](const std::vector<double>& errors) { return error_statistics(held_out(errors, whole.set)); };
+  const std::vector<std::int8_t> counted = judged_rows(whole, *out);
+  const auto judged = [&](const std::vector<double>& errors) { return error_statistics(held_out(errors, counted)); };
   out->robot = fitted.by_catalogue.found.robot;
   out->residuals_before = left_by(whole.frames.robot, whole.options.own_effects);
   out->residuals_after = left_by(fitted.by_named.found.robot, fitted.by_named.own);

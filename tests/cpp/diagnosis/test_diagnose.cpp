@@ -930,6 +930,11 @@ TEST_CASE("diagnose is not misled by gross outliers or a wandering frame" * doct
   const Diagnosis outliers = diagnose(light_arm(), table->data);
   INFO(names(outliers));
   CHECK(outliers.verdict == Verdict::none);
+  std::size_t held_out = 0;
+  for (std::size_t row = 0; row < 120; ++row) held_out += outliers.set[row] != 0 && row % 40 != 7;
+  CHECK(outliers.outliers == std::vector<std::size_t>{7, 47, 87});
+  CHECK(static_cast<std::size_t>(outliers.gap.n) == held_out);
+  CHECK(outliers.gap.max < 1e-3);
 
   table = measured(light_arm(), 150, 960);
   std::vector<double> time(150);
