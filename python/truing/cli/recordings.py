@@ -207,13 +207,14 @@ def checked(loaded: tuple[Robot, Sequence[Recording]]) -> CheckedRecordings:
 
 def with_sound_commands(robot: Robot, recordings: Sequence[Recording]) -> Sequence[Recording]:
     """Recordings of commands alone with what is certain corrected, which a warning says; others as they are.
-    Raises InputError on a mistake in them: both models would be judged by it."""
-    from truing.dynamics import check_recordings
+    Raises InputError on a mistake in them: both models would be judged by it. What a model contradicts is no
+    matter of theirs."""
     from truing.dynamics.recorded import by_commands
+    from truing.dynamics.sanity import check_commands
 
     if not by_commands(recordings):
         return recordings
-    found = check_recordings(robot, recordings)
+    found = check_commands(robot, recordings)
     for finding in found.findings:
         if finding.mistake:
             raise InputError(finding.evidence)

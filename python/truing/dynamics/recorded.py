@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -46,6 +47,28 @@ def with_rows(
     columns = {name: np.asarray(values)[kept] for name, values in recording.columns.items()}
     time = np.asarray(recording.time)[kept]
     return _core.Recording(recording.name, time=time, columns=columns, test=recording.test, **fields)
+
+
+@dataclass(frozen=True)
+class _Changed:
+    """Pieces of a recording, each changed as it is read."""
+
+    read: Callable[[], Iterator[_core.Recording]]
+    change: Callable[[_core.Recording], _core.Recording]
+
+    def __call__(self) -> Iterator[_core.Recording]:
+        return map(self.change, self.read())
+
+
+def of_all_rows(
+    recording: _core.Recording, change: Callable[[_core.Recording], _core.Recording]
+) -> _core.Recording:
+    """What `change` makes of a recording; of one that is read in pieces, of each of them. It must not depend
+    on the rows before."""
+    changed = change(recording)
+    if recording.pieces is None:
+        return changed
+    return changed.replace(pieces=_Changed(recording.pieces, change), end=recording.end)
 
 
 def by_commands(recordings: Sequence[_core.Recording]) -> bool:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pyarrow.parquet
 import pytest
 
 from truing._core import Recording
-from truing.dynamics import identify, load_recordings, predict, validate_recording
+from truing.dynamics import check_recordings, identify, load_recordings, predict, validate_recording
 from truing.dynamics.result import write_fit
 from truing.errors import InputError
 from truing.files import recording_table
@@ -148,3 +149,50 @@ def test_torques_are_predicted_of_recordings_in_memory(tmp_path: Path, simulated
     )
     with pytest.raises(InputError, match="longer than memory"):
         predict(simulated.nominal, found)
+
+
+def with_spikes(q: np.ndarray, tau: np.ndarray) -> None:
+    tau[50::400, 1] += 3000.0
+
+
+def frozen(q: np.ndarray, tau: np.ndarray) -> None:
+    for first in (100, 2100):
+        q[first : first + 30] = q[first - 1]
+
+
+def folded(q: np.ndarray, tau: np.ndarray) -> None:
+    q[:, 0] = (q[:, 0] + 3.0 + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def in_degrees(q: np.ndarray, tau: np.ndarray) -> None:
+    q *= 180.0 / np.pi
+
+
+@pytest.mark.parametrize(
+    ("spoil", "finding", "rows"),
+    [
+        (with_spikes, "spikes", 4000),
+        (frozen, "frozen", 3940),
+        (folded, "angle_folded", 4000),
+        (in_degrees, "position_unit", 4000),
+    ],
+)
+def test_what_is_corrected_is_corrected_in_all_pieces(
+    tmp_path: Path, simulated: SimulatedMotion, spoil: Callable[..., None], finding: str, rows: int
+) -> None:
+    files = []
+    for one in simulated.recordings:
+        q, tau = np.array(one.position), np.array(one.torque)
+        spoil(q, tau)
+        columns = columns_of(one.replace(position=q, torque=tau))
+        files.append(written(tmp_path / f"{one.name}.parquet", columns))
+    checked = check_recordings(simulated.nominal, load_recordings(files, simulated.nominal))
+    assert finding in {one.finding for one in checked.findings if one.applied}
+    for found, one in zip(checked.recordings, simulated.recordings, strict=True):
+        assert found.pieces is not None
+        pieces = list(pickle.loads(pickle.dumps(found.pieces))())
+        whole = {name: np.concatenate([getattr(p, name) for p in pieces]) for name in ("position", "torque")}
+        assert len(whole["position"]) == rows
+        assert np.abs(np.diff(whole["position"], axis=0)).max() < 2.0
+        assert np.abs(whole["position"]).max() < np.abs(one.position).max() + 4.0
+        assert np.abs(whole["torque"]).max() < 1.5 * np.abs(one.torque).max()

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 import truing
 from truing import _core
 from truing.dynamics import CheckedRecordings, Recording, RecordingFinding, check_recordings, load_recordings
+from truing.dynamics.sanity import check_commands
 from truing.dynamics.sanity.commands import other_order
 from truing.testing.dynamics import demo_arm
 
@@ -151,3 +152,4 @@ def test_angles_of_servos_counted_from_another_zero_or_the_other_way_are_a_mista
     said = only(check_recordings(ARM, moved))
     assert said.finding == "angle_convention" and said.mistake
     assert f"{JOINTS[1]} minus 90°, {JOINTS[2]} with the opposite sign" in said.evidence
+    assert check_commands(ARM, moved).findings == (), "by themselves they are sound"

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
 from truing.dynamics.magnitudes import are_magnitudes
-from truing.dynamics.recorded import by_commands, driven_joints, with_rows
+from truing.dynamics.recorded import by_commands, driven_joints, of_all_rows, with_rows
 from truing.dynamics.sanity import band, between, columns, commands, gravity, jumps, lag, loads, pushed
 from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
@@ -114,14 +114,23 @@ def _by_themselves(
     return [*found, *more, *of_speeds], recordings, [grid for grid in grids if len(grid.rows)]
 
 
-def _of_commands(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:
-    """Of recordings without torques: what angles and commands show."""
+def check_commands(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:
+    """What commands and angles show by themselves, whatever the robot's model is: of it no more is taken than
+    names, kinds and limits of the joints. recordings: of commands, without torques.
+    """
     positions = all(one.command.shape[1] for one in recordings)
     found, recordings = _mended(robot, recordings, [*JUMPS, *([commands.commands] if positions else [])])
-    if positions and not any(one.mistake for one in found):
-        found += _angles_by_leads(robot, recordings)
     found.sort(key=lambda one: not one.mistake)
     return CheckedRecordings(robot, tuple(recordings), tuple(found))
+
+
+def _of_commands(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:
+    checked = check_commands(robot, recordings)
+    positions = all(one.command.shape[1] for one in recordings)
+    if not positions or any(one.mistake for one in checked.findings):
+        return checked
+    angles = _angles_by_leads(robot, checked.recordings)
+    return replace(checked, findings=(*angles, *checked.findings))
 
 
 def _angles_by_leads(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> list[RecordingFinding]:
@@ -197,12 +206,18 @@ def _guessed(grids: Sequence[Grid], constants: Floats | None) -> Sequence[Grid]:
 
 
 def _scaled(recording: _core.Recording, by_speed: Floats | None, by_angle: Floats | None) -> _core.Recording:
-    fields: dict[str, Any] = {}
-    if by_speed is not None and (by_speed != 1.0).any() and recording.speed.shape[1]:
-        fields["speed"] = np.asarray(recording.speed) * by_speed
-    if by_angle is not None and (by_angle != 1.0).any():
-        fields["position"] = np.asarray(recording.position) * by_angle
-    return recording.replace(**fields) if fields else recording
+    given = {"speed": by_speed, "position": by_angle}
+    return _multiplied(recording, {name: by for name, by in given.items() if by is not None})
+
+
+def _multiplied(recording: _core.Recording, factors: Mapping[str, Floats]) -> _core.Recording:
+    """Columns of tables that were recorded times factors, shape=(joints,)."""
+    there = {n: by for n, by in factors.items() if (by != 1.0).any() and getattr(recording, n).shape[1]}
+    return of_all_rows(recording, partial(_times, factors=there)) if there else recording
+
+
+def _times(recording: _core.Recording, factors: Mapping[str, Floats]) -> _core.Recording:
+    return recording.replace(**{n: np.asarray(getattr(recording, n)) * by for n, by in factors.items()})
 
 
 def _without_constant(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> list[int]:
@@ -245,12 +260,7 @@ def _turned(
     out = []
     for one in recordings:
         own = factors.get(one.name, np.ones(len(joints)))
-        fields: dict[str, Any] = {}
-        if one.torque.shape[1]:
-            fields["torque"] = np.asarray(one.torque) * own
-        if one.current.shape[1]:
-            fields["current"] = np.asarray(one.current) * own * of_drive
-        out.append(one.replace(**fields) if fields else one)
+        out.append(_multiplied(one, {"torque": own, "current": own * of_drive}))
     return robot, out
 
 
@@ -258,6 +268,10 @@ def _shifted_back(recording: _core.Recording, late: float) -> _core.Recording:
     """Torques and currents as they were `late` seconds later, on the rows that have such."""
     if abs(late) < lag.APPLIED:
         return recording
+    return of_all_rows(recording, partial(_later, late=late))
+
+
+def _later(recording: _core.Recording, late: float) -> _core.Recording:
     time = np.asarray(recording.time)
     wanted = time + late
     kept = (wanted >= time[0]) & (wanted <= time[-1])

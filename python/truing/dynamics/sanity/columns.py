@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.recorded import driven_joints
+from truing.dynamics.recorded import driven_joints, of_all_rows
 from truing.dynamics.sanity.findings import RecordingFinding, listed, together
 from truing.dynamics.sanity.grids import (
     MOVES,
@@ -77,13 +77,18 @@ def clock(recordings: Sequence[_core.Recording]) -> tuple[list[RecordingFinding]
             smoother = 1.0 if len(after) else _smoother_if_even(time, np.asarray(recording.position))
             jitter.append(_jitter(recording, spread, usual, smoother))
             if smoother > SMOOTHER:
-                recording = recording.replace(time=np.linspace(time[0], time[-1], len(time)))
+                recording = of_all_rows(recording, _evenly_in_time)
         out.append(recording)
     found = together(gaps, lambda all_, worst: f"{_in(all_, worst)}{worst.evidence}; they are cut there")
     for applied in (True, False):
         same = [one for one in jitter if one.applied is applied]
         found += together(same, lambda all_, worst: f"{_in(all_, worst)}{worst.evidence}")
     return found, out
+
+
+def _evenly_in_time(recording: _core.Recording) -> _core.Recording:
+    time = np.asarray(recording.time)
+    return recording.replace(time=np.linspace(time[0], time[-1], len(time)))
 
 
 def _jitter(recording: _core.Recording, spread: float, usual: float, smoother: float) -> RecordingFinding:

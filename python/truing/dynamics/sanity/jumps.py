@@ -5,14 +5,15 @@ angles of all joints that stay the same for some rows in the middle of a motion.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.recorded import driven_joints, with_rows
+from truing.dynamics.recorded import driven_joints, of_all_rows, with_rows
 from truing.dynamics.sanity.columns import resolution
 from truing.dynamics.sanity.findings import RecordingFinding, listed
 from truing.dynamics.sanity.grids import STILL
@@ -40,19 +41,18 @@ def unfolded(
 ) -> tuple[list[RecordingFinding], list[_core.Recording]]:
     """Angles that step by a whole turn from row to row go on instead."""
     joints = driven_joints(robot)
+    turning = np.array([joint.type == "revolute" for joint in joints])
     out, where, most = [], [], 0
     columns: dict[str, None] = {}
     for recording in recordings:
-        q = np.array(recording.position)
-        steps = np.diff(q, axis=0)
-        folded = np.abs(np.abs(steps) - TURN) < NEAR_A_TURN
-        folded &= np.array([joint.type == "revolute" for joint in joints])
-        if folded.any():
-            q[1:] -= np.cumsum(np.where(folded, np.sign(steps) * TURN, 0.0), axis=0)
-            recording = recording.replace(position=q)
+        q = np.asarray(recording.position)
+        turns = _turns(q, turning, q[0])
+        if turns.any():
+            pieces = recording.pieces and _Unfolded(recording.pieces, turning)
+            recording = recording.replace(position=q - turns, pieces=pieces, end=recording.end)
             where.append(recording.name)
-            columns.update({joints[k].name: None for k in np.flatnonzero(folded.any(axis=0))})
-            most += int(folded.sum())
+            columns.update({joints[k].name: None for k in np.flatnonzero(turns.any(axis=0))})
+            most += int(np.count_nonzero(np.diff(turns, axis=0)))
         out.append(recording)
     if not where:
         return [], out
@@ -66,30 +66,78 @@ def unfolded(
     return [found], out
 
 
+def _turns(q: Floats, turning: Bools, before: Floats) -> Floats:
+    """[rad] shape=(n, joints) whole turns that steps up to each row had. before: the row before the first."""
+    steps = np.diff(q, axis=0, prepend=before[None])
+    folded = (np.abs(np.abs(steps) - TURN) < NEAR_A_TURN) & turning
+    return np.asarray(np.cumsum(np.where(folded, np.sign(steps) * TURN, 0.0), axis=0))
+
+
+@dataclass(frozen=True)
+class _Unfolded:
+    """Pieces of a recording, each of whose angles go on from the piece before."""
+
+    read: Callable[[], Iterator[_core.Recording]]
+    turning: Bools
+
+    def __call__(self) -> Iterator[_core.Recording]:
+        last, turned = None, 0.0
+        for piece in self.read():
+            q = np.asarray(piece.position)
+            turns = turned + _turns(q, self.turning, q[0] if last is None else last)
+            last, turned = q[-1], turns[-1]
+            yield piece.replace(position=q - turns)
+
+
 def without_spikes(
     robot: _core.Robot, recordings: Sequence[_core.Recording]
 ) -> tuple[list[RecordingFinding], list[_core.Recording]]:
     """Single values far from the rows around them are taken from these instead."""
-    joints = driven_joints(robot)
     found: list[RecordingFinding] = []
     out = []
     for recording in recordings:
-        fields = {}
-        for name, (stem, turning, sliding) in TABLES.items():
-            table = np.array(getattr(recording, name))
-            for k in range(table.shape[1]):
-                of_angle = (PART_OF_ANGLE, LEAST_ANGLE) if name == "position" else (PART, 0.0)
-                wrong = spikes(table[:, k], *of_angle)
-                if not wrong.any() or not np.ptp(recording.position[:, k]) > STILL:
-                    continue
-                unit = turning if joints[k].type == "revolute" else sliding
-                before = table[:, k].copy()
-                table[wrong, k] = np.interp(np.flatnonzero(wrong), np.flatnonzero(~wrong), before[~wrong])
-                largest = float(np.abs(before - table[:, k]).max())
-                found.append(_spiked(recording.name, joints[k].name, f"{stem}{k + 1}", wrong, largest, unit))
-                fields[name] = table
-        out.append(recording.replace(**fields) if fields else recording)
+        spiked = _spikes_of(robot, recording)
+        if spiked:
+            recording = of_all_rows(recording, partial(_without_spikes, robot))
+            found += [one.said for one in spiked]
+        out.append(recording)
     return _as_one(found), out
+
+
+@dataclass(frozen=True)
+class _Spiked:
+    """A column with spikes."""
+
+    table: str
+    column: int
+    mended: Floats  # shape=(n,)
+    said: RecordingFinding
+
+
+def _without_spikes(robot: _core.Robot, recording: _core.Recording) -> _core.Recording:
+    tables: dict[str, Floats] = {}
+    for one in _spikes_of(robot, recording):
+        tables.setdefault(one.table, np.array(getattr(recording, one.table)))[:, one.column] = one.mended
+    return recording.replace(**tables) if tables else recording
+
+
+def _spikes_of(robot: _core.Robot, recording: _core.Recording) -> list[_Spiked]:
+    joints, found = driven_joints(robot), []
+    for name, (stem, turning, sliding) in TABLES.items():
+        table = np.asarray(getattr(recording, name))
+        for k in range(table.shape[1]):
+            of_angle = (PART_OF_ANGLE, LEAST_ANGLE) if name == "position" else (PART, 0.0)
+            x = table[:, k]
+            wrong = spikes(x, *of_angle)
+            if not wrong.any() or not np.ptp(recording.position[:, k]) > STILL:
+                continue
+            unit = turning if joints[k].type == "revolute" else sliding
+            mended = x.copy()
+            mended[wrong] = np.interp(np.flatnonzero(wrong), np.flatnonzero(~wrong), x[~wrong])
+            largest = float(np.abs(x - mended).max())
+            said = _spiked(recording.name, joints[k].name, f"{stem}{k + 1}", wrong, largest, unit)
+            found.append(_Spiked(name, k, mended, said))
+    return found
 
 
 def spikes(x: Floats, part: float = PART, floor: float = 0.0) -> Bools:
@@ -130,7 +178,7 @@ def without_frozen(
             rows += int(stuck.sum())
             edges = np.flatnonzero(np.diff(np.concatenate([[0], stuck.astype(np.int8), [0]])))
             longest = max(longest, *(time[b - 1] - time[a - 1] for a, b in edges.reshape(-1, 2)))
-            recording = with_rows(recording, ~stuck)
+            recording = of_all_rows(recording, _without_frozen)
         out.append(recording)
     if not where:
         return [], out
@@ -139,6 +187,10 @@ def without_frozen(
     )
     words += f" {rows} rows in all, as where a bus drops out: these rows are left out"
     return [RecordingFinding("frozen", tuple(where), (), words, float(rows), "rows", applied=True)], out
+
+
+def _without_frozen(recording: _core.Recording) -> _core.Recording:
+    return with_rows(recording, ~frozen(np.asarray(recording.position)))
 
 
 def frozen(q: Floats) -> Bools:
