@@ -16,6 +16,7 @@ import pytest
 from truing._core import Recording
 from truing.dynamics import check_recordings, identify, load_recordings, predict, validate_recording
 from truing.dynamics.result import write_fit
+from truing.dynamics.servo.data import servo_data
 from truing.errors import InputError
 from truing.files import recording_table
 from truing.testing.dynamics import SimulatedMotion, simulate_motion
@@ -196,3 +197,15 @@ def test_what_is_corrected_is_corrected_in_all_pieces(
         assert np.abs(np.diff(whole["position"], axis=0)).max() < 2.0
         assert np.abs(whole["position"]).max() < np.abs(one.position).max() + 4.0
         assert np.abs(whole["torque"]).max() < 1.5 * np.abs(one.torque).max()
+
+
+def test_commands_longer_than_memory_are_refused_and_not_cut_short(
+    tmp_path: Path, simulated: SimulatedMotion
+) -> None:
+    columns = columns_of(simulated.recordings[0])
+    for k in range(6):
+        columns[f"u{k + 1}_rad"] = columns[f"q{k + 1}_rad"]
+        del columns[f"tau{k + 1}_Nm"]
+    recordings = load_recordings(written(tmp_path / "long.parquet", columns), simulated.nominal)
+    with pytest.raises(InputError, match="long: is longer than memory"):
+        servo_data(recordings, 6)

@@ -145,6 +145,11 @@ def servo_data(
 
 
 def _check(recording: _core.Recording, joints: int, torque: bool) -> None:
+    if recording.pieces is not None:
+        raise InputError(
+            f"{recording.name}: is longer than memory, in which what is simulated by commands must be: part"
+            " it into files of some hours"
+        )
     command = recording.torque_command if torque else recording.command
     if command.shape[1] == 0:
         raise InputError(
