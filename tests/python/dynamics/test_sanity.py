@@ -312,6 +312,53 @@ def test_real_arms_of_another_convention_are_recognised(folder: str) -> None:
     assert said in finding.evidence
 
 
+# ---- The file of another robot ---------------------------------------------------------------------
+def of_another(robot: truing.Robot, longer: float) -> truing.Robot:
+    """A robot of the same kind, whose links are longer and, as they grow with it, heavier."""
+    other = robot.copy()
+    for joint in other.joints:
+        joint.mass *= longer**2
+        joint.inertia = np.asarray(joint.inertia) * longer**4
+        joint.center_of_mass = np.asarray(joint.center_of_mass) * longer
+        if robot.convention == "urdf":
+            frame = np.array(joint.T_parent_joint)
+            frame[:3, 3] *= longer
+            joint.T_parent_joint = frame
+        else:
+            joint.a, joint.d = joint.a * longer, joint.d * longer
+    return other
+
+
+@pytest.mark.parametrize("longer", [0.6, 1.5])
+def test_a_robot_of_another_size_is_a_mistake(longer: float) -> None:
+    checked = check_recordings(of_another(ARM, longer), MOTIONS)
+    found = next(one for one in checked.findings if one.finding == "link_length")
+    assert found.mistake and checked.findings[0] is found
+    j = [joint.name for joint in ARM.joints].index(found.joints[0])
+    lengths = [abs(size) for size in (ARM.joints[j].a, ARM.joints[j].d) if size]
+    assert min(abs(abs(found.value) - size) / size for size in lengths) < 0.15
+
+
+@pytest.mark.parametrize("gain", [0.6, 1.6])
+@pytest.mark.parametrize("joint", [1, 2])
+def test_a_drive_of_another_constant_is_no_other_robot(joint: int, gain: float) -> None:
+    scaled = with_fields(torque=lambda one: column(one.torque, joint, lambda torque: gain * torque))
+    assert "link_length" not in kinds(check_recordings(ARM, scaled))
+
+
+@pytest.mark.realdata
+@pytest.mark.parametrize("longer", [0.6, 1.6])
+def test_the_file_of_another_size_is_recognised_by_a_real_arm(longer: float) -> None:
+    if not os.environ.get("TRUING_REALDATA") or not (REAL / "dyn_ur10").exists():
+        pytest.skip("TRUING_REALDATA does not hold dyn_ur10")
+    robot = truing.load_robot(REAL / "dyn_ur10" / "robot.urdf", any_tool=True)
+    recordings = load_recordings(str(REAL / "dyn_ur10" / "run.csv"), robot)
+    found = check_recordings(of_another(robot, longer), recordings).findings[0]
+    assert found.finding == "link_length" and found.mistake
+    assert found.joints[0] == "elbow_joint"
+    assert found.value == pytest.approx(0.612, rel=0.15)
+
+
 # ---- Scales ------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("factor", [0.7, 1.3])
 def test_torques_of_one_recording_on_another_scale_are_no_load(factor: float) -> None:

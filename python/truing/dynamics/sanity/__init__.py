@@ -8,7 +8,7 @@ What is certain is corrected, and said; all else is only said.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -17,7 +17,18 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.magnitudes import are_magnitudes
 from truing.dynamics.recorded import by_commands, driven_joints, of_all_rows, with_rows
-from truing.dynamics.sanity import band, between, columns, commands, gravity, jumps, lag, loads, pushed
+from truing.dynamics.sanity import (
+    band,
+    between,
+    columns,
+    commands,
+    dimensions,
+    gravity,
+    jumps,
+    lag,
+    loads,
+    pushed,
+)
 from truing.dynamics.sanity.findings import (
     CheckedRecordings as CheckedRecordings,
     RecordingFinding as RecordingFinding,
@@ -34,6 +45,7 @@ Check = Callable[
     [_core.Robot, Sequence[_core.Recording]], tuple[list[RecordingFinding], list[_core.Recording]]
 ]
 OF_ANGLES = ("angle_convention", "joint_sign", "joint_order")  # findings that need no scale of torques
+HIDES_LENGTHS = ("load_comes_and_goes", "load_differs")  # findings with which masses are no constants
 ANGLES: list[Check] = [jumps.unfolded, jumps.without_frozen]
 JUMPS: list[Check] = [*ANGLES, jumps.without_spikes]
 
@@ -64,30 +76,9 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     if magnitudes:
         found.append(columns.magnitudes())
     elif grids:
-        read = readings(robot, grids)
-        unknown = _without_constant(robot, recordings)
-        found += [*read.findings, *scales(robot, read.fit, unknown)]
-        # Recorded speeds are by now the derivatives of the angles, and go with them.
-        recordings = [
-            _scaled(one, read.position.get(one.name), read.position.get(one.name)) for one in recordings
-        ]
-        if read.gravity != tuple(robot.gravity):
-            robot = gravity.under(robot, np.array(read.gravity))
-        robot, recordings = _turned(robot, recordings, read.torque)
-        if _any_change(read.torque) or _any_change(read.position):
-            grids = grids_of(robot, recordings)
-        if not any(one.mistake for one in found):
-            late = lag.shifts(robot, grids)
-            found += lag.findings(late, len(recordings))
-            recordings = [_shifted_back(one, late.get(one.name, 0.0)) for one in recordings]
-            load = known_load(robot, recordings, unknown, constants_by_masses(read.fit, unknown))
-            robot, recordings, unknown = load.robot, load.recordings, load.unknown
-            found += load.findings
-            constants = constants_by_masses(read.fit, unknown)
-            recordings, differing = _what_differs(robot, recordings, grids, constants if unknown else None)
-            found += differing
-        if unknown:
-            found.append(gain_unknown(robot, read.fit, unknown))
+        held = _by_model(robot, recordings, grids)
+        robot, recordings, grids = held.robot, held.recordings, held.grids
+        found += held.findings
     if not any(one.mistake and one.finding == "position_unit" for one in found):
         found += columns.rest(robot, grids)
     found += [*columns.values(robot, recordings), *columns.alone(recordings)]
@@ -97,6 +88,54 @@ def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) 
     found.sort(key=lambda one: (not one.mistake, one.finding in ("at_rest", "gaps", "one_recording")))
     cutoff = _core.TorqueOptions().cutoff if frequency is None else band.cutoff_below(frequency)
     return CheckedRecordings(robot, tuple(recordings), tuple(found), cutoff)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Recordings as they are once they were held against the robot's model."""
+
+    robot: _core.Robot
+    recordings: list[_core.Recording]
+    grids: list[Grid]
+    findings: list[RecordingFinding]
+
+
+def _by_model(robot: _core.Robot, recordings: list[_core.Recording], grids: list[Grid]) -> _Held:
+    """What the robot's model shows: signs, order and scales; shifts; loads and pushes; its own lengths."""
+    read = readings(robot, grids)
+    unknown = _without_constant(robot, recordings)
+    found = [*read.findings, *scales(robot, read.fit, unknown)]
+    # Recorded speeds are by now the derivatives of the angles, and go with them.
+    recordings = [
+        _scaled(one, read.position.get(one.name), read.position.get(one.name)) for one in recordings
+    ]
+    if read.gravity != tuple(robot.gravity):
+        robot = gravity.under(robot, np.array(read.gravity))
+    robot, recordings = _turned(robot, recordings, read.torque)
+    if _any_change(read.torque) or _any_change(read.position):
+        grids = grids_of(robot, recordings)
+    if not any(one.mistake for one in found):
+        late = lag.shifts(robot, grids)
+        found += lag.findings(late, len(recordings))
+        recordings = [_shifted_back(one, late.get(one.name, 0.0)) for one in recordings]
+        load = known_load(robot, recordings, unknown, constants_by_masses(read.fit, unknown))
+        robot, recordings, unknown = load.robot, load.recordings, load.unknown
+        found += load.findings
+        constants = constants_by_masses(read.fit, unknown)
+        recordings, differing = _what_differs(robot, recordings, grids, constants if unknown else None)
+        found += differing
+    if not unknown and not any(one.finding in HIDES_LENGTHS or _other_mistake(one) for one in found):
+        pushed_at = any(one.finding == "tool_pushed" for one in found)
+        free = grids_of(robot, recordings) if pushed_at else grids
+        found = [*dimensions.dimensions(robot, free, read.fit), *found]
+    if unknown:
+        found.append(gain_unknown(robot, read.fit, unknown))
+    return _Held(robot, recordings, grids, found)
+
+
+def _other_mistake(found: RecordingFinding) -> bool:
+    """Than torques of another scale: those of another robot are, too."""
+    return found.mistake and found.finding != "gain"
 
 
 def _by_themselves(

@@ -104,8 +104,11 @@ def _percent_of(joints: Sequence[_core.Joint], ratio: dict[int, float]) -> str:
         return ""
     if all(1.0 / SCALE < r < SCALE for r in ratio.values()):
         return ""
+    of_limits = [r * (limits[j] or math.nan) for j, r in ratio.items()]
+    if max(of_limits) / min(of_limits) > max(ratio.values()) / min(ratio.values()):
+        return ""  # the same ratio at all joints: other masses, as of another robot's file
     for many, word in ((100.0, "cent"), (1000.0, "mille")):
-        of_limit = [r * (limits[j] or math.nan) / many for j, r in ratio.items()]
+        of_limit = [one / many for one in of_limits]
         if max(of_limit) < RATED and min(of_limit) > 1.0 / RATED:
             return word
     return ""
