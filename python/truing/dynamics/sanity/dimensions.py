@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Are the joints as far apart as the robot's file says, or is it the file of another robot?
 
-Torques are linear in masses and frictions once the distances between joints are known; gravity and inertia of
-all links beyond a joint depend on them. So distances are fitted by variable projection (Golub and Pereyra, SIAM
-Journal on Numerical Analysis 10, 1973): of each set of distances least squares finds the rest.
+Torques are linear in masses and frictions once the distances between joints are known. So distances are
+fitted by variable projection (Golub and Pereyra, SIAM Journal on Numerical Analysis 10, 1973): of each set of
+distances least squares finds the rest.
 """
 
 from __future__ import annotations
