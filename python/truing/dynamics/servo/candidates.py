@@ -70,7 +70,9 @@ class Candidate:
     def off(self, point: Point) -> Point:
         """The point without the effect."""
         if self.joint < 0:
-            return self.free[0].put(point, self.neutral)
+            for free in self.free:
+                point = free.put(point, self.neutral)
+            return point
         return point.with_value(self.joint, self.free[0].field, self.neutral)
 
     @property

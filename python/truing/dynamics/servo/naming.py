@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.servo.bus import late_alike
 from truing.dynamics.servo.candidates import Candidate, candidate_columns, candidates_of
 from truing.dynamics.servo.fit import (
     Column,
@@ -132,11 +133,13 @@ def squares_of_folds(
     fits, parts = ([_of_columns(one, columns) for one in some] for some in (by or sums.folds, sums.folds))
     xx, xy = sum(part[0] for part in fits), sum(part[1] for part in fits)
     sigma = np.sqrt(np.diag(np.linalg.inv(xx + np.diag(precision))))
-    known = slice(0, sums.always)
+    known = sigma[: sums.always]
     out = []
     for (fitted_xx, fitted_xy, _), (here, right, squares) in zip(fits, parts, strict=True):
         values = np.linalg.solve(xx - fitted_xx + np.diag(precision), xy - fitted_xy - pull)
-        values[known] = np.clip(values[known], -_STRAIGHT * sigma[known], _STRAIGHT * sigma[known])
+        # As a whole: along a valley values go together, and one that is held back alone leaves it.
+        far = float(np.max(np.abs(values[: known.size]) / known, initial=_STRAIGHT))
+        values[: known.size] *= _STRAIGHT / far
         out.append(squares - 2.0 * float(values @ right) + float(values @ here @ values))
     return np.array(out)
 
@@ -257,6 +260,10 @@ class Namer:
 
     def run(self, fitted: Fitted, sizes: Sizes, nominal: Point) -> Account:
         account = Account(fitted, fitted, [], sizes, nominal)
+        late = late_alike(self, fitted, sizes)
+        if late is not None:
+            account.found.append(late[0])
+            account.fitted = late[1]
         refused: set[tuple[str, int]] = set()
         while len(account.found) < self.most:
             self.fitter.progress(f"candidates beside {len(account.found)} that were named")

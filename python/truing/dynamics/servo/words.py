@@ -266,10 +266,31 @@ def _plain(effect: str) -> str:
 
 
 def _sentence(effect: str, joints: Sequence[str], values: Sequence[ServoParameter]) -> str:
+    if _of_bus(effect, values):
+        mean, sigma = _common(values)
+        return (
+            f"Commands arrive late at {_everywhere(joints)}, or angles are stamped late, which move alike:"
+            f" {1e3 * mean:.3g} ± {1e3 * sigma:.2g} ms"
+        )
     plain = _plain(effect)
     text = plain[:1].upper() + plain[1:] + (f" at {', '.join(joints)}" if joints else "")
     sizes = ", ".join(f"{v.value:.3g} ± {v.sigma:.2g}{'' if v.unit == '1' else ' ' + v.unit}" for v in values)
     return f"{text}: {sizes}" if sizes else text
+
+
+def _of_bus(effect: str, values: Sequence[ServoParameter]) -> bool:
+    """Whether it is the delay that several joints have alike."""
+    return effect == "delay" and len(values) > 1
+
+
+def _common(values: Sequence[ServoParameter]) -> tuple[float, float]:
+    """What values say together, each by its standard error, and how far it is known."""
+    precision = np.array([max(v.sigma, 1e-9) ** -2.0 for v in values])
+    return float(np.average([v.value for v in values], weights=precision)), float(precision.sum() ** -0.5)
+
+
+def _everywhere(joints: Sequence[str]) -> str:
+    return ", ".join(joints) if joints else "all joints"
 
 
 def _usual(parts: Parts, covariance: ServoCovariance) -> list[FoundServoEffect]:
@@ -322,7 +343,8 @@ def _unknown(f: FoundFunction, chain: ServoChain) -> UnknownMotion:
 # ---- classes --------------------------------------------------------------------------------------
 def _classes(parts: Parts, named: Sequence[FoundServoEffect]) -> list[ServoClass]:
     out = [_scale_class(named), *_orders(parts.data)]
-    for joint in (parts.simulator.arm.nominal.joints[j] for j in parts.late):
+    late = _late_alike(parts)
+    for joint in (parts.simulator.arm.nominal.joints[j] for j in parts.late if j not in late):
         alike = tuple(_member(effect, (joint,)) for effect in ("delay", "viscous", "damping_gain"))
         text = f"In motion as slow as this a delay, damping and a derivative part at {joint} do the same"
         out.append(ServoClass(alike, text, _SEPARATED["delay"]))
@@ -341,11 +363,17 @@ def _classes(parts: Parts, named: Sequence[FoundServoEffect]) -> list[ServoClass
     return out
 
 
+def _late_alike(parts: Parts) -> set[int]:
+    """Joints whose delay is named as that of all."""
+    return {f.joint for one in parts.account.found if one.joint < 0 for f in one.free if f.field == "delay"}
+
+
 def _instead(parts: Parts) -> list[ServoClass]:
     """By joint: what departs from the file there, and what alone does the same beside the file's values."""
-    joints = parts.simulator.arm.nominal.joints
+    joints, late = parts.simulator.arm.nominal.joints, _late_alike(parts)
     out = []
-    for j, others in parts.instead.items():
+    for j, every in parts.instead.items():
+        others = [i for i in every if not (i.other.effect == "delay" and j in late)]
         if not others:
             continue
         departed = [d.free.field for d in parts.departures if d.certain and d.free.joint == j]
@@ -471,10 +499,14 @@ def _causes(named: Sequence[FoundServoEffect]) -> str:
     """The largest in plain words, one effect at several joints once, and how many smaller ones there are."""
     joints: dict[str, list[str]] = {}
     for one in named:
-        joints.setdefault(one.effect, []).extend(one.joints)
+        if _of_bus(one.effect, one.parameters):
+            late = f"{1e3 * _common(one.parameters)[0]:.3g} ms late at {_everywhere(one.joints)}"
+            joints[f"commands that arrive {late}"] = []
+        else:
+            joints.setdefault(_plain(one.effect), []).extend(one.joints)
     some = list(joints)[:_TOLD]
-    told = [_plain(effect) + (f" ({', '.join(joints[effect])})" if joints[effect] else "") for effect in some]
-    smaller = sum(one.effect not in some for one in named)
+    told = [plain + (f" ({', '.join(joints[plain])})" if joints[plain] else "") for plain in some]
+    smaller = sum(max(1, len(places)) for plain, places in joints.items() if plain not in some)
     if smaller:
         told.append(f"{smaller} smaller")
     return " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
