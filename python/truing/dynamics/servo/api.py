@@ -8,6 +8,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ from truing import _core
 from truing.dynamics.recorded import by_commands as by_commands
 from truing.dynamics.servo.apart import Apart
 from truing.dynamics.servo.arm import ServoArm, servo_arm
+from truing.dynamics.servo.beats import READINGS, beat_of
+from truing.dynamics.servo.bus import late_alike, log_squares
 from truing.dynamics.servo.data import ServoData, Window, servo_data, windows_of
 from truing.dynamics.servo.departures import departures, instead
 from truing.dynamics.servo.firm import firm
@@ -133,9 +136,8 @@ def servo_diagnose(
     values that are not numbers, nothing to fit.
     """
     begun = time.perf_counter()
-    prepared = prepare(
-        robot, recordings, joints=joints, window=window, test_share=test_share, threads=threads
-    )
+    ready = partial(prepare, robot, joints=joints, window=window, test_share=test_share, threads=threads)
+    prepared, said = as_moved(recordings, ready, leave_out, progress)
     nominal, rows = point_of(prepared.arm.nominal), rows_of(prepared.data, prepared.train)
 
     def ground(apart: Apart) -> Grounded:
@@ -151,7 +153,7 @@ def servo_diagnose(
     if stands is not None and isinstance(fitter.simulator, Apart):
         apart, simulator = fitter.simulator, fitter.simulator.whole
         prepared = replace(prepared, arm=simulator.arm, simulator=simulator)
-    account = namer.run(standard, sizes, nominal)
+    account = namer.run(standard, sizes, nominal, late_alike(namer, standard, sizes, nominal))
     fitter.progress("judging by held-out motion")
     single = len({prepared.data.streams[w.stream].fold for w in prepared.train}) < 2
     judge = Judge(prepared, apart, nominal, standard.point)
@@ -174,12 +176,44 @@ def servo_diagnose(
         traces_of(prepared.simulator, prepared.windows, models),
         judge.held(account, [f.field for f in standard.free]),
         judge.blocks,
-        [*([stands.sentence()] if stands is not None else []), *prepared.arm.notes],
+        [*said, *([stands.sentence()] if stands is not None else []), *prepared.arm.notes],
         late(namer, account),
         departed := departures(namer, account),
         instead(namer, account, departed),
     )
     return diagnosis_of(parts, time.perf_counter() - begun)
+
+
+def as_moved(
+    recordings: Sequence[_core.Recording],
+    ready: Callable[[Sequence[_core.Recording]], Prepared],
+    leave_out: Sequence[str] = (),
+    progress: Callable[[str], None] | None = None,
+) -> tuple[Prepared, list[str]]:
+    """Recordings made ready; where commands change more seldom than rows are recorded, held from change to
+    change, or as they go on between, whichever moves better with the usual parameters and a delay; and what
+    is to be said of it."""
+    beats = [beat_of(recording) for recording in recordings]
+    periods = [beat.period for beat in beats if beat is not None]
+    if not periods:
+        return ready(recordings), []
+    period = float(np.median(periods))
+    tried = [
+        ready([read(one, beat, period) for one, beat in zip(recordings, beats, strict=True)])
+        for read in READINGS
+    ]
+    best = int(np.argmin([_left(one, leave_out, progress) for one in tried]))
+    return tried[best], [f"commands change every {1e3 * period:.3g} ms{tuple(READINGS.values())[best]}"]
+
+
+def _left(prepared: Prepared, leave_out: Sequence[str], progress: Callable[[str], None] | None) -> float:
+    """Logarithm of the squared error that the usual parameters and a delay of all joints leave."""
+    nominal = point_of(prepared.arm.nominal)
+    fitter = Fitter(Apart(prepared.simulator, LONGEST_STEP), rows_of(prepared.data, prepared.train), progress)
+    standard, sizes = groundwork(fitter, nominal, prepared.data)
+    namer = Namer(fitter, leave_out, 0)
+    late = late_alike(namer, standard, sizes, nominal)
+    return log_squares(standard.errors if late is None else late[1].errors, namer.resolution)
 
 
 def _what_holds(
@@ -281,7 +315,7 @@ class Judge:
 
     def held(self, account: Account, usual: Sequence[str]) -> list[Floats]:
         """Errors of every chain that is compared: see `Parts.held`. usual: fields that are always fitted."""
-        points = [*self._compared(account), *(w.point for w in account.weights)]
+        points = [self.nominal, self.standard, account.fitted.point, *(w.point for w in account.weights)]
         for name in (n for n in USUAL if n in usual):
             back = self.standard.chain.copy()
             back[:, FIELDS.index(name)] = self.nominal.chain[:, FIELDS.index(name)]
@@ -309,7 +343,7 @@ class Judge:
         return all(removes(errors[1], errors[2], errors[0], self.blocks))
 
     def _compared(self, account: Account) -> list[Point]:
-        return [self.nominal, self.standard, account.fitted.point]
+        return [self.nominal, account.ground.point, account.fitted.point]
 
 
 def _blocks(data: ServoData, rows: Rows) -> NDArray[np.intp]:

@@ -10,25 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truing.dynamics.servo.candidates import Candidate
+from truing.dynamics.servo.candidates import BUS, Candidate
 from truing.dynamics.servo.fit import Fitted, sums
-from truing.dynamics.servo.free import Sizes, free_value
+from truing.dynamics.servo.free import Free, Sizes, free_value
+from truing.dynamics.servo.ground import groundwork
+from truing.dynamics.servo.naming import Account, Namer
 from truing.dynamics.servo.simulator import FIELDS, Point
-
-if TYPE_CHECKING:
-    from truing.dynamics.servo.naming import Namer
 
 Floats = NDArray[np.float64]
 
-BUS = "delay of all"
 _DOING = "commands that are late at all joints"
 _DELAYS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1)  # [s] that are looked at
-_ALIKE = 0.2  # of the common delay: standard deviation of a joint's own
+_SPREAD = 0.2  # of the common delay: standard deviation of a joint's own
 _LEAST = 0.03  # of what is moved, and of the usual torque: rotor and dry friction that a fit begins from
 _ROUNDS = 4
 _TURNS, _SETTLED = 4, 0.03  # of a fit and its common delay; part of it that may still change
@@ -39,47 +36,55 @@ _SAME = 0.5  # of the common delay, that a joint's own is at least
 _LEAST_FOR = 2  # joints
 
 
-def late_alike(namer: Namer, fitted: Fitted, sizes: Sizes) -> tuple[Candidate, Fitted] | None:
+def late_alike(namer: Namer, fitted: Fitted, sizes: Sizes, nominal: Point) -> tuple[Candidate, Fitted] | None:
     """The delay that joints have in common, and the fit with it. None: there is none.
 
-    fitted: with the usual parameters. Delays are tried at all joints at once, the usual parameters following
-    (a profile of the likelihood); about the best one each joint's own is fitted. Of the joints that speak,
-    two or more must speak for it, and more than against it; these keep none.
+    fitted: the usual parameters alone. Delays are tried at all joints at once, the usual parameters following
+    (a profile of the likelihood); about the best one each joint's own is fitted. Of the joints that speak two
+    or more must speak for it, and more than against it; these keep none.
     """
     if namer.joints < _LEAST_FOR or "delay" in namer.leave_out:
         return None
     namer.fitter.progress(_DOING)
-    best = _best_of_all(namer, fitted, sizes)
+    other = namer.fitter.other
+    found = _alike(namer, Account(fitted, fitted, [], sizes, nominal))
+    if found is None:
+        namer.fitter.other = other
+    return found
+
+
+def _alike(namer: Namer, account: Account) -> tuple[Candidate, Fitted] | None:
+    best = _best_of_all(namer, account.fitted, account.sizes)
     if best is None:
         return None
     every = list(range(namer.joints))
-    tried = _with(namer, fitted, best, every, sizes)
-    speak_for, against = _said(namer, fitted, tried, every)
+    tried = _with(namer, account, best, every)
+    speak_for, against = _said(namer, account.fitted, tried, every)
     if against:
         every = [j for j in every if j not in against]
         if len(every) < _LEAST_FOR:
             return None
-        tried = _with(namer, fitted, best, every, sizes)
-        speak_for, more = _said(namer, fitted, tried, every)
+        tried = _with(namer, account, best, every)
+        speak_for, more = _said(namer, account.fitted, tried, every)
         if more:
             return None
     if len(speak_for) < max(_LEAST_FOR, len(against) + 1):
         return None
+    tried = _laid_anew(namer, account, tried, every)
     names = namer.arm.nominal.joints
     where = () if len(every) == namer.joints else tuple(names[j] for j in every)
-    free = tuple(f for f in tried.free if f.field == "delay")
-    return Candidate("delay", -1, where, free, label=BUS), tried
+    return Candidate("delay", -1, where, tuple(_delays(tried)), label=BUS), tried
 
 
 def _best_of_all(namer: Namer, fitted: Fitted, sizes: Sizes) -> Point | None:
     """The usual parameters and the delay of all joints that move best together (geometric mean of the joints'
     squared errors). None: that without."""
     fitter = namer.fitter
-    best, least, point = None, _logs(fitted.errors, namer.resolution), fitted.point
+    best, least, point = None, log_squares(fitted.errors, namer.resolution), fitted.point
     for delay in _DELAYS:
         point = _lifted(point.with_value(slice(None), "delay", delay), sizes)
         fit = fitter.fit(point, fitted.free, fitted.start, None, _ROUNDS, shown=False)
-        point, squares = fit.point, _logs(fit.errors, namer.resolution)
+        point, squares = fit.point, log_squares(fit.errors, namer.resolution)
         if squares < least:
             best, least = point, squares
         elif squares > least + np.log(_LOST):
@@ -97,27 +102,43 @@ def _lifted(point: Point, sizes: Sizes) -> Point:
     return replace(point, chain=chain)
 
 
-def _logs(errors: Floats, resolution: Floats) -> float:
+def log_squares(errors: Floats, resolution: Floats) -> float:
+    """Mean over the joints of the logarithm of their mean squared error."""
     return float(np.mean(np.log(np.maximum(np.mean(errors**2, axis=0), resolution**2))))
 
 
-def _with(namer: Namer, fitted: Fitted, best: Point, joints: Sequence[int], sizes: Sizes) -> Fitted:
+def _with(namer: Namer, account: Account, best: Point, joints: Sequence[int]) -> Fitted:
     """The usual parameters and these joints' delays, alike: about what all of them say together, which moves
     as they are fitted."""
-    common = best.value(0, "delay")
+    usual, common = account.fitted, best.value(joints[0], "delay")
     others = [j for j in range(namer.joints) if j not in joints]
     chain = best.chain.copy()
-    chain[others] = fitted.point.chain[others]
+    chain[others] = usual.point.chain[others]
     point = replace(best, chain=chain)
     for _ in range(_TURNS):
-        delays = [replace(free_value("delay", j, sizes), prior=_ALIKE * common) for j in joints]
-        start = np.array([*fitted.start, *(common for _ in delays)])
-        free = [*fitted.free, *delays]
-        tried = namer.fitter.settled(point, free, start, None, 2 * _ROUNDS, _DOING)
+        delays = [replace(free_value("delay", j, account.sizes), prior=_SPREAD * common) for j in joints]
+        start = np.array([*usual.start, *(common for _ in delays)])
+        tried = namer.fitter.settled(point, [*usual.free, *delays], start, None, 2 * _ROUNDS, _DOING)
         before, common, point = common, _together(namer, tried), tried.point
         if abs(common - before) < _SETTLED * before:
             break
     return tried
+
+
+def _laid_anew(namer: Namer, account: Account, tried: Fitted, joints: Sequence[int]) -> Fitted:
+    """The groundwork once more under these delays, where it ends better so: what was fitted without them may
+    have led light joints, whose torques' scale is hardly seen, far away."""
+    delays = np.array([f.at(tried.point) for f in _delays(tried)])
+    late = account.nominal.chain.copy()
+    late[list(joints), FIELDS.index("delay")] = delays
+    laid = groundwork(namer.fitter, replace(account.nominal, chain=late), namer.data)[0]
+    other = _with(namer, replace(account, fitted=laid), laid.point, joints)
+    squares = [log_squares(one.errors, namer.resolution) for one in (tried, other)]
+    return other if squares[1] < squares[0] else tried
+
+
+def _delays(tried: Fitted) -> list[Free]:
+    return [f for f in tried.free if f.field == "delay"]
 
 
 def _together(namer: Namer, tried: Fitted) -> float:

@@ -47,6 +47,10 @@ _MOTION = 0.1  # of the prior's standard deviation: step of a difference quotien
 _PAYLOAD_PRIOR, _MASS_PRIOR = 0.3, 0.3  # of the moved bodies' mass; of a body's
 
 
+BUS = "delay of all"
+"""Label of the delay that several joints have alike."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """One form of an effect at one joint, or of the whole arm."""

@@ -24,6 +24,7 @@ _ROUNDS = 20
 _KIND = 3  # joints of one gain in the file, at least: servos of one kind
 _ALIKE = 0.2  # of the logarithm of their gains
 _SAME_SQUARES = 0.3  # more of a joint's squared error, before it is fitted again: its scale is not seen
+_FINER_GAIN = 0.1  # of a joint's squared error, that finer differences have to win
 _NEAR = 10.0  # times a joint's squared error: with the file's torques they may still be the better ones
 _LEAST_ERROR = 1e-6  # [rad | m]
 _SCANNED = 12  # windows that the first scan looks at, at most
@@ -109,7 +110,7 @@ def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted,
     start = np.array([f.at(point) for f in free])
     begin = _better_start(fitter, point, sizes, free, start)
     fitted = fitter.settled(begin, free, start, None, _ROUNDS, "groundwork")
-    fitted = _alike(fitter, _from_file(fitter, fitted, nominal), nominal)
+    fitted = _alike(fitter, _from_file(fitter, _finer(fitter, fitted), nominal), nominal)
     point = with_limits(fitted.point, nominal)
     if not np.array_equal(point.chain, fitted.point.chain):
         fitted = fitter.settled(point, fitted.free, fitted.start, None, _ROUNDS // 4, "limits of the torques")
@@ -129,6 +130,20 @@ def _better_start(fitter: Fitter, point: Point, sizes: Sizes, free: Sequence[Fre
     ]
     best = np.argmin([np.mean(fit.errors**2, axis=0) for fit in fits], axis=0)
     return replace(point, chain=np.array([fits[k].point.chain[j] for j, k in enumerate(best)]))
+
+
+def _finer(fitter: Fitter, fitted: Fitted) -> Fitted:
+    """The fit goes on by finer differences at joints that move better for certain so."""
+    other = fitter.other
+    with fitter.finer():
+        fit = fitter.settled(fitted.point, fitted.free, fitted.start, None, _ROUNDS, "groundwork")
+    before, after = (np.mean(one.errors**2, axis=0) for one in (fitted, fit))
+    better = after < (1.0 - _FINER_GAIN) * before
+    if not better.any():
+        fitter.other = other
+        return fitted
+    point = replace(fitted.point, chain=np.where(better[:, None], fit.point.chain, fitted.point.chain))
+    return fitter.settled(point, fitted.free, fitted.start, None, _ROUNDS // 4, "groundwork")
 
 
 def with_limits(point: Point, nominal: Point) -> Point:

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.servo.bus import late_alike
-from truing.dynamics.servo.candidates import Candidate, candidate_columns, candidates_of
+from truing.dynamics.servo.candidates import BUS, Candidate, candidate_columns, candidates_of
 from truing.dynamics.servo.fit import (
     Column,
     Fitted,
@@ -103,6 +102,19 @@ class Account:
     """By the place of what was taken: rivals that were refitted where it was."""
     weights: list[Weight] = field(default_factory=list)
     vetoed: list[tuple[Candidate, str]] = field(default_factory=list)  # and why they are not named
+    late: Fitted | None = (
+        None  # with the usual parameters and the delay that joints have alike, if it is found
+    )
+
+    @property
+    def ground(self) -> Fitted:
+        """What other names are held against."""
+        return self.standard if self.late is None else self.late
+
+    def remove(self, at: int) -> None:
+        """Takes one of what was found from the list."""
+        if self.found.pop(at).label == BUS:
+            self.late = None
 
 
 @dataclass
@@ -136,12 +148,22 @@ def squares_of_folds(
     known = sigma[: sums.always]
     out = []
     for (fitted_xx, fitted_xy, _), (here, right, squares) in zip(fits, parts, strict=True):
-        values = np.linalg.solve(xx - fitted_xx + np.diag(precision), xy - fitted_xy - pull)
-        # As a whole: along a valley values go together, and one that is held back alone leaves it.
-        far = float(np.max(np.abs(values[: known.size]) / known, initial=_STRAIGHT))
-        values[: known.size] *= _STRAIGHT / far
+        others, pulls = xx - fitted_xx + np.diag(precision), xy - fitted_xy - pull
+        values = _held_back(np.linalg.solve(others, pulls), others, pulls, known)
         out.append(squares - 2.0 * float(values @ right) + float(values @ here @ values))
     return np.array(out)
+
+
+def _held_back(values: Floats, others: Floats, pulls: Floats, sigma: Floats) -> Floats:
+    """What is fitted no further than derivatives hold, value by value; all together, where rows that are
+    fitted would be further off so than at the fit: along a valley, as of a delay and damping, one that is
+    held back alone leaves it."""
+    known = slice(0, sigma.size)
+    out = values.copy()
+    out[known] = np.clip(values[known], -_STRAIGHT * sigma, _STRAIGHT * sigma)
+    if float(out @ others @ out) > 2.0 * float(out @ pulls):
+        out[known] = values[known] * _STRAIGHT / float(np.max(np.abs(values[known]) / sigma))
+    return out
 
 
 def rooted_gain(before: Floats, after: Floats) -> tuple[float, float]:
@@ -237,10 +259,10 @@ class Namer:
             return len(there) >= _OF_ARM[0] or [name for name, _ in there].count(one.effect) >= _OF_ARM[1]
         return len(there) >= (_REFITTED if self.joints == 1 else _REFITTED_EACH)
 
-    def matters(self, standard: Fitted, one: Candidate, before: Fitted, after: Fitted) -> bool:
+    def matters(self, ground: Fitted, one: Candidate, before: Fitted, after: Fitted) -> bool:
         """Whether a refit removes more of its joint's error than encoders' steps make, and than a part of
         what the usual parameters leave there: the laws themselves are no nearer to a machine's."""
-        squares = [np.mean(some.errors**2, axis=0) for some in (before, after, standard)]
+        squares = [np.mean(some.errors**2, axis=0) for some in (before, after, ground)]
         enough = squares[0] - squares[1] > np.maximum(self.resolution**2, _LEAST_PART * squares[2])
         return bool(np.any(enough) if one.joint < 0 else enough[one.joint])
 
@@ -258,12 +280,18 @@ class Namer:
 
     # ---- the search
 
-    def run(self, fitted: Fitted, sizes: Sizes, nominal: Point) -> Account:
+    def run(
+        self,
+        fitted: Fitted,
+        sizes: Sizes,
+        nominal: Point,
+        late: tuple[Candidate, Fitted] | None = None,
+    ) -> Account:
+        """late: a delay that joints have alike, and the fit with it."""
         account = Account(fitted, fitted, [], sizes, nominal)
-        late = late_alike(self, fitted, sizes)
         if late is not None:
             account.found.append(late[0])
-            account.fitted = late[1]
+            account.fitted = account.late = late[1]
         refused: set[tuple[str, int]] = set()
         while len(account.found) < self.most:
             self.fitter.progress(f"candidates beside {len(account.found)} that were named")
@@ -288,7 +316,7 @@ class Namer:
         self.fitter.progress(f"{one.effect} {' '.join(one.joints)} does not hold")
         noise = self._noise(fitted.columns, fitted.errors, len(fitted.columns))
         less = self.without(account, at, noise)
-        account.found.pop(at)
+        account.remove(at)
         account.fitted = self.polished(less, noise)
         self._weigh(account)
 
@@ -304,6 +332,7 @@ class Namer:
                 [c for k, c in enumerate(account.found) if k != at],
                 account.sizes,
                 account.nominal,
+                late=account.late,
             )
             best, seen = self.best_beside(rest, set(), joint)
             if not best or best[0][1].place == one.place:
@@ -329,7 +358,7 @@ class Namer:
             less, weight, needed = self.weighed(account, at, noise, squares)
             if not needed:
                 self.fitter.progress(f"{one.effect} {' '.join(one.joints)} is idle")
-                account.found.pop(at)
+                account.remove(at)
                 account.fitted = self.polished(less, noise)
                 return True
             weights.append(weight)
@@ -417,7 +446,7 @@ class Namer:
             after = self.folds_of(refit, sums.noise)
             before = self.folds_of(fitted, sums.noise)
             fine = gain > THRESHOLD and self.predicts(before, after, LEAST_GAIN, gain)
-            fine = fine and self.matters(account.standard, one, fitted, refit)
+            fine = fine and self.matters(account.ground, one, fitted, refit)
             if fine and self.carries(one, fitted, refit, sums.noise):
                 best.append((gain, one, refit))
             else:
@@ -512,10 +541,11 @@ class Namer:
         mine = [k for k in keep if one.joint < 0 or fitted.free[k].joint in (one.joint, -1)]
         point, free = one.off(fitted.point), [fitted.free[k] for k in mine]
         # Usual values have made up for what goes: they may as well begin where they were without any name.
-        usual = [f for f in free if any(f == other for other in account.standard.free)]
+        ground = account.standard if one.label == BUS else account.ground
+        known = {(f.field, f.joint, f.body) for f in ground.free}
         other = point
-        for f in usual:
-            other = f.put(other, f.at(account.standard.point))
+        for f in (f for f in free if (f.field, f.joint, f.body) in known):
+            other = f.put(other, f.at(ground.point))
         with self.fitter.beside(fitted):
             tries = [
                 self.fitter.fit(p, free, fitted.start[mine], noise, _MORE_ROUNDS, f"without {one.effect}")

@@ -95,6 +95,7 @@ _SEPARATED = {
 }
 _USUAL_SEPARATED = "record steps, slow reversals and a chirp of each joint alone"
 _TOGETHER = 0.9  # rank correlation (Spearman 1904) over recordings: inputs that rose in one order
+_BETTER = 0.05  # of the file's squared error: where the usual parameters win less, none departs
 _TOLD = 3  # causes in the sentence
 
 
@@ -306,7 +307,9 @@ def _usual(parts: Parts, covariance: ServoCovariance) -> list[FoundServoEffect]:
         for j, joint in enumerate(joints):
             departure = of_joint[name, j]
             value = _parameter(parts, covariance, departure.free, parts.nominal)
-            departs = departure.certain
+            # Of one value after the other: all may go together, and move no better than the file's.
+            better = np.sum(standard[:, j] ** 2) < (1.0 - _BETTER) * np.sum(nominal[:, j] ** 2)
+            departs = departure.certain and bool(better)
             scale = max(float(np.sum(np.maximum(nominal[:, j] ** 2, back[:, j] ** 2))), 1e-18)
             share = float(np.sum(back[:, j] ** 2 - standard[:, j] ** 2)) / scale / len(joints)
             out.append(
