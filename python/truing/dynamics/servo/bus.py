@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 
 _DOING = "commands that are late at all joints"
 _DELAYS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1)  # [s] that are looked at
+_NEARER = (1.4, 1.2, 1.1)  # times the best, on both sides, that are looked at then
 _SPREAD = 0.2  # of the common delay: standard deviation of a joint's own
 _LEAST = 0.03  # of what is moved, and of the usual torque: rotor and dry friction that a fit begins from
 _ROUNDS = 4
@@ -79,16 +80,25 @@ def _alike(namer: Namer, account: Account) -> tuple[Candidate, Fitted] | None:
 def _best_of_all(namer: Namer, fitted: Fitted, sizes: Sizes) -> Point | None:
     """The usual parameters and the delay of all joints that move best together (geometric mean of the joints'
     squared errors). None: that without."""
-    fitter = namer.fitter
-    best, least, point = None, log_squares(fitted.errors, namer.resolution), fitted.point
-    for delay in _DELAYS:
+    none = log_squares(fitted.errors, namer.resolution)
+    best, least, point = None, none, fitted.point
+
+    def tried(point: Point, delay: float) -> tuple[Point, float]:
         point = _lifted(point.with_value(slice(None), "delay", delay), sizes)
-        fit = fitter.fit(point, fitted.free, fitted.start, None, _ROUNDS, shown=False)
-        point, squares = fit.point, log_squares(fit.errors, namer.resolution)
+        fit = namer.fitter.fit(point, fitted.free, fitted.start, None, _ROUNDS, shown=False)
+        return fit.point, log_squares(fit.errors, namer.resolution)
+
+    for delay in _DELAYS:
+        point, squares = tried(point, delay)
         if squares < least:
             best, least = point, squares
         elif squares > least + np.log(_LOST):
             break
+    for factor in _NEARER if best is not None else ():
+        for times in (factor, 1.0 / factor):
+            point, squares = tried(best, times * best.value(0, "delay"))
+            if squares < least:
+                best, least = point, squares
     return best
 
 

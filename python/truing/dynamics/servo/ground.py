@@ -24,6 +24,7 @@ _ROUNDS = 20
 _KIND = 3  # joints of one gain in the file, at least: servos of one kind
 _ALIKE = 0.2  # of the logarithm of their gains
 _SAME_SQUARES = 0.3  # more of a joint's squared error, before it is fitted again: its scale is not seen
+_SCALES = (1.0, 0.2, 0.5, 2.0)  # of all torques, from which a fit goes on
 _FINER_GAIN = 0.1  # of a joint's squared error, that finer differences have to win
 _NEAR = 10.0  # times a joint's squared error: with the file's torques they may still be the better ones
 _LEAST_ERROR = 1e-6  # [rad | m]
@@ -133,10 +134,23 @@ def _better_start(fitter: Fitter, point: Point, sizes: Sizes, free: Sequence[Fre
 
 
 def _finer(fitter: Fitter, fitted: Fitted) -> Fitted:
-    """The fit goes on by finer differences at joints that move better for certain so."""
-    other = fitter.other
+    """The fit goes on by finer differences, also from all torques of a joint at other scales, where joints
+    move better for certain so."""
+    other, columns = fitter.other, [FIELDS.index(name) for name in TORQUES]
+    chains = []
+    for factor in _SCALES:
+        chains.append(fitted.point.chain.copy())
+        chains[-1][:, columns] *= factor
     with fitter.finer():
-        fit = fitter.settled(fitted.point, fitted.free, fitted.start, None, _ROUNDS, "groundwork")
+        fits = [
+            fitter.fit(
+                replace(fitted.point, chain=chain), fitted.free, fitted.start, None, _ROUNDS, "", False
+            )
+            for chain in chains
+        ]
+        best = np.argmin([np.mean(fit.errors**2, axis=0) for fit in fits], axis=0)
+        point = replace(fitted.point, chain=np.array([fits[k].point.chain[j] for j, k in enumerate(best)]))
+        fit = fitter.settled(point, fitted.free, fitted.start, None, _ROUNDS // 4, "groundwork")
     before, after = (np.mean(one.errors**2, axis=0) for one in (fitted, fit))
     better = after < (1.0 - _FINER_GAIN) * before
     if not better.any():
