@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,10 +15,11 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.servo import ServoDiagnosis, servo_diagnose
 from truing.dynamics.servo.api import prepare
+from truing.dynamics.servo.candidates import BUS, Candidate
 from truing.dynamics.servo.fit import Fitted, Noise
-from truing.dynamics.servo.free import Free
-from truing.dynamics.servo.naming import Sums, squares_of_folds
-from truing.dynamics.servo.simulator import Point, point_of
+from truing.dynamics.servo.free import Free, Sizes, free_value
+from truing.dynamics.servo.naming import Account, Namer, Sums, squares_of_folds
+from truing.dynamics.servo.simulator import FIELDS, Point, point_of
 
 pytest.importorskip("mujoco")
 
@@ -113,6 +115,37 @@ def test_delays_are_not_asked_for_where_they_are_left_out(tmp_path: Path) -> Non
     file.write_text(ARM, encoding="utf-8")
     found = servo_diagnose(file, recordings(file, (0.03, 0.03, 0.03)), leave_out=["delay"])
     assert not any(one.effect == "delay" for one in found.effects)
+
+
+@pytest.mark.parametrize(
+    ("values", "joined"),
+    [
+        ({0: 0.02, 1: 0.022, 2: 0.019}, ()),
+        ({0: 0.02, 2: 0.021}, ("turn", "wrist")),
+        ({0: 0.02, 1: 0.04, 2: 0.02}, None),
+        ({1: 0.02}, None),
+    ],
+)
+def test_delays_that_were_found_one_by_one_are_one_where_they_are_alike(
+    values: dict[int, float], joined: tuple[str, ...] | None
+) -> None:
+    names, one = ("turn", "lift", "wrist"), np.ones(3)
+    point, sizes = Point(np.zeros((3, len(FIELDS)))), Sizes(one, one, one, one)
+    found = [Candidate("payload", -1, (), (Free("payload_mass", -1, "linear", 1.0, 0.0, 9.0, "kg"),))]
+    for joint, value in values.items():
+        point = point.with_value(joint, "delay", value)
+        found.append(Candidate("delay", joint, (names[joint],), (free_value("delay", joint, sizes),)))
+    fitted = Fitted(point, [], np.zeros(0), np.zeros((1, 3)), [])
+    account = Account(fitted, fitted, list(found), sizes, point)
+    namer = Namer.__new__(Namer)
+    namer.joints, namer.arm = 3, SimpleNamespace(nominal=SimpleNamespace(joints=names))  # type: ignore[assignment]
+    namer._join(account)
+    if joined is None:
+        assert account.found == found
+    else:
+        assert account.found[0] is found[0] and len(account.found) == 2
+        assert (account.found[1].joints, account.found[1].label) == (joined, BUS)
+        assert [f.joint for f in account.found[1].free] == sorted(values)
 
 
 def test_values_that_go_together_are_held_back_together() -> None:

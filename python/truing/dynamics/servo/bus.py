@@ -81,7 +81,7 @@ def _best_of_all(namer: Namer, fitted: Fitted, sizes: Sizes) -> Point | None:
     """The usual parameters and the delay of all joints that move best together (geometric mean of the joints'
     squared errors). None: that without."""
     none = log_squares(fitted.errors, namer.resolution)
-    best, least, point = None, none, fitted.point
+    best, least, point = fitted.point, none, fitted.point
 
     def tried(point: Point, delay: float) -> tuple[Point, float]:
         point = _lifted(point.with_value(slice(None), "delay", delay), sizes)
@@ -94,11 +94,12 @@ def _best_of_all(namer: Namer, fitted: Fitted, sizes: Sizes) -> Point | None:
             best, least = point, squares
         elif squares > least + np.log(_LOST):
             break
-    for factor in _NEARER if best is not None else ():
-        for times in (factor, 1.0 / factor):
-            point, squares = tried(best, times * best.value(0, "delay"))
-            if squares < least:
-                best, least = point, squares
+    if not least < none:
+        return None
+    for times in (part for factor in _NEARER for part in (factor, 1.0 / factor)):
+        point, squares = tried(best, times * best.value(0, "delay"))
+        if squares < least:
+            best, least = point, squares
     return best
 
 

@@ -52,6 +52,7 @@ _FRICTIONS = (1.0, 0.4, 0.05)  # times the dry friction that stands beside it
 _OF_INPUTS = ("gain_law", "thermal_friction", "supply_gain", "warmup")
 _LEAST_GROUPS = 3
 _BETTER = 3.0  # nats: of a name that takes another's place
+_ALIKE = 0.4  # of the median: how far delays may be apart that are one
 _FARTHEST = 0.6  # of a prior: that derivatives are followed
 RESOLUTION = 0.3  # of the usual step between distinct readings: no error is smaller
 _MOST_ROWS = 15000  # of which sums are made; more are thinned
@@ -301,8 +302,24 @@ class Namer:
             for joint in range(self.joints):
                 if joint in {c.joint for c in account.found[before:]}:
                     self._question(account, joint)
+        self._join(account)
         self._weigh(account)
         return account
+
+    def _join(self, account: Account) -> None:
+        """Delays that most joints have alike, found one by one beside what hid that they are: one cause."""
+        late = [one for one in account.found if one.free[0].field == "delay"]
+        free = [f for one in late for f in one.free]
+        if len(late) < 2 or 2 * len(free) <= self.joints:
+            return
+        values = np.array([f.at(account.fitted.point) for f in free])
+        if np.ptp(values) > _ALIKE * np.median(values):
+            return
+        free.sort(key=lambda f: f.joint)
+        names = self.arm.nominal.joints
+        where = () if len(free) == self.joints else tuple(names[f.joint] for f in free)
+        account.found = [one for one in account.found if one.free[0].field != "delay"]
+        account.found.append(Candidate("delay", -1, where, tuple(free), label=BUS))
 
     def _weigh(self, account: Account) -> None:
         """Drops what is idle, until nothing is."""
