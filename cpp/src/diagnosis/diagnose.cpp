@@ -317,7 +317,7 @@ void judge_noise(const Repeats& repeats, const Work& work, const Decision& decis
   out->noise_from_repeats = repeats.enough();
   out->noise_floor =
       std::sqrt(components) *
-      (out->noise_from_repeats ? repeats.sigma : work.noise.position_sigma * std::sqrt(decision.state.sigma2));
+      (out->noise_from_repeats ? repeats.sigma : noise_of_positions(work, decision.state));
   if (work.given.mistaken && !out->noise_from_repeats) out->noise_floor = 0.0;  // nothing was fitted that could tell
   const double gap2 = std::pow(out->gap.rms, 2.0), floor2 = std::pow(out->noise_floor, 2.0),
                after2 = std::pow(out->after.rms, 2.0);

@@ -19,14 +19,14 @@ namespace truing::diagnosis {
 
 using Kind = Explanation::Kind;
 
-/// Sums over the rows of the training folds that are `wanted`, of some columns.
+/// Sums over the values of the training folds that are `wanted`, by fold and kind, of some columns.
 template <typename Wanted>
 static Gram sum_of(const Design& design, const Eigen::VectorXd& weight, const std::vector<int>& columns,
                    const Wanted& wanted) {
   GramSum sum(static_cast<Eigen::Index>(columns.size()));
   for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
     const std::int32_t fold = design.fold[static_cast<std::size_t>(i)];
-    if (fold >= design.folds || !wanted(fold)) continue;
+    if (fold >= design.folds || !wanted(fold, kind_of(design.component[static_cast<std::size_t>(i)]))) continue;
     double* out = sum.row();
     for (const int column : columns) {
       *out = weight[i] * design.x(i, column);
@@ -59,21 +59,23 @@ static std::vector<Block> blocks_of(const Design& design) {
   return out;
 }
 
+/// Of positions, rotations and distances.
+using ByKind = std::array<double, 3>;
+
 /// Noise of one value, by kind, from the median length of what a row leaves; 0: no row has this kind. `used`: effective
-/// parameters.
-static std::array<double, 3> sigma_of(const std::vector<Block>& blocks, const Eigen::VectorXd& residual, double used) {
+/// parameters that its values determine.
+static ByKind sigma_of(const std::vector<Block>& blocks, const Eigen::VectorXd& residual, const ByKind& used) {
   std::vector<double> lengths[3];
-  double training = 0.0;
+  ByKind values{}, sigma{};
   for (const Block& block : blocks) {
     if (!block.training) continue;
     lengths[block.kind].push_back(residual.segment(block.first, block.count).norm());
-    training += static_cast<double>(block.count);
+    values[static_cast<std::size_t>(block.kind)] += static_cast<double>(block.count);
   }
-  const double inflate = std::sqrt(training / std::max(1.0, training - used));
-  std::array<double, 3> sigma{};
   for (std::size_t kind = 0; kind < 3; ++kind) {
-    if (!lengths[kind].empty())
-      sigma[kind] = std::max(median_of(lengths[kind]) / kChiMedian[kind == 2 ? 1 : 3] * inflate, 1e-12);
+    if (lengths[kind].empty()) continue;
+    const double inflate = std::sqrt(values[kind] / std::max(1.0, values[kind] - used[kind]));
+    sigma[kind] = std::max(median_of(lengths[kind]) / kChiMedian[kind == 2 ? 1 : 3] * inflate, 1e-12);
   }
   return sigma;
 }
@@ -109,10 +111,9 @@ static std::vector<int> flexible_columns(const Design& design) {
 }
 
 /// What rows that were held out show of a fit that did not see them: their noise and the fit's own error.
-static std::array<double, 3> sigma_of_predictions(std::vector<Block> blocks, const Eigen::VectorXd& residual,
-                                                  const std::array<double, 3>& noise) {
+static ByKind sigma_of_predictions(std::vector<Block> blocks, const Eigen::VectorXd& residual, const ByKind& noise) {
   for (Block& block : blocks) block.training = !block.training;
-  std::array<double, 3> sigma = sigma_of(blocks, residual, 0.0);
+  ByKind sigma = sigma_of(blocks, residual, {});
   for (std::size_t kind = 0; kind < 3; ++kind) sigma[kind] = std::max(sigma[kind], noise[kind]);
   return sigma;
 }
@@ -120,8 +121,8 @@ static std::array<double, 3> sigma_of_predictions(std::vector<Block> blocks, con
 /// Squared length of what every block leaves, in units of what it should leave: `sigma`, and `predicted` of rows held
 /// out.
 static std::vector<double> standardised_squares(const std::vector<Block>& blocks, const Eigen::VectorXd& own,
-                                                const Eigen::VectorXd& residual, const std::array<double, 3>& sigma,
-                                                const std::array<double, 3>& predicted) {
+                                                const Eigen::VectorXd& residual, const ByKind& sigma,
+                                                const ByKind& predicted) {
   std::vector<double> out(blocks.size());
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const auto [first, count, kind, training] = blocks[b];
@@ -156,14 +157,22 @@ namespace {
 class FlexibleFit {
  public:
   explicit FlexibleFit(const Design& design)
-      : design_(design), columns_(flexible_columns(design)), residual_(design.y) {}
+      : design_(design), columns_(flexible_columns(design)), residual_(design.y) {
+    std::set<int> kinds;
+    for (const std::int8_t component : design.component) kinds.insert(kind_of(component));
+    kinds_.assign(kinds.begin(), kinds.end());
+  }
 
   /// `uniform`: the one noise that all rows are weighted with; 0: weights differ from row to row.
   void fit(const Eigen::VectorXd& weight, double uniform) {
     sum(weight, uniform);
-    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(with_prior(xx_));
+    Eigen::MatrixXd xx = Eigen::MatrixXd::Zero(xy_.size(), xy_.size());
+    for (const Eigen::MatrixXd& part : xx_) xx += part;
+    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(with_prior(std::move(xx)));
     const Eigen::VectorXd solution = factor.solve(xy_);
-    used_ = factor.solve(xx_).trace();
+    used_ = {};
+    for (std::size_t k = 0; k < kinds_.size(); ++k)
+      used_[static_cast<std::size_t>(kinds_[k])] = factor.solve(xx_[k]).trace();
     for (Eigen::Index i = 0; i < residual_.size(); ++i) residual_[i] = design_.y[i] - fitted(i, solution);
   }
 
@@ -173,7 +182,7 @@ class FlexibleFit {
     std::vector<Gram> parts;
     Gram all;
     for (std::int32_t part = 0; part < kParts; ++part) {
-      parts.push_back(sum_of(design_, weight, columns_, [&](std::int32_t fold) { return fold % kParts == part; }));
+      parts.push_back(sum_of(design_, weight, columns_, [&](std::int32_t fold, int) { return fold % kParts == part; }));
       all.add(parts.back());
     }
     std::vector<Eigen::VectorXd> solutions;
@@ -187,7 +196,9 @@ class FlexibleFit {
   }
 
   const Eigen::VectorXd& residual() const { return residual_; }
-  double used() const { return used_; }  ///< effective number of parameters
+  /// Effective number of parameters: the trace of the smoother matrix (Hastie and Tibshirani 1990), over values of each
+  /// kind.
+  const ByKind& used() const { return used_; }
 
  private:
   Eigen::MatrixXd with_prior(Eigen::MatrixXd xx) const {
@@ -210,21 +221,26 @@ class FlexibleFit {
   void sum(const Eigen::VectorXd& weight, double uniform) {
     if (uniform > 0.0 && summed_at_ > 0.0) {
       const double times = std::pow(summed_at_ / uniform, 2.0);
-      xx_ *= times;
+      for (Eigen::MatrixXd& part : xx_) part *= times;
       xy_ *= times;
     } else {
-      const Gram sums = sum_of(design_, weight, columns_, [](std::int32_t) { return true; });
-      xx_ = sums.xx;
-      xy_ = sums.xy;
+      xx_.clear();
+      xy_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(columns_.size()));
+      for (const int kind : kinds_) {
+        Gram sums = sum_of(design_, weight, columns_, [kind](std::int32_t, int other) { return other == kind; });
+        xx_.push_back(std::move(sums.xx));
+        xy_ += sums.xy;
+      }
     }
     summed_at_ = uniform;
   }
 
   const Design& design_;
   const std::vector<int> columns_;
-  Eigen::MatrixXd xx_;
+  std::vector<int> kinds_;           // that there are values of
+  std::vector<Eigen::MatrixXd> xx_;  // of each of these kinds
   Eigen::VectorXd xy_, residual_;
-  double used_ = 0.0;
+  ByKind used_{};
   double summed_at_ = 0.0;  // noise that the sums were weighted with
 };
 
@@ -278,12 +294,12 @@ Weighted weigh(const Design& design, const Measurements& data) {
   out.weight = Eigen::VectorXd::Zero(design.x.rows());
   for (int round = 0;; ++round) {
     // A fit that passes through most of what it saw says nothing of noise: then what it predicts of other poses counts.
-    const bool predicts = flexible.used() > kSaturated * static_cast<double>(values);
+    const ByKind& fitted = flexible.used();
+    const bool predicts = fitted[0] + fitted[1] + fitted[2] > kSaturated * static_cast<double>(values);
     const Eigen::VectorXd residual = predicts ? flexible.predicted_residual(out.weight) : flexible.residual();
-    const double used = predicts ? 0.0 : flexible.used();
-    const std::array<double, 3> sigma = sigma_of(blocks, own.cwiseProduct(residual), used);
-    const std::array<double, 3> predicted =
-        predicts ? sigma : sigma_of_predictions(blocks, own.cwiseProduct(residual), sigma);
+    const ByKind used = predicts ? ByKind{} : fitted;
+    const ByKind sigma = sigma_of(blocks, own.cwiseProduct(residual), used);
+    const ByKind predicted = predicts ? sigma : sigma_of_predictions(blocks, own.cwiseProduct(residual), sigma);
     const std::vector<double> squares = standardised_squares(blocks, own, residual, sigma, predicted);
     const bool tails = round > 0 && has_tails(blocks, standardised_squares(blocks, own, residual, sigma, sigma));
     for (std::size_t b = 0; b < blocks.size(); ++b) {
@@ -295,7 +311,7 @@ Weighted weigh(const Design& design, const Measurements& data) {
     }
     out.noise.unit = sigma[0] > 0.0 ? sigma[0] : sigma[2];
     // In metres, whatever the rows say of themselves: their own sigmas have taken the unit away.
-    const std::array<double, 3> in_metres = sigma_of(blocks, residual, used);
+    const ByKind in_metres = sigma_of(blocks, residual, used);
     out.noise.position_sigma = in_metres[0] > 0.0 ? in_metres[0] : in_metres[2];
     if (round == kFits) break;
     const auto kinds = std::count_if(sigma.begin(), sigma.end(), [](double noise) { return noise > 0.0; });
@@ -304,6 +320,33 @@ Weighted weigh(const Design& design, const Measurements& data) {
   if (has_repeats(design))
     out.noise.design_effect = design_effect_of(design, out.weight, flexible.predicted_residual(out.weight));
   return out;
+}
+
+double noise_of_positions(const Work& work, const Evidence::State& state) {
+  const Design& design = work.design;
+  struct KindLeft {
+    double squares = 0.0, values = 0.0, used = 0.0;
+    double variance() const { return squares / std::max(1.0, values - used); }
+  };
+  KindLeft positions, all;
+  const auto p = static_cast<Eigen::Index>(state.columns.size());
+  Eigen::VectorXd x(p);
+  for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (design.fold[at] >= design.folds) continue;
+    for (Eigen::Index c = 0; c < p; ++c)
+      x[c] = design.weight[i] * design.x(i, state.columns[static_cast<std::size_t>(c)]);
+    const double left = design.weight[i] * design.y[i] - x.dot(state.solution);
+    state.factor.matrixL().solveInPlace(x);
+    for (KindLeft* sum : {&all, &positions}) {
+      if (sum == &positions && kind_of(design.component[at]) == 1) continue;
+      sum->squares += left * left;
+      sum->values += 1.0;
+      sum->used += x.squaredNorm() / work.noise.design_effect;
+    }
+  }
+  const double times = all.values > positions.values ? positions.variance() / all.variance() : 1.0;
+  return work.noise.position_sigma * std::sqrt(state.sigma2 * times);
 }
 
 Grams make_grams(const Design& design, double design_effect, int threads) {

@@ -663,6 +663,16 @@ TEST_CASE("diagnose uses measured orientations") {
   CHECK(d.residuals_before.rotation.allFinite());
 }
 
+TEST_CASE("the noise of positions is theirs, whatever that of rotations is") {
+  for (const unsigned seed : {822u, 824u, 826u}) {
+    const auto table = measured(light_arm(), 150, seed, What::pose);
+    const Diagnosis d = diagnose(light_arm(), table->data);
+    CAPTURE(seed);
+    CHECK(d.verdict == Verdict::none);
+    CHECK(std::abs(d.noise_floor / (std::sqrt(3.0) * kNoise) - 1.0) < 0.1);  // of 360 values: standard error 4 %
+  }
+}
+
 TEST_CASE("diagnose takes several targets") {
   Robot truth = light_arm();
   truth.targets.push_back({"elbow", truing::frame_from_xyz_rpy({0.2, 0.1, -0.3}, {0.4, 0.5, 0.6})});
