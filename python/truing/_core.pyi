@@ -1561,8 +1561,8 @@ class Mistake:
     @property
     def kind(self) -> str:
         """
-        'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit' or 'convention': reading it
-        otherwise explains the measurements; 'unexplained': no such reading does.
+        'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit', 'row_shift' or 'convention':
+        reading it otherwise explains the measurements; 'unexplained': no such reading does.
         """
     @property
     def text(self) -> str:
@@ -2661,8 +2661,9 @@ class SanityFinding:
     @property
     def kind(self) -> str:
         """
-        'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'convention', 'gravity_direction',
-        'duplicates', 'direction', 'lag', 'moved_target', 'constant' or 'outliers'.
+        'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'length_unit', 'link_unit', 'row_shift',
+        'convention', 'gravity_direction', 'duplicates', 'direction', 'lag', 'moved_target', 'constant' or
+        'outliers'.
         """
     @property
     def mistake(self) -> bool:

@@ -15,8 +15,8 @@ namespace truing {
 
 /// What speaks against the robot file or the columns that were handed to `identify`.
 struct Mistake {
-  /// 'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit' or 'convention': reading it otherwise
-  /// explains the measurements; 'unexplained': no such reading does.
+  /// 'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit', 'row_shift' or 'convention': reading it
+  /// otherwise explains the measurements; 'unexplained': no such reading does.
   std::string kind;
   std::string text;  ///< what is wrong, and what to do, in sentences
   /// What changed by more than a workshop makes, most first: 10 mm or 2 % of the robot's reach if that is more, 3

@@ -4,7 +4,9 @@
 #include "model/readings.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "math/constants.hpp"
@@ -67,6 +69,54 @@ void add_joint_readings(const Robot& robot, const Measurements& data, Readings* 
                        "swapping joint columns " + std::to_string(k + 1) + " and " + std::to_string(m + 1)};
       });
     }
+  }
+}
+
+/// The joints of every row with what was measured `shift` rows further down. Rows that have no such row are the last
+/// one that has, once more.
+Measurements with_rows_shifted(const Measurements& data, int shift) {
+  const auto last = static_cast<std::ptrdiff_t>(data.rows) - 1;
+  std::vector<std::size_t> joints_of, measured_of;
+  for (std::ptrdiff_t row = 0; row <= last; ++row) {
+    const std::ptrdiff_t paired = std::clamp<std::ptrdiff_t>(row, std::max(0, -shift), last - std::max(0, shift));
+    joints_of.push_back(static_cast<std::size_t>(paired));
+    measured_of.push_back(static_cast<std::size_t>(paired + shift));
+  }
+  const auto taken = [](const auto& column, const std::vector<std::size_t>& rows) {
+    std::vector<std::decay_t<decltype(column[0])>> out;
+    for (const std::size_t row : rows) out.push_back(column[row]);
+    return out;
+  };
+  std::vector<std::vector<double>> joints;
+  for (const Column& column : data.joints) joints.push_back(taken(column, joints_of));
+  Measurements out = with_joint_columns(data, std::move(joints));
+  auto owned = std::make_shared<OtherColumns>(OtherColumns{out.owner, {}});
+  std::vector<Column*> measured = {&out.position[0], &out.position[1], &out.position[2], &out.distance};
+  for (Column& column : out.orientation) measured.push_back(&column);
+  owned->columns.reserve(measured.size());
+  for (Column* column : measured) {
+    if (!*column) continue;
+    owned->columns.push_back(taken(*column, measured_of));
+    *column = {owned->columns.back().data(), 1};
+  }
+  for (std::vector<std::int32_t>* index : {&out.target, &out.fixed_point}) {
+    if (!index->empty()) *index = taken(*index, measured_of);
+  }
+  out.owner = owned;
+  return out;
+}
+
+/// One of two records that were joined row by row has a few rows more than the other at its beginning.
+void add_row_readings(const Robot& robot, const Measurements& data, Readings* out) {
+  constexpr int kRowsOff = 3;
+  for (int shift = -kRowsOff; shift <= kRowsOff; ++shift) {
+    if (shift == 0 || data.rows < 8) continue;
+    out->push_back([&robot, &data, shift] {
+      const int by = std::abs(shift);
+      return Reading{robot, with_rows_shifted(data, shift), "row_shift",
+                     "taking for every row's joints what was measured " + std::to_string(by) +
+                         (by == 1 ? " row " : " rows ") + (shift > 0 ? "further down" : "further up")};
+    });
   }
 }
 
@@ -167,6 +217,7 @@ std::vector<std::function<Reading()>> readings_of(const Robot& robot, const Meas
   Readings out;
   add_joint_readings(robot, data, &out);
   add_unit_readings(robot, data, &out);
+  add_row_readings(robot, data, &out);
   add_link_readings(robot, data, &out);
   return out;
 }

@@ -16,14 +16,15 @@ namespace truing::model {
 struct Reading {
   Robot robot;
   Measurements data;
-  std::string kind;           ///< 'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit' or 'convention'
+  std::string kind;           ///< 'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit', 'row_shift' or
+                              ///< 'convention'
   std::string text;           ///< what is read otherwise: 'turning the sign of joint column 2'
   double length_scale = 1.0;  ///< measured lengths in `data` over those handed over
 };
 
 /// The usual mistakes, each undone: two joint columns exchanged, the sign of one turned, angles or lengths in another
-/// unit, the table of links read by the other convention. Each is made when it is called, since it copies columns;
-/// robot and data must outlive them.
+/// unit, joints and measurements up to three rows apart, the table of links read by the other convention. Each is made
+/// when it is called, since it copies columns; robot and data must outlive them.
 std::vector<std::function<Reading()>> readings_of(const Robot& robot, const Measurements& data);
 
 /// Rows that are enough to compare readings by: every so many, the others with weight zero. It must outlive what uses

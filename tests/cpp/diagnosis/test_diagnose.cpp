@@ -721,6 +721,25 @@ TEST_CASE("diagnose recognises exchanged and turned joint columns") {
   CHECK(finding(e, "joint_sign")->text.find("joint column 2") != std::string::npos);
 }
 
+TEST_CASE("diagnose says how many rows joints and measurements are apart") {
+  for (const int shift : {-2, 1, 3}) {
+    auto table = measured(light_arm(), 120, 915);
+    for (Column& column : table->data.position) {
+      std::vector<double> moved(120);
+      for (int row = 0; row < 120; ++row)
+        moved[static_cast<std::size_t>(row)] = column[static_cast<std::size_t>((row - shift + 120) % 120)];
+      column = table->add(moved);
+    }
+    const Diagnosis d = diagnose(light_arm(), table->data);
+    CAPTURE(shift);
+    REQUIRE(finding(d, "row_shift"));
+    CHECK(finding(d, "row_shift")->mistake);
+    const std::string rows = std::to_string(std::abs(shift)) + (std::abs(shift) == 1 ? " row " : " rows ");
+    CHECK(finding(d, "row_shift")->text.find(rows + (shift > 0 ? "further down" : "further up")) != std::string::npos);
+    CHECK(d.effects.empty());
+  }
+}
+
 TEST_CASE("diagnose recognises exchanged columns of the wrist, which move the tip little") {
   auto table = measured(light_arm(), 120, 905);
   std::swap(table->data.joints[3], table->data.joints[4]);

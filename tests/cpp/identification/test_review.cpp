@@ -96,6 +96,18 @@ TEST_CASE("angles and lengths in another unit are found") {
   }
 }
 
+TEST_CASE("measurements that are a row off their joints are found on every arm") {
+  for (const Robot& robot : some_arms()) {
+    const auto table = measured(robot, 150, 140);
+    for (Column& column : table->data.position) {
+      std::vector<double> late;
+      for (std::size_t row = 0; row < 150; ++row) late.push_back(column[row == 0 ? 0 : row - 1]);
+      column = table->add(late);
+    }
+    check_said(robot, table->data, "row_shift", "1 row further down");
+  }
+}
+
 TEST_CASE("links by the other convention are found") {
   for (const Robot& robot : some_arms()) {
     if (robot.convention == Convention::urdf) continue;

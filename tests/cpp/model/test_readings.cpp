@@ -41,6 +41,25 @@ TEST_CASE("without positions the measured range is that of the distances, withou
   CHECK(measured_range(table.data, {}) == 0.0);
 }
 
+TEST_CASE("rows that are shifted pair every row's joints with what was measured so many rows further down") {
+  Table table(10);
+  std::vector<double> count;
+  for (int row = 0; row < 10; ++row) count.push_back(row);
+  table.data.joints = {table.add(count)};
+  for (Column& column : table.data.position) column = table.add(count);
+  Robot robot;
+  robot.joints.resize(1);
+  std::vector<double> apart;
+  for (const auto& make_reading : truing::model::readings_of(robot, table.data)) {
+    const truing::model::Reading reading = make_reading();
+    if (reading.kind != "row_shift") continue;
+    apart.push_back(reading.data.position[0][0] - reading.data.joints[0][0]);
+    for (std::size_t row = 0; row < 10; ++row)
+      CHECK(reading.data.position[2][row] - reading.data.joints[0][row] == apart.back());
+  }
+  CHECK(apart == std::vector<double>{-3.0, -2.0, -1.0, 1.0, 2.0, 3.0});
+}
+
 TEST_CASE("the stretched length adds up the links of tables and of joint origins") {
   Robot robot;
   robot.joints.resize(2);
