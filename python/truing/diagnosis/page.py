@@ -124,8 +124,16 @@ def _headline(result: Mapping[str, Any], rows: Rows) -> str:
         f'<header><p class="kicker">truing diagnose · {escaped(result.get("robot"))} ·'
         f' {counted(rows.count, "row")}<span class="verdict'
         f' {tone}">{label}</span></p><h1{size}>{escaped(first)}</h1>{more}<p'
-        f' class="sub">{numbers}</p>{_corrected(result)}</header>'
+        f' class="sub">{numbers}{_left_out(result, rows)}</p>{_corrected(result)}</header>'
     )
+
+
+def _left_out(result: Mapping[str, Any], rows: Rows) -> str:
+    """Held-out rows that no error of the first screen counts."""
+    count = int(np.count_nonzero(rows.rejected & rows.test))
+    if not count or _many_outliers(result):
+        return ""
+    return f" Without {counted(count, 'held-out row')} far out."
 
 
 def _corrected(result: Mapping[str, Any]) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import json
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -317,6 +318,21 @@ def test_rows_that_count_little_are_a_warning_when_they_are_many(outliers: int, 
     text = visible(diagnosis_report(result, some_rows()))
     assert ("Look at the data first Rows stand far out" in text) == first
     assert ("How the data were read Rows stand far out" in text) != first
+
+
+@pytest.mark.parametrize("verdict", SENTENCES)
+def test_the_first_screen_says_which_rows_its_errors_leave_out(verdict: str) -> None:
+    rows = some_rows()
+    held_out = np.flatnonzero(rows.test)
+
+    def head(outliers: list[int], of: int) -> str:
+        far = np.isin(np.arange(rows.count), outliers)
+        result = some_result(verdict, outliers=outliers, rows=of)
+        return visible(diagnosis_report(result, replace(rows, rejected=far))).partition("What the gap of")[0]
+
+    assert "Without 2 held-out rows far out." in head(held_out[:2].tolist(), 100)
+    assert "far out" not in head(held_out[:2].tolist(), 10)  # so many are no exceptions: they count
+    assert "far out" not in head(np.flatnonzero(~rows.test)[:1].tolist(), 100)
 
 
 @pytest.mark.parametrize("verdict", SENTENCES)
