@@ -122,6 +122,7 @@ Work prepare(Registered given) {
   work.design.weight = std::move(weighted.weight);
   work.noise = std::move(weighted.noise);
   work.grams = make_grams(work.design, work.noise.design_effect, options.threads);
+  size_angles_of_links(&work);
   return work;
 }
 

@@ -208,6 +208,8 @@ int add_fine_function(Work* work, const Robot& robot, std::size_t joint, const s
 /// Groups that do not help, for sure, on poses they were not fitted to go, however well they fit.
 Evidence::State keep_what_predicts(const Work& work, Evidence::State state);
 
+/// How large angles of links are against their lengths, as the data have it.
+void size_angles_of_links(Work* work);
 Decision decide(Work* work, const Robot& robot);
 /// The group is all links together, and poses that it was not fitted to are predicted better with it, for sure.
 bool links_predict(const Work& work, const Choice& choice, std::size_t at);

@@ -144,3 +144,45 @@ TEST_CASE("sums of appended columns are those of all columns made afresh") {
   for (std::size_t f = 0; f < 4; ++f) same(grown.train_folds[f], afresh.train_folds[f]);
   for (std::size_t f = 0; f < 2; ++f) same(grown.test_folds[f], afresh.test_folds[f]);
 }
+
+namespace {
+
+/// Of what angles of links may be over what they were: six lengths and six angles of all links together, of so many
+/// poses. `angle` and `length` are true sizes over the noise of a value.
+double ratio_of_links(int poses, double length, double angle, std::uint64_t seed) {
+  Work work;
+  Weighed scene(poses, 1, 1.0, 0.0);
+  work.design = std::move(scene.design);
+  Design& design = work.design;
+  constexpr Eigen::Index kAll = 16;
+  Random random(seed);
+  design.x.conservativeResize(Eigen::NoChange, kAll);
+  design.prior = Eigen::VectorXd::Constant(kAll, kLargest);
+  design.column_units.assign(kAll, "m");
+  design.candidates.groups.resize(1);
+  design.candidates.named.resize(1);
+  design.candidates.named[0].kind = Explanation::Kind::all_geometry;
+  design.y *= 1e-5;  // of noise, in metres
+  for (Eigen::Index c = 4; c < kAll; ++c) {
+    for (Eigen::Index i = 0; i < design.x.rows(); ++i) design.x(i, c) = random.normal();
+    design.y += 1e-5 * (c % 2 ? angle : length) * random.normal() * design.x.col(c);
+    design.column_units[static_cast<std::size_t>(c)] = c % 2 ? "rad" : "m";
+    design.candidates.groups[0].columns.push_back(static_cast<int>(c));
+  }
+  design.weight = Eigen::VectorXd::Constant(design.x.rows(), 1e5);
+  work.grams = make_grams(design, 1.0, 1);
+  size_angles_of_links(&work);
+  CHECK(design.prior[4] == kLargest);
+  return design.prior[5] / kLargest;
+}
+
+}  // namespace
+
+TEST_CASE("angles of links are as large against lengths as few poses have them") {
+  for (const std::uint64_t seed : {31u, 32u, 33u}) {
+    CHECK(ratio_of_links(40, 1.0, 1.0, seed) == 1.0);
+    CHECK(ratio_of_links(40, 1.0, 30.0, seed) > 2.0);
+    CHECK(ratio_of_links(40, 30.0, 1.0, seed) < 0.5);
+    CHECK(ratio_of_links(400, 1.0, 30.0, seed) == 1.0);  // so many need no prior
+  }
+}
