@@ -317,8 +317,7 @@ void judge_noise(const Repeats& repeats, const Work& work, const Decision& decis
   const double components = work.given.data.distance ? 1.0 : 3.0;
   out->noise_from_repeats = repeats.enough();
   out->noise_floor =
-      std::sqrt(components) *
-      (out->noise_from_repeats ? repeats.sigma : noise_of_positions(work, decision.state));
+      std::sqrt(components) * (out->noise_from_repeats ? repeats.sigma : noise_of_positions(work, decision.state));
   if (work.given.mistaken && !out->noise_from_repeats) out->noise_floor = 0.0;  // nothing was fitted that could tell
   const double gap2 = std::pow(out->gap.rms, 2.0), floor2 = std::pow(out->noise_floor, 2.0),
                after2 = std::pow(out->after.rms, 2.0);
@@ -500,6 +499,7 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
   say_what_is_negative(&result);
   scale_to_exact(&result);
   merge_the_same(&result);
+  say_where_any_function_looks_like_a_gear(work, robot, &result);
   question_noise(whole.beyond_repeats, &result);
   for (const SanityFinding& finding : checked.findings) {
     if (finding.mistake) result.unknown = {describe_mistake(result, finding)};

@@ -220,6 +220,9 @@ bool links_predict(const Work& work, const Choice& choice, std::size_t at);
 void say_what_angles_cannot_show(const std::vector<Sampling>& samplings, const Robot& robot,
                                  std::vector<NotTestable>* out);
 
+/// Of joints that err as an unknown function of so few angles that an order explains much of any function by chance.
+void say_where_any_function_looks_like_a_gear(const Work& work, const Robot& robot, Diagnosis* out);
+
 /// Orders of gears as they are found, one after another.
 class Gears {
  public:

@@ -91,7 +91,34 @@ std::string why_not_told_apart(double repeats, const std::vector<std::string>& j
          stand_for_each_other(kExample, repeats) + "); measure at angles on no grid";
 }
 
+/// Chance that one of the gears' ratios explains half of a function of so many angles that no gear makes: six values of
+/// waves at the ratio, half and twice explain a fraction s of `angles` - 1 independent ones with the density of Beta(3,
+/// (angles - 7) / 2).
+double chance_of_half(std::size_t angles) {
+  constexpr double kRatios = 161.0 - 30.0 + 1.0;
+  if (angles <= 8) return 1.0;
+  const double b = 0.5 * (static_cast<double>(angles) - 7.0);
+  return std::min(1.0, kRatios * std::pow(0.5, b) * (1.0 + 0.5 * b + 0.125 * b * (b + 1.0)));
+}
+
 }  // namespace
+
+void say_where_any_function_looks_like_a_gear(const Work& work, const Robot& robot, Diagnosis* out) {
+  for (const UnknownEffect& unknown : out->unknown) {
+    for (const Sampling& sampling : work.samplings) {
+      if (robot.joints[sampling.joint].name != unknown.joint || sampling.repeats > 0.0) continue;
+      const std::vector<std::string> own_angle = {input_name(Driver::angle, sampling.joint)};
+      if (unknown.inputs != own_angle || sampling.angles <= kFewAngles || chance_of_half(sampling.angles) < 1.0)
+        continue;
+      out->not_testable.push_back({family().name,
+                                   {unknown.joint},
+                                   unknown.joint + " stood at " + std::to_string(sampling.angles) +
+                                       " angles only and errs as a function of them: at so few some gear ratio "
+                                       "explains half of whatever a joint does; measure where angles do not repeat",
+                                   Untestable::other});
+    }
+  }
+}
 
 void say_what_angles_cannot_show(const std::vector<Sampling>& samplings, const Robot& robot,
                                  std::vector<NotTestable>* out) {

@@ -211,6 +211,47 @@ TEST_CASE("a joint that stood at few angles, or hardly turned, is said not to sh
   CHECK(why["J4"].find("J4 turns too little for two whole waves of orders below 2") == 0);
 }
 
+TEST_CASE("of few uneven angles a gear's error is no order, and any other is none either" * doctest::skip(kSanitized)) {
+  const auto of_angles = [](std::size_t count, bool teeth) {
+    const Robot robot = arm_of_gears();
+    auto table = arms::random_joints(robot, 300, 744);
+    std::mt19937_64 random(745);
+    std::vector<double> stops, errors;
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1.0p-53; };
+      stops.push_back(5.0 * uniform() - 2.5);
+      errors.push_back(teeth ? 4e-4 * std::cos(81.0 * stops.back()) + 3e-4 * std::cos(162.0 * stops.back())
+                             : 1.2e-3 * (uniform() - 0.5));
+    }
+    std::vector<double> angles(300), moved(300);
+    for (std::size_t row = 0; row < 300; ++row) {
+      angles[row] = stops[row % count];
+      moved[row] = angles[row] + errors[row % count];
+    }
+    table->data.joints[2] = table->add(moved);
+    arms::measure(table.get(), robot, arms::What::position, kWhiteNoise, 746);
+    table->data.joints[2] = table->add(angles);
+    return truing::diagnose(robot, table->data);
+  };
+  const auto says_so = [](const Diagnosis& d) {
+    return std::any_of(d.not_testable.begin(), d.not_testable.end(), [](const NotTestable& n) {
+      return n.joints == std::vector<std::string>{"J3"} &&
+             n.why.find("some gear ratio explains half") != std::string::npos;
+    });
+  };
+  for (const bool teeth : {true, false}) {
+    const Diagnosis d = of_angles(16, teeth);
+    CAPTURE(teeth);
+    INFO(said(d));
+    REQUIRE(d.unknown.size() == 1);
+    CHECK(d.unknown[0].inputs == std::vector<std::string>{"q3"});
+    CHECK(says_so(d));
+  }
+  const Diagnosis many = of_angles(60, false);
+  INFO(said(many));
+  CHECK(!says_so(many));
+}
+
 TEST_CASE("a joint that moved over hundreds of turns is not looked at, in no time" * doctest::skip(kSanitized)) {
   auto table = waving(40, 742, {});
   std::vector<double> far(40);  // degrees called radians, or a wrong power of ten
