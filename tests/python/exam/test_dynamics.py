@@ -33,7 +33,7 @@ from truing.exam.dynamics.bodies import numbers, regressor, torques
 from truing.exam.dynamics.departures import DEPARTURES, FAR, UNLISTED
 from truing.exam.dynamics.laws import LISTED
 from truing.exam.dynamics.robots import Arm, Floats, arms, loaded, misjudged
-from truing.exam.dynamics.run import run_exam
+from truing.exam.dynamics.run import diagnose, run_exam
 from truing.exam.dynamics.scenes import Case, Stage, stage
 from truing.exam.dynamics.score import LINES, MORE, score
 from truing.exam.dynamics.sizing import low_pass, orthonormal
@@ -616,6 +616,15 @@ def test_a_load_that_only_the_check_of_recordings_finds_is_a_name_with_its_mass(
     assert answer.verdict == "effects" and answer.parameters == {"payload.m": 1.5}
     assert "b carries a load of 1.50 kg that nobody told" in answer.sentence
     assert answer_of(told(nothing)).effects == ()
+
+
+def test_what_free_inertias_take_up_is_named_though_they_leave_a_little_less(tmp_path: Path) -> None:
+    """A rotor over right inertials: free ones, fitted to small errors of derivatives as well, leave less."""
+    case = sets.build("development/confounded/12@5101")
+    found = diagnose(*case.write(tmp_path))
+    said = {(one.effect, *one.joints) for one in answer_of(found).effects}
+    assert case.label["effects"] == [{"effect": "armature", "joints": ["J1"]}]
+    assert ("armature", "J1") in said
 
 
 def test_shortfalls_are_listed_by_set() -> None:
