@@ -23,6 +23,8 @@ constexpr double kClassR2 = 0.95;      ///< so is what can make the same torque
 constexpr double kSameR2 = 0.5;        ///< what makes less of the torque is another matter
 constexpr double kTempered = 0.5;      ///< no model is exact: half a nat counts for one
 constexpr double kOtherLaws = 0.2;     ///< part of a joint's error that other laws than the catalogue's may well be
+constexpr double kOwnR2 = 0.9;         ///< a free function that makes so much of a law's torque has the law's inputs
+constexpr double kOwnPart = 0.5;       ///< of what a law removes: what it lacks itself removes less
 constexpr double kNamed = 0.5;         ///< what is less likely than not is fitted, and not named
 constexpr double kUnknown = 0.5;       ///< so sure at least must be that there is what nobody knows
 constexpr double kBlocksOfTime = 0.9;  ///< the most that folds of one recording are worth
@@ -148,6 +150,24 @@ class Naming {
   bool is_likely(std::size_t at) const {
     std::vector<TorqueAlternative> ignored;
     return not_another_law(at) >= kNamed && sure(at, &ignored) >= kNamed;
+  }
+
+  /// The named effect of whose law the free function number `at` is what the law lacks; null: of none. It makes the
+  /// torque of the law as well, and removes less beside it than a part of what the law removes.
+  const TorqueGroup* law_of(std::size_t at) const {
+    const TorqueGroup& function = group_of(design_, choice_.groups[at]);
+    const Choice laws = Search::without(choice_, at);
+    const double rest = search_.squares_of_folds(laws).sum();
+    for (std::size_t k = 0; k < laws.groups.size(); ++k) {
+      const TorqueGroup& law = group_of(design_, laws.groups[k]);
+      if (law.effect.empty() || law.joint != function.joint) continue;
+      const Choice neither = Search::without(laws, k);
+      const Evidence::State& state = search_.state(neither);
+      if (search_.evidence().explained(state, law.columns, values_of(law), function.columns) < kOwnR2) continue;
+      const double of_law = search_.squares_of_folds(neither).sum() - rest;
+      if (rest - squares_.sum() < kOwnPart * of_law) return &law;
+    }
+    return nullptr;
   }
 
   VectorXd values_of(const TorqueGroup& group) const {
@@ -314,8 +334,14 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Accou
   return out;
 }
 
+std::string words_of_rest(const TorqueGroup& law, const UnknownTorque& rest) {
+  return law.effect + (law.joints.empty() ? "" : " at " + listed(law.joints)) +
+         " has not quite the law that was fitted: what is left goes with " + listed(rest.inputs);
+}
+
+/// `rest_of_laws`: what the laws of named effects lack is nothing unknown, and is said in words.
 std::vector<UnknownTorque> unknown_of(const Account& account, const Naming& naming, const std::vector<Noise>& noise,
-                                      bool single) {
+                                      bool single, std::vector<std::string>* rest_of_laws) {
   const TorqueDesign& design = *account.design;
   const Choice& choice = account.choice;
   const Shares shares(account);
@@ -330,6 +356,10 @@ std::vector<UnknownTorque> unknown_of(const Account& account, const Naming& nami
     std::vector<TorqueAlternative> ignored;
     unknown.probability = naming.sure(k, &ignored);
     if (unknown.probability < kUnknown) continue;
+    if (const TorqueGroup* law = naming.law_of(k)) {
+      rest_of_laws->push_back(words_of_rest(*law, unknown));
+      continue;
+    }
     if (single) unknown.probability = std::min(unknown.probability, kBlocksOfTime);
     unknown.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     const std::vector<Parameter> knots = parameters_of(design, group.columns, naming.fit());
@@ -606,7 +636,7 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   TorqueDiagnosis out;
   out.warnings = problem.warnings;
   std::vector<std::string> small;
-  out.unknown = unknown_of(functions, all, noise_of_functions, problem.single);
+  out.unknown = unknown_of(functions, all, noise_of_functions, problem.single, &out.warnings);
   out.effects = found_effects(problem, account, naming, noise, own, out.unknown, &small);
   if (!small.empty()) {
     out.warnings.push_back("fitted, and too small to be named, as something else may look so: " + listed(small));

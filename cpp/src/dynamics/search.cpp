@@ -218,12 +218,14 @@ Choice Search::better_forms(Choice choice) const {
   return choice;
 }
 
-Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits) const {
+Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits, bool free_functions) const {
   for (bool changed = true; changed;) {
     changed = false;
     const Evidence::State& whole = state(choice);
     const VectorXd& squares = squares_of_folds(choice);
     for (std::size_t at = 0; at < choice.groups.size(); ++at) {
+      // A free function bends to what a law does as well; a law that was named stays, or it would be unknown too.
+      if (design_.groups[static_cast<std::size_t>(choice.groups[at])].effect.empty() != free_functions) continue;
       const Choice less = without(choice, at);
       const bool possible = !limits.plausible_only || is_plausible(whole, choice.groups[at]);
       const bool wins = possible && state(less).score < whole.score - 0.5 * limits.threshold;
@@ -263,7 +265,7 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
     if (!taken) break;
     choice = better_forms(std::move(choice));
   }
-  return less_what_is_idle(std::move(choice), limits);
+  return less_what_is_idle(std::move(choice), limits, free_functions);
 }
 
 Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, Sums held_out, std::vector<int> nuisance) {

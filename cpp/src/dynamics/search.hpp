@@ -99,7 +99,8 @@ class Search {
 
   bool may_enter(const Choice& choice, int group, const SearchLimits& limits, bool free_functions) const;
   Choice better_forms(Choice choice) const;
-  Choice less_what_is_idle(Choice choice, const SearchLimits& limits) const;
+  /// Of effects or, where these were searched for, of free functions.
+  Choice less_what_is_idle(Choice choice, const SearchLimits& limits, bool free_functions) const;
   bool is_plausible(const Evidence::State& state, int group) const;
   bool predicts(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const SearchLimits& limits) const;
 

@@ -164,6 +164,19 @@ TEST_CASE("a function that helps the recordings it was fitted to, and no other, 
   CHECK(twisted(false).empty());
 }
 
+TEST_CASE("what the law of a named effect lacks is said of that law, and is nothing unknown") {
+  const TorqueDiagnosis d = dynamics::diagnose(level_arm(), recorded_with("hardening", [](const Motion& m) {
+                                                 const Eigen::ArrayXd q = m.q.col(0).array();
+                                                 return Eigen::MatrixXd(6.0 * (q + 3.0 * q.cube()));
+                                               }));
+  REQUIRE(found(d, "spring") != nullptr);
+  CHECK(found(d, "spring")->joints == std::vector<std::string>{"J1"});
+  CHECK(d.unknown.empty());
+  CHECK(std::any_of(d.warnings.begin(), d.warnings.end(), [](const std::string& text) {
+    return text == "spring at J1 has not quite the law that was fitted: what is left goes with angle";
+  }));
+}
+
 TEST_CASE("a detent that is narrower than a wide function is unknown over the joint's angle") {
   const TorqueDiagnosis d =
       dynamics::diagnose(level_arm(), recorded_with("detent", [](const Motion& m) -> Eigen::MatrixXd {
