@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <set>
 
 #include "dynamics/judge.hpp"
@@ -36,12 +35,13 @@ const TorqueGroup& group_of(const TorqueDesign& design, int g) { return design.g
 bool same_name(const TorqueGroup& a, const TorqueGroup& b) { return a.effect == b.effect && a.joints == b.joints; }
 
 /// Stated confidence: the posterior of the class, times how often names were right on development sets of the
-/// examination (docs/method/exam.md) that removed as much of a joint's error on folds which were not fitted, all but
-/// the best one, and beside which there was, or was not, something unknown at the joint. A logistic map (Platt 1999,
-/// "Probabilistic outputs for support vector machines"). Whatever is named is no less likely than not.
-double calibrated(double posterior, double gain, bool beside_unknown) {
-  constexpr double kConstant = 0.5, kOfGain = 3.9, kOfUnknown = -1.3;
-  const double log_odds = kConstant + kOfGain * std::clamp(gain, 0.0, 1.0) + (beside_unknown ? kOfUnknown : 0.0);
+/// examination (docs/method/exam.md) that removed as much of a joint's error on folds which were not fitted, and beside
+/// which there was, or was not, something unknown at the joint. A logistic map (Platt 1999, "Probabilistic outputs for
+/// support vector machines") of the logarithm of that part. Whatever is named is no less likely than not.
+double calibrated(double posterior, double part, bool beside_unknown) {
+  constexpr double kOfPart = 2.3, kOfUnknown = -2.0, kLeast = 0.05, kMost = 2.0;
+  const double size = std::log(std::clamp(part, kLeast, kMost) / kOtherLaws);
+  const double log_odds = kOfPart * size + (beside_unknown ? kOfUnknown : 0.0);
   return std::max(kNamed, posterior / (1.0 + std::exp(-log_odds)));
 }
 
@@ -60,12 +60,16 @@ class Naming {
   const Fit& fit() const { return fit_; }
   const Evidence::State& state() const { return state_; }
 
-  /// No law here is exact: what removes a small part of the error that a joint has without it, on folds that were not
-  /// fitted, may stand for something else. All joints count alike in the sum of squares.
-  double not_another_law(std::size_t at) const {
+  /// Part of the error that a joint has without it which it removes on folds that were not fitted. All joints count
+  /// alike in the sum of squares.
+  double part_of_joint(std::size_t at) const {
     const VectorXd less = search_.squares_of_folds(Search::without(choice_, at));
-    const double gain = (less - squares_).sum() / less.sum();
-    const double part = std::max(0.0, gain) * search_.joints();
+    return std::max(0.0, (less - squares_).sum() / less.sum()) * search_.joints();
+  }
+
+  /// No law here is exact: what removes a small part may stand for something else.
+  double not_another_law(std::size_t at) const {
+    const double part = part_of_joint(at);
     return part * part / (part * part + kOtherLaws * kOtherLaws);
   }
 
@@ -127,18 +131,6 @@ class Naming {
       confounded->push_back({other.effect, other.joints, weight});
       *in_class += weight;
     }
-  }
-
-  /// Part of the error that a joint has without it which it removes on folds that were not fitted, without the fold
-  /// that gains most by it.
-  double gain_without_best_fold(std::size_t at) const {
-    const VectorXd less = search_.squares_of_folds(Search::without(choice_, at)), gain = less - squares_;
-    double least = std::numeric_limits<double>::infinity();
-    for (Index f = 0; f < gain.size(); ++f) {
-      const double of = less.sum() - less[f];
-      if (of > 0.0) least = std::min(least, (gain.sum() - gain[f]) / of);
-    }
-    return std::isfinite(least) ? least * search_.joints() : 0.0;
   }
 
   /// That it, or one of its class, is there: what decides whether it is named.
@@ -317,7 +309,7 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Accou
     const bool beside_unknown = std::any_of(unknown.begin(), unknown.end(), [&](const UnknownTorque& u) {
       return std::find(group.joints.begin(), group.joints.end(), u.joint) != group.joints.end();
     });
-    found.probability = calibrated(posterior, naming.gain_without_best_fold(k), beside_unknown);
+    found.probability = calibrated(posterior, naming.part_of_joint(k), beside_unknown);
     if (problem.single) found.probability = std::min(found.probability, kBlocksOfTime);
     found.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     found.plain = find_torque_effect(group.effect, own).traits.plain;
