@@ -154,7 +154,7 @@ def _delays(tried: Fitted) -> list[Free]:
 
 def _together(namer: Namer, tried: Fitted) -> float:
     """[s] the mean of the joints' delays, each by what its motion says (prior apart)."""
-    noise = namer._noise(tried.columns, tried.errors, len(tried.columns))
+    noise = namer.noise_after(tried)
     xx, _ = sums(tried.columns, tried.errors, noise)
     sigma = np.sqrt(np.diag(np.linalg.inv(xx + np.diag([f.prior**-2.0 for f in tried.free]))))
     own = [k for k, f in enumerate(tried.free) if f.field == "delay"]
@@ -165,10 +165,9 @@ def _together(namer: Namer, tried: Fitted) -> float:
 
 def _said(namer: Namer, before: Fitted, after: Fitted, joints: Sequence[int]) -> tuple[list[int], list[int]]:
     """Joints that speak for the delay, and against it: which it costs nats, or whose own is another."""
-    noise = namer._noise(after.columns, after.errors, len(after.columns))
+    noise = namer.noise_after(after)
     costs = [
-        namer.fitter._joint_costs(one.errors, one.point, one.free, one.start, noise)
-        for one in (before, after)
+        namer.fitter.joint_costs(one.errors, one.point, one.free, one.start, noise) for one in (before, after)
     ]
     squares = [np.mean(one.errors**2, axis=0) for one in (before, after)]
     won, left = costs[0] - costs[1], squares[1] / np.maximum(squares[0], 1e-300)

@@ -61,7 +61,7 @@ def departures(namer: Namer, account: Account) -> list[Departure]:
     """Of every usual parameter, as the usual parameters alone have it; its standard error is that beside all
     that is named."""
     fitted, standard = account.fitted, account.standard
-    noise = namer._noise(fitted.columns, fitted.errors, len(fitted.columns))
+    noise = namer.noise_after(fitted)
     xx, _ = sums(fitted.columns, fitted.errors, noise)
     prior = np.array([f.prior for f in fitted.free])
     sigma = np.sqrt(np.diag(np.linalg.inv(xx + np.diag(prior**-2.0))))
@@ -85,7 +85,7 @@ def instead(namer: Namer, account: Account, found: Sequence[Departure]) -> dict[
     if not joints:
         return {}
     fitted, fitter = account.fitted, namer.fitter
-    noise = namer._noise(fitted.columns, fitted.errors, len(fitted.columns))
+    noise = namer.noise_after(fitted)
     here, other = _nats(fitted.errors, noise), fitter.other
     fitter.anchor(account.nominal)
     of_file = _nats(fitter.errors(fitter.motions([account.nominal])[0]), noise)

@@ -33,7 +33,7 @@ def firm(namer: Namer, account: Account) -> Account:
     out = replace(account, standard=standard, fitted=fitted)
     if fitted is account.fitted:
         return out
-    noise = namer._noise(fitted.columns, fitted.errors, len(fitted.columns))
+    noise = namer.noise_after(fitted)
     noise = replace(noise, cut=cut_of(fitted.errors))
     points = [namer.without(out, at, noise).point for at in range(len(out.found))]
     return replace(out, weights=[replace(w, point=p) for w, p in zip(out.weights, points, strict=True)])
@@ -49,7 +49,7 @@ def firmly(namer: Namer, fitted: Fitted) -> Fitted:
 def serves(namer: Namer, fitted: Fitted) -> bool:
     """Whether folds are predicted better, for certain, by Huber's loss over the others than by squares.
     Linear at the fit; recordings of one firmware gain are one fold, where there are several."""
-    noise = namer._noise(fitted.columns, fitted.errors, len(fitted.columns))
+    noise = namer.noise_after(fitted)
     labels = namer.groups
     plain = namer.sums(fitted, [], None, noise, labels)
     fold = np.unique(namer.fitter.rows.fold if labels is None else labels, return_inverse=True)[1]

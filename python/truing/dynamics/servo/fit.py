@@ -314,7 +314,7 @@ class Fitter:
         motions = self.motions(tried[1:])
         some = [errors, *(self.errors(motion) for motion in motions)]
         costs = np.array(
-            [self._joint_costs(e, p, free, start, noise) for e, p in zip(some, tried, strict=True)]
+            [self.joint_costs(e, p, free, start, noise) for e, p in zip(some, tried, strict=True)]
         )
         sags = np.any(tried[0].chain[:, FIELDS.index("supply_sag")] != 0.0)
         if not isinstance(self.simulator, Apart) or sags or any(one.joint < 0 for one in free):
@@ -328,7 +328,7 @@ class Fitter:
         functions = tuple(f for j, k in enumerate(each) for f in tried[k].functions if f[0] == j)
         return replace(tried[0], chain=chain, functions=functions), float(costs.min(axis=0).sum()), motion
 
-    def _joint_costs(
+    def joint_costs(
         self, errors: Floats, point: Point, free: Sequence[Free], start: Floats, noise: Noise
     ) -> Floats:
         """`cost`, joint by joint; priors of what is of the whole arm stand at the first."""

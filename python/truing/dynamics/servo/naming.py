@@ -223,6 +223,10 @@ class Namer:
     def _every(self) -> int:
         return max(1, math.ceil(len(self.fitter.rows.fold) / _MOST_ROWS))
 
+    def noise_after(self, fitted: Fitted) -> Noise:
+        """What a ridge fit leaves of what is fitted, joint by joint."""
+        return self._noise(fitted.columns, fitted.errors, len(fitted.columns))
+
     def _noise(self, columns: Sequence[Column], errors: Floats, always: int) -> Noise:
         """What a ridge fit of everything leaves, joint by joint."""
         rms = np.maximum(np.sqrt(np.mean(errors**2, axis=0)), self.resolution)
@@ -331,7 +335,7 @@ class Namer:
         """Takes one of what was found out of the chain; the rest is fitted, and weighed, without it."""
         fitted, one = account.fitted, account.found[at]
         self.fitter.progress(f"{one.effect} {' '.join(one.joints)} does not hold")
-        noise = self._noise(fitted.columns, fitted.errors, len(fitted.columns))
+        noise = self.noise_after(fitted)
         less = self.without(account, at, noise)
         account.remove(at)
         account.fitted = self.polished(less, noise)
@@ -339,7 +343,7 @@ class Namer:
 
     def _question(self, account: Account, joint: int) -> None:
         """Looks again at every earlier name of the joint where one was taken: another may stand there now."""
-        noise = self._noise(account.fitted.columns, account.fitted.errors, len(account.fitted.columns))
+        noise = self.noise_after(account.fitted)
         for at in [k for k, c in enumerate(account.found) if c.joint == joint][:-1]:
             one, fitted = account.found[at], account.fitted
             less = self.without(account, at, noise)
@@ -369,7 +373,7 @@ class Namer:
         """Takes away what folds that were not fitted are predicted as well without; the others are weighed
         by what is left without them (`Account.weights`)."""
         fitted, weights = account.fitted, []
-        noise = self._noise(fitted.columns, fitted.errors, len(fitted.columns))
+        noise = self.noise_after(fitted)
         squares = self.folds_of(fitted, noise)
         for at, one in enumerate(account.found):
             less, weight, needed = self.weighed(account, at, noise, squares)

@@ -102,7 +102,7 @@ class Unknown:
         namer, account = self.namer, self.account
         for function in found:
             beside = replace(account, fitted=function.fitted)
-            noise = namer._noise(account.fitted.columns, account.fitted.errors, len(account.fitted.columns))
+            noise = namer.noise_after(account.fitted)
             squares = namer.folds_of(function.fitted, noise)
             for at, one in enumerate(account.found):
                 if one.joint in (function.joint, -1) and not namer.weighed(beside, at, noise, squares)[2]:

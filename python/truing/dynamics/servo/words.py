@@ -169,7 +169,7 @@ def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
 def covariance_of(parts: Parts) -> ServoCovariance:
     """(X'X + P)^-1 with rows that count for as many as their noise goes on for."""
     fitted = parts.account.fitted
-    noise = parts.namer._noise(fitted.columns, fitted.errors, len(fitted.columns))
+    noise = parts.namer.noise_after(fitted)
     xx, _ = sums(fitted.columns, fitted.errors, noise)
     prior = np.array([f.prior for f in fitted.free])
     matrix = np.linalg.inv(xx + np.diag(prior**-2.0))
