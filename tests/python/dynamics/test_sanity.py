@@ -346,6 +346,12 @@ def test_a_drive_of_another_constant_is_no_other_robot(joint: int, gain: float) 
     assert "link_length" not in kinds(check_recordings(ARM, scaled))
 
 
+def test_a_robot_of_another_size_is_seen_without_one_of_the_torques() -> None:
+    unmeasured = with_fields(torque=lambda one: column(one.torque, 5, lambda torque: np.nan * torque))
+    found = check_recordings(of_another(ARM, 1.5), unmeasured).findings[0]
+    assert found.finding == "link_length" and math.isfinite(found.value)
+
+
 @pytest.mark.realdata
 @pytest.mark.parametrize("longer", [0.6, 1.6])
 def test_the_file_of_another_size_is_recognised_by_a_real_arm(longer: float) -> None:

@@ -22,10 +22,10 @@ from truing.dynamics.sanity import (
     between,
     columns,
     commands,
-    dimensions,
     gravity,
     jumps,
     lag,
+    lengths,
     loads,
     pushed,
 )
@@ -127,7 +127,7 @@ def _by_model(robot: _core.Robot, recordings: list[_core.Recording], grids: list
     if not unknown and not any(one.finding in HIDES_LENGTHS or _other_mistake(one) for one in found):
         pushed_at = any(one.finding == "tool_pushed" for one in found)
         free = grids_of(robot, recordings) if pushed_at else grids
-        found = [*dimensions.dimensions(robot, free, read.fit), *found]
+        found = [*lengths.of_another_robot(robot, free, read.fit), *found]
     if unknown:
         found.append(gain_unknown(robot, read.fit, unknown))
     return _Held(robot, recordings, grids, found)

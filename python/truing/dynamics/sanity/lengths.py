@@ -52,7 +52,7 @@ class _Fitted:
     sigma: Floats  # [m]
 
 
-def dimensions(robot: _core.Robot, grids: Sequence[Grid], fit: Fit) -> list[RecordingFinding]:
+def of_another_robot(robot: _core.Robot, grids: Sequence[Grid], fit: Fit) -> list[RecordingFinding]:
     """Distances between joints that torques contradict. fit: what the file's masses leave."""
     distances = _distances_of(robot)
     if not distances or _fair(fit):
@@ -128,9 +128,14 @@ def _left(columns: Floats, rows: Rows, sigma: Floats) -> Floats:
 
 def _noise(robot: _core.Robot, rows: Rows) -> Floats:
     """Root mean square of what is left of each joint with the file's distances. shape=(joints,)"""
-    usual = np.nanstd(rows.torque, axis=0)
-    usual = np.where(usual > 0.0, usual, 1.0)
     measured = ~np.isnan(rows.torque)
+    usual = np.array(
+        [
+            torque[there].std() if there.any() else 1.0
+            for torque, there in zip(rows.torque.T, measured.T, strict=True)
+        ]
+    )
+    usual = np.where(usual > 0.0, usual, 1.0)
     left = np.zeros(rows.torque.shape)
     left[measured] = _left(_columns(robot, rows, np.ones(len(usual))), rows, usual)
     rms = np.sqrt((left**2).sum(axis=0) / np.maximum(1, measured.sum(axis=0)))
