@@ -57,6 +57,7 @@ class ServoDrive {
     has_rotor_ = d(F::backlash) > 0.0 || d(F::elasticity) > 0.0;
     on_motor_ = has_rotor_ && d(F::motor_encoder) > 0.5;
     limited_ = std::isfinite(d(F::rate_limit));
+    feedback_ = d(F::viscous) * d(F::limited_damping);
     if (d(F::elasticity) > 0.0)
       spring_rub_ = 2.0 * kSpringDamping * std::sqrt(d(F::armature) * (1.0 - kLinkArmature) / d(F::elasticity));
     const auto steps = static_cast<std::size_t>(std::lround(recording.step / arm.step));
@@ -82,7 +83,7 @@ class ServoDrive {
     unsigned out = 0;
     const auto add = [&out](bool has, unsigned law) { out |= has ? law : 0; };
     add(torque_command_, kernel::kDriveTorqueCommand);
-    add(d(F::damping_gain) != 0.0, kernel::kDriveDamped);
+    add(d(F::damping_gain) != 0.0 || feedback_ != 0.0, kernel::kDriveDamped);
     add(d(F::drive_law) != 1.0, kernel::kDriveBent);
     add(d(F::stribeck) != 0.0, kernel::kDriveStribeck);
     add(d(F::asymmetric_friction) != 0.0, kernel::kDriveAsymmetric);
@@ -98,6 +99,7 @@ class ServoDrive {
     put(Row::command_gain, d(F::command_gain));
     put(Row::integral_gain, d(F::integral_gain));
     put(Row::damping_gain, d(F::damping_gain));
+    put(Row::feedback, feedback_);
     put(Row::most_change, d(F::rate_limit) * step_);
     put(Row::saturation, d(F::saturation));
     put(Row::drive_law, d(F::drive_law));
@@ -350,22 +352,29 @@ class ServoDrive {
       tau = gain_factor_ * (d(F::command_gain) * error + d(F::integral_gain) * integral_);
       tau += d(F::damping_gain) * (command.slope - speed);
     }
+    tau -= feedback_ * speed;
     tau = drive_law(tau);
     tau *= supply_factor_;
-    tau *= std::max(0.0, 1.0 - d(F::supply_sag) * now.all_torques);
+    tau *= with_sag(now);
     return std::clamp(tau, -d(F::saturation), d(F::saturation));
   }
 
+  double with_sag(const ServoMoment& now) const { return std::max(0.0, 1.0 - d(F::supply_sag) * now.all_torques); }
+
+  /// Torque that the drive loses for more speed: none beyond its limit, as MuJoCo has it.
   double speed_slope(const ServoMoment& now, const Held& command, double angle, double speed) {
-    if (d(F::damping_gain) == 0.0) return 0.0;
-    const double more = kSlope / d(F::damping_gain);
+    const double gain = d(F::damping_gain) + feedback_;
+    if (gain == 0.0 || !on_) return 0.0;
+    if (d(F::drive_law) == 1.0)
+      return std::abs(torque_) < d(F::saturation) ? gain * supply_factor_ * with_sag(now) : 0.0;
+    const double more = kSlope / gain;
     return std::max(0.0, (torque_ - drive_torque(now, command, angle, speed + more)) / more);
   }
 
   // ---- friction
 
   /// A motor that is switched off (its bridge open) does not brake: its part of the damping is not there.
-  double viscous(bool on) const { return d(F::viscous) * (on ? 1.0 : 1.0 - d(F::back_emf)); }
+  double viscous(bool on) const { return (d(F::viscous) - feedback_) * (on ? 1.0 : 1.0 - d(F::back_emf)); }
 
   double friction_level(const ServoMoment& now, double speed) const {
     double level = d(F::coulomb) + d(F::load_friction) * std::abs(torque_);
@@ -500,6 +509,7 @@ class ServoDrive {
   double step_, row_step_, rate_;
   bool torque_command_ = false, has_rotor_ = false, on_motor_ = false, limited_ = false;
   double spring_rub_ = 0.0;
+  double feedback_ = 0.0;  ///< [Nm s/rad] damping that the controller makes, within the largest torque
   // What the joint carries from step to step.
   double integral_ = 0.0;  ///< of the command error [rad s]
   double wanted_ = 0.0;    ///< command, as the rate limit lets it follow

@@ -137,6 +137,7 @@ class Step {
       tau = at(DriveRow::gain) * (at(DriveRow::command_gain) * error + at(DriveRow::integral_gain) * integral_);
       if (has(kDriveDamped)) tau = tau + at(DriveRow::damping_gain) * (slope_ - speed);
     }
+    if (has(kDriveDamped)) tau = tau - at(DriveRow::feedback) * speed;
     if (has(kDriveBent)) bend_effort(&tau);
     return at(DriveRow::on) != 0.0 ? within(tau * at(DriveRow::supply), at(DriveRow::saturation)) : Pack{};
   }
@@ -152,10 +153,14 @@ class Step {
     }
   }
 
+  /// Torque that the drive loses for more speed: none beyond its limit, as MuJoCo has it.
   Pack speed_slope() const {
-    const Pack gain = at(DriveRow::damping_gain), more = kSlope / gain;
-    const Pack slope = positive((torque_ - drive_torque(speed_ + more)) / more);
-    return gain != 0.0 ? slope : Pack{};
+    const Pack gain = at(DriveRow::damping_gain) + at(DriveRow::feedback);
+    const Mask follows = (at(DriveRow::on) != 0.0) & (size(torque_) < at(DriveRow::saturation));
+    const Pack straight = follows ? gain * at(DriveRow::supply) : Pack{};
+    if (!has(kDriveBent)) return straight;
+    const Pack more = kSlope / gain, bent = positive((torque_ - drive_torque(speed_ + more)) / more);
+    return at(DriveRow::drive_law) == 1.0 ? straight : (gain != 0.0 ? bent : Pack{});
   }
 
   /// What acts at the link besides drive and friction.

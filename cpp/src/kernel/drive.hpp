@@ -14,6 +14,7 @@ enum class DriveRow : int {
   command_gain,
   integral_gain,
   damping_gain,
+  feedback,     ///< damping that the controller makes
   most_change,  ///< of the command in a step; infinite: no limit
   saturation,
   drive_law,
@@ -82,7 +83,7 @@ struct DriveFunction {
 
 /// Laws that few chains have, and that take long.
 enum DriveLaws : unsigned {
-  kDriveDamped = 1,         ///< damping_gain
+  kDriveDamped = 1,         ///< damping_gain, feedback
   kDriveBent = 2,           ///< drive_law
   kDriveStribeck = 4,       ///< stribeck
   kDriveAsymmetric = 8,     ///< asymmetric_friction

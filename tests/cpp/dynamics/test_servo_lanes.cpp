@@ -100,6 +100,7 @@ ServoSet set_of(Engine& random, unsigned number) {
     some(13, ServoField::thermal_friction, -0.02, 0.02);
     some(14, ServoField::back_emf, 0.2, 0.8);
     some(15, ServoField::current_offset, -0.1, 0.1);
+    some(16, ServoField::limited_damping, 0.2, 1.0);
   }
   return out;
 }
@@ -146,7 +147,7 @@ ServoScene scene_of(Engine& random) {
   }
   out.windows = {{0, 0, 40}, {0, 40, 49}, {1, 3, 21}, {1, 24, 65}};
   for (int k = 0; k < 40; ++k) {
-    out.sets.push_back(set_of(random, k == 0 ? 0 : k == 1 ? 0xFFFF : random()));
+    out.sets.push_back(set_of(random, k == 0 ? 0 : k == 1 ? 0x1FFFF : random()));
     out.sets.back().only = k % 3 == 2 ? k % static_cast<int>(kJoints) : -1;
     if (k % 5 == 0) add_functions(random, &out.sets.back());
   }

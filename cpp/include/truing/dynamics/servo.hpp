@@ -31,6 +31,7 @@ enum class ServoField : int {
   viscous,
   viscous_law,
   back_emf,
+  limited_damping,
   stribeck,
   stribeck_speed,
   load_friction,

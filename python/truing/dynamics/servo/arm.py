@@ -204,13 +204,14 @@ class _Reader:
         m = self.m
         dof = int(m.jnt_dofadr[j])
         gain, viscous, limit, delay = _GUESSED_GAIN, float(np.ravel(m.dof_damping[dof])[0]), math.inf, 0.0
+        fed_back = 0.0  # [Nm s/rad] for the speed: MuJoCo limits it together with the torque for the error
         mine = [a for a in range(m.nu) if m.actuator_trntype[a] in (0, 1) and m.actuator_trnid[a, 0] == j]
         if len(mine) > 1:
             raise InputError(f"{self.path}: joint {m.joint(j).name} has {len(mine)} actuators, expected one")
         for a in mine:
             gear = abs(float(m.actuator_gear[a, 0]))
             gain = abs(float(m.actuator_gainprm[a, 0])) * gear**2
-            viscous += abs(float(m.actuator_biasprm[a, 2])) * gear**2
+            fed_back = abs(float(m.actuator_biasprm[a, 2])) * gear**2
             if m.actuator_forcelimited[a]:
                 limit = gear * float(np.abs(m.actuator_forcerange[a]).max())
             delay = float(m.actuator_delay[a]) if hasattr(m, "actuator_delay") else 0.0
@@ -218,7 +219,8 @@ class _Reader:
             self.notes.append(f"joint {m.joint(j).name} has no actuator: its gain is fitted from a guess")
         return ServoJoint(
             command_gain=max(gain, 1e-9),
-            viscous=max(viscous, LEAST_FRICTION),
+            viscous=max(viscous + fed_back, LEAST_FRICTION),
+            limited_damping=fed_back / (viscous + fed_back) if 0.0 < limit < math.inf and fed_back else 0.0,
             coulomb=max(float(m.dof_frictionloss[dof]), LEAST_FRICTION),
             armature=max(float(m.dof_armature[dof]), LEAST_ARMATURE),
             saturation=limit if limit > 0.0 else math.inf,

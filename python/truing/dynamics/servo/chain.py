@@ -7,6 +7,7 @@ In every step of the simulation, with `u` the command of `delay` seconds ago, no
     e      = u - q, less `dead_band` on both sides of zero; q is the rotor's angle where `backlash` or
              `elasticity` stand between the rotor and the link and the encoder sits on the motor
     c      = g (command_gain e + integral_gain * integral of e) + damping_gain (du/dt - dq/dt)
+              - limited_damping viscous dq/dt
              g = (firmware gain / its reference) ** gain_law, where the recordings have `kp1_raw` …
     tau    = sign(c) drive_reference (|c| / drive_reference) ** drive_law
     tau   *= 1 + supply_gain (volt / its reference - 1), and 1 - supply_sag * (all drives' |torques|)
@@ -14,8 +15,8 @@ In every step of the simulation, with `u` the command of `delay` seconds ago, no
     level  = coulomb + load_friction |tau| + stribeck exp(-(dq/dt / stribeck_speed)^2)
               + asymmetric_friction sign(dq/dt)
     level *= 1 + thermal_friction (temperature - its reference) + warmup t
-    friction = dry, at most `level` (elastic over `presliding` of travel) + viscous dq/dt
-              + viscous_law dq/dt |dq/dt|; of viscous the part back_emf is not there where `enabled` is 0
+    friction = dry, at most `level` (elastic over `presliding` of travel) + viscous_law dq/dt |dq/dt|
+              + (1 - limited_damping) viscous dq/dt, its part back_emf not where `enabled` is 0
     joint  = tau + current_offset - spring q - friction - gravity_scale * gravity, with `armature` on it
 
 All values are those at the joint, SI. Where a joint slides read m for rad and N for Nm.
@@ -197,6 +198,16 @@ class ServoJoint:
         "one",
         "part of viscous friction that the motor makes, and not while it is switched off",
         spread=0.5,
+        low=0.0,
+        high=1.0,
+    )
+    limited_damping: float = _value(
+        0.0,
+        "viscous",
+        "1",
+        "one",
+        "part of viscous friction that the controller makes, within its largest torque",
+        scale="constant",
         low=0.0,
         high=1.0,
     )

@@ -25,7 +25,9 @@ _KIND = 3  # joints of one gain in the file, at least: servos of one kind
 _ALIKE = 0.2  # of the logarithm of their gains
 _SAME_SQUARES = 0.3  # more of a joint's squared error, before it is fitted again: its scale is not seen
 _SCALES = (1.0, 0.2, 0.5, 2.0)  # of all torques, from which a fit goes on
-_FINER_GAIN = 0.1  # of a joint's squared error, that finer differences have to win
+_FINER_GAIN = (
+    0.1  # of a joint's squared error, that finer differences, or another place of damping, have to win
+)
 _NEAR = 10.0  # times a joint's squared error: with the file's torques they may still be the better ones
 _LEAST_ERROR = 1e-6  # [rad | m]
 _SCANNED = 12  # windows that the first scan looks at, at most
@@ -105,11 +107,14 @@ def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted,
     """The usual parameters fitted to all rows of the fitter."""
     simulator = fitter.simulator
     fitter.progress("groundwork")
-    point = with_limits(first_guess(simulator, fitter.rows, nominal, data.torque_command), nominal)
+    beyond = _with_damping_of(
+        nominal
+    )  # servos of unknown make: damping that does not end at a largest torque
+    point = with_limits(first_guess(simulator, fitter.rows, beyond, data.torque_command), nominal)
     sizes = sizes_of(simulator, point, fitter.rows.windows)
     free = usual_values(simulator.arm.nominal, sizes, data.torque_command)
     start = np.array([f.at(point) for f in free])
-    begin = _better_start(fitter, point, sizes, free, start)
+    begin = _better_start(fitter, point, nominal, sizes, free, start)
     fitted = fitter.settled(begin, free, start, None, _ROUNDS, "groundwork")
     fitted = _alike(fitter, _from_file(fitter, _finer(fitter, fitted), nominal), nominal)
     point = with_limits(fitted.point, nominal)
@@ -118,19 +123,41 @@ def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted,
     return fitted, sizes
 
 
-def _better_start(fitter: Fitter, point: Point, sizes: Sizes, free: Sequence[Free], start: Floats) -> Point:
+def _better_start(
+    fitter: Fitter, point: Point, nominal: Point, sizes: Sizes, free: Sequence[Free], start: Floats
+) -> Point:
     """Where a fit ends best, joint by joint, of two: one begins at the point, one with rotors as heavy as
     what they move and with dry friction. A rotor that a scan left at next to nothing does not come back, as
-    damping has taken its place."""
+    damping has taken its place. Where joints are at their largest torque, a controller's damping ends there
+    if the file's torques, or those of the point, then leave clearly less."""
     chain = point.chain.copy()
     chain[:, FIELDS.index("armature")] = sizes.inertia
     chain[:, FIELDS.index("coulomb")] = _RUBS * sizes.torque
-    fits = [
-        fitter.fit(one, free, start, None, _ROUNDS, "groundwork", shown=False)
-        for one in (point, replace(point, chain=chain))
-    ]
-    best = np.argmin([np.mean(fit.errors**2, axis=0) for fit in fits], axis=0)
+    begins = [point, replace(point, chain=chain)]
+    if _limited(fitter, nominal).any():
+        begins += [nominal, _with_damping_of(point, nominal)]
+    fits = [fitter.fit(one, free, start, None, _ROUNDS, "groundwork", shown=False) for one in begins]
+    squares = np.array([np.mean(fit.errors**2, axis=0) for fit in fits])
+    squares[2:] /= 1.0 - _FINER_GAIN
+    best = np.argmin(squares, axis=0)
     return replace(point, chain=np.array([fits[k].point.chain[j] for j, k in enumerate(best)]))
+
+
+def _limited(fitter: Fitter, point: Point) -> NDArray[np.bool_]:
+    """Joints whose controller makes damping and that are at their largest torque in some row."""
+    within = point.chain[:, FIELDS.index("limited_damping")] > 0.0
+    if not within.any():
+        return within
+    torque = fitter.simulator.run([point], fitter.rows.windows, torques=True)[1][0]
+    at_most = np.abs(torque) >= (1.0 - _TINY) * point.chain[:, FIELDS.index("saturation")]
+    return np.asarray(at_most.any(axis=0) & within)
+
+
+def _with_damping_of(point: Point, other: Point | None = None) -> Point:
+    """With the part of the damping that ends at the largest torque of another; None: all of it goes on."""
+    chain, column = point.chain.copy(), FIELDS.index("limited_damping")
+    chain[:, column] = 0.0 if other is None else other.chain[:, column]
+    return replace(point, chain=chain)
 
 
 def _finer(fitter: Fitter, fitted: Fitted) -> Fitted:

@@ -31,7 +31,7 @@ from truing.dynamics.servo.result import (
     UnknownMotion,
     departing,
 )
-from truing.dynamics.servo.simulator import Point, Simulator, chain_of
+from truing.dynamics.servo.simulator import FIELDS, Point, Simulator, chain_of
 from truing.dynamics.servo.unknown import FoundFunction
 
 Floats = NDArray[np.float64]
@@ -96,7 +96,7 @@ _SEPARATED = {
 _USUAL_SEPARATED = "record steps, slow reversals and a chirp of each joint alone"
 _TOGETHER = 0.9  # rank correlation (Spearman 1904) over recordings: inputs that rose in one order
 _BETTER = 0.05  # of the file's squared error: where the usual parameters win less, none departs
-_TOLD = 3  # causes in the sentence
+_TOLD = 3  # causes in a sentence
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def diagnosis_of(parts: Parts, seconds: float) -> ServoDiagnosis:
     unknown = [_unknown(f, chains["nominal"]) for f in parts.functions]
     classes = [*_classes(parts, named), *_instead(parts)]
     verdict, sentence = _verdict(parts, named, unknown, departing(usual))
-    warnings = list(parts.notes)
+    warnings = [*parts.notes, *_beyond_limit(parts)]
     for why in dict.fromkeys(why for _, why in parts.account.vetoed):
         places = ", ".join(_place(one) for one, other in parts.account.vetoed if other == why)
         warnings.append(f"not named, as {why}: {places}")
@@ -301,15 +301,14 @@ def _usual(parts: Parts, covariance: ServoCovariance) -> list[FoundServoEffect]:
     out = []
     first = 3 + len(parts.account.found)
     nominal, standard = parts.held[0], parts.held[1]
+    better = _better(parts)
     of_joint = {(d.free.field, d.free.joint): d for d in parts.departures}
     for k, name in enumerate(n for n in USUAL if any(f.field == n for f in parts.standard.free)):
         back = parts.held[first + k]
         for j, joint in enumerate(joints):
             departure = of_joint[name, j]
             value = _parameter(parts, covariance, departure.free, parts.nominal)
-            # Of one value after the other: all may go together, and move no better than the file's.
-            better = np.sum(standard[:, j] ** 2) < (1.0 - _BETTER) * np.sum(nominal[:, j] ** 2)
-            departs = departure.certain and bool(better)
+            departs = departure.certain and bool(better[j])
             scale = max(float(np.sum(np.maximum(nominal[:, j] ** 2, back[:, j] ** 2))), 1e-18)
             share = float(np.sum(back[:, j] ** 2 - standard[:, j] ** 2)) / scale / len(joints)
             out.append(
@@ -330,6 +329,13 @@ def _usual(parts: Parts, covariance: ServoCovariance) -> list[FoundServoEffect]:
     return sorted(out, key=lambda e: -e.share)
 
 
+def _better(parts: Parts) -> NDArray[np.bool_]:
+    """By joint: whether the usual parameters move it better than the file's, which they need not where they
+    depart one after the other: all may go together."""
+    nominal, standard = (np.sum(parts.held[k] ** 2, axis=0) for k in range(2))
+    return np.asarray(standard < (1.0 - _BETTER) * nominal)
+
+
 def _unknown(f: FoundFunction, chain: ServoChain) -> UnknownMotion:
     places = f.low + f.width * np.arange(f.values.size)
     words = {"directed_load": ("load", "direction"), "directed_angle": ("angle", "direction")}
@@ -341,6 +347,20 @@ def _unknown(f: FoundFunction, chain: ServoChain) -> UnknownMotion:
         (f.share, f.share),
         tuple((float(x), float(v), float(s)) for x, v, s in zip(places, f.values, f.sigmas, strict=True)),
     )
+
+
+def _beyond_limit(parts: Parts) -> list[str]:
+    """Joints whose damping is not within the largest torque, as it is in the file."""
+    column = FIELDS.index("limited_damping")
+    file, found = (point.chain[:, column] for point in (parts.nominal, parts.standard.point))
+    joints = parts.simulator.arm.nominal.joints
+    moved = [joint for joint, changed in zip(joints, file != found, strict=True) if changed]
+    if not moved:
+        return []
+    return [
+        f"damping at {', '.join(moved)} goes on where the servo gives its largest torque: joints move better"
+        " so than with the file's, which is the controller's (kv) and ends there (forcerange)"
+    ]
 
 
 # ---- classes --------------------------------------------------------------------------------------
@@ -374,14 +394,19 @@ def _late_alike(parts: Parts) -> set[int]:
 def _instead(parts: Parts) -> list[ServoClass]:
     """By joint: what departs from the file there, and what alone does the same beside the file's values."""
     joints, late = parts.simulator.arm.nominal.joints, _late_alike(parts)
+    better = _better(parts)
     out = []
     for j, every in parts.instead.items():
+        if not better[j]:
+            continue
         others = [i for i in every if not (i.other.effect == "delay" and j in late)]
         if not others:
             continue
         departed = [d.free.field for d in parts.departures if d.certain and d.free.joint == j]
-        best = max(others, key=lambda i: i.probability).other
-        alone = ", ".join(_place(i.other) for i in others)
+        others.sort(key=lambda i: -i.probability)
+        places = list(dict.fromkeys(_place(i.other) for i in others))
+        more = f" and {len(places) - _TOLD} more" if len(places) > _TOLD else ""
+        alone = ", ".join(places[:_TOLD]) + more
         out.append(
             ServoClass(
                 tuple(
@@ -390,7 +415,7 @@ def _instead(parts: Parts) -> list[ServoClass]:
                 ),
                 f"What departs from the file at {joints[j]} ({', '.join(departed)}) may as well be one cause:"
                 f" {alone}",
-                _SEPARATED.get(best.effect, _USUAL_SEPARATED),
+                _SEPARATED.get(others[0].other.effect, _USUAL_SEPARATED),
             )
         )
     return out

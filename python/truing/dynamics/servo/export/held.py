@@ -110,6 +110,7 @@ def _held(joint: str, drive: ServoJoint, use: Use, left: list[NotWritten]) -> He
         size = (lead - drive.delay) * gain * _rms(use.command_speed)
         reason = "the torque for the command's speed is written as a shorter delay, as far as there is one"
         left.append(NotWritten(f"damping_gain.{joint}", size, reason))
+    fed_back = drive.viscous * drive.limited_damping
     friction = drive.coulomb + _mean_load_friction(joint, drive, use, left)
     _by_inputs(joint, drive, use, left)
     encoder_on_motor = drive.motor_encoder > 0.5
@@ -120,12 +121,12 @@ def _held(joint: str, drive: ServoJoint, use: Use, left: list[NotWritten]) -> He
                 left.append(NotWritten(f"{name}.{joint}", math.nan, reason))
     return HeldJoint(
         gain=gain,
-        damping_gain=drive.damping_gain,
+        damping_gain=drive.damping_gain + fed_back,
         integral_gain=drive.integral_gain,
         delay=delay,
         rate_limit=drive.rate_limit if math.isfinite(drive.rate_limit) else None,
         force_limit=drive.saturation if math.isfinite(drive.saturation) else None,
-        damping=(drive.viscous, drive.viscous_law),
+        damping=(drive.viscous - fed_back, drive.viscous_law),
         friction=max(friction, 0.0),
         more_at_rest=drive.stribeck,
         stribeck_speed=drive.stribeck_speed,
@@ -207,7 +208,7 @@ def _by_inputs(joint: str, drive: ServoJoint, use: Use, left: list[NotWritten]) 
         (
             "back_emf",
             drive.back_emf,
-            drive.back_emf * drive.viscous * _rms(use.speed),
+            drive.back_emf * (1.0 - drive.limited_damping) * drive.viscous * _rms(use.speed),
             "written for a servo that is switched on",
         ),
     ):
