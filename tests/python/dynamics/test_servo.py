@@ -462,6 +462,24 @@ def test_a_rotor_that_a_scan_left_at_nothing_comes_back(tmp_path: Path) -> None:
     assert scanned.value(2, "armature") < 1e-3 < both.value(2, "armature")
 
 
+def test_dry_friction_is_held_as_newtons_method_holds_it(tmp_path: Path) -> None:
+    arm, joints = tmp_path / "arm", ("shoulder_pan", "shoulder_lift", "elbow_flex")
+    copy_servo_arm(arm)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)
+        robot = load_robot(arm / "arm.xml", any_tool=True, tip_link="gripper")
+        recordings = list(load_recordings([arm / "recordings"], robot, units="deg"))
+    fast, slow = (prepare(arm / "arm.xml", recordings, joints=joints) for _ in range(2))
+    for model in slow.simulator._models:
+        assert model.opt.solver == mujoco.mjtSolver.mjSOL_PGS
+        model.opt.solver, model.opt.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, 1e-14
+    point = point_of(fast.arm.nominal)
+    for coulomb in (0.0, 0.1, 5.0):
+        rubs = point.with_value(slice(None), "coulomb", coulomb)
+        motions = [of.simulator.run([rubs], of.windows)[0][0] for of in (fast, slow)]
+        assert np.abs(motions[0] - motions[1]).max() < 1e-6
+
+
 def test_torques_that_share_a_factor_are_one_departure(file: Path) -> None:
     nominal = point_of(prepared_of(file, recordings_of(file)).arm.nominal)
     fields = ("command_gain", "viscous", "coulomb", "armature")
