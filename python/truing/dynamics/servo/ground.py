@@ -15,6 +15,7 @@ from truing.dynamics.servo.arm import LEAST_ARMATURE, LEAST_FRICTION
 from truing.dynamics.servo.data import ServoData, Window
 from truing.dynamics.servo.fit import Fitted, Fitter, Rows, noise_of, rows_of
 from truing.dynamics.servo.free import Free, Sizes, usual_values
+from truing.dynamics.servo.scatter import narrowed, scattered
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator
 
 Floats = NDArray[np.float64]
@@ -73,18 +74,21 @@ def _moving_rms(speed: Floats) -> float:
 
 def _inertia(simulator: Simulator | Apart, point: Point) -> Floats:
     """Of everything that each joint moves, at the file's zero."""
+    return _carried(simulator) + point.chain[:, FIELDS.index("armature")]
+
+
+def _carried(simulator: Simulator | Apart) -> Floats:
+    """The same without rotors."""
     m = simulator.model
     bodies = np.asarray(m.dof_M0, dtype=float)[simulator.dofs] - np.asarray(m.dof_armature)[simulator.dofs]
-    return np.asarray(np.maximum(bodies, 0.0) + point.chain[:, FIELDS.index("armature")])
+    return np.asarray(np.maximum(bodies, 1e-9))
 
 
 def first_guess(simulator: Simulator | Apart, rows: Rows, point: Point, torque_command: bool) -> Point:
     """Joint by joint the best of wide steps in gain, damping, friction and rotor, and in all torques at once,
     of which only weight and masses say how large they are: a file may be off by hundreds, where no derivative
     leads back. All joints are changed at once: they hardly see each other."""
-    every = max(1, len(rows.windows) // _SCANNED)
-    few = rows_of(simulator.data, rows.windows[::every])
-    fitter = Fitter(simulator, few)
+    fitter = Fitter(simulator, _few(Fitter(simulator, rows)))
     names = [name for name in TORQUES if not (torque_command and name == "command_gain")]
     wide = [([name], _GAINS if name == "command_gain" else _WIDE) for name in names]
     fine = [([name], _FINE) for name in names]
@@ -107,10 +111,8 @@ def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted,
     """The usual parameters fitted to all rows of the fitter."""
     simulator = fitter.simulator
     fitter.progress("groundwork")
-    beyond = _with_damping_of(
-        nominal
-    )  # servos of unknown make: damping that does not end at a largest torque
-    point = with_limits(first_guess(simulator, fitter.rows, beyond, data.torque_command), nominal)
+    guess = first_guess(simulator, fitter.rows, _beyond_limit(nominal), data.torque_command)
+    point = with_limits(guess, nominal)
     sizes = sizes_of(simulator, point, fitter.rows.windows)
     free = usual_values(simulator.arm.nominal, sizes, data.torque_command)
     start = np.array([f.at(point) for f in free])
@@ -126,21 +128,46 @@ def groundwork(fitter: Fitter, nominal: Point, data: ServoData) -> tuple[Fitted,
 def _better_start(
     fitter: Fitter, point: Point, nominal: Point, sizes: Sizes, free: Sequence[Free], start: Floats
 ) -> Point:
-    """Where a fit ends best, joint by joint, of two: one begins at the point, one with rotors as heavy as
-    what they move and with dry friction. A rotor that a scan left at next to nothing does not come back, as
-    damping has taken its place. Where joints are at their largest torque, a controller's damping ends there
-    if the file's torques, or those of the point, then leave clearly less."""
+    """Where a fit ends best, joint by joint, of several: one begins at the point, one with rotors as heavy as
+    what they move and with dry friction (a rotor that a scan left at next to nothing does not come back, as
+    damping has taken its place), one at the best servo of all that there may be. Where joints are at their
+    largest torque, a controller's damping ends there if that leaves clearly less."""
     chain = point.chain.copy()
     chain[:, FIELDS.index("armature")] = sizes.inertia
     chain[:, FIELDS.index("coulomb")] = _RUBS * sizes.torque
     begins = [point, replace(point, chain=chain)]
-    if _limited(fitter, nominal).any():
-        begins += [nominal, _with_damping_of(point, nominal)]
+    limited = bool(_limited(fitter, nominal).any())
+    if not fitter.simulator.data.torque_command:
+        few, carried = Fitter(fitter.simulator, _few(fitter)), _carried(fitter.simulator)
+        for one in [point, nominal] if limited else [point]:
+            begins.append(narrowed(few, scattered(one, carried)))
+    if limited:
+        begins.append(nominal)
+    best = _best_ends(fitter, begins, free, start)
+    return _best_ends(fitter, [best, _turned(best, nominal)], free, start) if limited else best
+
+
+def _best_ends(fitter: Fitter, begins: Sequence[Point], free: Sequence[Free], start: Floats) -> Point:
+    """Joint by joint where fits from these end best."""
     fits = [fitter.fit(one, free, start, None, _ROUNDS, "groundwork", shown=False) for one in begins]
+    within = [fit.point.chain[:, FIELDS.index("limited_damping")] > 0.0 for fit in fits]
     squares = np.array([np.mean(fit.errors**2, axis=0) for fit in fits])
-    squares[2:] /= 1.0 - _FINER_GAIN
-    best = np.argmin(squares, axis=0)
-    return replace(point, chain=np.array([fits[k].point.chain[j] for j, k in enumerate(best)]))
+    best = np.argmin(np.where(within, squares / (1.0 - _FINER_GAIN), squares), axis=0)
+    return replace(begins[0], chain=np.array([fits[k].point.chain[j] for j, k in enumerate(best)]))
+
+
+def _turned(point: Point, nominal: Point) -> Point:
+    """With damping beyond the largest torque where it ends there, and the other way round."""
+    column = FIELDS.index("limited_damping")
+    chain = point.chain.copy()
+    chain[:, column] = nominal.chain[:, column] - chain[:, column]
+    return replace(point, chain=chain)
+
+
+def _few(fitter: Fitter) -> Rows:
+    """A dozen windows' rows: enough for a first look."""
+    windows = fitter.rows.windows
+    return rows_of(fitter.simulator.data, windows[:: max(1, len(windows) // _SCANNED)])
 
 
 def _limited(fitter: Fitter, point: Point) -> NDArray[np.bool_]:
@@ -153,11 +180,9 @@ def _limited(fitter: Fitter, point: Point) -> NDArray[np.bool_]:
     return np.asarray(at_most.any(axis=0) & within)
 
 
-def _with_damping_of(point: Point, other: Point | None = None) -> Point:
-    """With the part of the damping that ends at the largest torque of another; None: all of it goes on."""
-    chain, column = point.chain.copy(), FIELDS.index("limited_damping")
-    chain[:, column] = 0.0 if other is None else other.chain[:, column]
-    return replace(point, chain=chain)
+def _beyond_limit(point: Point) -> Point:
+    """With damping that does not end at the largest torque."""
+    return point.with_value(slice(None), "limited_damping", 0.0)
 
 
 def _finer(fitter: Fitter, fitted: Fitted) -> Fitted:
