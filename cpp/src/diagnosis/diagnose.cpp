@@ -481,7 +481,7 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
   std::map<int, Named> names = keep_what_is_likely(work, evidence, resampled, &decision);
   while (keep_what_is_confirmed(work, evidence, &decision))  // without what was not likely
     names = keep_what_is_likely(work, evidence, resampled, &decision);
-  for (const auto& [departure, law] : departures_from_laws(work, decision)) {
+  for (const auto& [departure, law] : departures_from_laws(work, evidence, decision)) {
     decision.corrects[departure] = law;
     names.erase(departure);
   }

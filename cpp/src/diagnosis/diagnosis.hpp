@@ -285,7 +285,7 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
 /// A function of what the name's law depends on moves the same joint beside it: the law is not quite right.
 bool is_function_beside(const Work& work, const Decision& decision, const Explanation& name);
 /// Names that are what a larger law at their joint leaves of the motion, by group, and the group of that law.
-std::map<int, int> departures_from_laws(const Work& work, const Decision& decision);
+std::map<int, int> departures_from_laws(const Work& work, const Evidence& evidence, const Decision& decision);
 Resampled resample(const Work& work, const Decision& decision);
 /// How often the selection on resampled folds finds the group's class again.
 double selection_frequency(const Work& work, const Resampled& resampled, const Sureness& sure, int group);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "diagnosis/free_search.hpp"
 #include "math/random.hpp"
 #include "model/effects/traits.hpp"
 
@@ -196,6 +197,45 @@ static bool is_law(const Work& work, const Explanation& e) {
   return is_named(e) && traits.stands_for != StandsFor::link_geometry && traits.search != Search::by_order;
 }
 
+/// What a law of the temperature leaves where nothing is as warm as the sensor says: its motion, as any function of
+/// time. Log Bayes factor beside `rest`, at most.
+static double as_lagging_warmth(const Work& work, const Evidence& evidence, const Evidence::State& rest,
+                                const Explanation& law, const std::vector<int>& time) {
+  const auto& groups = work.design.candidates.groups;
+  const auto is_of_law = [&](const std::string& joint) {
+    return law.joints.empty() || std::find(law.joints.begin(), law.joints.end(), joint) != law.joints.end();
+  };
+  double best = -1e300;
+  std::vector<int> of_all_links;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const Explanation& e = work.design.candidates.named[g];
+    if (e.kind != Kind::law || e.effect != law.effect || !is_of_law(e.site) || groups[g].columns.empty()) continue;
+    best = std::max(best, evidence.gain(rest, groups[g].columns, 0.0).evidence);
+    of_all_links.insert(of_all_links.end(), groups[g].columns.begin(), groups[g].columns.end());
+  }
+  if (law.joints.empty() && !of_all_links.empty())
+    best = std::max(best, evidence.gain(rest, of_all_links, 0.0).evidence);
+  FreeScanOptions of_time;
+  of_time.flips = 0;
+  of_time.only_of = time;
+  const Robot& robot = work.given.frames.robot;
+  for (const FreeGain& found :
+       scan_free(work.design, evidence, rest, work.inputs, robot, work.noise.design_effect, of_time).best) {
+    if (is_of_law(found.what.site)) best = std::max(best, found.gain.evidence);
+  }
+  return best;
+}
+
+/// Does the frame wander in a way that lagging warmth of the parts that a law of the temperature names does not make?
+static bool wanders_by_itself(const Work& work, const Evidence& evidence, const Decision& decision, int drift,
+                              const Explanation& law) {
+  const Evidence::State rest = evidence.evaluate(without_these(decision.state.choice, {drift}));
+  const ColumnGroup& frame = work.design.candidates.groups[static_cast<std::size_t>(drift)];
+  const double by_frame = evidence.gain(rest, frame.columns, 0.0).evidence;
+  const std::vector<int>& time = work.design.candidates.named[static_cast<std::size_t>(drift)].inputs;
+  return by_frame > as_lagging_warmth(work, evidence, rest, law, time) + decision.search.threshold;
+}
+
 /// Laws are seldom exact, and what one leaves looks like another one: the joint was not set to zero where the law says;
 /// where both go with the joint's own angle, little is left; what is warm is not as warm as the sensor says, and the
 /// frame seems to wander.
@@ -209,7 +249,7 @@ static bool is_departure(const Work& work, const Explanation& small, const Expla
   return follows_own_angle(one) && follows_own_angle(other) && ratio < kLittle;
 }
 
-std::map<int, int> departures_from_laws(const Work& work, const Decision& decision) {
+std::map<int, int> departures_from_laws(const Work& work, const Evidence& evidence, const Decision& decision) {
   std::vector<std::pair<double, int>> laws;  // the largest first
   for (const int g : decision.state.choice.groups) {
     if (!is_law(work, work.design.candidates.named[static_cast<std::size_t>(g)])) continue;
@@ -225,8 +265,12 @@ std::map<int, int> departures_from_laws(const Work& work, const Decision& decisi
       const auto named = [&](int g) -> const Explanation& {
         return work.design.candidates.named[static_cast<std::size_t>(g)];
       };
-      if (is_departure(work, named(laws[small].second), named(group), laws[small].first / size))
-        out[laws[small].second] = group;
+      const int less = laws[small].second;
+      if (!is_departure(work, named(less), named(group), laws[small].first / size)) continue;
+      if (effect_traits(work, named(less)).driver == Driver::time &&
+          wanders_by_itself(work, evidence, decision, less, named(group)))
+        continue;
+      out[less] = group;
     }
   }
   return out;
