@@ -110,6 +110,17 @@ static std::vector<int> flexible_columns(const Design& design) {
   return out;
 }
 
+/// The nuisance and all links together.
+static std::vector<int> columns_of_links(const Design& design) {
+  std::vector<int> out = design.nuisance;
+  for (std::size_t g = 0; g < design.candidates.groups.size(); ++g) {
+    if (design.candidates.named[g].kind != Kind::all_geometry) continue;
+    const std::vector<int>& links = design.candidates.groups[g].columns;
+    out.insert(out.end(), links.begin(), links.end());
+  }
+  return out;
+}
+
 /// What rows that were held out show of a fit that did not see them: their noise and the fit's own error.
 static ByKind sigma_of_predictions(std::vector<Block> blocks, const Eigen::VectorXd& residual, const ByKind& noise) {
   for (Block& block : blocks) block.training = !block.training;
@@ -156,8 +167,8 @@ namespace {
 /// noise.
 class FlexibleFit {
  public:
-  explicit FlexibleFit(const Design& design)
-      : design_(design), columns_(flexible_columns(design)), residual_(design.y) {
+  FlexibleFit(const Design& design, std::vector<int> columns)
+      : design_(design), columns_(std::move(columns)), residual_(design.y) {
     std::set<int> kinds;
     for (const std::int8_t component : design.component) kinds.insert(kind_of(component));
     kinds_.assign(kinds.begin(), kinds.end());
@@ -246,6 +257,24 @@ class FlexibleFit {
 
 }  // namespace
 
+/// By how much less than everything at once the best of some models misses poses that it did not see, by kind of value:
+/// few poses are predicted worse by a fit of everything than by frames alone, or links as well.
+static ByKind less_than_everything(const FlexibleFit& everything, const std::vector<FlexibleFit>& others,
+                                   const std::vector<Block>& blocks, const Eigen::VectorXd& own,
+                                   const Eigen::VectorXd& weight) {
+  const auto misses = [&](const FlexibleFit& model) {
+    return sigma_of(blocks, own.cwiseProduct(model.predicted_residual(weight)), {});
+  };
+  const ByKind all = misses(everything);
+  ByKind out = {1.0, 1.0, 1.0};
+  for (const FlexibleFit& model : others) {
+    const ByKind sigma = misses(model);
+    for (std::size_t kind = 0; kind < out.size(); ++kind)
+      if (all[kind] > 0.0) out[kind] = std::min(out[kind], sigma[kind] / all[kind]);
+  }
+  return out;
+}
+
 /// Are there poses with more than one row?
 static bool has_repeats(const Design& design) {
   const std::set<std::int32_t> rows(design.row.begin(), design.row.end()),
@@ -287,7 +316,8 @@ Weighted weigh(const Design& design, const Measurements& data) {
   constexpr double kCountsLittle = 0.2;  // root of the weight of a row that is said to be an outlier
   const std::vector<Block> blocks = blocks_of(design);
   const Eigen::VectorXd own = own_weights(design, data);
-  FlexibleFit flexible(design);
+  FlexibleFit flexible(design, flexible_columns(design));
+  const std::vector<FlexibleFit> plainer = {{design, design.nuisance}, {design, columns_of_links(design)}};
   const auto values =
       std::count_if(design.fold.begin(), design.fold.end(), [&](std::int32_t fold) { return fold < design.folds; });
   Weighted out;
@@ -302,20 +332,25 @@ Weighted weigh(const Design& design, const Measurements& data) {
     const ByKind predicted = predicts ? sigma : sigma_of_predictions(blocks, own.cwiseProduct(residual), sigma);
     const std::vector<double> squares = standardised_squares(blocks, own, residual, sigma, predicted);
     const bool tails = round > 0 && has_tails(blocks, standardised_squares(blocks, own, residual, sigma, sigma));
+    const bool bounded = predicts && round == kFits;
+    const ByKind less =
+        bounded ? less_than_everything(flexible, plainer, blocks, own, out.weight) : ByKind{1.0, 1.0, 1.0};
+    ByKind noise{};
+    for (std::size_t kind = 0; kind < noise.size(); ++kind) noise[kind] = less[kind] * sigma[kind];
     for (std::size_t b = 0; b < blocks.size(); ++b) {
       const auto [first, count, kind, training] = blocks[b];
       const double root = tails ? root_weight(blocks[b], squares[b]) : 1.0;
       if (round == kFits && root < kCountsLittle)
         out.noise.outliers.push_back(design.row[static_cast<std::size_t>(first)]);
-      out.weight.segment(first, count) = own.segment(first, count) * root / sigma[static_cast<std::size_t>(kind)];
+      out.weight.segment(first, count) = own.segment(first, count) * root / noise[static_cast<std::size_t>(kind)];
     }
-    out.noise.unit = sigma[0] > 0.0 ? sigma[0] : sigma[2];
+    out.noise.unit = noise[0] > 0.0 ? noise[0] : noise[2];
     // In metres, whatever the rows say of themselves: their own sigmas have taken the unit away.
     const ByKind in_metres = sigma_of(blocks, residual, used);
-    out.noise.position_sigma = in_metres[0] > 0.0 ? in_metres[0] : in_metres[2];
+    out.noise.position_sigma = in_metres[0] > 0.0 ? less[0] * in_metres[0] : less[2] * in_metres[2];
     if (round == kFits) break;
-    const auto kinds = std::count_if(sigma.begin(), sigma.end(), [](double noise) { return noise > 0.0; });
-    flexible.fit(out.weight, kinds == 1 && !tails ? *std::max_element(sigma.begin(), sigma.end()) : 0.0);
+    const auto kinds = std::count_if(sigma.begin(), sigma.end(), [](double one) { return one > 0.0; });
+    flexible.fit(out.weight, kinds == 1 && !tails ? *std::max_element(noise.begin(), noise.end()) : 0.0);
   }
   if (has_repeats(design))
     out.noise.design_effect = design_effect_of(design, out.weight, flexible.predicted_residual(out.weight));

@@ -402,7 +402,7 @@ TEST_CASE("of few poses wrong links are believed before names that were chosen a
 }
 
 TEST_CASE("links that predict the folds of few poses stay where noise alone reaches as high a score") {
-  const Robot truth = perturbed(light_arm(), 4e-5, 4e-5, 903);
+  const Robot truth = perturbed(light_arm(), 3.5e-5, 3.5e-5, 903);
   const auto table = measured(truth, 20, 904);
   const DiagnoseOptions options;
   const Diagnosis d = diagnose(light_arm(), table->data, options);

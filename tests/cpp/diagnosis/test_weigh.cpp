@@ -59,20 +59,29 @@ TEST_CASE("noise is found, and weights are its inverse") {
   CHECK(weighted.weight[0] * weighted.noise.position_sigma == doctest::Approx(1.0).scale(0).epsilon(1e-3));
 }
 
+namespace {
+
+/// The design with free columns of chance beside its own, one candidate of all of them.
+Design with_chance(Design design, Eigen::Index columns) {
+  const Eigen::Index own = design.x.cols();
+  design.x.conservativeResize(Eigen::NoChange, columns);
+  Random random(13);
+  for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
+    for (Eigen::Index c = own; c < columns; ++c) design.x(i, c) = random.normal();
+  }
+  design.prior = Eigen::VectorXd::Constant(columns, kLargest);
+  design.candidates.groups.resize(1);
+  design.candidates.named.resize(1);
+  for (Eigen::Index c = own; c < columns; ++c) design.candidates.groups[0].columns.push_back(static_cast<int>(c));
+  return design;
+}
+
+}  // namespace
+
 TEST_CASE("rows held out do not stand far out because a flexible fit did not see them") {
   // 240 poses of 3 values each, and 340 free columns: of other poses they leave twice the square of the noise.
   const Weighed few(360, 1, 2e-4, 0.0);
-  Design design = few.design;
-  constexpr Eigen::Index kColumns = 340;
-  design.x.conservativeResize(Eigen::NoChange, kColumns);
-  Random random(13);
-  for (Eigen::Index i = 0; i < design.x.rows(); ++i) {
-    for (Eigen::Index c = 4; c < kColumns; ++c) design.x(i, c) = random.normal();
-  }
-  design.prior = Eigen::VectorXd::Constant(kColumns, kLargest);
-  design.candidates.groups.resize(1);
-  design.candidates.named.resize(1);
-  for (int c = 4; c < kColumns; ++c) design.candidates.groups[0].columns.push_back(c);
+  const Design design = with_chance(few.design, 340);
   const Weighted weighted = weigh(design, few.data);
   CHECK(weighted.noise.outliers.empty());
   int less = 0;  // of 120 rows held out, one in 34 beyond three standard deviations
@@ -81,6 +90,13 @@ TEST_CASE("rows held out do not stand far out because a flexible fit did not see
     less += held_out && weighted.weight[i] < 0.999 * weighted.weight.maxCoeff() ? 1 : 0;
   }
   CHECK(less <= 8);
+}
+
+TEST_CASE("what a fit of everything predicts badly of few poses is not their noise") {
+  // 120 poses of 3 values each, and as many free columns: frames alone predict other poses better.
+  const Weighed few(180, 1, 2e-4, 0.0);
+  CHECK(weigh(with_chance(few.design, 360), few.data).noise.position_sigma ==
+        doctest::Approx(2e-4).scale(0).epsilon(0.12));
 }
 
 TEST_CASE("a row far out counts for nothing, and is named") {
