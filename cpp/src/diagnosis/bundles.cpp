@@ -18,6 +18,7 @@ using Kind = Explanation::Kind;
 namespace {
 
 constexpr double kInQuestion = 3.0;       ///< nats by which the names are better, from which on they are in no question
+constexpr std::size_t kMany = 3;          ///< names at one joint: all of them at once are no likelier than a function
 constexpr double kForFunctions = 4.0;     ///< nats beyond the threshold, that a free function must win
 constexpr double kPredictsAsWell = 1.06;  ///< times the sum of squares of unseen folds, that the function may leave
 
@@ -25,7 +26,8 @@ constexpr double kPredictsAsWell = 1.06;  ///< times the sum of squares of unsee
 struct Bundle {
   std::vector<int> groups;
   std::vector<int> inputs;
-  int joint = -1;  ///< where all of them act; -1: at the base
+  std::size_t names = 0;  ///< of `groups`, without what corrects them
+  int joint = -1;         ///< where all of them act; -1: at the base
 };
 
 /// Laws of one joint's own angle, with what corrects them. A single one is held against functions where its confidence
@@ -35,7 +37,6 @@ Bundle laws_of_angle(const Work& work, const Choice& choice, std::size_t joint) 
   const int angle = input_named(work, input_name(Driver::angle, joint));
   if (angle < 0) return out;
   const std::string& name = work.given.frames.robot.joints[joint].name;
-  std::size_t names = 0;
   for (const int g : choice.groups) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     if (e.kind == Kind::law || e.kind == Kind::free) {
@@ -44,9 +45,9 @@ Bundle laws_of_angle(const Work& work, const Choice& choice, std::size_t joint) 
     }
     if (e.kind != Kind::catalogue || !has_law_at(work, e, name) || !follows_own_angle(effect_traits(work, e))) continue;
     out.groups.push_back(g);
-    ++names;
+    ++out.names;
   }
-  if (names < 2) out.groups.clear();
+  if (out.names < 2) out.groups.clear();
   out.inputs = {angle};
   out.joint = static_cast<int>(joint);
   return out;
@@ -136,7 +137,9 @@ void question_bundles(Work* work, const Robot& robot, Decision* decision) {
         scan_free(work->design, evidence, rest, work->inputs, robot, work->noise.design_effect, options);
     const InItsPlace best = best_in_its_place(*work, evidence, rest, bundle, scan);
     const double by_function = best.as_shape ? best.score : best.taken ? best.taken->gain.score : -1e300;
-    const double margin = bundle.joint < 0 ? decision->search.threshold : 0.0;  // frames wander more often
+    double margin = 0.0;
+    if (bundle.joint < 0) margin = decision->search.threshold;  // frames wander more often
+    if (bundle.names >= kMany) margin = -kInQuestion;
     const bool is_better = by_function > std::max(by_names + margin, decision->search.threshold + kForFunctions);
     if (is_better && put_in_its_place(work, robot, rest, bundle, best, scan.tried, decision)) continue;
     if (best.score > by_names - kInQuestion) decision->in_question.insert(bundle.groups.begin(), bundle.groups.end());

@@ -15,3 +15,10 @@ def test_one_link_off_by_little_more_than_noise_shows_where_few_poses_have_orien
     found = truing.diagnose(robot, data)
     assert [(e.effect, e.joints) for e in found.effects] == [("link_geometry", ("J3",))]
     assert found.noise_floor == pytest.approx(3**0.5 * label["sigma"], rel=0.15)
+
+
+def test_an_end_stop_is_no_zero_ratio_and_harmonic_at_once() -> None:
+    robot, data, _ = make("examination/unlisted/1@19")
+    found = truing.diagnose(robot, data)
+    assert not found.effects
+    assert [(u.joint, u.inputs) for u in found.unknown] == [("B3", ("q3",))]
