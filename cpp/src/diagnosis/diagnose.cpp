@@ -414,8 +414,16 @@ void question_noise(double beyond_repeats, Diagnosis* out) {
   if (beyond_repeats > kLackOfFit) out->unknown.push_back(describe_lack_of_fit(*out, beyond_repeats));
 }
 
+/// Held-out errors rise to a multiple of their squares that few poses, however they scatter, do not have where other
+/// poses' errors fall.
+bool is_far_worse(double before, double after) {
+  constexpr double kTimes = 2.5;
+  return after * after > kTimes * before * before;
+}
+
 Verdict verdict_of(const Diagnosis& d) {
-  if (d.held_out_fall.probability < kContradicted) return Verdict::does_not_hold;
+  if (d.held_out_fall.probability < kContradicted || is_far_worse(d.gap.rms, d.after.rms))
+    return Verdict::does_not_hold;
   if (d.effects.empty()) return d.unknown.empty() ? Verdict::none : Verdict::unknown;
   return d.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown;
 }
@@ -506,7 +514,9 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
   }
   share_the_gap(&result);
   result.verdict = verdict_of(result);
-  const bool contradicted = result.verdict == Verdict::does_not_hold || fitted.by_robot.probability < kContradicted;
+  const bool robot_is_worse =
+      fitted.by_robot.probability < kContradicted || is_far_worse(1.0, 1.0 - result.shrink.value);
+  const bool contradicted = result.verdict == Verdict::does_not_hold || robot_is_worse;
   if (contradicted) {  // no robot worse than nothing
     result.robot = whole.frames.robot;
     result.shrink = {};

@@ -4,10 +4,27 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
 import pytest
 
 import truing
 from truing.exam.sets import make
+
+_BENCH = Path(__file__).resolve().parents[3] / "bench"
+
+
+def _bench(name: str) -> Any:
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, _BENCH / f"{name}.py")
+        assert spec is not None and spec.loader is not None
+        sys.modules[name] = importlib.util.module_from_spec(spec)  # its dataclasses look themselves up
+        spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
 
 
 def test_one_link_off_by_little_more_than_noise_shows_where_few_poses_have_orientations() -> None:
@@ -22,3 +39,21 @@ def test_an_end_stop_is_no_zero_ratio_and_harmonic_at_once() -> None:
     found = truing.diagnose(robot, data)
     assert not found.effects
     assert [(u.joint, u.inputs) for u in found.unknown] == [("B3", ("q3",))]
+
+
+@pytest.mark.realdata
+@pytest.mark.filterwarnings("ignore::truing.InputWarning")
+def test_held_out_errors_that_nearly_double_are_not_explained_by_chance() -> None:
+    real_data = _bench("real_data")
+    if not real_data.default_folder().is_dir():
+        pytest.skip("no recordings here: set TRUING_REALDATA to their folder")
+    small_sets = _bench("small_sets")
+    recording = next(one for one in real_data.RECORDINGS if one.name == "IRB 120, draw-wire")
+    robot, data = real_data.load(real_data.default_folder(), recording)
+    poses = np.asarray(truing.model.pose_groups(data))
+    drawn = np.random.default_rng([61, 40, 0]).permutation(np.unique(poses))[:40]
+    found = truing.diagnose(robot, small_sets.subset(data, np.isin(poses, drawn), robot), seed=0)
+    assert found.after.rms > 1.6 * found.gap.rms
+    assert found.held_out_fall.probability > 0.05  # eight poses scatter too much to say more
+    assert found.verdict == "does_not_hold"
+    assert small_sets.rms(found.robot, data) == pytest.approx(small_sets.rms(found.robot_before, data))
