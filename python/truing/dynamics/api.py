@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 TorqueEffects: TypeAlias = EffectLike | TorqueEffect | Iterable[EffectLike | TorqueEffect]
 
 PAYLOAD_COLUMNS = ("payload_kg", "payload_x_m", "payload_y_m", "payload_z_m")
+PAYLOAD_FOUND = "payload_found"
+"""A column above zero where the mass was found from the torques, and nobody weighed it."""
 
 
 @takes(_core.TorqueOptions)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.api import PAYLOAD_COLUMNS
+from truing.dynamics.api import PAYLOAD_COLUMNS, PAYLOAD_FOUND
 from truing.dynamics.comparison import Comparison, comparison_dict
 from truing.dynamics.comparison.page import comparison_report
 from truing.dynamics.export import Exported, refit_words
@@ -272,7 +272,7 @@ def _motion_columns(joints: Sequence[_core.Joint], recordings: Sequence[_core.Re
     for name in sorted(warm):
         each = [np.asarray(r.columns.get(name, np.full(len(r), np.nan))) for r in recordings]
         columns[name] = np.concatenate(each)
-    for name in PAYLOAD_COLUMNS:
+    for name in (*PAYLOAD_COLUMNS, PAYLOAD_FOUND):
         if any(name in r.columns for r in recordings):
             each = [np.asarray(r.columns.get(name, np.zeros(len(r)))) for r in recordings]
             columns[name] = np.concatenate(each)

@@ -17,7 +17,7 @@ from truing import _core
 from truing.errors import InputError
 
 Floats = NDArray[np.float64]
-_OTHER = re.compile(r"temp\d*_C|payload_kg|payload_[xyz]_m", re.ASCII)  # what simulations know of besides
+_OTHER = re.compile(r"temp\d*_C|payload_(kg|[xyz]_m|found)", re.ASCII)  # what models know of besides
 
 
 def load_residual_motion(path: Path, robot: _core.Robot) -> list[tuple[_core.Recording, NDArray[np.bool_]]]:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.api import PAYLOAD_COLUMNS
+from truing.dynamics.api import PAYLOAD_COLUMNS, PAYLOAD_FOUND
 from truing.dynamics.recorded import driven_joints
 from truing.dynamics.sanity.findings import FoundParameter, RecordingFinding, listed
 from truing.dynamics.sanity.grids import SPEED_AT_REST, Grid
@@ -38,10 +38,7 @@ MOST = 4  # loads that are told apart
 REACH = 1.0  # [m] no load hangs farther from the tool
 RIDGE = 1e-6  # of the links' mean square column: what motion does not show stays the file's
 OF_LOAD = 4  # parameters of a link that a load adds to: mass, and mass times centre
-_COLUMNS = (
-    *PAYLOAD_COLUMNS,
-    "payload_found",
-)  # of a recording; the last is above zero where nobody weighed it
+_COLUMNS = (*PAYLOAD_COLUMNS, PAYLOAD_FOUND)  # of a recording
 
 
 @dataclass(frozen=True)
@@ -74,6 +71,20 @@ def compared(robot: _core.Robot, grids: Sequence[Grid]) -> Compared | None:
     """The links that recordings have in common, and a load of each of them; None for one recording alone."""
     seen = [halves for grid in grids if len(halves := _halves(robot, grid)) == 2]
     return Compared.of(seen, len(driven_joints(robot))) if len(seen) > 1 else None
+
+
+def always_there(robot: _core.Robot, grid: Grid) -> Load | None:
+    """What one recording carries from end to end, more than a robot whose links are known."""
+    halves = _halves(robot, grid)
+    if len(halves) < 2:
+        return None
+    fit = Compared.of([halves], len(driven_joints(robot)), links_known=True)
+    load, sigma = fit.loads[0], fit.sigma([0])
+    others = min(PART * fit.squares(0, np.zeros(OF_LOAD)), fit.squares_scaled(0, fit.scale(0)))
+    if load[0] < SURE * sigma or fit.squares(0, load) > others:
+        return None  # torques on another scale look like a load, too
+    place = _in_tool(robot, load)
+    return Load((grid.name,), float(load[0]), sigma, place) if np.linalg.norm(place) < REACH else None
 
 
 def gain_differs(fit: Compared) -> list[RecordingFinding]:
@@ -276,13 +287,13 @@ class Compared:
     variance: Floats  # shape=(recordings,) [kg^2] of the masses
 
     @classmethod
-    def of(cls, seen: list[list[_Half]], joints: int) -> Compared:
+    def of(cls, seen: list[list[_Half]], joints: int, links_known: bool = False) -> Compared:
         """Least squares, joints weighed by what is left of them. What noise that goes on from row to row adds
         to the variance shows where two halves of a recording do not carry the same."""
         halves = [half for two in seen for half in two]
         weight = np.ones(joints)
         for _ in range(ROUNDS):
-            links, loads, variance = _solved(halves, weight)
+            links, loads, variance = _solved(halves, weight, links_known)
             squares, n = np.zeros(joints), np.zeros(joints)
             for half, load in zip(halves, loads, strict=True):
                 squares += np.bincount(half.joint, _left(half, links, load) ** 2, joints)
@@ -340,9 +351,9 @@ def _left(half: _Half, links: Floats, load: Floats) -> Floats:
     return np.asarray(half.left - half.links @ links - half.load @ load)
 
 
-def _solved(halves: Sequence[_Half], weight: Floats) -> tuple[Floats, Floats, Floats]:
+def _solved(halves: Sequence[_Half], weight: Floats, links_known: bool) -> tuple[Floats, Floats, Floats]:
     """Common links, loads of the halves, shape=(halves, 4), and variances of their masses, the links being
-    known: by elimination of the loads (Schur)."""
+    known: by elimination of the loads (Schur). links_known: they are the robot's."""
     grams, cross, own, right_of_links, right_of_loads = [], [], [], [], []
     for half in halves:
         w = weight[half.joint][:, None]
@@ -361,6 +372,6 @@ def _solved(halves: Sequence[_Half], weight: Floats) -> tuple[Floats, Floats, Fl
     side = np.sum(right_of_links, axis=0) - sum(
         c @ i @ r for c, i, r in zip(cross, inverses, right_of_loads, strict=True)
     )
-    links = np.linalg.solve(reduced, side)
+    links = np.zeros(len(whole)) if links_known else np.linalg.solve(reduced, side)
     loads = [i @ (r - c.T @ links) for i, r, c in zip(inverses, right_of_loads, cross, strict=True)]
     return links, np.array(loads), np.array([i[0, 0] for i in inverses])

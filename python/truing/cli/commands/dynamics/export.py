@@ -227,6 +227,7 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
         self, folder: Path, loaded: Loaded | LoadedServo, found: Found, warnings: list[str]
     ) -> Mapping[str, Any]:
         from truing.dynamics.result import write_export, write_servo_export
+        from truing.dynamics.sanity.untold import untold_load
         from truing.dynamics.servo.export import ServoExported
 
         for name, text in found.files.items():
@@ -236,6 +237,9 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
             name = loaded.result.robot
             return write_servo_export(folder, name, exported, self.to, found.rollout, warnings=warnings)
         assert not isinstance(exported, ServoExported)
+        if self.held_out:
+            said = (untold_load(loaded.robot, recording) for recording, _ in loaded.held_out)
+            warnings = [*warnings, *(text for text in said if text)]
         return write_export(folder, loaded.robot, exported, self.to, found.rollout, warnings=warnings)
 
     def table(self, result: Mapping[str, Any], found: Found) -> None:

@@ -82,9 +82,16 @@ class Command(MotionCommand["tuple[Robot, Recording]", Found]):
         self, folder: Path, loaded: tuple[Robot, Recording], found: Found, warnings: list[str]
     ) -> Mapping[str, Any]:
         from truing.dynamics.result import write_prediction
+        from truing.dynamics.sanity.untold import untold_load
 
+        load = untold_load(*loaded)
         return write_prediction(
-            folder, *loaded, found.torques, found.response, cutoff=self.cutoff, warnings=warnings
+            folder,
+            *loaded,
+            found.torques,
+            found.response,
+            cutoff=self.cutoff,
+            warnings=[*warnings, *([load] if load else [])],
         )
 
     def table(self, result: Mapping[str, Any], found: Found) -> None:
